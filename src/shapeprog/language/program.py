@@ -1,0 +1,135 @@
+"""A program: drawing statements and loops, nested freely, as plain immutable values."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from shapeprog.language.statement import language
+
+PUBLISHED_DEPTH = 3
+"""Steps of one block in the published generator."""
+
+
+@dataclass(frozen=True)
+class Draw:
+    """A drawing statement with its parameters in slot order; every number is exact in float32."""
+
+    name: str
+    values: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Loop:
+    """A loop with its parameters in slot order and what it repeats."""
+
+    name: str
+    values: tuple[float, ...]
+    body: tuple[Node, ...]
+
+    @property
+    def count(self) -> int:
+        """Number of copies; none when the count is not positive."""
+        return max(0, round(self.values[0]))
+
+
+Node = Draw | Loop
+Chain = tuple[Draw | Loop, ...]
+"""Loops from the outermost inwards, without bodies, and the drawing statement they repeat: one block."""
+
+
+@dataclass(frozen=True)
+class Program:
+    """A shape as a list of drawing statements and loops.
+
+    Parameters
+    ----------
+    body
+        The statements in the order they are written.
+    """
+
+    body: tuple[Node, ...] = ()
+
+    @property
+    def chains(self) -> list[Chain]:
+        """The blocks: for each drawing statement the loops around it, outermost first, then itself.
+
+        A loop around several statements is the union of that loop around each, so nothing is lost.
+        """
+        return [chain for node in self.body for chain in _chains(node, ())]
+
+    @property
+    def statements(self) -> int:
+        """Number of statements as written; loops count one each."""
+        return sum(1 for _ in self.walk())
+
+    @property
+    def blocks(self) -> int:
+        """Number of blocks: drawing statements with the loops around them."""
+        return len(self.chains)
+
+    @property
+    def size(self) -> int:
+        """Number of drawn copies after unrolling."""
+        total = 0
+        for chain in self.chains:
+            copies = 1
+            for node in chain[:-1]:
+                assert isinstance(node, Loop)
+                copies *= node.count
+            total += copies
+        return total
+
+    def walk(self) -> Iterator[Node]:
+        """Every node in the order of the text."""
+        stack = list(reversed(self.body))
+        while stack:
+            node = stack.pop()
+            yield node
+            if isinstance(node, Loop):
+                stack.extend(reversed(node.body))
+
+    def flat(self) -> Program:
+        """The same shape with one drawing statement in each loop nest."""
+        return Program(tuple(nest(chain) for chain in self.chains))
+
+    def snap(self) -> Program:
+        """The program with every number rounded half to even to a whole one, as published executors do."""
+        return Program(tuple(_snap(node) for node in self.body))
+
+    def outside_published(self) -> list[str]:
+        """Why the program leaves the published blocks [k], [19,k], [19,19,k], [20,10], [20,17]; empty if it does not."""
+        reasons = []
+        for number, chain in enumerate(self.chains, 1):
+            words = [node.name for node in chain]
+            ids = [language()[word].id for word in words]
+            loops = ids[:-1]
+            plain = 1 <= ids[-1] <= 18 and loops in ([], [19], [19, 19])
+            if not plain and ids not in ([20, 10], [20, 17]):
+                reasons.append(f"block {number} ({' > '.join(words)}) is none of the published blocks")
+        return reasons
+
+
+def nest(chain: Chain) -> Node:
+    """The node that a chain of loops and a drawing statement stands for."""
+    *loops, node = chain
+    for outer in reversed(loops):
+        assert isinstance(outer, Loop)
+        node = Loop(outer.name, outer.values, (node,))
+    return node
+
+
+def _chains(node: Node, loops: tuple[Loop, ...]) -> Iterator[Chain]:
+    if isinstance(node, Draw):
+        yield (*loops, node)
+    else:
+        bare = Loop(node.name, node.values, ())
+        for inner in node.body:
+            yield from _chains(inner, (*loops, bare))
+
+
+def _snap(node: Node) -> Node:
+    values = tuple(float(round(value)) for value in node.values)
+    if isinstance(node, Draw):
+        return Draw(node.name, values)
+    return Loop(node.name, values, tuple(_snap(inner) for inner in node.body))

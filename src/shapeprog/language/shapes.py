@@ -1,0 +1,71 @@
+"""Words for the bodies of declarations: solids from corners, centres, ends."""
+
+from __future__ import annotations
+
+import torch
+from jaxtyping import Float
+from torch import Tensor
+
+from shapeprog.geometry.cuboid import CUBOID
+from shapeprog.geometry.cylinder import CYLINDER
+from shapeprog.geometry.primitive import SIZES, Primitive, primitives, safe_norm
+from shapeprog.geometry.scene import Solids
+
+Scalar = Float[Tensor, "*batch"]
+Vector = Float[Tensor, "*batch 3"]
+
+
+def solid(
+    primitive: Primitive, centre: Vector, *sizes: Scalar, rotation: Float[Tensor, "*batch 3 3"] | None = None
+) -> Solids:
+    """A solid of any declared primitive from its sizes in the order it declares them."""
+    zero = torch.zeros_like(centre[..., 0])
+    padded = [*sizes, *[zero] * (SIZES - len(sizes))]
+    return Solids(primitives.kind(primitive.name), torch.stack(padded, -1), centre, rotation)
+
+
+def cuboid(centre: Vector, half: Vector, lean: Scalar | None = None) -> Solids:
+    """A cuboid from centre and half extents (..., 3); ``lean`` shifts its top against its bottom along depth."""
+    sizes = half.unbind(-1)
+    return solid(CUBOID, centre, *sizes) if lean is None else solid(CUBOID, centre, *sizes, lean)
+
+
+def box(corner: Vector, extent: Vector) -> Solids:
+    """A cuboid from its low, front, left corner and its full extents."""
+    return cuboid(corner + extent / 2, extent / 2)
+
+
+def slab(at: Vector, thickness: Scalar, half_depth: Scalar, half_side: Scalar) -> Solids:
+    """A cuboid that stands on ``at``, the centre of its bottom face."""
+    return cuboid(_raised(at, thickness), torch.stack([thickness / 2, half_depth, half_side], -1))
+
+
+def disc(at: Vector, thickness: Scalar, radius: Scalar) -> Solids:
+    """An upright cylinder that stands on ``at``, the centre of its bottom face."""
+    return solid(CYLINDER, _raised(at, thickness), thickness / 2, radius)
+
+
+def bar(start: Vector, end: Vector, radius: Scalar) -> Solids:
+    """A cylinder between two points, with flat caps."""
+    along = end - start
+    half = safe_norm((along**2).sum(-1)) / 2
+    return solid(CYLINDER, (start + end) / 2, half, radius, rotation=align(along))
+
+
+def align(direction: Vector) -> Float[Tensor, "*batch 3 3"]:
+    """A rotation whose first column points along ``direction``; up for a zero vector.
+
+    The other two columns come from the grid axis that is farthest from the direction, so the gradient is finite.
+    """
+    length = safe_norm((direction**2).sum(-1, keepdim=True))
+    up = torch.zeros_like(direction)
+    up[..., 0] = 1
+    first = torch.where(length > 1e-9, direction / length, up)
+    helper = torch.nn.functional.one_hot(first.detach().abs().argmin(-1), 3).to(direction)
+    second = torch.linalg.cross(first, helper)
+    second = second / safe_norm((second**2).sum(-1, keepdim=True))
+    return torch.stack([first, second, torch.linalg.cross(first, second)], -1)
+
+
+def _raised(at: Vector, thickness: Scalar) -> Vector:
+    return torch.stack([at[..., 0] + thickness / 2, at[..., 1], at[..., 2]], -1)

@@ -1,0 +1,280 @@
+"""One declaration per statement: id, named parameters, one line of doc, and the solids it draws.
+
+    @statement("leg", id=1, paper=("Leg", "Cub"))
+    def leg(at: Position, size: Extent) -> Solids:
+        "A leg: an upright board or post from its low, front, left corner."
+        return box(at, size)
+
+From the signature follow syntax, printing, tensor slots, sampling range, legality, execution and the manual.
+"""
+
+from __future__ import annotations
+
+import inspect
+import keyword
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass
+from typing import Any, get_type_hints
+
+import torch
+from jaxtyping import Float
+from torch import Tensor
+
+from shapeprog.errors import DeclarationError
+from shapeprog.geometry.scene import Solids
+from shapeprog.language.parameters import Parameter, Quantity
+
+SLOTS = 7
+"""Tensor slots for the parameters of one statement."""
+
+EMPTY, END = 0, 21
+"""Ids without a statement: nothing, and the end of a loop in flat listings."""
+
+
+@dataclass(frozen=True)
+class Motion:
+    """How a loop moves one copy: a turn about the vertical axis through the pivot, then a shift.
+
+    Parameters
+    ----------
+    turn
+        Fraction of a full circle (...), from depth towards left-right.
+    shift
+        Shift (..., 3) in cells.
+    """
+
+    turn: Float[Tensor, "*batch"] | None = None
+    shift: Float[Tensor, "*batch 3"] | None = None
+
+
+@dataclass(frozen=True)
+class Statement:
+    """The declaration of a statement that draws, or of a loop.
+
+    Parameters
+    ----------
+    name, id
+        Word in program text and number in tensors.
+    doc
+        One line of manual.
+    parameters
+        Named parameters in slot order.
+    draw
+        For a drawing statement: parameter tensors by name to one or more :class:`Solids`; else ``None``.
+    move
+        For a loop: ``(copy index, quarter, **parameters) -> Motion``; else ``None``.
+    pivot
+        Parameter tensors by name to a point (..., 3) on the vertical axis about which rotation loops turn what the
+        statement draws; ``None`` is the axis of the grid.
+    quarter
+        Whether rotation loops advance it by quarter turns instead of spreading copies evenly.
+    paper
+        Names in the notation of the paper, such as ``("Leg", "Cub")``.
+    """
+
+    name: str
+    id: int
+    doc: str
+    parameters: tuple[Parameter, ...]
+    draw: Callable[..., Solids | Sequence[Solids]] | None = None
+    move: Callable[..., Motion] | None = None
+    pivot: Callable[..., Float[Tensor, "*batch 3"]] | None = None
+    quarter: bool = False
+    paper: tuple[str, str] | None = None
+
+    @property
+    def is_loop(self) -> bool:
+        """Whether it repeats what is inside instead of drawing."""
+        return self.move is not None
+
+    @property
+    def size(self) -> int:
+        """Number of tensor slots in use."""
+        return sum(parameter.quantity.width for parameter in self.parameters)
+
+    @property
+    def quantities(self) -> tuple[Quantity, ...]:
+        """Quantity of every slot in use, in order."""
+        return tuple(p.quantity for p in self.parameters for _ in range(p.quantity.width))
+
+    def split(self, values: Float[Tensor, "*batch 7"]) -> dict[str, Tensor]:
+        """Parameter tensors by name: (...) for one slot, (..., width) for several; turns and counts are rounded."""
+        named = {}
+        for parameter in self.parameters:
+            part = values[..., parameter.slots]
+            if parameter.quantity.discrete:
+                part = part.detach().round()
+            named[parameter.name] = part if parameter.quantity.width > 1 else part[..., 0]
+        return named
+
+    def solids(self, values: Float[Tensor, "*batch 7"]) -> list[Solids]:
+        """What the statement draws for parameters (..., 7), before any loop."""
+        assert self.draw is not None
+        drawn = self.draw(**self.split(values))
+        return [drawn] if isinstance(drawn, Solids) else list(drawn)
+
+
+class Language:
+    """A registry of statements and loops, found by name or by id."""
+
+    def __init__(self) -> None:
+        self._by_id: dict[int, Statement] = {}
+        self._by_name: dict[str, Statement] = {}
+
+    def register(self, declared: Statement) -> Statement:
+        """Add a declaration and return it.
+
+        Raises
+        ------
+        DeclarationError
+            If its name or id is taken or its parameters do not fit, in words.
+        """
+        _check(declared)
+        if declared.name in self._by_name:
+            raise DeclarationError(f"statement {declared.name!r} is declared twice", "give one of them another name")
+        if declared.id in self._by_id or declared.id in (EMPTY, END):
+            owner = self._by_id[declared.id].name if declared.id in self._by_id else "the language itself"
+            raise DeclarationError(
+                f"statement {declared.name!r} wants id {declared.id}, which belongs to {owner}",
+                f"leave the id out; the next free one is {self.free_id()}",
+            )
+        self._by_id[declared.id] = declared
+        self._by_name[declared.name] = declared
+        return declared
+
+    def free_id(self) -> int:
+        """The smallest id above all that are taken."""
+        return max([END, *self._by_id]) + 1
+
+    def __contains__(self, key: str | int) -> bool:
+        return key in (self._by_name if isinstance(key, str) else self._by_id)
+
+    def __getitem__(self, key: str | int) -> Statement:
+        return self._by_name[key] if isinstance(key, str) else self._by_id[key]
+
+    def __iter__(self) -> Iterator[Statement]:
+        return iter(sorted(self._by_id.values(), key=lambda declared: declared.id))
+
+    def __len__(self) -> int:
+        return len(self._by_id)
+
+    @property
+    def names(self) -> list[str]:
+        """All names in order of id."""
+        return [declared.name for declared in self]
+
+
+standard = Language()
+"""The language of this process: the built-in statements and those that users register."""
+
+_active: ContextVar[Language] = ContextVar("language", default=standard)
+
+
+def language() -> Language:
+    """The language in force."""
+    return _active.get()
+
+
+@contextmanager
+def using(other: Language) -> Iterator[Language]:
+    """Put another language in force for a while."""
+    token = _active.set(other)
+    try:
+        yield other
+    finally:
+        _active.reset(token)
+
+
+def statement(
+    name: str,
+    *,
+    id: int | None = None,
+    paper: tuple[str, str] | None = None,
+    pivot: Callable[..., Tensor] | None = None,
+    quarter: bool = False,
+) -> Callable[[Callable[..., Any]], Statement]:
+    """Declare a drawing statement from a function of annotated parameters that returns its solids."""
+
+    def register(draw: Callable[..., Any]) -> Statement:
+        known = language()
+        number = known.free_id() if id is None else id
+        parameters = _parameters(name, draw, skip=0)
+        declared = Statement(
+            name, number, _doc(name, draw), parameters, draw=draw, pivot=pivot, quarter=quarter, paper=paper
+        )
+        _try(declared)
+        return known.register(declared)
+
+    return register
+
+
+def loop(
+    name: str, *, id: int | None = None, paper: tuple[str, str] | None = None
+) -> Callable[[Callable[..., Motion]], Statement]:
+    """Declare a loop from a function ``(copy, quarter, count, ...) -> Motion``; the first parameter is the count."""
+
+    def register(move: Callable[..., Motion]) -> Statement:
+        known = language()
+        number = known.free_id() if id is None else id
+        parameters = _parameters(name, move, skip=2)
+        if not parameters or parameters[0].quantity.kind != "count":
+            raise DeclarationError(f"loop {name!r} has no count", "annotate its first parameter with Count")
+        return known.register(Statement(name, number, _doc(name, move), parameters, move=move, paper=paper))
+
+    return register
+
+
+def _doc(name: str, function: Callable[..., Any]) -> str:
+    doc = inspect.getdoc(function)
+    if not doc:
+        raise DeclarationError(f"statement {name!r} has no docstring", "say in one line what it draws")
+    return doc.split("\n")[0]
+
+
+def _parameters(name: str, function: Callable[..., Any], skip: int) -> tuple[Parameter, ...]:
+    hints = get_type_hints(function, include_extras=True)
+    parameters, start = [], 0
+    for word in list(inspect.signature(function).parameters)[skip:]:
+        quantity = next((m for m in getattr(hints.get(word), "__metadata__", ()) if isinstance(m, Quantity)), None)
+        if quantity is None:
+            raise DeclarationError(
+                f"parameter {word!r} of statement {name!r} has no kind",
+                "annotate it with one of Position, Extent, Half, Length, Radius, Shift, Shift3, Count, Turn",
+            )
+        parameters.append(Parameter(word, quantity, start))
+        start += quantity.width
+    return tuple(parameters)
+
+
+def _check(declared: Statement) -> None:
+    if not declared.name.isidentifier() or keyword.iskeyword(declared.name):
+        raise DeclarationError(f"{declared.name!r} is not a word of Python", "use letters, digits and underscores")
+    if declared.size > SLOTS:
+        raise DeclarationError(
+            f"statement {declared.name!r} has {declared.size} numbers, but a statement has {SLOTS} slots",
+            "use fewer or narrower parameters",
+        )
+    if any(p.quantity.low > p.quantity.high for p in declared.parameters):
+        raise DeclarationError(f"a range of statement {declared.name!r} ends before it starts", "swap low and high")
+
+
+def _try(declared: Statement) -> None:
+    """Draw once with mid-range parameters, so that a wrong shape is refused now and not in the middle of a run."""
+    try:
+        values = torch.zeros(2, SLOTS)
+        for slot, quantity in enumerate(declared.quantities):
+            values[:, slot] = (quantity.low + quantity.high) / 2
+        drawn = declared.solids(values)
+        shapes = [(tuple(s.size.shape), tuple(s.centre.shape)) for s in drawn]
+    except Exception as cause:
+        raise DeclarationError(
+            f"statement {declared.name!r} cannot be drawn: {cause}",
+            "its function gets one tensor (...) or (..., width) per parameter and returns solids",
+        ) from cause
+    if not drawn or any(shape != ((2, 4), (2, 3)) for shape in shapes):
+        raise DeclarationError(
+            f"statement {declared.name!r} returns solids of shapes {shapes}",
+            "sizes must be (..., 4) and centres (..., 3) with the leading dimensions of the parameters",
+        )

@@ -1,0 +1,112 @@
+"""Programs as tensors: ids and parameters of K blocks x 3 steps x 7 slots, batched."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from jaxtyping import Float, Int
+from torch import Tensor
+
+from shapeprog.errors import ShapeProgError
+from shapeprog.language.program import PUBLISHED_DEPTH, Chain, Draw, Loop, Program, nest
+from shapeprog.language.statement import EMPTY, END, SLOTS, language
+
+
+@dataclass(frozen=True)
+class Code:
+    """A batch of programs as tensors.
+
+    Parameters
+    ----------
+    ids
+        Statement of each step of each block; 0 is empty.
+    parameters
+        Parameters of each step in slot order; unused slots are ignored.
+    """
+
+    ids: Int[Tensor, "*batch K J"]
+    parameters: Float[Tensor, "*batch K J 7"]
+
+    def __getitem__(self, index: int | slice) -> Code:
+        """The programs at an index of the first batch dimension."""
+        return Code(self.ids[index], self.parameters[index])
+
+
+def encode(
+    programs: Program | Sequence[Program],
+    *,
+    blocks: int | None = None,
+    steps: int | None = None,
+    dtype: torch.dtype = torch.float32,
+    device: torch.device | str = "cpu",
+) -> Code:
+    """Tensors of programs: (B, K, J) for a sequence, (K, J) for one program.
+
+    Parameters
+    ----------
+    blocks, steps
+        K and J; by default the longest program and at least the published three steps.
+
+    Raises
+    ------
+    ShapeProgError
+        If a program has more blocks, or loops nested deeper, than asked for.
+    """
+    batch = [programs] if isinstance(programs, Program) else list(programs)
+    chains = [program.chains for program in batch]
+    needed = max((len(each) for each in chains), default=0)
+    depth = max((len(chain) for each in chains for chain in each), default=0)
+    rows = needed if blocks is None else blocks
+    columns = max(depth, PUBLISHED_DEPTH) if steps is None else steps
+    if needed > rows or depth > columns:
+        raise ShapeProgError(
+            f"a program of {needed} blocks and {depth} steps does not fit {rows} blocks of {columns} steps",
+            "allow more blocks or steps, or shorten the program",
+        )
+    ids = np.zeros((len(batch), rows, columns), np.int64)
+    parameters = np.zeros((len(batch), rows, columns, SLOTS), np.float64)
+    known = language()
+    for b, each in enumerate(chains):
+        for k, chain in enumerate(each):
+            for j, node in enumerate(chain):
+                ids[b, k, j] = known[node.name].id
+                parameters[b, k, j, : len(node.values)] = node.values
+    code = Code(torch.from_numpy(ids).to(device), torch.from_numpy(parameters).to(device, dtype))
+    return code[0] if isinstance(programs, Program) else code
+
+
+def decode(code: Code) -> list[Program]:
+    """Programs of tensors (..., K, J), one for each element of the batch in row-major order.
+
+    A block that is no loops-then-statement, such as one the generator got wrong, draws nothing and is left out.
+    """
+    ids = code.ids.detach().cpu().reshape(-1, *code.ids.shape[-2:]).numpy()
+    values = code.parameters.detach().cpu().float().reshape(-1, *code.parameters.shape[-3:]).numpy()
+    found = []
+    for program_ids, program_values in zip(ids, values, strict=True):
+        chains = (_chain(row, numbers) for row, numbers in zip(program_ids, program_values, strict=True))
+        found.append(Program(tuple(nest(chain) for chain in chains if chain is not None)))
+    return found
+
+
+def _chain(ids: np.ndarray, values: np.ndarray) -> Chain | None:  # type: ignore[type-arg]
+    known = language()
+    chain: list[Draw | Loop] = []
+    for place, number in enumerate(ids.tolist()):
+        if number not in known:
+            return None
+        declared = known[number]
+        numbers = tuple(
+            float(round(value)) if quantity.discrete else value
+            for value, quantity in zip(values[place].tolist(), declared.quantities, strict=False)
+        )
+        if declared.is_loop:
+            chain.append(Loop(declared.name, numbers, ()))
+            continue
+        chain.append(Draw(declared.name, numbers))
+        rest = set(ids[place + 1 :].tolist())
+        return tuple(chain) if rest <= {EMPTY, END} else None
+    return None

@@ -98,7 +98,7 @@ class Program:
         return Program(tuple(_snap(node) for node in self.body))
 
     def outside_published(self) -> list[str]:
-        """Why the program leaves the published blocks [k], [19,k], [19,19,k], [20,10], [20,17]; empty if it does not."""
+        """Why the program leaves the published blocks [k], [19,k], [19,19,k], [20,10], [20,17]; empty if it stays."""
         reasons = []
         for number, chain in enumerate(self.chains, 1):
             words = [node.name for node in chain]

@@ -13,6 +13,8 @@ from torch import Tensor
 from shapeprog.errors import ShapeProgError
 from shapeprog.language.program import PUBLISHED_DEPTH, Chain, Draw, Loop, Program, nest
 from shapeprog.language.statement import EMPTY, END, SLOTS, language
+from shapeprog.language.values import LARGEST_WHOLE
+from shapeprog.space import Array
 
 
 @dataclass(frozen=True)
@@ -81,7 +83,8 @@ def encode(
 def decode(code: Code) -> list[Program]:
     """Programs of tensors (..., K, J), one for each element of the batch in row-major order.
 
-    A block that is no loops-then-statement, such as one the generator got wrong, draws nothing and is left out.
+    A block that is no loops-then-statement, such as one the generator got wrong, draws nothing and is left out, and so
+    is one with a number that is not finite.  Counts and turns end at the last whole number that float32 holds exactly.
     """
     ids = code.ids.detach().cpu().reshape(-1, *code.ids.shape[-2:]).numpy()
     values = code.parameters.detach().cpu().float().reshape(-1, *code.parameters.shape[-3:]).numpy()
@@ -92,16 +95,19 @@ def decode(code: Code) -> list[Program]:
     return found
 
 
-def _chain(ids: np.ndarray, values: np.ndarray) -> Chain | None:  # type: ignore[type-arg]
+def _chain(ids: Array, values: Array) -> Chain | None:
     known = language()
     chain: list[Draw | Loop] = []
     for place, number in enumerate(ids.tolist()):
         if number not in known:
             return None
         declared = known[number]
+        used = values[place, : declared.size]
+        if not np.isfinite(used).all():
+            return None
         numbers = tuple(
-            float(round(value)) if quantity.discrete else value
-            for value, quantity in zip(values[place].tolist(), declared.quantities, strict=False)
+            float(round(min(max(value, -LARGEST_WHOLE), LARGEST_WHOLE))) if quantity.discrete else value
+            for value, quantity in zip(used.tolist(), declared.quantities, strict=True)
         )
         if declared.is_loop:
             chain.append(Loop(declared.name, numbers, ()))

@@ -49,7 +49,7 @@ def unroll(program: Program | Sequence[Program] | Code) -> Scene:
 
 def _roles(ids: Int[Tensor, "R J"]) -> tuple[Bool[Tensor, "R J"], Bool[Tensor, "R J"]]:
     """Which steps are loops and which draw."""
-    known = [declared for declared in language()]
+    known = list(language())
     top = max([END, *(declared.id for declared in known)]) + 1
     table = torch.zeros(2, top, dtype=torch.bool, device=ids.device)
     for declared in known:

@@ -1,0 +1,202 @@
+"""From program text to programs: a strict subset of Python, read through ``ast``; nothing is ever executed.
+
+A program holds calls of drawing statements with literal numbers, and ``for`` loops over calls of loops.
+"""
+
+from __future__ import annotations
+
+import ast
+import difflib
+import re
+import warnings
+from collections.abc import Sequence
+
+from shapeprog.errors import ProgramError, ShapeProgError
+from shapeprog.language.parameters import Parameter
+from shapeprog.language.program import Draw, Loop, Node
+from shapeprog.language.statement import Statement, language
+from shapeprog.language.values import blank, checked, signature, to_float32
+
+DEEPEST = 64
+"""How deep loops may nest in text; Python itself ends at 100 levels of indentation."""
+
+_SHOWN = 60
+_WIDEST = 200
+
+
+def read(text: str, name: str) -> tuple[Node, ...]:
+    """The nodes of a program text.
+
+    Raises
+    ------
+    ProgramError
+        At the first place that is not in the language.
+    """
+    text = text.removeprefix("\ufeff")
+    reader = _Reader(re.split(r"\r\n|\r|\n", text), name)
+    return reader.body(reader.tree(text).body, 0)
+
+
+def nearest(word: str, known: Sequence[str]) -> str:
+    """A hint that proposes the known word nearest to ``word``, or lists them all."""
+    close = difflib.get_close_matches(word.lower(), known, 1)
+    if close:
+        return f"did you mean {close[0]}?"
+    return f"known are {', '.join(known)}" if known else "nothing is declared"
+
+
+class _Reader:
+    """Turns syntax into nodes and knows the place of every mistake."""
+
+    def __init__(self, lines: list[str], name: str) -> None:
+        self.lines = lines
+        self.name = name
+
+    def tree(self, text: str) -> ast.Module:
+        for number, line in enumerate(self.lines, 1):
+            indent = line[: len(line) - len(line.lstrip())]
+            if "\t" in indent and line.strip():
+                raise self._at(
+                    number, indent.index("\t") + 1, "this line is indented with a tab", "indent with four spaces"
+                )
+            if "\0" in line:
+                raise self._at(
+                    number, line.index("\0") + 1, "there is a null byte in this line", "is this a text file?"
+                )
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")
+                return ast.parse(text)
+        except SyntaxError as error:
+            row = min(max(error.lineno or 1, 1), len(self.lines))
+            column = min(max(error.offset or 1, 1), len(self.lines[row - 1]) + 1)
+            reason = (error.msg or "invalid syntax").split(";")[0]
+            raise self._at(
+                row, column, f"this cannot be read: {reason}", "a line is name(parameter=number, ...) or a for loop"
+            ) from None
+        except (RecursionError, MemoryError):
+            raise self._at(1, 1, "this is nested too deeply to be a program", "write plain numbers") from None
+        except ValueError:
+            raise self._at(1, 1, "this text cannot be encoded as UTF-8", "is this a text file?") from None
+
+    def body(self, statements: list[ast.stmt], depth: int) -> tuple[Node, ...]:
+        if depth and len(statements) == 1 and isinstance(statements[0], ast.Pass):
+            return ()
+        return tuple(self._node(statement, depth) for statement in statements)
+
+    def _node(self, statement: ast.stmt, depth: int) -> Node:
+        if isinstance(statement, ast.For):
+            return self._loop(statement, depth)
+        if not isinstance(statement, ast.Expr):
+            raise self._error(
+                statement,
+                "a program holds only drawing statements and for loops",
+                "write name(parameter=number, ...) or for i in loop(count, ...):",
+            )
+        declared, call = self._call(statement.value, "statement")
+        if declared.is_loop:
+            raise self._error(
+                call, f"{declared.name} is a loop and draws nothing itself", f"write {signature(declared)}"
+            )
+        return Draw(declared.name, self._values(declared, call))
+
+    def _loop(self, statement: ast.For, depth: int) -> Loop:
+        if depth >= DEEPEST:
+            raise self._error(statement, f"loops are nested more than {DEEPEST} deep", "put some of them side by side")
+        if not isinstance(statement.target, ast.Name):
+            raise self._error(statement.target, "a loop has one variable", "write for i in loop(count, ...):")
+        if statement.orelse:
+            raise self._error(statement.orelse[0], "a loop of the language has no else", "leave it out")
+        declared, call = self._call(statement.iter, "loop")
+        if not declared.is_loop:
+            raise self._error(call, f"{declared.name} draws and repeats nothing", f"write {signature(declared)}")
+        return Loop(declared.name, self._values(declared, call), self.body(statement.body, depth + 1))
+
+    def _call(self, node: ast.expr, wanted: str) -> tuple[Statement, ast.Call]:
+        """The declaration that a call names; ``wanted`` is the kind of word that fits the place."""
+        known = language()
+        function = node.func if isinstance(node, ast.Call) else node
+        if not isinstance(function, ast.Name):
+            raise self._error(
+                node, f"{self._shown(node)} is no {wanted}", f"write the name of a {wanted} and its parameters"
+            )
+        if function.id not in known:
+            fitting = [declared.name for declared in known if declared.is_loop == (wanted == "loop")]
+            raise self._error(function, f"no {wanted} is called {function.id!r}", nearest(function.id, fitting))
+        declared = known[function.id]
+        if not isinstance(node, ast.Call):
+            raise self._error(node, f"{declared.name} lacks its parameters", f"write {signature(declared)}")
+        return declared, node
+
+    def _values(self, declared: Statement, call: ast.Call) -> tuple[float, ...]:
+        parameters = {parameter.name: parameter for parameter in declared.parameters}
+        found: dict[str, list[float]] = {}
+        for place, argument in enumerate(call.args):
+            if not declared.is_loop or place > 0 or isinstance(argument, ast.Starred):
+                allowed = "only its count" if declared.is_loop else "nothing"
+                raise self._error(
+                    argument, f"{declared.name} takes {allowed} without a name", f"write {signature(declared)}"
+                )
+            found[declared.parameters[0].name] = self._numbers(declared, declared.parameters[0], argument)
+        for word in call.keywords:
+            if word.arg is None or word.arg not in parameters:
+                what = f"parameter {word.arg!r}" if word.arg else "parameter **"
+                hint = nearest(word.arg or "", list(parameters))
+                raise self._error(word, f"{declared.name} has no {what}", hint)
+            if word.arg in found:
+                raise self._error(word, f"{word.arg} of {declared.name} is given twice", "leave one of them out")
+            found[word.arg] = self._numbers(declared, parameters[word.arg], word.value)
+        for name in parameters:
+            if name not in found:
+                raise self._error(call, f"{declared.name} lacks {name}", f"write {signature(declared)}")
+        return tuple(number for name in parameters for number in found[name])
+
+    def _numbers(self, declared: Statement, parameter: Parameter, node: ast.expr) -> list[float]:
+        place = f"{parameter.name} of {declared.name}"
+        if isinstance(node, ast.Tuple):
+            if parameter.quantity.width == 1:
+                raise self._error(node, f"{place} takes 1 number, not a group", f"write {blank(parameter)}")
+            elements = node.elts
+        else:
+            elements = [node]
+        numbers = [self._number(place, element) for element in elements]
+        try:
+            return checked(declared, parameter, numbers)
+        except ShapeProgError as mistake:
+            raise self._error(node, mistake.message, mistake.hint) from None
+
+    def _number(self, place: str, node: ast.expr) -> float:
+        sign, bare = 1.0, node
+        if isinstance(node, ast.UnaryOp) and isinstance(node.op, (ast.USub, ast.UAdd)):
+            sign, bare = (-1.0 if isinstance(node.op, ast.USub) else 1.0), node.operand
+        if not isinstance(bare, ast.Constant) or type(bare.value) not in (int, float):
+            raise self._error(
+                node,
+                f"{place} holds {self._shown(node)}, which is not a number",
+                "write plain numbers such as 4 or -2.5",
+            )
+        try:
+            number = sign * float(bare.value)  # type: ignore[arg-type]
+            to_float32(number)
+        except (OverflowError, ShapeProgError):
+            raise self._error(
+                node, f"{place} holds {self._shown(node)}, which is too large", "numbers end at 3.4028235e+38"
+            ) from None
+        return number
+
+    def _shown(self, node: ast.expr) -> str:
+        """The source of an expression, on one line and cut where it is long."""
+        raw = self.lines[node.lineno - 1].encode()
+        end = node.end_col_offset if node.end_lineno == node.lineno else None
+        text = raw[node.col_offset : end].decode(errors="replace").strip()
+        return text if len(text) <= _SHOWN else text[:_SHOWN] + "..."
+
+    def _error(self, node: ast.stmt | ast.expr | ast.keyword, message: str, hint: str) -> ProgramError:
+        before = self.lines[node.lineno - 1].encode()[: node.col_offset]  # ast counts columns in bytes of UTF-8
+        return self._at(node.lineno, len(before.decode(errors="replace")) + 1, message, hint)
+
+    def _at(self, line: int, column: int, message: str, hint: str) -> ProgramError:
+        source = re.sub(r"[\0-\x1f]", " ", self.lines[line - 1]).encode(errors="replace").decode()
+        if len(source) > _WIDEST:
+            source = source[:_WIDEST] if column <= _WIDEST else ""
+        return ProgramError(message, line=line, column=column, source=source, hint=hint, name=self.name)

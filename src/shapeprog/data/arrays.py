@@ -1,0 +1,138 @@
+"""Points and voxels out of array files: XYZ text, NPY, NPZ and the published HDF5.  Pickles are never opened."""
+
+from __future__ import annotations
+
+import zipfile
+import zlib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from shapeprog.errors import InputError
+
+Array = npt.NDArray[Any]
+
+_SHAPES = "give points as (P, 3), voxels as (R, R, R), or many voxel grids as (N, R, R, R)"
+
+
+def read_array(path: Path) -> Array:
+    """The array of a file: points (P, 3), or voxel grids (N, R, R, R) of booleans.
+
+    An NPZ may hold ``points`` or ``voxels`` or a single array of any name; an HDF5 file holds ``data`` (N, R, R, R).
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, holds objects, or an array of another shape or with other values.
+    """
+    suffix = path.suffix.lower()
+    if suffix == ".xyz":
+        array = _read_text(path)
+    elif suffix in (".h5", ".hdf5"):
+        array = _read_hdf5(path)
+    else:
+        array = _chosen(path)
+    return checked(array, path.name)
+
+
+def checked(array: Array, name: str) -> Array:
+    """``array`` as points (P, 3) or as boolean voxel grids (N, R, R, R).
+
+    Raises
+    ------
+    InputError
+        If it is neither.
+    """
+    if array.dtype.kind not in "biuf":
+        raise InputError(f"{name} holds {array.dtype} where numbers are needed", _SHAPES)
+    if array.ndim == 2 and array.shape[1] == 3:
+        return array.astype(np.float64)
+    grids = array[None] if array.ndim == 3 else array
+    if grids.ndim != 4 or len(set(grids.shape[1:])) != 1 or 0 in grids.shape:
+        raise InputError(f"{name} holds an array of shape {array.shape}", _SHAPES)
+    if grids.dtype != np.bool_:
+        odd = (grids != 0) & (grids != 1)
+        if odd.any():
+            raise InputError(
+                f"{name} holds voxels with the value {grids[odd].flat[0]}; only 0 and 1 have a meaning",
+                "compare with a threshold first, as in voxels > 0.5",
+            )
+    return grids.astype(np.bool_)
+
+
+def _read_text(path: Path) -> Array:
+    try:
+        rows = np.loadtxt(path, dtype=np.float64, comments=("#", "//"), ndmin=2, encoding="utf-8")
+    except (ValueError, UnicodeDecodeError) as error:
+        raise InputError(
+            f"{path.name} cannot be read as points: {' '.join(str(error).split())[:160]}",
+            "write one point a line: x y z, and whatever else behind, parted by blanks",
+        ) from None
+    if rows.shape[0] and rows.shape[1] < 3:
+        raise InputError(f"{path.name} has {rows.shape[1]} numbers a line", "write one point a line: x y z")
+    return rows[:, :3] if rows.size else np.zeros((0, 3))
+
+
+def read_numpy(path: Path) -> dict[str, Array]:
+    """Every array of an NPY (named ``""``) or NPZ file.
+
+    Raises
+    ------
+    InputError
+        If the file is damaged or holds Python objects.
+    """
+    try:
+        loaded = np.load(path, allow_pickle=False)
+        if isinstance(loaded, np.ndarray):
+            return {"": loaded}
+        with loaded:
+            return {name: loaded[name] for name in loaded.files}
+    except (ValueError, EOFError, OSError, KeyError, zipfile.BadZipFile, zlib.error) as error:
+        if isinstance(error, OSError) and error.errno:
+            raise
+        text = " ".join(str(error).split())
+        if "pickle" in text.lower():
+            raise InputError(
+                f"{path.name} holds Python objects (a pickle), which are never opened, or is damaged",
+                "save plain numbers: numpy.save(path, array.astype('float32'))",
+            ) from None
+        raise InputError(
+            f"{path.name} cannot be read as {path.suffix[1:].upper()}: {text[:160] or type(error).__name__}",
+            "the file is cut short or damaged; write it again",
+        ) from None
+
+
+def _chosen(path: Path) -> Array:
+    arrays = read_numpy(path)
+    for name in ("voxels", "points"):
+        if name in arrays:
+            return arrays[name]
+    if len(arrays) != 1:
+        held = ", ".join(arrays) or "nothing"
+        raise InputError(f"{path.name} holds {held}", "name the array to be read 'points' or 'voxels'")
+    return next(iter(arrays.values()))
+
+
+def _read_hdf5(path: Path) -> Array:
+    try:
+        import h5py
+    except ImportError:
+        raise InputError(
+            f"{path.name} needs the library h5py, which is not installed", "pip install 'shapeprog[hdf5]'"
+        ) from None
+    try:
+        with h5py.File(path, "r") as file:
+            names = list(file)
+            if "data" not in names:
+                raise InputError(
+                    f"{path.name} holds {', '.join(names) or 'nothing'}", "its voxels must be named 'data'"
+                )
+            array: Array = np.asarray(file["data"])
+            return array
+    except (OSError, KeyError, RuntimeError) as error:
+        raise InputError(
+            f"{path.name} cannot be read as HDF5: {' '.join(str(error).split())[:160]}",
+            "the file is cut short or damaged; write it again",
+        ) from None

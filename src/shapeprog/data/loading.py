@@ -1,0 +1,202 @@
+"""Any file with a shape in it, into the grid: meshes, point clouds and voxels, one or many."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy.typing as npt
+
+from shapeprog.data.orientation import axes_of, in_shapenet_layout
+from shapeprog.data.placement import shape_from_mesh, shape_from_points, shape_from_voxels
+from shapeprog.data.shape import Shape
+from shapeprog.errors import InputError, ShapeProgError
+
+Array = npt.NDArray[Any]
+
+ARRAY_SUFFIXES = frozenset({".xyz", ".npy", ".npz", ".h5", ".hdf5"})
+"""Suffixes of files that hold arrays of points or voxels."""
+
+
+def load(
+    path: str | os.PathLike[str],
+    *,
+    up: str | None = None,
+    front: str | None = None,
+    points: int = 5000,
+    seed: int = 0,
+) -> Shape:
+    """The shape in a file, centred in the grid with its longest side 24 cells, and the way back.
+
+    Parameters
+    ----------
+    path
+        A mesh (OBJ, OFF, PLY, STL, GLB, GLTF and what trimesh reads besides), a point cloud (PLY, XYZ, NPY or NPZ
+        (P, 3)), or voxels (binvox, NPY or NPZ (R, R, R), HDF5, packs).  ``file.npz#12`` is the shape numbered 12, from
+        0, of a file that holds many; ``file.npz#name`` the one of that name.
+    up, front
+        World axes such as ``+y`` and ``-z``; by default those of the format (:mod:`shapeprog.data.orientation`).
+    points
+        How many points to draw from a mesh, or to keep of a cloud, at most.
+    seed
+        Seed of that choice.
+
+    Raises
+    ------
+    InputError
+        If there is no such file, or it cannot be read as a shape.
+    """
+    file, index = _split_index(path)
+    held = _open(file, up, front, points, seed)
+    if index is None:
+        if len(held) != 1:
+            raise InputError(
+                f"{file.name} holds {len(held)} shapes",
+                f"choose one, as in {file.name}#0, or read them all with load_all",
+            )
+        return held[0]
+    return held[_number(file, index, held)]
+
+
+def load_all(
+    paths: Iterable[str | os.PathLike[str]],
+    *,
+    up: str | None = None,
+    front: str | None = None,
+    points: int = 5000,
+    seed: int = 0,
+) -> Iterator[tuple[Path, Shape | ShapeProgError]]:
+    """Every shape of files, of folders with all within, and of files with many; what is broken comes as its error.
+
+    The order is that of ``paths``, and within a folder that of the names.  A broken file never stops the others.
+
+    Parameters
+    ----------
+    paths
+        Files, folders, or ``file.npz#12``.
+    up, front, points, seed
+        As for :func:`load`.
+    """
+    for path in paths:
+        try:
+            file, index = _split_index(path)
+            files = _files_in(file) if file.is_dir() else [file]
+        except ShapeProgError as error:
+            yield Path(path), error
+            continue
+        for each in files:
+            try:
+                held = _open(each, up, front, points, seed)
+                chosen = range(len(held)) if index is None else [_number(each, index, held)]
+            except ShapeProgError as error:
+                yield each, error
+                continue
+            for number in chosen:
+                label = each if len(held) == 1 else Path(f"{each}#{number}")
+                try:
+                    yield label, held[number]
+                except ShapeProgError as error:
+                    yield label, error
+
+
+def readable_suffixes() -> set[str]:
+    """Every suffix, with its dot and in lower case, that :func:`load` understands."""
+    from shapeprog.data.meshes import mesh_formats
+
+    return {f".{name}" for name in mesh_formats()} | ARRAY_SUFFIXES | {".binvox"}
+
+
+class _Held:
+    """The shapes of one file, each made when asked for."""
+
+    def __init__(self, names: list[str], make: Any) -> None:
+        self.names, self._make = names, make
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    def __getitem__(self, number: int) -> Shape:
+        shape: Shape = self._make(number)
+        return shape
+
+
+def _open(path: Path, up: str | None, front: str | None, points: int, seed: int) -> _Held:
+    if path.is_dir():
+        raise InputError(f"{path} is a folder", "name a file in it, or read the whole folder with load_all")
+    if not path.exists():
+        raise InputError(f"there is no file {path}", "check the path")
+    suffix, axes, name = path.suffix.lower(), axes_of(path, up, front), _name(path)
+    try:
+        if suffix == ".binvox":
+            from shapeprog.data.binvox import read_binvox
+
+            cells, corner, cell = read_binvox(path)
+            grid = shape_from_voxels(cells, name=name, axes=axes, corner=corner, cell=cell, source=path)
+            return _Held([name], lambda _: grid)
+        if suffix in ARRAY_SUFFIXES:
+            return _open_array(path, name, axes, points, seed)
+        if suffix not in readable_suffixes():
+            known = ", ".join(sorted(readable_suffixes()))
+            raise InputError(f"{path.name}: no shapes are read from files that end in {suffix!r}", f"known: {known}")
+        from shapeprog.data.meshes import read_mesh
+
+        vertices, faces = read_mesh(path)
+    except OSError as error:
+        raise InputError(f"{path} cannot be read: {error.strerror or error}", "check its permissions") from error
+    if len(faces):
+        mesh = shape_from_mesh(vertices, faces, name=name, axes=axes, points=points, seed=seed, source=path)
+    else:
+        mesh = shape_from_points(vertices, name=name, axes=axes, points=points, seed=seed, source=path)
+    return _Held([name], lambda _: mesh)
+
+
+def _open_array(path: Path, name: str, axes: Array, points: int, seed: int) -> _Held:
+    from shapeprog.data.arrays import read_array
+    from shapeprog.data.packs import is_pack, read_pack
+
+    if is_pack(path):
+        pack = read_pack(path)
+        return _Held([str(each) for each in pack.ids], pack.__getitem__)
+    array = read_array(path)
+    if array.ndim == 2:
+        cloud = shape_from_points(array, name=name, axes=axes, points=points, seed=seed, source=path)
+        return _Held([name], lambda _: cloud)
+    names = [name] if len(array) == 1 else [f"{name}#{number}" for number in range(len(array))]
+    return _Held(names, lambda n: shape_from_voxels(array[n], name=names[n], axes=axes, source=path))
+
+
+def _split_index(path: str | os.PathLike[str]) -> tuple[Path, str | None]:
+    whole = Path(path)
+    text = os.fspath(path)
+    if whole.exists() or "#" not in text:
+        return whole, None
+    file, _, index = text.rpartition("#")
+    return Path(file), index
+
+
+def _number(path: Path, index: str, held: _Held) -> int:
+    if index.isdigit() and int(index) < len(held):
+        return int(index)
+    if index in held.names:
+        return held.names.index(index)
+    raise InputError(
+        f"{path.name} has no shape {index!r}",
+        f"it holds {len(held)}, numbered from 0 to {len(held) - 1}, or use a name",
+    )
+
+
+def _files_in(folder: Path) -> list[Path]:
+    suffixes = readable_suffixes()
+    found = sorted(path for path in folder.rglob("*") if path.suffix.lower() in suffixes and path.is_file())
+    # ShapeNet lays the voxels of each object beside its mesh: one shape, read from the mesh.
+    meshes = {path.parent for path in found if path.suffix.lower() != ".binvox" and in_shapenet_layout(path)}
+    found = [path for path in found if not (path.suffix.lower() == ".binvox" and path.parent in meshes)]
+    if not found:
+        raise InputError(f"the folder {folder} holds no file that can be read as a shape", "name another folder")
+    return found
+
+
+def _name(path: Path) -> str:
+    return path.absolute().parts[-3] if in_shapenet_layout(path) else path.stem

@@ -1,0 +1,131 @@
+"""Triangles (or bare points) of a mesh file, through trimesh, with nothing but geometry read and nothing fetched."""
+
+from __future__ import annotations
+
+import io
+import warnings
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from shapeprog.errors import InputError
+
+Array = npt.NDArray[Any]
+
+_NO_MESH = {"bz2", "dict", "dict64", "dxf", "json", "msgpack", "stl_ascii", "svg", "tar.bz2", "tar.gz", "xyz", "zip"}
+_COMMON = ("obj", "off", "ply", "stl", "glb", "gltf")
+
+
+def mesh_formats() -> set[str]:
+    """Suffixes, without the dot, of the mesh files that can be read: the common ones and what trimesh reads besides."""
+    import trimesh
+
+    return (set(trimesh.available_formats()) | set(_COMMON)) - _NO_MESH
+
+
+def read_mesh(path: Path) -> tuple[Array, Array]:
+    """Vertices (V, 3) in float64 and faces (F, 3) of every part of a file, placed as its scene places them.
+
+    A file with points but no faces gives no faces, (0, 3).
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read as what its suffix says, or names vertices that it does not hold.
+    """
+    import trimesh
+
+    suffix = path.suffix.lower().lstrip(".")
+    content = path.read_bytes()
+    if not content.strip():
+        raise InputError(f"{path.name} is empty", "write the file again")
+    _check_length(path.name, suffix, content)
+    resolver = _siblings(path) if suffix == "gltf" else None
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # about textures and materials, which are not used
+            loaded = trimesh.load(
+                io.BytesIO(content),
+                file_type=suffix,
+                resolver=resolver,
+                process=False,
+                maintain_order=True,
+                skip_materials=True,
+            )
+        scene = loaded if isinstance(loaded, trimesh.Scene) else trimesh.Scene([loaded])
+        parts = [(scene.graph[node][0], scene.geometry[scene.graph[node][1]]) for node in scene.graph.nodes_geometry]
+    except (MemoryError, KeyboardInterrupt):
+        raise
+    except Exception as error:
+        raise InputError(
+            f"{path.name} cannot be read as {suffix.upper()}: {_reason(error)}",
+            "the file may be cut short or of another format; write it again, or convert it to GLB or OBJ",
+        ) from error
+    return _joined(path.name, parts)
+
+
+def _joined(name: str, parts: list[tuple[Array, Any]]) -> tuple[Array, Array]:
+    vertices: list[Array] = [np.zeros((0, 3))]
+    faces: list[Array] = [np.zeros((0, 3), np.int64)]
+    loose: list[Array] = [np.zeros((0, 3))]
+    count = 0
+    for matrix, part in parts:
+        own = np.asarray(getattr(part, "vertices", np.zeros((0, 3))), np.float64).reshape(-1, 3)
+        placed = own @ np.asarray(matrix)[:3, :3].T + np.asarray(matrix)[:3, 3]
+        listed = getattr(part, "faces", None)
+        if listed is None or len(listed) == 0:
+            loose.append(placed)
+            continue
+        triangles = np.asarray(listed, np.int64).reshape(-1, 3)
+        if triangles.min() < 0 or triangles.max() >= len(own):
+            raise InputError(
+                f"{name} has a face that names vertex {triangles.max()} of {len(own)}",
+                "the file is cut short or damaged; write it again",
+            )
+        vertices.append(placed)
+        faces.append(triangles + count)
+        count += len(placed)
+    if count == 0:
+        return np.concatenate(loose), faces[0]
+    return np.concatenate(vertices), np.concatenate(faces)
+
+
+def _check_length(name: str, suffix: str, content: bytes) -> None:
+    """Refuse the cut-short files that trimesh would read in part or explain badly."""
+    expected = 0
+    if suffix == "glb":
+        if content[:4] != b"glTF" or len(content) < 12:
+            raise InputError(f"{name} is not a GLB file", "check the suffix, or write the file again")
+        expected = int.from_bytes(content[8:12], "little")
+    elif suffix == "stl" and len(content) >= 84 and content[:5].lower() != b"solid":
+        expected = 84 + 50 * int.from_bytes(content[80:84], "little")
+    elif suffix == "stl" and b"facet" in content[:1000] and b"endsolid" not in content[-1000:]:
+        raise InputError(f"{name} ends before its 'endsolid': it is cut short", "write the file again")
+    if len(content) < expected:
+        raise InputError(
+            f"{name} is cut short: {len(content):,} bytes of the {expected:,} its head announces",
+            "write the file again",
+        )
+
+
+def _reason(error: Exception) -> str:
+    text = " ".join(str(error).split())
+    return f"{type(error).__name__}: {text[:160]}" if text else type(error).__name__
+
+
+def _siblings(path: Path) -> Any:
+    """What a GLTF may read besides itself: plain files of its own folder or below, and nothing over a network."""
+    from trimesh.resolvers import FilePathResolver
+
+    folder = path.resolve().parent
+
+    class Siblings(FilePathResolver):
+        def get(self, name: str) -> bytes:
+            place = (folder / name.strip()).resolve()
+            if not place.is_relative_to(folder) or not place.is_file():
+                raise FileNotFoundError(f"the part {name!r} is not beside the file")
+            return place.read_bytes()
+
+    return Siblings(str(path))

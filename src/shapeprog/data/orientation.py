@@ -1,0 +1,77 @@
+"""Which way is up: the axes of a file by its format, unless the user says otherwise.
+
+==========================================  ====  ======
+file                                        up    front
+==========================================  ====  ======
+OBJ, OFF, PLY, GLB, GLTF, binvox, others    +y    +z
+STL, XYZ                                    +z    -y
+ShapeNet layout ``synset/id/models/file``   +y    -z
+NPY, NPZ, HDF5                              axes 0, 1, 2 are up, depth (+ is the rear) and left-right already
+==========================================  ====  ======
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy.typing as npt
+
+from shapeprog.errors import InputError
+from shapeprog.space import grid_axes
+
+Array = npt.NDArray[Any]
+
+_UP_Z = {".stl", ".xyz"}
+_ARRAYS = {".npy", ".npz", ".h5", ".hdf5"}
+_SYNSET = re.compile(r"\d{8}")
+
+
+def default_axes(path: Path) -> tuple[str, str]:
+    """The usual (up, front) of a file, from the table above."""
+    if in_shapenet_layout(path):
+        return "+y", "-z"
+    suffix = path.suffix.lower()
+    if suffix in _UP_Z:
+        return "+z", "-y"
+    return ("+x", "-y") if suffix in _ARRAYS else ("+y", "+z")
+
+
+def in_shapenet_layout(path: Path) -> bool:
+    """Whether the path ends as ShapeNetCore v2 is distributed: ``<synset>/<id>/models/<file>``."""
+    parts = path.absolute().parts
+    return len(parts) >= 4 and parts[-2] == "models" and _SYNSET.fullmatch(parts[-4]) is not None
+
+
+def axes_of(path: Path, up: str | None, front: str | None) -> Array:
+    """World directions of the grid axes, columns (3, 3), with the file's defaults for what is not given.
+
+    Where one axis is given and lies on the line of the other's default, the shape is taken to be tipped over: the
+    default pair is turned together until the given axis fits.
+
+    Raises
+    ------
+    InputError
+        If a name is not an axis or the two lie on one line.
+    """
+    usual_up, usual_front = default_axes(path)
+    rise, face = up or usual_up, front or usual_front
+    if up and not front and up.strip()[-1:].lower() == usual_front[-1]:
+        face = _opposite(usual_up) if _same(up, usual_front) else usual_up
+    if front and not up and front.strip()[-1:].lower() == usual_up[-1]:
+        rise = _opposite(usual_front) if _same(front, usual_up) else usual_front
+    try:
+        return grid_axes(rise, face)
+    except ValueError as error:
+        raise InputError(
+            f"{path.name}: {error}", "give --up and --front as two different axes, as in +y and -z"
+        ) from None
+
+
+def _opposite(axis: str) -> str:
+    return ("+" if axis.startswith("-") else "-") + axis[-1]
+
+
+def _same(axis: str, other: str) -> bool:
+    return axis.strip().startswith("-") == other.startswith("-")

@@ -1,0 +1,205 @@
+"""Packs: many shapes in one NPZ file, cells as bits and points as 16-bit numbers.
+
+==============  ====================  ==============================================================================
+array           shape                 meaning
+==============  ====================  ==============================================================================
+``ids``         (N,)                  names
+``voxels``      (N, 4096) uint8       ``numpy.unpackbits`` gives the 32^3 touched cells of the grid frame
+``points``      (N, P, 3) uint16      ``(points / 65535 - 0.5) * longest_side``: world frame, axes up, depth, left-right
+``longest_side``  (N,)                of the bounding box, in the world
+``split``       (N,)                  train, val or test
+==============  ====================  ==============================================================================
+
+The last three may be missing.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, overload
+
+import numpy as np
+import numpy.typing as npt
+
+from shapeprog.data.arrays import read_numpy
+from shapeprog.data.shape import Shape
+from shapeprog.errors import InputError
+from shapeprog.files import atomic_path
+from shapeprog.space import RESOLUTION, SPAN, Frame
+
+Array = npt.NDArray[Any]
+
+_BYTES = RESOLUTION**3 // 8
+_LEVELS = 65535
+
+
+@dataclass(frozen=True)
+class Pack(Sequence[Shape]):
+    """The shapes of a pack, each unpacked when asked for.
+
+    Parameters
+    ----------
+    source
+        The file.
+    ids, voxels, points, longest_side, split
+        Its arrays as in the table of the module; the last three may be None.
+    """
+
+    source: Path
+    ids: Array
+    voxels: Array
+    points: Array | None = None
+    longest_side: Array | None = None
+    split: Array | None = None
+
+    def __len__(self) -> int:
+        return len(self.ids)
+
+    @overload
+    def __getitem__(self, index: int) -> Shape: ...
+    @overload
+    def __getitem__(self, index: slice) -> Pack: ...
+    def __getitem__(self, index: int | slice) -> Shape | Pack:
+        if isinstance(index, slice):
+            return self.take(np.arange(len(self))[index])
+        if not -len(self) <= index < len(self):
+            raise IndexError(
+                f"{self.source.name} holds {len(self)} shapes, numbered from 0; {index} is not one of them"
+            )
+        cells = np.unpackbits(self.voxels[index]).reshape((RESOLUTION,) * 3).astype(np.bool_)
+        points = None
+        if self.points is not None:
+            points = ((self.points[index].astype(np.float64) / _LEVELS - 0.5) * SPAN).astype(np.float32)
+        scale = 1.0 if self.longest_side is None else float(self.longest_side[index]) / SPAN
+        return Shape(
+            name=str(self.ids[index]),
+            voxels=cells,
+            points=points,
+            frame=Frame(scale=scale),
+            source=self.source,
+            kind="voxels" if points is None else "mesh",
+            split="" if self.split is None else str(self.split[index]),
+        )
+
+    def __iter__(self) -> Iterator[Shape]:
+        return (self[index] for index in range(len(self)))
+
+    def take(self, places: npt.ArrayLike) -> Pack:
+        """The pack of the shapes at ``places`` (numbers, or a mask)."""
+        chosen = np.asarray(places)
+        parts = (self.points, self.longest_side, self.split)
+        return Pack(self.source, self.ids[chosen], self.voxels[chosen], *(p if p is None else p[chosen] for p in parts))
+
+    def only(self, split: str) -> Pack:
+        """The shapes of one split: train, val or test.
+
+        Raises
+        ------
+        InputError
+            If the pack does not tell splits apart, or has none of that name.
+        """
+        if self.split is None:
+            raise InputError(f"{self.source.name} has no splits", "read the whole pack, or the file of that split")
+        mask = self.split == split
+        if not mask.any():
+            held = ", ".join(sorted(set(self.split.tolist())))
+            raise InputError(f"{self.source.name} has no split {split!r}", f"choose one of {held}")
+        return self.take(mask)
+
+
+def is_pack(path: Path) -> bool:
+    """Whether an NPZ file is a pack, by the shape of its ``voxels``; reads no more than that array's head."""
+    import zipfile
+
+    if path.suffix.lower() != ".npz" or not zipfile.is_zipfile(path):
+        return False
+    with zipfile.ZipFile(path) as archive:
+        if not {"ids.npy", "voxels.npy"} <= set(archive.namelist()):
+            return False
+        try:
+            with archive.open("voxels.npy") as stream:
+                version = np.lib.format.read_magic(stream)
+                head = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}
+                shape, _, dtype = head[version](stream)
+        except (ValueError, KeyError, EOFError, OSError, zipfile.BadZipFile):
+            return True  # a damaged pack: reading it says so
+        return len(shape) == 2 and shape[1] == _BYTES and dtype == np.uint8
+
+
+def read_pack(path: str | os.PathLike[str], split: str | None = None) -> Pack:
+    """The shapes of a pack, in the order of the file.
+
+    Parameters
+    ----------
+    path
+        An NPZ file with the arrays listed at the head of this module.
+    split
+        Only the shapes of this split: train, val or test.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, is no pack, or its arrays do not fit together.
+    """
+    source = Path(path)
+    cure = "make packs with 'shapeprog prepare'; the manual of shapeprog.data.packs says what they hold"
+    if not source.is_file():
+        raise InputError(f"there is no file {source}", "check the path")
+    arrays = read_numpy(source)
+    missing = {"ids", "voxels"} - set(arrays)
+    if missing:
+        raise InputError(f"{source.name} is no pack: it has no {' and no '.join(sorted(missing))}", cure)
+    voxels, count = arrays["voxels"], len(arrays["ids"])
+    if voxels.dtype != np.uint8 or voxels.shape != (count, _BYTES):
+        raise InputError(
+            f"{source.name}: voxels are {voxels.dtype} {voxels.shape}, not uint8 ({count}, {_BYTES})", cure
+        )
+    points = arrays.get("points")
+    if points is not None and (points.dtype != np.uint16 or points.ndim != 3 or points.shape[::2] != (count, 3)):
+        raise InputError(f"{source.name}: points are {points.dtype} {points.shape}, not uint16 ({count}, P, 3)", cure)
+    longest = arrays.get("longest_side")
+    if longest is not None and (longest.shape != (count,) or not (np.isfinite(longest) & (longest > 0)).all()):
+        raise InputError(f"{source.name}: longest_side must be {count} positive numbers", cure)
+    splits = arrays.get("split")
+    if splits is not None and splits.shape != (count,):
+        raise InputError(f"{source.name}: split has {splits.shape[:1]} entries for {count} shapes", cure)
+    pack = Pack(source, arrays["ids"], voxels, points, longest, splits)
+    return pack if split is None else pack.only(split)
+
+
+def write_pack(path: str | os.PathLike[str], shapes: Iterable[Shape]) -> int:
+    """Write shapes as a pack, whole or not at all, and return how many there were.
+
+    Points are kept where every shape has the same number of them, splits where a shape names one.
+
+    Raises
+    ------
+    InputError
+        If the shapes are not of the grid's resolution.
+    OutputError
+        If the file cannot be written.
+    """
+    listed = list(shapes)
+    for shape in listed:
+        if shape.voxels.shape != (RESOLUTION,) * 3:
+            raise InputError(
+                f"{shape.name} has {shape.voxels.shape} cells", f"a pack holds grids of {RESOLUTION}^3 cells"
+            )
+    cells = [np.packbits(shape.voxels) for shape in listed]
+    arrays: dict[str, Array] = {
+        "ids": np.array([shape.name for shape in listed], dtype=np.str_),
+        "voxels": np.stack(cells) if cells else np.zeros((0, _BYTES), np.uint8),
+        "longest_side": np.array([shape.frame.scale * SPAN for shape in listed], np.float64),
+    }
+    points = [shape.points for shape in listed if shape.points is not None]
+    if listed and len(points) == len(listed) and len({p.shape for p in points}) == 1:
+        levels = np.rint((np.stack(points).astype(np.float64) / SPAN + 0.5) * _LEVELS)
+        arrays["points"] = np.clip(levels, 0, _LEVELS).astype(np.uint16)
+    if any(shape.split for shape in listed):
+        arrays["split"] = np.array([shape.split for shape in listed], dtype=np.str_)
+    with atomic_path(path) as temporary, temporary.open("wb") as stream:
+        np.savez_compressed(stream, **arrays)  # type: ignore[arg-type]
+    return len(listed)

@@ -1,0 +1,187 @@
+"""A directory of models into packs with splits: ShapeNetCore v2 as it is distributed, or plain folders by category."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import re
+from collections import Counter
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from shapeprog.data.loading import load, readable_suffixes
+from shapeprog.data.packs import write_pack
+from shapeprog.data.shape import Shape
+from shapeprog.errors import InputError, ShapeProgError
+from shapeprog.files import make_folder
+from shapeprog.space import SPAN, Frame
+
+SPLITS = ("train", "val", "test")
+"""Names of the splits, in the order of their shares."""
+
+SYNSETS = {
+    "02801938": "basket",
+    "02818832": "bed",
+    "02828884": "bench",
+    "02871439": "bookshelf",
+    "02933112": "cabinet",
+    "03001627": "chair",
+    "03211117": "display",
+    "03636649": "lamp",
+    "04256520": "sofa",
+    "04379243": "table",
+}
+"""Plain names of the ShapeNet synsets that hold furniture; the others keep their number."""
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """What :func:`prepare` made of one model, or of the whole directory.
+
+    Parameters
+    ----------
+    done, total
+        How many models have been read, of how many.
+    path
+        The model just read; in the last record the output folder.
+    error
+        Why it could not be read, if it could not.
+    packs
+        In the last record the packs written, with their number of shapes.
+    failures
+        In the last record every model that could not be read, with its error.
+    """
+
+    done: int
+    total: int
+    path: Path
+    error: ShapeProgError | None = None
+    packs: tuple[tuple[Path, int], ...] = ()
+    failures: tuple[tuple[Path, ShapeProgError], ...] = ()
+
+
+def prepare(
+    directory: str | os.PathLike[str],
+    output: str | os.PathLike[str],
+    *,
+    shares: tuple[float, float, float] = (0.7, 0.1, 0.2),
+    points: int = 5000,
+    seed: int = 0,
+    up: str | None = None,
+    front: str | None = None,
+    read: Callable[..., Shape] = load,
+) -> Iterator[Prepared]:
+    """Read every model of ``directory`` and write packs ``{category}_{split}.npz``; yields one record per model.
+
+    The directory holds a folder per category.  In the layout of ShapeNetCore v2 (``<synset>/<id>/models/...``) a model
+    is an id; elsewhere it is a file, named by its path in the category's folder.  The split of a shape follows from its
+    cells alone, so equal shapes never straddle a split, in whatever order, together or apart they are read.  Worlds
+    are scaled to a bounding box of diagonal 1, centred, with axes up, depth, left-right.  A broken model is told and
+    stops nothing.  The last record holds the packs and the failures.
+
+    Parameters
+    ----------
+    directory
+        Where the models are.
+    output
+        Folder for the packs; made if missing.
+    shares
+        Parts of the shapes that go to train, val and test.
+    points, seed, up, front
+        As for :func:`shapeprog.data.load`.
+    read
+        What reads a model.
+
+    Raises
+    ------
+    InputError
+        If the directory holds no models.
+    OutputError
+        If the packs cannot be written.
+    """
+    if len(shares) != 3 or min(shares) < 0 or not abs(sum(shares) - 1) < 1e-6:
+        raise InputError(f"shares {shares} are not three parts of a whole", "give three numbers that sum to 1")
+    models = find_models(Path(directory))
+    folder = make_folder(output)
+    groups: dict[tuple[str, str], list[Shape]] = {}
+    failures: list[tuple[Path, ShapeProgError]] = []
+    for done, (category, name, path) in enumerate(models, start=1):
+        problem: ShapeProgError | None = None
+        try:
+            shape = read(path, up=up, front=front, points=points, seed=seed)
+        except ShapeProgError as error:
+            problem = error
+            failures.append((path, error))
+        else:
+            split = split_of(shape, shares)
+            # Only what a pack holds is kept, so that a large directory fits in memory.
+            kept = Shape(name, shape.voxels, shape.points, _unit_frame(shape), split=split)
+            groups.setdefault((category, split), []).append(kept)
+        yield Prepared(done, len(models), path, problem)
+    packs = []
+    for (category, split), shapes in sorted(groups.items()):
+        target = folder / f"{category}_{split}.npz"
+        packs.append((target, write_pack(target, sorted(shapes, key=lambda shape: shape.name))))
+    yield Prepared(len(models), len(models), folder, packs=tuple(packs), failures=tuple(failures))
+
+
+def find_models(directory: Path) -> list[tuple[str, str, Path]]:
+    """Every model of a directory as (category, name, file), in the order of the names.
+
+    Raises
+    ------
+    InputError
+        If there is no such directory, or it holds no models.
+    """
+    if not directory.is_dir():
+        raise InputError(f"there is no folder {directory}", "give the folder that holds one folder per category")
+    suffixes, found = readable_suffixes(), []
+    for branch in sorted(path for path in directory.iterdir() if path.is_dir()):
+        category = SYNSETS.get(branch.name, re.sub(r"[^\w-]+", "_", branch.name))
+        layout = sorted(path for path in branch.iterdir() if (path / "models").is_dir())
+        for place in layout:
+            files = [path for path in (place / "models").iterdir() if path.suffix.lower() in suffixes]
+            if files:
+                found.append((category, place.name, min(files, key=_preference)))
+        if not layout:
+            for path in sorted(branch.rglob("*")):
+                if path.suffix.lower() in suffixes and path.is_file():
+                    found.append((category, path.relative_to(branch).with_suffix("").as_posix(), path))
+    if not found:
+        raise InputError(
+            f"the folder {directory} holds no models",
+            "it needs a folder per category: <category>/... or <synset>/<id>/models",
+        )
+    twice = Counter((category, name) for category, name, _ in found)
+    return [
+        (category, name if twice[category, name] == 1 else f"{name}{path.suffix}", path)
+        for category, name, path in found
+    ]
+
+
+def split_of(shape: Shape, shares: tuple[float, float, float] = (0.7, 0.1, 0.2)) -> str:
+    """train, val or test, drawn from the cells of a shape alone: equal cells, equal split."""
+    digest = hashlib.sha256(np.packbits(shape.voxels).tobytes()).digest()
+    drawn = int.from_bytes(digest[:8], "big") / 2**64
+    return SPLITS[0] if drawn < shares[0] else SPLITS[1] if drawn < shares[0] + shares[1] else SPLITS[2]
+
+
+def _preference(path: Path) -> tuple[bool, bool, str]:
+    """A mesh before voxels, and the normalised model before others."""
+    return path.suffix.lower() == ".binvox", not path.stem.startswith("model_normalized"), path.name
+
+
+def _unit_frame(shape: Shape) -> Frame:
+    """The frame of a world in which the bounding box of the shape has diagonal 1 and is centred."""
+    if shape.vertices is not None and shape.faces is not None:
+        corners = shape.vertices[np.unique(shape.faces)]
+        extents = np.ptp(corners.astype(np.float64), axis=0)
+    elif shape.points is not None:
+        extents = np.ptp(shape.points.astype(np.float64), axis=0)
+    else:
+        extents = np.ptp(np.argwhere(shape.voxels), axis=0) + 1.0
+    longest = SPAN / float(np.linalg.norm(extents * (SPAN / extents.max())))
+    return replace(Frame(), scale=longest / SPAN)

@@ -1,0 +1,49 @@
+"""A shape as everything above sees it: touched cells, surface points and the way back to its file."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from shapeprog.space import Frame
+
+Array = npt.NDArray[Any]
+
+
+@dataclass(frozen=True)
+class Shape:
+    """A shape in the grid frame: centred, its longest side 24 cells, axes up, depth and left-right.
+
+    Parameters
+    ----------
+    name
+        What it is called: the stem of its file, or its id in a pack.
+    voxels
+        Cells (32, 32, 32) that its surface touches or its solid contains.
+    points
+        Points (P, 3) in cells, float32, uniform by area on its surface; None when it came as voxels.
+    frame
+        The map from the grid to the world of the file.
+    vertices, faces
+        The mesh, (V, 3) in cells and (F, 3), where there is one; for pictures.
+    source
+        The file it was read from.
+    kind
+        What the file held.
+    split
+        train, val or test, where its pack says so.
+    """
+
+    name: str
+    voxels: npt.NDArray[np.bool_]
+    points: npt.NDArray[np.float32] | None = None
+    frame: Frame = field(default_factory=Frame)
+    vertices: npt.NDArray[np.float32] | None = None
+    faces: npt.NDArray[np.int32] | None = None
+    source: Path | None = None
+    kind: Literal["mesh", "points", "voxels"] = "voxels"
+    split: str = ""

@@ -1,0 +1,128 @@
+"""Surfaces, points and foreign grids into cells: everything that the surface touches or the solid holds.
+
+Real meshes are soups: open, doubled, turned inside out.  So no normal, no winding and no parity is trusted.  A cell
+belongs to the solid when none of the six views along the axes sees its centre (the rule of the binvox grids that
+ShapeNet is distributed with); the views meet the surface on a lattice of half cells and pass no hole of a cell's width.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from shapeprog.errors import InputError
+from shapeprog.space import RESOLUTION
+
+Array = npt.NDArray[Any]
+BoolArray = npt.NDArray[np.bool_]
+
+SHRINK = 1 / 256
+"""How far, in cells, a surface must reach into a cell to touch it: a face on a boundary touches neither side."""
+
+HOLE = 2
+"""Widest hole, in half cells, that lets no view through."""
+
+
+def voxelise_mesh(vertices: Array, faces: Array, resolution: int = RESOLUTION) -> BoolArray:
+    """Every cell that the surface touches or the solid contains, (R, R, R).
+
+    A box from boundary to boundary fills exactly its cells; a sheet without thickness between two layers fills one.
+
+    Parameters
+    ----------
+    vertices
+        Corners (V, 3) in the grid frame: cells, origin at the centre of the grid.
+    faces
+        Triangles (F, 3) as indices of vertices; their order, their direction and their being joined do not matter.
+    resolution
+        Cells along each side.
+    """
+    from shapeprog.data.voxelise_kernels import carve, mark_boundary_sheets, mark_triangles
+
+    corners = np.asarray(vertices, np.float64) + resolution / 2
+    triangles = np.ascontiguousarray(corners[np.asarray(faces, np.int64)].reshape(-1, 3, 3))
+    touched = np.zeros((resolution,) * 3, np.bool_)
+    mark_triangles(triangles, 0.5 - SHRINK, touched)
+    # Half cells that straddle the boundaries of the cells: a wall on a boundary has one clear place among them.
+    barrier = np.zeros((2 * resolution + 1,) * 3, np.bool_)
+    mark_triangles(2 * triangles + 0.5, 0.5 + 1e-6, barrier)
+    carve(barrier, HOLE, 1, 2, touched)
+    mark_boundary_sheets(triangles, SHRINK, touched)
+    return touched
+
+
+def voxelise_points(points: Array, resolution: int = RESOLUTION) -> BoolArray:
+    """Every cell that holds a point, and those that the points enclose, (R, R, R).
+
+    Views along the six axes are stopped by the cells with points, and by holes between them no wider than about four
+    times the spacing of the points; what no view sees is inside.
+
+    Parameters
+    ----------
+    points
+        Positions (P, 3) in the grid frame.
+    resolution
+        Cells along each side.
+    """
+    from scipy.spatial import cKDTree
+
+    from shapeprog.data.voxelise_kernels import carve
+
+    positions = np.asarray(points, np.float64) + resolution / 2
+    touched = np.zeros((resolution,) * 3, np.bool_)
+    # A point on the last boundary of the shape belongs to the shape's last cell: pulled in by a hair.
+    inner = positions + SHRINK * np.sign(positions.mean(0) - positions) * (
+        np.abs(positions - np.rint(positions)) < 1e-4
+    )
+    cells = np.floor(inner).astype(np.int64)
+    cells = cells[((cells >= 0) & (cells < resolution)).all(1)]
+    touched[tuple(cells.T)] = True
+    some = positions[:: max(1, len(positions) // 2000)]
+    distance, _ = cKDTree(positions).query(some, k=[min(2, len(positions))])
+    spacing = float(np.median(np.asarray(distance)))
+    carve(touched.copy(), int(np.clip(np.ceil(4 * spacing), 1, 4)), 0, 1, touched)
+    return touched
+
+
+def resample_voxels(voxels: Array, low: Array, scale: float, resolution: int = RESOLUTION) -> BoolArray:
+    """Every cell of the grid that an occupied cell of another grid reaches, (R, R, R).
+
+    A finer cell reaches the cell that holds its centre, as in the packs; a coarser one every cell that it touches.
+
+    Parameters
+    ----------
+    voxels
+        Occupied cells (A, B, C), axes up, depth, left-right.
+    low
+        Grid position, with the origin at the grid's centre, of the corner of cell (0, 0, 0).
+    scale
+        Side of one of its cells in cells of the grid.
+    """
+    occupied = np.argwhere(voxels)
+    start = np.asarray(low, np.float64) + resolution / 2 + occupied * scale
+    margin = scale / 2 if scale < 1 else SHRINK  # all of a finer cell is drawn together into its centre
+    first = np.floor(start + margin).astype(np.int64)
+    last = np.maximum(np.ceil(start + scale - margin).astype(np.int64) - 1, first)
+    cells = np.zeros((resolution,) * 3, np.bool_)
+    reach = int((last - first).max()) + 1 if len(first) else 0
+    for step in np.ndindex(reach, reach, reach):
+        place = np.minimum(first + step, last)
+        place = place[((place >= 0) & (place < resolution)).all(1)]
+        cells[tuple(place.T)] = True
+    return cells
+
+
+def occupied_bounds(voxels: Array) -> tuple[Array, Array]:
+    """Lowest and highest boundary of the occupied cells along each axis, in cells from the corner of the array.
+
+    Raises
+    ------
+    InputError
+        If no cell is occupied.
+    """
+    places = np.argwhere(voxels)
+    if len(places) == 0:
+        raise InputError("the voxel grid is empty", "give a grid in which at least one cell is occupied")
+    return places.min(0), places.max(0) + 1

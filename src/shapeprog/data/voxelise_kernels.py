@@ -1,0 +1,222 @@
+"""Compiled loops of :mod:`shapeprog.data.voxelise`: triangles into cells, and carving from six sides.
+
+Coordinates are in cells with the origin at the corner of the grid, so cell ``k`` covers ``[k, k + 1]``.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from numba import njit
+
+Array = npt.NDArray[Any]
+
+
+@njit(cache=True, nogil=True)
+def mark_triangles(triangles: Array, half: float, cells: Array) -> None:
+    """Mark every cell whose box of half side ``half`` about its centre meets a triangle.
+
+    Separating axes (Akenine-Moller 2001): three box faces, the triangle's plane and nine edge products; the projections
+    of a triangle are found once and compared with those of each cell in the triangle's own box.
+
+    Parameters
+    ----------
+    triangles
+        Corners (F, 3 corners, 3), float64.
+    half
+        0.5 is the closed cell; a little less leaves out what merely touches its boundary.
+    cells
+        Output (R, R, R) of booleans, only ever set.
+    """
+    size = cells.shape[0]
+    low = np.empty(3, np.int64)
+    high = np.empty(3, np.int64)
+    normal = np.empty(3)
+    edge = np.empty((3, 3))
+    least = np.empty(9)
+    most = np.empty(9)
+    for face in range(triangles.shape[0]):
+        corner = triangles[face]
+        empty = False
+        for axis in range(3):
+            smallest = min(corner[0, axis], corner[1, axis], corner[2, axis])
+            largest = max(corner[0, axis], corner[1, axis], corner[2, axis])
+            low[axis] = max(int(np.ceil(smallest - half - 0.5)), 0)
+            high[axis] = min(int(np.floor(largest + half - 0.5)), size - 1)
+            empty |= low[axis] > high[axis]
+        if empty:
+            continue
+        if low[0] == high[0] and low[1] == high[1] and low[2] == high[2] and half >= 0.5:
+            cells[low[0], low[1], low[2]] = True  # its own box lies in one closed cell
+            continue
+        for side in range(3):
+            for axis in range(3):
+                edge[side, axis] = corner[(side + 1) % 3, axis] - corner[side, axis]
+        normal[0] = edge[0, 1] * edge[1, 2] - edge[0, 2] * edge[1, 1]
+        normal[1] = edge[0, 2] * edge[1, 0] - edge[0, 0] * edge[1, 2]
+        normal[2] = edge[0, 0] * edge[1, 1] - edge[0, 1] * edge[1, 0]
+        offset = normal[0] * corner[0, 0] + normal[1] * corner[0, 1] + normal[2] * corner[0, 2]
+        reach = half * (abs(normal[0]) + abs(normal[1]) + abs(normal[2]))
+        for side in range(3):
+            for axis in range(3):
+                second, third = (axis + 1) % 3, (axis + 2) % 3
+                a = edge[side, second] * corner[0, third] - edge[side, third] * corner[0, second]
+                b = edge[side, second] * corner[1, third] - edge[side, third] * corner[1, second]
+                c = edge[side, second] * corner[2, third] - edge[side, third] * corner[2, second]
+                radius = half * (abs(edge[side, second]) + abs(edge[side, third]))
+                least[3 * side + axis] = min(a, b, c) - radius
+                most[3 * side + axis] = max(a, b, c) + radius
+        for i in range(low[0], high[0] + 1):
+            x = i + 0.5
+            for j in range(low[1], high[1] + 1):
+                y = j + 0.5
+                for k in range(low[2], high[2] + 1):
+                    if cells[i, j, k]:
+                        continue
+                    z = k + 0.5
+                    if abs(normal[0] * x + normal[1] * y + normal[2] * z - offset) > reach:
+                        continue
+                    apart = False
+                    for side in range(3):
+                        p = edge[side, 1] * z - edge[side, 2] * y
+                        q = edge[side, 2] * x - edge[side, 0] * z
+                        r = edge[side, 0] * y - edge[side, 1] * x
+                        m = 3 * side
+                        if (
+                            (p < least[m] or p > most[m])
+                            or (q < least[m + 1] or q > most[m + 1])
+                            or (r < least[m + 2] or r > most[m + 2])
+                        ):
+                            apart = True
+                            break
+                    if not apart:
+                        cells[i, j, k] = True
+
+
+@njit(cache=True, nogil=True)
+def mark_boundary_sheets(triangles: Array, shrink: float, cells: Array) -> None:
+    """Give a sheet that lies exactly between two layers of cells to one of them, where neither is marked yet.
+
+    The layer nearer the middle of the grid gets it, so that mirrored shapes stay mirrored and nothing grows.
+    """
+    size = cells.shape[0]
+    flat = np.zeros((1, 3, 3))
+    layer = np.zeros((size, size, size), np.bool_)
+    low = np.empty(3, np.int64)
+    high = np.empty(3, np.int64)
+    for face in range(triangles.shape[0]):
+        for axis in range(3):
+            a, b, c = triangles[face, 0, axis], triangles[face, 1, axis], triangles[face, 2, axis]
+            plane = np.rint(a)
+            if max(abs(a - plane), abs(b - plane), abs(c - plane)) > shrink:
+                continue
+            near = int(plane) if 2 * plane < size else int(plane) - 1
+            beyond = 2 * int(plane) - 1 - 2 * near  # from the near layer to the far one: -1 or +1
+            if near < 0 or near >= size:
+                continue
+            flat[0] = triangles[face]
+            flat[0, :, axis] = near + 0.5
+            mark_triangles(flat, 0.5 - shrink, layer)
+            for k in range(3):
+                low[k] = max(int(np.floor(flat[0, :, k].min())), 0)
+                high[k] = min(int(np.floor(flat[0, :, k].max())) + 1, size)
+            for i in range(low[0], high[0]):
+                for j in range(low[1], high[1]):
+                    for k in range(low[2], high[2]):
+                        if not layer[i, j, k]:
+                            continue
+                        layer[i, j, k] = False
+                        u = i + beyond if axis == 0 else i
+                        v = j + beyond if axis == 1 else j
+                        w = k + beyond if axis == 2 else k
+                        inside = 0 <= u < size and 0 <= v < size and 0 <= w < size
+                        if not (inside and cells[u, v, w]):
+                            cells[i, j, k] = True
+
+
+@njit(cache=True, nogil=True)
+def first_hits(barrier: Array, axis: int, reverse: bool, hole: int) -> Array:
+    """Depth (N, N) at which rays along ``axis`` first meet the barrier, with small holes closed.
+
+    A ray that passes where the rays around it, within ``hole`` lines on all four sides, are stopped earlier, is stopped
+    as late as the latest of those four: a missing triangle lets nothing through, while a slot, open along one
+    direction, stays.
+
+    Parameters
+    ----------
+    barrier
+        Cells (N, N, N) that stop a ray.
+    axis, reverse
+        Direction of the rays; the other two axes index the result in rising order.
+    hole
+        Widest hole, in cells of the barrier, that is closed.
+    """
+    size = barrier.shape[0]
+    depth = np.full((size, size), size, np.int64)
+    for i in range(size):
+        for j in range(size):
+            for step in range(size):
+                k = size - 1 - step if reverse else step
+                if axis == 0:
+                    stopped = barrier[k, i, j]
+                elif axis == 1:
+                    stopped = barrier[i, k, j]
+                else:
+                    stopped = barrier[i, j, k]
+                if stopped:
+                    depth[i, j] = step
+                    break
+    closed = depth.copy()
+    for i in range(size):
+        for j in range(size):
+            latest = 0
+            for di, dj in ((-1, 0), (1, 0), (0, -1), (0, 1)):
+                nearest = size
+                for step in range(1, hole + 1):
+                    a, b = i + di * step, j + dj * step
+                    if 0 <= a < size and 0 <= b < size:
+                        nearest = min(nearest, depth[a, b])
+                latest = max(latest, nearest)
+            closed[i, j] = min(depth[i, j], latest)
+    return closed
+
+
+@njit(cache=True, nogil=True)
+def carve(barrier: Array, hole: int, start: int, stride: int, cells: Array) -> None:
+    """Mark the cells that none of the six views along the axes can see (Nooruddin & Turk 2003, ray stabbing).
+
+    Parameters
+    ----------
+    barrier
+        Cells (N, N, N) that stop a ray.
+    hole
+        Widest hole in the barrier that is closed.
+    start, stride
+        Cell ``k`` of the output is cell ``start + stride * k`` of the barrier.
+    cells
+        Output (R, R, R) of booleans, only ever set.
+    """
+    size, last = cells.shape[0], barrier.shape[0] - 1
+    up = first_hits(barrier, 0, False, hole)
+    down = first_hits(barrier, 0, True, hole)
+    back = first_hits(barrier, 1, False, hole)
+    front = first_hits(barrier, 1, True, hole)
+    right = first_hits(barrier, 2, False, hole)
+    left = first_hits(barrier, 2, True, hole)
+    for i in range(size):
+        a = start + stride * i
+        for j in range(size):
+            b = start + stride * j
+            for k in range(size):
+                c = start + stride * k
+                if (
+                    up[b, c] <= a
+                    and down[b, c] <= last - a
+                    and back[a, c] <= b
+                    and front[a, c] <= last - b
+                    and right[a, b] <= c
+                    and left[a, b] <= last - c
+                ):
+                    cells[i, j, k] = True

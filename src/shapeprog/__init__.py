@@ -57,7 +57,7 @@ _HOMES = {
 }
 _OTHER_NAMES = {"load_shape": "load"}
 
-__all__ = sorted([*_HOMES, "__version__"])  # noqa: PLE0605
+__all__ = sorted([*_HOMES, "__version__"])
 
 
 def _resolve(name: str) -> Any:

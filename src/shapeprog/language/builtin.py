@@ -47,13 +47,13 @@ def layer(at: Position, thickness: Length, half: Half) -> Solids:
     return slab(at, thickness, half[..., 0], half[..., 1])
 
 
-@statement("support_cylinder", id=6, paper=("Support", "Cylinder"))
+@statement("support_cylinder", id=6, paper=("Sup", "Cylinder"))
 def support_cylinder(at: Position, height: Length, radius: Radius) -> Solids:
     """A round central support on the centre of its bottom face."""
     return disc(at, height, radius)
 
 
-@statement("support_cuboid", id=7, paper=("Support", "Cub"))
+@statement("support_cuboid", id=7, paper=("Sup", "Cub"))
 def support_cuboid(at: Position, height: Length, half: Radius) -> Solids:
     """A square central support on the centre of its bottom face."""
     return slab(at, height, half, half)
@@ -71,7 +71,7 @@ def base_square(at: Position, thickness: Length, half: Radius) -> Solids:
     return slab(at, thickness, half, half)
 
 
-@statement("base_cross", id=10, paper=("Base", "Cross"), pivot=lambda at, **_: at, quarter=True)
+@statement("base_cross", id=10, paper=("Base", "Line"), pivot=lambda at, **_: at, quarter=True)
 def base_cross(at: Position, thickness: Length, length: Length, turn: Turn) -> Solids:
     """One arm of a cross base, two cells wide, from the hub in the direction of its quarter turn."""
     quarter = turn.long() % 4
@@ -90,13 +90,13 @@ def sideboard(at: Position, height: Length, half_depth: Length, width: Length) -
     return cuboid(centre, torch.stack([height / 2, half_depth, width / 2], -1))
 
 
-@statement("horizontal_bar", id=12, paper=("Horizontal_Bar", "Cub"))
+@statement("horizontal_bar", id=12, paper=("Hori_Bar", "Cub"))
 def horizontal_bar(at: Position, size: Extent) -> Solids:
     """A horizontal bar from its low corner and its full extents."""
     return box(at, size)
 
 
-@statement("vertical_board", id=13, paper=("Vertical_board", "Cub"))
+@statement("vertical_board", id=13, paper=("Vert_Board", "Cub"))
 def vertical_board(at: Position, size: Extent) -> Solids:
     """A vertical board from its low corner and its full extents."""
     return box(at, size)
@@ -121,13 +121,13 @@ def chair_beam(at: Position, size: Extent) -> Solids:
     return box(at, size)
 
 
-@statement("line", id=17, paper=("Line", "line"), pivot=lambda start, **_: start + CELL_CENTRE)
+@statement("line", id=17, paper=("Connect", "Line"), pivot=lambda start, **_: start + CELL_CENTRE)
 def line(start: Position, end: Position, radius: Radius) -> Solids:
     """A round bar between the centres of two cells, with flat caps."""
     return bar(start + CELL_CENTRE, end + CELL_CENTRE, radius)
 
 
-@statement("back_support", id=18, paper=("Back_support", "Cub"))
+@statement("back_support", id=18, paper=("Back_sup", "Cub"))
 def back_support(at: Position, size: Extent) -> Solids:
     """A support that carries a back, from its low corner and its full extents."""
     return box(at, size)
@@ -139,7 +139,7 @@ def translate(copy: Tensor, quarter: Tensor, count: Count, by: Shift3) -> Motion
     return Motion(shift=copy[..., None] * by)
 
 
-@loop("rotate", id=20, paper=("Rot", "theta"))
+@loop("rotate", id=20, paper=("Rot", "step"))
 def rotate(copy: Tensor, quarter: Tensor, count: Count, step: Turn) -> Motion:
     """Repeats what is inside ``count`` times around a vertical axis: a line about its start, a cross arm about its hub
     in quarter turns of ``step``, everything else about the axis of the grid, spread evenly over the circle."""

@@ -39,9 +39,10 @@ def read(text: str, name: str) -> tuple[Node, ...]:
 
 def nearest(word: str, known: Sequence[str]) -> str:
     """A hint that proposes the known word nearest to ``word``, or lists them all."""
-    close = difflib.get_close_matches(word.lower(), known, 1)
+    lower = {each.lower(): each for each in known}
+    close = difflib.get_close_matches(word.lower(), lower, 1)
     if close:
-        return f"did you mean {close[0]}?"
+        return f"did you mean {lower[close[0]]}?"
     return f"known are {', '.join(known)}" if known else "nothing is declared"
 
 

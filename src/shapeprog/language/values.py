@@ -84,11 +84,9 @@ def checked(declared: Statement, parameter: Parameter, numbers: Sequence[float])
         wanted = "1 number" if quantity.width == 1 else f"{quantity.width} numbers"
         raise ShapeProgError(f"{place} takes {wanted}, not {len(numbers)}", f"write {blank(parameter)}")
     singles = [to_float32(number) for number in numbers]
-    for number, single in zip(numbers, singles, strict=True):
+    for number in numbers:
         if quantity.discrete and number != math.floor(number):
-            raise ShapeProgError(
-                f"{place} is {shortest(single)}, but must be whole", f"it takes {range_text(quantity)}"
-            )
+            raise ShapeProgError(f"{place} is {number!r}, but must be whole", f"it takes {range_text(quantity)}")
         if quantity.discrete and abs(number) > LARGEST_WHOLE:
             raise ShapeProgError(
                 f"{place} is {int(number)}, beyond {LARGEST_WHOLE}, the end of exact whole numbers",

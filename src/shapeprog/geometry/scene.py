@@ -80,10 +80,10 @@ class Scene:
 
     def flatten(self) -> Scene:
         """The same scenes with exactly one batch dimension."""
-        lead = len(self.batch_shape)
+        lead, count = len(self.batch_shape), self.batch_shape.numel()
         return Scene(
             **{
-                field.name: getattr(self, field.name).reshape(-1, *getattr(self, field.name).shape[lead:])
+                field.name: getattr(self, field.name).reshape(count, *getattr(self, field.name).shape[lead:])
                 for field in fields(self)
             }
         )

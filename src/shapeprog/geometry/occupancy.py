@@ -1,0 +1,161 @@
+"""Occupancy of the grid: hard cells as bits and bytes, and the soft form that has a gradient."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+import torch
+from jaxtyping import Float, Int, UInt8
+from torch import Tensor
+
+from shapeprog.errors import ShapeProgError
+from shapeprog.geometry.arrays import array, arrays, declared_kinds, over_threads
+from shapeprog.geometry.distance import signed_distance
+from shapeprog.geometry.primitive import primitives
+from shapeprog.geometry.scene import Scene
+from shapeprog.space import RESOLUTION
+
+Words = npt.NDArray[np.uint32]
+"""Rows of cells as bits, lowest cell in the lowest bit."""
+
+AT_ONCE = 1 << 21
+"""Cells that are tested together for primitives known by their declared distance."""
+
+
+def voxels(scene: Scene, resolution: int = RESOLUTION) -> UInt8[Tensor, "*batch R R R"]:
+    """The cells that the primitives of each scene occupy, 1 or 0, clipped to the grid.
+
+    A cuboid at right angles covers [rint(low), rint(high)) along each axis, and if sheared each layer is moved by
+    whole cells; a cylinder covers the cells whose centre is within 1.01 radii of its axis; a turned cuboid, and any
+    other primitive, those whose centre it contains.  On whole-numbered programs this is the published executor.
+
+    Parameters
+    ----------
+    resolution
+        Cells along each side R; the scene is scaled with it.
+    """
+    from shapeprog.geometry import voxel_kernels as kernels
+
+    words = _words(scene, resolution)
+    shape = (len(words), resolution, resolution, resolution)
+    if resolution == RESOLUTION:
+        cells, rows = np.empty(shape, np.uint8), words.reshape(-1)
+        eights = cells.reshape(-1, RESOLUTION).view(np.uint64)
+        over_threads(lambda first, last: kernels.unpack(rows, _SPREAD, eights, first, last), len(rows), least=1 << 15)
+    else:
+        bits = np.unpackbits(words.transpose(0, 2, 3, 1).copy().view(np.uint8), axis=-1, bitorder="little")
+        cells = np.ascontiguousarray(bits[..., :resolution])
+    return torch.from_numpy(cells).to(scene.mask.device).reshape(*scene.batch_shape, *shape[1:])
+
+
+def packed_rows(scene: Scene) -> Words:
+    """The cells of each scene at 32^3 with every (up, depth) row of 32 cells as one word: (..., 32, 32)."""
+    return _words(scene, RESOLUTION)[:, 0].reshape(*scene.batch_shape, RESOLUTION, RESOLUTION)
+
+
+def pack(cells: npt.ArrayLike) -> Words:
+    """Packed rows (..., 32, 32) of grids of cells (..., 32, 32, 32)."""
+    bits = np.packbits(np.asarray(cells, dtype=bool), axis=-1, bitorder="little")
+    return bits.view("<u4")[..., 0].astype(np.uint32, copy=False)
+
+
+def packed_iou(one: Words, two: Words) -> npt.NDArray[np.float64]:
+    """Intersection over union (...) of packed grids (..., 32, 32); leading dimensions broadcast, empty grids agree."""
+    from shapeprog.geometry import voxel_kernels as kernels
+
+    one, two = np.broadcast_arrays(one, two)
+    lead = one.shape[:-2]
+    counts = np.empty((int(np.prod(lead)), 2), np.int64)
+    kernels.shared_cells(
+        np.ascontiguousarray(one).reshape(len(counts), -1), np.ascontiguousarray(two).reshape(len(counts), -1), counts
+    )
+    ratio = np.where(counts[:, 1] > 0, counts[:, 0] / np.maximum(counts[:, 1], 1), 1.0)
+    return ratio.reshape(lead)
+
+
+def cell_centres(resolution: int = RESOLUTION, like: Tensor | None = None) -> Float[Tensor, "R R R 3"]:
+    """Centres of all cells in the grid frame."""
+    cell = RESOLUTION / resolution
+    ticks = (torch.arange(resolution, dtype=torch.float64) + 0.5) * cell - RESOLUTION / 2
+    grid = torch.stack(torch.meshgrid(ticks, ticks, ticks, indexing="ij"), -1)
+    return grid.float() if like is None else grid.to(like)
+
+
+def soft_logits(
+    scene: Scene, sharpness: float | Tensor = 4.0, resolution: int = RESOLUTION
+) -> Float[Tensor, "*batch R R R"]:
+    """Logits of the soft occupancy: minus sharpness times the signed distance of the union at the cell centres."""
+    centres = cell_centres(resolution, scene.centre)
+    points = centres.reshape(-1, 3).expand(*scene.batch_shape, -1, 3)
+    distance: Tensor = signed_distance(scene, points).unflatten(-1, centres.shape[:-1])
+    return distance * -sharpness
+
+
+def soft_occupancy(
+    scene: Scene, sharpness: float | Tensor = 4.0, resolution: int = RESOLUTION
+) -> Float[Tensor, "*batch R R R"]:
+    """How far each cell is inside the union, between 0 and 1, with gradient to every size and pose.
+
+    As the sharpness grows it tends to 1 where the centre of the cell is inside and to 0 where it is outside.
+
+    Parameters
+    ----------
+    sharpness
+        Slope per cell of the logit; the transition is about 4 / sharpness cells wide.
+    """
+    return torch.sigmoid(soft_logits(scene, sharpness, resolution))
+
+
+_SPREAD: npt.NDArray[np.uint64] = (
+    np.unpackbits(np.arange(256, dtype=np.uint8)[:, None], axis=1, bitorder="little").copy().view(np.uint64)[:, 0]
+)
+
+
+def _words(scene: Scene, resolution: int) -> Words:
+    """Words (B, W, R, R) of all scenes."""
+    from shapeprog.geometry import voxel_kernels as kernels
+
+    if resolution < 1:
+        raise ShapeProgError(f"a grid of {resolution} cells a side holds nothing", "ask for a resolution of 1 or more")
+    kind, size, centre, rotation, mask = arrays(scene)
+    words = np.zeros((len(kind), (resolution + 31) // 32, resolution, resolution), np.uint32)
+    over_threads(
+        lambda first, last: kernels.fill(kind, size, centre, rotation, mask, words, first, last), len(kind), least=32
+    )
+    for declared in declared_kinds(scene):
+        _fill_declared(scene.flatten().detach(), declared, words)
+    return words
+
+
+def _fill_declared(scene: Scene, kind: int, words: Words) -> None:
+    """Add the cells whose centre a primitive of a declared kind contains, within its bounding box."""
+    resolution = words.shape[-1]
+    cell = RESOLUTION / resolution
+    program, slot = (scene.mask & (scene.kind == kind)).nonzero(as_tuple=True)
+    size, centre, rotation = (t[program, slot].double() for t in (scene.size, scene.centre, scene.rotation))
+    finite = torch.cat([size, centre, rotation.flatten(1)], -1).isfinite().all(-1)
+    program, size, centre, rotation = program[finite], size[finite], centre[finite], rotation[finite]
+    reach = (rotation.abs() @ primitives[kind].bound(size)[..., None])[..., 0]
+    first = ((centre - reach + RESOLUTION / 2) / cell - 0.5).floor().clamp(0, resolution).long()
+    last = ((centre + reach + RESOLUTION / 2) / cell + 0.5).ceil().clamp(0, resolution).long()
+    window = (last - first).clamp(min=0)
+    volume = window.prod(-1)
+    place = 0
+    while place < len(program):
+        stop = place + max(1, int((volume[place:].cumsum(0) <= AT_ONCE).sum()))
+        owner = torch.repeat_interleave(torch.arange(place, stop), volume[place:stop].cpu()).to(program.device)
+        begin = (volume[place:stop].cumsum(0) - volume[place:stop])[owner - place]
+        rest = torch.arange(len(owner), device=owner.device) - begin
+        side, depth = window[owner, 2], window[owner, 1]
+        index = torch.stack([rest // (side * depth), rest // side % depth, rest % side], -1) + first[owner]
+        offset = (index + 0.5) * cell - RESOLUTION / 2 - centre[owner]
+        local = (rotation[owner].mT @ offset[..., None])[..., 0]
+        inside = primitives[kind].distance(local, size[owner]) <= 0
+        _set_cells(words, program[owner[inside]], index[inside])
+        place = stop
+
+
+def _set_cells(words: Words, program: Int[Tensor, " M"], index: Int[Tensor, "M 3"]) -> None:
+    which, (up, depth, side) = array(program), array(index).T
+    bits = np.left_shift(np.uint32(1), (side % 32).astype(np.uint32))
+    np.bitwise_or.at(words, (which, side // 32, up, depth), bits)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 import zipfile
 import zlib
 from pathlib import Path
@@ -64,7 +65,9 @@ def checked(array: Array, name: str) -> Array:
 
 def _read_text(path: Path) -> Array:
     try:
-        rows = np.loadtxt(path, dtype=np.float64, comments=("#", "//"), ndmin=2, encoding="utf-8")
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # that there are no points is told below, as an error
+            rows = np.loadtxt(path, dtype=np.float64, comments=("#", "//"), ndmin=2, encoding="utf-8")
     except (ValueError, UnicodeDecodeError) as error:
         raise InputError(
             f"{path.name} cannot be read as points: {' '.join(str(error).split())[:160]}",
@@ -84,11 +87,12 @@ def read_numpy(path: Path) -> dict[str, Array]:
         If the file is damaged or holds Python objects.
     """
     try:
-        loaded = np.load(path, allow_pickle=False)
-        if isinstance(loaded, np.ndarray):
-            return {"": loaded}
-        with loaded:
-            return {name: loaded[name] for name in loaded.files}
+        with path.open("rb") as stream:
+            loaded = np.load(stream, allow_pickle=False)
+            if isinstance(loaded, np.ndarray):
+                return {"": loaded}
+            with loaded:
+                return {name: loaded[name] for name in loaded.files}
     except (ValueError, EOFError, OSError, KeyError, zipfile.BadZipFile, zlib.error) as error:
         if isinstance(error, OSError) and error.errno:
             raise

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 import warnings
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,7 @@ from shapeprog.errors import InputError
 Array = npt.NDArray[Any]
 
 _NO_MESH = {"bz2", "dict", "dict64", "dxf", "json", "msgpack", "stl_ascii", "svg", "tar.bz2", "tar.gz", "xyz", "zip"}
+_OFF_COUNTS = re.compile(rb"^\s*(?:C?N?OFF)?\s*(\d+)\s+(\d+)\s+\d+", re.MULTILINE)
 _COMMON = ("obj", "off", "ply", "stl", "glb", "gltf")
 
 
@@ -63,7 +65,14 @@ def read_mesh(path: Path) -> tuple[Array, Array]:
             f"{path.name} cannot be read as {suffix.upper()}: {_reason(error)}",
             "the file may be cut short or of another format; write it again, or convert it to GLB or OBJ",
         ) from error
-    return _joined(path.name, parts)
+    vertices, faces = _joined(path.name, parts)
+    if suffix == "off":
+        counts = _OFF_COUNTS.search(content)
+        if counts and len(faces) < int(counts[2]):
+            raise InputError(
+                f"{path.name} is cut short: {len(faces)} faces of {int(counts[2])}", "write the file again"
+            )
+    return vertices, faces
 
 
 def _joined(name: str, parts: list[tuple[Array, Any]]) -> tuple[Array, Array]:
@@ -73,7 +82,8 @@ def _joined(name: str, parts: list[tuple[Array, Any]]) -> tuple[Array, Array]:
     count = 0
     for matrix, part in parts:
         own = np.asarray(getattr(part, "vertices", np.zeros((0, 3))), np.float64).reshape(-1, 3)
-        placed = own @ np.asarray(matrix)[:3, :3].T + np.asarray(matrix)[:3, 3]
+        with np.errstate(invalid="ignore"):  # infinite coordinates are told by name later
+            placed = own @ np.asarray(matrix)[:3, :3].T + np.asarray(matrix)[:3, 3]
         listed = getattr(part, "faces", None)
         if listed is None or len(listed) == 0:
             loose.append(placed)

@@ -107,7 +107,9 @@ def shape_from_voxels(
     middle, longest = (low + high) / 2 - HALF, (high - low).max()
     if size == RESOLUTION and abs(longest - SPAN) <= 2 and np.abs(middle).max() <= 1.5:
         triple = start + cell * HALF
-        frame = Frame(cell, (float(triple[0]), float(triple[1]), float(triple[2])), Frame.around(0, 1, turn).axes)
+        frame = Frame(
+            cell, (float(triple[0]), float(triple[1]), float(triple[2])), Frame.around(start, start + 1, turn).axes
+        )
         return Shape(name, np.ascontiguousarray(turned), frame=frame, source=source)
     first, last = occupied_bounds(voxels)
     frame = Frame.around(start + cell * first, start + cell * last, turn)

@@ -97,6 +97,10 @@ class Primitives:
         self._kinds.append(primitive)
         return primitive
 
+    def shorten(self, length: int) -> None:
+        """Forget the newest primitives beyond ``length``, as when the module that declares them fails."""
+        del self._kinds[length:]
+
     def kind(self, name: str) -> int:
         """Index of the primitive called ``name``.
 

@@ -140,9 +140,19 @@ class Language:
                 f"statement {declared.name!r} wants id {declared.id}, which belongs to {owner}",
                 f"leave the id out; the next free one is {self.free_id()}",
             )
+        twin = next((known for known in self if declared.paper and known.paper == declared.paper), None)
+        if twin is not None:
+            raise DeclarationError(
+                f"statement {declared.name!r} has the paper's name {declared.paper}, which belongs to {twin.name}",
+                "leave it out; the notation then uses the statement's own name",
+            )
         self._by_id[declared.id] = declared
         self._by_name[declared.name] = declared
         return declared
+
+    def forget(self, name: str) -> None:
+        """Take a declaration out again, as when the module that made it fails."""
+        del self._by_id[self._by_name.pop(name).id]
 
     def free_id(self) -> int:
         """The smallest id above all that are taken."""
@@ -230,7 +240,7 @@ def _doc(name: str, function: Callable[..., Any]) -> str:
     doc = inspect.getdoc(function)
     if not doc:
         raise DeclarationError(f"statement {name!r} has no docstring", "say in one line what it draws")
-    return doc.split("\n")[0]
+    return " ".join(doc.split("\n\n")[0].split())
 
 
 def _parameters(name: str, function: Callable[..., Any], skip: int) -> tuple[Parameter, ...]:

@@ -1,0 +1,84 @@
+"""Statements of a user's own: a module file by path, loaded whole or not at all."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import sys
+import traceback
+from dataclasses import replace
+from pathlib import Path
+
+from shapeprog.errors import DeclarationError, InputError, ShapeProgError
+from shapeprog.geometry.primitive import primitives
+from shapeprog.language.statement import Statement, language
+
+_loaded: dict[Path, tuple[Statement, ...]] = {}
+
+
+def load_statements(path: str | os.PathLike[str]) -> tuple[Statement, ...]:
+    """Run a module of declarations and return the statements and loops that it declares.
+
+    The module is trusted: it is Python and may do anything.  If it fails, none of its declarations stays.  Loading a
+    file again changes nothing; in another language it declares the same statements there.
+
+    Raises
+    ------
+    InputError
+        If there is no such file.
+    DeclarationError
+        If the module fails or declares nothing, with the cause and its line.
+    """
+    file = Path(path).resolve()
+    if file in _loaded:
+        return _declare_again(file)
+    if not file.is_file():
+        found = "a folder" if file.is_dir() else "no file"
+        raise InputError(f"{path} is {found}", "give the path of a Python file that declares statements")
+    before, kinds = set(language().names), len(primitives)
+    module_name = f"shapeprog_statements_{len(_loaded)}_{file.stem}"
+    try:
+        _run(file, module_name)
+        declared = tuple(each for each in language() if each.name not in before)
+        if not declared:
+            raise DeclarationError(f"{path} declares no statement", "decorate a function with @statement or @loop")
+    except BaseException as cause:
+        for name in set(language().names) - before:
+            language().forget(name)
+        primitives.shorten(kinds)
+        sys.modules.pop(module_name, None)
+        if isinstance(cause, (Exception, SystemExit)):
+            raise _in_words(path, file, cause) from cause
+        raise
+    _loaded[file] = declared
+    return declared
+
+
+def _run(file: Path, module_name: str) -> None:
+    spec = importlib.util.spec_from_loader(module_name, loader=None, origin=str(file))
+    assert spec is not None
+    module = importlib.util.module_from_spec(spec)
+    module.__file__ = str(file)
+    sys.modules[module_name] = module
+    exec(compile(file.read_bytes(), str(file), "exec"), module.__dict__)
+
+
+def _declare_again(file: Path) -> tuple[Statement, ...]:
+    known = language()
+    declared = []
+    for each in _loaded[file]:
+        if each.name not in known:
+            known.register(replace(each, id=known.free_id()) if each.id in known else each)
+        declared.append(known[each.name])
+    return tuple(declared)
+
+
+def _in_words(path: str | os.PathLike[str], file: Path, cause: BaseException) -> DeclarationError:
+    lines = [frame.lineno for frame in traceback.extract_tb(cause.__traceback__) if frame.filename == str(file)]
+    line = cause.lineno if isinstance(cause, SyntaxError) else (lines[-1] if lines else None)
+    place = f"{path}, line {line}" if line else f"{path}"
+    if isinstance(cause, ShapeProgError):
+        return DeclarationError(f"{place}: {cause.message}", cause.hint)
+    reason = str(cause).split("\n")[0]
+    kind = type(cause).__name__
+    return DeclarationError(f"{place}: {kind}: {reason}" if reason else f"{place}: {kind}", "mend the module")

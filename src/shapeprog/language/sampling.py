@@ -1,0 +1,68 @@
+"""Random programs from the declared ranges, for tests and as raw material for training."""
+
+from __future__ import annotations
+
+import torch
+
+from shapeprog.language.program import PUBLISHED_DEPTH, Chain, Draw, Loop, Program, nest
+from shapeprog.language.statement import Statement, language
+
+
+def random_program(
+    generator: torch.Generator,
+    *,
+    blocks: int = 6,
+    depth: int = PUBLISHED_DEPTH,
+    copies: int = 4,
+    whole: bool = False,
+    published: bool = False,
+) -> Program:
+    """A program whose statements, loops and numbers are drawn uniformly from the declarations in force.
+
+    Parameters
+    ----------
+    generator
+        Where the randomness comes from; the same state gives the same program.
+    blocks
+        How many drawing statements; each gets loops of its own.
+    depth
+        How many steps a block may have: one statement and up to ``depth - 1`` loops around it.
+    copies
+        The largest number of copies of a loop, within its declared range; at least one is drawn.
+    whole
+        Whether all numbers are whole, as in published programs.
+    published
+        Whether to stay within the published blocks.
+    """
+    drawing = [declared for declared in language() if not declared.is_loop]
+    loops = [declared for declared in language() if declared.is_loop]
+    body: list[Chain] = []
+    while len(body) < blocks and drawing:
+        levels = _pick(generator, depth) if loops else 0
+        chain = [drawing[_pick(generator, len(drawing))]]
+        chain = [loops[_pick(generator, len(loops))] for _ in range(levels)] + chain
+        steps = [_step(generator, declared, copies, whole) for declared in chain]
+        candidate: Chain = tuple(steps)
+        if not published or not Program((nest(candidate),)).outside_published():
+            body.append(candidate)
+    return Program(tuple(nest(chain) for chain in body))
+
+
+def _pick(generator: torch.Generator, choices: int) -> int:
+    return int(torch.randint(choices, (), generator=generator, device=generator.device))
+
+
+def _step(generator: torch.Generator, declared: Statement, copies: int, whole: bool) -> Draw | Loop:
+    values = []
+    for quantity in declared.quantities:
+        low, high = quantity.low, quantity.high
+        if quantity.kind == "count":
+            low, high = max(low, 1.0), min(high, float(copies))
+        if quantity.discrete or whole:
+            values.append(float(low + _pick(generator, int(high - low) + 1)))
+        else:
+            part = torch.rand((), generator=generator, device=generator.device)
+            values.append(float((low + (high - low) * part).clamp(low, high)))
+    if declared.is_loop:
+        return Loop(declared.name, tuple(values), ())
+    return Draw(declared.name, tuple(values))

@@ -156,6 +156,14 @@ def test_voxels_of_the_grid_are_kept_cell_for_cell(tmp_path):
     np.testing.assert_array_equal(load(tmp_path / "d.npz").voxels, cells)
 
 
+def test_a_grid_of_32_that_fills_its_cube_is_fitted_too(tmp_path):
+    np.save(tmp_path / "full.npy", np.ones((32, 32, 32), np.bool_))
+    shape = load(tmp_path / "full.npy")
+    assert shape.voxels.sum() == 24**3
+    assert shape.voxels[4:28, 4:28, 4:28].all()
+    np.testing.assert_allclose(shape.frame.to_world([[-12, -12, -12], [12, 12, 12]]), [[0, 0, 0], [32, 32, 32]])
+
+
 @pytest.mark.parametrize("factor", [2, 3])
 def test_voxels_of_other_resolutions_are_fitted(tmp_path, factor):
     fine = np.pad(steps_in_grid()[10:22, 8:24, 4:28].repeat(factor, 0).repeat(factor, 1).repeat(factor, 2), 1)

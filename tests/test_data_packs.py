@@ -146,6 +146,15 @@ def test_plain_folders_are_categories(tmp_path):
     assert [shape.name for shape in read_pack(tmp_path / "out" / "desk_train.npz")] == ["a.obj", "a.stl", "sub/b"]
 
 
+def test_old_packs_do_not_stay_beside_new_ones(tmp_path):
+    (tmp_path / "in" / "desk").mkdir(parents=True)
+    trimesh.creation.box((1, 2, 3)).export(tmp_path / "in" / "desk" / "a.obj")
+    for shares, counts in (((1, 0, 0), {"desk_train": 1}), ((0, 0, 1), {"desk_train": 0, "desk_test": 1})):
+        *_, last = prepare(tmp_path / "in", tmp_path / "out", points=50, shares=shares)
+        assert {path.stem: count for path, count in last.packs} == counts
+    assert len(read_pack(tmp_path / "out" / "desk_train.npz")) == 0
+
+
 def test_shares_are_kept_on_the_whole():
     rng = np.random.default_rng(0)
     drawn = [split_of(Shape("x", rng.random((32, 32, 32)) < 0.5, frame=Frame())) for _ in range(600)]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import warnings
 import zipfile
 import zlib
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -19,23 +20,16 @@ _SHAPES = "give points as (P, 3), voxels as (R, R, R), or many voxel grids as (N
 
 
 def read_array(path: Path) -> Array:
-    """The array of a file: points (P, 3), or voxel grids (N, R, R, R) of booleans.
+    """The array of an XYZ, NPY or NPZ file: points (P, 3), or voxel grids (N, R, R, R) of booleans.
 
-    An NPZ may hold ``points`` or ``voxels`` or a single array of any name; an HDF5 file holds ``data`` (N, R, R, R).
+    An NPZ may hold ``points`` or ``voxels`` or a single array of any name.
 
     Raises
     ------
     InputError
         If the file cannot be read, holds objects, or an array of another shape or with other values.
     """
-    suffix = path.suffix.lower()
-    if suffix == ".xyz":
-        array = _read_text(path)
-    elif suffix in (".h5", ".hdf5"):
-        array = _read_hdf5(path)
-    else:
-        array = _chosen(path)
-    return checked(array, path.name)
+    return checked(_read_text(path) if path.suffix.lower() == ".xyz" else _chosen(path), path.name)
 
 
 def checked(array: Array, name: str) -> Array:
@@ -119,24 +113,45 @@ def _chosen(path: Path) -> Array:
     return next(iter(arrays.values()))
 
 
-def _read_hdf5(path: Path) -> Array:
-    try:
-        import h5py
-    except ImportError:
-        raise InputError(
-            f"{path.name} needs the library h5py, which is not installed", "pip install 'shapeprog[hdf5]'"
-        ) from None
-    try:
-        with h5py.File(path, "r") as file:
-            names = list(file)
-            if "data" not in names:
-                raise InputError(
-                    f"{path.name} holds {', '.join(names) or 'nothing'}", "its voxels must be named 'data'"
-                )
-            array: Array = np.asarray(file["data"])
-            return array
-    except (OSError, KeyError, RuntimeError) as error:
-        raise InputError(
-            f"{path.name} cannot be read as HDF5: {' '.join(str(error).split())[:160]}",
-            "the file is cut short or damaged; write it again",
-        ) from None
+class Hdf5Grids:
+    """The voxel grids of an HDF5 file, each read when asked for: the published file unpacks to gigabytes.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, or holds no ``data`` of shape (N, R, R, R).
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._shape = self._read(lambda data: tuple(data.shape))
+        if len(self._shape) not in (3, 4) or len(set(self._shape[-3:])) != 1 or 0 in self._shape:
+            raise InputError(f"{path.name} holds an array of shape {self._shape}", _SHAPES)
+
+    def __len__(self) -> int:
+        return int(self._shape[0]) if len(self._shape) == 4 else 1
+
+    def __getitem__(self, number: int) -> Array:
+        """The grid (R, R, R) numbered ``number``."""
+        array = self._read(lambda data: np.asarray(data[number] if len(self._shape) == 4 else data))
+        grid: Array = checked(array, f"{self.path.name}#{number}")[0]
+        return grid
+
+    def _read(self, part: Callable[[Any], Any]) -> Any:
+        try:
+            import h5py
+        except ImportError:
+            raise InputError(
+                f"{self.path.name} needs the library h5py, which is not installed", "pip install 'shapeprog[hdf5]'"
+            ) from None
+        try:
+            with h5py.File(self.path, "r") as file:
+                if not isinstance(file.get("data"), h5py.Dataset):
+                    held = ", ".join(file) or "nothing"
+                    raise InputError(f"{self.path.name} holds {held}", "its voxels must be named 'data'")
+                return part(file["data"])
+        except (OSError, KeyError, RuntimeError) as error:
+            raise InputError(
+                f"{self.path.name} cannot be read as HDF5: {' '.join(str(error).split())[:160]}",
+                "the file is cut short or damaged; write it again",
+            ) from None

@@ -82,7 +82,7 @@ def load_all(
     for path in paths:
         try:
             file, index = _split_index(path)
-            files = _files_in(file) if file.is_dir() else [file]
+            files = _files_in(file) if os.path.isdir(file) else [file]
         except ShapeProgError as error:
             yield Path(path), error
             continue
@@ -123,9 +123,9 @@ class _Held:
 
 
 def _open(path: Path, up: str | None, front: str | None, points: int, seed: int) -> _Held:
-    if path.is_dir():
+    if os.path.isdir(path):
         raise InputError(f"{path} is a folder", "name a file in it, or read the whole folder with load_all")
-    if not path.exists():
+    if not os.path.exists(path):  # unlike Path.exists, never raises
         raise InputError(f"there is no file {path}", "check the path")
     suffix, axes, name = path.suffix.lower(), axes_of(path, up, front), _name(path)
     try:
@@ -153,14 +153,14 @@ def _open(path: Path, up: str | None, front: str | None, points: int, seed: int)
 
 
 def _open_array(path: Path, name: str, axes: Array, points: int, seed: int) -> _Held:
-    from shapeprog.data.arrays import read_array
+    from shapeprog.data.arrays import Hdf5Grids, read_array
     from shapeprog.data.packs import is_pack, read_pack
 
     if is_pack(path):
         pack = read_pack(path)
         return _Held([str(each) for each in pack.ids], pack.__getitem__)
-    array = read_array(path)
-    if array.ndim == 2:
+    array = Hdf5Grids(path) if path.suffix.lower() in (".h5", ".hdf5") else read_array(path)
+    if not isinstance(array, Hdf5Grids) and array.ndim == 2:
         cloud = shape_from_points(array, name=name, axes=axes, points=points, seed=seed, source=path)
         return _Held([name], lambda _: cloud)
     names = [name] if len(array) == 1 else [f"{name}#{number}" for number in range(len(array))]
@@ -170,7 +170,7 @@ def _open_array(path: Path, name: str, axes: Array, points: int, seed: int) -> _
 def _split_index(path: str | os.PathLike[str]) -> tuple[Path, str | None]:
     whole = Path(path)
     text = os.fspath(path)
-    if whole.exists() or "#" not in text:
+    if os.path.exists(whole) or "#" not in text:
         return whole, None
     file, _, index = text.rpartition("#")
     return Path(file), index

@@ -8,6 +8,7 @@ import re
 from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from itertools import groupby
 from pathlib import Path
 
 import numpy as np
@@ -106,26 +107,30 @@ def prepare(
         raise InputError(f"shares {shares} are not three parts of a whole", "give three numbers that sum to 1")
     models = find_models(Path(directory))
     folder = make_folder(output)
-    groups: dict[tuple[str, str], list[Shape]] = {}
     failures: list[tuple[Path, ShapeProgError]] = []
-    for done, (category, name, path) in enumerate(models, start=1):
-        problem: ShapeProgError | None = None
-        try:
-            shape = read(path, up=up, front=front, points=points, seed=seed)
-        except ShapeProgError as error:
-            problem = error
-            failures.append((path, error))
-        else:
-            split = split_of(shape, shares)
-            # Only what a pack holds is kept, so that a large directory fits in memory.
-            kept = Shape(name, shape.voxels, shape.points, _unit_frame(shape), split=split)
-            groups.setdefault((category, split), []).append(kept)
-        yield Prepared(done, len(models), path, problem)
-    packs = []
-    for (category, split), shapes in sorted(groups.items()):
-        target = folder / f"{category}_{split}.npz"
-        packs.append((target, write_pack(target, sorted(shapes, key=lambda shape: shape.name))))
-    yield Prepared(len(models), len(models), folder, packs=tuple(packs), failures=tuple(failures))
+    packs: list[tuple[Path, int]] = []
+    done = 0
+    # A category is written as soon as it is read: what is in memory stays small, and a stop loses one category at most.
+    for category, branch in groupby(models, key=lambda model: model[0]):
+        groups: dict[str, list[Shape]] = {}
+        for _, name, path in branch:
+            done += 1
+            problem: ShapeProgError | None = None
+            try:
+                shape = read(path, up=up, front=front, points=points, seed=seed)
+            except ShapeProgError as error:
+                problem = error
+                failures.append((path, error))
+            else:
+                split = split_of(shape, shares)
+                kept = Shape(name, shape.voxels, shape.points, _unit_frame(shape), split=split)
+                groups.setdefault(split, []).append(kept)
+            yield Prepared(done, len(models), path, problem)
+        for split in SPLITS:
+            target, shapes = folder / f"{category}_{split}.npz", groups.get(split, [])
+            if shapes or target.exists():  # an old pack would let duplicates straddle
+                packs.append((target, write_pack(target, sorted(shapes, key=lambda shape: shape.name))))
+    yield Prepared(done, len(models), folder, packs=tuple(packs), failures=tuple(failures))
 
 
 def find_models(directory: Path) -> list[tuple[str, str, Path]]:
@@ -156,10 +161,11 @@ def find_models(directory: Path) -> list[tuple[str, str, Path]]:
             "it needs a folder per category: <category>/... or <synset>/<id>/models",
         )
     twice = Counter((category, name) for category, name, _ in found)
-    return [
+    named = [
         (category, name if twice[category, name] == 1 else f"{name}{path.suffix}", path)
         for category, name, path in found
     ]
+    return sorted(named, key=lambda model: model[:2])
 
 
 def split_of(shape: Shape, shares: tuple[float, float, float] = (0.7, 0.1, 0.2)) -> str:

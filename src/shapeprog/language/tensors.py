@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -86,8 +87,9 @@ def decode(code: Code) -> list[Program]:
     A block that is no loops-then-statement, such as one the generator got wrong, draws nothing and is left out, and so
     is one with a number that is not finite.  Counts and turns end at the last whole number that float32 holds exactly.
     """
-    ids = code.ids.detach().cpu().reshape(-1, *code.ids.shape[-2:]).numpy()
-    values = code.parameters.detach().cpu().float().reshape(-1, *code.parameters.shape[-3:]).numpy()
+    programs = math.prod(code.ids.shape[:-2])
+    ids = code.ids.detach().cpu().reshape(programs, *code.ids.shape[-2:]).numpy()
+    values = code.parameters.detach().cpu().float().reshape(programs, *code.parameters.shape[-3:]).numpy()
     found = []
     for program_ids, program_values in zip(ids, values, strict=True):
         chains = (_chain(row, numbers) for row, numbers in zip(program_ids, program_values, strict=True))

@@ -47,12 +47,12 @@ def shortest(value: float) -> str:
         If the value is not finite, or too large for float32.
     """
     single = to_float32(value)
-    text = str(np.float32(single))
-    if to_float32(float(text)) != single:  # the decimal was rounded twice on its way through float64
-        text = repr(single)
+    decimal = float(str(np.float32(single)))
+    if to_float32(decimal) != single:  # it was rounded twice on its way through float64
+        decimal = single
     if single == 0 and math.copysign(1, single) < 0:
         return "-0.0"
-    return text.removesuffix(".0")
+    return repr(decimal).removesuffix(".0")
 
 
 def written(quantity: Quantity, value: float) -> str:

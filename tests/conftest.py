@@ -1,0 +1,31 @@
+"""Options and profiles of the suite."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import hypothesis
+import pytest
+
+SOURCE = Path(__file__).parents[1] / "src"
+
+hypothesis.settings.register_profile("quick", max_examples=20, deadline=None, derandomize=True, database=None)
+hypothesis.settings.register_profile("nightly", max_examples=1000, deadline=None)
+hypothesis.settings.load_profile("quick")
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--typecheck", action="store_true", help="check the shapes of all annotated tensors; slower")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    if config.getoption("--typecheck"):
+        from jaxtyping import install_import_hook
+
+        files = [path for path in SOURCE.rglob("*.py") if not path.stem.endswith("_kernels")]  # numba compiles those
+        names = [".".join(path.relative_to(SOURCE).with_suffix("").parts) for path in files]
+        install_import_hook([name for name in names if not name.endswith("__init__")], "beartype.beartype")
+
+    import torch
+
+    torch.set_num_threads(1)  # the suite runs one process per core

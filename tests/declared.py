@@ -1,0 +1,61 @@
+"""The table behind the generic laws: every statement there is, built in or from the examples, and random programs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from hypothesis import strategies as st
+
+from shapeprog.language import Draw, Language, Loop, Program, Statement, standard, using
+from shapeprog.language import builtin as builtin
+from shapeprog.language.plugins import load_statements
+from shapeprog.language.values import LARGEST_WHOLE
+
+EXAMPLES = Path(__file__).parents[1] / "examples" / "statements"
+MODULES = sorted(EXAMPLES.glob("*.py"))
+
+LANGUAGE = Language()
+for _declared in list(standard):
+    if _declared.id <= 21:
+        LANGUAGE.register(_declared)
+with using(LANGUAGE):
+    for _module in MODULES:
+        load_statements(_module)
+
+STATEMENTS = [declared for declared in LANGUAGE if not declared.is_loop]
+LOOPS = [declared for declared in LANGUAGE if declared.is_loop]
+
+
+def name_of(declared: Statement) -> str:
+    return declared.name
+
+
+def middle(declared: Statement) -> tuple[float, ...]:
+    """Plain parameters inside the declared ranges, all different, none at a symmetric place."""
+    values = []
+    for slot, quantity in enumerate(declared.quantities):
+        base = {"position": -3.3, "length": 1.7, "shift": 2.9, "count": 3, "turn": 1}[quantity.kind]
+        values.append(float(base) if quantity.discrete else base + 1.3 * slot)
+    return tuple(values)
+
+
+def numbers(declared: Statement) -> st.SearchStrategy[tuple[float, ...]]:
+    """Every finite float32 for continuous parameters, every exact whole number for discrete ones."""
+    real = st.floats(width=32, allow_nan=False, allow_infinity=False)
+    whole = st.integers(-LARGEST_WHOLE, LARGEST_WHOLE).map(float)
+    return st.tuples(*(whole if quantity.discrete else real for quantity in declared.quantities))
+
+
+def draws() -> st.SearchStrategy[Draw]:
+    return st.sampled_from(STATEMENTS).flatmap(lambda d: st.builds(Draw, st.just(d.name), numbers(d)))
+
+
+def loops(inner: st.SearchStrategy[Draw | Loop]) -> st.SearchStrategy[Loop]:
+    body = st.lists(inner, min_size=1, max_size=3).map(tuple)
+    return st.sampled_from(LOOPS).flatmap(lambda d: st.builds(Loop, st.just(d.name), numbers(d), body))
+
+
+def programs() -> st.SearchStrategy[Program]:
+    """Programs of any statements, freely nested."""
+    nodes = st.recursive(draws(), loops, max_leaves=6)
+    return st.lists(nodes, max_size=4).map(tuple).map(Program)

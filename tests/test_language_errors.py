@@ -1,0 +1,255 @@
+"""Mistakes in program text point at their place and propose a cure; the words are pinned."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from shapeprog.errors import InputError, ProgramError, ShapeProgError
+from shapeprog.language import Draw, Language, Loop, Program, using
+from shapeprog.language.json_form import code_from_json, program_from_json
+from shapeprog.language.notation import parse_notation
+from shapeprog.language.text import format_program, parse
+
+LEG = "leg(at=(1, 2, 3), size=(1, 2, 3))"
+
+PINNED = [
+    (
+        "legg(at=(1, 2, 3), size=(1, 2, 3))",
+        "t.shape, line 1, column 1: no statement is called 'legg'\n"
+        "  legg(at=(1, 2, 3), size=(1, 2, 3))\n"
+        "  ^\n"
+        "  hint: did you mean leg?",
+    ),
+    (
+        f"{LEG}\nleg(at=(1, 2, 3), sise=(1, 2, 3))",
+        "t.shape, line 2, column 19: leg has no parameter 'sise'\n"
+        "  leg(at=(1, 2, 3), sise=(1, 2, 3))\n"
+        "                    ^\n"
+        "  hint: did you mean size?",
+    ),
+    (
+        "leg(at=(1, 2, 3))",
+        "t.shape, line 1, column 1: leg lacks size\n"
+        "  leg(at=(1, 2, 3))\n"
+        "  ^\n"
+        "  hint: write leg(at=(_, _, _), size=(_, _, _))",
+    ),
+    (
+        "leg(at=(1, 2), size=(1, 2, 3))",
+        "t.shape, line 1, column 8: at of leg takes 3 numbers, not 2\n"
+        "  leg(at=(1, 2), size=(1, 2, 3))\n"
+        "         ^\n"
+        "  hint: write at=(_, _, _)",
+    ),
+    (
+        f"for i in translate(2.5, by=(0, 0, 1)):\n    {LEG}",
+        "t.shape, line 1, column 20: count of translate is 2.5, but must be whole\n"
+        "  for i in translate(2.5, by=(0, 0, 1)):\n"
+        "                     ^\n"
+        "  hint: it takes whole numbers from 0 to 64",
+    ),
+    (
+        f"for i in translate(1e9, by=(0, 0, 1)):\n    {LEG}",
+        "t.shape, line 1, column 20: count of translate is 1000000000, beyond 16777216, the end of exact whole numbers\n"
+        "  for i in translate(1e9, by=(0, 0, 1)):\n"
+        "                     ^\n"
+        "  hint: it takes whole numbers from 0 to 64",
+    ),
+    (
+        f"for i in range(4):\n    {LEG}",
+        "t.shape, line 1, column 10: no loop is called 'range'\n"
+        "  for i in range(4):\n"
+        "           ^\n"
+        "  hint: known are translate, rotate",
+    ),
+    (
+        "translate(2, by=(0, 0, 1))",
+        "t.shape, line 1, column 1: translate is a loop and draws nothing itself\n"
+        "  translate(2, by=(0, 0, 1))\n"
+        "  ^\n"
+        "  hint: write for i in translate(_, by=(_, _, _)):",
+    ),
+    (
+        "leg(at=(1, 2, 3), size=(1, 2, width))",
+        "t.shape, line 1, column 31: size of leg holds width, which is not a number\n"
+        "  leg(at=(1, 2, 3), size=(1, 2, width))\n"
+        "                                ^\n"
+        "  hint: write plain numbers such as 4 or -2.5",
+    ),
+    (
+        "leg(at=(1, 2, 1e39), size=(1, 2, 3))",
+        "t.shape, line 1, column 15: at of leg holds 1e39, which is too large\n"
+        "  leg(at=(1, 2, 1e39), size=(1, 2, 3))\n"
+        "                ^\n"
+        "  hint: numbers end at 3.4028235e+38",
+    ),
+    (
+        "height = 4",
+        "t.shape, line 1, column 1: a program holds only drawing statements and for loops\n"
+        "  height = 4\n"
+        "  ^\n"
+        "  hint: write name(parameter=number, ...) or for i in loop(count, ...):",
+    ),
+    (
+        "leg(1, 2, 3)",
+        "t.shape, line 1, column 5: leg takes nothing without a name\n"
+        "  leg(1, 2, 3)\n"
+        "      ^\n"
+        "  hint: write leg(at=(_, _, _), size=(_, _, _))",
+    ),
+    (
+        "for i in translate(2, by=(0, 0, 1)):\n\tleg()",
+        "t.shape, line 2, column 1: this line is indented with a tab\n   leg()\n  ^\n  hint: indent with four spaces",
+    ),
+    (
+        "'\N{LATIN SMALL LETTER E WITH ACUTE}'; legg()",
+        "t.shape, line 1, column 1: '\N{LATIN SMALL LETTER E WITH ACUTE}' is no statement\n"
+        "  '\N{LATIN SMALL LETTER E WITH ACUTE}'; legg()\n"
+        "  ^\n"
+        "  hint: write the name of a statement and its parameters",
+    ),
+]
+
+
+@pytest.mark.parametrize(("text", "message"), PINNED, ids=[message.split(": ")[1] for _, message in PINNED])
+def test_messages(text: str, message: str) -> None:
+    with pytest.raises(ProgramError) as caught:
+        parse(text, "t.shape")
+    assert str(caught.value) == message
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "column", "words"),
+    [
+        (f"{LEG}\n\nleg(at=(1, 2, 3), size=(1, 2, 3)", 3, 4, "never closed"),
+        (f"{LEG}\n{LEG[:-1]}, at=(1, 2, 3))", 2, 35, "given twice"),
+        (f"for i in translate(2, count=2, by=(0, 0, 0)):\n  {LEG}", 1, 23, "given twice"),
+        (f"for i in translate(2, (0, 0, 0)):\n  {LEG}", 1, 23, "only its count"),
+        (f"for i in translate(2, by=(0, 0, 0)):\n  {LEG}\nelse:\n  {LEG}", 4, 3, "no else"),
+        (f"for i, j in translate(2, by=(0, 0, 0)):\n  {LEG}", 1, 5, "one variable"),
+        ("for i in translate(2, by=(0, 0, 0)):\n", 1, 37, "expected an indented block"),
+        (f"for i in {LEG}:\n    pass", 1, 10, "repeats nothing"),
+        ("leg", 1, 1, "lacks its parameters"),
+        ("leg.__class__()", 1, 1, "is no statement"),
+        ("__import__('os').system('x')", 1, 1, "is no statement"),
+        ("leg(**{})", 1, 5, "no parameter"),
+        ("leg(*a)", 1, 5, "without a name"),
+        ("leg(at=[1, 2, 3], size=(1, 2, 3))", 1, 8, "not a number"),
+        ("leg(at=(1, 2, True), size=(1, 2, 3))", 1, 15, "not a number"),
+        ("leg(at=(1, 2, 3j), size=(1, 2, 3))", 1, 15, "not a number"),
+        ("leg(at=(1, 2, --3), size=(1, 2, 3))", 1, 15, "not a number"),
+        ("leg(at=(1, 2, 1 + 1), size=(1, 2, 3))", 1, 15, "not a number"),
+        ("leg(at=(1, 2, nan), size=(1, 2, 3))", 1, 15, "not a number"),
+        ("leg(at=(1, 2, 1e999), size=(1, 2, 3))", 1, 15, "too large"),
+        (f"leg(at=(1, 2, 1{'0' * 400}), size=(1, 2, 3))", 1, 15, "too large"),
+        (f"leg(at=(1, 2, 1{'0' * 5000}), size=(1, 2, 3))", 1, 1, "cannot be read"),
+        ("top_square(at=(1, 2, 3), thickness=(1,), half=2)", 1, 36, "1 number, not a group"),
+        ("leg(at='\N{SNOWMAN}', foo=(1, 2, 3))", 1, 8, "'\N{SNOWMAN}', which is not a number"),
+        ("leg(at=(1,2,3), \N{LATIN SMALL LETTER E WITH ACUTE}=1, b=2)", 1, 17, "no parameter"),
+        ("leg(\0)", 1, 5, "null byte"),
+        ("\ud800", 1, 1, "UTF-8"),
+        (f"leg({'-' * 100000}1)", 1, 1, "too deeply"),
+        ("1" + "+1" * 100000, 1, 1, "too deeply"),
+        ("leg(" * 300 + ")" * 300, 1, 804, "too many nested"),
+        ("import os", 1, 1, "only drawing statements"),
+        ("pass", 1, 1, "only drawing statements"),
+    ],
+)
+def test_places(text: str, line: int, column: int, words: str) -> None:
+    with pytest.raises(ProgramError, match=words) as caught:
+        parse(text)
+    assert (caught.value.line, caught.value.column) == (line, column)
+    assert len(caught.value.source) <= 200
+    str(caught.value).encode()
+
+
+def nested(depth: int) -> str:
+    heads = ("    " * level + "for i in translate(1, by=(0, 0, 0)):\n" for level in range(depth))
+    return "".join(heads) + "    " * depth + LEG
+
+
+def test_loops_nest_to_a_stated_depth() -> None:
+    program = parse(nested(64))
+    assert parse(format_program(program)) == program
+    for depth in (65, 99, 101, 300):
+        with pytest.raises(ProgramError):
+            parse(nested(depth))
+    deeper = Program((Loop("translate", (1, 0, 0, 0), program.body),))
+    with pytest.raises(ShapeProgError, match="more than 64 deep"):
+        format_program(deeper)
+
+
+def test_programs_made_wrongly_are_refused_in_words() -> None:
+    with pytest.raises(ShapeProgError, match="no statement is called 'stool'"):
+        format_program(Program((Draw("stool", ()),)))
+    with pytest.raises(ShapeProgError, match="has 2 numbers instead of 6"):
+        format_program(Program((Draw("leg", (1.0, 2.0)),)))
+    with using(Language()), pytest.raises(ProgramError, match="no statement is called 'leg'"):
+        parse(LEG)
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "column", "words"),
+    [
+        ("draw('Legg', 'Cub', P=(1,2,3), G=(1,2,3))", 1, 1, "did you mean 'Leg', 'Cub'"),
+        ("draw('Leg', 'Cub', P=(1,2,3))", 1, 1, "G of leg is missing"),
+        ("draw('Leg', 'Cub', P=(1,2), G=(1,2,3))", 1, 1, "P of leg has 2 numbers"),
+        ("draw('Leg', 'Cub', P=(1,2,3), G=(1,2,3), H=1)", 1, 1, "leg has no group H"),
+        ("draw('Leg', 'Cub', P=(1,2,x), G=(1,2,3))", 1, 19, "neither a quoted word"),
+        ("draw('Leg', 'Cub', P=(1,2,3), P=(1,2,3))", 1, 30, "given twice"),
+        ("draw('Leg', 'Cub', P=(1,2,3), G=(1,2,3)", 1, 40, "parenthesis is missing"),
+        ("draw('Leg', 'Cub', P=(1,2,3), G=(1,2,3)) + 4", 1, 41, "goes on"),
+        ("draw('Leg', 'Cub', P=(1,2,3), G=(1,2,1e999))", 1, 1, "too large"),
+        ("leg(at=(1, 2, 3))", 1, 1, "a line is draw"),
+        ("for(i<2, 'Trans', u=(0,0,1))", 1, 1, "repeats nothing"),
+        ("for(i<2, 'Trans', u=(0,0,1))\n  end\nend", 1, 1, "repeats nothing"),
+        ("for(i<2.5, 'Trans', u=(0,0,1))\n  draw()", 1, 1, "must be whole"),
+        ("for(i<2, 'Trans', u=(0,0,1))\n draw('Leg','Cub',P=(1,2,3),G=(1,2,3))\n  draw()", 3, 3, "indented unlike"),
+        ("end", 1, 1, "no loop to end"),
+        ("for(i<2, 'Rot', axis=(1,2,3))\n  draw()", 1, 1, "has no group axis"),
+    ],
+)
+def test_places_in_the_notation(text: str, line: int, column: int, words: str) -> None:
+    with pytest.raises(ProgramError, match=words) as caught:
+        parse_notation(text)
+    assert (caught.value.line, caught.value.column) == (line, column)
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        ([], "not in the form"),
+        ({"format": "shapeprog", "version": 2}, "version 2"),
+        ({"program": 3}, "program is not a list"),
+        ({"program": [3]}, r"program\[0\] is not a statement"),
+        ({"program": [{"statement": "legg"}]}, "did you mean leg"),
+        ({"program": [{"statement": "leg"}]}, "lacks its parameters"),
+        ({"program": [{"statement": "leg", "parameters": {"at": [1, 2, 3]}}]}, "leg lacks size"),
+        ({"program": [{"statement": "leg", "parameters": {"ta": [1, 2, 3]}}]}, "no parameter 'ta'"),
+        ({"program": [{"statement": "leg", "parameters": {"at": [1, 2, "3"], "size": [1, 2, 3]}}]}, "not a number"),
+        ({"program": [{"statement": "leg", "parameters": {"at": [1, 2, 1e39], "size": [1, 2, 3]}}]}, "too large"),
+        ({"program": [{"statement": "leg", "parameters": {"at": 1, "size": [1, 2, 3]}}]}, "3 numbers, not 1"),
+        ({"program": [{"statement": "leg", "parameters": {}, "body": []}]}, "no entry 'body'"),
+        ({"program": [{"statement": "rotate", "parameters": {"count": 1, "step": 1}}]}, r"program\[0\].body is not"),
+        ({"program": [{"statement": "rotate", "parameters": {"count": 1.5, "step": 1}}]}, "must be whole"),
+    ],
+)
+def test_wrong_json_is_refused_in_words(content: object, words: str) -> None:
+    if isinstance(content, dict):
+        content = {"format": "shapeprog", "version": 1, **content}
+    with pytest.raises(InputError, match=words):
+        program_from_json(json.dumps(content))
+
+
+def test_broken_json_is_refused_in_words() -> None:
+    with pytest.raises(ProgramError, match="not JSON") as caught:
+        program_from_json('{"format":\n  oops}', "p.json")
+    assert (caught.value.line, caught.value.column) == (2, 3)
+    for text in ("[" * 100000, '{"a": NaN}', '{"a": 1, "a": 2}', '{"a": 1' + "0" * 5000 + "}"):
+        with pytest.raises(ShapeProgError):
+            program_from_json(text)
+    for ids in ([[1, "x"]], [[[1]], [[2, 3]]], [1.5], "x", None):
+        with pytest.raises(InputError):
+            code_from_json(json.dumps({"format": "shapeprog-code", "version": 1, "shape": [1, 2], "ids": ids}))

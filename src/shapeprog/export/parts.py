@@ -1,0 +1,157 @@
+"""The parts of a program as named meshes, and the solid they make together."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from shapeprog.errors import OutputError
+from shapeprog.geometry.scene import Scene
+from shapeprog.language.program import Program
+from shapeprog.space import Frame
+
+Vertices = npt.NDArray[np.float64]
+Faces = npt.NDArray[np.int64]
+
+_LARGEST_FAN = 400
+"""Vertices with more corners than this keep the normals of their triangles: all pairs of corners are compared."""
+
+
+@dataclass(frozen=True)
+class Part:
+    """One primitive of an unrolled program.
+
+    Parameters
+    ----------
+    name
+        Statement and number, such as ``leg_3``.
+    statement
+        Id of the statement that drew it.
+    word
+        Name of that statement.
+    block
+        Which of the program's drawing statements, in the order of the text, from 0.
+    vertices, faces
+        Watertight triangles, (V, 3) and (F, 3), counter-clockwise from outside.
+    """
+
+    name: str
+    statement: int
+    word: str
+    block: int
+    vertices: Vertices
+    faces: Faces
+
+    @property
+    def volume(self) -> float:
+        """Volume enclosed, by the divergence theorem."""
+        return float(np.linalg.det(self.vertices[self.faces]).sum() / 6)
+
+
+def parts(program: Program, frame: Frame | None = None) -> list[Part]:
+    """The parts of a program in the order they are drawn, in the world of ``frame`` (the grid by default).
+
+    Parts without volume, such as boards of zero thickness, are kept.
+    """
+    import torch
+
+    from shapeprog.language.statement import language
+    from shapeprog.language.tensors import encode
+    from shapeprog.language.unroll import unroll
+
+    scene = unroll(encode(program, dtype=torch.float64))
+    numbers: Counter[str] = Counter()
+    found = []
+    for slot, vertices, faces in _part_meshes(scene):
+        statement = int(scene.statement[slot])
+        word = language()[statement].name
+        numbers[word] += 1
+        placed = np.asarray(vertices, np.float64)
+        placed = placed if frame is None else frame.to_world(placed)
+        found.append(Part(f"{word}_{numbers[word]}", statement, word, int(scene.block[slot]), placed, faces))
+    return found
+
+
+def drawn_parts(program: Program, frame: Frame | None = None) -> list[Part]:
+    """The same, for files that must hold something.
+
+    Raises
+    ------
+    OutputError
+        If the program draws nothing.
+    """
+    found = parts(program, frame)
+    if not found:
+        raise OutputError("this program draws nothing, so there is no mesh of it", "add a statement, or save as .shape")
+    return found
+
+
+def solid(program: Program, frame: Frame | None = None) -> tuple[Vertices, Faces]:
+    """The union of all parts as one watertight mesh.
+
+    Raises
+    ------
+    OutputError
+        If nothing in the program has a volume.
+    """
+    vertices, faces = _union_mesh(parts(program))
+    if not len(faces):
+        raise OutputError("nothing in this program has a volume, so it makes no solid", "thicken its parts")
+    return (np.asarray(vertices, np.float64) if frame is None else frame.to_world(vertices)), faces
+
+
+def _part_meshes(scene: Scene) -> Iterator[tuple[int, Vertices, Faces]]:
+    from shapeprog.geometry.primitive import primitives
+
+    for slot in np.flatnonzero(scene.mask.numpy()).tolist():
+        local, faces = primitives[int(scene.kind[slot])].mesh(scene.size[slot].numpy().astype(np.float64))
+        yield slot, scene.centre[slot].numpy() + local @ scene.rotation[slot].numpy().T, faces
+
+
+def _union_mesh(each: list[Part]) -> tuple[Vertices, Faces]:
+    import manifold3d
+
+    solids = [
+        manifold3d.Manifold(manifold3d.Mesh64(part.vertices, part.faces.astype(np.uint64)))
+        for part in each
+        if part.volume > 0
+    ]
+    mesh = manifold3d.Manifold.batch_boolean(solids, manifold3d.OpType.Add).to_mesh64()
+    return np.asarray(mesh.vert_properties)[:, :3], np.asarray(mesh.tri_verts).astype(np.int64)
+
+
+def crease_normals(vertices: npt.NDArray[Any], faces: npt.NDArray[Any], angle: float = 40.0) -> Vertices:
+    """Unit normals (F, 3, 3) of the corners of every triangle: smooth across shallow edges, sharp across steep ones.
+
+    The normal of a corner is the area-weighted mean over the triangles at its vertex whose own normals are within
+    ``angle`` degrees of its triangle's.  Vertices at one place are taken as one.
+    """
+    corners = np.asarray(vertices, np.float64)[faces]
+    area = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    length = np.linalg.norm(area, axis=1, keepdims=True)
+    flat = area / np.where(length > 0, length, 1)
+    extent = float(np.ptp(vertices, axis=0).max()) if len(vertices) else 1.0
+    keys = np.rint(np.asarray(vertices, np.float64) / max(extent, 1e-30) * 1e6).astype(np.int64)
+    place = np.unique(keys, axis=0, return_inverse=True)[1].reshape(-1)[faces].reshape(-1)
+    order = np.argsort(place, kind="stable")
+    starts = np.flatnonzero(np.diff(place[order], prepend=-1))
+    counts = np.diff(starts, append=len(order))
+    group = np.repeat(np.arange(len(starts)), counts)
+    # All pairs of corners that share a place, without a loop over places.
+    repeats = np.where(counts < _LARGEST_FAN, counts, 0)[group]
+    first = np.repeat(np.arange(len(order)), repeats)
+    within = np.arange(len(first)) - np.repeat(np.cumsum(repeats) - repeats, repeats)
+    one, two = order[first], order[starts[group[first]] + within]
+    near = np.einsum("pc,pc->p", flat[one // 3], flat[two // 3]) > np.cos(np.radians(angle))
+    total = np.zeros((len(faces) * 3, 3))
+    for axis in range(3):
+        total[:, axis] = np.bincount(one[near], area[two[near] // 3, axis], minlength=len(total))
+    size = np.linalg.norm(total, axis=1, keepdims=True)
+    fallback = np.repeat(flat, 3, axis=0)
+    normals: Vertices = np.where(size > 1e-30, total / np.where(size > 1e-30, size, 1), fallback).reshape(-1, 3, 3)
+    return normals

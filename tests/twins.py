@@ -109,3 +109,16 @@ def cells(scene, resolution=SIZE):
             inside = (np.abs(local) <= size[:3]).all(-1)
         grid[inside] = 1
     return grid
+
+
+# ---------------------------------------------------------------- distances over all pairs
+
+
+def nearest_squared(queries, points):
+    """Squared distance of each query (P, 3) to the nearest point (Q, 3), by all pairs, differentiable."""
+    return ((queries[:, None] - points[None]) ** 2).sum(-1).min(1)[0]
+
+
+def chamfer(points, target):
+    """Chamfer distance of two clouds by all pairs, differentiable."""
+    return nearest_squared(points, target).mean() + nearest_squared(target, points).mean()

@@ -1,0 +1,130 @@
+"""Losses between shapes: chamfer, coverage and its reverse, occupancy, and the price of volume and of parts.
+
+All return one value for each shape of the batch.  Distances are in cells; squared ones are means, not sums.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import torch
+from jaxtyping import Float
+from torch import Tensor
+
+from shapeprog.geometry.distance import signed_distance
+from shapeprog.geometry.nearest import squared_distance
+from shapeprog.geometry.primitive import primitives
+from shapeprog.geometry.scene import Scene
+
+Cloud = Float[Tensor, "*batch P 3"]
+Weights = Float[Tensor, "*batch P"]
+Values = Float[Tensor, "*batch"]
+Grid = Float[Tensor, "*batch R R R"]
+
+
+class Chamfer(NamedTuple):
+    """The two directions of the chamfer distance and their sum.
+
+    Parameters
+    ----------
+    to_target
+        Mean squared distance of the points to the target: is what is there right?
+    from_target
+        Mean squared distance of the target to the points: is everything there?
+    """
+
+    to_target: Values
+    from_target: Values
+
+    @property
+    def total(self) -> Values:
+        """Both directions added."""
+        return self.to_target + self.from_target
+
+
+def chamfer_directions(
+    points: Cloud, target: Cloud, *, weights: Weights | None = None, target_weights: Weights | None = None
+) -> Chamfer:
+    """Both directions of the chamfer distance, as means of squared distances (..., ).
+
+    Parameters
+    ----------
+    points, target
+        Clouds in cells; they may differ in size.
+    weights, target_weights
+        How much each point counts in the mean, such as the weights of a surface sample; evenly by default.
+    """
+    forward = _mean(squared_distance(points, target), weights)
+    return Chamfer(forward, _mean(squared_distance(target, points), target_weights))
+
+
+def chamfer(
+    points: Cloud, target: Cloud, *, weights: Weights | None = None, target_weights: Weights | None = None
+) -> Values:
+    """Chamfer distance: mean squared distance to the nearest neighbour, points to target plus target to points."""
+    return chamfer_directions(points, target, weights=weights, target_weights=target_weights).total
+
+
+def coverage(scene: Scene, target: Cloud, *, surface: bool = False) -> Values:
+    """How far the target is from the union on average: the paper's coverage loss (equation of section 3.4).
+
+    A target point inside a primitive is covered and costs nothing, so alone it is minimised by one box that fills
+    everything: add :func:`excess` and a price.
+
+    Parameters
+    ----------
+    surface
+        Ask for the distance to the surface instead, so that points deep inside cost too.
+    """
+    distance = signed_distance(scene, target)
+    return (distance.abs() if surface else distance.clamp(min=0)).mean(-1)
+
+
+def excess(points: Cloud, target: Cloud, *, weights: Weights | None = None) -> Values:
+    """How far points of the prediction are from the target on average: the reverse of coverage."""
+    squared = squared_distance(points, target)
+    return _mean(torch.sqrt(squared.clamp(min=1e-12)), weights)
+
+
+def volume(scene: Scene) -> Values:
+    """Price of volume: the volumes of all primitives added, in cubic cells; overlaps are paid for twice."""
+    total = torch.zeros_like(scene.centre[..., 0])
+    for kind in torch.unique(scene.kind[scene.mask]).tolist():
+        here = scene.mask & (scene.kind == kind)
+        total = total + torch.where(here, primitives[kind].volume(scene.size), 0)
+    return total.sum(-1)
+
+
+def parts(scene: Scene, presence: Float[Tensor, "*batch N"] | None = None) -> Values:
+    """Price of parts: how many primitives there are, or are expected where ``presence`` gives their probabilities."""
+    mask = scene.mask.to(scene.size)
+    return (mask if presence is None else mask * presence).sum(-1)
+
+
+def occupancy_cross_entropy(logits: Grid, target: Grid) -> Values:
+    """Cross-entropy of soft occupancy against target cells, as a mean over cells.
+
+    Parameters
+    ----------
+    logits
+        Logits of the occupancy, see ``soft_logits``; finite for any scene that is not empty.
+    target
+        Cells, 0 or 1 or a share between.
+    """
+    logits = logits.clamp(-1e4, 1e4)
+    loss = torch.nn.functional.binary_cross_entropy_with_logits(logits, target.to(logits), reduction="none")
+    return loss.flatten(-3).mean(-1)
+
+
+def soft_iou(occupancy: Grid, target: Grid) -> Values:
+    """Intersection over union of soft cells against target cells; 1 when both are empty, exact for hard cells."""
+    target = target.to(occupancy)
+    both = (occupancy * target).flatten(-3).sum(-1)
+    either = (occupancy + target - occupancy * target).flatten(-3).sum(-1)
+    return torch.where(either > 0, both / either.clamp(min=1e-12), 1.0)
+
+
+def _mean(values: Weights, weights: Weights | None) -> Values:
+    if weights is None:
+        return values.mean(-1)
+    return (values * weights).sum(-1) / weights.sum(-1)

@@ -7,13 +7,14 @@ counts, turns and ids are discrete and carry none.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import torch
 from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
 from shapeprog.errors import ShapeProgError
-from shapeprog.geometry.primitive import primitives
+from shapeprog.geometry.primitive import SIZES, primitives
 from shapeprog.geometry.scene import Scene
 from shapeprog.language.program import Program
 from shapeprog.language.statement import EMPTY, END, Statement, language
@@ -35,25 +36,179 @@ def unroll(program: Program | Sequence[Program] | Code) -> Scene:
         If the loop counts multiply to more primitives than ``MOST_PRIMITIVES``.
     """
     code = program if isinstance(program, Code) else encode(program)
-    lead, (blocks, steps) = code.ids.shape[:-2], code.ids.shape[-2:]
-    ids = code.ids.reshape(-1, steps)
-    values = code.parameters.reshape(-1, steps, code.parameters.shape[-1])
-    row, step, copies = _copies(ids, values.detach())
-    flat = _Flat(ids, values, row, step, copies)
-    programs = 1
-    for extent in lead:
-        programs *= extent
-    scene = flat.scene(programs, max(blocks, 1))
-    return Scene(**{name: tensor.reshape(*lead, *tensor.shape[1:]) for name, tensor in vars(scene).items()})
+    return Plan(code).scene(code.parameters)
+
+
+@dataclass(frozen=True)
+class _Kind:
+    """All copies that one kind of statement draws: its declaration, their items, rows and steps."""
+
+    declared: Statement
+    item: Int[Tensor, " m"]
+    row: Int[Tensor, " m"]
+    step: Int[Tensor, " m"]
+
+
+@dataclass(frozen=True)
+class _Level:
+    """All copies, in drawing order, that one kind of loop moves at one level."""
+
+    declared: Statement
+    level: int
+    place: Int[Tensor, " m"]
+    row: Int[Tensor, " m"]
+    copy: Int[Tensor, " m"]
+    quarter: Bool[Tensor, " m"]
+
+
+class Plan:
+    """What of a batch of programs is discrete: which statement draws which copy, moved by which loops.
+
+    Made once, it renders the same programs for other continuous parameters, which is what refinement does.
+
+    Parameters
+    ----------
+    code
+        Programs (..., K, J); of their parameters only the counts are read.
+    """
+
+    def __init__(self, code: Code) -> None:
+        self._lead, (self._blocks, self._steps) = code.ids.shape[:-2], code.ids.shape[-2:]
+        ids = code.ids.reshape(-1, self._steps)
+        values = code.parameters.detach().reshape(-1, self._steps, code.parameters.shape[-1])
+        row, step, copies = _copies(ids, values)
+        self._programs = ids.shape[0] // self._blocks if self._blocks else code.ids[..., 0, 0].numel()
+        statement = ids[row].gather(-1, step[:, None])[:, 0] if len(row) else row
+        present = [language()[number] for number in torch.unique(ids).tolist() if number in language()]
+        self._kinds = []
+        for declared in present:
+            item = (statement == declared.id).nonzero()[:, 0]
+            if len(item) and not declared.is_loop:
+                self._kinds.append(_Kind(declared, item, row[item], step[item]))
+        item = torch.cat([row[:0], *(kind.item for kind in self._kinds)])
+        quarter = torch.cat([row[:0].bool(), *(torch.full_like(k.item, k.declared.quarter).bool() for k in self._kinds)])
+        self._levels = []
+        for level in reversed(range(self._steps)):
+            for declared in present:
+                place = ((ids[row[item], level] == declared.id) & (level < step[item])).nonzero()[:, 0]
+                if len(place) and declared.is_loop:
+                    here = item[place]
+                    self._levels.append(
+                        _Level(declared, level, place, row[here], copies[here, level], quarter[place])
+                    )
+        self._item, self._row, self._statement = item, row, statement
+        self._copy = torch.arange(len(row), device=row.device) - torch.searchsorted(row, row)
+
+    def scene(self, parameters: Float[Tensor, "*batch K J 7"]) -> Scene:
+        """The scenes for parameters of the same programs, with gradient."""
+        values = parameters.reshape(-1, self._steps, parameters.shape[-1])
+        if not self._kinds:
+            return self._padded(values.new_zeros(0, SIZES), values.new_zeros(0, 3), None, self._item, self._item)
+        drawn = [kind.declared.solids(values[kind.row, kind.step]) for kind in self._kinds]
+        motion = self._motion(values)
+        sizes, centres, rotations, kinds, items, orders = [], [], [], [], [], []
+        start = 0
+        turned = motion[0] is not None or any(part.rotation is not None for parts in drawn for part in parts)
+        for kind, parts in zip(self._kinds, drawn, strict=True):
+            mine = slice(start, start + len(kind.item))
+            start += len(kind.item)
+            for order, part in enumerate(parts):
+                centre, rotation = part.centre, part.rotation
+                if turned and rotation is None:
+                    rotation = torch.eye(3, device=values.device, dtype=values.dtype).expand(len(kind.item), 3, 3)
+                if motion[0] is not None:
+                    matrix = motion[0][mine]
+                    centre, rotation = (matrix @ centre[..., None])[..., 0], matrix @ rotation
+                sizes.append(part.size)
+                centres.append(centre + motion[1][mine])
+                rotations.append(rotation)
+                kinds.append(torch.full_like(kind.item, part.kind))
+                items.append(kind.item)
+                orders.append(torch.full_like(kind.item, order))
+        item, order = torch.cat(items), torch.cat(orders)
+        place = torch.argsort(item * (int(order.max()) + 1) + order)
+        rotation = torch.cat([each for each in rotations if each is not None])[place] if turned else None
+        return self._padded(torch.cat(sizes)[place], torch.cat(centres)[place], rotation, torch.cat(kinds)[place], item[place])
+
+    def _motion(self, values: Float[Tensor, "R J 7"]) -> tuple[Float[Tensor, "M 3 3"] | None, Float[Tensor, "M 3"]]:
+        """The rigid motion of each copy in drawing order: its loops composed from the innermost outwards."""
+        shift = values.new_zeros(len(self._item), 3)
+        turn: Tensor | None = None
+        axis: Tensor | None = None
+        for level in self._levels:
+            assert level.declared.move is not None
+            named = level.declared.split(values[level.row, level.level])
+            motion = level.declared.move(level.copy.to(values), level.quarter, **named)
+            if motion.turn is not None:
+                axis = self._axes(values) if axis is None else axis
+                angle = torch.zeros_like(shift[:, 0]).index_copy(0, level.place, motion.turn.detach())
+                shift = (_turned(angle) @ (shift - axis)[..., None])[..., 0] + axis
+                turn = angle if turn is None else turn + angle
+            if motion.shift is not None:
+                shift = shift.index_add(0, level.place, motion.shift)
+        return (None if turn is None else _turned(turn)), shift
+
+    def _axes(self, values: Float[Tensor, "R J 7"]) -> Float[Tensor, "M 3"]:
+        """A point at height zero on the axis about which rotation loops turn each copy, in drawing order."""
+        points = []
+        for kind in self._kinds:
+            pivot = kind.declared.pivot
+            if pivot is None:
+                points.append(values.new_zeros(len(kind.item), 3))
+            else:
+                point = pivot(**kind.declared.split(values[kind.row, kind.step]))
+                points.append(torch.cat([torch.zeros_like(point[:, :1]), point[:, 1:]], -1))
+        return torch.cat(points)
+
+    def _padded(
+        self,
+        size: Float[Tensor, "M 4"],
+        centre: Float[Tensor, "M 3"],
+        rotation: Float[Tensor, "M 3 3"] | None,
+        kind: Int[Tensor, " M"],
+        item: Int[Tensor, " M"],
+    ) -> Scene:
+        """Primitives in the order of programs, blocks and copies as padded slots (..., N)."""
+        device, dtype = size.device, size.dtype
+        row = self._row[item]
+        program = row.div(max(self._blocks, 1), rounding_mode="floor")
+        counts = torch.bincount(program, minlength=self._programs)
+        slots = int(counts.max()) if len(counts) else 0
+        first = counts.cumsum(0) - counts
+        target = program * slots + torch.arange(len(item), device=device) - first[program]
+
+        def pad(tensor: Tensor) -> Tensor:
+            if self._programs == 1:
+                return tensor.reshape(*self._lead, *tensor.shape)
+            out = torch.zeros(self._programs * slots, *tensor.shape[1:], device=device, dtype=tensor.dtype)
+            return out.index_copy(0, target, tensor).reshape(*self._lead, slots, *tensor.shape[1:])
+
+        padded_size, padded_kind = pad(size), pad(kind)
+        extents = torch.tensor([known.extents for known in primitives], device=device)[padded_kind]
+        used = torch.arange(SIZES, device=device) < extents[..., None]
+        drawable = ((padded_size.detach() >= 0) | ~used).all(-1)
+        mask = pad(torch.ones_like(item, dtype=torch.bool)) & drawable
+        identity = torch.eye(3, device=device, dtype=dtype).expand(*mask.shape, 3, 3)
+        return Scene(
+            kind=padded_kind,
+            size=padded_size,
+            centre=pad(centre),
+            rotation=identity if rotation is None else torch.where(mask[..., None, None], pad(rotation), identity),
+            mask=mask,
+            statement=pad(self._statement[item]),
+            block=pad(row % max(self._blocks, 1)),
+            copy=pad(self._copy[item]),
+        )
 
 
 def _roles(ids: Int[Tensor, "R J"]) -> tuple[Bool[Tensor, "R J"], Bool[Tensor, "R J"]]:
     """Which steps are loops and which draw."""
     known = list(language())
     top = max([END, *(declared.id for declared in known)]) + 1
-    table = torch.zeros(2, top, dtype=torch.bool, device=ids.device)
+    table = torch.zeros(2, top, dtype=torch.bool)
     for declared in known:
         table[0 if declared.is_loop else 1, declared.id] = True
+    table = table.to(ids.device)
     inside = ids.clamp(0, top - 1)
     valid = inside == ids
     return table[0][inside] & valid, table[1][inside] & valid
@@ -61,7 +216,7 @@ def _roles(ids: Int[Tensor, "R J"]) -> tuple[Bool[Tensor, "R J"], Bool[Tensor, "
 
 def _copies(
     ids: Int[Tensor, "R J"], values: Float[Tensor, "R J 7"]
-) -> tuple[Int[Tensor, " M"], Int[Tensor, " M"], Int[Tensor, " M J"]]:
+) -> tuple[Int[Tensor, " M"], Int[Tensor, " M"], Int[Tensor, "M J"]]:
     """Block row, drawing step and copy index at each loop level of every drawn copy."""
     is_loop, draws = _roles(ids)
     steps = ids.shape[-1]
@@ -102,114 +257,3 @@ def _turned(turn: Float[Tensor, "*batch"]) -> Float[Tensor, "*batch 3 3"]:
     zero, one = torch.zeros_like(turn), torch.ones_like(turn)
     entries = [one, zero, zero, zero, cos, -sin, zero, sin, cos]
     return torch.stack(entries, -1).unflatten(-1, (3, 3))
-
-
-class _Flat:
-    """All copies of all programs in one list; every step below is one pass over the kinds in use."""
-
-    def __init__(
-        self,
-        ids: Int[Tensor, "R J"],
-        values: Float[Tensor, "R J 7"],
-        row: Int[Tensor, " M"],
-        step: Int[Tensor, " M"],
-        copies: Int[Tensor, "M J"],
-    ) -> None:
-        self.row = row
-        self.copies = copies
-        self.ids = ids[row]
-        self.values = values[row]
-        self.step = step
-        self.statement = self.ids.gather(-1, step[:, None])[:, 0] if len(row) else row
-        present = torch.unique(self.ids).tolist()
-        self.declared = [language()[number] for number in present if number in language()]
-
-    def scene(self, programs: int, blocks: int) -> Scene:
-        """Draw, move and pad."""
-        drawn = [part for declared in self.declared if not declared.is_loop for part in self._draw(declared)]
-        device, dtype = self.values.device, self.values.dtype
-        if not drawn:
-            empty = torch.zeros(programs, 0, device=device, dtype=torch.long)
-            return Scene(
-                empty, torch.zeros(programs, 0, 4, device=device, dtype=dtype),
-                torch.zeros(programs, 0, 3, device=device, dtype=dtype),
-                torch.zeros(programs, 0, 3, 3, device=device, dtype=dtype), empty.bool(), empty, empty, empty,
-            )  # fmt: skip
-        item, order, kind = (torch.cat([part[i] for part in drawn]) for i in range(3))
-        size, centre, rotation = (torch.cat([part[i] for part in drawn]) for i in range(3, 6))
-        place = torch.argsort(item * len(drawn) + order)
-        item = item[place]
-        row = self.row[item]
-        program = row.div(blocks, rounding_mode="floor")
-        counts = torch.bincount(program, minlength=programs)
-        slots = int(counts.max())
-        first = counts.cumsum(0) - counts
-        target = program * slots + torch.arange(len(item), device=device) - first[program]
-
-        def pad(tensor: Tensor) -> Tensor:
-            out = torch.zeros(programs * slots, *tensor.shape[1:], device=device, dtype=tensor.dtype)
-            return out.index_copy(0, target, tensor).unflatten(0, (programs, slots))
-
-        mask = pad(torch.ones_like(item, dtype=torch.bool))
-        identity = torch.eye(3, device=device, dtype=dtype)
-        padded_size, padded_kind = pad(size[place]), pad(kind[place])
-        extents = torch.tensor([known.extents for known in primitives], device=device)[padded_kind]
-        used = torch.arange(padded_size.shape[-1], device=device) < extents[..., None]
-        mask = mask & ((padded_size.detach() >= 0) | ~used).all(-1)
-        copy = torch.arange(len(self.row), device=device) - torch.searchsorted(self.row, self.row)
-        return Scene(
-            kind=padded_kind,
-            size=padded_size,
-            centre=pad(centre[place]),
-            rotation=torch.where(mask[..., None, None], pad(rotation[place]), identity),
-            mask=mask,
-            statement=pad(self.statement[item]),
-            block=pad(row % blocks),
-            copy=pad(copy[item]),
-        )
-
-    def _draw(self, declared: Statement) -> list[tuple[Tensor, Tensor, Tensor, Tensor, Tensor, Tensor]]:
-        """Item, order, kind, size, centre and rotation of all solids that one kind of statement draws."""
-        item = (self.statement == declared.id).nonzero()[:, 0]
-        if not len(item):
-            return []
-        values = self.values[item, self.step[item]]
-        matrix, shift = self._motion(declared, item, values)
-        parts = []
-        for order, drawn in enumerate(declared.solids(values)):
-            centre, rotation = drawn.centre, drawn.rotation
-            if rotation is None:
-                rotation = torch.eye(3, device=values.device, dtype=values.dtype).expand(len(item), 3, 3)
-            if matrix is not None:
-                centre = (matrix @ centre[..., None])[..., 0]
-                rotation = matrix @ rotation
-            kind = torch.full_like(item, drawn.kind)
-            parts.append((item, torch.full_like(item, order), kind, drawn.size, centre + shift, rotation))
-        return parts
-
-    def _motion(
-        self, declared: Statement, item: Int[Tensor, " m"], values: Float[Tensor, "m 7"]
-    ) -> tuple[Float[Tensor, "m 3 3"] | None, Float[Tensor, "m 3"]]:
-        """The rigid motion of each copy: its loops composed from the innermost outwards."""
-        pivot = torch.zeros_like(values[:, :3]) if declared.pivot is None else declared.pivot(**declared.split(values))
-        axis = torch.cat([torch.zeros_like(pivot[:, :1]), pivot[:, 1:]], -1)
-        quarter = torch.full_like(item, declared.quarter, dtype=torch.bool)
-        turn: Tensor | None = None
-        shift = torch.zeros_like(axis)
-        ids, loops = self.ids[item], [known for known in self.declared if known.is_loop]
-        for level in reversed(range(self.ids.shape[-1])):
-            for known in loops:
-                here = (ids[:, level] == known.id) & (level < self.step[item])
-                if not bool(here.any()):
-                    continue
-                assert known.move is not None
-                copy = self.copies[item, level].to(values)
-                motion = known.move(copy, quarter, **known.split(self.values[item, level]))
-                if motion.turn is not None:
-                    angle = torch.where(here, motion.turn.detach(), torch.zeros_like(copy))
-                    turned = (_turned(angle) @ (shift - axis)[..., None])[..., 0] + axis
-                    shift = torch.where(here[:, None], turned, shift)
-                    turn = angle if turn is None else turn + angle
-                if motion.shift is not None:
-                    shift = torch.where(here[:, None], shift + motion.shift, shift)
-        return (None if turn is None else _turned(turn)), shift

@@ -39,7 +39,7 @@ def voxelise_mesh(vertices: Array, faces: Array, resolution: int = RESOLUTION) -
     resolution
         Cells along each side.
     """
-    from shapeprog.data.voxelise_kernels import carve, mark_boundary_sheets, mark_triangles
+    from shapeprog.data.voxelise_kernels import mark_triangles
 
     corners = np.asarray(vertices, np.float64) + resolution / 2
     triangles = np.ascontiguousarray(corners[np.asarray(faces, np.int64)].reshape(-1, 3, 3))
@@ -48,8 +48,8 @@ def voxelise_mesh(vertices: Array, faces: Array, resolution: int = RESOLUTION) -
     # Half cells that straddle the boundaries of the cells: a wall on a boundary has one clear place among them.
     barrier = np.zeros((2 * resolution + 1,) * 3, np.bool_)
     mark_triangles(2 * triangles + 0.5, 0.5 + 1e-6, barrier)
-    carve(barrier, HOLE, 1, 2, touched)
-    mark_boundary_sheets(triangles, SHRINK, touched)
+    _carve(barrier, HOLE, 1, 2, touched)
+    _mark_boundary_sheets(triangles, touched)
     return touched
 
 
@@ -68,8 +68,6 @@ def voxelise_points(points: Array, resolution: int = RESOLUTION) -> BoolArray:
     """
     from scipy.spatial import cKDTree
 
-    from shapeprog.data.voxelise_kernels import carve
-
     positions = np.asarray(points, np.float64) + resolution / 2
     touched = np.zeros((resolution,) * 3, np.bool_)
     # A point on the last boundary of the shape belongs to the shape's last cell: pulled in by a hair.
@@ -82,7 +80,7 @@ def voxelise_points(points: Array, resolution: int = RESOLUTION) -> BoolArray:
     some = positions[:: max(1, len(positions) // 2000)]
     distance, _ = cKDTree(positions).query(some, k=[min(2, len(positions))])
     spacing = float(np.median(np.asarray(distance)))
-    carve(touched.copy(), int(np.clip(np.ceil(4 * spacing), 1, 4)), 0, 1, touched)
+    _carve(touched.copy(), int(np.clip(np.ceil(4 * spacing), 1, 4)), 0, 1, touched)
     return touched
 
 
@@ -126,3 +124,35 @@ def occupied_bounds(voxels: Array) -> tuple[Array, Array]:
     if len(places) == 0:
         raise InputError("the voxel grid is empty", "give a grid in which at least one cell is occupied")
     return places.min(0), places.max(0) + 1
+
+
+def _carve(barrier: BoolArray, hole: int, start: int, stride: int, cells: BoolArray) -> None:
+    """Mark the cells that none of the six views along the axes can see (Nooruddin & Turk 2003, ray stabbing)."""
+    from shapeprog.data.voxelise_kernels import first_hits, mark_hidden
+
+    views = [first_hits(barrier, axis, reverse, hole) for axis in range(3) for reverse in (False, True)]
+    mark_hidden(np.stack(views), start, stride, cells)
+
+
+def _mark_boundary_sheets(triangles: Array, cells: BoolArray) -> None:
+    """Give a sheet that lies exactly between two layers of cells to one of them, where neither is marked yet.
+
+    The layer nearer the middle of the grid gets it, so that mirrored shapes stay mirrored and nothing grows.
+    """
+    from shapeprog.data.voxelise_kernels import mark_triangles
+
+    size = len(cells)
+    planes = np.rint(triangles[:, 0])
+    for axis in range(3):
+        flat = np.abs(triangles[:, :, axis] - planes[:, None, axis]).max(1) <= SHRINK
+        for plane in np.unique(planes[flat, axis]).astype(int):
+            near = plane if 2 * plane < size else plane - 1
+            far = 2 * plane - 1 - near
+            if not 0 <= near < size:
+                continue
+            sheet = triangles[flat & (planes[:, axis] == plane)]
+            sheet[:, :, axis] = near + 0.5
+            drawn = np.zeros_like(cells)
+            mark_triangles(sheet, 0.5 - SHRINK, drawn)
+            layers, own = np.moveaxis(cells, axis, 0), np.moveaxis(drawn, axis, 0)[near]
+            layers[near] |= own & ~layers[far] if 0 <= far < size else own

@@ -1,4 +1,6 @@
-"""Compiled loops of :mod:`shapeprog.data.voxelise`: triangles into cells, and carving from six sides.
+"""Compiled loops of :mod:`shapeprog.data.voxelise`: triangles into cells, and views from six sides.
+
+Each is compiled on its own: kernels that call each other are compiled again for every call.
 
 Coordinates are in cells with the origin at the corner of the grid, so cell ``k`` covers ``[k, k + 1]``.
 """
@@ -96,47 +98,6 @@ def mark_triangles(triangles: Array, half: float, cells: Array) -> None:
 
 
 @njit(cache=True, nogil=True)
-def mark_boundary_sheets(triangles: Array, shrink: float, cells: Array) -> None:
-    """Give a sheet that lies exactly between two layers of cells to one of them, where neither is marked yet.
-
-    The layer nearer the middle of the grid gets it, so that mirrored shapes stay mirrored and nothing grows.
-    """
-    size = cells.shape[0]
-    flat = np.zeros((1, 3, 3))
-    layer = np.zeros((size, size, size), np.bool_)
-    low = np.empty(3, np.int64)
-    high = np.empty(3, np.int64)
-    for face in range(triangles.shape[0]):
-        for axis in range(3):
-            a, b, c = triangles[face, 0, axis], triangles[face, 1, axis], triangles[face, 2, axis]
-            plane = np.rint(a)
-            if max(abs(a - plane), abs(b - plane), abs(c - plane)) > shrink:
-                continue
-            near = int(plane) if 2 * plane < size else int(plane) - 1
-            beyond = 2 * int(plane) - 1 - 2 * near  # from the near layer to the far one: -1 or +1
-            if near < 0 or near >= size:
-                continue
-            flat[0] = triangles[face]
-            flat[0, :, axis] = near + 0.5
-            mark_triangles(flat, 0.5 - shrink, layer)
-            for k in range(3):
-                low[k] = max(int(np.floor(flat[0, :, k].min())), 0)
-                high[k] = min(int(np.floor(flat[0, :, k].max())) + 1, size)
-            for i in range(low[0], high[0]):
-                for j in range(low[1], high[1]):
-                    for k in range(low[2], high[2]):
-                        if not layer[i, j, k]:
-                            continue
-                        layer[i, j, k] = False
-                        u = i + beyond if axis == 0 else i
-                        v = j + beyond if axis == 1 else j
-                        w = k + beyond if axis == 2 else k
-                        inside = 0 <= u < size and 0 <= v < size and 0 <= w < size
-                        if not (inside and cells[u, v, w]):
-                            cells[i, j, k] = True
-
-
-@njit(cache=True, nogil=True)
 def first_hits(barrier: Array, axis: int, reverse: bool, hole: int) -> Array:
     """Depth (N, N) at which rays along ``axis`` first meet the barrier, with small holes closed.
 
@@ -184,27 +145,19 @@ def first_hits(barrier: Array, axis: int, reverse: bool, hole: int) -> Array:
 
 
 @njit(cache=True, nogil=True)
-def carve(barrier: Array, hole: int, start: int, stride: int, cells: Array) -> None:
-    """Mark the cells that none of the six views along the axes can see (Nooruddin & Turk 2003, ray stabbing).
+def mark_hidden(depths: Array, start: int, stride: int, cells: Array) -> None:
+    """Mark the cells that no view sees: those behind the first hit of every one of six.
 
     Parameters
     ----------
-    barrier
-        Cells (N, N, N) that stop a ray.
-    hole
-        Widest hole in the barrier that is closed.
+    depths
+        First hits (6, N, N) of the views along axes 0, 0 reversed, 1, 1 reversed, 2 and 2 reversed.
     start, stride
-        Cell ``k`` of the output is cell ``start + stride * k`` of the barrier.
+        Cell ``k`` of the output is cell ``start + stride * k`` of the lattice of the hits.
     cells
         Output (R, R, R) of booleans, only ever set.
     """
-    size, last = cells.shape[0], barrier.shape[0] - 1
-    up = first_hits(barrier, 0, False, hole)
-    down = first_hits(barrier, 0, True, hole)
-    back = first_hits(barrier, 1, False, hole)
-    front = first_hits(barrier, 1, True, hole)
-    right = first_hits(barrier, 2, False, hole)
-    left = first_hits(barrier, 2, True, hole)
+    size, last = cells.shape[0], depths.shape[1] - 1
     for i in range(size):
         a = start + stride * i
         for j in range(size):
@@ -212,11 +165,11 @@ def carve(barrier: Array, hole: int, start: int, stride: int, cells: Array) -> N
             for k in range(size):
                 c = start + stride * k
                 if (
-                    up[b, c] <= a
-                    and down[b, c] <= last - a
-                    and back[a, c] <= b
-                    and front[a, c] <= last - b
-                    and right[a, b] <= c
-                    and left[a, b] <= last - c
+                    depths[0, b, c] <= a
+                    and depths[1, b, c] <= last - a
+                    and depths[2, a, c] <= b
+                    and depths[3, a, c] <= last - b
+                    and depths[4, a, b] <= c
+                    and depths[5, a, b] <= last - c
                 ):
                     cells[i, j, k] = True

@@ -142,15 +142,17 @@ def _mark_boundary_sheets(triangles: Array, cells: BoolArray) -> None:
     from shapeprog.data.voxelise_kernels import mark_triangles
 
     size = len(cells)
-    planes = np.rint(triangles[:, 0])
     for axis in range(3):
-        flat = np.abs(triangles[:, :, axis] - planes[:, None, axis]).max(1) <= SHRINK
-        for plane in np.unique(planes[flat, axis]).astype(int):
+        first = triangles[:, 0, axis]
+        near_one = triangles[np.abs(first - np.rint(first)) <= SHRINK]  # few are, so the rest is quick
+        planes = np.rint(near_one[:, 0, axis])
+        flat = np.abs(near_one[:, :, axis] - planes[:, None]).max(1) <= SHRINK
+        for plane in np.unique(planes[flat]).astype(int):
             near = plane if 2 * plane < size else plane - 1
             far = 2 * plane - 1 - near
             if not 0 <= near < size:
                 continue
-            sheet = triangles[flat & (planes[:, axis] == plane)]
+            sheet = near_one[flat & (planes == plane)]
             sheet[:, :, axis] = near + 0.5
             drawn = np.zeros_like(cells)
             mark_triangles(sheet, 0.5 - SHRINK, drawn)

@@ -34,8 +34,9 @@ def middle(declared: Statement) -> tuple[float, ...]:
     """Plain parameters inside the declared ranges, all different, none at a symmetric place."""
     values = []
     for slot, quantity in enumerate(declared.quantities):
-        base = {"position": -3.3, "length": 1.7, "shift": 2.9, "count": 3, "turn": 1}[quantity.kind]
-        values.append(float(base) if quantity.discrete else base + 1.3 * slot)
+        whole = {"count": 3.0, "turn": 1.0}.get(quantity.kind)
+        real = 9.7 - 1.3 * slot if quantity.kind == "length" else -3.3 + 1.3 * slot + 0.17 * slot**2
+        values.append(real if whole is None else whole)
     return tuple(values)
 
 

@@ -52,7 +52,8 @@ PINNED = [
     ),
     (
         f"for i in translate(1e9, by=(0, 0, 1)):\n    {LEG}",
-        "t.shape, line 1, column 20: count of translate is 1000000000, beyond 16777216, the end of exact whole numbers\n"
+        "t.shape, line 1, column 20: count of translate is 1000000000, beyond 16777216, "
+        "the end of exact whole numbers\n"
         "  for i in translate(1e9, by=(0, 0, 1)):\n"
         "                     ^\n"
         "  hint: it takes whole numbers from 0 to 64",

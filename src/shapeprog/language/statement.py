@@ -146,6 +146,7 @@ class Language:
                 f"statement {declared.name!r} has the paper's name {declared.paper}, which belongs to {twin.name}",
                 "leave it out; the notation then uses the statement's own name",
             )
+        _try(declared)
         self._by_id[declared.id] = declared
         self._by_name[declared.name] = declared
         return declared
@@ -211,11 +212,9 @@ def statement(
         known = language()
         number = known.free_id() if id is None else id
         parameters = _parameters(name, draw, skip=0)
-        declared = Statement(
-            name, number, _doc(name, draw), parameters, draw=draw, pivot=pivot, quarter=quarter, paper=paper
+        return known.register(
+            Statement(name, number, _doc(name, draw), parameters, draw=draw, pivot=pivot, quarter=quarter, paper=paper)
         )
-        _try(declared)
-        return known.register(declared)
 
     return register
 
@@ -271,20 +270,31 @@ def _check(declared: Statement) -> None:
 
 
 def _try(declared: Statement) -> None:
-    """Draw once with mid-range parameters, so that a wrong shape is refused now and not in the middle of a run."""
+    """Draw or move once with mid-range parameters, so that a wrong shape is refused now and not amid a run."""
+    what = "moved" if declared.is_loop else "drawn"
     try:
         values = torch.zeros(2, SLOTS)
         for slot, quantity in enumerate(declared.quantities):
             values[:, slot] = (quantity.low + quantity.high) / 2
-        drawn = declared.solids(values)
-        shapes = [(tuple(s.size.shape), tuple(s.centre.shape)) for s in drawn]
+        if declared.move is not None:
+            motion = declared.move(torch.arange(2.0), torch.zeros(2, dtype=torch.bool), **declared.split(values))
+            shapes = [(part if part is None else tuple(part.shape)) for part in (motion.turn, motion.shift)]
+            fitting = shapes[0] in (None, (2,)) and shapes[1] in (None, (2, 3))
+        else:
+            drawn = [(tuple(solids.size.shape), tuple(solids.centre.shape)) for solids in declared.solids(values)]
+            fitting = bool(drawn) and all(pair == ((2, 4), (2, 3)) for pair in drawn)
     except Exception as cause:
         raise DeclarationError(
-            f"statement {declared.name!r} cannot be drawn: {cause}",
-            "its function gets one tensor (...) or (..., width) per parameter and returns solids",
+            f"statement {declared.name!r} cannot be {what}: {cause}",
+            "its function gets one tensor (...) or (..., width) per parameter, with any leading dimensions",
         ) from cause
-    if not drawn or any(shape != ((2, 4), (2, 3)) for shape in shapes):
+    if not fitting and declared.is_loop:
         raise DeclarationError(
-            f"statement {declared.name!r} returns solids of shapes {shapes}",
+            f"loop {declared.name!r} returns a motion of shapes {shapes}",
+            "a turn must be (...) and a shift (..., 3) with the leading dimensions of the parameters",
+        )
+    if not fitting:
+        raise DeclarationError(
+            f"statement {declared.name!r} returns solids of shapes {drawn}",
             "sizes must be (..., 4) and centres (..., 3) with the leading dimensions of the parameters",
         )

@@ -6,6 +6,7 @@ counts, turns and ids are discrete and carry none.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -77,7 +78,7 @@ class Plan:
         ids = code.ids.reshape(-1, self._steps)
         values = code.parameters.detach().reshape(-1, self._steps, code.parameters.shape[-1])
         row, step, copies = _copies(ids, values)
-        self._programs = ids.shape[0] // self._blocks if self._blocks else code.ids[..., 0, 0].numel()
+        self._programs = math.prod(self._lead)
         statement = ids[row].gather(-1, step[:, None])[:, 0] if len(row) else row
         present = [language()[number] for number in torch.unique(ids).tolist() if number in language()]
         self._kinds = []
@@ -86,16 +87,16 @@ class Plan:
             if len(item) and not declared.is_loop:
                 self._kinds.append(_Kind(declared, item, row[item], step[item]))
         item = torch.cat([row[:0], *(kind.item for kind in self._kinds)])
-        quarter = torch.cat([row[:0].bool(), *(torch.full_like(k.item, k.declared.quarter).bool() for k in self._kinds)])
+        quarter = torch.cat(
+            [row[:0].bool(), *(torch.full_like(k.item, k.declared.quarter).bool() for k in self._kinds)]
+        )
         self._levels = []
         for level in reversed(range(self._steps)):
             for declared in present:
                 place = ((ids[row[item], level] == declared.id) & (level < step[item])).nonzero()[:, 0]
                 if len(place) and declared.is_loop:
                     here = item[place]
-                    self._levels.append(
-                        _Level(declared, level, place, row[here], copies[here, level], quarter[place])
-                    )
+                    self._levels.append(_Level(declared, level, place, row[here], copies[here, level], quarter[place]))
         self._item, self._row, self._statement = item, row, statement
         self._copy = torch.arange(len(row), device=row.device) - torch.searchsorted(row, row)
 
@@ -112,11 +113,11 @@ class Plan:
         for kind, parts in zip(self._kinds, drawn, strict=True):
             mine = slice(start, start + len(kind.item))
             start += len(kind.item)
-            for order, part in enumerate(parts):
+            for index, part in enumerate(parts):
                 centre, rotation = part.centre, part.rotation
-                if turned and rotation is None:
+                if rotation is None and turned:
                     rotation = torch.eye(3, device=values.device, dtype=values.dtype).expand(len(kind.item), 3, 3)
-                if motion[0] is not None:
+                if motion[0] is not None and rotation is not None:
                     matrix = motion[0][mine]
                     centre, rotation = (matrix @ centre[..., None])[..., 0], matrix @ rotation
                 sizes.append(part.size)
@@ -124,11 +125,13 @@ class Plan:
                 rotations.append(rotation)
                 kinds.append(torch.full_like(kind.item, part.kind))
                 items.append(kind.item)
-                orders.append(torch.full_like(kind.item, order))
+                orders.append(torch.full_like(kind.item, index))
         item, order = torch.cat(items), torch.cat(orders)
         place = torch.argsort(item * (int(order.max()) + 1) + order)
         rotation = torch.cat([each for each in rotations if each is not None])[place] if turned else None
-        return self._padded(torch.cat(sizes)[place], torch.cat(centres)[place], rotation, torch.cat(kinds)[place], item[place])
+        return self._padded(
+            torch.cat(sizes)[place], torch.cat(centres)[place], rotation, torch.cat(kinds)[place], item[place]
+        )
 
     def _motion(self, values: Float[Tensor, "R J 7"]) -> tuple[Float[Tensor, "M 3 3"] | None, Float[Tensor, "M 3"]]:
         """The rigid motion of each copy in drawing order: its loops composed from the innermost outwards."""

@@ -1,0 +1,222 @@
+"""Statements of a user's own: declared once they work everywhere; bad ones are refused in words and leave nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Annotated, Any
+
+import pytest
+import torch
+from declared import MODULES
+
+from shapeprog.errors import DeclarationError, InputError, ShapeProgError
+from shapeprog.geometry import Primitive, Solids, primitives
+from shapeprog.language import Language, decode, encode, loop, standard, statement, unroll, using
+from shapeprog.language.manual import manual
+from shapeprog.language.notation import format_notation, parse_notation
+from shapeprog.language.parameters import Count, Extent, Length, Position, Quantity, Shift3
+from shapeprog.language.plugins import load_statements
+from shapeprog.language.sampling import random_program
+from shapeprog.language.shapes import box
+from shapeprog.language.statement import Motion
+from shapeprog.language.text import format_program, parse
+
+
+@pytest.fixture
+def empty() -> Iterator[Language]:
+    with using(Language()) as language:
+        yield language
+
+
+def crate(at: Position, size: Extent) -> Solids:
+    """A crate."""
+    return box(at, size)
+
+
+def row(copy: torch.Tensor, quarter: torch.Tensor, count: Count, by: Shift3) -> Motion:
+    """A row."""
+    return Motion(shift=copy[..., None] * by)
+
+
+def test_a_language_without_the_built_in_library_still_works(empty: Language) -> None:
+    assert (empty.names, random_program(torch.Generator(), blocks=3).body) == ([], ())
+    statement("crate")(crate)
+    loop("row")(row)
+    assert [declared.id for declared in empty] == [22, 23]
+    program = random_program(torch.Generator().manual_seed(0), blocks=5)
+    assert parse(format_program(program)) == program
+    assert decode(encode(program)) == [program]
+    assert parse_notation(format_notation(program)) == program
+    assert int(unroll(program).mask.sum()) == program.size
+    assert "A crate." in manual("crate")
+    with pytest.raises(ShapeProgError, match="did you mean crate"):
+        manual("crates")
+
+
+def no_doc(at: Position, size: Extent) -> Solids:
+    return box(at, size)
+
+
+def no_kind(at: Position, size) -> Solids:  # type: ignore[no-untyped-def]
+    """Size has no kind."""
+    return box(at, size)
+
+
+def too_wide(at: Position, size: Extent, more: Extent) -> Solids:
+    """Nine numbers."""
+    return box(at, size)
+
+
+def wrong_shape(at: Position, size: Extent) -> Solids:
+    """Sizes of the wrong width."""
+    return Solids(0, size, at)
+
+
+def no_batch(at: Position, size: Extent) -> Solids:
+    """Forgets the leading dimensions."""
+    return box(at[0], size[0])
+
+
+def failing(at: Position, size: Length) -> Solids:
+    """Fails."""
+    return box(at, size[..., 5])
+
+
+def nothing(at: Position) -> list[Solids]:
+    """Draws nothing."""
+    return []
+
+
+def backwards(at: Annotated[torch.Tensor, Quantity("length", 3, 4, 2)]) -> Solids:
+    """A range from 4 to 2."""
+    return box(at, at)
+
+
+@pytest.mark.parametrize(
+    ("name", "options", "function", "words"),
+    [
+        ("leg", {}, crate, "'leg' is declared twice"),
+        ("crate", {"id": 1}, crate, "wants id 1, which belongs to leg"),
+        ("crate", {"id": 0}, crate, "belongs to the language itself"),
+        ("crate", {"paper": ("Leg", "Cub")}, crate, "the paper's name"),
+        ("my crate", {}, crate, "not a word of Python"),
+        ("for", {}, crate, "not a word of Python"),
+        ("crate", {}, no_doc, "no docstring"),
+        ("crate", {}, no_kind, "parameter 'size' of statement 'crate' has no kind"),
+        ("crate", {}, too_wide, "9 numbers, but a statement has 7 slots"),
+        ("crate", {}, wrong_shape, "solids of shapes"),
+        ("crate", {}, no_batch, "solids of shapes"),
+        ("crate", {}, failing, "cannot be drawn: index 5"),
+        ("crate", {}, nothing, "solids of shapes"),
+        ("crate", {}, backwards, "ends before it starts"),
+    ],
+)
+def test_bad_statements_are_refused(
+    name: str, options: dict[str, Any], function: Callable[..., Any], words: str
+) -> None:
+    before = standard.names
+    with pytest.raises(DeclarationError, match=words) as caught:
+        statement(name, **options)(function)
+    assert caught.value.hint
+    assert standard.names == before
+
+
+def still(copy: torch.Tensor, quarter: torch.Tensor, by: Shift3, count: Count) -> Motion:
+    """The count comes last."""
+    return Motion(shift=copy[..., None] * by)
+
+
+def flat(copy: torch.Tensor, quarter: torch.Tensor, count: Count, by: Shift3) -> Motion:
+    """Shifts by two numbers."""
+    return Motion(shift=copy[..., None] * by[..., :2])
+
+
+def absent(copy: torch.Tensor, quarter: torch.Tensor, count: Count) -> None:
+    """Returns nothing."""
+
+
+@pytest.mark.parametrize(
+    ("function", "words"), [(still, "no count"), (flat, "a motion of shapes"), (absent, "cannot be moved")]
+)
+def test_bad_loops_are_refused(function: Callable[..., Any], words: str) -> None:
+    with pytest.raises(DeclarationError, match=words):
+        loop("still")(function)
+
+
+def test_bad_primitives_are_refused() -> None:
+    known = primitives[0]
+    with pytest.raises(DeclarationError, match="declared twice"):
+        primitives.register(known)
+    words = {field: getattr(known, field) for field in known.__dataclass_fields__}
+    with pytest.raises(DeclarationError, match="5 sizes"):
+        primitives.register(Primitive(**{**words, "name": "big", "sizes": ("a",) * 5}))
+    with pytest.raises(DeclarationError, match="known are cuboid, cylinder"):
+        primitives.kind("sphere")
+
+
+@pytest.mark.parametrize("module", MODULES, ids=lambda path: path.stem)
+def test_the_examples_declare_in_at_most_15_lines(module: Path) -> None:
+    text = module.read_text()
+    declaration = text[text.index("@statement") :]
+    assert len(declaration.strip().splitlines()) <= 15
+    if "primitives.register" in text:
+        register = text[text.index("= primitives.register") : text.index("@statement")]
+        assert len(register.strip().splitlines()) <= 15
+
+
+def test_modules_load_into_any_language_once(empty: Language) -> None:
+    kinds = len(primitives)
+    for module in MODULES:
+        first = load_statements(module)
+        assert load_statements(str(module)) == first
+        assert all(empty[declared.name] is declared for declared in first)
+    assert len(primitives) == kinds
+    assert sorted(empty.names) == ["arch", "cone_leg", "cushion"]
+    program = random_program(torch.Generator().manual_seed(0))
+    assert parse(format_program(program)) == program
+
+
+CRATE = '''
+from shapeprog.geometry import Solids, primitives
+from shapeprog.language import statement
+from shapeprog.language.parameters import Extent, Position
+from shapeprog.language.shapes import box
+
+@statement("crate")
+def crate(at: Position, size: Extent) -> Solids:
+    """A crate."""
+    return box(at, size)
+'''
+
+TWIN = "\nimport dataclasses\nprimitives.register(dataclasses.replace(primitives[0], name='twin'))\n"
+
+
+@pytest.mark.parametrize(
+    ("code", "words"),
+    [
+        ("1 / 0", r"bad.py, line 1: ZeroDivisionError: division by zero"),
+        (f"{CRATE}{TWIN}1 / 0", r"bad.py, line 14: ZeroDivisionError"),
+        (f"{CRATE}{TWIN}raise SystemExit(3)", r"line 14: SystemExit: 3"),
+        (f"{CRATE}{CRATE}", r"line 17: statement 'crate' is declared twice"),
+        ("def (", r"line 1: SyntaxError"),
+        ("import no_such_module_anywhere", r"line 1: ModuleNotFoundError"),
+        ("x = 1", r"bad.py: .*declares no statement"),
+        ("\0", r"bad.py: .*null bytes"),
+    ],
+)
+def test_failing_modules_leave_nothing(empty: Language, tmp_path: Path, code: str, words: str) -> None:
+    kinds = len(primitives)
+    path = tmp_path / "bad.py"
+    path.write_text(code)
+    with pytest.raises(DeclarationError, match=words):
+        load_statements(path)
+    assert (empty.names, len(primitives)) == ([], kinds)
+    path.write_text(CRATE)
+    assert [declared.name for declared in load_statements(path)] == ["crate"]
+
+
+def test_missing_modules_are_named(tmp_path: Path) -> None:
+    for path in (tmp_path, tmp_path / "none.py"):
+        with pytest.raises(InputError, match=str(path)):
+            load_statements(path)

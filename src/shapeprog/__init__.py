@@ -13,12 +13,36 @@ from typing import TYPE_CHECKING, Any
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
+    from shapeprog.data import load as load_shape  # noqa: F401
     from shapeprog.data.shape import Shape as Shape
+    from shapeprog.errors import InputError as InputError
+    from shapeprog.errors import OutputError as OutputError
+    from shapeprog.errors import ProgramError as ProgramError
     from shapeprog.errors import ShapeProgError as ShapeProgError
+    from shapeprog.geometry.losses import chamfer as chamfer
     from shapeprog.geometry.scene import Scene as Scene
+    from shapeprog.inference import infer as infer
+    from shapeprog.inference import refine as refine
+    from shapeprog.language.json_form import program_from_json as program_from_json
+    from shapeprog.language.json_form import program_to_json as program_to_json
+    from shapeprog.language.notation import format_notation as format_notation
+    from shapeprog.language.notation import parse_notation as parse_notation
+    from shapeprog.language.plugins import load_statements as load_statements
     from shapeprog.language.program import Draw as Draw
     from shapeprog.language.program import Loop as Loop
     from shapeprog.language.program import Program as Program
+    from shapeprog.language.sampling import random_program as random_program
+    from shapeprog.language.statement import loop as loop
+    from shapeprog.language.statement import statement as statement
+    from shapeprog.language.statement import using as using
+    from shapeprog.language.tensors import Code as Code
+    from shapeprog.language.tensors import decode as decode
+    from shapeprog.language.tensors import encode as encode
+    from shapeprog.language.text import format_program as format_program
+    from shapeprog.language.text import load as load
+    from shapeprog.language.text import parse as parse
+    from shapeprog.language.text import save as save
+    from shapeprog.language.unroll import unroll as unroll
     from shapeprog.space import Frame as Frame
 
 _HOMES = {

@@ -1,0 +1,167 @@
+"""Conventions of the house as tests: floors of imports, no prints below the edges, everything documented."""
+
+from __future__ import annotations
+
+import ast
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import shapeprog
+
+ROOT = Path(__file__).parents[1]
+SOURCE = ROOT / "src" / "shapeprog"
+FILES = sorted(SOURCE.rglob("*.py"))
+LONGEST = 400
+
+FLOORS = {
+    "errors": 0, "files": 0, "space": 0, "geometry": 1, "language": 2, "data": 3, "models": 3,
+    "training": 4, "inference": 4, "evaluation": 4, "export": 5, "view": 5, "cli": 5, "__main__": 5,
+}  # fmt: skip
+STRANGERS = [("data", "models"), ("models", "data")]
+EDGE = 5
+HEAVY = {"torch", "numpy", "scipy", "numba", "trimesh", "manifold3d", "matplotlib", "h5py", "rich", "typer"}
+LAZY = {"trimesh", "manifold3d", "matplotlib", "mpl_toolkits", "h5py", "build123d"}
+
+
+def room_of(path: Path) -> str:
+    return path.relative_to(SOURCE).parts[0].removesuffix(".py")
+
+
+def tree_of(path: Path) -> ast.Module:
+    return ast.parse(path.read_text(encoding="utf-8"))
+
+
+def imported(node: ast.AST) -> list[str]:
+    """Full names that an import statement brings in."""
+    if isinstance(node, ast.Import):
+        return [alias.name for alias in node.names]
+    if isinstance(node, ast.ImportFrom):
+        assert node.level == 0, "imports name the package in full"
+        return [f"{node.module}.{alias.name}" for alias in node.names]
+    return []
+
+
+def place(path: Path, node: ast.AST) -> str:
+    return f"{path.relative_to(ROOT)}:{getattr(node, 'lineno', 1)}"
+
+
+def test_rooms_import_only_downwards() -> None:
+    wrong = []
+    for path in FILES:
+        room = room_of(path)
+        if room == "__init__":
+            continue
+        assert room in FLOORS, f"{path.name}: which floor is the room {room!r} on?"
+        for node in ast.walk(tree_of(path)):
+            for name in imported(node):
+                package, _, rest = name.partition(".")
+                if package != "shapeprog":
+                    continue
+                other = rest.split(".")[0]
+                above = FLOORS.get(other, 0) > FLOORS[room]
+                if above or (room, other) in STRANGERS:
+                    wrong.append(f"{place(path, node)} imports {name}")
+    assert wrong == []
+
+
+def test_rooms_on_one_floor_import_each_other_one_way_only() -> None:
+    pairs = set()
+    for path in FILES:
+        room = room_of(path)
+        for node in ast.walk(tree_of(path)):
+            for name in imported(node):
+                other = name.split(".")[1] if "." in name else ""
+                if name.startswith("shapeprog.") and other != room and FLOORS.get(other) == FLOORS.get(room):
+                    pairs.add((room, other))
+    assert [pair for pair in pairs if pair[::-1] in pairs] == []
+
+
+def test_only_the_edges_print() -> None:
+    wrong = []
+    for path in FILES:
+        if FLOORS.get(room_of(path)) == EDGE:
+            continue
+        for node in ast.walk(tree_of(path)):
+            calls = isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "print"
+            plots = any(name.split(".")[0] in ("matplotlib", "rich", "typer") for name in imported(node))
+            if calls or plots:
+                wrong.append(place(path, node))
+    assert wrong == []
+
+
+def public(body: list[ast.stmt]) -> list[ast.ClassDef | ast.FunctionDef]:
+    return [n for n in body if isinstance(n, (ast.ClassDef, ast.FunctionDef)) and not n.name.startswith("_")]
+
+
+def test_every_public_name_is_documented() -> None:
+    wrong = []
+    for path in FILES:
+        tree = tree_of(path)
+        if not ast.get_docstring(tree):
+            wrong.append(place(path, tree))
+        for node in public(tree.body):
+            inner = public(node.body) if isinstance(node, ast.ClassDef) else []
+            wrong += [f"{place(path, each)} {each.name}" for each in [node, *inner] if not ast.get_docstring(each)]
+    assert wrong == []
+
+
+def test_files_are_short() -> None:
+    long = {str(path.relative_to(ROOT)): len(path.read_text().splitlines()) for path in FILES}
+    assert {name: lines for name, lines in long.items() if lines > LONGEST} == {}
+
+
+def test_nothing_names_a_place_on_one_machine() -> None:
+    wrong = re.compile(r"""["'\s(=](/(home|root|work|tmp|usr|opt|mnt|Users)/|[A-Z]:\\\\)""")
+    files = [*FILES, *ROOT.glob("*.toml"), *ROOT.glob("*.txt"), *ROOT.glob("*.md"), ROOT / "Makefile"]
+    files += [*(ROOT / "examples").rglob("*.py"), *(ROOT / "benchmarks").rglob("*.py")]
+    assert [str(path.relative_to(ROOT)) for path in files if path.exists() and wrong.search(path.read_text())] == []
+
+
+def test_heavy_libraries_load_where_they_are_used() -> None:
+    """Readers, meshes and figures cost seconds; their modules import them inside functions."""
+    wrong = []
+    for path in FILES:
+        for node in tree_of(path).body:
+            names = {name.split(".")[0] for name in imported(node)}
+            if names & LAZY:
+                wrong.append(place(path, node))
+    assert wrong == []
+
+
+def run_python(code: str) -> str:
+    done = subprocess.run([sys.executable, "-W", "error", "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return done.stdout.strip()
+
+
+def test_importing_the_package_loads_nothing_heavy() -> None:
+    found = run_python("import sys, shapeprog; print(*{name.split('.')[0] for name in sys.modules})").split()
+    assert set(found) & HEAVY == set()
+
+
+def test_importing_the_core_loads_no_heavy_library_but_torch_and_numpy() -> None:
+    code = "import sys, shapeprog.language, shapeprog.language.text; print(*{n.split('.')[0] for n in sys.modules})"
+    assert set(run_python(code).split()) & (HEAVY | LAZY) - {"torch", "numpy"} == set()
+
+
+def test_public_names_are_found_where_they_are_said_to_be() -> None:
+    for name in shapeprog.__all__:
+        assert getattr(shapeprog, name) is not None
+        assert name in dir(shapeprog)
+    with pytest.raises(AttributeError, match="no attribute 'parser'"):
+        _ = shapeprog.parser  # type: ignore[attr-defined]
+
+
+def test_type_checkers_see_the_names_that_are_resolved_lazily() -> None:
+    imports = [node for node in ast.walk(tree_of(SOURCE / "__init__.py")) if isinstance(node, ast.ImportFrom)]
+    seen = {alias.asname for node in imports for alias in node.names if str(node.module).startswith("shapeprog.")}
+    assert seen | {"export", "__version__"} == set(shapeprog.__all__)  # export is a property of the package
+
+
+def test_the_export_function_survives_the_import_of_its_room() -> None:
+    code = "import shapeprog.export; import shapeprog as sp; print(callable(sp.export), callable(sp.parse))"
+    assert run_python(code) == "True True"

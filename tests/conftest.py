@@ -24,7 +24,8 @@ def pytest_configure(config: pytest.Config) -> None:
 
         files = [path for path in SOURCE.rglob("*.py") if not path.stem.endswith("_kernels")]  # numba compiles those
         names = [".".join(path.relative_to(SOURCE).with_suffix("").parts) for path in files]
-        install_import_hook([name for name in names if not name.endswith("__init__")], "beartype.beartype")
+        config.addinivalue_line("filterwarnings", "ignore:Do not use the `random` module")  # beartype does
+        install_import_hook([name for name in names if not name.endswith("__init__")], "typechecker.check")
 
     import torch
 

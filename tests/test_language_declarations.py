@@ -105,7 +105,7 @@ def backwards(at: Annotated[torch.Tensor, Quantity("length", 3, 4, 2)]) -> Solid
         ("crate", {}, no_doc, "no docstring"),
         ("crate", {}, no_kind, "parameter 'size' of statement 'crate' has no kind"),
         ("crate", {}, too_wide, "9 numbers, but a statement has 7 slots"),
-        ("crate", {}, wrong_shape, "solids of shapes"),
+        ("crate", {}, wrong_shape, "solids of shapes|Type-check error"),
         ("crate", {}, no_batch, "solids of shapes"),
         ("crate", {}, failing, "cannot be drawn: index 5"),
         ("crate", {}, nothing, "solids of shapes"),
@@ -137,7 +137,8 @@ def absent(copy: torch.Tensor, quarter: torch.Tensor, count: Count) -> None:
 
 
 @pytest.mark.parametrize(
-    ("function", "words"), [(still, "no count"), (flat, "a motion of shapes"), (absent, "cannot be moved")]
+    ("function", "words"),
+    [(still, "no count"), (flat, "a motion of shapes|Type-check error"), (absent, "cannot be moved")],
 )
 def test_bad_loops_are_refused(function: Callable[..., Any], words: str) -> None:
     with pytest.raises(DeclarationError, match=words):

@@ -9,22 +9,22 @@ CYLINDER = 1
 
 
 @njit(cache=True, nogil=True)
-def distance(kind, size, a, b, c):
-    """Signed distance of the local point (a, b, c) to a cuboid or a cylinder."""
-    half_up = max(size[0], 0.0)
-    if kind == CYLINDER:
+def distance(kind, size, slot, a, b, c):
+    """Signed distance of the local point (a, b, c) to the cuboid or cylinder of a slot."""
+    half_up = max(size[slot, 0], 0.0)
+    if kind[slot] == CYLINDER:
         over_up = abs(a) - half_up
-        over_side = np.sqrt(b * b + c * c) - max(size[1], 0.0)
+        over_side = np.sqrt(b * b + c * c) - max(size[slot, 1], 0.0)
     else:
-        over_side = abs(c) - max(size[2], 0.0)
-        half_depth = max(size[1], 0.0)
-        if size[3] == 0:
+        over_side = abs(c) - max(size[slot, 2], 0.0)
+        half_depth = max(size[slot, 1], 0.0)
+        if size[slot, 3] == 0:
             up, depth = abs(a) - half_up, abs(b) - half_depth
             over_up = max(up, depth)
             if over_up > 0:
                 over_up = np.sqrt(max(up, 0.0) ** 2 + max(depth, 0.0) ** 2)
         else:
-            over_up = _parallelogram(half_up, half_depth, size[3] / 2, a, b)
+            over_up = _parallelogram(half_up, half_depth, size[slot, 3] / 2, a, b)
     inner = max(over_up, over_side)
     if inner <= 0:
         return inner
@@ -51,101 +51,102 @@ def _parallelogram(half_up, half_depth, slant, up, depth):
 
 
 @njit(cache=True, nogil=True)
-def local(centre, rotation, x, y, z):
-    """A point in the local frame of a primitive."""
-    x, y, z = x - centre[0], y - centre[1], z - centre[2]
+def local(centre, rotation, slot, x, y, z):
+    """A point in the local frame of a slot."""
+    x, y, z = x - centre[slot, 0], y - centre[slot, 1], z - centre[slot, 2]
     return (
-        rotation[0, 0] * x + rotation[1, 0] * y + rotation[2, 0] * z,
-        rotation[0, 1] * x + rotation[1, 1] * y + rotation[2, 1] * z,
-        rotation[0, 2] * x + rotation[1, 2] * y + rotation[2, 2] * z,
+        rotation[slot, 0, 0] * x + rotation[slot, 1, 0] * y + rotation[slot, 2, 0] * z,
+        rotation[slot, 0, 1] * x + rotation[slot, 1, 1] * y + rotation[slot, 2, 1] * z,
+        rotation[slot, 0, 2] * x + rotation[slot, 1, 2] * y + rotation[slot, 2, 2] * z,
     )
 
 
 @njit(cache=True, nogil=True)
-def bound(kind, size, rotation, axis):
-    """Half extent along a grid axis of the box around a primitive."""
-    if kind == CYLINDER:
-        along = rotation[axis, 0]
+def bound(kind, size, rotation, slot, axis):
+    """Half extent along a grid axis of the box around the primitive of a slot."""
+    if kind[slot] == CYLINDER:
+        along = rotation[slot, axis, 0]
         across = np.sqrt(max(1 - along * along, 0.0))
-        return abs(along) * max(size[0], 0.0) + across * max(size[1], 0.0)
-    depth = max(size[1], 0.0) + abs(size[3]) / 2
+        return abs(along) * max(size[slot, 0], 0.0) + across * max(size[slot, 1], 0.0)
+    depth = max(size[slot, 1], 0.0) + abs(size[slot, 3]) / 2
     return (
-        abs(rotation[axis, 0]) * max(size[0], 0.0)
-        + abs(rotation[axis, 1]) * depth
-        + abs(rotation[axis, 2]) * max(size[2], 0.0)
+        abs(rotation[slot, axis, 0]) * max(size[slot, 0], 0.0)
+        + abs(rotation[slot, axis, 1]) * depth
+        + abs(rotation[slot, axis, 2]) * max(size[slot, 2], 0.0)
     )
 
 
 @njit(cache=True, nogil=True)
-def _exact(kind, size, rotation):
+def _exact(kind, size, rotation, slot):
     """Whether a primitive fills the box around it: a cuboid at right angles to the grid, without a shear."""
-    if kind == CYLINDER or size[3] != 0:
+    if kind[slot] == CYLINDER or size[slot, 3] != 0:
         return False
     for i in range(3):
         for j in range(3):
-            if rotation[i, j] != np.rint(rotation[i, j]):
+            if rotation[slot, i, j] != np.rint(rotation[slot, i, j]):
                 return False
     return True
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def nearest(kind, size, centre, rotation, mask, points, slots, values, begin, end):
-    """Nearest primitive and signed distance of the union for the points ``begin`` to ``end`` of all scenes.
+@njit(cache=True, nogil=True)
+def nearest(kinds, sizes, centres, rotations, masks, points, slots, values, begin, end):
+    """Nearest primitive and signed distance of the union for the points ``begin`` to ``end`` of all scenes."""
+    count = points.shape[1]
+    item = begin
+    while item < end:
+        scene, first = item // count, item % count
+        last = min(count, first + end - item)
+        _nearest_in_scene(
+            kinds[scene], sizes[scene], centres[scene], rotations[scene], masks[scene],
+            points[scene], slots[scene], values[scene], first, last,
+        )  # fmt: skip
+        item += last - first
+
+
+@njit(cache=True, nogil=True)
+def _nearest_in_scene(kind, size, centre, rotation, mask, points, slots, values, begin, end):
+    """The same for one scene.
 
     The box around a primitive bounds its signed distance from below, inside too; only primitives whose bound is
     below the best value so far are looked at closely.
     """
-    count = points.shape[1]
-    most = kind.shape[1]
-    kept = np.empty(most, np.int64)
-    full = np.empty(most, np.bool_)
-    box = np.empty((6, most), points.dtype)
-    lower = np.empty(most, points.dtype)
+    kept = np.nonzero(mask)[0]
+    used = len(kept)
+    full = np.empty(used, np.bool_)
+    box = np.empty((6, used), points.dtype)
+    lower = np.empty(used, points.dtype)
     zero = points.dtype.type(0)
-    last, used = -1, 0
+    for n in range(used):
+        full[n] = _exact(kind, size, rotation, kept[n])
+        for axis in range(3):
+            box[axis, n] = centre[kept[n], axis]
+            box[axis + 3, n] = bound(kind, size, rotation, kept[n], axis)
     for item in range(begin, end):
-        scene = item // count
-        if scene != last:
-            last, used = scene, 0
-            for slot in range(most):
-                if mask[scene, slot]:
-                    kept[used] = slot
-                    full[used] = _exact(kind[scene, slot], size[scene, slot], rotation[scene, slot])
-                    for axis in range(3):
-                        box[axis, used] = centre[scene, slot, axis]
-                        box[axis + 3, used] = bound(kind[scene, slot], size[scene, slot], rotation[scene, slot], axis)
-                    used += 1
-        x, y, z = points[scene, item % count]
         if used == 0:
-            slots[scene, item % count] = 0
-            values[scene, item % count] = np.inf
+            slots[item], values[item] = 0, np.inf
             continue
+        x, y, z = points[item, 0], points[item, 1], points[item, 2]
         for n in range(used):
             u = abs(x - box[0, n]) - box[3, n]
             v = abs(y - box[1, n]) - box[4, n]
             w = abs(z - box[2, n]) - box[5, n]
             p, q, r = max(u, zero), max(v, zero), max(w, zero)
             lower[n] = np.sqrt(p * p + q * q + r * r) + min(max(u, max(v, w)), zero)
-        first = 0
+        found = 0
         for n in range(used):
-            if lower[n] < lower[first]:
-                first = n
-        best, found = (
-            _closely(kind, size, centre, rotation, scene, kept[first], full[first], lower[first], x, y, z),
-            first,
-        )
+            if lower[n] < lower[found]:
+                found = n
+        best = float(lower[found])
+        if not full[found]:
+            a, b, c = local(centre, rotation, kept[found], x, y, z)
+            best = distance(kind, size, kept[found], a, b, c)
+        start = found
         for n in range(used):
-            if lower[n] <= best and n != first:
-                value = _closely(kind, size, centre, rotation, scene, kept[n], full[n], lower[n], x, y, z)
+            if lower[n] <= best and n != start:
+                value = float(lower[n])
+                if not full[n]:
+                    a, b, c = local(centre, rotation, kept[n], x, y, z)
+                    value = distance(kind, size, kept[n], a, b, c)
                 if value < best or (value == best and n < found):
                     best, found = value, n
-        slots[scene, item % count] = kept[found]
-        values[scene, item % count] = best
-
-
-@njit(cache=True, nogil=True)
-def _closely(kind, size, centre, rotation, scene, slot, full, lower, x, y, z):
-    if full:
-        return float(lower)
-    a, b, c = local(centre[scene, slot], rotation[scene, slot], x, y, z)
-    return distance(kind[scene, slot], size[scene, slot], a, b, c)
+        slots[item], values[item] = kept[found], best

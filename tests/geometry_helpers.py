@@ -1,0 +1,113 @@
+"""Scenes for the tests of geometry, and a primitive of a user's own."""
+
+import dataclasses
+from contextlib import contextmanager
+
+import numpy as np
+import torch
+
+from shapeprog.geometry.primitive import Primitive, primitives, safe_norm
+from shapeprog.geometry.scene import Scene
+
+
+def make_scene(kinds, sizes, centres, rotation=None, dtype=torch.float32, lead=()):
+    kind = torch.tensor([primitives.kind(k) if isinstance(k, str) else k for k in kinds], dtype=torch.long)
+    count = len(kinds)
+    size = torch.zeros(count, 4, dtype=dtype)
+    for row, values in enumerate(sizes):
+        size[row, : len(values)] = torch.tensor(values, dtype=dtype)
+    centre = torch.tensor(centres, dtype=dtype).reshape(count, 3)
+    rotation = torch.eye(3, dtype=dtype).expand(count, 3, 3) if rotation is None else rotation.to(dtype)
+    zero = torch.zeros_like(kind)
+    parts = (kind, size, centre, rotation, zero == 0, zero + 1, zero, zero)
+    return Scene(*(part.expand(*lead, *part.shape) for part in parts))
+
+
+def random_scene(seed, lead=(), slots=5, dtype=torch.float32, user=False):
+    """Turned and upright cuboids, sheared ones and cylinders; the last slot is padding."""
+    g = torch.Generator().manual_seed(seed)
+    kinds = 3 if user else 2
+    if user:
+        ellipsoid_kind()
+    kind = torch.randint(0, kinds, (*lead, slots), generator=g)
+    if user:
+        kind[..., 0] = ellipsoid_kind()
+    size = torch.rand(*lead, slots, 4, generator=g, dtype=torch.float64) * 4 + 0.5
+    size[..., 3] = torch.where(torch.rand(*lead, slots, generator=g) < 0.5, size[..., 3] - 2, 0) * (kind == 0)
+    centre = torch.rand(*lead, slots, 3, generator=g, dtype=torch.float64) * 16 - 8
+    rotation = torch.linalg.qr(torch.randn(*lead, slots, 3, 3, generator=g, dtype=torch.float64))[0]
+    upright = torch.rand(*lead, slots, generator=g) < 0.4
+    rotation = torch.where(upright[..., None, None], torch.eye(3, dtype=torch.float64), rotation)
+    mask = torch.ones(*lead, slots, dtype=torch.bool)
+    mask[..., -1] = False
+    zero = torch.zeros(*lead, slots, dtype=torch.long)
+    return Scene(kind, size.to(dtype), centre.to(dtype), rotation.to(dtype), mask, zero + 1, zero, zero)
+
+
+def require(scene, **changes):
+    return dataclasses.replace(scene, **changes)
+
+
+def with_leaves(scene):
+    """The scene with size, centre and rotation as leaves, and the leaves."""
+    leaves = [t.detach().clone().requires_grad_() for t in (scene.size, scene.centre, scene.rotation)]
+    return require(scene, size=leaves[0], centre=leaves[1], rotation=leaves[2]), leaves
+
+
+# ---------------------------------------------------------------- a primitive as a user would declare it
+
+
+def _ellipsoid_distance(points, size):
+    """Along the ray through the centre; exact for a ball."""
+    radii = size[..., :3].clamp(min=1e-6)
+    length = safe_norm(((points / radii) ** 2).sum(-1))
+    slope = safe_norm(((points / radii**2) ** 2).sum(-1))
+    deep = -radii.amin(-1)
+    return torch.where(length > 1e-6, length * (length - 1) / slope.clamp(min=1e-12), deep)
+
+
+def _ball_mesh(size):
+    import trimesh
+
+    ball = trimesh.creation.icosphere(subdivisions=3)
+    return np.asarray(ball.vertices) * size[:3], np.asarray(ball.faces, np.int64)
+
+
+def _on_ball(size, face, u):
+    side = 2 * u[..., 0] - 1
+    angle = 2 * torch.pi * u[..., 1]
+    ring = (1 - side**2).clamp(min=0).sqrt()
+    return torch.stack([side, ring * angle.cos(), ring * angle.sin()], -1)
+
+
+def _ball_normal(size, unit, face):
+    normal = unit / size[..., :3].clamp(min=1e-6)
+    return normal / safe_norm((normal**2).sum(-1, keepdim=True))
+
+
+def ellipsoid_kind():
+    """Index of the test's ellipsoid, declared on first use."""
+    name = "test_ellipsoid"
+    if name not in [each.name for each in primitives]:
+        primitives.register(
+            Primitive(
+                name, ("r_up", "r_depth", "r_side"), 3,
+                distance=_ellipsoid_distance,
+                bound=lambda size: size[..., :3],
+                areas=lambda size: 4 * torch.pi * (size[..., :3].prod(-1, keepdim=True).clamp(min=0)) ** (2 / 3),
+                sample=_on_ball,
+                place=lambda size, unit: size[..., :3] * unit,
+                normal=_ball_normal,
+                mesh=_ball_mesh,
+                volume=lambda size: 4 / 3 * torch.pi * size[..., :3].prod(-1),
+            )
+        )  # fmt: skip
+    return primitives.kind(name)
+
+
+@contextmanager
+def primitives_restored():
+    """Forget afterwards what was declared inside, so that no other test sees it."""
+    known = list(primitives)
+    yield
+    primitives._kinds[:] = known

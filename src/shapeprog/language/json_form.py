@@ -15,7 +15,7 @@ import torch
 from shapeprog.errors import InputError, ProgramError, ShapeProgError
 from shapeprog.language.program import Draw, Loop, Node, Program
 from shapeprog.language.statement import SLOTS, Statement, language
-from shapeprog.language.syntax import DEEPEST, nearest
+from shapeprog.language.syntax import DEEPEST, nearest, proper_text
 from shapeprog.language.tensors import Code
 from shapeprog.language.values import checked, written
 
@@ -118,8 +118,9 @@ def _document(text: str, name: str, wanted: str) -> dict[str, Any]:
             raise InputError(f"{name}: {twice!r} is given twice in one entry", "leave one of them out")
         return found
 
+    text = proper_text(text, name)
     try:
-        content = json.loads(text.removeprefix("\ufeff"), parse_constant=refuse, object_pairs_hook=unique)
+        content = json.loads(text, parse_constant=refuse, object_pairs_hook=unique)
     except json.JSONDecodeError as error:
         lines = text.split("\n")
         source = lines[min(error.lineno, len(lines)) - 1][:200]

@@ -15,9 +15,9 @@ from collections.abc import Iterator
 from shapeprog.errors import ProgramError, ShapeProgError
 from shapeprog.language.parameters import Parameter
 from shapeprog.language.program import Draw, Loop, Node, Program
-from shapeprog.language.published import Groups, is_published, restored
+from shapeprog.language.published import COUNT, Groups, is_published, restored
 from shapeprog.language.statement import Statement, language
-from shapeprog.language.syntax import DEEPEST, nearest
+from shapeprog.language.syntax import DEEPEST, nearest, proper_text
 from shapeprog.language.text import INDENT, variable
 from shapeprog.language.values import checked, written
 
@@ -59,6 +59,7 @@ def parse_notation(text: str, name: str = "<program>", notes: list[str] | None =
     ProgramError
         At the first place that is not in the notation.
     """
+    text = proper_text(text, name)
     lines = [(number, line) for number, line in enumerate(text.splitlines(), 1) if line.split("#")[0].strip()]
     reader = _Reader(lines, name, [] if notes is None else notes)
     return Program(reader.body(-1, 0, inside=None))
@@ -177,7 +178,7 @@ class _Reader:
                 "a line is draw(...), for(...) or end", "write draw('Leg', 'Cub', P=(_, _, _), G=(_, _, _))"
             )
         is_loop = found.re is _FOR
-        start: Groups = {"count": [float(found[1])]} if is_loop else {}
+        start: Groups = {COUNT: [float(found[1])]} if is_loop else {}
         words, groups = self._arguments(text, found, indent, start)
         declared, values = self._declared(words, groups, is_loop)
         self.next += 1
@@ -237,11 +238,11 @@ class _Reader:
         wanted = groups(declared)
         given = {_symbol(symbol, wanted): numbers for symbol, numbers in found.items()}
         for symbol in given:
-            if symbol not in wanted and symbol != "count":
+            if symbol not in wanted and symbol != COUNT:
                 raise ShapeProgError(f"{declared.name} has no group {symbol}", f"its groups are {', '.join(wanted)}")
         slots = [0.0] * declared.size
         if declared.is_loop:
-            slots[:1] = given["count"]
+            slots[:1] = given[COUNT]
         for symbol, parameters in wanted.items():
             width = sum(parameter.quantity.width for parameter in parameters)
             numbers = given.get(symbol)

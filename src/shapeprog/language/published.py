@@ -21,7 +21,11 @@ RADIUS = 1.0
 STEP = 1.0
 """Quarter turns from one copy to the next where a rotation lost its step."""
 
+COUNT = ""
+"""The group that holds the count of a loop; no name of the notation can be empty."""
+
 Groups = dict[str, list[float]]
+"""Numbers by the name of their group."""
 
 
 def is_published(words: Sequence[str], groups: Groups) -> bool:
@@ -41,8 +45,8 @@ def restored(words: Sequence[str], groups: Groups) -> tuple[str, tuple[float, ..
         If the text is not what the published printer writes.
     """
     if words == ["Rot"]:
-        count = groups["count"]
-        if set(groups) - {"count", "theta", "axis"}:
+        count = groups[COUNT]
+        if set(groups) - {COUNT, "theta", "axis"}:
             raise ShapeProgError("a rotation takes a step, or theta and axis", "write for(i<4, 'Rot', step=1)")
         note = f"the step of a rotation was not printed; taken as {shortest(STEP)} quarter turn"
         return "rotate", (*count, STEP), note

@@ -32,9 +32,27 @@ def read(text: str, name: str) -> tuple[Node, ...]:
     ProgramError
         At the first place that is not in the language.
     """
-    text = text.removeprefix("\ufeff")
+    text = proper_text(text, name)
     reader = _Reader(re.split(r"\r\n|\r|\n", text), name)
     return reader.body(reader.tree(text).body, 0)
+
+
+def proper_text(text: str, name: str) -> str:
+    """The text without its byte order mark.
+
+    Raises
+    ------
+    ProgramError
+        If it holds half characters, which no file and no terminal can show.
+    """
+    try:
+        text.encode()
+    except UnicodeEncodeError as error:
+        line = text.count("\n", 0, error.start) + 1
+        raise ProgramError(
+            "this line holds half a character", line=line, hint="is this a text file in UTF-8?", name=name
+        ) from None
+    return text.removeprefix("\ufeff")
 
 
 def nearest(word: str, known: Sequence[str]) -> str:
@@ -77,8 +95,6 @@ class _Reader:
             ) from None
         except (RecursionError, MemoryError):
             raise self._at(1, 1, "this is nested too deeply to be a program", "write plain numbers") from None
-        except ValueError:
-            raise self._at(1, 1, "this text cannot be encoded as UTF-8", "is this a text file?") from None
 
     def body(self, statements: list[ast.stmt], depth: int) -> tuple[Node, ...]:
         if depth and len(statements) == 1 and isinstance(statements[0], ast.Pass):
@@ -197,7 +213,7 @@ class _Reader:
         return self._at(node.lineno, len(before.decode(errors="replace")) + 1, message, hint)
 
     def _at(self, line: int, column: int, message: str, hint: str) -> ProgramError:
-        source = re.sub(r"[\0-\x1f]", " ", self.lines[line - 1]).encode(errors="replace").decode()
+        source = re.sub(r"[\0-\x1f]", " ", self.lines[line - 1])
         if len(source) > _WIDEST:
             source = source[:_WIDEST] if column <= _WIDEST else ""
         return ProgramError(message, line=line, column=column, source=source, hint=hint, name=self.name)

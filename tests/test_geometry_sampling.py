@@ -144,8 +144,8 @@ def test_scenes_without_a_surface_are_refused():
     scene = make_scene(["cuboid"], [[0.0, 0, 0]], [[0.0, 0, 0]])
     with pytest.raises(ShapeProgError, match="no surface"):
         sample_surface(scene, 10)
+    both = make_scene(["cuboid"], [[1.0, 1, 1]], [[0.0, 0, 0]], lead=(2,))
     with pytest.raises(ShapeProgError, match="scene 1 of 2"):
-        both = make_scene(["cuboid"], [[1.0, 1, 1]], [[0.0, 0, 0]], lead=(2,))
         sample_surface(require(both, mask=torch.tensor([[True], [False]])), 10)
     with pytest.raises(ShapeProgError, match="no surface"):
         sample_surface(make_scene([], [], []), 10)

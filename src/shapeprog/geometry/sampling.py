@@ -3,8 +3,8 @@
 Which primitive and which face a point lies on, where on the face, and whether another part hides it, is decided
 without gradient; then only its place is differentiated.
 
-*Weighting.*  Faces are chosen in proportion to their area, so a plain mean over points is the mean over the surface, but
-the choice has no gradient: growing a face moves its points and does not yet make it count for more.  Every point
+*Weighting.*  Faces are chosen in proportion to their area, so a plain mean over points is the mean over the surface,
+but the choice has no gradient: growing a face moves its points and does not yet make it count for more.  Every point
 therefore has a weight of value 1 whose gradient is that of the logarithm of the area of its face.  A mean weighted
 by it has the gradient of the mean over the surface, for faces that ``place`` stretches evenly, as those of cuboid
 and cylinder.  The line along which a part becomes hidden in another is held still.
@@ -138,9 +138,11 @@ def _by_kernel(scene: Scene, shares: Tensor, n: int, seed: int) -> _Choice:
     slot, face = (torch.empty(count, n, dtype=torch.long) for _ in range(2))
     unit, normal = (torch.empty(count, n, 3, dtype=like.dtype) for _ in range(2))
     found = torch.zeros(count, dtype=torch.long)
-    outputs = [each.numpy() for each in (slot, face, unit, normal, found)]
-    inputs = *arrays(scene), array(shares), seed, SKIN, PATIENCE * n
-    over_threads(lambda first, last: kernels.visible(*inputs, *outputs, first, last), count)
+    data = (
+        *arrays(scene), array(shares), seed, SKIN, PATIENCE * n,
+        slot.numpy(), face.numpy(), unit.numpy(), normal.numpy(), found.numpy(),
+    )  # fmt: skip
+    over_threads(lambda first, last: kernels.visible(*data, first, last), count)
     return _Choice(slot, face, unit, normal, found)
 
 
@@ -204,7 +206,7 @@ def _place(scene: Scene, slot: Tensor, unit: Tensor) -> Tensor:
     for each in torch.unique(kind).tolist():
         here = (kind == each).nonzero(as_tuple=True)
         local = local.index_put(here, primitives[each].place(size[here], unit[here]))
-    return (rotation @ local[..., None])[..., 0] + centre
+    return _turned(rotation, local) + centre
 
 
 def _draw(scene: Scene, slot: Tensor, face: Tensor, numbers: Tensor) -> tuple[Tensor, Tensor]:
@@ -215,7 +217,12 @@ def _draw(scene: Scene, slot: Tensor, face: Tensor, numbers: Tensor) -> tuple[Te
         here = (kind == each).nonzero(as_tuple=True)
         unit[here] = primitives[each].sample(size[here], face[here], numbers[here])
         normal[here] = primitives[each].normal(size[here], unit[here], face[here])
-    return unit, (rotation @ normal[..., None])[..., 0]
+    return unit, _turned(rotation, normal)
+
+
+def _turned(rotation: Tensor, vectors: Tensor) -> Tensor:
+    turned: Tensor = (rotation @ vectors[..., None])[..., 0]
+    return turned
 
 
 def _hidden(scene: Scene, slot: Tensor, points: Tensor, normals: Tensor) -> Tensor:

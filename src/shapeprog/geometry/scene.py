@@ -6,8 +6,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass, fields
 
 import torch
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Float, Int, UInt8
 from torch import Tensor
+
+from shapeprog.space import RESOLUTION
 
 
 @dataclass(frozen=True)
@@ -91,6 +93,24 @@ class Scene:
     def detach(self) -> Scene:
         """The same scene without gradient."""
         return Scene(**{field.name: getattr(self, field.name).detach() for field in fields(self)})
+
+    def sample(self, n: int, generator: torch.Generator | None = None) -> Float[Tensor, "*batch n 3"]:
+        """Points drawn uniformly by area from the visible surface, with gradient; see ``sample_surface``."""
+        from shapeprog.geometry.sampling import sample_surface
+
+        return sample_surface(self, n, generator).points
+
+    def distance(self, points: Float[Tensor, "*batch P 3"]) -> Float[Tensor, "*batch P"]:
+        """Signed distance of points to the union, with gradient; see ``signed_distance``."""
+        from shapeprog.geometry.distance import signed_distance
+
+        return signed_distance(self, points)
+
+    def voxels(self, resolution: int = RESOLUTION) -> UInt8[Tensor, "*batch R R R"]:
+        """The cells that the primitives occupy, 1 or 0; see ``occupancy.voxels``."""
+        from shapeprog.geometry.occupancy import voxels
+
+        return voxels(self, resolution)
 
     def local(self, points: Float[Tensor, "*batch P 3"]) -> Float[Tensor, "*batch P N 3"]:
         """Positions of points (P, 3) in the local frame of every slot."""

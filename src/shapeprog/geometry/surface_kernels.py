@@ -1,6 +1,6 @@
 """Kernels that draw visible surface points: choose faces by area, place points on them, drop hidden ones.
 
-They are the twins of the declared ``sample``, ``place`` and ``normal`` of cuboid and cylinder, and draw the same points.
+They are the twins of the declared ``sample``, ``place`` and ``normal`` of cuboid and cylinder: the same points.
 """
 
 from __future__ import annotations

@@ -1,0 +1,217 @@
+"""How well a program rebuilds a shape: chamfer distance, F-score, IoU and size, with every convention fixed.
+
+World frame
+    The bounding box of the target has its centre at the origin and diagonal 1.
+CD
+    Mean squared distance to the nearest neighbour, prediction to target plus target to prediction, between points
+    drawn uniformly by area from the surface of the predicted union and from the target; of the program as it is.
+F1
+    F-score of the same points at a distance of one grid cell.
+IoU
+    Cells of the program snapped to whole numbers against the touched cells of the target, at 32^3.
+Noise floor
+    The CD between two independent samplings of the target itself.
+Size
+    Blocks, statements (loops count one each) and primitives after unrolling.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import Any, Protocol
+
+import numpy as np
+import numpy.typing as npt
+import torch
+from jaxtyping import Float
+from torch import Tensor
+
+from shapeprog.data.sampling import sample_surface as sample_triangles
+from shapeprog.errors import ShapeProgError
+from shapeprog.geometry.nearest import squared_distance
+from shapeprog.geometry.occupancy import pack, packed_iou, packed_rows
+from shapeprog.geometry.sampling import sample_surface
+from shapeprog.geometry.scene import Scene
+from shapeprog.language.program import Program
+from shapeprog.language.unroll import unroll
+
+POINTS = 5000
+"""Points drawn on each of the two surfaces."""
+
+CELL = 1.0
+"""Distance in cells within which a point counts as found."""
+
+Cloud = Float[Tensor, "P 3"]
+
+
+class Target(Protocol):
+    """What a target must have; ``shapeprog.data.Shape`` does.
+
+    Positions are in the grid frame.  Where there is neither a mesh nor points, distances are not a number.
+    """
+
+    @property
+    def name(self) -> str:
+        """What it is called."""
+
+    @property
+    def voxels(self) -> npt.NDArray[np.bool_]:
+        """Touched cells (32, 32, 32)."""
+
+    @property
+    def points(self) -> npt.NDArray[np.float32] | None:
+        """Points (P, 3) uniform by area on its surface."""
+
+    @property
+    def vertices(self) -> npt.NDArray[np.float32] | None:
+        """Vertices (V, 3) of its mesh."""
+
+    @property
+    def faces(self) -> npt.NDArray[np.int32] | None:
+        """Triangles (F, 3) of its mesh."""
+
+
+@dataclass(frozen=True)
+class Metrics:
+    """The measures of one program against one target; see the module for the conventions.
+
+    Parameters
+    ----------
+    name
+        Name of the target.
+    cd, to_target, from_target, noise_floor
+        Squared world lengths, for a bounding box with diagonal 1.
+    f1
+        Share between 0 and 1.
+    iou
+        Share between 0 and 1, of the snapped program.
+    blocks, statements, primitives
+        Size of the program.
+    """
+
+    name: str
+    cd: float
+    to_target: float
+    from_target: float
+    noise_floor: float
+    f1: float
+    iou: float
+    blocks: int
+    statements: int
+    primitives: int
+
+
+@dataclass(frozen=True)
+class Summary:
+    """One measure over many shapes: mean with its standard error, median, and how many have it."""
+
+    mean: float
+    error: float
+    median: float
+    count: int
+
+
+def evaluate_program(
+    program: Program, target: Target, snapped: Program | None = None, points: int = POINTS, seed: int = 0
+) -> Metrics:
+    """Measure a program against a target.
+
+    Parameters
+    ----------
+    program
+        The program as it is; its CD and F1 are measured.  One that draws nothing has an infinite CD and F1 0.
+    target
+        The shape it should be.
+    snapped
+        The whole-numbered program whose IoU is measured; ``program`` rounded by default.
+    points
+        Points on each surface.
+    seed
+        Seed of all samplings; the same seed gives the same figures.
+    """
+    scene = unroll(program)
+    rows = packed_rows(unroll(program.snap() if snapped is None else snapped))
+    iou = float(packed_iou(rows, pack(target.voxels)))
+    to_target, from_target, f1, floor = _distances(scene, target, points, seed)
+    return Metrics(
+        name=target.name, cd=to_target + from_target, to_target=to_target, from_target=from_target,
+        noise_floor=floor, f1=f1, iou=iou, blocks=program.blocks, statements=program.statements,
+        primitives=int(scene.mask.sum()),
+    )  # fmt: skip
+
+
+def summarise(rows: Sequence[Metrics]) -> dict[str, Summary]:
+    """Mean, standard error and median of every measure over shapes; those that are not a number are left out."""
+    found = {}
+    columns: dict[str, list[Any]] = {}
+    for row in rows:
+        for name, value in asdict(row).items():
+            columns.setdefault(name, []).append(value)
+    for name, values in columns.items():
+        if name == "name":
+            continue
+        known = np.asarray(values, np.float64)
+        known = known[~np.isnan(known)]
+        count = len(known)
+        finite = bool(count) and bool(np.isfinite(known).all())
+        error = float(known.std(ddof=1) / np.sqrt(count)) if finite and count > 1 else float("nan")
+        mean, median = (float(known.mean()), float(np.median(known))) if count else (float("nan"), float("nan"))
+        found[name] = Summary(mean, error, median, count)
+    return found
+
+
+def world_scale(target: Target) -> float:
+    """World units per cell of a target whose bounding box has diagonal 1.
+
+    The box is that of its mesh, else of its points, else of its cells.
+    """
+    if target.vertices is not None and len(target.vertices):
+        span = np.ptp(np.asarray(target.vertices, np.float64), axis=0)
+    elif target.points is not None and len(target.points):
+        span = np.ptp(np.asarray(target.points, np.float64), axis=0)
+    else:
+        cells = np.argwhere(target.voxels)
+        span = np.ptp(cells, axis=0) + 1.0 if len(cells) else np.ones(3)
+    diagonal = float(np.linalg.norm(span))
+    return 1 / diagonal if diagonal > 0 else 1.0
+
+
+def target_samples(target: Target, points: int, seed: int) -> tuple[Cloud, Cloud] | None:
+    """Two independent samplings of the surface of a target, or None where it is known as cells only.
+
+    From a mesh both have ``points`` points.  Otherwise they are two halves of the points at hand, each of at most
+    ``points``: with fewer than twice as many at hand the noise floor reads too high.
+    """
+    if target.vertices is not None and target.faces is not None and len(target.faces):
+        mesh, seeds = (target.vertices, target.faces), np.random.SeedSequence(seed).generate_state(2).tolist()
+        one, two = (np.asarray(sample_triangles(*mesh, points, each), np.float64) for each in seeds)
+        return torch.from_numpy(one), torch.from_numpy(two)
+    if target.points is None or len(target.points) < 2:
+        return None
+    mixed = np.asarray(target.points, np.float64)[np.random.default_rng(seed).permutation(len(target.points))]
+    half = len(mixed) // 2
+    return torch.from_numpy(mixed[:half][:points].copy()), torch.from_numpy(mixed[half:][:points].copy())
+
+
+def _distances(scene: Scene, target: Target, points: int, seed: int) -> tuple[float, float, float, float]:
+    """Prediction to target, target to prediction, F1, and noise floor."""
+    samples = target_samples(target, points, seed)
+    if samples is None:
+        return float("nan"), float("nan"), float("nan"), float("nan")
+    square = world_scale(target) ** 2
+    floor = float(squared_distance(*samples).mean() + squared_distance(*reversed(samples)).mean()) * square
+    surface = samples[0] if target.vertices is not None and target.faces is not None else _all_points(target, points)
+    try:
+        drawn = sample_surface(scene, points, torch.Generator().manual_seed(seed)).points.double()
+    except ShapeProgError:  # nothing is drawn, or nothing that has a surface
+        return float("inf"), float("inf"), 0.0, floor
+    there, back = squared_distance(drawn, surface), squared_distance(surface, drawn)
+    precision, recall = float((there <= CELL**2).double().mean()), float((back <= CELL**2).double().mean())
+    f1 = 2 * precision * recall / (precision + recall) if precision + recall > 0 else 0.0
+    return float(there.mean()) * square, float(back.mean()) * square, f1, floor
+
+
+def _all_points(target: Target, points: int) -> Cloud:
+    assert target.points is not None
+    return torch.from_numpy(np.asarray(target.points[:points], np.float64).copy())

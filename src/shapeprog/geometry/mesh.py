@@ -1,0 +1,77 @@
+"""Triangle meshes of the parts of a scene and of their union."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from shapeprog.errors import ShapeProgError
+from shapeprog.geometry.arrays import array
+from shapeprog.geometry.primitive import primitives
+from shapeprog.geometry.scene import Scene
+
+FLAT = 1e-6
+"""A part whose box is thinner than this, in cells, has no solid to mesh and is left out."""
+
+
+class PartMesh(NamedTuple):
+    """The watertight mesh of one primitive.
+
+    Parameters
+    ----------
+    slot
+        Which slot of the scene it is.
+    vertices, faces
+        Positions (V, 3) in the grid frame and triangles (F, 3), counter-clockwise from outside.
+    """
+
+    slot: int
+    vertices: npt.NDArray[np.float64]
+    faces: npt.NDArray[np.int64]
+
+
+def part_meshes(scene: Scene) -> list[PartMesh]:
+    """A watertight mesh of every primitive of one scene, in the order of the slots; degenerate ones are left out.
+
+    Raises
+    ------
+    ShapeProgError
+        If given a batch.
+    """
+    if scene.batch_shape:
+        raise ShapeProgError(
+            f"a batch of shape {tuple(scene.batch_shape)} has no single mesh", "mesh its scenes one by one"
+        )
+    found = []
+    reach = {kind: array(primitives[kind].bound(scene.size.detach())) for kind in set(scene.kind.tolist())}
+    size, centre, rotation = (array(t.double()) for t in (scene.size, scene.centre, scene.rotation))
+    for slot, (kind, present) in enumerate(zip(scene.kind.tolist(), scene.mask.tolist(), strict=True)):
+        if not present or not (reach[kind][slot] > FLAT).all() or not np.isfinite(size[slot]).all():
+            continue
+        if primitives[kind].extents and (size[slot, : primitives[kind].extents] <= FLAT).any():
+            continue
+        vertices, faces = primitives[kind].mesh(size[slot])
+        found.append(PartMesh(slot, vertices @ rotation[slot].T + centre[slot], np.asarray(faces, np.int64)))
+    return found
+
+
+def union_mesh(scene: Scene) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.int64]]:
+    """One watertight mesh of the union of all primitives of one scene: vertices (V, 3) and triangles (F, 3).
+
+    Raises
+    ------
+    ShapeProgError
+        If the scene holds no solid part, or a batch is given.
+    """
+    from manifold3d import Manifold, Mesh, OpType
+
+    parts = part_meshes(scene)
+    if not parts:
+        raise ShapeProgError("the scene holds no solid part", "give the program a statement that draws something")
+    solids = [Manifold(Mesh(part.vertices.astype(np.float32), part.faces.astype(np.uint32))) for part in parts]
+    merged = Manifold.batch_boolean(solids, OpType.Add).to_mesh()
+    if not len(merged.tri_verts):
+        raise ShapeProgError("the union of the parts is empty", "a part may be too thin; give it some thickness")
+    return np.asarray(merged.vert_properties[:, :3], np.float64), np.asarray(merged.tri_verts, np.int64)

@@ -1,0 +1,112 @@
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+import torch
+
+from shapeprog.evaluation.metrics import Metrics, evaluate_program, summarise, target_samples, world_scale
+from shapeprog.geometry.mesh import union_mesh
+from shapeprog.geometry.occupancy import voxels
+from shapeprog.language import Draw, Loop, Program, unroll
+
+TABLE = Program(
+    (
+        Draw("top_rectangle", (8.0, 0.0, 0.0, 2.0, 9.0, 11.0)),
+        Loop(
+            "translate",
+            (2.0, 0.0, 0.0, 18.0),
+            (Loop("translate", (2.0, 0.0, 14.0, 0.0), (Draw("leg", (-10.0, -8.0, -10.0, 18.0, 2.0, 2.0)),)),),
+        ),
+    )
+)
+
+
+@dataclass(frozen=True)
+class Target:
+    name: str
+    voxels: np.ndarray
+    points: np.ndarray | None = None
+    vertices: np.ndarray | None = None
+    faces: np.ndarray | None = None
+
+
+@pytest.fixture(scope="module")
+def table():
+    scene = unroll(TABLE)
+    vertices, faces = union_mesh(scene)
+    return Target("table", voxels(scene).numpy().astype(bool), None, vertices, faces)
+
+
+def moved(program, up):
+    top = program.body[0]
+    return Program((Draw(top.name, (top.values[0] + up, *top.values[1:])), *program.body[1:]))
+
+
+def test_a_program_against_itself_reads_the_noise_floor(table):
+    row = evaluate_program(TABLE, table, points=2000)
+    assert row.iou == 1
+    assert row.f1 > 0.98
+    assert row.cd == pytest.approx(row.noise_floor, rel=0.1)
+    assert (row.blocks, row.statements, row.primitives) == (2, 4, 5)
+    assert row == evaluate_program(TABLE, table, points=2000)
+    assert row.cd != evaluate_program(TABLE, table, points=2000, seed=1).cd
+
+
+def test_the_world_has_a_bounding_box_of_diagonal_one(table):
+    diagonal = math.sqrt(20**2 + 18**2 + 22**2)
+    assert world_scale(table) == pytest.approx(1 / diagonal)
+    cells = replace(table, vertices=None, faces=None)
+    assert world_scale(cells) == pytest.approx(1 / diagonal)
+
+
+def test_distances_are_squared_world_lengths_and_a_cell_is_a_cell(table):
+    plate = Program((Draw("locker", (0.0, -6.0, -6.0, 0.0, 12.0, 12.0)),))
+    flat = np.random.default_rng(0).uniform(-6, 6, (20000, 3)) * [0, 1, 1]
+    for height, f1 in ((0.9, 1.0), (1.1, 0.0)):
+        target = Target("plate", np.zeros((32, 32, 32), bool), flat + np.array([height, 0, 0]))
+        row = evaluate_program(plate, target, points=10000)
+        assert row.to_target == pytest.approx(height**2 / 288, rel=0.02)
+        assert row.cd == pytest.approx(row.to_target + row.from_target)
+        assert row.f1 == f1
+
+
+def test_iou_is_of_the_snapped_program_and_cd_of_the_program_as_it_is(table):
+    shifted = moved(TABLE, 0.4)
+    row = evaluate_program(shifted, table, points=2000)
+    assert row.iou == 1
+    assert row.cd > 1.2 * row.noise_floor
+    assert evaluate_program(TABLE, table, snapped=moved(TABLE, 1.0), points=500).iou < 1
+
+
+def test_targets_without_a_surface_have_an_iou_only(table):
+    row = evaluate_program(TABLE, Target("cells", table.voxels))
+    assert row.iou == 1
+    assert math.isnan(row.cd)
+    assert math.isnan(row.f1)
+    assert target_samples(Target("cells", table.voxels), 10, 0) is None
+
+
+def test_a_program_that_draws_nothing_has_the_worst_figures(table):
+    row = evaluate_program(Program(()), table, points=200)
+    assert (row.iou, row.f1, row.cd) == (0, 0, math.inf)
+    assert row.primitives == 0
+
+
+def test_the_two_samplings_of_points_share_none():
+    points = torch.rand(100, 3).numpy()
+    one, two = target_samples(Target("p", np.zeros((32, 32, 32), bool), points), 80, 0)
+    assert len(one) == len(two) == 50
+    assert not set(map(tuple, one.tolist())) & set(map(tuple, two.tolist()))
+
+
+def test_summaries_state_mean_standard_error_and_median():
+    rows = [Metrics(str(i), cd, cd / 2, cd / 2, 0.0, 0.5, 0.25 * i, 1, 2, 3) for i, cd in enumerate((1.0, 2.0, 6.0))]
+    summary = summarise([*rows, Metrics("cells", *[math.nan] * 5, 0.75, 1, 2, 3)])
+    assert summary["cd"].mean == 3
+    assert summary["cd"].error == pytest.approx(math.sqrt(7 / 3))
+    assert (summary["cd"].median, summary["cd"].count) == (2, 3)
+    assert summary["iou"].count == 4
+    assert summary["blocks"].error == 0
+    assert "name" not in summary
+    assert summarise([]) == {}

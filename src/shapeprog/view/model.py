@@ -1,0 +1,119 @@
+"""What can be drawn: triangles with normals, colours and the part that each belongs to."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from shapeprog.data.shape import Shape
+from shapeprog.export.colours import colour
+from shapeprog.export.parts import Part, crease_normals
+from shapeprog.space import RESOLUTION
+
+Array = npt.NDArray[Any]
+
+INPUT_COLOUR = (212, 215, 220)
+"""Light grey of everything that was given."""
+
+MOST_POINTS = 2500
+"""Points of a cloud that are drawn, each as a small ball."""
+
+
+@dataclass(frozen=True)
+class Model:
+    """Triangles in the grid frame, ready to be drawn.
+
+    Parameters
+    ----------
+    vertices, faces
+        (V, 3) in cells and (F, 3).
+    normals
+        Unit normals (F, 3, 3) of the corners of each face; either side may be seen.
+    colours
+        Red, green, blue (F, 3) in 0 to 255.
+    group
+        The part (F,) that a face belongs to; lines are drawn between parts.
+    """
+
+    vertices: Array
+    faces: Array
+    normals: Array
+    colours: Array
+    group: Array
+
+
+def of_parts(parts: Sequence[Part]) -> Model:
+    """Parts in the colours of their statements."""
+    if not parts:
+        return _empty()
+    starts = np.cumsum([0, *(len(part.vertices) for part in parts)])
+    return Model(
+        np.concatenate([part.vertices for part in parts]),
+        np.concatenate([part.faces + start for part, start in zip(parts, starts, strict=False)]),
+        np.concatenate([crease_normals(part.vertices, part.faces) for part in parts]),
+        np.concatenate([np.tile(colour(part.statement), (len(part.faces), 1)) for part in parts]),
+        np.concatenate([np.full(len(part.faces), number) for number, part in enumerate(parts)]),
+    )
+
+
+def of_shape(shape: Shape) -> Model:
+    """An input in light grey: its mesh where there is one, else its points as small balls, else its cells."""
+    if shape.vertices is not None and shape.faces is not None and len(shape.faces):
+        return of_mesh(shape.vertices, shape.faces)
+    if shape.kind == "points" and shape.points is not None:
+        return of_points(shape.points)
+    return of_cells(shape.voxels)
+
+
+def of_mesh(vertices: Array, faces: Array) -> Model:
+    """A mesh in one colour."""
+    return _plain(np.asarray(vertices, np.float64), np.asarray(faces, np.int64))
+
+
+def of_cells(cells: Array) -> Model:
+    """Occupied cells (R, R, R): the faces between occupied and empty ones."""
+    padded = np.pad(np.asarray(cells, np.bool_), 1)
+    size = RESOLUTION / cells.shape[0]
+    corners, normals = [], []
+    for axis in range(3):
+        for sign in (-1, 1):
+            open_side = padded & ~np.roll(padded, -sign, axis)
+            place = np.argwhere(open_side).astype(np.float64) - 1
+            place[:, axis] += (sign + 1) / 2
+            one, two = np.zeros(3), np.zeros(3)
+            one[(axis + 1) % 3], two[(axis + 2) % 3] = 1, 1
+            quad = np.stack([place, place + one, place + one + two, place + two], 1)
+            corners.append(quad if sign > 0 else quad[:, ::-1])
+            normals.append(np.tile(sign * np.eye(3)[axis], (2 * len(place), 3, 1)))
+    vertices = np.concatenate(corners).reshape(-1, 3) * size - RESOLUTION / 2
+    first = 4 * np.arange(len(vertices) // 4)[:, None]
+    faces = (first + np.array([0, 1, 2, 0, 2, 3])).reshape(-1, 3)
+    return _plain(vertices, faces, np.concatenate(normals))
+
+
+def of_points(points: Array) -> Model:
+    """A cloud (P, 3) as small balls."""
+    import trimesh
+
+    kept = np.asarray(points, np.float64)
+    kept = kept[:: max(1, -(-len(kept) // MOST_POINTS))]
+    ball: Any = trimesh.creation.icosahedron()
+    unit, faces = np.asarray(ball.vertices), np.asarray(ball.faces)
+    unit = unit / np.linalg.norm(unit, axis=1, keepdims=True)
+    radius = 0.2 * np.sqrt(MOST_POINTS / max(len(kept), MOST_POINTS / 4))
+    vertices = (kept[:, None] + radius * unit).reshape(-1, 3)
+    all_faces = (len(unit) * np.arange(len(kept))[:, None, None] + faces).reshape(-1, 3)
+    return _plain(vertices, all_faces, np.tile(unit[faces], (len(kept), 1, 1)))
+
+
+def _plain(vertices: Array, faces: Array, normals: Array | None = None) -> Model:
+    shown = crease_normals(vertices, faces) if normals is None else normals
+    return Model(vertices, faces, shown, np.tile(INPUT_COLOUR, (len(faces), 1)), np.zeros(len(faces), np.int64))
+
+
+def _empty() -> Model:
+    return Model(np.zeros((0, 3)), np.zeros((0, 3), np.int64), np.zeros((0, 3, 3)), np.zeros((0, 3)), np.zeros(0))

@@ -1,0 +1,301 @@
+"""Pictures for people: input beside reconstruction beside program, and contact sheets of many."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from shapeprog.data.shape import Shape
+from shapeprog.errors import OutputError
+from shapeprog.export.colours import colour
+from shapeprog.export.parts import parts
+from shapeprog.files import atomic_path
+from shapeprog.language.program import Program
+from shapeprog.language.statement import language
+from shapeprog.view.listing import Line, listing, parted
+from shapeprog.view.model import Model, of_parts, of_shape
+from shapeprog.view.render import Image, camera_for, render
+
+if TYPE_CHECKING:
+    from PIL.ImageDraw import ImageDraw
+
+VIEW = 560
+"""Pixels along each side of one view in a picture."""
+
+SMALL = (216, 204)
+"""Width and height of one view in a contact sheet."""
+
+COLUMNS = 4
+SUFFIXES = (".png", ".jpg", ".jpeg", ".webp", ".tif", ".tiff", ".pdf")
+
+_INK, _FAINT, _RULE = (38, 40, 44), (124, 128, 136), (222, 224, 228)
+_PAD = 28
+
+
+@dataclass(frozen=True)
+class Item:
+    """One entry of a contact sheet.
+
+    Parameters
+    ----------
+    name
+        Its caption.
+    shape
+        The input, or None.
+    program
+        Its reconstruction.
+    note
+        A second line, such as the scores.
+    """
+
+    name: str
+    shape: Shape | None
+    program: Program
+    note: str = ""
+
+
+def picture(
+    shape: Shape | None,
+    program: Program,
+    path: str | os.PathLike[str],
+    *,
+    title: str = "",
+    scores: Mapping[str, float] | None = None,
+    view: int = VIEW,
+) -> Path:
+    """Draw input, reconstruction (same camera, parts coloured by statement) and program side by side.
+
+    Parameters
+    ----------
+    shape
+        The input, or None to show the program alone.
+    program
+        The reconstruction; its text is shown with numbers rounded to two decimals.
+    path
+        A file that ends in .png, .jpg, .webp, .tiff or .pdf.
+    title
+        Stands above the input; by default the name of the shape.
+    scores
+        Numbers to show below the program, such as ``{"iou": 0.93, "cd": 0.0004}``.
+    view
+        Pixels along each side of a view.
+
+    Raises
+    ------
+    OutputError
+        If the suffix is unknown or the file cannot be written.
+    """
+    target = _checked(path)
+    models = ([of_shape(shape)] if shape is not None else []) + [of_parts(parts(program))]
+    views = _views(models, view, view)
+    panel = _Panel(program, scores, int(view * 1.12), view)
+    head = 44
+    width = view * len(views) + panel.width + 2 * _PAD
+    page, draw = _sheet(width, view + head + 20)
+    names = [title or (shape.name if shape is not None else ""), "reconstruction"][-len(views) :]
+    for place, (image, name) in enumerate(zip(views, names, strict=True)):
+        _paste(page, image, place * view, head)
+        _text(draw, (place * view + view / 2, 16), _cut(name, 46), 19, _FAINT, anchor="ma")
+    panel.draw(draw, view * len(views) + _PAD, head)
+    _save(page, target)
+    return target
+
+
+def contact_sheet(
+    items: Sequence[Item], path: str | os.PathLike[str], *, columns: int = COLUMNS, title: str = ""
+) -> Path:
+    """Draw many reconstructions beside their inputs, with a legend of the statements in use.
+
+    Raises
+    ------
+    OutputError
+        If there is nothing to show, the suffix is unknown or the file cannot be written.
+    """
+    target = _checked(path)
+    if not items:
+        raise OutputError("there is nothing to put on the contact sheet", "name a folder that holds programs")
+    wide, tall = SMALL
+    across = min(columns, len(items))
+    cell, row = 2 * wide + _PAD, tall + 52
+    drawn = [_pair(item) for item in items]
+    words = sorted({statement for _, _, used in drawn for statement in used})
+    width = across * cell + _PAD
+    legend = _legend_rows(words, width - 2 * _PAD)
+    head = (54 if title else 14) + 30 * len(legend)
+    page, draw = _sheet(width, head + row * -(-len(items) // across) + 8)
+    if title:
+        _text(draw, (_PAD, 16), title, 22, _INK, bold=True)
+    for line, entries in enumerate(legend):
+        for offset, statement in entries:
+            _swatch(draw, _PAD + offset, head - 30 * (len(legend) - line) + 4, 13, statement)
+            corner = (_PAD + offset + 20, head - 30 * (len(legend) - line))
+            _text(draw, corner, language()[statement].name, 15, _INK)
+    for number, (item, (left, right, _)) in enumerate(zip(items, drawn, strict=True)):
+        x, y = _PAD + number % across * cell, head + number // across * row
+        for offset, image in ((0, left), (wide, right)):
+            if image is not None:
+                _paste(page, image, x + offset, y)
+        _text(draw, (x + wide, y + tall + 2), _cut(item.name, 44), 14, _INK, anchor="ma", bold=True)
+        _text(draw, (x + wide, y + tall + 21), _cut(item.note, 56), 13, _FAINT, anchor="ma")
+    _save(page, target)
+    return target
+
+
+class _Panel:
+    """The program as text, fitted into a column."""
+
+    def __init__(self, program: Program, scores: Mapping[str, float] | None, width: int, height: int) -> None:
+        self.lines = listing(program)
+        self.scores = scores_text(scores, program)
+        self.width, self.height = width, height
+
+    def draw(self, draw: ImageDraw, x: int, y: int) -> None:
+        room = self.height - 84
+        longest = max((len(line.text) for line in self.lines), default=1)
+        size = int(max(9, min(17, (self.width - 30) / longest / 0.602, room / max(len(self.lines), 1) / 1.5)))
+        step = int(size * 1.55)
+        fits = max(1, room // step)
+        shown = self.lines if len(self.lines) <= fits else self.lines[: fits - 1]
+        top = y + max(0, (room - step * len(self.lines)) // 2)
+        advance = _font(size, "Mono").getlength("m" * 10) / 10
+        most = int((self.width - 30) / advance)
+        for number, line in enumerate(shown):
+            place = (x + 24, top + number * step)
+            if line.statement is not None:
+                _swatch(draw, x, place[1] + size * 0.28, int(size * 0.72), line.statement)
+            _line(draw, place, line, size, advance, most)
+        if len(shown) < len(self.lines):
+            left = f"... and {len(self.lines) - len(shown)} more lines"
+            _text(draw, (x + 24, top + len(shown) * step), left, size, _FAINT, face="Mono")
+        foot = y + self.height - 62
+        draw.line([(x, foot), (x + self.width - 8, foot)], fill=_RULE, width=1)
+        for number, text in enumerate(self.scores):
+            _text(draw, (x, foot + 12 + 24 * number), text, 16, _INK if number == 0 else _FAINT)
+
+
+def scores_text(scores: Mapping[str, float] | None, program: Program) -> list[str]:
+    """Scores and size of a program as one or two short lines."""
+    size = f"{program.blocks} blocks · {program.statements} statements · {program.size} primitives"
+    if not scores:
+        return [size]
+    labels = {"iou": "IoU", "cd": "CD", "f1": "F1", "seconds": "time"}
+    words = []
+    for key, label in labels.items():
+        if key in scores and np.isfinite(scores[key]):
+            value = scores[key]
+            text = {"cd": f"{value:.5f}", "seconds": f"{value:.1f} s"}.get(key, f"{value:.3f}")
+            words.append(f"{label} {text}")
+    return [" · ".join(words), size] if words else [size]
+
+
+def _views(models: Sequence[Model], width: int, height: int) -> list[Image]:
+    """One view of each model from the same camera; kernels hold no lock, so threads help."""
+    camera = camera_for(models, width / height)
+    with ThreadPoolExecutor(2) as pool:
+        return list(pool.map(lambda model: render(model, camera, width, height), models))
+
+
+def _pair(item: Item) -> tuple[Image | None, Image, set[int]]:
+    drawn = parts(item.program)
+    models = ([of_shape(item.shape)] if item.shape is not None else []) + [of_parts(drawn)]
+    views = _views(models, *SMALL)
+    return (views[0] if len(views) > 1 else None), views[-1], {part.statement for part in drawn}
+
+
+def _legend_rows(words: Sequence[int], width: int) -> list[list[tuple[int, int]]]:
+    rows: list[list[tuple[int, int]]] = [[]]
+    offset = 0
+    for statement in words:
+        wide = int(_font(15).getlength(language()[statement].name)) + 44
+        if offset and offset + wide > width:
+            rows.append([])
+            offset = 0
+        rows[-1].append((offset, statement))
+        offset += wide
+    return rows
+
+
+def _line(draw: ImageDraw, place: tuple[float, float], line: Line, size: int, advance: float, most: int) -> None:
+    before, word, after = parted(line)
+    x, y = place
+    if len(line.text) > most:
+        after = after[: max(0, most - len(before) - len(word) - 1)] + "…"
+    shade = _FAINT if line.statement is None else readable(line.statement)
+    _text(draw, (x, y), before, size, _FAINT, face="Mono")
+    _text(draw, (x + advance * len(before), y), word, size, shade, face="Mono", bold=line.statement is not None)
+    _text(draw, (x + advance * (len(before) + len(word)), y), after, size, _INK, face="Mono")
+
+
+def readable(statement: int) -> tuple[int, int, int]:
+    """The colour of a statement, dark enough for text on white."""
+    red, green, blue = colour(statement)
+    light = (0.3 * red + 0.59 * green + 0.11 * blue) / 255
+    scale = min(1.0, 0.46 / max(light, 1e-6))
+    return (int(red * scale), int(green * scale), int(blue * scale))
+
+
+@lru_cache(maxsize=64)
+def _font(size: int, face: str = "", bold: bool = False) -> Any:
+    from PIL import ImageFont
+
+    found = importlib.util.find_spec("matplotlib")
+    assert found is not None
+    assert found.submodule_search_locations
+    folder = Path(found.submodule_search_locations[0]) / "mpl-data" / "fonts" / "ttf"
+    return ImageFont.truetype(str(folder / f"DejaVuSans{face}{'-Bold' if bold else ''}.ttf"), size)
+
+
+def _text(
+    draw: ImageDraw,
+    place: tuple[float, float],
+    text: str,
+    size: int,
+    fill: tuple[int, int, int],
+    *,
+    face: str = "",
+    bold: bool = False,
+    anchor: str = "la",
+) -> None:
+    draw.text(place, text, font=_font(size, face, bold), fill=fill, anchor=anchor)
+
+
+def _swatch(draw: ImageDraw, x: float, y: float, size: int, statement: int) -> None:
+    draw.rounded_rectangle([x, y, x + size, y + size], 3, fill=colour(statement))
+
+
+def _cut(text: str, most: int) -> str:
+    return text if len(text) <= most else text[: most - 1] + "…"
+
+
+def _sheet(width: int, height: int) -> tuple[Any, ImageDraw]:
+    from PIL import Image as Pillow
+    from PIL import ImageDraw as Drawing
+
+    page = Pillow.new("RGB", (width, height), "white")
+    return page, Drawing.Draw(page)
+
+
+def _paste(page: Any, image: Image, x: int, y: int) -> None:
+    from PIL import Image as Pillow
+
+    page.paste(Pillow.fromarray(image), (x, y))
+
+
+def _checked(path: str | os.PathLike[str]) -> Path:
+    target = Path(path)
+    if target.suffix.lower() not in SUFFIXES:
+        raise OutputError(f"no picture ends in {target.suffix!r}", f"known are {' '.join(SUFFIXES)}")
+    return target
+
+
+def _save(page: Any, target: Path) -> None:
+    with atomic_path(target) as temporary:
+        page.save(temporary)

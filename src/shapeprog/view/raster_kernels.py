@@ -1,0 +1,231 @@
+"""Loops over triangles and pixels: nearest triangle per pixel, depth seen from lights, light that arrives.
+
+Serial and without the interpreter lock, so that two views can be drawn in two threads.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+BACKGROUND = -1
+"""Face of a pixel that shows the ground."""
+
+
+@njit(cache=True, nogil=True, inline="always")
+def _span(wb, wc, step_b, step_c, first, last):  # type: ignore[no-untyped-def]
+    """The pixels of a row, from ``first`` to ``last``, whose three weights are not negative; weights are given at 0."""
+    low, high = float(first), float(last)
+    for weight, step in ((wb, step_b), (wc, step_c), (1 - wb - wc, -step_b - step_c)):
+        weight += 1e-9
+        if step > 1e-15:
+            low = max(low, -weight / step)
+        elif step < -1e-15:
+            high = min(high, -weight / step)
+        elif weight < 0:
+            return 1, 0
+    return math.ceil(low), math.floor(high)
+
+
+@njit(cache=True, nogil=True)
+def nearest_faces(points, faces, width, height, tolerance):  # type: ignore[no-untyped-def]
+    """Face and inverse depth of every pixel; of faces in one place the first in the list shows.
+
+    ``points`` (V, 3) are pixel coordinates and inverse depth, which is linear across the screen.
+    """
+    face = np.full((height, width), BACKGROUND, np.int32)
+    depth = np.zeros((height, width), np.float64)
+    for f in range(len(faces)):
+        a, b, c = points[faces[f, 0]], points[faces[f, 1]], points[faces[f, 2]]
+        area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+        if abs(area) < 1e-12:
+            continue
+        left = max(0, math.ceil(min(a[0], b[0], c[0]) - 0.5))
+        right = min(width - 1, math.floor(max(a[0], b[0], c[0]) - 0.5))
+        low = max(0, math.ceil(min(a[1], b[1], c[1]) - 0.5))
+        high = min(height - 1, math.floor(max(a[1], b[1], c[1]) - 0.5))
+        step_b, step_c = (c[1] - a[1]) / area, (a[1] - b[1]) / area
+        slope = step_b * (b[2] - a[2]) + step_c * (c[2] - a[2])
+        for y in range(low, high + 1):
+            wb = ((0.5 - a[0]) * (c[1] - a[1]) - (y + 0.5 - a[1]) * (c[0] - a[0])) / area
+            wc = ((b[0] - a[0]) * (y + 0.5 - a[1]) - (b[1] - a[1]) * (0.5 - a[0])) / area
+            first, last = _span(wb, wc, step_b, step_c, left, right)
+            start = a[2] + wb * (b[2] - a[2]) + wc * (c[2] - a[2])
+            for x in range(first, last + 1):
+                near = start + x * slope
+                if near > depth[y, x] * (1 + tolerance):
+                    depth[y, x] = near
+                    face[y, x] = f
+    return face, depth
+
+
+@njit(cache=True, nogil=True)
+def light_maps(vertices, faces, frames, size, radius):  # type: ignore[no-untyped-def]
+    """For each light the height of the highest surface below it, seen along its direction: (L, size, size).
+
+    ``frames`` (L, 3, 3) hold two axes across the light and the direction towards it as rows; ``radius`` is half the
+    side of the square that a map covers.
+    """
+    maps = np.full((len(frames), size, size), -1e9, np.float32)
+    scale = size / (2 * radius)
+    placed = np.empty((len(vertices), 3))
+    for light in range(len(frames)):
+        frame = frames[light]
+        for v in range(len(vertices)):
+            for axis in range(3):
+                placed[v, axis] = (
+                    frame[axis, 0] * vertices[v, 0] + frame[axis, 1] * vertices[v, 1] + frame[axis, 2] * vertices[v, 2]
+                )
+            placed[v, 0] = (placed[v, 0] + radius) * scale
+            placed[v, 1] = (placed[v, 1] + radius) * scale
+        depth = maps[light]
+        for f in range(len(faces)):
+            a, b, c = placed[faces[f, 0]], placed[faces[f, 1]], placed[faces[f, 2]]
+            area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+            if abs(area) < 1e-12:
+                continue
+            left = max(0, math.ceil(min(a[0], b[0], c[0]) - 0.5))
+            right = min(size - 1, math.floor(max(a[0], b[0], c[0]) - 0.5))
+            low = max(0, math.ceil(min(a[1], b[1], c[1]) - 0.5))
+            high = min(size - 1, math.floor(max(a[1], b[1], c[1]) - 0.5))
+            step_b, step_c = (c[1] - a[1]) / area, (a[1] - b[1]) / area
+            slope = step_b * (b[2] - a[2]) + step_c * (c[2] - a[2])
+            for y in range(low, high + 1):
+                wb = ((0.5 - a[0]) * (c[1] - a[1]) - (y + 0.5 - a[1]) * (c[0] - a[0])) / area
+                wc = ((b[0] - a[0]) * (y + 0.5 - a[1]) - (b[1] - a[1]) * (0.5 - a[0])) / area
+                first, last = _span(wb, wc, step_b, step_c, left, right)
+                start = a[2] + wb * (b[2] - a[2]) + wc * (c[2] - a[2])
+                for x in range(first, last + 1):
+                    depth[y, x] = max(depth[y, x], start + x * slope)
+    return maps
+
+
+@njit(cache=True, nogil=True)
+def surface(face, depth, points, faces, normals, eye, corner, across, down, ground):  # type: ignore[no-untyped-def]
+    """Position and normal towards the eye of every pixel; pixels without a face lie on the ground.
+
+    The ray of pixel (x, y) is ``corner + x * across + y * down``; depth is inverse, along the axis of view.
+    """
+    height, width = face.shape
+    position = np.empty((height, width, 3), np.float32)
+    normal = np.empty((height, width, 3), np.float32)
+    ray, here = np.empty(3), np.empty(3)
+    for y in range(height):
+        for x in range(width):
+            px, py = x + 0.5, y + 0.5
+            for axis in range(3):
+                ray[axis] = corner[axis] + px * across[axis] + py * down[axis]
+            f = face[y, x]
+            if f == BACKGROUND:
+                along = (ground - eye[0]) / ray[0] if ray[0] < -1e-6 else 1e6
+                for axis in range(3):
+                    position[y, x, axis] = eye[axis] + along * ray[axis]
+                    normal[y, x, axis] = 1.0 if axis == 0 else 0.0
+                continue
+            a, b, c = points[faces[f, 0]], points[faces[f, 1]], points[faces[f, 2]]
+            area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+            wb = ((px - a[0]) * (c[1] - a[1]) - (py - a[1]) * (c[0] - a[0])) / area * b[2]
+            wc = ((b[0] - a[0]) * (py - a[1]) - (b[1] - a[1]) * (px - a[0])) / area * c[2]
+            wa = depth[y, x] - wb - wc
+            length, facing = 0.0, 0.0
+            for axis in range(3):
+                position[y, x, axis] = eye[axis] + ray[axis] / depth[y, x]
+                here[axis] = (wa * normals[f, 0, axis] + wb * normals[f, 1, axis] + wc * normals[f, 2, axis]) / depth[
+                    y, x
+                ]
+                length += here[axis] ** 2
+                facing += here[axis] * ray[axis]
+            scale = (-1.0 if facing > 0 else 1.0) / max(math.sqrt(length), 1e-12)
+            for axis in range(3):
+                normal[y, x, axis] = here[axis] * scale
+    return position, normal
+
+
+@njit(cache=True, nogil=True)
+def irradiance(position, normal, skip, maps, frames, weights, radius, samples, bias):  # type: ignore[no-untyped-def]
+    """Share of the light of the sky that arrives at every pixel that is not to be skipped.
+
+    Each of the ``samples`` x ``samples`` pixels that are averaged later asks another share of the lights.
+    """
+    height, width, _ = position.shape
+    lit = np.zeros((height, width), np.float32)
+    shares = samples * samples
+    size = maps.shape[1]
+    scale = size / (2 * radius)
+    for y in range(height):
+        for x in range(width):
+            if skip[y, x] < 0:
+                continue
+            p, n = position[y, x], normal[y, x]
+            arrived = 0.0
+            for light in range((y % samples) * samples + x % samples, len(frames), shares):
+                frame = frames[light]
+                slope = frame[2, 0] * n[0] + frame[2, 1] * n[1] + frame[2, 2] * n[2]
+                if slope <= 0:
+                    continue
+                shift = bias * (1.1 - slope)
+                q0, q1, q2 = p[0] + shift * n[0], p[1] + shift * n[1], p[2] + shift * n[2]
+                u = int((frame[0, 0] * q0 + frame[0, 1] * q1 + frame[0, 2] * q2 + radius) * scale)
+                v = int((frame[1, 0] * q0 + frame[1, 1] * q1 + frame[1, 2] * q2 + radius) * scale)
+                if 0 <= u < size and 0 <= v < size:
+                    high = frame[2, 0] * q0 + frame[2, 1] * q1 + frame[2, 2] * q2
+                    if maps[light, v, u] > high + bias:
+                        continue
+                arrived += weights[light] * slope
+            lit[y, x] = arrived * shares
+    return lit
+
+
+@njit(cache=True, nogil=True)
+def edges(face, groups, position, normal, reach, gap):  # type: ignore[no-untyped-def]
+    """Lines to draw: 2 where another part or the ground begins or the surface jumps, 1 at creases, 0 elsewhere."""
+    height, width = face.shape
+    out = np.zeros((height, width), np.uint8)
+    for y in range(height):
+        for x in range(width):
+            mine, found = face[y, x], 0
+            for dy in range(-reach, reach + 1):
+                for dx in range(-reach, reach + 1):
+                    yy, xx = y + dy, x + dx
+                    if dx * dx + dy * dy > reach * reach + 0.5 or found == 2:
+                        continue
+                    if yy < 0 or xx < 0 or yy >= height or xx >= width or face[yy, xx] == mine:
+                        continue
+                    other = face[yy, xx]
+                    if other < 0 or mine < 0 or groups[other] != groups[mine]:
+                        found = 2
+                        continue
+                    cosine, off, away = 0.0, 0.0, 0.0
+                    for axis in range(3):
+                        step = position[yy, xx, axis] - position[y, x, axis]
+                        cosine += normal[y, x, axis] * normal[yy, xx, axis]
+                        off += step * normal[y, x, axis]
+                        away += step * normal[yy, xx, axis]
+                    if abs(off) > gap and abs(away) > gap:
+                        found = 2
+                    elif cosine < 0.8:
+                        found = max(found, 1)
+            out[y, x] = found
+    return out
+
+
+@njit(cache=True, nogil=True)
+def develop(face, colours, lit, lines, inks, ambient, ground, samples):  # type: ignore[no-untyped-def]
+    """Mean linear colour of every square of samples; ``ground`` is the brightness where no face is."""
+    height, width = ground.shape
+    out = np.zeros((height, width, 3), np.float32)
+    for y in range(height * samples):
+        for x in range(width * samples):
+            f, line = face[y, x], lines[y, x]
+            row, column = y // samples, x // samples
+            if f < 0:
+                shade = ground[row, column] * (inks[3] if line == 2 else 1.0)
+                for channel in range(3):
+                    out[row, column, channel] += shade
+                continue
+            shade = (ambient + (1 - ambient) * lit[y, x]) * inks[line]
+            for channel in range(3):
+                out[row, column, channel] += colours[f, channel] * shade
+    return out / (samples * samples)

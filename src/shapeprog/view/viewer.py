@@ -1,0 +1,100 @@
+"""An interactive view as one self-contained HTML file: turn the shape, and see which line draws which part."""
+
+from __future__ import annotations
+
+import base64
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from shapeprog.data.shape import Shape
+from shapeprog.export.colours import colour
+from shapeprog.export.parts import crease_normals, parts
+from shapeprog.files import write_text
+from shapeprog.language.program import Program
+from shapeprog.view.listing import listing, parted
+from shapeprog.view.model import of_shape
+from shapeprog.view.page import readable, scores_text
+from shapeprog.view.template import HTML
+
+Array = npt.NDArray[Any]
+
+_TO_PAGE = np.array([[0.0, 0.0, -1.0], [1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
+"""From up, depth, left-right to the page's right, up, towards the viewer."""
+
+
+def viewer(
+    program: Program, path: str | os.PathLike[str], *, shape: Shape | None = None, title: str = "", scores: Any = None
+) -> Path:
+    """Write the page: the program beside its parts, and the input where there is one.
+
+    Raises
+    ------
+    OutputError
+        If the file cannot be written.
+    """
+    drawn = parts(program)
+    model = None if shape is None else of_shape(shape)
+    places = [part.vertices for part in drawn] + ([] if model is None else [model.vertices])
+    points = np.concatenate([*places, np.zeros((0, 3))])
+    points = points if len(points) else np.zeros((1, 3))
+    low, high = points.min(0), points.max(0)
+    content = {
+        "title": title or (shape.name if shape is not None else Path(path).stem),
+        "facts": " · ".join(scores_text(scores, program)),
+        "middle": (_TO_PAGE @ ((low + high) / 2)).tolist(),
+        "radius": max(1.0, float(np.linalg.norm(high - low)) / 2),
+        "lines": [_line(line) for line in listing(program, None)],
+        "parts": [
+            {"name": part.name, "block": part.block, "colour": [channel / 255 for channel in colour(part.statement)]}
+            | _buffers(part.vertices, part.faces, crease_normals(part.vertices, part.faces))
+            for part in drawn
+        ],
+        "input": None if model is None else _buffers(model.vertices, model.faces, model.normals),
+    }
+    text = json.dumps(content, separators=(",", ":")).replace("<", "\\u003c")
+    target = Path(path)
+    write_text(target, HTML.replace("@DATA@", text))
+    return target
+
+
+def _line(line: Any) -> dict[str, Any]:
+    before, word, after = parted(line)
+    found = {"before": before, "word": word, "after": after, "blocks": list(line.blocks), "colour": None, "ink": None}
+    if line.statement is not None:
+        found["colour"] = "rgb({}, {}, {})".format(*colour(line.statement))
+        found["ink"] = "rgb({}, {}, {})".format(*readable(line.statement))
+    return found
+
+
+def _buffers(vertices: Array, faces: Array, normals: Array) -> dict[str, str]:
+    """Triangles as positions and normals, and the creases as lines, in the axes of the page."""
+    corners = np.asarray(vertices, np.float64)[faces]
+    triangles = np.concatenate([corners @ _TO_PAGE.T, np.asarray(normals) @ _TO_PAGE.T], -1)
+    return {"triangles": _packed(triangles), "lines": _packed(_creases(corners, normals) @ _TO_PAGE.T)}
+
+
+def _creases(corners: Array, normals: Array) -> Array:
+    """Ends (E, 2, 3) of the edges of triangles along which their normals part."""
+    starts, ends = corners.reshape(-1, 3), np.roll(corners, -1, 1).reshape(-1, 3)
+    tilt = np.asarray(normals).reshape(-1, 3) + np.roll(normals, -1, 1).reshape(-1, 3)
+    extent = float(np.ptp(corners.reshape(-1, 3), axis=0).max()) if len(corners) else 1.0
+    keys = np.rint(np.stack([starts, ends], 1) / max(extent, 1e-30) * 1e5).astype(np.int64)
+    swap = [tuple(one) > tuple(two) for one, two in keys.tolist()]
+    keys[swap] = keys[swap][:, ::-1]
+    _, first, place, count = np.unique(
+        keys.reshape(-1, 6), axis=0, return_index=True, return_inverse=True, return_counts=True
+    )
+    total = np.zeros((len(first), 3))
+    np.add.at(total, place.reshape(-1), tilt / np.maximum(np.linalg.norm(tilt, axis=1, keepdims=True), 1e-12))
+    sharp = (count == 1) | (np.linalg.norm(total, axis=1) < 0.94 * count)
+    sharp &= (keys[first, 0] != keys[first, 1]).any(1)
+    return np.stack([starts[first[sharp]], ends[first[sharp]]], 1)
+
+
+def _packed(values: Array) -> str:
+    return base64.b64encode(np.ascontiguousarray(values, "<f4").tobytes()).decode()

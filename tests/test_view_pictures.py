@@ -1,0 +1,174 @@
+"""Pictures: what is nearest shows, what is lit is bright, and files are whole."""
+
+from __future__ import annotations
+
+import base64
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from shapeprog.data import shape_from_mesh
+from shapeprog.data.shape import Shape
+from shapeprog.errors import OutputError
+from shapeprog.export.colours import colour
+from shapeprog.export.parts import parts
+from shapeprog.geometry.cuboid import mesh as box_mesh
+from shapeprog.language.program import Program
+from shapeprog.language.text import format_program, parse
+from shapeprog.view import Item, contact_sheet, picture, viewer
+from shapeprog.view import raster_kernels as kernels
+from shapeprog.view.listing import listing, parted
+from shapeprog.view.model import of_cells, of_mesh, of_parts, of_points, of_shape
+from shapeprog.view.render import camera_for, render
+
+TEXT = """
+top_rectangle(at=(4, 0, 0), thickness=2, half=(9, 11))
+for i in translate(2, by=(0, 0, 18)):
+    for j in translate(2, by=(0, 14, 0)):
+        leg(at=(-12, -8, -10), size=(16, 2, 2))
+    horizontal_bar(at=(-8, -7, -10), size=(1.237, 14, 1))
+"""
+PROGRAM = parse(TEXT)
+
+
+def size_of(path: Path) -> tuple[int, int]:
+    with Image.open(path) as image:
+        return image.size
+
+
+def box_shape() -> Shape:
+    vertices, faces = box_mesh(np.array([3.0, 2.0, 1.0, 0.0]))
+    return shape_from_mesh(vertices, faces, name="box")
+
+
+def test_the_nearest_face_shows_as_in_a_slow_twin():
+    generator = np.random.default_rng(0)
+    points = generator.uniform([-4, -4, 0.1], [36, 28, 1], (60, 3))
+    faces = generator.permutation(60).reshape(20, 3)
+    face, depth = kernels.nearest_faces(points, faces, 32, 24, 1e-6)
+    best, wanted = np.full((24, 32), -1), np.zeros((24, 32))
+    centre = np.stack(np.meshgrid(np.arange(32) + 0.5, np.arange(24) + 0.5), -1)
+    for number, (a, b, c) in enumerate(points[faces]):
+        solve = np.linalg.inv(np.stack([b[:2] - a[:2], c[:2] - a[:2]], 1))
+        w = (centre - a[:2]) @ solve.T
+        near = a[2] + w @ np.array([b[2] - a[2], c[2] - a[2]])
+        shown = (w >= 0).all(-1) & (w.sum(-1) <= 1) & (near > wanted)
+        best[shown], wanted[shown] = number, near[shown]
+    assert (face == best).all()
+    np.testing.assert_allclose(depth, wanted, atol=1e-9)
+
+
+def test_of_faces_in_one_place_the_first_shows_without_speckles():
+    board = "top_rectangle(at=(0, 0, 0), thickness=2, half=(8, 8))\n"
+    model = of_parts(parts(parse(board + "leg(at=(-1, -4, -4), size=(3, 4, 4))")))
+    image = render(model, camera_for([model]), 96, 96)
+    blue = (image[..., 2].astype(int) - image[..., 0]) > 25
+    assert not blue[:60].any(), "the leg ends flush with the top, which comes first in the program"
+
+
+def test_everything_fits_the_frame_and_both_share_a_camera():
+    one, two = of_parts(parts(PROGRAM)), of_cells(np.ones((32, 32, 32), bool))
+    camera = camera_for([one, two], 1.5)
+    pixels = camera.project(two.vertices, 300, 200)
+    assert pixels[:, 0].min() >= 15
+    assert pixels[:, 0].max() <= 285
+    assert pixels[:, 1].min() >= 10
+    assert pixels[:, 1].max() <= 190
+    top, floor = camera.project(np.array([[10.0, 0, 0], [-10.0, 0, 0]]), 300, 200)
+    front, rear = camera.project(np.array([[0.0, -10, 0], [0.0, 10, 0]]), 300, 200)
+    assert top[1] < floor[1], "up is up in the picture"
+    assert front[2] > rear[2], "the front is nearer"
+
+
+def test_shape_comes_in_colour_on_white_with_a_shadow():
+    model = of_parts(parts(parse("top_rectangle(at=(0, 0, 0), thickness=2, half=(9, 9))")))
+    lifted = of_parts(parts(parse("leg(at=(-12, 0, 0), size=(1, 1, 1))")))
+    image = render(model, camera_for([model, lifted]), 160, 160).astype(float)
+    assert (image[:4] == 255).all()
+    gold = np.array(colour(2), float)
+    close = np.abs(image / image.max(-1, keepdims=True) - gold / gold.max()).max(-1) < 0.15
+    assert close.mean() > 0.15
+    grey = (np.ptp(image, axis=-1) < 3) & (image[..., 0] < 250)
+    assert grey.mean() > 0.02, "a shadow lies on the ground"
+
+
+def test_cells_points_and_meshes_become_models():
+    cells = np.zeros((32, 32, 32), bool)
+    cells[16, 16, 16:18] = True
+    model = of_cells(cells)
+    corners = model.vertices[model.faces]
+    area = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) / 2
+    assert np.linalg.norm(area, axis=1).sum() == pytest.approx(10)
+    assert np.einsum("fc,fc->", area, corners.mean(1)) / 3 == pytest.approx(2), "faces look outwards"
+    assert model.vertices.min(0).tolist() == [0, 0, 0]
+    np.testing.assert_allclose(np.einsum("fc,fc->f", area, model.normals[:, 0]), 0.5)
+    assert len(of_points(np.zeros((9000, 3))).faces) <= 2500 * 20
+    shape = box_shape()
+    assert len(of_shape(shape).faces) == 12
+    assert shape.vertices is not None
+    assert shape.faces is not None
+    assert len(of_mesh(shape.vertices, shape.faces).normals) == 12
+
+
+def test_pictures_are_written_with_and_without_an_input(tmp_path: Path):
+    both = picture(box_shape(), PROGRAM, tmp_path / "both.png", scores={"iou": 0.9, "cd": 0.0004}, view=120)
+    alone = picture(None, PROGRAM, tmp_path / "alone.jpg", view=120)
+    nothing = picture(None, Program(), tmp_path / "nothing.png", view=120)
+    sizes = [size_of(path) for path in (both, alone, nothing)]
+    assert sizes[0][0] - sizes[1][0] == 120
+    assert sizes[1] == sizes[2]
+    assert not list(tmp_path.glob(".*"))
+
+
+def test_a_long_program_still_fits(tmp_path: Path):
+    path = picture(None, parse("leg(at=(0, 0, 0), size=(1, 1, 1))\n" * 90), tmp_path / "long.png", view=120)
+    assert size_of(path)[1] == 184
+
+
+def test_contact_sheets_hold_every_item(tmp_path: Path):
+    items = [Item(f"item {k}", box_shape() if k % 2 else None, PROGRAM, "IoU 0.9") for k in range(5)]
+    one = size_of(contact_sheet(items[:1], tmp_path / "one.png"))
+    many = size_of(contact_sheet(items, tmp_path / "many.png", title="many", columns=2))
+    assert many[0] > one[0]
+    assert many[1] > 2.5 * (one[1] - 60)
+
+
+def test_errors_name_the_cure(tmp_path: Path):
+    with pytest.raises(OutputError, match=r"\.png"):
+        picture(None, PROGRAM, tmp_path / "a.bmpx")
+    with pytest.raises(OutputError, match="nothing to put"):
+        contact_sheet([], tmp_path / "a.png")
+    with pytest.raises(OutputError, match="make the folder"):
+        picture(None, PROGRAM, tmp_path / "no" / "a.png", view=60)
+
+
+def test_listing_knows_which_line_draws_what():
+    lines = listing(PROGRAM, None)
+    assert "\n".join(line.text for line in lines) + "\n" == format_program(PROGRAM)
+    assert [line.blocks for line in lines] == [(0,), (1, 2), (1,), (1,), (2,)]
+    assert [line.statement for line in lines] == [2, None, None, 1, 12]
+    assert ["".join(parted(line)) for line in lines] == [line.text for line in lines]
+    assert all(parted(line)[1] == line.word for line in lines)
+    assert "size=(1.24, 14, 1)" in listing(PROGRAM)[-1].text
+    assert [line.blocks for line in listing(parse("for i in rotate(2, step=1):\n    pass"))] == [()]
+
+
+def test_the_page_needs_nothing_else_and_escapes_what_it_is_told(tmp_path: Path):
+    path = viewer(PROGRAM, tmp_path / "view.html", shape=box_shape(), title="</script><b>&", scores={"iou": 0.5})
+    text = path.read_text()
+    assert not re.search(r"""(src|href)=|https?://|@import|fetch\(""", text)
+    assert text.count("</script>") == 2
+    data = json.loads(re.search(r'id="data">(.*?)</script>', text, re.DOTALL).group(1))  # type: ignore[union-attr]
+    assert data["title"] == "</script><b>&"
+    assert [part["name"] for part in data["parts"]][:3] == ["top_rectangle_1", "leg_1", "leg_2"]
+    triangles = np.frombuffer(base64.b64decode(data["parts"][0]["triangles"]), "<f4").reshape(-1, 6)
+    assert triangles.shape == (36, 6)
+    assert triangles[:, :3].max(0).tolist() == [11, 6, 9], "right, up, towards the viewer"
+    lines = np.frombuffer(base64.b64decode(data["parts"][0]["lines"]), "<f4").reshape(-1, 6)
+    assert len(lines) == 12, "a box has twelve edges"
+    assert data["input"] is not None
+    assert [part["block"] for part in data["parts"]] == [0, 1, 1, 1, 1, 2, 2]

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from shapeprog.errors import OutputError
-from shapeprog.geometry.scene import Scene
+from shapeprog.errors import OutputError, ShapeProgError
 from shapeprog.language.program import Program
 from shapeprog.space import Frame
 
@@ -56,10 +54,11 @@ class Part:
 def parts(program: Program, frame: Frame | None = None) -> list[Part]:
     """The parts of a program in the order they are drawn, in the world of ``frame`` (the grid by default).
 
-    Parts without volume, such as boards of zero thickness, are kept.
+    Parts without volume, such as boards of zero thickness, are left out.
     """
     import torch
 
+    from shapeprog.geometry.mesh import part_meshes
     from shapeprog.language.statement import language
     from shapeprog.language.tensors import encode
     from shapeprog.language.unroll import unroll
@@ -67,7 +66,7 @@ def parts(program: Program, frame: Frame | None = None) -> list[Part]:
     scene = unroll(encode(program, dtype=torch.float64))
     numbers: Counter[str] = Counter()
     found = []
-    for slot, vertices, faces in _part_meshes(scene):
+    for slot, vertices, faces in part_meshes(scene):
         statement = int(scene.statement[slot])
         word = language()[statement].name
         numbers[word] += 1
@@ -99,30 +98,17 @@ def solid(program: Program, frame: Frame | None = None) -> tuple[Vertices, Faces
     OutputError
         If nothing in the program has a volume.
     """
-    vertices, faces = _union_mesh(parts(program))
-    if not len(faces):
-        raise OutputError("nothing in this program has a volume, so it makes no solid", "thicken its parts")
-    return (np.asarray(vertices, np.float64) if frame is None else frame.to_world(vertices)), faces
+    import torch
 
+    from shapeprog.geometry.mesh import union_mesh
+    from shapeprog.language.tensors import encode
+    from shapeprog.language.unroll import unroll
 
-def _part_meshes(scene: Scene) -> Iterator[tuple[int, Vertices, Faces]]:
-    from shapeprog.geometry.primitive import primitives
-
-    for slot in np.flatnonzero(scene.mask.numpy()).tolist():
-        local, faces = primitives[int(scene.kind[slot])].mesh(scene.size[slot].numpy().astype(np.float64))
-        yield slot, scene.centre[slot].numpy() + local @ scene.rotation[slot].numpy().T, faces
-
-
-def _union_mesh(each: list[Part]) -> tuple[Vertices, Faces]:
-    import manifold3d
-
-    solids = [
-        manifold3d.Manifold(manifold3d.Mesh64(part.vertices, part.faces.astype(np.uint64)))
-        for part in each
-        if part.volume > 0
-    ]
-    mesh = manifold3d.Manifold.batch_boolean(solids, manifold3d.OpType.Add).to_mesh64()
-    return np.asarray(mesh.vert_properties)[:, :3], np.asarray(mesh.tri_verts).astype(np.int64)
+    try:
+        vertices, faces = union_mesh(unroll(encode(program, dtype=torch.float64)))
+    except ShapeProgError as error:
+        raise OutputError("nothing in this program has a volume, so it makes no solid", "thicken its parts") from error
+    return (vertices if frame is None else frame.to_world(vertices)), faces
 
 
 def crease_normals(vertices: npt.NDArray[Any], faces: npt.NDArray[Any], angle: float = 40.0) -> Vertices:

@@ -6,9 +6,12 @@ overlap, it is only a bound: the true depth below the common surface can be grea
 
 from __future__ import annotations
 
+from typing import Any
+
 import torch
 from jaxtyping import Float, Int
 from torch import Tensor
+from torch.autograd.function import once_differentiable
 
 from shapeprog.geometry.arrays import array, arrays, declared_kinds, over_threads
 from shapeprog.geometry.primitive import SIZES, primitives
@@ -63,6 +66,17 @@ def signed_distance(scene: Scene, points: Float[Tensor, "*batch P 3"]) -> Float[
         return torch.full(points.shape[:-1], torch.inf, dtype=points.dtype, device=points.device)
     flat = scene.flatten()
     positions = points.reshape(-1, *points.shape[-2:])
+    if positions.device.type == "cpu" and not declared_kinds(flat):
+        found: Tensor = _UnionDistance.apply(  # type: ignore[no-untyped-call]
+            flat, flat.size, flat.centre, flat.rotation, positions
+        )
+    else:
+        found = _gathered_distance(flat, positions)
+    return found.reshape(points.shape[:-1])
+
+
+def _gathered_distance(flat: Scene, positions: Float[Tensor, "B P 3"]) -> Float[Tensor, "B P"]:
+    """The same from the declarations, for any kind of primitive on any device; the twin of the kernels."""
     slot = _nearest(flat, positions)[0]
     table = torch.cat([flat.size, flat.centre, flat.rotation.flatten(-2)], -1)
     size, centre, rotation = take(table, slot).split([SIZES, 3, 9], -1)
@@ -77,8 +91,31 @@ def signed_distance(scene: Scene, points: Float[Tensor, "*batch P 3"]) -> Float[
         for each in kinds:
             here = (kind == each).nonzero(as_tuple=True)
             found = found.index_put(here, primitives[each].distance(local[here], size[here]))
-    found = torch.where(flat.mask.any(-1, keepdim=True), found, torch.inf)
-    return found.reshape(points.shape[:-1])
+    return torch.where(flat.mask.any(-1, keepdim=True), found, torch.inf)
+
+
+class _UnionDistance(torch.autograd.Function):
+    """The kernels as one differentiable step."""
+
+    @staticmethod
+    def forward(ctx: Any, scene: Scene, size: Tensor, centre: Tensor, rotation: Tensor, points: Tensor) -> Tensor:
+        slots, values = _nearest_kernel(scene, points)
+        ctx.save_for_backward(scene.kind, size, centre, rotation, points, slots)
+        return values
+
+    @staticmethod
+    @once_differentiable
+    def backward(ctx: Any, slope: Tensor) -> tuple[Tensor | None, ...]:
+        from shapeprog.geometry import solid_kernels as kernels
+
+        kind, size, centre, rotation, points, slots = ctx.saved_tensors
+        found = [each.new_zeros(each.shape) for each in (size, centre, rotation, points)]
+        data = (
+            array(kind), array(size), array(centre), array(rotation), array(points), array(slots), array(slope),
+            found[0].numpy(), found[1].numpy(), found[2].numpy(), found[3].numpy(),
+        )  # fmt: skip
+        over_threads(lambda first, last: kernels.pull(*data, first, last), len(slots))
+        return None, *found
 
 
 def _kinds(scene: Scene) -> list[int]:

@@ -190,7 +190,8 @@ def _uniform(seed: int, scenes: int, first: int, more: int, device: torch.device
     for shift, factor in ((30, 0xBF58476D1CE4E5B9), (27, 0x94D049BB133111EB)):
         word = (word ^ ((word >> shift) & ((1 << (64 - shift)) - 1))) * (factor - 2**64)
     word = word ^ ((word >> 31) & ((1 << 33) - 1))
-    return (((word >> 11) & ((1 << 53) - 1)).double() * 2.0**-53).unflatten(-1, (more, 4))
+    numbers: Tensor = ((word >> 11) & ((1 << 53) - 1)).double() * 2.0**-53
+    return numbers.reshape(scenes, more, 4)
 
 
 def _gathered(scene: Scene, slot: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:

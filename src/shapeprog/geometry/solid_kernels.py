@@ -150,3 +150,102 @@ def _nearest_in_scene(kind, size, centre, rotation, mask, points, slots, values,
                 if value < best or (value == best and n < found):
                     best, found = value, n
         slots[item], values[item] = kept[found], best
+
+
+@njit(cache=True, nogil=True)
+def _slopes(kind, size, slot, a, b, c, slope):
+    """Fill ``slope`` with the derivatives of the distance by a, b, c and the four sizes, as autograd takes them."""
+    slope[:] = 0.0
+    if kind[slot] == CYLINDER:
+        over_up = abs(a) - max(size[slot, 0], 0.0)
+        rho = np.sqrt(b * b + c * c)
+        over_side = rho - max(size[slot, 1], 0.0)
+        by_up, by_side = _corner_slopes(over_up, over_side)
+        slope[0], slope[3], slope[4] = by_up * np.sign(a), -by_up, -by_side
+        if rho >= 1e-12:
+            slope[1], slope[2] = by_side * b / rho, by_side * c / rho
+    else:
+        plane = _parallelogram_slopes(max(size[slot, 0], 0.0), max(size[slot, 1], 0.0), size[slot, 3] / 2, a, b, slope)
+        by_plane, by_side = _corner_slopes(plane, abs(c) - max(size[slot, 2], 0.0))
+        for place in (0, 1, 3, 4, 6):
+            slope[place] *= by_plane
+        slope[2], slope[5] = by_side * np.sign(c), -by_side
+    for place in range(3):
+        if size[slot, place] < 0:
+            slope[3 + place] = 0.0
+
+
+@njit(cache=True, nogil=True)
+def _corner_slopes(one, two):
+    """Derivatives of the distance to the corner of two half planes by the distances to each."""
+    if one <= 0 and two <= 0:
+        if one == two:
+            return 0.5, 0.5
+        return (1.0, 0.0) if one > two else (0.0, 1.0)
+    one, two = max(one, 0.0), max(two, 0.0)
+    whole = np.sqrt(one * one + two * two)
+    if whole < 1e-12:
+        return 0.0, 0.0
+    return one / whole, two / whole
+
+
+@njit(cache=True, nogil=True)
+def _parallelogram_slopes(half_up, half_depth, slant, up, depth, slope):
+    """Signed distance in the plane of the shear, its derivatives by up, depth, the half extents and the lean.
+
+    The foot of the perpendicular is where the squared distance is least, so it need not be differentiated.
+    """
+    turn = -1.0 if up < 0 else 1.0
+    up, depth = up * turn, depth * turn
+    over_up, along = up - half_up, depth - slant
+    over_along = max(abs(along) - half_depth, 0.0)
+    to_cap = over_up * over_up + over_along * over_along
+    cross = depth * half_up - up * slant
+    fold = -1.0 if cross < 0 else 1.0
+    edge_up, edge_depth = up * fold, depth * fold - half_depth
+    length = max(half_up * half_up + slant * slant, 1e-24)
+    foot = min(max((edge_up * half_up + edge_depth * slant) / length, -1.0), 1.0)
+    side_up, side_depth = edge_up - foot * half_up, edge_depth - foot * slant
+    to_side = side_up * side_up + side_depth * side_depth
+    plane = np.sqrt(min(to_cap, to_side))
+    inside = over_up < 0 and abs(cross) < half_depth * half_up
+    if plane >= 1e-12:
+        scale = (-1.0 if inside else 1.0) / plane
+        if to_cap <= to_side:
+            slope[0], slope[3] = over_up * scale * turn, -over_up * scale
+            slope[1] = over_along * np.sign(along) * scale * turn
+            slope[4] = -over_along * scale
+            slope[6] = -over_along * np.sign(along) * scale / 2
+        else:
+            slope[0], slope[3] = side_up * fold * scale * turn, -foot * side_up * scale
+            slope[1] = side_depth * fold * scale * turn
+            slope[4] = -side_depth * scale
+            slope[6] = -foot * side_depth * scale / 2
+    return -plane if inside else plane
+
+
+@njit(cache=True, nogil=True)
+def pull(
+    kinds, sizes, centres, rotations, points, slots, slope, to_size, to_centre, to_rotation, to_points, begin, end
+):
+    """Gradient of the distances to known primitives, given the gradient of a loss by each of them."""
+    part = np.empty(7)
+    for scene in range(begin, end):
+        kind, size, centre, rotation = kinds[scene], sizes[scene], centres[scene], rotations[scene]
+        for item in range(slots.shape[1]):
+            slot, weight = slots[scene, item], slope[scene, item]
+            if weight == 0:
+                continue
+            x, y, z = points[scene, item, 0], points[scene, item, 1], points[scene, item, 2]
+            a, b, c = local(centre, rotation, slot, x, y, z)
+            _slopes(kind, size, slot, a, b, c, part)
+            for place in range(4):
+                to_size[scene, slot, place] += weight * part[3 + place]
+            for axis in range(3):
+                offset = points[scene, item, axis] - centre[slot, axis]
+                moved = 0.0
+                for other in range(3):
+                    moved += rotation[slot, axis, other] * part[other]
+                    to_rotation[scene, slot, axis, other] += weight * offset * part[other]
+                to_centre[scene, slot, axis] -= weight * moved
+                to_points[scene, item, axis] = weight * moved

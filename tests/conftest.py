@@ -30,3 +30,13 @@ def pytest_configure(config: pytest.Config) -> None:
     import torch
 
     torch.set_num_threads(1)  # the suite runs one process per core
+
+
+@pytest.fixture(autouse=True)
+def same_random_state() -> None:
+    """Every test begins alike, whichever ran before it in the same process."""
+    import numpy as np
+    import torch
+
+    torch.manual_seed(0)
+    np.random.seed(0)  # noqa: NPY002

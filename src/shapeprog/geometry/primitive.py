@@ -91,7 +91,7 @@ class Primitives:
             raise DeclarationError(f"primitive {primitive.name!r} is declared twice", "give one of them another name")
         if not 1 <= len(primitive.sizes) <= SIZES or not 0 <= primitive.extents <= len(primitive.sizes):
             raise DeclarationError(
-                f"primitive {primitive.name!r} has {len(primitive.sizes)} sizes of which {primitive.extents} are lengths",
+                f"primitive {primitive.name!r} has {len(primitive.sizes)} sizes, {primitive.extents} of them lengths",
                 f"a primitive has 1 to {SIZES} sizes",
             )
         self._kinds.append(primitive)

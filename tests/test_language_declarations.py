@@ -152,6 +152,14 @@ def test_bad_primitives_are_refused() -> None:
     words = {field: getattr(known, field) for field in known.__dataclass_fields__}
     with pytest.raises(DeclarationError, match="5 sizes"):
         primitives.register(Primitive(**{**words, "name": "big", "sizes": ("a",) * 5}))
+    for field, wrong, said in [
+        ("distance", lambda points, size: points, "distance of primitive 'big' returns shape"),
+        ("areas", lambda size: size[..., 0], "areas of primitive 'big' returns shape"),
+        ("sample", lambda size, face: size, "sample of primitive 'big' fails: .*positional"),
+        ("mesh", lambda size: 1 / 0, "mesh of primitive 'big' fails: division by zero"),
+    ]:
+        with pytest.raises(DeclarationError, match=said):
+            primitives.register(Primitive(**{**words, "name": "big", field: wrong}))
     with pytest.raises(DeclarationError, match="known are cuboid, cylinder"):
         primitives.kind("sphere")
 

@@ -85,7 +85,7 @@ class Primitives:
         Raises
         ------
         DeclarationError
-            If the name is taken or the sizes do not fit the four slots.
+            If the name is taken, the sizes do not fit the four slots, or a function fails or returns a wrong shape.
         """
         if any(known.name == primitive.name for known in self._kinds):
             raise DeclarationError(f"primitive {primitive.name!r} is declared twice", "give one of them another name")
@@ -94,6 +94,7 @@ class Primitives:
                 f"primitive {primitive.name!r} has {len(primitive.sizes)} sizes, {primitive.extents} of them lengths",
                 f"a primitive has 1 to {SIZES} sizes",
             )
+        _try(primitive)
         self._kinds.append(primitive)
         return primitive
 
@@ -132,3 +133,35 @@ primitives = Primitives()
 def safe_norm(squared: Scalars) -> Scalars:
     """Square root whose gradient is zero, not infinite, at zero."""
     return torch.sqrt(squared.clamp(min=1e-24))
+
+
+def _try(primitive: Primitive) -> None:
+    """Call every function once, so that a wrong shape is refused now and not amid a run."""
+    size, points, face = torch.ones(2, SIZES), torch.full((2, 3), 0.5), torch.zeros(2, dtype=torch.long)
+    word = "sample"
+    try:
+        unit = primitive.sample(size, face, points)
+        calls: dict[str, tuple[Callable[[], Tensor], tuple[int | None, ...]]] = {
+            "sample": (lambda: unit, (2, 3)),
+            "distance": (lambda: primitive.distance(points, size), (2,)),
+            "bound": (lambda: primitive.bound(size), (2, 3)),
+            "areas": (lambda: primitive.areas(size), (2, None)),
+            "place": (lambda: primitive.place(size, unit), (2, 3)),
+            "normal": (lambda: primitive.normal(size, unit, face), (2, 3)),
+            "volume": (lambda: primitive.volume(size), (2,)),
+            "mesh": (lambda: torch.as_tensor(primitive.mesh(np.ones(SIZES))[0]), (None, 3)),
+        }
+        for word, (call, wanted) in calls.items():
+            found = tuple(call().shape)
+            if len(found) != len(wanted) or any(w not in (None, f) for f, w in zip(found, wanted, strict=True)):
+                raise DeclarationError(
+                    f"{word} of primitive {primitive.name!r} returns shape {found}",
+                    f"for 2 sizes it should be {wanted}".replace("None", "any number"),
+                )
+    except DeclarationError:
+        raise
+    except Exception as cause:
+        raise DeclarationError(
+            f"{word} of primitive {primitive.name!r} fails: {cause}",
+            "it gets sizes (..., 4) and what else Primitive says, with any leading dimensions",
+        ) from cause

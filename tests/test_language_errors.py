@@ -152,7 +152,7 @@ def test_messages(text: str, message: str) -> None:
         ("leg(\0)", 1, 5, "null byte"),
         ("\n\ud800", 2, 1, "half a character"),
         (f"leg({'-' * 100000}1)", 1, 1, "too deeply"),
-        ("1" + "+1" * 100000, 1, 1, "too deeply"),
+        ("1" + "+1" * 100000, 1, 1, "too deeply|is no statement"),  # Python 3.10 reads it
         ("leg(" * 300 + ")" * 300, 1, 804, "too many nested"),
         ("import os", 1, 1, "only drawing statements"),
         ("pass", 1, 1, "only drawing statements"),

@@ -1,0 +1,116 @@
+"""Inference: a shape in, a program out, with its scores and a sentence that says why the search stopped."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import torch
+
+from shapeprog.data.shape import Shape
+from shapeprog.inference.blocks import to_program
+from shapeprog.inference.refine import REACH, Schedule, refine
+from shapeprog.inference.structure import Settings, search_structure
+from shapeprog.inference.surface import points_of_cells
+from shapeprog.language.program import Program
+
+SEARCH_SHARE = 0.65
+"""Share of the time budget after which the structure search hands over to refinement."""
+
+Progress = Callable[[str, float], None]
+
+
+@dataclass(frozen=True)
+class Result:
+    """What inference found.
+
+    Parameters
+    ----------
+    program
+        The program with continuous parameters.
+    snapped
+        The same statements with whole numbers, each within one of the rounded parameter of ``program``.
+    scores
+        ``iou`` of the snapped program at 32^3, and ``blocks``, ``statements``, ``primitives``, ``seconds``.
+    reason
+        Why the search stopped and what to try next.
+    """
+
+    program: Program
+    snapped: Program
+    scores: dict[str, float]
+    reason: str
+
+
+def infer(
+    shape: Shape | str | Path,
+    *,
+    blocks: int = 10,
+    budget: float = 4.0,
+    seed: int = 0,
+    settings: Settings | None = None,
+    schedule: Schedule | None = None,
+    progress: Progress | None = None,
+) -> Result:
+    """A short program of at most ``blocks`` blocks that rebuilds a shape.
+
+    Structure is searched on the touched cells, with whole numbers; then all parameters are refined together on
+    surface points through the renderer.  The result is the same for the same seed unless the time budget cuts in.
+
+    Parameters
+    ----------
+    shape
+        A loaded shape, or the path of a mesh, point cloud or voxel file.
+    blocks
+        Most blocks of the program.
+    budget
+        Seconds after which neither search nor refinement starts another step.
+    settings, schedule
+        What search and refinement may spend; the defaults were chosen on validation shapes.
+    progress
+        Called with what is being done and the share of it that is done.
+
+    Raises
+    ------
+    InputError
+        If the path is no readable shape.
+    """
+    started = time.monotonic()
+    target = _load(shape)
+    chosen = replace(settings or Settings(), blocks=blocks)
+    structure = search_structure(
+        target.voxels, chosen, seed=seed, deadline=started + SEARCH_SHARE * budget, progress=progress
+    )
+    snapped = to_program(structure.blocks)
+    points = target.points if target.points is not None else points_of_cells(target.voxels, seed=seed)
+    refined = refine(
+        snapped, torch.from_numpy(np.asarray(points, np.float32)), schedule=schedule, reach=REACH, seed=seed,
+        deadline=started + budget, progress=progress,
+    )  # fmt: skip
+    scores = {
+        "iou": structure.iou,
+        "blocks": float(snapped.blocks),
+        "statements": float(snapped.statements),
+        "primitives": float(snapped.size),
+        "seconds": time.monotonic() - started,
+    }
+    return Result(refined, snapped, scores, _advice(structure.reason, snapped.blocks, blocks))
+
+
+def _load(shape: Shape | str | Path) -> Shape:
+    if isinstance(shape, Shape):
+        return shape
+    from shapeprog.data import load
+
+    return load(shape)
+
+
+def _advice(reason: str, used: int, allowed: int) -> str:
+    if "budget" in reason:
+        return f"Stopped because {reason}; give it a larger --budget to search on."
+    if used >= allowed:
+        return f"Stopped because {reason} and every one of the {allowed} blocks is in use; allow more with --blocks."
+    return f"Stopped because {reason}; {used} of {allowed} blocks were enough, another would not earn its price."

@@ -1,0 +1,144 @@
+"""Refinement: all continuous parameters of a program together, by gradient through the renderer.
+
+The loss has both directions of a chamfer distance, one of them exact: target points to the surface of the union by
+signed distance, and points sampled on the visible surface to their nearest target points.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+import torch
+from jaxtyping import Bool, Float
+from torch import Tensor
+
+from shapeprog.errors import InputError
+from shapeprog.geometry.distance import signed_distance
+from shapeprog.geometry.nearest import squared_distance
+from shapeprog.geometry.sampling import sample_surface
+from shapeprog.language.program import Program
+from shapeprog.language.statement import language
+from shapeprog.language.tensors import Code, decode, encode
+from shapeprog.language.unroll import Plan
+
+THINNEST = 0.05
+"""Smallest length in cells that refinement leaves, so that no part vanishes."""
+
+REACH = 1.49
+"""Farthest that refinement moves a parameter from a whole number, in cells: rounding and one step lead back."""
+
+
+@dataclass(frozen=True)
+class Schedule:
+    """How long and how boldly to refine; chosen on val.
+
+    Parameters
+    ----------
+    steps
+        Gradient steps.
+    rate
+        First step size of Adam in cells; it falls to a tenth by a cosine.
+    points
+        Target points that one step looks at, drawn at random.
+    samples
+        Points sampled on the surface of the program in one step.
+    """
+
+    steps: int = 60
+    rate: float = 0.12
+    points: int = 1500
+    samples: int = 1500
+
+
+def refine(
+    program: Program,
+    target: Float[Tensor, "P 3"],
+    *,
+    schedule: Schedule | None = None,
+    reach: float | None = None,
+    seed: int = 0,
+    deadline: float = float("inf"),
+    progress: Callable[[str, float], None] | None = None,
+) -> Program:
+    """The same program with parameters that fit target points (P, 3) on a surface, in the grid frame.
+
+    Parameters
+    ----------
+    schedule
+        Steps, step size and numbers of points.
+    reach
+        Farthest that any parameter may move from where it is, in cells; anywhere by default.
+    deadline
+        Value of ``time.monotonic()`` after which no further step starts.
+
+    Raises
+    ------
+    InputError
+        If there are no target points or some are not finite.
+    """
+    plan = schedule or Schedule()
+    points = torch.as_tensor(target, dtype=torch.float32)
+    if not len(points) or not bool(torch.isfinite(points).all()):
+        raise InputError("refinement needs finite target points", "load the target with shapeprog.load_shape")
+    if not program.size:
+        return program
+    start = encode(program.flat())
+    free, length = _slots(start)
+    values = start.parameters.clone()
+    low = torch.where(length, THINNEST, -torch.inf)
+    high = torch.full_like(low, torch.inf)
+    if reach is not None:
+        low, high = torch.maximum(low, values - reach), values + reach
+    moved = values.clone().requires_grad_()
+    render = Plan(start)
+    optimiser = torch.optim.Adam([moved], lr=plan.rate, betas=(0.8, 0.95))
+    decay = torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, plan.steps, plan.rate / 10)
+    generator = torch.Generator().manual_seed(seed)
+    with single_threaded():
+        for step in range(plan.steps):
+            if time.monotonic() > deadline:
+                break
+            scene = render.scene(moved)
+            if not bool(scene.mask.any()):
+                break
+            some = points[torch.randint(len(points), (plan.points,), generator=generator)]
+            sample = sample_surface(scene, plan.samples, generator)
+            there = (squared_distance(sample.points, points) * sample.weights).mean()
+            loss = (signed_distance(scene, some) ** 2).mean() + there
+            optimiser.zero_grad()
+            loss.backward()
+            assert moved.grad is not None
+            moved.grad.nan_to_num_(0).mul_(free)
+            optimiser.step()
+            decay.step()
+            with torch.no_grad():
+                moved.copy_(torch.where(free, torch.minimum(torch.maximum(moved, low), high), values))
+            if progress:
+                progress("refining", (step + 1) / plan.steps)
+    return decode(Code(start.ids, moved.detach()))[0]
+
+
+def _slots(code: Code) -> tuple[Bool[Tensor, "K J 7"], Bool[Tensor, "K J 7"]]:
+    """Which slots of a program are continuous parameters in use, and which of them are lengths."""
+    free = torch.zeros(code.parameters.shape, dtype=torch.bool)
+    length = torch.zeros_like(free)
+    for declared in language():
+        here = code.ids == declared.id
+        for slot, quantity in enumerate(declared.quantities):
+            free[..., slot] |= here & (not quantity.discrete)
+            length[..., slot] |= here & (quantity.kind == "length")
+    return free, length
+
+
+@contextmanager
+def single_threaded() -> Iterator[None]:
+    """One thread for tensors too small to share; several shapes run side by side in processes instead."""
+    before = torch.get_num_threads()
+    torch.set_num_threads(1)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(before)

@@ -240,7 +240,11 @@ def _ball():
         return np.asarray(sphere.vertices) * size[:3], np.asarray(sphere.faces)
 
     unused = {"distance": lambda points, size: points[..., 0], "areas": lambda size: size[..., :1]}
-    unused |= {"sample": lambda size, face, u: u, "place": lambda size, unit: unit, "normal": lambda size, unit, f: unit}
+    unused |= {
+        "sample": lambda size, face, u: u,
+        "place": lambda size, unit: unit,
+        "normal": lambda size, unit, f: unit,
+    }
     unused |= {"volume": lambda size: size[..., 0]}
     return Primitive("test_ball", ("a", "b", "c"), 3, bound=lambda size: size[..., :3], mesh=mesh, **unused)
 

@@ -1,0 +1,5 @@
+"""The commands of ``shapeprog``."""
+
+from shapeprog.cli.app import main
+
+__all__ = ["main"]

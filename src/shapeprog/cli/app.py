@@ -1,0 +1,63 @@
+"""The command ``shapeprog``: what it is called, and where its parts are.
+
+Nothing heavy is imported here or by the modules of this room: commands import what they need when they run.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from typing import Annotated
+
+import typer
+
+from shapeprog.cli import inferring, measuring, terminal, writing
+
+app = typer.Typer(
+    name="shapeprog",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+for name, command, help_line in (
+    ("infer", inferring.infer_command, "Infer a program from each mesh, point cloud or voxel grid."),
+    ("render", writing.render_command, "Draw a program as a picture, cells or points."),
+    ("export", writing.export_command, "Write a program for other tools: GLB, STL, OpenSCAD, STEP..."),
+    ("show", writing.show_command, "Write a page to turn a program's shape in a browser."),
+    ("sheet", writing.sheet_command, "Draw a contact sheet of a folder of programs."),
+    ("statements", writing.statements_command, "Print the manual of the language."),
+    ("prepare", measuring.prepare_command, "Turn a directory of models into packs."),
+    ("evaluate", measuring.evaluate_command, "Measure predictions against targets."),
+):
+    app.command(name, short_help=help_line)(terminal.guarded(command))
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        from shapeprog import __version__
+
+        print(f"shapeprog {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _options(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")
+    ] = False,
+    debug: Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")] = False,
+) -> None:
+    """Furniture as a mesh, point cloud or voxels in; a short program that a person can read, edit and run out.
+
+    Exit codes: 0 all is well, 1 some of several inputs failed, 2 a mistake that can be mended, 130 interrupted.
+    """
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run the command with the arguments of the process, or with those given; ends in ``SystemExit``."""
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    terminal.debugging = "--debug" in words  # wherever it stands
+    app(args=[word for word in words if word != "--debug"], prog_name="shapeprog")

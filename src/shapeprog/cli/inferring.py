@@ -1,0 +1,212 @@
+"""``shapeprog infer``: shapes in, programs out, one after another; what is broken stops nothing."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable
+from contextlib import nullcontext
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from shapeprog.cli import terminal
+from shapeprog.errors import InputError, ShapeProgError
+
+if TYPE_CHECKING:
+    from shapeprog.data.shape import Shape
+    from shapeprog.language.program import Program
+
+FOLDER = Path("shapeprog-out")
+
+Progress = Callable[[str, float], None]
+
+
+@dataclass(frozen=True)
+class Found:
+    """A program for one shape."""
+
+    program: Program
+    snapped: Program
+    scores: dict[str, float]
+    reason: str
+
+
+def infer_command(
+    inputs: Annotated[list[Path], typer.Argument(help="Meshes, point clouds, voxels, packs, or folders of them.")],
+    out: Annotated[Path, typer.Option("--out", "-o", help="Folder for the results; made if missing.")] = FOLDER,
+    blocks: Annotated[int, typer.Option(help="Most blocks of a program.", min=1)] = 10,
+    budget: Annotated[float, typer.Option(help="Seconds of search for each shape.", min=0.1)] = 4.0,
+    seed: Annotated[int, typer.Option(help="Seed of everything random.")] = 0,
+    up: Annotated[
+        str | None, typer.Option(help="World axis that points up, such as +y; by default the format's.")
+    ] = None,
+    front: Annotated[str | None, typer.Option(help="World axis that the front faces, such as -z.")] = None,
+    modules: terminal.With = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object per shape, one per line.")] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
+    no_picture: Annotated[bool, typer.Option("--no-picture", help="Write no PNG.")] = False,
+    baseline: Annotated[bool, typer.Option("--baseline", help="Greedy boxes instead of the search.")] = False,
+) -> None:
+    """Infer a program from each shape and write NAME.shape, NAME.json, NAME.glb and NAME.png.
+
+    The .json and .shape files keep the place of the input, so what is exported from them later lies on it.
+    A file that cannot be read is told at the end and stops nothing.
+    """
+    from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+    from shapeprog.data import load_all
+    from shapeprog.files import make_folder
+
+    terminal.load_modules(modules)
+    folder = make_folder(out)
+    search = _baseline if baseline else _search
+    failures: list[tuple[Path, ShapeProgError]] = []
+    written, taken = 0, set[str]()
+    talk = not (quiet or as_json)
+    console = terminal.output()
+    columns = (SpinnerColumn(), TextColumn("{task.description}", markup=False), BarColumn(24), TimeElapsedColumn())
+    bar = Progress(*columns, console=terminal.errors(), transient=True) if talk else None
+    with bar or nullcontext():
+        task = bar.add_task("reading", total=1.0) if bar else None
+        shapes = iter(load_all(inputs, up=up, front=front, seed=seed))
+        try:
+            for path, shape in shapes:
+                if isinstance(shape, ShapeProgError):
+                    failures.append((path, shape))
+                    continue
+                if bar and task is not None:
+                    bar.reset(task, description=shape.name, total=1.0)
+
+                def progress(stage: str, share: float, name: str = shape.name) -> None:
+                    if bar and task is not None:
+                        bar.update(task, completed=share, description=f"{name}: {stage}")
+
+                try:
+                    found = search(shape, blocks, budget, seed, progress)
+                    stem = _free_stem(shape, taken, folder)
+                    names = _write(found, shape, folder, stem, not no_picture)
+                except ShapeProgError as error:
+                    failures.append((path, error))
+                    continue
+                except Exception as error:
+                    if terminal.debugging:
+                        raise
+                    cause = f"{type(error).__name__}: {error}"
+                    failures.append((path, ShapeProgError(f"inference failed: {cause}", "run it again with --debug")))
+                    continue
+                written += 1
+                if as_json:
+                    terminal.print_json(
+                        {"name": shape.name, "folder": str(folder)} | json.loads(_document(found, shape))
+                    )
+                elif talk:
+                    _report(console, found, shape, folder, names)
+        except KeyboardInterrupt:
+            done = f"{written} program{'s' if written != 1 else ''} in {folder}"
+            raise terminal.Interrupted(f"what was finished is kept: {done}") from None
+    for path, problem in failures:
+        if as_json:
+            told = {"name": path.name, "source": str(path), "error": problem.message, "hint": problem.hint}
+            terminal.print_json(told)
+        terminal.complain(_at(path, problem))
+    if failures:
+        if len(failures) + written > 1 and not quiet:
+            terminal.errors().print(f"{len(failures)} of {len(failures) + written} inputs failed.", markup=False)
+        raise typer.Exit(1)
+    if not written:
+        raise InputError("there was nothing to infer from", "name files or folders that hold shapes")
+
+
+def _search(shape: Shape, blocks: int, budget: float, seed: int, progress: Progress) -> Found:
+    from shapeprog.inference import infer
+
+    result = infer(shape, blocks=blocks, budget=budget, seed=seed, progress=progress)
+    return Found(
+        result.program,
+        result.snapped,
+        _scores(result.program, result.snapped, shape, result.scores, seed),
+        result.reason,
+    )
+
+
+def _baseline(shape: Shape, blocks: int, budget: float, seed: int, progress: Progress) -> Found:
+    import time
+
+    from shapeprog.inference import greedy_boxes
+
+    started = time.monotonic()
+    program: Program = greedy_boxes(shape.voxels, blocks)
+    seconds = {"seconds": time.monotonic() - started}
+    reason = "Stopped because greedy boxes place one box per block and never go back."
+    return Found(program, program.snap(), _scores(program, program.snap(), shape, seconds, seed), reason)
+
+
+def _scores(program: Program, snapped: Program, shape: Shape, known: dict[str, float], seed: int) -> dict[str, float]:
+    """Everything that was said about the program, and how close it comes to the input."""
+    from shapeprog.evaluation.metrics import evaluate_program
+
+    measured = evaluate_program(program, shape, snapped, seed=seed)
+    found = {"iou": measured.iou, "cd": measured.cd, "noise_floor": measured.noise_floor, "f1": measured.f1}
+    sizes = {"blocks": measured.blocks, "statements": measured.statements, "primitives": measured.primitives}
+    return terminal.plain({**known, **found, **sizes})
+
+
+def _document(found: Found, shape: Shape) -> str:
+    from shapeprog.export.text import result_json
+    from shapeprog.language.json_form import program_to_json
+
+    snapped = json.loads(program_to_json(found.snapped))["program"]
+    source = None if shape.source is None else str(shape.source.absolute())
+    return result_json(
+        found.program, shape.frame, scores=found.scores, reason=found.reason, source=source, snapped=snapped
+    )
+
+
+def _write(found: Found, shape: Shape, folder: Path, stem: str, picture: bool) -> list[str]:
+    from shapeprog.export import export
+    from shapeprog.files import write_text
+
+    write_text(folder / f"{stem}.json", _document(found, shape))
+    names = [f"{stem}.json", f"{stem}.shape"]
+    export(found.program, folder / f"{stem}.shape", shape.frame)
+    if found.program.size:
+        export(found.program, folder / f"{stem}.glb", shape.frame)
+        names.append(f"{stem}.glb")
+    if picture:
+        from shapeprog.view import picture as draw
+
+        draw(shape, found.program, folder / f"{stem}.png", scores=found.scores)
+        names.append(f"{stem}.png")
+    return names
+
+
+def _free_stem(shape: Shape, taken: set[str], folder: Path) -> str:
+    """A file name for a shape that no other shape of this run has, and that spares the input itself."""
+    base = re.sub(r"[^\w.\-]+", "_", shape.name).strip("._") or "shape"
+    source = None if shape.source is None else shape.source.resolve()
+    stem, number = base, 1
+    while stem in taken or (source is not None and source.parent == folder.resolve() and source.stem == stem):
+        number += 1
+        stem = f"{base}_{number}"
+    taken.add(stem)
+    return stem
+
+
+def _report(console: Any, found: Found, shape: Shape, folder: Path, names: list[str]) -> None:
+    from shapeprog.view.page import scores_text
+
+    console.print(shape.name, style="bold")
+    terminal.print_program(console, found.program)
+    for line in scores_text(found.scores, found.program):
+        console.print(line, style="dim")
+    console.print(found.reason, style="dim")
+    console.print(f"Wrote {', '.join(names)} in {folder}; the files keep every digit.", style="dim")
+    console.print()
+
+
+def _at(path: Path, error: ShapeProgError) -> ShapeProgError:
+    named = str(path) in error.message or path.name in error.message
+    return error if named else ShapeProgError(f"{path}: {error.message}", error.hint)

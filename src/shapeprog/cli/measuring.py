@@ -1,0 +1,163 @@
+"""Commands over whole collections: prepare packs, evaluate predictions."""
+
+from __future__ import annotations
+
+import csv
+import sys
+from collections.abc import Sequence
+from contextlib import nullcontext
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from shapeprog.cli import terminal
+from shapeprog.errors import InputError, ShapeProgError
+
+if TYPE_CHECKING:
+    from shapeprog.data.shape import Shape
+    from shapeprog.evaluation.metrics import Metrics, Summary
+
+_LABELS = {
+    "iou": "IoU@32", "cd": "CD", "noise_floor": "CD noise floor", "f1": "F1@1cell",
+    "blocks": "blocks", "statements": "statements", "primitives": "primitives",
+}  # fmt: skip
+_SIZES = ("blocks", "statements", "primitives")
+
+
+def prepare_command(
+    directory: Annotated[Path, typer.Argument(help="ShapeNetCore v2 as distributed, or a folder per category.")],
+    output: Annotated[Path, typer.Argument(help="Folder for the packs; made if missing.")],
+    points: Annotated[int, typer.Option(help="Points on each surface.", min=1)] = 5000,
+    seed: Annotated[int, typer.Option(help="Seed of the points.")] = 0,
+    up: Annotated[str | None, typer.Option(help="World axis that points up, such as +y.")] = None,
+    front: Annotated[str | None, typer.Option(help="World axis that the front faces, such as -z.")] = None,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
+) -> None:
+    """Turn a directory of models into packs CATEGORY_SPLIT.npz; equal shapes never straddle a split."""
+    from rich.progress import Progress
+
+    from shapeprog.data import prepare
+
+    last = None
+    bar = None if quiet else Progress(console=terminal.errors(), transient=True)
+    with bar or nullcontext():
+        task = bar.add_task("preparing", total=None) if bar else None
+        try:
+            for last in prepare(directory, output, points=points, seed=seed, up=up, front=front):
+                if bar and task is not None:
+                    bar.update(task, completed=last.done, total=last.total)
+        except KeyboardInterrupt:
+            raise terminal.Interrupted(f"categories that were finished are kept in {output}") from None
+    assert last is not None
+    for path, error in last.failures:
+        terminal.complain(ShapeProgError(f"{path}: {error.message}", error.hint))
+    if not quiet:
+        for path, count in last.packs:
+            terminal.output().print(f"wrote {path}: {count} shapes")
+    if last.failures:
+        raise typer.Exit(1)
+
+
+def evaluate_command(
+    predictions: Annotated[Path, typer.Argument(help="Programs, meshes, clouds or voxels: a file, pack or folder.")],
+    targets: Annotated[list[Path], typer.Argument(help="Targets of any kind: files, packs or folders.")],
+    points: Annotated[int, typer.Option(help="Points on each surface.", min=2)] = 5000,
+    seed: Annotated[int, typer.Option(help="Seed of all samplings.")] = 0,
+    up: Annotated[str | None, typer.Option(help="World axis of the targets that points up.")] = None,
+    front: Annotated[str | None, typer.Option(help="World axis that the front of the targets faces.")] = None,
+    each: Annotated[bool, typer.Option("--each", help="A row for every shape as well.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print rows and summary as JSON.")] = False,
+    as_csv: Annotated[bool, typer.Option("--csv", help="Print a row per shape as CSV.")] = False,
+    modules: terminal.With = None,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Show no progress.")] = False,
+) -> None:
+    """Measure predictions against targets of the same name: IoU at 32^3, CD, F1 at one cell, and size.
+
+    IoU is of the program snapped to the grid (the 'snapped' form of a .json result, else rounded); CD and F1 of the
+    program as it is, 5,000 points each, bounding box of the target scaled to diagonal 1, squared distances, both
+    directions added. The noise floor is the CD between two samplings of the target itself. Predicted meshes and
+    clouds must lie in the world of their target. One prediction and one target need not have the same name.
+    """
+    from rich.progress import track
+
+    from shapeprog.cli import scoring
+    from shapeprog.data import load_all
+    from shapeprog.evaluation.metrics import summarise
+
+    terminal.load_modules(modules)
+    missing = [path for path in [predictions, *targets] if not Path(str(path).split("#")[0]).exists()]
+    if missing:
+        raise InputError(f"there is no file or folder {missing[0]}", "check the path")
+    failures: list[ShapeProgError] = []
+    shapes: dict[str, Shape] = {}
+    for path, shape in load_all(targets, up=up, front=front, points=2 * points, seed=seed):
+        if isinstance(shape, ShapeProgError):
+            failures.append(ShapeProgError(f"target {path}: {shape.message}", shape.hint))
+        elif shape.name in shapes:
+            failures.append(ShapeProgError(f"two targets are called {shape.name}", "only the first is used"))
+        else:
+            shapes[shape.name] = shape
+    found = list(scoring.predictions(predictions))
+    rows: list[Metrics] = []
+    console = terminal.errors()
+    silent = quiet or as_json or as_csv
+    for name, prediction in track(found, "measuring", console=console, transient=True, disable=silent):
+        target = next(iter(shapes.values())) if len(shapes) == len(found) == 1 else shapes.get(name)
+        if isinstance(prediction, ShapeProgError):
+            failures.append(ShapeProgError(f"prediction {name}: {prediction.message}", prediction.hint))
+        elif target is None:
+            failures.append(ShapeProgError(f"prediction {name} has no target of that name", "rename one of them"))
+        else:
+            rows.append(scoring.measure(prediction, target, points, seed))
+    if not rows:
+        for error in failures:
+            terminal.complain(error)
+        raise InputError("no prediction could be measured", "predictions and targets are matched by name")
+    summary = summarise(rows)
+    if not any(row.blocks for row in rows):
+        summary = {name: value for name, value in summary.items() if name not in _SIZES}
+    if as_json:
+        totals = {name: terminal.plain(asdict(value)) for name, value in summary.items()}
+        terminal.print_json({"seed": seed, "rows": [terminal.plain(asdict(row)) for row in rows], "summary": totals})
+    elif as_csv:
+        writer = csv.DictWriter(sys.stdout, asdict(rows[0]).keys(), lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(asdict(row) for row in rows)
+    else:
+        _table(rows, summary, each, seed)
+    for error in failures:
+        terminal.complain(error)
+    if failures:
+        raise typer.Exit(1)
+
+
+def _table(rows: Sequence[Metrics], summary: dict[str, Summary], each: bool, seed: int) -> None:
+    from rich import box
+    from rich.table import Table
+
+    console = terminal.output()
+    names = [name for name in _LABELS if name in summary and summary[name].count]
+    if each:
+        table = Table("shape", box=box.SIMPLE_HEAD)
+        for name in names:
+            table.add_column(_LABELS[name], justify="right")
+        for row in rows:
+            table.add_row(row.name, *(_number(name, getattr(row, name)) for name in names))
+        console.print(table)
+    table = Table(f"{len(rows)} shapes, seed {seed}", box=box.SIMPLE_HEAD)
+    for heading in ("mean", "standard error", "median"):
+        table.add_column(heading, justify="right")
+    for name in names:
+        value = summary[name]
+        table.add_row(_LABELS[name], *(_number(name, each) for each in (value.mean, value.error, value.median)))
+    console.print(table)
+
+
+def _number(name: str, value: Any) -> str:
+    if value != value:
+        return "-"
+    return (
+        f"{value:.5f}" if name in ("cd", "noise_floor") else f"{value:.3f}" if name in ("iou", "f1") else f"{value:.4g}"
+    )

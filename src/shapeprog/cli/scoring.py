@@ -1,0 +1,98 @@
+"""Predictions of any kind against targets of any kind: programs by themselves, everything else as a shape."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from shapeprog.cli.terminal import read_program_file
+from shapeprog.cli.writing import program_files
+from shapeprog.data import load_all
+from shapeprog.data.shape import Shape
+from shapeprog.data.voxelise import voxelise_mesh, voxelise_points
+from shapeprog.errors import ShapeProgError
+from shapeprog.evaluation.metrics import CELL, Metrics, evaluate_program, target_samples, world_scale
+from shapeprog.geometry.nearest import squared_distance
+from shapeprog.language.program import Program
+
+if TYPE_CHECKING:
+    from torch import Tensor
+
+PROGRAMS = (".shape", ".json")
+
+Prediction = tuple[Program, Program | None] | Shape
+"""A program with its whole-numbered form where the file holds one, or a shape."""
+
+
+def predictions(path: Path) -> Iterator[tuple[str, Prediction | ShapeProgError]]:
+    """Names and predictions of a file, a pack or a folder; a folder that holds programs is read for those alone."""
+    files = [path] if path.suffix.lower() in PROGRAMS else []
+    if path.is_dir() and any(path.glob(f"*{suffix}") for suffix in PROGRAMS):
+        files = program_files(path)
+    for file in files:
+        try:
+            yield file.stem, _program(file)
+        except ShapeProgError as error:
+            yield file.stem, error
+    if not files:
+        for file, shape in load_all([path]):
+            yield (file.stem if isinstance(shape, ShapeProgError) else shape.name), shape
+
+
+def measure(prediction: Prediction, target: Shape, points: int, seed: int) -> Metrics:
+    """The measures of one prediction; sizes are 0 for what is no program."""
+    if isinstance(prediction, Shape):
+        return _measure_shape(prediction, target, points, seed)
+    return evaluate_program(prediction[0], target, prediction[1], points, seed)
+
+
+def _program(path: Path) -> tuple[Program, Program | None]:
+    from shapeprog.language.json_form import FORMAT, VERSION, program_from_json
+
+    program, _ = read_program_file(path)
+    if path.suffix.lower() != ".json":
+        return program, None
+    body = json.loads(path.read_text(encoding="utf-8-sig")).get("snapped")
+    if body is None:
+        return program, None
+    return program, program_from_json(json.dumps({"format": FORMAT, "version": VERSION, "program": body}), str(path))
+
+
+def _measure_shape(prediction: Shape, target: Shape, points: int, seed: int) -> Metrics:
+    """A predicted mesh or cloud lies where its file says, in the world of the target; cells lie in the grid."""
+    import torch
+
+    cells = prediction.voxels
+    drawn = None if prediction.points is None else torch.from_numpy(prediction.points.astype(np.float64))
+    if prediction.vertices is not None and prediction.faces is not None:
+        from shapeprog.data.sampling import sample_surface
+
+        placed = target.frame.to_grid(prediction.frame.to_world(prediction.vertices))
+        cells = voxelise_mesh(placed, prediction.faces)
+        drawn = torch.from_numpy(np.asarray(sample_surface(placed, prediction.faces, points, seed), np.float64))
+    elif prediction.kind == "points" and prediction.points is not None:
+        placed = target.frame.to_grid(prediction.frame.to_world(prediction.points))
+        cells, drawn = voxelise_points(placed), torch.from_numpy(placed)
+    union = int((cells | target.voxels).sum())
+    iou = float((cells & target.voxels).sum() / union) if union else 1.0
+    return Metrics(target.name, *_distances(drawn, target, points, seed), iou=iou, blocks=0, statements=0, primitives=0)
+
+
+def _distances(drawn: Tensor | None, target: Shape, points: int, seed: int) -> tuple[float, float, float, float, float]:
+    """CD, its two halves, the noise floor, and F1, as :mod:`shapeprog.evaluation.metrics` measures programs."""
+    samples = target_samples(target, points, seed)
+    unknown = float("nan")
+    if samples is None or drawn is None or not len(drawn):
+        return unknown, unknown, unknown, unknown, unknown
+    surface = samples[0]
+    square = world_scale(target) ** 2
+    there, back = squared_distance(drawn, surface), squared_distance(surface, drawn)
+    floor = float(squared_distance(*samples).mean() + squared_distance(*reversed(samples)).mean()) * square
+    near: list[Any] = [float((each <= CELL**2).double().mean()) for each in (there, back)]
+    f1 = 2 * near[0] * near[1] / sum(near) if sum(near) else 0.0
+    one, two = float(there.mean()) * square, float(back.mean()) * square
+    return one + two, one, two, floor, f1

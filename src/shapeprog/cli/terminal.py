@@ -1,0 +1,150 @@
+"""What commands say: results on the standard output, progress and errors beside it."""
+
+from __future__ import annotations
+
+import functools
+import json
+import os
+import sys
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
+
+import typer
+
+from shapeprog.errors import InputError, ShapeProgError
+from shapeprog.files import output_error
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from shapeprog.language.program import Program
+
+debugging = False
+"""Whether errors show their traceback."""
+
+WIDTH = 120
+"""Columns of a table where the output is no terminal."""
+
+INTERRUPTED = 130
+MISTAKE = 2
+
+Command = TypeVar("Command", bound=Callable[..., None])
+
+With = Annotated[
+    list[Path] | None,
+    typer.Option("--with", help="A Python module that declares statements of your own; may be given again."),
+]
+
+
+class Interrupted(KeyboardInterrupt):
+    """An interruption by the user, with a sentence on what was kept."""
+
+
+def guarded(command: Command) -> Command:
+    """The command with every mistake told in words: no traceback, and an exit code that scripts can rely on."""
+
+    @functools.wraps(command)
+    def run(*args: Any, **kwargs: Any) -> None:
+        try:
+            command(*args, **kwargs)
+            sys.stdout.flush()
+        except ShapeProgError as error:
+            if debugging:
+                raise
+            complain(error)
+            raise typer.Exit(MISTAKE) from None
+        except KeyboardInterrupt as stop:
+            kept = str(stop) if isinstance(stop, Interrupted) else "nothing was left half written"
+            errors().print(f"Interrupted; {kept}.", style="yellow", markup=False, highlight=False)
+            raise typer.Exit(INTERRUPTED) from None
+        except BrokenPipeError:
+            # The reader of a pipe has gone; keep Python from complaining about it at exit.
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            raise typer.Exit(0) from None
+        except OSError as error:
+            if debugging:
+                raise
+            complain(output_error(Path(error.filename or "the standard output"), error))
+            raise typer.Exit(MISTAKE) from None
+
+    return run  # type: ignore[return-value]
+
+
+def output() -> Console:
+    """The standard output; lines are not wrapped where it is a file or a pipe."""
+    from rich.console import Console
+
+    return Console(highlight=False, markup=False, soft_wrap=True, width=None if sys.stdout.isatty() else WIDTH)
+
+
+def errors() -> Console:
+    """The standard error, for progress and complaints."""
+    from rich.console import Console
+
+    return Console(stderr=True, highlight=False, soft_wrap=True)
+
+
+def complain(error: ShapeProgError) -> None:
+    """Print an error: the cause in red, the cure below it."""
+    text = str(error)
+    if error.hint:
+        text = text.removesuffix(f"\n  hint: {error.hint}")
+    console = errors()
+    console.print("error: ", style="bold red", end="")
+    console.print(text, style="red", markup=False)
+    if error.hint:
+        console.print(f"hint: {error.hint}", markup=False)
+
+
+def load_modules(modules: list[Path] | None) -> None:
+    """Declare the statements of a user's modules."""
+    if not modules:
+        return
+    from shapeprog.language.plugins import load_statements
+
+    for module in modules:
+        load_statements(module)
+
+
+def read_program_file(path: Path) -> tuple[Program, Any]:
+    """The program and frame of a file.
+
+    Raises
+    ------
+    InputError
+        Where the file holds a shape instead, with the command that makes a program of it.
+    """
+    from shapeprog.export.text import read_program
+
+    try:
+        return read_program(path)
+    except InputError as error:
+        if path.is_file() and path.suffix.lower() not in (".shape", ".json", ".txt"):
+            raise InputError(error.message, f"make a program of it first: shapeprog infer {path}") from None
+        raise
+
+
+def print_program(console: Console, program: Program) -> None:
+    """Print a program with each statement in its colour, numbers rounded for reading."""
+    from rich.text import Text
+
+    from shapeprog.export.colours import hexadecimal
+    from shapeprog.view.listing import listing, parted
+
+    for line in listing(program):
+        before, word, after = parted(line)
+        style = "dim" if line.statement is None else f"bold {hexadecimal(line.statement)}"
+        console.print(Text.assemble((before, "dim"), (word, style), after))
+
+
+def plain(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Numbers fit for JSON: those that are not finite are left out."""
+    import math
+
+    return {key: value for key, value in values.items() if not isinstance(value, float) or math.isfinite(value)}
+
+
+def print_json(content: Any) -> None:
+    """Print one JSON value on one line."""
+    print(json.dumps(content, allow_nan=False), flush=True)

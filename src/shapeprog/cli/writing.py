@@ -1,0 +1,230 @@
+"""Commands that turn programs into something to look at or to use: render, export, show, sheet, statements."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from shapeprog.cli import terminal
+from shapeprog.errors import InputError, OutputError, ShapeProgError
+
+if TYPE_CHECKING:
+    from shapeprog.data.shape import Shape
+    from shapeprog.language.program import Program
+
+ProgramFile = Annotated[Path, typer.Argument(help="A .shape or .json file.")]
+Input = Annotated[
+    Path | None, typer.Option("--shape", help="The input to show beside it; by default the one a .json file names.")
+]
+
+
+def export_command(
+    program: ProgramFile,
+    outputs: Annotated[list[Path], typer.Argument(help="Files to write; the suffix of each names its format.")],
+    modules: terminal.With = None,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
+) -> None:
+    """Write a program as .glb .obj .ply .stl .scad .py .step .binvox .npz .shape or .json.
+
+    Where the program file keeps its frame (every .json and .shape written by infer does), the export lies on the
+    input. A .shape file without one is exported upright, one cell one unit; to place it, put the comment
+    '# frame: {"scale": ..., "centre": [...], "axes": [[...], [...], [...]]}' at its top.
+    """
+    from shapeprog.export import export
+
+    terminal.load_modules(modules)
+    found, frame = terminal.read_program_file(program)
+    for path in outputs:
+        export(found, path, frame)
+        if not quiet:
+            terminal.output().print(f"wrote {path}")
+
+
+def render_command(
+    program: ProgramFile,
+    output: Annotated[Path, typer.Argument(help="A picture (.png .jpg .pdf), cells (.npy .binvox) or points (.xyz).")],
+    shape: Input = None,
+    resolution: Annotated[int, typer.Option(help="Cells along each side, for .npy.", min=1, max=512)] = 32,
+    points: Annotated[int, typer.Option(help="How many points, for .xyz.", min=1)] = 5000,
+    seed: Annotated[int, typer.Option(help="Seed of the points.")] = 0,
+    modules: terminal.With = None,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
+) -> None:
+    """Draw a program: as a picture, as hard voxels, or as points on its surface.
+
+    Cells are those of the program snapped to whole numbers. Points come as lines 'x y z nx ny nz' in the world of the
+    input, or in the grid where no frame is known.
+    """
+    from shapeprog.export.writing import export
+    from shapeprog.view.page import SUFFIXES, picture
+
+    terminal.load_modules(modules)
+    found, frame = terminal.read_program_file(program)
+    suffix = output.suffix.lower()
+    if suffix in SUFFIXES:
+        scores = _kept(program).get("scores")
+        beside = _input_of(program, shape)
+        picture(beside, found, output, title=program.stem, scores=scores if isinstance(scores, dict) else None)
+    elif suffix == ".npy":
+        _write_cells(found, output, resolution)
+    elif suffix == ".xyz":
+        _write_points(found, frame, output, points, seed)
+    elif suffix in (".binvox", ".npz"):
+        export(found, output, frame)
+    else:
+        known = " ".join((*SUFFIXES, ".npy", ".binvox", ".npz", ".xyz"))
+        raise OutputError(f"nothing is rendered to {suffix or 'a file without a suffix'}", f"known are {known}")
+    if not quiet:
+        terminal.output().print(f"wrote {output}")
+
+
+def show_command(
+    program: ProgramFile,
+    output: Annotated[Path | None, typer.Argument(help="The page; by default NAME.html in this folder.")] = None,
+    shape: Input = None,
+    browse: Annotated[bool, typer.Option("--open", help="Open it in the browser.")] = False,
+    modules: terminal.With = None,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
+) -> None:
+    """Write one HTML page to turn the shape and see which line draws which part; it needs no network."""
+    from shapeprog.view import viewer
+
+    terminal.load_modules(modules)
+    found, _ = terminal.read_program_file(program)
+    page = output or Path(f"{program.stem}.html")
+    if page.suffix.lower() not in (".html", ".htm"):
+        raise OutputError(f"{page} is no page", "pages end in .html; pictures are made by 'shapeprog render'")
+    viewer(found, page, shape=_input_of(program, shape), title=program.stem, scores=_kept(program).get("scores"))
+    if not quiet:
+        terminal.output().print(f"wrote {page}")
+    if browse:
+        import webbrowser
+
+        webbrowser.open(page.absolute().as_uri())
+
+
+def sheet_command(
+    folder: Annotated[Path, typer.Argument(help="A folder with .json or .shape files, such as infer writes.")],
+    output: Annotated[Path, typer.Argument(help="The picture, such as sheet.png.")],
+    columns: Annotated[int, typer.Option(help="Pairs in a row.", min=1)] = 4,
+    most: Annotated[int, typer.Option("--most", help="Most programs to show.", min=1)] = 96,
+    title: Annotated[str, typer.Option(help="Stands above it.")] = "",
+    modules: terminal.With = None,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
+) -> None:
+    """Draw a contact sheet of a folder of programs, each beside the input that its .json file names."""
+    from shapeprog.view import Item, contact_sheet
+    from shapeprog.view.page import scores_text
+
+    terminal.load_modules(modules)
+    items: list[Item] = []
+    failures: list[ShapeProgError] = []
+    for path in program_files(folder):
+        if len(items) == most:
+            break
+        try:
+            found, _ = terminal.read_program_file(path)
+        except ShapeProgError as error:
+            failures.append(error)
+            continue
+        scores = _kept(path).get("scores")
+        note = scores_text(scores if isinstance(scores, dict) else None, found)[0]
+        items.append(Item(path.stem, _input_of(path, None), found, note))
+    contact_sheet(items, output, columns=columns, title=title)
+    if not quiet:
+        terminal.output().print(f"wrote {output}: {len(items)} programs")
+    for problem in failures:
+        terminal.complain(problem)
+    if failures:
+        raise typer.Exit(1)
+
+
+def statements_command(
+    name: Annotated[str | None, typer.Argument(help="A statement or loop; without it all are listed.")] = None,
+    modules: terminal.With = None,
+) -> None:
+    """Print the manual of the language, or of one statement, drawn from the declarations."""
+    from shapeprog.language.manual import manual
+
+    terminal.load_modules(modules)
+    terminal.output().print(manual(name).rstrip("\n"))
+
+
+def program_files(folder: Path) -> list[Path]:
+    """The programs in a folder in the order of their names; of NAME.json and NAME.shape only the first.
+
+    Raises
+    ------
+    InputError
+        If there is no such folder, or it holds no programs.
+    """
+    if not folder.is_dir():
+        raise InputError(f"there is no folder {folder}", "give a folder that holds .json or .shape files")
+    found = {path.with_suffix(""): path for path in folder.glob("*.shape")}
+    found |= {path.with_suffix(""): path for path in folder.glob("*.json")}
+    if not found:
+        raise InputError(f"the folder {folder} holds no programs", "give a folder that holds .json or .shape files")
+    return [found[key] for key in sorted(found)]
+
+
+def _kept(path: Path) -> dict[str, Any]:
+    """Everything a .json result keeps beside the program."""
+    if path.suffix.lower() != ".json":
+        return {}
+    content = json.loads(path.read_text(encoding="utf-8-sig"))
+    return content if isinstance(content, dict) else {}
+
+
+def _input_of(program: Path, shape: Path | None) -> Shape | None:
+    """The shape a program was inferred from: the one given, or the one its file names if it is still there."""
+    from dataclasses import replace
+
+    from shapeprog.data import load
+
+    if shape is not None:
+        return load(shape)
+    content = _kept(program)
+    source = content.get("source")
+    if not isinstance(source, str) or not Path(source.split("#")[0]).exists():
+        return None
+    try:
+        found = load(source)
+    except ShapeProgError:
+        return None  # a picture without the input is better than none
+    frame = terminal.read_program_file(program)[1]
+    if frame is None or found.vertices is None or frame.axes == found.frame.axes:
+        return found
+    # It was inferred with --up or --front: show it as it was seen then.
+    return replace(found, vertices=frame.to_grid(found.frame.to_world(found.vertices)))
+
+
+def _write_cells(program: Program, path: Path, resolution: int) -> None:
+    import numpy as np
+
+    from shapeprog.files import atomic_path
+    from shapeprog.geometry.occupancy import voxels
+    from shapeprog.language.unroll import unroll
+
+    cells = voxels(unroll(program.snap()), resolution).numpy().astype(np.bool_)
+    with atomic_path(path) as temporary, temporary.open("wb") as stream:
+        np.save(stream, cells)
+
+
+def _write_points(program: Program, frame: Any, path: Path, points: int, seed: int) -> None:
+    import numpy as np
+    import torch
+
+    from shapeprog.export.frames import upright
+    from shapeprog.files import atomic_path
+    from shapeprog.geometry.sampling import sample_surface
+    from shapeprog.language.unroll import unroll
+
+    place = upright(path.suffix.lower()) if frame is None else frame
+    sample = sample_surface(unroll(program), points, torch.Generator().manual_seed(seed))
+    normals = sample.normals.numpy() @ np.asarray(place.axes).T
+    rows = np.concatenate([place.to_world(sample.points.detach().numpy()), normals], 1)
+    with atomic_path(path) as temporary:
+        np.savetxt(temporary, rows, fmt="%.7g")

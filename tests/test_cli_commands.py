@@ -1,0 +1,290 @@
+"""The commands: what they write, what they say, and how they end."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+from shapeprog import inference
+from shapeprog.cli import main, terminal
+from shapeprog.export import export
+from shapeprog.export.text import read_program
+from shapeprog.language.text import parse
+from shapeprog.space import Frame, grid_axes
+
+PROGRAM = parse(
+    "top_rectangle(at=(10, 0, 0), thickness=2, half=(9, 12))\n"
+    "for i in translate(2, by=(0, 0, 22)):\n"
+    "    for j in translate(2, by=(0, 16, 0)):\n"
+    "        leg(at=(-12, -9, -12), size=(22, 2, 2))\n"
+)
+FRAME = Frame.around([1, 2, 3], [3, 4, 4.5], grid_axes("+y", "+z"))
+
+
+@dataclass(frozen=True)
+class Ended:
+    code: int
+    out: str
+    err: str
+
+
+Run = Callable[..., Ended]
+
+
+@pytest.fixture
+def run(capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Run:
+    """Run the command in an empty folder, as a shell would."""
+    monkeypatch.chdir(tmp_path)
+
+    def call(*words: object) -> Ended:
+        with pytest.raises(SystemExit) as end:
+            main([str(word) for word in words])
+        told = capsys.readouterr()
+        code = end.value.code
+        return Ended(code if isinstance(code, int) else 0, told.out, told.err)
+
+    return call
+
+
+@pytest.fixture
+def quick(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Inference that always finds the same table, at once."""
+
+    def infer(shape, *, blocks, budget, seed, progress):
+        progress("searching", 0.5)
+        return inference.Result(PROGRAM, PROGRAM.snap(), {"seconds": 0.1, "odd": float("nan")}, "Stopped at once.")
+
+    monkeypatch.setattr(inference, "infer", infer)
+
+
+def table(path: Path) -> Path:
+    """A mesh of the table, as somebody would have it on the disk."""
+    return export(PROGRAM, path, FRAME)
+
+
+@pytest.mark.usefixtures("quick")
+def test_infer_writes_four_files_that_lie_on_the_input(run: Run, tmp_path: Path):
+    ended = run("infer", table(tmp_path / "table.stl"), "--out", "res", "--up", "+y", "--front", "+z")
+    assert ended.code == 0, ended.err
+    assert sorted(path.name for path in (tmp_path / "res").iterdir()) == [
+        "table.glb", "table.json", "table.png", "table.shape"
+    ]  # fmt: skip
+    assert "leg(at=(-12, -9, -12), size=(22, 2, 2))" in ended.out
+    assert "IoU 1.000" in ended.out
+    assert "Stopped at once." in ended.out
+    source = trimesh.load(tmp_path / "table.stl", force="mesh").bounds
+    np.testing.assert_allclose(trimesh.load(tmp_path / "res" / "table.glb").bounds, source, atol=1e-4)
+    kept = json.loads((tmp_path / "res" / "table.json").read_text())
+    assert kept["scores"]["iou"] == 1
+    assert "odd" not in kept["scores"], "JSON knows no NaN"
+    for name in ("table.shape", "table.json"):
+        assert run("export", f"res/{name}", f"{name}.obj").code == 0
+        np.testing.assert_allclose(trimesh.load(tmp_path / f"{name}.obj", force="mesh").bounds, source, atol=1e-4)
+
+
+@pytest.mark.usefixtures("quick")
+def test_a_broken_file_is_told_at_the_end_and_stops_nothing(run: Run, tmp_path: Path):
+    folder = tmp_path / "in"
+    folder.mkdir()
+    (folder / "a_broken.obj").write_text("no mesh at all")
+    table(folder / "b_good.obj")
+    ended = run("infer", "in", "in/b_good.obj", "missing.obj", "--out", "res", "--no-picture")
+    assert ended.code == 1
+    assert sorted(path.name for path in (tmp_path / "res").glob("*.json")) == ["b_good.json", "b_good_2.json"]
+    assert not list((tmp_path / "res").glob("*.png"))
+    assert ended.err.index("a_broken.obj") < ended.err.index("missing.obj") < ended.err.index("2 of 4 inputs failed")
+
+
+@pytest.mark.usefixtures("quick")
+def test_the_input_itself_is_never_overwritten(run: Run, tmp_path: Path):
+    before = table(tmp_path / "table.glb").read_bytes()
+    assert run("infer", "table.glb", "--out", ".", "--no-picture").code == 0
+    assert (tmp_path / "table.glb").read_bytes() == before
+    assert (tmp_path / "table_2.glb").exists()
+
+
+@pytest.mark.usefixtures("quick")
+def test_json_is_one_object_a_line_and_quiet_says_nothing(run: Run, tmp_path: Path):
+    (tmp_path / "broken.ply").write_text("ply?")
+    table(tmp_path / "good.obj")
+    ended = run("infer", "good.obj", "broken.ply", "--json", "--no-picture")
+    lines = [json.loads(line) for line in ended.out.splitlines()]
+    assert lines[0]["name"] == "good"
+    assert lines[0]["program"][0]["statement"] == "top_rectangle"
+    assert "broken" in lines[1]["error"]
+    quiet = run("infer", "good.obj", "--quiet", "--no-picture")
+    assert (quiet.code, quiet.out, quiet.err) == (0, "", "")
+
+
+def test_an_interruption_says_what_was_kept(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    def infer(shape, **_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(inference, "infer", infer)
+    ended = run("infer", table(tmp_path / "table.obj"), "--out", "res")
+    assert ended.code == 130
+    assert "what was finished is kept: 0 programs in res" in ended.err
+
+
+def test_a_fault_of_ours_in_one_shape_stops_nothing(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    def infer(shape, **_):
+        raise RuntimeError("a bug")
+
+    monkeypatch.setattr(inference, "infer", infer)
+    ended = run("infer", table(tmp_path / "table.obj"))
+    assert ended.code == 1
+    assert "RuntimeError: a bug" in ended.err
+    assert "--debug" in ended.err
+    with pytest.raises(RuntimeError, match="a bug"):
+        main(["infer", str(tmp_path / "table.obj"), "--debug"])
+    terminal.debugging = False
+
+
+def test_the_baseline_runs_greedy_boxes(run: Run, tmp_path: Path):
+    ended = run("infer", table(tmp_path / "table.obj"), "--baseline", "--blocks", 3, "--no-picture")
+    assert ended.code == 0, ended.err
+    assert "greedy boxes" in ended.out
+    assert read_program(tmp_path / "shapeprog-out" / "table.json")[0].blocks == 3
+
+
+@pytest.fixture
+def program(tmp_path: Path) -> Path:
+    return export(PROGRAM, tmp_path / "table.json", FRAME)
+
+
+def test_export_writes_every_file_it_is_given(run: Run, tmp_path: Path, program: Path):
+    ended = run("export", program, "a.glb", "b.scad", "c.py", "d.stl")
+    assert ended.code == 0, ended.err
+    assert all((tmp_path / name).exists() for name in ("a.glb", "b.scad", "c.py", "d.stl"))
+
+
+def test_render_makes_pictures_cells_and_points(run: Run, tmp_path: Path, program: Path):
+    table(tmp_path / "input.obj")
+    for words in (["a.png", "--shape", "input.obj"], ["b.npy", "--resolution", 16], ["c.xyz", "--points", 50]):
+        assert run("render", program, *words).code == 0
+    assert np.load(tmp_path / "b.npy").shape == (16, 16, 16)
+    rows = np.loadtxt(tmp_path / "c.xyz")
+    assert rows.shape == (50, 6)
+    assert (rows[:, :3] > [0.99, 1.99, 2.9]).all()
+    assert (rows[:, :3] < [3.01, 4.01, 4.6]).all()
+    assert "nothing is rendered to .gif" in run("render", program, "a.gif").err
+
+
+def test_show_and_sheet_write_a_page_and_a_picture(run: Run, tmp_path: Path, program: Path):
+    assert run("show", program).code == 0
+    assert "top_rectangle" in (tmp_path / "table.html").read_text()
+    assert "pages end in .html" in run("show", program, "a.png").err
+    (tmp_path / "cut.json").write_text(program.read_text()[:100])
+    ended = run("sheet", ".", "sheet.png")
+    assert ended.code == 1
+    assert "1 programs" in ended.out
+    assert "was the file cut off?" in ended.err
+    assert (tmp_path / "sheet.png").exists()
+
+
+def test_statements_prints_the_manual(run: Run):
+    assert "base_cross" in run("statements").out
+    assert "tilt" in run("statements", "back").out
+    ended = run("statements", "bak")
+    assert (ended.code, "did you mean back?" in ended.err) == (2, True)
+
+
+def test_statements_of_a_users_own_come_with_an_option(run: Run, tmp_path: Path):
+    (tmp_path / "mine.py").write_text("oops")
+    ended = run("statements", "--with", "mine.py")
+    assert ended.code == 2
+    assert "mine.py, line 1" in ended.err
+
+
+def test_prepare_writes_packs(run: Run, tmp_path: Path):
+    (tmp_path / "in" / "table").mkdir(parents=True)
+    table(tmp_path / "in" / "table" / "one.obj")
+    (tmp_path / "in" / "table" / "two.obj").write_text("broken")
+    ended = run("prepare", "in", "packs")
+    assert ended.code == 1
+    assert "1 shapes" in ended.out
+    assert "two.obj" in ended.err
+
+
+def test_evaluate_measures_programs_and_meshes_alike(run: Run, tmp_path: Path, program: Path):
+    (tmp_path / "targets").mkdir()
+    (tmp_path / "meshes").mkdir()
+    table(tmp_path / "targets" / "table.obj")
+    table(tmp_path / "meshes" / "table.ply")
+    (tmp_path / "programs").mkdir()
+    program.rename(tmp_path / "programs" / "table.json")
+    found = {}
+    for kind in ("programs", "meshes"):
+        ended = run("evaluate", kind, "targets", "--json", "--points", 2000)
+        assert ended.code == 0, ended.err
+        found[kind] = json.loads(ended.out)["rows"][0]
+        assert found[kind]["iou"] > 0.99
+        assert found[kind]["cd"] < 2 * found[kind]["noise_floor"]
+        assert found[kind]["f1"] > 0.95
+    assert (found["programs"]["blocks"], found["meshes"]["blocks"]) == (2, 0)
+    shown = run("evaluate", "programs", "targets", "--each")
+    assert "IoU@32" in shown.out
+    assert "noise floor" in shown.out
+    rows = list(csv.DictReader(io.StringIO(run("evaluate", "programs", "targets", "--csv").out)))
+    assert rows[0]["name"] == "table"
+
+
+def test_evaluate_tells_what_has_no_partner(run: Run, tmp_path: Path, program: Path):
+    for name in ("one", "two"):
+        (tmp_path / "programs").mkdir(exist_ok=True)
+        (tmp_path / "programs" / f"{name}.json").write_text(program.read_text())
+    table(tmp_path / "one.obj")
+    ended = run("evaluate", "programs", "one.obj")
+    assert ended.code == 1
+    assert "two has no target" in ended.err
+    table(tmp_path / "other.obj")
+    ended = run("evaluate", "programs", "other.obj")
+    assert (ended.code, "matched by name" in ended.err) == (2, True)
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["export", "table.json", "a.gbl"], "did you mean .glb"),
+        (["export", "table.json", "no/a.glb"], "make the folder first"),
+        (["export", "gone.json", "a.glb"], "there is no file"),
+        (["export", "mesh.obj", "a.glb"], "shapeprog infer"),
+        (["export", "cut.json", "a.glb"], "was the file cut off?"),
+        (["export", "typo.shape", "a.glb"], "did you mean leg?"),
+        (["render", "table.json", "no/a.png"], "make the folder first"),
+        (["sheet", "gone", "a.png"], "there is no folder"),
+        (["evaluate", "gone", "mesh.obj"], "there is no file or folder gone"),
+        (["infer", "mesh.obj", "--out", "table.json"], "there is a file of that name"),
+        (["infer", "mesh.obj", "--with", "gone.py"], "no file"),
+    ],
+)
+def test_mistakes_are_told_without_a_traceback(run: Run, tmp_path: Path, program: Path, words: list[str], told: str):
+    table(tmp_path / "mesh.obj")
+    (tmp_path / "cut.json").write_text(program.read_text()[:200])
+    (tmp_path / "typo.shape").write_text("legg(at=(0, 0, 0), size=(1, 1, 1))")
+    ended = run(*words)
+    assert ended.code == 2
+    assert told in ended.err
+    assert "error: " in ended.err
+    assert "Traceback" not in ended.err
+
+
+def test_help_and_version_load_nothing_heavy():
+    code = (
+        "import sys, io, contextlib\nfrom shapeprog.cli import main\n"
+        "for words in (['--help'], ['infer', '--help'], ['--version']):\n"
+        "    with contextlib.suppress(SystemExit), contextlib.redirect_stdout(io.StringIO()):\n        main(words)\n"
+        "print(*{name.split('.')[0] for name in sys.modules})"
+    )
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
+    assert not {"torch", "numpy", "numba", "trimesh", "matplotlib", "scipy", "PIL"} & set(found)

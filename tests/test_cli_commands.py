@@ -225,7 +225,7 @@ def test_evaluate_measures_programs_and_meshes_alike(run: Run, tmp_path: Path, p
     program.rename(tmp_path / "programs" / "table.json")
     found = {}
     for kind in ("programs", "meshes"):
-        ended = run("evaluate", kind, "targets", "--json", "--points", 2000)
+        ended = run("evaluate", kind, "targets", "--json")
         assert ended.code == 0, ended.err
         found[kind] = json.loads(ended.out)["rows"][0]
         assert found[kind]["iou"] > 0.99

@@ -31,7 +31,7 @@ Prediction = tuple[Program, Program | None] | Shape
 def predictions(path: Path) -> Iterator[tuple[str, Prediction | ShapeProgError]]:
     """Names and predictions of a file, a pack or a folder; a folder that holds programs is read for those alone."""
     files = [path] if path.suffix.lower() in PROGRAMS else []
-    if path.is_dir() and any(path.glob(f"*{suffix}") for suffix in PROGRAMS):
+    if path.is_dir() and any(any(path.glob(f"*{suffix}")) for suffix in PROGRAMS):
         files = program_files(path)
     for file in files:
         try:

@@ -7,6 +7,9 @@ from numba import njit
 
 CYLINDER = 1
 
+STRIDE = 2.0
+"""How far in cells from a point its list of possible nearest primitives is used."""
+
 
 @njit(cache=True, nogil=True)
 def distance(kind, size, slot, a, b, c):
@@ -77,15 +80,21 @@ def bound(kind, size, rotation, slot, axis):
 
 
 @njit(cache=True, nogil=True)
-def _exact(kind, size, rotation, slot):
-    """Whether a primitive fills the box around it: a cuboid at right angles to the grid, without a shear."""
-    if kind[slot] == CYLINDER or size[slot, 3] != 0:
+def _box(kind, size, centre, rotation, slot, box, n):
+    """Column n of the boxes: centre, local axes and half extents of the turned box around the primitive of a slot.
+
+    Returns whether the primitive fills it: a cuboid without a shear.
+    """
+    for axis in range(3):
+        box[axis, n] = centre[slot, axis]
+        for other in range(3):
+            box[3 + 3 * axis + other, n] = rotation[slot, other, axis]
+        box[12 + axis, n] = max(size[slot, axis], 0.0)
+    if kind[slot] == CYLINDER:
+        box[14, n] = box[13, n]
         return False
-    for i in range(3):
-        for j in range(3):
-            if rotation[slot, i, j] != np.rint(rotation[slot, i, j]):
-                return False
-    return True
+    box[13, n] += abs(size[slot, 3]) / 2
+    return size[slot, 3] == 0
 
 
 @njit(cache=True, nogil=True)
@@ -104,52 +113,91 @@ def nearest(kinds, sizes, centres, rotations, masks, points, slots, values, begi
 
 
 @njit(cache=True, nogil=True)
+def _over(box, axis, count, x, y, z, over):
+    """How far a point is beyond the faces of each box along one of its axes."""
+    for n in range(count):
+        dx, dy, dz = x - box[0, n], y - box[1, n], z - box[2, n]
+        along = box[3 + 3 * axis, n] * dx + box[4 + 3 * axis, n] * dy + box[5 + 3 * axis, n] * dz
+        over[n] = abs(along) - box[12 + axis, n]
+
+
+@njit(cache=True, nogil=True)
+def _bounds(box, count, x, y, z, up, depth, lower):
+    """Lower bounds of the signed distances of a point: those to the turned boxes around the primitives.
+
+    One short loop after another, because the compiler makes vectors of loops over few arrays only.
+    """
+    zero = box.dtype.type(0)
+    _over(box, 0, count, x, y, z, up)
+    _over(box, 1, count, x, y, z, depth)
+    _over(box, 2, count, x, y, z, lower)
+    for n in range(count):
+        u, v, w = up[n], depth[n], lower[n]
+        p, q, r = max(u, zero), max(v, zero), max(w, zero)
+        lower[n] = np.sqrt(p * p + q * q + r * r) + min(max(u, max(v, w)), zero)
+
+
+@njit(cache=True, nogil=True)
+def _best(kind, size, centre, rotation, kept, full, lower, count, x, y, z):
+    """The best primitive by its exact distance, looking only at those whose bound is below the best so far."""
+    found, least = 0, lower[0]
+    for n in range(count):
+        value = lower[n]
+        if value < least:
+            least, found = value, n
+    best = float(least)
+    if not full[found]:
+        a, b, c = local(centre, rotation, kept[found], x, y, z)
+        best = distance(kind, size, kept[found], a, b, c)
+    start = found
+    for n in range(count):
+        if lower[n] <= best and n != start:
+            closer = float(lower[n])
+            if not full[n]:
+                a, b, c = local(centre, rotation, kept[n], x, y, z)
+                closer = distance(kind, size, kept[n], a, b, c)
+            if closer < best or (closer == best and n < found):
+                best, found = closer, n
+    return best, found
+
+
+@njit(cache=True, nogil=True)
 def _nearest_in_scene(kind, size, centre, rotation, mask, points, slots, values, begin, end):
     """The same for one scene.
 
-    The box around a primitive bounds its signed distance from below, inside too; only primitives whose bound is
-    below the best value so far are looked at closely.
+    The turned box around a primitive bounds its signed distance from below, inside too.  Distances change no faster
+    than points move: a primitive whose bound at one point exceeds the best there by more than twice ``STRIDE`` is not the
+    nearest within ``STRIDE`` of it, so points that come in order, such as cells, look at few primitives.
     """
     kept = np.nonzero(mask)[0]
     used = len(kept)
-    full = np.empty(used, np.bool_)
-    box = np.empty((6, used), points.dtype)
-    lower = np.empty(used, points.dtype)
-    zero = points.dtype.type(0)
+    full, box, lower = np.empty(used, np.bool_), np.empty((15, used), points.dtype), np.empty(used, points.dtype)
+    up, depth = np.empty(used, points.dtype), np.empty(used, points.dtype)
+    few, few_full, few_box = kept.copy(), full.copy(), box.copy()
+    count = 0
     for n in range(used):
-        full[n] = _exact(kind, size, rotation, kept[n])
-        for axis in range(3):
-            box[axis, n] = centre[kept[n], axis]
-            box[axis + 3, n] = bound(kind, size, rotation, kept[n], axis)
+        full[n] = _box(kind, size, centre, rotation, kept[n], box, n)
+    px, py, pz = np.inf, np.inf, np.inf
     for item in range(begin, end):
         if used == 0:
             slots[item], values[item] = 0, np.inf
             continue
         x, y, z = points[item, 0], points[item, 1], points[item, 2]
-        for n in range(used):
-            u = abs(x - box[0, n]) - box[3, n]
-            v = abs(y - box[1, n]) - box[4, n]
-            w = abs(z - box[2, n]) - box[5, n]
-            p, q, r = max(u, zero), max(v, zero), max(w, zero)
-            lower[n] = np.sqrt(p * p + q * q + r * r) + min(max(u, max(v, w)), zero)
-        found = 0
-        for n in range(used):
-            if lower[n] < lower[found]:
-                found = n
-        best = float(lower[found])
-        if not full[found]:
-            a, b, c = local(centre, rotation, kept[found], x, y, z)
-            best = distance(kind, size, kept[found], a, b, c)
-        start = found
-        for n in range(used):
-            if lower[n] <= best and n != start:
-                value = float(lower[n])
-                if not full[n]:
-                    a, b, c = local(centre, rotation, kept[n], x, y, z)
-                    value = distance(kind, size, kept[n], a, b, c)
-                if value < best or (value == best and n < found):
-                    best, found = value, n
+        if (x - px) ** 2 + (y - py) ** 2 + (z - pz) ** 2 < STRIDE**2:
+            _bounds(few_box, count, x, y, z, up, depth, lower)
+            best, found = _best(kind, size, centre, rotation, few, few_full, lower, count, x, y, z)
+            slots[item], values[item] = few[found], best
+            continue
+        _bounds(box, used, x, y, z, up, depth, lower)
+        best, found = _best(kind, size, centre, rotation, kept, full, lower, used, x, y, z)
         slots[item], values[item] = kept[found], best
+        px, py, pz, count = x, y, z, 0
+        for n in range(used):
+            if lower[n] <= best + 2 * STRIDE + 1e-3:
+                few[count], few_full[count] = kept[n], full[n]
+                for row in range(15):
+                    few_box[row, count] = box[row, n]
+                count += 1
 
 
 @njit(cache=True, nogil=True)

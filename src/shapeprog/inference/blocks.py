@@ -22,8 +22,11 @@ from shapeprog.space import FloatArray
 
 CENTRED = ("top_rectangle", "layer")
 CENTRED_SQUARE = ("top_square", "support_cuboid", "base_square")
-CORNER = "horizontal_bar"
-"""Statement for a horizontal board whose width in cells is odd: those with a centre can only be even on the grid."""
+CORNER = {"support_cuboid": "leg", "sideboard": "vertical_board"}
+"""Statements for parts whose width in cells is odd: those with a centre can only be even on the grid.
+
+Tops, layers and bases, which lie, become horizontal bars.
+"""
 
 
 def to_program(blocks: FloatArray) -> Program:
@@ -37,8 +40,13 @@ def to_program(blocks: FloatArray) -> Program:
 
 
 def tidy(block: FloatArray) -> FloatArray:
-    """The same block with loops that run upwards, to the rear and to the right, the longer one inside."""
+    """The same cells with loops that run upwards, to the rear and to the right, the longer one inside.
+
+    A sheared box without shear becomes a box, which may then take any name.
+    """
     block = block.copy()
+    if int(block[0]) == BACK and block[FIRST + 6] == 0:
+        block[0] = BOX
     for count, shift in ((COUNT1, SHIFT1), (COUNT2, SHIFT2)):
         step = block[shift : shift + 3]
         moving = np.flatnonzero(step)
@@ -84,9 +92,8 @@ def _node(block: FloatArray, name: str) -> Draw | Loop:
     elif name == "back":
         numbers = [*low, up, depth, side, 0.0]
     else:
-        fallback = {"support_cuboid": "leg", "sideboard": "vertical_board"}
         if name in (*CENTRED, *CENTRED_SQUARE, "sideboard"):
-            name = fallback.get(name, CORNER)
+            name = CORNER.get(name, "horizontal_bar")
         numbers = [*low, up, depth, side]
     chain: Chain = (*_loops(block), Draw(name, tuple(float(number) for number in numbers)))
     return nest(chain)

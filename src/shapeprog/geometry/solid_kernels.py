@@ -166,8 +166,8 @@ def _nearest_in_scene(kind, size, centre, rotation, mask, points, slots, values,
     """The same for one scene.
 
     The turned box around a primitive bounds its signed distance from below, inside too.  Distances change no faster
-    than points move: a primitive whose bound at one point exceeds the best there by more than twice ``STRIDE`` is not the
-    nearest within ``STRIDE`` of it, so points that come in order, such as cells, look at few primitives.
+    than points move: a primitive whose bound at one point exceeds the best there by more than twice ``STRIDE`` is
+    not the nearest within ``STRIDE`` of it, so points that come in order, such as cells, look at few primitives.
     """
     kept = np.nonzero(mask)[0]
     used = len(kept)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,7 @@ from shapeprog.inference.refine import REACH, Schedule, refine
 from shapeprog.inference.structure import Settings, search_structure
 from shapeprog.inference.surface import points_of_cells
 from shapeprog.language.program import Program
+from shapeprog.space import RESOLUTION
 
 SEARCH_SHARE = 0.65
 """Share of the time budget after which the structure search hands over to refinement."""
@@ -78,6 +80,7 @@ def infer(
     InputError
         If the path is no readable shape.
     """
+    prepare_kernels()
     started = time.monotonic()
     target = _load(shape)
     chosen = replace(settings or Settings(), blocks=blocks)
@@ -98,6 +101,18 @@ def infer(
         "seconds": time.monotonic() - started,
     }
     return Result(refined, snapped, scores, _advice(structure.reason, snapped.blocks, blocks))
+
+
+@cache
+def prepare_kernels() -> None:
+    """Compile, or load from the cache, all kernels that inference runs, so that no time budget pays for it.
+
+    The first call on a machine takes some tens of seconds, the first in a process well below one.
+    """
+    cells = np.zeros((RESOLUTION,) * 3, np.bool_)
+    cells[14:18, 14:18, 14:18] = True
+    found = search_structure(cells, Settings(blocks=2, rounds=2, forms=1.0))
+    refine(to_program(found.blocks), torch.from_numpy(points_of_cells(cells)), schedule=Schedule(steps=1))
 
 
 def _load(shape: Shape | str | Path) -> Shape:

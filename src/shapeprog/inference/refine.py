@@ -47,10 +47,10 @@ class Schedule:
         Points sampled on the surface of the program in one step.
     """
 
-    steps: int = 60
+    steps: int = 50
     rate: float = 0.12
-    points: int = 1500
-    samples: int = 1500
+    points: int = 1000
+    samples: int = 1000
 
 
 def refine(

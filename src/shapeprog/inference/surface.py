@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 from shapeprog.space import HALF, SPAN
 
-INSET = 0.4
+INSET = 0.65
 """How far below the faces of its touched cells a surface lies on average, in cells; chosen on val.
 
 A surface is anywhere within the cells that it touches, so the touched solid is too fat by up to a cell each side.

@@ -298,4 +298,4 @@ def _checked(path: str | os.PathLike[str]) -> Path:
 
 def _save(page: Any, target: Path) -> None:
     with atomic_path(target) as temporary:
-        page.save(temporary)
+        page.save(temporary, **({"compress_level": 4} if target.suffix.lower() == ".png" else {}))

@@ -103,17 +103,19 @@ def light_maps(vertices, faces, frames, size, radius):  # type: ignore[no-untype
 
 
 @njit(cache=True, nogil=True)
-def surface(face, depth, points, faces, normals, eye, corner, across, down, ground):  # type: ignore[no-untyped-def]
-    """Position and normal towards the eye of every pixel; pixels without a face lie on the ground.
+def surface(face, depth, points, faces, normals, eye, corner, across, down, ground, everywhere):  # type: ignore[no-untyped-def]
+    """Position and normal towards the eye of every pixel; without a face, and if ``everywhere``, those of the ground.
 
     The ray of pixel (x, y) is ``corner + x * across + y * down``; depth is inverse, along the axis of view.
     """
     height, width = face.shape
     position = np.empty((height, width, 3), np.float32)
-    normal = np.empty((height, width, 3), np.float32)
+    normal = np.empty((height, width, 3), np.float32)  # left as it is where nobody looks
     ray, here = np.empty(3), np.empty(3)
     for y in range(height):
         for x in range(width):
+            if face[y, x] == BACKGROUND and not everywhere:
+                continue
             px, py = x + 0.5, y + 0.5
             for axis in range(3):
                 ray[axis] = corner[axis] + px * across[axis] + py * down[axis]

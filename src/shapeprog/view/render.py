@@ -31,10 +31,10 @@ MARGIN = 0.07
 SAMPLES = 3
 """Samples along each side of a pixel."""
 
-LIGHTS = (27, 63)
+LIGHTS = (27, 45)
 """Fewest and most lights: small pictures and large meshes get fewer."""
 
-MAP_SIZE = (112, 224)
+MAP_SIZE = (112, 208)
 """Pixels along each side of what a light sees, in small and in large pictures."""
 
 LARGE = 480
@@ -153,7 +153,9 @@ def render(model: Model, camera: Camera, width: int, height: int, samples: int =
     across, down = camera.right / scale, -camera.up / scale
     corner = camera.ahead + camera.right * camera.middle[0] + camera.up * camera.middle[1]
     corner = corner - across * wide / 2 - down * tall / 2
-    position, normal = kernels.surface(face, depth, points, faces, shown, camera.eye, corner, across, down, camera.low)
+    position, normal = kernels.surface(
+        face, depth, points, faces, shown, camera.eye, corner, across, down, camera.low, False
+    )
     large = int(width >= LARGE)
     lights = samples**2 * max(1, min(LIGHTS[large], WORK // max(len(faces), 1)) // samples**2)
     frames, weights = _sky(lights)
@@ -165,7 +167,17 @@ def render(model: Model, camera: Camera, width: int, height: int, samples: int =
     few = np.full((height // COARSE + 1, width // COARSE + 1), -1, np.int32)
     step = COARSE * samples
     place, upward = kernels.surface(
-        few, few.astype(np.float64), points, faces, shown, camera.eye, corner, across * step, down * step, camera.low
+        few,
+        few.astype(np.float64),
+        points,
+        faces,
+        shown,
+        camera.eye,
+        corner,
+        across * step,
+        down * step,
+        camera.low,
+        True,
     )
     ground = 1 - SHADOW * (1 - _enlarged(kernels.irradiance(place, upward, -few, *sky, 1, bias), height, width))
     lines = kernels.edges(face, np.asarray(model.group, np.int64), position, normal, max(1, samples // 2), 0.3)

@@ -27,6 +27,9 @@ from shapeprog.language.unroll import Plan
 THINNEST = 0.05
 """Smallest length in cells that refinement leaves, so that no part vanishes."""
 
+DIGIT = 0.01
+"""Cells to which refined parameters are rounded at the end: a twenty-fourth of a percent of the longest side."""
+
 REACH = 1.49
 """Farthest that refinement moves a parameter from a whole number, in cells: rounding and one step lead back."""
 
@@ -118,17 +121,22 @@ def refine(
                 moved.copy_(torch.where(free, torch.minimum(torch.maximum(moved, low), high), values))
             if progress:
                 progress("refining", (step + 1) / plan.steps)
-    return decode(Code(start.ids, moved.detach()))[0]
+    tidy = torch.where(free, (moved.detach() / DIGIT).round() * DIGIT, values)
+    return decode(Code(start.ids, tidy))[0]
 
 
 def _slots(code: Code) -> tuple[Bool[Tensor, "K J 7"], Bool[Tensor, "K J 7"]]:
-    """Which slots of a program are continuous parameters in use, and which of them are lengths."""
+    """Which slots of a program may move, and which of those in use are lengths.
+
+    Continuous parameters move; a shift that is exactly zero stays zero, so that a loop along an axis keeps to it.
+    """
     free = torch.zeros(code.parameters.shape, dtype=torch.bool)
     length = torch.zeros_like(free)
     for declared in language():
         here = code.ids == declared.id
         for slot, quantity in enumerate(declared.quantities):
-            free[..., slot] |= here & (not quantity.discrete)
+            still = (code.parameters[..., slot] == 0) & (quantity.kind == "shift")
+            free[..., slot] |= here & (not quantity.discrete) & ~still
             length[..., slot] |= here & (quantity.kind == "length")
     return free, length
 

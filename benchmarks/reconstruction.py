@@ -1,0 +1,143 @@
+"""Reconstruction on packs of shapes: search and its baselines, the same shapes in the same run.
+
+    python benchmarks/reconstruction.py --packs bench_test.npz cabinet_test.npz --out results/shapenet.jsonl
+    python benchmarks/reconstruction.py --packs chair.npz table.npz --split test --out results/modelnet.jsonl
+    python benchmarks/reconstruction.py --table results/shapenet.jsonl
+
+One line of JSON is kept for every shape, method and number of blocks; a run that was stopped goes on where it was.
+Packs with points give the methods ``search`` (mesh points given) and ``search, voxels alone``; packs without give
+``search``.  ``greedy boxes`` and ``greedy boxes, refined`` are the baselines of the measuring protocol.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import multiprocessing
+import time
+from collections.abc import Iterator
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+
+Task = tuple[str, int, int, tuple[str, ...], int, float]
+"""Pack, index, most blocks, methods, seed, seconds."""
+
+GREEDY, REFINED, SEARCH, ALONE = "greedy boxes", "greedy boxes, refined", "search", "search, voxels alone"
+COLUMNS = ("iou", "cd", "f1", "noise_floor", "blocks", "statements", "primitives", "seconds")
+
+
+def measure(task: Task) -> list[dict[str, Any]]:
+    """Rows of one shape for all methods that were asked for."""
+    from shapeprog.data import read_pack
+    from shapeprog.evaluation.metrics import evaluate_program
+    from shapeprog.inference import greedy_boxes, infer, refine, snapped_from
+    from shapeprog.inference.infer import prepare_kernels
+    from shapeprog.inference.refine import REACH
+    from shapeprog.inference.surface import points_of_cells
+
+    torch.set_num_threads(1)
+    prepare_kernels()
+    pack, index, blocks, methods, seed, budget = task
+    shape = read_pack(Path(pack))[index]
+    cloud = None if shape.points is None else torch.from_numpy(np.asarray(shape.points, np.float32))
+    guessed = torch.from_numpy(points_of_cells(shape.voxels, seed=seed))
+    rows = []
+
+    def keep(method: str, program: Any, snapped: Any, seconds: float) -> None:
+        assert snapped_from(program, snapped), (pack, shape.name, method)
+        row = asdict(evaluate_program(program, shape, snapped, seed=seed))
+        row |= {"pack": Path(pack).stem, "method": method, "allowed": blocks, "seconds": seconds, "seed": seed}
+        rows.append(row)
+
+    boxes = greedy_boxes(shape.voxels, blocks)
+    if GREEDY in methods:
+        keep(GREEDY, boxes, boxes, float("nan"))
+    if REFINED in methods and cloud is not None:
+        started = time.monotonic()
+        keep(REFINED, refine(boxes, cloud, reach=REACH, seed=seed), boxes, time.monotonic() - started)
+    if SEARCH in methods:
+        result = infer(shape, blocks=blocks, seed=seed, budget=budget)
+        keep(SEARCH, result.program, result.snapped, result.scores["seconds"])
+        if ALONE in methods and cloud is not None:  # the structure is searched on cells, so it is the same
+            alone = refine(result.snapped, guessed, reach=REACH, seed=seed)
+            keep(ALONE, alone, result.snapped, result.scores["seconds"])
+    return rows
+
+
+def tasks(args: argparse.Namespace, done: set[tuple[str, str, int]]) -> Iterator[Task]:
+    """What is still to do: every shape of the split, for every number of blocks."""
+    from shapeprog.data import read_pack
+
+    for pack in args.packs:
+        shapes = read_pack(Path(pack))
+        chosen = [i for i in range(len(shapes)) if shapes.split is None or shapes.split[i] == args.split]
+        for index in chosen[: args.shapes]:
+            for blocks in args.blocks:
+                if (Path(pack).stem, str(shapes.ids[index]), blocks) not in done:
+                    yield pack, index, blocks, tuple(args.methods), args.seed, args.budget
+
+
+def run(args: argparse.Namespace) -> None:
+    """Measure what is not in the output yet, shape after shape, in several processes."""
+    out = Path(args.out)
+    out.parent.mkdir(parents=True, exist_ok=True)
+    known = [json.loads(line) for line in out.read_text().splitlines()] if out.exists() else []
+    done = {(row["pack"], row["name"], row["allowed"]) for row in known}
+    todo = list(tasks(args, done))
+    context = multiprocessing.get_context("spawn")
+    with context.Pool(args.workers) as pool, out.open("a") as file:
+        for number, rows in enumerate(pool.imap_unordered(measure, todo), 1):
+            file.writelines(json.dumps(row) + "\n" for row in rows)
+            file.flush()
+            print(f"\r{number}/{len(todo)}", end="", flush=True)
+    print()
+
+
+def table(paths: list[str]) -> str:
+    """Markdown: mean, its standard error and the median of every measure, for each pack, method and size."""
+    groups: dict[tuple[str, int, str], list[dict[str, Any]]] = {}
+    for path in paths:
+        for line in Path(path).read_text().splitlines():
+            row = json.loads(line)
+            groups.setdefault((row["pack"], row["allowed"], row["method"]), []).append(row)
+    lines = ["| pack | shapes | method | " + " | ".join(COLUMNS) + " |", "|" + "---|" * (len(COLUMNS) + 3)]
+    for (pack, allowed, method), rows in sorted(groups.items()):
+        cells = [f"{pack}, <= {allowed}", str(len(rows)), method]
+        for column in COLUMNS:
+            values = np.array([row[column] for row in rows], np.float64)
+            values = values[np.isfinite(values)]
+            if not len(values):
+                cells.append("-")
+                continue
+            digits = 5 if column in ("cd", "noise_floor") else 3 if column in ("iou", "f1") else 2
+            error = values.std(ddof=1) / np.sqrt(len(values)) if len(values) > 1 else 0.0
+            cells.append(f"{values.mean():.{digits}f} ± {error:.{digits}f} ({np.median(values):.{digits}f})")
+        lines.append("| " + " | ".join(cells) + " |")
+    return "\n".join(lines)
+
+
+def main() -> None:
+    """Run, or print the table of runs."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--packs", nargs="*", default=[], help="packs in the format of shapeprog prepare")
+    parser.add_argument("--split", default="test", help="split to use of packs that name one")
+    parser.add_argument("--shapes", type=int, default=None, help="only the first so many of each pack")
+    parser.add_argument("--blocks", type=int, nargs="*", default=[10], help="most blocks, one run for each")
+    parser.add_argument("--methods", nargs="*", default=[GREEDY, REFINED, SEARCH, ALONE])
+    parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--budget", type=float, default=60.0, help="seconds; ample, so that the seed alone decides")
+    parser.add_argument("--out", default="reconstruction.jsonl", help="rows, one line of JSON each; appended to")
+    parser.add_argument("--table", nargs="*", default=None, help="print the table of these rows and do nothing else")
+    args = parser.parse_args()
+    if args.table is None:
+        run(args)
+    print(table(args.table or [args.out]))
+
+
+if __name__ == "__main__":
+    main()

@@ -10,17 +10,24 @@ from pathlib import Path
 
 import numpy as np
 import torch
+from jaxtyping import Float
+from torch import Tensor
 
 from shapeprog.data.shape import Shape
+from shapeprog.geometry.distance import union_distance
 from shapeprog.inference.blocks import to_program
 from shapeprog.inference.refine import REACH, Schedule, refine
 from shapeprog.inference.structure import Settings, search_structure
 from shapeprog.inference.surface import points_of_cells
 from shapeprog.language.program import Program
+from shapeprog.language.unroll import unroll
 from shapeprog.space import RESOLUTION
 
 SEARCH_SHARE = 0.65
 """Share of the time budget after which the structure search hands over to refinement."""
+
+DEEP = 2.5
+"""Depth in cells below the surface of the snapped program beyond which points are inner faces; chosen on val."""
 
 Progress = Callable[[str, float], None]
 
@@ -88,9 +95,8 @@ def infer(
         target.voxels, chosen, seed=seed, deadline=started + SEARCH_SHARE * budget, progress=progress
     )
     snapped = to_program(structure.blocks)
-    points = target.points if target.points is not None else points_of_cells(target.voxels, seed=seed)
     refined = refine(
-        snapped, torch.from_numpy(np.asarray(points, np.float32)), schedule=schedule, reach=REACH, seed=seed,
+        snapped, _surface(target, snapped, seed), schedule=schedule, reach=REACH, seed=seed,
         deadline=started + budget, progress=progress,
     )  # fmt: skip
     scores = {
@@ -121,6 +127,19 @@ def _load(shape: Shape | str | Path) -> Shape:
     from shapeprog.data import load
 
     return load(shape)
+
+
+def _surface(target: Shape, snapped: Program, seed: int) -> Float[Tensor, "P 3"]:
+    """Points that the surface of the program should meet.
+
+    Points deep inside the solid lie on inner faces of the mesh, such as the back of a drawer.  The surface of a union
+    cannot reach them; trying to would pull its outer faces inwards.
+    """
+    if target.points is None:
+        return torch.from_numpy(points_of_cells(target.voxels, seed=seed))
+    points = torch.from_numpy(np.asarray(target.points, np.float32))
+    outer = points[union_distance(unroll(snapped), points) > -DEEP] if snapped.size else points
+    return outer if len(outer) else points
 
 
 def _advice(reason: str, used: int, allowed: int) -> str:

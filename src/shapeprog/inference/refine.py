@@ -27,8 +27,8 @@ from shapeprog.language.unroll import Plan
 THINNEST = 0.05
 """Smallest length in cells that refinement leaves, so that no part vanishes."""
 
-DIGIT = 0.01
-"""Cells to which refined parameters are rounded at the end: a twenty-fourth of a percent of the longest side."""
+DECIMALS = 2
+"""Decimals of a cell that refined parameters keep: a hundredth is .04 % of the longest side."""
 
 REACH = 1.49
 """Farthest that refinement moves a parameter from a whole number, in cells: rounding and one step lead back."""
@@ -121,7 +121,7 @@ def refine(
                 moved.copy_(torch.where(free, torch.minimum(torch.maximum(moved, low), high), values))
             if progress:
                 progress("refining", (step + 1) / plan.steps)
-    tidy = torch.where(free, (moved.detach() / DIGIT).round() * DIGIT, values)
+    tidy = torch.where(free, moved.detach().double().round(decimals=DECIMALS).to(values), values)
     return decode(Code(start.ids, tidy))[0]
 
 

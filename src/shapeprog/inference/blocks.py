@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from shapeprog.inference.naming import look_around, name_of
-from shapeprog.inference.raster_kernels import (
+from shapeprog.inference.block_layout import (
     BACK,
     BOX,
     COUNT1,
@@ -17,6 +16,7 @@ from shapeprog.inference.raster_kernels import (
     SHIFT1,
     SHIFT2,
 )  # fmt: skip
+from shapeprog.inference.naming import look_around, name_of
 from shapeprog.language.program import Chain, Draw, Loop, Program, nest
 from shapeprog.space import FloatArray
 

@@ -10,80 +10,91 @@ import numpy as np
 from numba import njit
 
 from shapeprog.inference.box_kernels import heaviest_box
+from shapeprog.inference.families import MIRROR, PERIOD
 
-PLAIN, MIRROR, PERIOD = 0, 1, 2
+ANY = 1 << 20
+"""More cells than any side has: no limit."""
 
 
 @njit(cache=True, nogil=True)
-def fold(weights, kind, a, b):  # type: ignore[no-untyped-def]
-    """Fold the first axis: mirrored at boundary a / 2 cells, or summed over a copies at distance b."""
-    size = weights.shape[0]
-    if kind == MIRROR:
-        left = (a - 1) // 2 if a % 2 else a // 2 - 1
-        right = left + 2 if a % 2 else left + 1
-        length = max(0, min(left + 1, size - right))
-        out = np.zeros((length, weights.shape[1], weights.shape[2]), np.float32)
-        for i in range(length):
-            out[i] = weights[left - i] + weights[right + i]
+def mirrors(plane):  # type: ignore[no-untyped-def]
+    """The cells left and right of a mirror plane at ``plane`` / 2 cells, which may run through a cell."""
+    left = (plane - 1) // 2 if plane % 2 else plane // 2 - 1
+    return left, left + 2 if plane % 2 else left + 1
+
+
+@njit(cache=True, nogil=True)
+def fold(volume, axis, kind, a, b):  # type: ignore[no-untyped-def]
+    """Fold an axis: mirrored at a plane at a / 2 cells, or summed over a copies at distance b."""
+    size0, size1, size2 = volume.shape
+    size = volume.shape[axis]
+    left, right = mirrors(a)
+    length = max(0, min(left + 1, size - right) if kind == MIRROR else size - (a - 1) * b)
+    new0, new1, new2 = length if axis == 0 else size0, length if axis == 1 else size1, length if axis == 2 else size2
+    out = np.zeros((new0, new1, new2), np.float32)
+    if axis == 2:
+        fold_rows(volume.reshape((size0 * size1, size2)), out.reshape((size0 * size1, length)), kind, left, right, a, b)
         return out
-    length = max(0, size - (a - 1) * b)
-    out = np.zeros((length, weights.shape[1], weights.shape[2]), np.float32)
-    for i in range(length):
-        for copy in range(a):
-            out[i] += weights[i + copy * b]
+    outer, inner = (1, size1 * size2) if axis == 0 else (size0, size2)
+    source, folded = volume.reshape((outer, size, inner)), out.reshape((outer, length, inner))
+    for o in range(outer):
+        for i in range(length):
+            if kind == MIRROR:
+                near, far = np.uint64(left - i), np.uint64(right + i)  # unsigned: no test for indices from the end
+                for k in range(inner):
+                    folded[o, i, k] = source[o, near, k] + source[o, far, k]
+            else:
+                for copy in range(a):
+                    near = np.uint64(i + copy * b)
+                    for k in range(inner):
+                        folded[o, i, k] += source[o, near, k]
     return out
 
 
 @njit(cache=True, nogil=True)
-def unfold(kind, a, b, lo, hi):  # type: ignore[no-untyped-def]
-    """First low end, count and distance of the copies of a folded side [lo, hi)."""
-    if kind == MIRROR:
-        left = (a - 1) // 2 if a % 2 else a // 2 - 1
-        right = left + 2 if a % 2 else left + 1
-        first = left - hi + 1
-        return first, 2, right + lo - first
-    if kind == PERIOD:
-        return lo, a, b
-    return lo, 1, 0
+def fold_rows(rows, out, kind, left, right, a, b):  # type: ignore[no-untyped-def]
+    """Fold the rows of a matrix, as ``fold`` does its last axis."""
+    length = out.shape[1]
+    for r in range(len(rows)):
+        if kind == MIRROR:
+            near, far = np.uint64(left), np.uint64(right)
+            for i in range(length):
+                step = np.uint64(i)
+                out[r, i] = rows[r, near - step] + rows[r, far + step]
+        else:
+            for copy in range(a):
+                near = np.uint64(copy * b)
+                for i in range(length):
+                    out[r, i] += rows[r, near + np.uint64(i)]
 
 
 @njit(cache=True, nogil=True)
-def families(size, planes, most):  # type: ignore[no-untyped-def]
-    """Rows (axis1, kind1, a1, b1, axis2, kind2, a2, b2) of ways to repeat a box in a volume of this size."""
-    single = np.zeros((600, 4), np.int64)
-    n = 0
-    for axis in range(3):
-        length = size[axis]
-        for plane in range(max(2, length // 2), min(2 * length - 1, 3 * length // 2 + 1)):
-            single[n] = (axis, MIRROR, plane, 0)
-            n += 1
-        for count in range(3, most + 1):
-            for step in range(2, (length - 1) // (count - 1) + 1):
-                single[n] = (axis, PERIOD, count, step)
-                n += 1
-    out = np.zeros((1 + n + n * planes * 6, 8), np.int64)
-    total = 1
-    for s in range(n):
-        out[total, :4] = single[s]
-        out[total, 4] = -1
-        total += 1
-    for axis in range(3):
-        length = size[axis]
-        for p in range(planes):
-            plane = length + (p + 1) // 2 * (1 if p % 2 else -1)
-            if plane < 2 or plane > 2 * length - 2:
-                continue
-            for s in range(n):
-                if single[s, 0] == axis:
-                    continue
-                if single[s, 1] == MIRROR and single[s, 0] > axis and single[s, 2] == size[single[s, 0]]:
-                    continue
-                out[total, :4] = single[s]
-                out[total, 4:] = (axis, MIRROR, plane, 0)
-                total += 1
-    out[0, 0] = -1
-    out[0, 4] = -1
-    return out[:total]
+def turn(volume, order):  # type: ignore[no-untyped-def]
+    """The volume with its axes in another order."""
+    if order[2] == 2:
+        return volume
+    steps = np.array([volume.shape[1] * volume.shape[2], volume.shape[2], 1])
+    step0, step1, step2 = steps[order[0]], steps[order[1]], np.uint64(steps[order[2]])
+    size0, size1, size2 = volume.shape[order[0]], volume.shape[order[1]], volume.shape[order[2]]
+    cells = volume.reshape(volume.size)
+    out = np.empty((size0, size1, size2), np.float32)
+    for i in range(size0):
+        for j in range(size1):
+            at = np.uint64(i * step0 + j * step1)  # unsigned: no test for indices from the end
+            for k in range(size2):
+                out[i, j, k] = cells[at]
+                at += step2
+    return out
+
+
+@njit(cache=True, nogil=True)
+def unfold(kind, a, b, low, high):  # type: ignore[no-untyped-def]
+    """First low end, count and distance of the copies of a folded side [low, high)."""
+    if kind == MIRROR:
+        left, right = mirrors(a)
+        first = left - high + 1
+        return first, 2, right + low - first
+    return low, a, b
 
 
 @njit(cache=True, nogil=True)
@@ -91,58 +102,35 @@ def search_family(weights, family, floor):  # type: ignore[no-untyped-def]
     """Best repeated box of one family: its sum, and (start, extent, count1, axis1, step1, count2, axis2, step2)."""
     found = np.zeros(12, np.int64)
     folded = weights
-    order = np.array([0, 1, 2])
-    limits = np.array([1 << 20, 1 << 20, 1 << 20])
-    for part in range(2):
-        axis = family[4 * part]
-        if axis < 0:
-            continue
-        kind, a, b = family[4 * part + 1], family[4 * part + 2], family[4 * part + 3]
-        if axis == 0:
-            folded = fold(folded, kind, a, b)
-        elif axis == 1:
-            turned = fold(np.ascontiguousarray(folded.transpose(1, 0, 2)), kind, a, b)
-            folded = np.ascontiguousarray(turned.transpose(1, 0, 2))
-        else:
-            turned = fold(np.ascontiguousarray(folded.transpose(2, 1, 0)), kind, a, b)
-            folded = np.ascontiguousarray(turned.transpose(2, 1, 0))
-        if kind == PERIOD:
-            limits[axis] = b - 1
-    if folded.shape[0] == 0 or folded.shape[1] == 0 or folded.shape[2] == 0:
+    limits = np.full(3, ANY)
+    for part in (0, 4):
+        axis, kind, a, b = family[part], family[part + 1], family[part + 2], family[part + 3]
+        if axis >= 0:
+            folded = fold(folded, axis, kind, a, b)
+            if kind == PERIOD:
+                limits[axis] = b - 1
+    if folded.size == 0:
         return floor, found
+    # The scan along the last axis is the fast one, so the longest goes there; it takes no limit of its length.
     last = 2
     for axis in range(3):
-        free = limits[axis] > 1000
-        taken = limits[last] > 1000
+        free, taken = limits[axis] == ANY, limits[last] == ANY
         if (free and not taken) or (free == taken and folded.shape[axis] > folded.shape[last]):
             last = axis
     first = 0 if last != 0 else 1
-    second = 3 - last - first
-    order[0], order[1], order[2] = first, second, last
-    turned = np.ascontiguousarray(folded.transpose(order[0], order[1], order[2]))
-    best, box = heaviest_box(turned, limits[first], limits[second], floor)
+    order = np.array([first, 3 - last - first, last])
+    best, box = heaviest_box(turn(folded, order), limits[order[0]], limits[order[1]], floor)
     if best <= floor:
         return floor, found
-    lo = np.zeros(3, np.int64)
-    hi = np.zeros(3, np.int64)
     for place in range(3):
-        lo[order[place]] = box[2 * place]
-        hi[order[place]] = box[2 * place + 1]
-    counts = np.ones(2, np.int64)
-    steps = np.zeros(2, np.int64)
+        found[order[place]] = box[2 * place]
+        found[3 + order[place]] = box[2 * place + 1] - box[2 * place]
+    found[6], found[9] = 1, 1
+    found[7], found[10] = family[0], family[4]
     for part in range(2):
         axis = family[4 * part]
-        if axis < 0:
-            continue
-        length = hi[axis] - lo[axis]
-        start, counts[part], steps[part] = unfold(
-            family[4 * part + 1], family[4 * part + 2], family[4 * part + 3], lo[axis], hi[axis]
-        )
-        lo[axis] = start
-        hi[axis] = start + length
-    for axis in range(3):
-        found[axis] = lo[axis]
-        found[3 + axis] = hi[axis] - lo[axis]
-    found[6], found[7], found[8] = counts[0], family[0], steps[0]
-    found[9], found[10], found[11] = counts[1], family[4], steps[1]
+        if axis >= 0:
+            kind, a, b = family[4 * part + 1], family[4 * part + 2], family[4 * part + 3]
+            low = found[axis]
+            found[axis], found[6 + 3 * part], found[8 + 3 * part] = unfold(kind, a, b, low, low + found[3 + axis])
     return best, found

@@ -1,22 +1,29 @@
-"""Kernels that propose what is no upright box: discs, sheared backs, oblique bars, stars and crosses."""
+"""Kernels that guess what is no upright box: discs, sheared backs, oblique bars, stars and crosses."""
 
 from __future__ import annotations
 
 import numpy as np
 from numba import njit
 
-from shapeprog.inference.raster_kernels import (
+from shapeprog.inference.block_layout import (
     BACK,
+    BOX,
+    COUNT1,
+    COUNT2,
     CROSS,
     DISC,
+    EXTENT,
+    FIRST,
+    FORM,
     LINE,
-    ROWS,
+    RADIUS,
+    ROTATE,
+    SHIFT1,
+    TILT,
     WIDTH,
-    gains,
-    improve_block,
-    statements,
-    valid,
 )
+from shapeprog.inference.descent_kernels import gains, statements
+from shapeprog.inference.raster_kernels import ROWS
 
 
 @njit(cache=True, nogil=True)
@@ -37,9 +44,9 @@ def cells_of(rows):  # type: ignore[no-untyped-def]
 def plain(form):  # type: ignore[no-untyped-def]
     """A block of a form without loops."""
     block = np.zeros(WIDTH)
-    block[0] = form
-    block[8] = 1
-    block[12] = 1
+    block[FORM] = form
+    block[COUNT1] = 1
+    block[COUNT2] = 1
     return block
 
 
@@ -50,59 +57,100 @@ def guess(form, cells, box):  # type: ignore[no-untyped-def]
     a = cells[np.random.randint(len(cells))]
     b = cells[np.random.randint(len(cells))]
     if form == LINE:
-        if np.random.random() < 0.4 and box[0] == 0 and box[4] > 0:
-            long = np.argmax(box[4:7])
-            for axis in range(3):
-                middle = int(box[1 + axis] + (box[4 + axis] - 1) / 2)
-                block[1 + axis], block[4 + axis] = middle, middle
-            block[1 + long], block[4 + long] = box[1 + long], box[1 + long] + box[4 + long] - 1
-            block[8:16] = box[8:16]
-        else:
-            for axis in range(3):
-                block[1 + axis], block[4 + axis] = a[axis], b[axis]
-        block[7] = 1 + (np.random.random() < 0.2)
+        guess_line(block, a, b, box)
     elif form == BACK:
-        block[1:7] = box[1:7]
-        block[8:16] = box[8:16]
-        if box[4] <= 0:
-            for axis in range(3):
-                block[1 + axis] = min(a[axis], b[axis])
-                block[4 + axis] = abs(a[axis] - b[axis]) + 1
-        tilt = np.random.randint(1, 6) * (1 if np.random.random() < 0.7 else -1)
-        block[7] = tilt
-        if np.random.random() < 0.5 and block[5] > abs(tilt):
-            block[5] -= abs(tilt)
-            if tilt < 0:
-                block[2] -= tilt
+        guess_back(block, a, b, box)
     elif form == DISC:
-        block[8:16] = box[8:16]
-        if box[4] > 0 and np.random.random() < 0.6:
-            radius = max(1, int(np.rint((box[5] + box[6]) / 4)))
-            block[1], block[4], block[5] = box[1], box[4], radius
-            block[2], block[3] = np.rint(box[2] + box[5] / 2), np.rint(box[3] + box[6] / 2)
-        else:
-            block[1], block[4] = min(a[0], b[0]), abs(a[0] - b[0]) + 1
-            block[2], block[3] = np.rint((a[1] + b[1] + 1) / 2), np.rint((a[2] + b[2] + 1) / 2)
-            block[5] = max(1, int(max(abs(a[1] - b[1]), abs(a[2] - b[2])) / 2) + np.random.randint(0, 2))
+        guess_disc(block, a, b, box)
     else:
-        centre1, centre2 = cells[:, 1].mean() + 0.5, cells[:, 2].mean() + 0.5
-        if np.random.random() < 0.5:
-            centre1, centre2 = 0.0, 0.0
-        block[1] = a[0]
-        if form == CROSS:
-            block[2], block[3] = np.rint(centre1), np.rint(centre2)
-            block[4] = np.random.randint(1, 4)
-            block[5] = max(2.0, np.rint(np.sqrt((a[1] - centre1) ** 2 + (a[2] - centre2) ** 2)))
-            block[6] = np.random.randint(0, 4)
-            block[16] = 4
-        else:
-            block[0] = LINE
-            block[2], block[3] = np.floor(centre1), np.floor(centre2)
-            block[4], block[5], block[6] = a[0], a[1], a[2]
-            block[1] = a[0] + np.random.randint(0, 4)
-            block[7] = 1
-            block[16] = np.random.randint(3, 7)
+        guess_star(block, a, cells)
     return block
+
+
+@njit(cache=True, nogil=True)
+def guess_line(block, a, b, box):  # type: ignore[no-untyped-def]
+    """A bar along the middle of a box and repeated like it, or from one cell to the other."""
+    if np.random.random() < 0.4 and box[FORM] == BOX and box[EXTENT] > 0:
+        long = 0
+        for axis in range(3):
+            middle = int(box[FIRST + axis] + (box[EXTENT + axis] - 1) / 2)
+            block[FIRST + axis], block[EXTENT + axis] = middle, middle
+            if box[EXTENT + axis] > box[EXTENT + long]:
+                long = axis
+        block[FIRST + long] = box[FIRST + long]
+        block[EXTENT + long] = box[FIRST + long] + box[EXTENT + long] - 1
+        copy_loops(block, box)
+    else:
+        for axis in range(3):
+            block[FIRST + axis], block[EXTENT + axis] = a[axis], b[axis]
+    block[TILT] = 1 + (np.random.random() < 0.2)
+
+
+@njit(cache=True, nogil=True)
+def guess_back(block, a, b, box):  # type: ignore[no-untyped-def]
+    """A box, or what two cells span, with a random tilt inside it or beyond it."""
+    copy_loops(block, box)
+    for axis in range(3):
+        block[FIRST + axis], block[EXTENT + axis] = box[FIRST + axis], box[EXTENT + axis]
+        if box[EXTENT] <= 0:
+            block[FIRST + axis] = min(a[axis], b[axis])
+            block[EXTENT + axis] = abs(a[axis] - b[axis]) + 1
+    tilt = np.random.randint(1, 6) * (1 if np.random.random() < 0.7 else -1)
+    block[TILT] = tilt
+    if np.random.random() < 0.5 and block[EXTENT + 1] > abs(tilt):
+        block[EXTENT + 1] -= abs(tilt)
+        if tilt < 0:
+            block[FIRST + 1] -= tilt
+
+
+@njit(cache=True, nogil=True)
+def guess_disc(block, a, b, box):  # type: ignore[no-untyped-def]
+    """An upright cylinder inside a box or between two cells."""
+    copy_loops(block, box)
+    if box[EXTENT] > 0 and np.random.random() < 0.6:
+        block[FIRST], block[EXTENT] = box[FIRST], box[EXTENT]
+        block[RADIUS] = max(1, int(np.rint((box[EXTENT + 1] + box[EXTENT + 2]) / 4)))
+        for axis in (1, 2):
+            block[FIRST + axis] = np.rint(box[FIRST + axis] + box[EXTENT + axis] / 2)
+    else:
+        block[FIRST], block[EXTENT] = min(a[0], b[0]), abs(a[0] - b[0]) + 1
+        for axis in (1, 2):
+            block[FIRST + axis] = np.rint((a[axis] + b[axis] + 1) / 2)
+        block[RADIUS] = max(1, int(max(abs(a[1] - b[1]), abs(a[2] - b[2])) / 2) + np.random.randint(0, 2))
+
+
+@njit(cache=True, nogil=True)
+def guess_star(block, a, cells):  # type: ignore[no-untyped-def]
+    """A cross, or a star of bars where the form says a bar, around the middle of the grid or of the cells."""
+    centre1, centre2 = 0.0, 0.0
+    for i in range(len(cells)):
+        centre1 += cells[i, 1]
+        centre2 += cells[i, 2]
+    centre1, centre2 = centre1 / len(cells) + 0.5, centre2 / len(cells) + 0.5
+    if np.random.random() < 0.5:
+        centre1, centre2 = 0.0, 0.0
+    block[FIRST] = a[0]
+    if block[FORM] == CROSS:
+        block[FIRST + 1], block[FIRST + 2] = np.rint(centre1), np.rint(centre2)
+        block[EXTENT] = np.random.randint(1, 4)
+        block[RADIUS] = max(2.0, np.rint(np.sqrt((a[1] - centre1) ** 2 + (a[2] - centre2) ** 2)))
+        block[RADIUS + 1] = np.random.randint(0, 4)
+        block[ROTATE] = 4
+    else:
+        block[FORM] = LINE
+        block[FIRST + 1], block[FIRST + 2] = np.floor(centre1), np.floor(centre2)
+        for axis in range(3):
+            block[EXTENT + axis] = a[axis]
+        block[FIRST] = a[0] + np.random.randint(0, 4)
+        block[TILT] = 1
+        block[ROTATE] = np.random.randint(3, 7)
+
+
+@njit(cache=True, nogil=True)
+def copy_loops(block, box):  # type: ignore[no-untyped-def]
+    """Give a block the translation loops of another."""
+    for slot in range(COUNT1, ROTATE):
+        block[slot] = box[slot]
 
 
 @njit(cache=True, nogil=True)
@@ -112,56 +160,24 @@ def repeat(block, gained, wasted, waste, price):  # type: ignore[no-untyped-def]
     good, bad = gains(rows, block, gained, wasted)
     best = good - waste * bad - price * statements(block)
     chosen = block.copy()
-    if block[8] > 1 or block[16] > 0:
+    if block[COUNT1] > 1 or block[ROTATE] > 0:
         return chosen
     trial = block.copy()
     for axis in range(3):
+        for other in range(3):
+            trial[SHIFT1 + other] = 0
         for step in range(-23, 24):
             if step == 0:
                 continue
             for count in range(2, 5):
                 if (count - 1) * abs(step) > 24:
                     break
-                trial[8] = count
-                trial[9:12] = 0
-                trial[9 + axis] = step
+                trial[COUNT1] = count
+                trial[SHIFT1 + axis] = step
                 good, bad = gains(rows, trial, gained, wasted)
                 value = good - waste * bad - price * statements(trial)
                 if value > best:
                     best = value
-                    chosen[:] = trial
+                    for i in range(len(trial)):
+                        chosen[i] = trial[i]
     return chosen
-
-
-@njit(cache=True, nogil=True)
-def propose_form(form, occupied, covered, waste, box, price, share, tries):  # type: ignore[no-untyped-def]
-    """The best of several guesses of one form, improved by descent; gain and block.
-
-    ``price`` is in cells for the gain and ``share`` is the same in IoU for the descent.
-    """
-    gained = occupied & ~covered
-    wasted = ~occupied & ~covered
-    cells = cells_of(gained)
-    best = 0.0
-    chosen = plain(form)
-    if len(cells) < 4:
-        return best, chosen
-    rows = np.zeros(ROWS, np.uint32)
-    first = -1e9
-    rough = plain(form)
-    for _ in range(tries):
-        block = guess(form, cells, box)
-        if not valid(block):
-            continue
-        good, bad = gains(rows, block, gained, wasted)
-        if good - waste * bad > first:
-            first = good - waste * bad
-            rough[:] = block
-    if first < -1e8:
-        return best, chosen
-    block, _value = improve_block(rough, occupied, covered, share, 2)
-    looped = repeat(block, gained, wasted, waste, price)
-    if looped[8] > block[8]:
-        block, _value = improve_block(looped, occupied, covered, share, 1)
-    good, bad = gains(rows, block, gained, wasted)
-    return good - waste * bad - price * statements(block), block

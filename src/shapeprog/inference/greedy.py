@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from shapeprog.inference.block_layout import BOX, COUNT1, COUNT2, EXTENT, FIRST, FORM, WIDTH
 from shapeprog.inference.blocks import to_program
 from shapeprog.language.program import Program
 from shapeprog.space import HALF, RESOLUTION
@@ -16,18 +17,17 @@ def greedy_boxes(voxels: npt.NDArray[np.bool_], boxes: int = 10) -> Program:
     No learning, no loops, no search beyond the exact maximum-sum box: what a program must beat at equal size.
     """
     from shapeprog.inference.box_kernels import heaviest_box
-    from shapeprog.inference.raster_kernels import BOX, COUNT1, COUNT2, WIDTH
 
     weights = np.where(voxels, np.float32(1), np.float32(-1))
     blocks = []
     for _ in range(boxes):
-        gain, box = heaviest_box(weights, RESOLUTION, RESOLUTION, np.float32(0))
+        gain, box = heaviest_box(weights, RESOLUTION, RESOLUTION, 0.0)
         if gain <= 0:
             break
         low, high = box[0::2], box[1::2]
         weights[tuple(slice(a, b) for a, b in zip(low, high, strict=True))] = 0
         block = np.zeros(WIDTH)
-        block[0], block[COUNT1], block[COUNT2] = BOX, 1, 1
-        block[1:4], block[4:7] = low - HALF, high - low
+        block[FORM], block[COUNT1], block[COUNT2] = BOX, 1, 1
+        block[FIRST:EXTENT], block[EXTENT : EXTENT + 3] = low - HALF, high - low
         blocks.append(block)
     return to_program(np.stack(blocks)) if blocks else Program()

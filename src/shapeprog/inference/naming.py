@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shapeprog.inference.raster_kernels import (
+from shapeprog.inference.block_layout import (
     BACK,
     BOX,
     COUNT1,

@@ -14,6 +14,8 @@ import numpy as np
 import numpy.typing as npt
 
 from shapeprog.geometry.occupancy import pack
+from shapeprog.inference.block_layout import WIDTH
+from shapeprog.inference.families import families
 from shapeprog.space import FloatArray
 
 PLANES = 3
@@ -86,30 +88,30 @@ def search_structure(
     progress
         Called with what is being done and the share done.
     """
-    from shapeprog.inference import edit_kernels as edit
-    from shapeprog.inference import fold_kernels, raster_kernels
+    from shapeprog.inference import editing
+    from shapeprog.inference.proposal_kernels import propose
+    from shapeprog.inference.raster_kernels import draw_all, iou_rows
 
     cells = np.argwhere(voxels)
     low, high = cells.min(0), cells.max(0) + 1
-    occupied = pack(voxels).reshape(-1)
-    table = fold_kernels.families(high - low, PLANES, MOST_COPIES)
-    price, everything = settings.price, np.arange(len(table))
-    best, best_count, best_value = np.zeros((settings.blocks, raster_kernels.WIDTH)), 0, -np.inf
+    table = families((high - low).tolist(), PLANES, MOST_COPIES)
+    target = editing.Target(pack(voxels).reshape(-1), low, high, table, settings.price, len(cells))
+    everything = np.arange(len(table))
+    best, best_value = np.zeros((0, WIDTH)), -np.inf
     for waste in STARTS:
-        blocks, count = np.zeros_like(best), 0
-        while count < settings.blocks:
-            covered = raster_kernels.draw_all(blocks[:count])
-            gain, block = edit.propose(
-                occupied, covered, np.float32(waste), low, high, table, everything, price * len(cells)
-            )
+        blocks = np.zeros((0, WIDTH))
+        while len(blocks) < settings.blocks:
+            gain, block = propose(
+                target.occupied, draw_all(blocks), float(np.float32(waste)), low, high, table, everything,
+                target.price * target.cells,
+            )  # fmt: skip
             if gain <= 0:
                 break
-            blocks[count] = block
-            count += 1
-        count = edit.polish(blocks, count, occupied, price, 1, 3)
-        value = edit.value_of(blocks, count, occupied, price)
+            blocks = np.concatenate([blocks, block[None]])
+        blocks = editing.polish(blocks, target, 1, 3)
+        value = editing.value_of(blocks, target)
         if value > best_value:
-            best, best_count, best_value = blocks, count, value
+            best, best_value = blocks, value
     done, reason = 0, f"all {settings.rounds} rounds of editing were done"
     while done < settings.rounds:
         if time.monotonic() > deadline:
@@ -117,15 +119,12 @@ def search_structure(
             break
         rounds = min(settings.chunk, settings.rounds - done)
         heat = settings.heat * (1 - done / settings.rounds)
-        blocks, count, value = edit.rebuild(
-            best, best_count, settings.blocks, occupied, low, high, table, price, rounds,
-            min(settings.families, len(table)), seed + done, heat, settings.forms,
-        )  # fmt: skip
+        plan = editing.Plan(settings.blocks, min(settings.families, len(table)), settings.forms, heat)
+        blocks, value = editing.rebuild(best, target, plan, rounds, seed + done)
         if value >= best_value:
-            best, best_count, best_value = blocks, count, value
+            best, best_value = blocks, value
         done += rounds
         if progress:
             progress("searching structure", done / settings.rounds)
-    count = edit.polish(best, best_count, occupied, price, 3, 5)
-    found = best[:count]
-    return Structure(found, float(raster_kernels.iou_rows(raster_kernels.draw_all(found), occupied)), reason)
+    found = editing.polish(best, target, 3, 5)
+    return Structure(found, float(iou_rows(draw_all(found), target.occupied)), reason)

@@ -1,0 +1,227 @@
+"""Editing whole programs of blocks: take some out, put better ones in, keep what pays."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from shapeprog.inference.block_layout import COUNT1
+from shapeprog.inference.chance_kernels import below, shuffled, start, uniform
+from shapeprog.inference.descent_kernels import GAIN, gains, improve_block, statements, valid
+from shapeprog.inference.form_kernels import cells_of, guess, plain, repeat
+from shapeprog.inference.proposal_kernels import propose
+from shapeprog.inference.raster_kernels import ROWS, draw_all, draw_block, iou_rows
+from shapeprog.space import FloatArray
+
+Rows = npt.NDArray[np.uint32]
+Whole = npt.NDArray[np.int64]
+
+GUESSES = 30
+"""Rough blocks of a form from which one descent starts."""
+
+FEWEST = 4
+"""Uncovered cells from which a form other than a box is tried."""
+
+
+@dataclass(frozen=True)
+class Target:
+    """What a search works towards.
+
+    Parameters
+    ----------
+    occupied
+        The solid as rows of bits (1024).
+    low, high
+        Bounding box of its cells, in cells of the grid from 0.
+    table
+        The ways of repeating a box.
+    price
+        IoU that one statement has to earn.
+    cells
+        Number of occupied cells.
+    """
+
+    occupied: Rows
+    low: Whole
+    high: Whole
+    table: Whole
+    price: float
+    cells: int
+
+
+def value_of(blocks: FloatArray, target: Target) -> float:
+    """IoU minus price x statements."""
+    total = sum(statements(block) for block in blocks)
+    return float(iou_rows(draw_all(blocks), target.occupied) - target.price * total)
+
+
+def polish(blocks: FloatArray, target: Target, far: int, sweeps: int) -> FloatArray:
+    """Blocks after descent, one after another until nothing changes; a block that no longer pays is dropped.
+
+    Parameters
+    ----------
+    far
+        Most cells that one move goes.
+    sweeps
+        Most passes over all blocks.
+    """
+    blocks = blocks.copy()
+    drawn = np.zeros((len(blocks), ROWS), np.uint32)
+    for rows, block in zip(drawn, blocks, strict=True):
+        draw_block(rows, block)
+    settled = np.zeros(len(blocks), np.bool_)
+    for _ in range(sweeps):
+        changed = False
+        for k in range(len(blocks)):
+            if settled[k]:
+                continue
+            better, _value = improve_block(blocks[k], target.occupied, _union(drawn, k), target.price, far)
+            settled[k] = True
+            if not np.array_equal(better, blocks[k]):
+                changed = True
+                settled[:] = False
+                settled[k] = True
+                blocks[k] = better
+                drawn[k] = 0
+                draw_block(drawn[k], better)
+        if not changed:
+            break
+    k = 0
+    while k < len(blocks):
+        others = _union(drawn, k)
+        with_it = iou_rows(others | drawn[k], target.occupied) - target.price * statements(blocks[k])
+        if iou_rows(others, target.occupied) >= with_it:
+            blocks, drawn = np.delete(blocks, k, 0), np.delete(drawn, k, 0)
+        else:
+            k += 1
+    return blocks
+
+
+def _union(drawn: Rows, left_out: int) -> Rows:
+    """Rows of all blocks but one."""
+    before = np.bitwise_or.reduce(drawn[:left_out], axis=0)
+    return np.asarray(before | np.bitwise_or.reduce(drawn[left_out + 1 :], axis=0))
+
+
+def propose_form(form: int, covered: Rows, waste: float, box: FloatArray, target: Target) -> tuple[float, FloatArray]:
+    """The best of several guesses of one form on what is not covered, improved by descent: its gain and the block.
+
+    Parameters
+    ----------
+    form
+        ``DISC``, ``BACK``, ``LINE``, ``CROSS``, or one more for a star of lines.
+    waste
+        Weight of an empty cell against an occupied one.
+    box
+        The box proposed for the same place, from which some guesses start.
+    """
+    price = target.price * target.cells
+    gained, wasted = target.occupied & ~covered, ~target.occupied & ~covered
+    cells = cells_of(gained)
+    if len(cells) < FEWEST:
+        return 0.0, plain(form)
+    rows = np.zeros(ROWS, np.uint32)
+    first, rough = -np.inf, None
+    for _ in range(GUESSES):
+        block = guess(form, cells, box)
+        if not valid(block):
+            continue
+        good, bad = gains(rows, block, gained, wasted)
+        if good - waste * bad > first:
+            first, rough = good - waste * bad, block
+    if rough is None:
+        return 0.0, plain(form)
+    block, _value = improve_block(rough, target.occupied, covered, target.price, 2)
+    looped = repeat(block, gained, wasted, waste, price)
+    if looped[COUNT1] > block[COUNT1]:
+        block, _value = improve_block(looped, target.occupied, covered, target.price, 1)
+    good, bad = gains(rows, block, gained, wasted)
+    return float(good - waste * bad - price * statements(block)), block
+
+
+@dataclass(frozen=True)
+class Plan:
+    """How rounds of ruin and recreate go about it.
+
+    Parameters
+    ----------
+    most
+        Most blocks.
+    families
+        Ways of repeating a box that one proposal tries, drawn at random.
+    forms
+        Share of proposals that also try a form other than a box.
+    heat
+        Largest loss of the objective that the first round may accept; it cools linearly.
+    """
+
+    most: int
+    families: int
+    forms: float
+    heat: float
+
+
+def rebuild(blocks: FloatArray, target: Target, plan: Plan, rounds: int, seed: int) -> tuple[FloatArray, float]:
+    """Ruin and recreate: drop some blocks, propose others on what is left uncovered, keep the result if it pays.
+
+    Returns
+    -------
+    blocks, value
+        The best that the rounds met, which may be those they began with.
+    """
+    start(seed)
+    here, here_value = blocks, value_of(blocks, target)
+    best, best_value = here, here_value
+    for turn in range(rounds):
+        trial = recreate(*ruin(here, plan), target, plan)
+        trial = polish(trial, target, 1, 3)
+        value = value_of(trial, target)
+        if value > here_value - plan.heat * (1 - turn / rounds) * uniform():
+            here, here_value = trial, value
+            if value > best_value + GAIN:
+                best, best_value = trial, value
+    return best, best_value
+
+
+def ruin(blocks: FloatArray, plan: Plan) -> tuple[FloatArray, int]:
+    """The blocks without up to three of them, mostly one, and how many to put in at most: as many and one more."""
+    drops = 0
+    if len(blocks):
+        chance = uniform()
+        drops = min(len(blocks), 1 + int(chance * chance * 3))
+        if len(blocks) < plan.most and uniform() < 0.3:
+            drops -= 1
+    for _ in range(drops):
+        blocks = np.delete(blocks, below(len(blocks)), 0)
+    return blocks, drops + 1
+
+
+def recreate(blocks: FloatArray, wanted: int, target: Target, plan: Plan) -> FloatArray:
+    """The blocks and up to ``wanted`` new ones, each the best found for what is uncovered and improved by descent."""
+    waste = _single(0.6 + 0.5 * uniform())
+    if uniform() < 0.25:  # sometimes look for thin boards, and for more of them
+        waste = _single(1.0 + 3.0 * uniform())
+        wanted += below(3)
+    for _ in range(min(wanted, plan.most - len(blocks))):
+        picks = shuffled(len(target.table))[: plan.families]
+        picks[0] = 0
+        covered = draw_all(blocks)
+        gain, block = propose(
+            target.occupied, covered, waste, target.low, target.high, target.table, picks, target.price * target.cells
+        )
+        if uniform() < plan.forms:
+            other_gain, other = propose_form(1 + below(5), covered, waste, block, target)
+            if other_gain > gain or (other_gain > 0 and uniform() < 0.3):
+                gain, block = other_gain, other
+        if gain <= 0:
+            break
+        better, _value = improve_block(block, target.occupied, covered, target.price, 1)
+        blocks = np.concatenate([blocks, better[None]])
+    return blocks
+
+
+def _single(value: float) -> float:
+    """A number rounded to single precision, as the weights are kept."""
+    return float(np.float32(value))

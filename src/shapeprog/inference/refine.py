@@ -1,7 +1,8 @@
 """Refinement: all continuous parameters of a program together, by gradient through the renderer.
 
 The loss has both directions of a chamfer distance, one of them exact: target points to the surface of the union by
-signed distance, and points sampled on the visible surface to their nearest target points.
+signed distance, and points sampled on the visible surface to their nearest target points.  Parts that touch on the
+grid are asked to keep touching, which no point can tell: contact faces are hidden.
 """
 
 from __future__ import annotations
@@ -12,13 +13,15 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 
 import torch
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
 from shapeprog.errors import InputError
 from shapeprog.geometry.distance import signed_distance
 from shapeprog.geometry.nearest import squared_distance
+from shapeprog.geometry.primitive import primitives
 from shapeprog.geometry.sampling import sample_surface
+from shapeprog.geometry.scene import Scene
 from shapeprog.language.program import Program
 from shapeprog.language.statement import language
 from shapeprog.language.tensors import Code, decode, encode
@@ -32,6 +35,10 @@ DECIMALS = 2
 
 REACH = 1.49
 """Farthest that refinement moves a parameter from a whole number, in cells: rounding and one step lead back."""
+
+
+TOUCH = 0.03
+"""Weight of a squared gap between two parts that touch on the grid, against squared distances of points."""
 
 
 @dataclass(frozen=True)
@@ -100,6 +107,7 @@ def refine(
     optimiser = torch.optim.Adam([moved], lr=plan.rate, betas=(0.8, 0.95))
     decay = torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, plan.steps, plan.rate / 10)
     generator = torch.Generator().manual_seed(seed)
+    touching = _contacts(render.scene(values))
     with single_threaded():
         for step in range(plan.steps):
             if time.monotonic() > deadline:
@@ -110,7 +118,7 @@ def refine(
             some = points[torch.randint(len(points), (plan.points,), generator=generator)]
             sample = sample_surface(scene, plan.samples, generator)
             there = (squared_distance(sample.points, points) * sample.weights).mean()
-            loss = (signed_distance(scene, some) ** 2).mean() + there
+            loss = (signed_distance(scene, some) ** 2).mean() + there + TOUCH * _gaps(scene, touching)
             optimiser.zero_grad()
             loss.backward()
             assert moved.grad is not None
@@ -139,6 +147,34 @@ def _slots(code: Code) -> tuple[Bool[Tensor, "K J 7"], Bool[Tensor, "K J 7"]]:
             free[..., slot] |= here & (not quantity.discrete) & ~still
             length[..., slot] |= here & (quantity.kind == "length")
     return free, length
+
+
+def _ends(scene: Scene) -> tuple[Float[Tensor, "N 3"], Float[Tensor, "N 3"]]:
+    """Low and high corners of the boxes around all primitives, for those that stand upright on the grid."""
+    bounds = torch.zeros_like(scene.centre)
+    for kind in torch.unique(scene.kind).tolist():
+        here = (scene.kind == kind)[:, None]
+        bounds = torch.where(here, primitives[kind].bound(scene.size), bounds)
+    return scene.centre - bounds, scene.centre + bounds
+
+
+def _contacts(scene: Scene) -> Int[Tensor, "C 3"]:
+    """Pairs of primitives and the axis along which the first ends where the second begins: (below, above, axis)."""
+    upright = scene.mask & (scene.rotation.diagonal(dim1=-2, dim2=-1) > 0.999).all(-1)
+    low, high = _ends(scene)
+    overlap = torch.minimum(high[:, None], high[None]) - torch.maximum(low[:, None], low[None])
+    meets = (high[:, None] - low[None]).abs() < 1e-3
+    beside = torch.stack([(overlap[..., [a for a in range(3) if a != axis]] > 0.5).all(-1) for axis in range(3)], -1)
+    return (meets & beside & (upright[:, None] & upright[None])[..., None]).nonzero()
+
+
+def _gaps(scene: Scene, touching: Int[Tensor, "C 3"]) -> Float[Tensor, ""]:
+    """Sum of the squared gaps, in cells, between primitives that are to touch."""
+    if not len(touching):
+        return scene.centre.new_zeros(())
+    low, high = _ends(scene)
+    below, above, axis = touching.unbind(-1)
+    return ((low[above, axis] - high[below, axis]).clamp(min=0) ** 2).sum()
 
 
 @contextmanager

@@ -6,6 +6,7 @@ from geometry_helpers import ellipsoid_kind, make_scene, primitives_restored, ra
 
 from shapeprog.errors import ShapeProgError
 from shapeprog.geometry import sampling as room
+from shapeprog.geometry.arrays import solids
 from shapeprog.geometry.distance import each_distance
 from shapeprog.geometry.sampling import sample_surface
 
@@ -37,26 +38,26 @@ def test_points_lie_on_their_own_surface_and_in_no_other_part(dtype, user):
 def test_the_kernel_draws_what_the_declarations_draw():
     scene = random_scene(2, lead=(3,), slots=6, dtype=torch.float64)
     shares = room._shares(room._areas(scene), scene)
-    fast, slow = room._by_kernel(scene, shares, 300, 7), room._by_declaration(scene, shares, 300, 7)
+    fast, slow = room._by_kernel(solids(scene), shares, 300, 7), room._by_declaration(scene, shares, 300, 7)
     assert (fast.slot == slow.slot).all()
     assert (fast.face == slow.face).all()
-    torch.testing.assert_close(fast.unit, slow.unit)
-    torch.testing.assert_close(fast.normal, slow.normal)
+    torch.testing.assert_close(fast.places, slow.places)
 
 
 def test_gradient_of_placing_is_that_of_the_declarations():
     scene, leaves = with_leaves(random_scene(3, lead=(2,), slots=5, dtype=torch.float64))
-    sample = sample_surface(scene, 200, seeded())
-    choice = room._by_kernel(scene.detach(), room._shares(room._areas(scene.detach()), scene), 200, 5)
+    table, areas = solids(scene), room._areas(scene)
+    choice = room._by_kernel(table, room._shares(areas.detach(), scene), 200, 5)
     slope = torch.randn(2, 200, 3, dtype=torch.float64, generator=seeded())
-    fast = room._Place.apply(*leaves, scene.kind, choice.slot, choice.unit)
-    slow = room._place(scene, choice.slot, choice.unit)
+    weigh = torch.randn(2, 200, dtype=torch.float64, generator=seeded())
+    fast = room._Place.apply(*leaves, areas, table, choice)
+    area = areas.flatten(-2).gather(-1, choice.slot * areas.shape[-1] + choice.face)
+    slow = room._place(scene, choice.slot, choice.unit), area / area.detach()
     torch.testing.assert_close(fast, slow)
-    for got, expected in zip(
-        torch.autograd.grad(fast, leaves, slope), torch.autograd.grad(slow, leaves, slope), strict=True
-    ):
+    fast, slow = (torch.autograd.grad(each, leaves, (slope, weigh), retain_graph=True) for each in (fast, slow))
+    for got, expected in zip(fast, slow, strict=True):
         torch.testing.assert_close(got, expected)
-    assert sample.points.requires_grad
+    assert sample_surface(scene, 20, seeded()).points.requires_grad
 
 
 def test_two_overlapping_cubes_show_their_exact_areas():

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
+import numpy as np
 import numpy.typing as npt
 import torch
 from torch import Tensor
@@ -19,6 +20,9 @@ Array = npt.NDArray[Any]
 BUILT_IN = 2
 """The first kinds of primitive, cuboid and cylinder, are known to the kernels; later ones use their declaration."""
 
+ROW = 17
+"""Numbers of one primitive in the table for the kernels."""
+
 _pool: ThreadPoolExecutor | None = None
 
 
@@ -28,11 +32,31 @@ def array(tensor: Tensor) -> Array:
     return values
 
 
-def arrays(scene: Scene) -> tuple[Array, Array, Array, Array, Array]:
-    """Kind, size, centre, rotation and mask (B, N, ...) of the scenes; the mask holds built-in kinds only."""
-    flat = scene.flatten()
-    mask = flat.mask & (flat.kind < BUILT_IN)
-    return array(flat.kind), array(flat.size), array(flat.centre), array(flat.rotation), array(mask)
+def numbers(tensor: Tensor) -> Array:
+    """The values of a tensor as a contiguous array of float64, which is all that kernels take."""
+    values: Array = array(tensor).astype(np.float64, copy=False)
+    return values
+
+
+def solids(scene: Scene) -> Array:
+    """The primitives of all scenes as rows (B * N, 17) of float64: kind, 4 sizes, centre, rotation row by row.
+
+    The kind is negative for padding and for kinds that only their declaration knows.
+    """
+    count = scene.mask.numel()
+    kind = array(scene.kind).reshape(count)
+    table: Array = np.empty((count, ROW))
+    table[:, 0] = np.where(array(scene.mask).reshape(count) & (kind < BUILT_IN), kind, -1)
+    table[:, 1:5] = array(scene.size).reshape(count, 4)
+    table[:, 5:8] = array(scene.centre).reshape(count, 3)
+    table[:, 8:] = array(scene.rotation).reshape(count, 9)
+    return table
+
+
+def slopes(table: Array, like: Tensor, *shape: int) -> tuple[Tensor, Tensor, Tensor]:
+    """Gradient by sizes, centres and rotations of scenes (B, N) from rows of gradient by :func:`solids`."""
+    found = torch.from_numpy(table).to(like).reshape(*shape, ROW)
+    return found[..., 1:5], found[..., 5:8], found[..., 8:].unflatten(-1, (3, 3))
 
 
 def declared_kinds(scene: Scene) -> list[int]:

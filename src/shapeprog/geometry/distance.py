@@ -8,15 +8,17 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 import torch
 from jaxtyping import Float, Int
 from torch import Tensor
 from torch.autograd.function import once_differentiable
 
-from shapeprog.geometry.arrays import array, arrays, declared_kinds, over_threads
+from shapeprog.geometry.arrays import ROW, declared_kinds, numbers, over_threads, slopes, solids
 from shapeprog.geometry.primitive import SIZES, primitives
 from shapeprog.geometry.scene import Scene
 from shapeprog.geometry.take import take
+from shapeprog.space import Array
 
 AT_ONCE = 1 << 22
 """Pairs of point and primitive that are looked at together where no kernel helps."""
@@ -99,8 +101,10 @@ class _UnionDistance(torch.autograd.Function):
 
     @staticmethod
     def forward(ctx: Any, scene: Scene, size: Tensor, centre: Tensor, rotation: Tensor, points: Tensor) -> Tensor:
-        slots, values = _nearest_kernel(scene, points)
-        ctx.save_for_backward(scene.kind, size, centre, rotation, points, slots)
+        table = solids(scene)
+        slots, values = _nearest_kernel(scene, points, table)
+        ctx.save_for_backward(points, slots)
+        ctx.table = table
         return values
 
     @staticmethod
@@ -108,14 +112,16 @@ class _UnionDistance(torch.autograd.Function):
     def backward(ctx: Any, slope: Tensor) -> tuple[Tensor | None, ...]:
         from shapeprog.geometry import solid_kernels as kernels
 
-        kind, size, centre, rotation, points, slots = ctx.saved_tensors
-        found = [each.new_zeros(each.shape) for each in (size, centre, rotation, points)]
+        points, slots = ctx.saved_tensors
+        (scenes, count), many = slots.shape, len(ctx.table) // max(len(slots), 1)
+        to_solids, to_points = np.zeros((len(ctx.table), ROW)), np.zeros((scenes * count, 3))
         data = (
-            array(kind), array(size), array(centre), array(rotation), array(points), array(slots), array(slope),
-            found[0].numpy(), found[1].numpy(), found[2].numpy(), found[3].numpy(),
+            ctx.table, many, numbers(points).reshape(-1, 3), count, slots.numpy().reshape(-1),
+            numbers(slope).reshape(-1), to_solids, to_points,
         )  # fmt: skip
-        over_threads(lambda first, last: kernels.pull(*data, first, last), len(slots))
-        return None, *found
+        over_threads(lambda first, last: kernels.pull(*data, first, last), scenes)
+        to_points = to_points.reshape(scenes, count, 3)
+        return None, *slopes(to_solids, points, scenes, many), torch.from_numpy(to_points).to(points)
 
 
 def _kinds(scene: Scene) -> list[int]:
@@ -140,14 +146,18 @@ def _nearest(scene: Scene, points: Tensor) -> tuple[Tensor, Tensor]:
     return slot.reshape(*lead, shape[0]), value.reshape(*lead, shape[0])
 
 
-def _nearest_kernel(scene: Scene, points: Tensor) -> tuple[Tensor, Tensor]:
+def _nearest_kernel(scene: Scene, points: Tensor, table: Array | None = None) -> tuple[Tensor, Tensor]:
     from shapeprog.geometry import solid_kernels as kernels
 
-    slots = torch.empty(points.shape[:-1], dtype=torch.long)
-    values = torch.empty(points.shape[:-1], dtype=points.dtype)
-    data = (*arrays(scene), array(points), slots.numpy(), values.numpy())
-    over_threads(lambda first, last: kernels.nearest(*data, first, last), slots.numel(), least=2048)
-    return slots, values
+    scenes, count = points.shape[:-1]
+    slots, values = np.empty(scenes * count, np.int64), np.empty(scenes * count)
+    data = (
+        solids(scene) if table is None else table, scene.mask.shape[-1], numbers(points).reshape(-1, 3), count,
+        slots, values,
+    )  # fmt: skip
+    over_threads(lambda first, last: kernels.nearest(*data, first, last), len(slots), least=2048)
+    nearest = torch.from_numpy(slots).reshape(scenes, count)
+    return nearest, torch.from_numpy(values).to(points.dtype).reshape(scenes, count)
 
 
 def _nearest_pairs(scene: Scene, points: Tensor) -> tuple[Tensor, Tensor]:

@@ -9,7 +9,7 @@ from jaxtyping import Float, Int, UInt8
 from torch import Tensor
 
 from shapeprog.errors import ShapeProgError
-from shapeprog.geometry.arrays import array, arrays, declared_kinds, over_threads
+from shapeprog.geometry.arrays import array, declared_kinds, over_threads, solids
 from shapeprog.geometry.distance import signed_distance
 from shapeprog.geometry.primitive import primitives
 from shapeprog.geometry.scene import Scene
@@ -117,11 +117,9 @@ def _words(scene: Scene, resolution: int) -> Words:
 
     if resolution < 1:
         raise ShapeProgError(f"a grid of {resolution} cells a side holds nothing", "ask for a resolution of 1 or more")
-    kind, size, centre, rotation, mask = arrays(scene)
-    words = np.zeros((len(kind), (resolution + 31) // 32, resolution, resolution), np.uint32)
-    over_threads(
-        lambda first, last: kernels.fill(kind, size, centre, rotation, mask, words, first, last), len(kind), least=32
-    )
+    table, many, scenes = solids(scene), scene.mask.shape[-1], scene.batch_shape.numel()
+    words = np.zeros((scenes, (resolution + 31) // 32, resolution, resolution), np.uint32)
+    over_threads(lambda first, last: kernels.fill(table, many, words, first, last), scenes, least=32)
     for declared in declared_kinds(scene):
         _fill_declared(scene.flatten().detach(), declared, words)
     return words

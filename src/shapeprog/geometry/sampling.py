@@ -14,17 +14,19 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+import numpy as np
 import torch
 from jaxtyping import Float, Int
 from torch import Tensor
 from torch.autograd.function import once_differentiable
 
 from shapeprog.errors import ShapeProgError
-from shapeprog.geometry.arrays import array, arrays, declared_kinds, over_threads
+from shapeprog.geometry.arrays import ROW, array, declared_kinds, numbers, over_threads, slopes, solids
 from shapeprog.geometry.distance import each_distance
 from shapeprog.geometry.primitive import SIZES, primitives
 from shapeprog.geometry.scene import Scene
 from shapeprog.geometry.take import take
+from shapeprog.space import Array
 
 SKIN = 1e-3
 """How far in cells off the surface a point is looked at to see whether it is hidden."""
@@ -55,13 +57,31 @@ class SurfaceSample(NamedTuple):
 
 
 class _Choice(NamedTuple):
-    """What is decided without gradient, (B, n, ...), and how many points each scene has found (B,)."""
+    """What is decided without gradient.
 
-    slot: Tensor
-    face: Tensor
-    unit: Tensor
-    normal: Tensor
+    ``chosen`` (B, n, 2) holds slot and face of each point, ``places`` (B, n, 9) its unit place, its position and its
+    normal, ``found`` (B,) how many points each scene has.
+    """
+
+    chosen: Tensor
+    places: Tensor
     found: Tensor
+
+    @property
+    def slot(self) -> Tensor:
+        return self.chosen[..., 0]
+
+    @property
+    def face(self) -> Tensor:
+        return self.chosen[..., 1]
+
+    @property
+    def unit(self) -> Tensor:
+        return self.places[..., :3]
+
+    @property
+    def normal(self) -> Tensor:
+        return self.places[..., 6:]
 
 
 def sample_surface(scene: Scene, n: int, generator: torch.Generator | None = None) -> SurfaceSample:
@@ -86,23 +106,23 @@ def sample_surface(scene: Scene, n: int, generator: torch.Generator | None = Non
     shares = _shares(areas.detach(), scene)
     device = generator.device if generator is not None else torch.device("cpu")
     seed = int(torch.randint(0, 2**62, (), generator=generator, device=device))
-    still = flat.detach()
-    with torch.no_grad():
-        quick = flat.mask.device.type == "cpu" and not declared_kinds(flat)
-        choice = (_by_kernel if quick else _by_declaration)(still, shares, n, seed)
-        choice = _whole(choice, n, scene)
-    if quick:
-        points: Tensor = _Place.apply(  # type: ignore[no-untyped-call]
-            flat.size, flat.centre, flat.rotation, flat.kind, choice.slot, choice.unit
-        )
-    else:
-        points = _place(flat, choice.slot, choice.unit)
-    cell = choice.slot * areas.shape[-1] + choice.face
-    area = areas.flatten(-2).gather(-1, cell)
     lead = scene.batch_shape
+    if flat.mask.device.type == "cpu" and not declared_kinds(flat):
+        table = solids(flat)
+        choice = _whole(_by_kernel(table, shares, n, seed), n)
+        points, weights = _Place.apply(  # type: ignore[no-untyped-call]
+            flat.size, flat.centre, flat.rotation, areas, table, choice
+        )
+        normal = _cast(choice.normal, flat.size)
+    else:
+        with torch.no_grad():
+            choice = _whole(_by_declaration(flat.detach(), shares, n, seed), n)
+        points, normal = _place(flat, choice.slot, choice.unit), choice.normal
+        area = areas.flatten(-2).gather(-1, choice.slot * areas.shape[-1] + choice.face)
+        weights = area / area.detach()
     return SurfaceSample(
-        points.reshape(*lead, n, 3), (area / area.detach()).reshape(*lead, n),
-        choice.slot.reshape(*lead, n), choice.normal.reshape(*lead, n, 3),
+        points.reshape(*lead, n, 3), weights.reshape(*lead, n), choice.slot.reshape(*lead, n),
+        normal.reshape(*lead, n, 3),
     )  # fmt: skip
 
 
@@ -131,19 +151,25 @@ def _shares(areas: Float[Tensor, "B N F"], scene: Scene) -> Float[Tensor, "B C"]
     return total / whole
 
 
-def _by_kernel(scene: Scene, shares: Tensor, n: int, seed: int) -> _Choice:
+def _by_kernel(table: Array, shares: Tensor, n: int, seed: int) -> _Choice:
     from shapeprog.geometry import surface_kernels as kernels
 
-    count, like = len(shares), scene.size
-    slot, face = (torch.empty(count, n, dtype=torch.long) for _ in range(2))
-    unit, normal = (torch.empty(count, n, 3, dtype=like.dtype) for _ in range(2))
-    found = torch.zeros(count, dtype=torch.long)
+    count = len(shares)
+    chosen, places = np.empty((count * n, 2), np.int64), np.empty((count * n, 9))
+    found = np.zeros(count, np.int64)
     data = (
-        *arrays(scene), array(shares), seed, SKIN, PATIENCE * n,
-        slot.numpy(), face.numpy(), unit.numpy(), normal.numpy(), found.numpy(),
+        table, len(table) // max(count, 1), numbers(shares), seed, SKIN, PATIENCE * n, n, chosen, places, found,
     )  # fmt: skip
     over_threads(lambda first, last: kernels.visible(*data, first, last), count)
-    return _Choice(slot, face, unit, normal, found)
+    return _Choice(
+        torch.from_numpy(chosen).reshape(count, n, 2), torch.from_numpy(places).reshape(count, n, 9),
+        torch.from_numpy(found),
+    )  # fmt: skip
+
+
+def _cast(values: Tensor, like: Tensor) -> Tensor:
+    """The values in another type, by numpy: torch would wake threads that then wait in the way of the kernels."""
+    return torch.from_numpy(np.ascontiguousarray(values.numpy(), array(like).dtype))
 
 
 def _by_declaration(scene: Scene, shares: Tensor, n: int, seed: int) -> _Choice:
@@ -153,34 +179,28 @@ def _by_declaration(scene: Scene, shares: Tensor, n: int, seed: int) -> _Choice:
     drawn, found = 0, torch.zeros(len(shares), dtype=torch.long, device=shares.device)
     while drawn < PATIENCE * n and bool((found < n).any()):
         more = min(max(n, 256), PATIENCE * n - drawn)
-        numbers = _uniform(seed, len(shares), drawn, more, shares.device)
-        cell = torch.searchsorted(shares, numbers[..., 0].contiguous(), right=True)
+        uniform = _uniform(seed, len(shares), drawn, more, shares.device)
+        cell = torch.searchsorted(shares, uniform[..., 0].contiguous(), right=True)
         slot, face = cell.div(per, rounding_mode="floor"), cell % per
-        unit, normal = _draw(scene, slot, face, numbers[..., 1:].to(scene.size))
-        seen = ~_hidden(scene, slot, _place(scene, slot, unit), normal)
-        pieces.append((slot, face, unit, normal, seen))
+        unit, normal = _draw(scene, slot, face, uniform[..., 1:].to(scene.size))
+        points = _place(scene, slot, unit)
+        seen = ~_hidden(scene, slot, points, normal)
+        pieces.append((torch.stack([slot, face], -1), torch.cat([unit, points, normal], -1), seen))
         found = found + seen.sum(-1)
         drawn += more
-    slot, face, unit, normal, seen = (torch.cat(each, 1) for each in zip(*pieces, strict=True))
+    chosen, places, seen = (torch.cat(each, 1) for each in zip(*pieces, strict=True))
     first = torch.argsort(~seen, dim=-1, stable=True)[:, :n]
-    deep = first[..., None].expand(-1, -1, 3)
-    return _Choice(
-        slot.gather(1, first), face.gather(1, first), unit.gather(1, deep), normal.gather(1, deep), found.clamp(max=n)
-    )
+    return _Choice(take(chosen, first), take(places, first), found.clamp(max=n))
 
 
-def _whole(choice: _Choice, n: int, scene: Scene) -> _Choice:
+def _whole(choice: _Choice, n: int) -> _Choice:
     """Repeat the points of scenes that are nearly hidden; refuse those that are hidden altogether."""
     if bool((choice.found >= n).all()):
         return choice
     if bool((choice.found == 0).any()):
         raise ShapeProgError("no point of the surface is visible", "the primitives of the scene hide each other")
-    place = torch.arange(n, device=choice.slot.device) % choice.found[:, None]
-    deep = place[..., None].expand(-1, -1, 3)
-    return _Choice(
-        choice.slot.gather(1, place), choice.face.gather(1, place), choice.unit.gather(1, deep),
-        choice.normal.gather(1, deep), choice.found,
-    )  # fmt: skip
+    place = torch.arange(n, device=choice.found.device) % choice.found[:, None]
+    return _Choice(take(choice.chosen, place), take(choice.places, place), choice.found)
 
 
 def _uniform(seed: int, scenes: int, first: int, more: int, device: torch.device) -> Float[Tensor, "B M 4"]:
@@ -235,30 +255,30 @@ def _hidden(scene: Scene, slot: Tensor, points: Tensor, normals: Tensor) -> Tens
 
 
 class _Place(torch.autograd.Function):
-    """Placing points on cuboids and cylinders as one differentiable step."""
+    """Points on cuboids and cylinders, and their weights, as one differentiable step."""
 
     @staticmethod
     def forward(
-        ctx: Any, size: Tensor, centre: Tensor, rotation: Tensor, kind: Tensor, slot: Tensor, unit: Tensor
-    ) -> Tensor:
-        from shapeprog.geometry import surface_kernels as kernels
-
-        ctx.save_for_backward(size, centre, rotation, kind, slot, unit)
-        points = unit.new_empty(unit.shape)
-        data = array(kind), array(size), array(centre), array(rotation), array(slot), array(unit), points.numpy()
-        over_threads(lambda first, last: kernels.put(*data, first, last), len(slot), least=8)
-        return points
+        ctx: Any, size: Tensor, centre: Tensor, rotation: Tensor, areas: Tensor, table: Array, choice: _Choice
+    ) -> tuple[Tensor, Tensor]:
+        ctx.save_for_backward(areas)
+        ctx.table, ctx.choice = table, choice
+        points = _cast(choice.places[..., 3:6], size)
+        return points, torch.from_numpy(np.ones(points.shape[:-1], points.numpy().dtype))
 
     @staticmethod
     @once_differentiable
-    def backward(ctx: Any, slope: Tensor) -> tuple[Tensor | None, ...]:
+    def backward(ctx: Any, slope: Tensor, weigh: Tensor) -> tuple[Tensor | None, ...]:
         from shapeprog.geometry import surface_kernels as kernels
 
-        size, centre, rotation, kind, slot, unit = ctx.saved_tensors
-        to_size, to_centre, to_rotation = (each.new_zeros(each.shape) for each in (size, centre, rotation))
+        (areas,) = ctx.saved_tensors
+        scenes, many, faces = areas.shape
+        n, choice = slope.shape[1], ctx.choice
+        to_solids, to_faces = np.zeros((scenes * many, ROW)), np.zeros((scenes * many, faces))
         data = (
-            array(kind), array(size), array(rotation), array(slot), array(unit), array(slope),
-            to_size.numpy(), to_centre.numpy(), to_rotation.numpy(),
+            ctx.table, many, n, array(choice.chosen).reshape(-1, 2), array(choice.places).reshape(-1, 9),
+            numbers(slope).reshape(-1, 3), numbers(weigh).reshape(-1), to_solids, to_faces,
         )  # fmt: skip
-        over_threads(lambda first, last: kernels.pull(*data, first, last), len(slot), least=8)
-        return to_size, to_centre, to_rotation, None, None, None
+        over_threads(lambda first, last: kernels.pull(*data, first, last), scenes)
+        to_areas = torch.from_numpy(to_faces).to(areas).reshape(areas.shape) / torch.where(areas > 0, areas, 1)
+        return *slopes(to_solids, areas, scenes, many), to_areas, None, None

@@ -1,48 +1,49 @@
 """Kernels that draw visible surface points: choose faces by area, place points on them, drop hidden ones.
 
 They are the twins of the declared ``sample``, ``place`` and ``normal`` of cuboid and cylinder: the same points.
+Primitives come as rows of one table, see ``arrays.solids``.
 """
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
-from numba import njit
 
-from shapeprog.geometry.solid_kernels import bound, distance, local
-
-CYLINDER = 1
+from shapeprog.geometry.compiling import helper, kernel
+from shapeprog.geometry.solid_kernels import CYLINDER, local
 
 GUIDE = 256
 """Steps of the table that shortens the search for a face."""
 
 
-@njit(cache=True, nogil=True)
-def _place(kind, size, slot, u, v, w):
+@helper
+def _place(solids, row, u, v, w):
     """Local point of a unit place."""
-    if kind[slot] == CYLINDER:
-        return size[slot, 0] * u, size[slot, 1] * v, size[slot, 1] * w
-    return size[slot, 0] * u, size[slot, 1] * v + size[slot, 3] / 2 * u, size[slot, 2] * w
+    if solids[row, 0] == CYLINDER:
+        return solids[row, 1] * u, solids[row, 2] * v, solids[row, 2] * w
+    return solids[row, 1] * u, solids[row, 2] * v + solids[row, 4] / 2 * u, solids[row, 3] * w
 
 
-@njit(cache=True, nogil=True)
-def _turn(rotation, slot, a, b, c):
+@helper
+def _turn(solids, row, a, b, c):
     """A local direction in the grid frame."""
     return (
-        rotation[slot, 0, 0] * a + rotation[slot, 0, 1] * b + rotation[slot, 0, 2] * c,
-        rotation[slot, 1, 0] * a + rotation[slot, 1, 1] * b + rotation[slot, 1, 2] * c,
-        rotation[slot, 2, 0] * a + rotation[slot, 2, 1] * b + rotation[slot, 2, 2] * c,
+        solids[row, 8] * a + solids[row, 9] * b + solids[row, 10] * c,
+        solids[row, 11] * a + solids[row, 12] * b + solids[row, 13] * c,
+        solids[row, 14] * a + solids[row, 15] * b + solids[row, 16] * c,
     )
 
 
-@njit(cache=True, nogil=True)
+@helper
 def _draw(kind, face, one, two, three):
     """Unit place on a face for three uniform numbers."""
     if kind == CYLINDER:
-        angle = 2 * np.pi * one
+        angle = 2 * math.pi * one
         if face == 2:
-            return 2 * three - 1, np.cos(angle), np.sin(angle)
-        rim = np.sqrt(two)
-        return 2.0 * face - 1, rim * np.cos(angle), rim * np.sin(angle)
+            return 2 * three - 1, math.cos(angle), math.sin(angle)
+        rim = math.sqrt(two)
+        return 2.0 * face - 1, rim * math.cos(angle), rim * math.sin(angle)
     sign = 2.0 * (face % 2) - 1
     u, v, w = 2 * one - 1, 2 * two - 1, 2 * three - 1
     if face < 2:
@@ -52,22 +53,22 @@ def _draw(kind, face, one, two, three):
     return u, v, sign
 
 
-@njit(cache=True, nogil=True)
-def _normal(kind, size, slot, face, u, v, w):
+@helper
+def _normal(solids, row, face, u, v, w):
     """Local normal of a face at a unit place."""
-    if kind[slot] == CYLINDER:
+    if solids[row, 0] == CYLINDER:
         return (0.0, v, w) if face == 2 else (u, 0.0, 0.0)
     sign = 2.0 * (face % 2) - 1
     if face < 2:
         return sign, 0.0, 0.0
     if face < 4:
-        slant = size[slot, 3] / 2
-        length = np.sqrt(max(size[slot, 0] * size[slot, 0] + slant * slant, 1e-24))
-        return -sign * slant / length, sign * size[slot, 0] / length, 0.0
+        slant = solids[row, 4] / 2
+        length = math.sqrt(max(solids[row, 1] * solids[row, 1] + slant * slant, 1e-24))
+        return -sign * slant / length, sign * solids[row, 1] / length, 0.0
     return 0.0, 0.0, sign
 
 
-@njit(cache=True, nogil=True)
+@helper
 def uniform(seed, count):
     """Number ``count`` of the stream of a seed, uniform in [0, 1): a counter put through the mixer of SplitMix64."""
     word = np.uint64(seed) + np.uint64(count + 1) * np.uint64(0x9E3779B97F4A7C15)
@@ -77,137 +78,142 @@ def uniform(seed, count):
     return float(word >> np.uint64(11)) * (1.0 / 9007199254740992.0)
 
 
-@njit(cache=True, nogil=True)
-def _around(kind, size, centre, rotation, mask, skin, reach, near, nears):
-    """For each primitive the others whose boxes touch its own: only they can hide it."""
-    for slot in range(kind.shape[0]):
+@helper
+def _reach(solids, row, axis):
+    """Half extent along a grid axis of the box around the primitive of a row."""
+    start = 8 + 3 * axis
+    half_up, one, two = max(solids[row, 1], 0.0), max(solids[row, 2], 0.0), max(solids[row, 3], 0.0)
+    if solids[row, 0] == CYLINDER:
+        along = solids[row, start]
+        return abs(along) * half_up + math.sqrt(max(1 - along * along, 0.0)) * one
+    one += abs(solids[row, 4]) / 2
+    return abs(solids[row, start]) * half_up + abs(solids[row, start + 1]) * one + abs(solids[row, start + 2]) * two
+
+
+@helper
+def _around(solids, first, many, skin, box, near, nears):
+    """Boxes around the primitives, and for each of them the others whose box touches its own: only they can hide it."""
+    for slot in range(many):
         for axis in range(3):
-            reach[slot, axis] = skin + bound(kind, size, rotation, slot, axis)
-    for slot in range(kind.shape[0]):
+            box[slot, axis] = solids[first + slot, 5 + axis]
+            box[slot, 3 + axis] = skin + _reach(solids, first + slot, axis)
+    for slot in range(many):
         nears[slot] = 0
-        for other in range(kind.shape[0]):
-            apart = other == slot or not mask[slot] or not mask[other]
+        for other in range(many):
+            apart = other == slot or solids[first + slot, 0] < 0 or solids[first + other, 0] < 0
             for axis in range(3):
-                gap = abs(centre[slot, axis] - centre[other, axis]) - reach[slot, axis] - reach[other, axis]
+                gap = abs(box[slot, axis] - box[other, axis]) - box[slot, 3 + axis] - box[other, 3 + axis]
                 apart = apart or gap > 0
             if not apart:
                 near[slot, nears[slot]] = other
                 nears[slot] += 1
 
 
-@njit(cache=True, nogil=True)
-def _hidden(kind, size, centre, rotation, reach, near, nears, slot, x, y, z, dx, dy, dz):
+@helper
+def _inside(solids, row, x, y, z):
+    """Whether a point is inside the primitive of a row: where its distance is negative."""
+    a, b, c = local(solids, row, x, y, z)
+    half_up, radius = solids[row, 1], solids[row, 2]
+    if not abs(a) < half_up:
+        return False
+    if solids[row, 0] == CYLINDER:
+        return radius > 0 and b * b + c * c < radius * radius
+    return abs(b * half_up - a * solids[row, 4] / 2) < radius * half_up and abs(c) < solids[row, 3]
+
+
+@helper
+def _hidden(solids, first, box, near, nears, slot, x, y, z, dx, dy, dz):
     """Whether another part begins just outside the point, or an earlier part has the same face there."""
     for place in range(nears[slot]):
         other = near[slot, place]
-        if abs(x - centre[other, 0]) > reach[other, 0] or abs(y - centre[other, 1]) > reach[other, 1]:
+        if abs(x - box[other, 0]) > box[other, 3] or abs(y - box[other, 1]) > box[other, 4]:
             continue
-        if abs(z - centre[other, 2]) > reach[other, 2]:
+        if abs(z - box[other, 2]) > box[other, 5]:
             continue
-        a, b, c = local(centre, rotation, other, x + dx, y + dy, z + dz)
-        if distance(kind, size, other, a, b, c) < 0:
+        if _inside(solids, first + other, x + dx, y + dy, z + dz):
             return True
-        if other < slot:
-            a, b, c = local(centre, rotation, other, x - dx, y - dy, z - dz)
-            if distance(kind, size, other, a, b, c) < 0:
-                return True
+        if other < slot and _inside(solids, first + other, x - dx, y - dy, z - dz):
+            return True
     return False
 
 
-@njit(cache=True, nogil=True)
-def _choose(shares, guide, number):
-    """First cell whose cumulative share is above a number; the guide says where to start looking."""
-    cell = guide[int(number * GUIDE)]
-    while shares[cell] <= number:
-        cell += 1
-    return cell
+@kernel
+def visible(solids, many, shares, seed, skin, most, n, chosen, places, found, begin, end):
+    """Draw visible surface points of the scenes ``begin`` to ``end``, n of each.
 
-
-@njit(cache=True, nogil=True)
-def _visible_in_scene(
-    kind, size, centre, rotation, mask, shares, seed, stream, skin, most, slots, faces, units, normals
-):
-    """Fill the outputs (n, ...) of one scene; returns how many of at most ``most`` candidates were kept."""
-    many = kind.shape[0]
-    per = shares.shape[0] // max(many, 1)
-    reach, near, nears = np.empty((many, 3)), np.empty((many, many), np.int64), np.empty(many, np.int64)
-    _around(kind, size, centre, rotation, mask, skin, reach, near, nears)
-    guide = np.searchsorted(shares, np.arange(GUIDE + 1) / GUIDE, side="right")
-    kept = 0
-    for candidate in range(most):
-        if kept == slots.shape[0]:
-            break
-        count = stream + 4 * candidate
-        cell = _choose(shares, guide, uniform(seed, count))
-        slot, face = cell // per, cell % per
-        u, v, w = _draw(kind[slot], face, uniform(seed, count + 1), uniform(seed, count + 2), uniform(seed, count + 3))
-        a, b, c = _place(kind, size, slot, u, v, w)
-        x, y, z = _turn(rotation, slot, a, b, c)
-        a, b, c = _normal(kind, size, slot, face, u, v, w)
-        a, b, c = _turn(rotation, slot, a, b, c)
-        x, y, z = x + centre[slot, 0], y + centre[slot, 1], z + centre[slot, 2]
-        if _hidden(kind, size, centre, rotation, reach, near, nears, slot, x, y, z, skin * a, skin * b, skin * c):
-            continue
-        slots[kept], faces[kept] = slot, face
-        units[kept, 0], units[kept, 1], units[kept, 2] = u, v, w
-        normals[kept, 0], normals[kept, 1], normals[kept, 2] = a, b, c
-        kept += 1
-    return kept
-
-
-@njit(cache=True, nogil=True)
-def visible(
-    kind, size, centre, rotation, mask, shares, seed, skin, most, slots, faces, units, normals, found, begin, end
-):
-    """Fill the outputs (B, n, ...) with visible surface points of the scenes ``begin`` to ``end``.
-
-    ``shares`` (B, N * F) are cumulative shares of area; ``found`` (B,) receives how many of at most ``most``
+    ``shares`` (B, N * F) are cumulative shares of area.  ``chosen`` (B * n, 2) receives slot and face, ``places``
+    (B * n, 9) the unit place, the grid position and the normal, and ``found`` (B,) how many of at most ``most``
     candidates were visible, n at most.
     """
+    box, near, nears = np.empty((many, 6)), np.empty((many, many), np.int64), np.empty(many, np.int64)
+    guide = np.empty(GUIDE + 1, np.int64)
+    per = shares.shape[1] // max(many, 1)
     for scene in range(begin, end):
-        found[scene] = _visible_in_scene(
-            kind[scene], size[scene], centre[scene], rotation[scene], mask[scene], shares[scene],
-            seed, scene << 40, skin, most, slots[scene], faces[scene], units[scene], normals[scene],
-        )  # fmt: skip
+        first, stream, base = scene * many, scene << 40, scene * n
+        _around(solids, first, many, skin, box, near, nears)
+        cell = 0
+        for step in range(GUIDE + 1):
+            while cell < shares.shape[1] and shares[scene, cell] <= step / GUIDE:
+                cell += 1
+            guide[step] = cell
+        kept = 0
+        for candidate in range(most):
+            if kept == n:
+                break
+            count = stream + 4 * candidate
+            number = uniform(seed, count)
+            cell = guide[int(number * GUIDE)]
+            while shares[scene, cell] <= number:
+                cell += 1
+            slot, face = cell // per, cell % per
+            row = first + slot
+            u, v, w = _draw(
+                solids[row, 0], face, uniform(seed, count + 1), uniform(seed, count + 2), uniform(seed, count + 3)
+            )
+            a, b, c = _place(solids, row, u, v, w)
+            x, y, z = _turn(solids, row, a, b, c)
+            a, b, c = _normal(solids, row, face, u, v, w)
+            a, b, c = _turn(solids, row, a, b, c)
+            x, y, z = x + solids[row, 5], y + solids[row, 6], z + solids[row, 7]
+            if _hidden(solids, first, box, near, nears, slot, x, y, z, skin * a, skin * b, skin * c):
+                continue
+            item = base + kept
+            chosen[item, 0], chosen[item, 1] = slot, face
+            places[item, 0], places[item, 1], places[item, 2] = u, v, w
+            places[item, 3], places[item, 4], places[item, 5] = x, y, z
+            places[item, 6], places[item, 7], places[item, 8] = a, b, c
+            kept += 1
+        found[scene] = kept
 
 
-@njit(cache=True, nogil=True)
-def put(kinds, sizes, centres, rotations, slots, units, points, begin, end):
-    """Grid positions of unit places."""
+@kernel
+def pull(solids, many, n, chosen, places, slope, weigh, to_solids, to_faces, begin, end):
+    """Gradient by rows of the table and by faces of placed points and their weights.
+
+    ``slope`` (B * n, 3) and ``weigh`` (B * n,) are the gradients of a loss by each point and each weight;
+    ``to_faces`` (B * N, F) adds up the latter.
+    """
     for scene in range(begin, end):
-        kind, size, centre, rotation = kinds[scene], sizes[scene], centres[scene], rotations[scene]
-        for item in range(slots.shape[1]):
-            slot = slots[scene, item]
-            a, b, c = _place(kind, size, slot, units[scene, item, 0], units[scene, item, 1], units[scene, item, 2])
-            x, y, z = _turn(rotation, slot, a, b, c)
-            points[scene, item, 0] = x + centre[slot, 0]
-            points[scene, item, 1] = y + centre[slot, 1]
-            points[scene, item, 2] = z + centre[slot, 2]
-
-
-@njit(cache=True, nogil=True)
-def pull(kinds, sizes, rotations, slots, units, slope, to_size, to_centre, to_rotation, begin, end):
-    """Gradient by size, centre and rotation of placed points, given the gradient of a loss by each point."""
-    for scene in range(begin, end):
-        kind, size, rotation = kinds[scene], sizes[scene], rotations[scene]
-        for item in range(slots.shape[1]):
-            slot = slots[scene, item]
-            u, v, w = units[scene, item, 0], units[scene, item, 1], units[scene, item, 2]
-            a, b, c = _place(kind, size, slot, u, v, w)
+        for item in range(scene * n, (scene + 1) * n):
+            row = scene * many + chosen[item, 0]
+            to_faces[row, chosen[item, 1]] += weigh[item]
+            u, v, w = places[item, 0], places[item, 1], places[item, 2]
+            a, b, c = _place(solids, row, u, v, w)
             da, db, dc = 0.0, 0.0, 0.0
             for axis in range(3):
-                part = slope[scene, item, axis]
-                to_centre[scene, slot, axis] += part
-                to_rotation[scene, slot, axis, 0] += part * a
-                to_rotation[scene, slot, axis, 1] += part * b
-                to_rotation[scene, slot, axis, 2] += part * c
-                da += rotation[slot, axis, 0] * part
-                db += rotation[slot, axis, 1] * part
-                dc += rotation[slot, axis, 2] * part
-            to_size[scene, slot, 0] += da * u
-            if kind[slot] == CYLINDER:
-                to_size[scene, slot, 1] += db * v + dc * w
+                part = slope[item, axis]
+                start = 8 + 3 * axis
+                to_solids[row, 5 + axis] += part
+                to_solids[row, start] += part * a
+                to_solids[row, start + 1] += part * b
+                to_solids[row, start + 2] += part * c
+                da += solids[row, start] * part
+                db += solids[row, start + 1] * part
+                dc += solids[row, start + 2] * part
+            to_solids[row, 1] += da * u
+            if solids[row, 0] == CYLINDER:
+                to_solids[row, 2] += db * v + dc * w
             else:
-                to_size[scene, slot, 1] += db * v
-                to_size[scene, slot, 2] += dc * w
-                to_size[scene, slot, 3] += db * u / 2
+                to_solids[row, 2] += db * v
+                to_solids[row, 3] += dc * w
+                to_solids[row, 4] += db * u / 2

@@ -6,10 +6,13 @@ Planes of words (B, W, R, R) hold rows of R cells, 32 to a word, lowest cell in 
 
 from __future__ import annotations
 
-import numpy as np
-from numba import njit
+import math
 
-CUBOID, CYLINDER = 0, 1
+import numpy as np
+
+from shapeprog.geometry.compiling import helper, kernel
+
+CYLINDER = 1.0
 REACH = 1.01
 """A cell belongs to a cylinder when its centre is within this many radii of the axis."""
 
@@ -20,13 +23,13 @@ SQUARE = 1e-6
 """How far an entry of a rotation may be from 0 or 1 and still count as a right angle."""
 
 
-@njit(cache=True, nogil=True)
+@helper
 def _clip(value, high):
     """A position as a cell boundary within the grid."""
     return int(min(max(value, 0.0), float(high)))
 
 
-@njit(cache=True, nogil=True)
+@helper
 def _word(first, last, word):
     """Bits of one word for the cells [first, last)."""
     low = min(max(first - 32 * word, 0), 32)
@@ -36,36 +39,36 @@ def _word(first, last, word):
     return np.uint32(((1 << high) - (1 << low)) & 0xFFFFFFFF)
 
 
-@njit(cache=True, nogil=True)
-def _box(rows, low, high):
+@helper
+def _box(rows, scene, low, high):
     """Fill the cells [low, high) along the three axes."""
     for word in range(low[2] >> 5, (high[2] + 31) >> 5):
         bits = _word(low[2], high[2], word)
         for i in range(low[0], high[0]):
             for j in range(low[1], high[1]):
-                rows[word, i, j] |= bits
+                rows[scene, word, i, j] |= bits
 
 
-@njit(cache=True, nogil=True)
-def _upright_box(rows, size, centre, rotation, low, high):
+@helper
+def _upright_box(rows, scene, size, centre, rotation, low, high):
     """A cuboid at right angles to the grid covers [rint(low), rint(high)) along each axis."""
-    resolution = rows.shape[1]
+    resolution = rows.shape[2]
     for axis in range(3):
         half = 0.0
         for local in range(3):
             half += abs(np.rint(rotation[axis, local])) * size[local]
         low[axis] = _clip(np.rint(centre[axis] - half), resolution)
         high[axis] = _clip(np.rint(centre[axis] + half), resolution)
-    _box(rows, low, high)
+    _box(rows, scene, low, high)
 
 
-@njit(cache=True, nogil=True)
-def _upright_shear(rows, size, centre, rotation, low, high):
+@helper
+def _upright_shear(rows, scene, size, centre, rotation, low, high):
     """A sheared cuboid that stands upright: each layer is moved by a whole number of cells.
 
     Layer i of t covers [o, o + a) with o = rint(y + lean * i / t) along the axis that it leans to.
     """
-    resolution = rows.shape[1]
+    resolution = rows.shape[2]
     along = 1 if abs(rotation[1, 1]) > 0.5 else 2
     across = 3 - along
     lean = size[3] * np.rint(rotation[along, 1]) * np.rint(rotation[0, 0])
@@ -78,13 +81,13 @@ def _upright_shear(rows, size, centre, rotation, low, high):
         low[0], high[0] = i, i + 1
         offset = np.rint(start + lean * (i - bottom) / (2 * size[0]))
         low[along], high[along] = _clip(offset, resolution), _clip(offset + depth, resolution)
-        _box(rows, low, high)
+        _box(rows, scene, low, high)
 
 
-@njit(cache=True, nogil=True)
-def _upright_cylinder(rows, size, centre):
+@helper
+def _upright_cylinder(rows, scene, size, centre):
     """A disc of cells, repeated in every layer whose centres lie between the caps."""
-    resolution = rows.shape[1]
+    resolution = rows.shape[2]
     bottom = _clip(np.ceil(centre[0] - size[0] - CAP - 0.5), resolution)
     top = _clip(np.floor(centre[0] + size[0] + CAP + 0.5), resolution)
     reach = REACH * size[1]
@@ -93,7 +96,7 @@ def _upright_cylinder(rows, size, centre):
         left = reach * reach - dy * dy
         if left < 0:
             continue
-        width = np.sqrt(left)
+        width = math.sqrt(left)
         first = _clip(np.floor(centre[2] - width - 0.5), resolution)
         last = _clip(np.ceil(centre[2] + width + 0.5), resolution)
         while first < last and (first + 0.5 - centre[2]) ** 2 > left:
@@ -103,10 +106,10 @@ def _upright_cylinder(rows, size, centre):
         for word in range(first >> 5, (last + 31) >> 5):
             bits = _word(first, last, word)
             for i in range(bottom, top):
-                rows[word, i, j] |= bits
+                rows[scene, word, i, j] |= bits
 
 
-@njit(cache=True, nogil=True)
+@helper
 def _inside(kind, size, rotation, x, y, z):
     """Whether a position relative to the centre is inside a turned solid by the rules for cells."""
     a = rotation[0, 0] * x + rotation[1, 0] * y + rotation[2, 0] * z
@@ -118,25 +121,22 @@ def _inside(kind, size, rotation, x, y, z):
     return abs(a) <= size[0] and abs(b - lean) <= size[1] and abs(c) <= size[2]
 
 
-@njit(cache=True, nogil=True)
-def _turned(rows, kind, size, centre, rotation):
+@helper
+def _turned(rows, scene, kind, size, centre, rotation, low, high, reach):
     """Any solid in any pose: cells whose centre is inside.
 
     Solids are convex, so the cells of a row are an interval: it is clipped analytically and its ends are tested.
     """
-    resolution = rows.shape[1]
-    reach = np.empty(3)
+    resolution = rows.shape[2]
     for axis in range(3):
         if kind == CYLINDER:
             along = rotation[axis, 0]
-            reach[axis] = abs(along) * (size[0] + CAP) + REACH * size[1] * np.sqrt(max(1 - along * along, 0.0))
+            reach[axis] = abs(along) * (size[0] + CAP) + REACH * size[1] * math.sqrt(max(1 - along * along, 0.0))
         else:
             depth = size[1] + abs(size[3]) / 2
             reach[axis] = (
                 abs(rotation[axis, 0]) * size[0] + abs(rotation[axis, 1]) * depth + abs(rotation[axis, 2]) * size[2]
             )
-    low = np.empty(3, np.int64)
-    high = np.empty(3, np.int64)
     for axis in range(3):
         low[axis] = _clip(np.floor(centre[axis] - reach[axis] - 0.5), resolution)
         high[axis] = _clip(np.ceil(centre[axis] + reach[axis] + 0.5), resolution)
@@ -154,10 +154,10 @@ def _turned(rows, kind, size, centre, rotation):
             while first < last and not _inside(kind, size, rotation, x, y, last - 0.5 - centre[2]):
                 last -= 1
             for word in range(first >> 5, (last + 31) >> 5):
-                rows[word, i, j] |= _word(first, last, word)
+                rows[scene, word, i, j] |= _word(first, last, word)
 
 
-@njit(cache=True, nogil=True)
+@helper
 def _slab(near, far, start, slope, half):
     """The part of [near, far] where start + slope * z stays within half of zero."""
     if abs(slope) < 1e-12:
@@ -168,7 +168,7 @@ def _slab(near, far, start, slope, half):
     return max(near, min(one, two)), min(far, max(one, two))
 
 
-@njit(cache=True, nogil=True)
+@helper
 def _interval(kind, size, rotation, x, y, reach):
     """Where along left-right the row through (x, y) can be inside, relative to the centre."""
     a = rotation[0, 0] * x + rotation[1, 0] * y
@@ -188,7 +188,7 @@ def _interval(kind, size, rotation, x, y, reach):
         root = half * half - square * rest
         if root < 0:
             return 1.0, -1.0
-        width = np.sqrt(root) / square
+        width = math.sqrt(root) / square
         return max(near, -half / square - width), min(far, -half / square + width)
     lean = size[3] / 2 / size[0] if size[0] > 0 else 0.0
     near, far = _slab(near, far, a, da, size[0])
@@ -196,7 +196,7 @@ def _interval(kind, size, rotation, x, y, reach):
     return _slab(near, far, c, dc, size[2])
 
 
-@njit(cache=True, nogil=True)
+@helper
 def _square(rotation):
     """Whether every entry is -1, 0 or 1."""
     for i in range(3):
@@ -206,46 +206,48 @@ def _square(rotation):
     return True
 
 
-@njit(cache=True, nogil=True)
-def fill(kind, sizes, centres, rotations, mask, rows, begin, end):
-    """Fill the words of scenes ``begin`` to ``end`` with the cells that their primitives occupy."""
+@kernel
+def fill(solids, many, rows, begin, end):
+    """Fill the words of scenes ``begin`` to ``end``, of ``many`` rows of the table each, with their cells."""
     resolution = rows.shape[2]
     scale, origin = resolution / 32, resolution / 2
-    size, centre = np.empty(4), np.empty(3)
+    size, centre, rotation, reach = np.empty(4), np.empty(3), np.empty((3, 3)), np.empty(3)
     low, high = np.empty(3, np.int64), np.empty(3, np.int64)
-    for scene in range(begin, end):
-        for slot in range(kind.shape[1]):
-            if not mask[scene, slot]:
+    for item in range(begin * many, end * many):
+        scene, kind = item // many, solids[item, 0]
+        if kind < 0:
+            continue
+        total = 0.0
+        for i in range(4):
+            size[i] = solids[item, 1 + i] * scale
+            total += size[i]
+        for i in range(3):
+            centre[i] = solids[item, 5 + i] * scale + origin
+            total += centre[i]
+            for j in range(3):
+                rotation[i, j] = solids[item, 8 + 3 * i + j]
+        if not math.isfinite(total):
+            continue
+        upright = _square(rotation)
+        standing = upright and abs(rotation[0, 0]) > 0.5
+        if kind == CYLINDER:
+            if size[0] < 0 or size[1] <= 0:
                 continue
-            total = 0.0
-            for i in range(4):
-                size[i] = sizes[scene, slot, i] * scale
-                total += size[i]
-            for i in range(3):
-                centre[i] = centres[scene, slot, i] * scale + origin
-                total += centre[i]
-            if not np.isfinite(total):
+            if standing:
+                _upright_cylinder(rows, scene, size, centre)
                 continue
-            rotation = rotations[scene, slot]
-            upright = _square(rotation)
-            if kind[scene, slot] == CYLINDER:
-                if size[0] < 0 or size[1] <= 0:
-                    continue
-                if abs(rotation[0, 0]) > 0.5 and upright:
-                    _upright_cylinder(rows[scene], size, centre)
-                else:
-                    _turned(rows[scene], CYLINDER, size, centre, rotation)
-            elif size[0] <= 0 or size[1] <= 0 or size[2] <= 0:
-                continue
-            elif upright and size[3] == 0:
-                _upright_box(rows[scene], size, centre, rotation, low, high)
-            elif upright and abs(rotation[0, 0]) > 0.5:
-                _upright_shear(rows[scene], size, centre, rotation, low, high)
-            else:
-                _turned(rows[scene], CUBOID, size, centre, rotation)
+        elif size[0] <= 0 or size[1] <= 0 or size[2] <= 0:
+            continue
+        elif upright and size[3] == 0:
+            _upright_box(rows, scene, size, centre, rotation, low, high)
+            continue
+        elif standing:
+            _upright_shear(rows, scene, size, centre, rotation, low, high)
+            continue
+        _turned(rows, scene, kind, size, centre, rotation, low, high, reach)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def unpack(rows, table, cells, begin, end):
     """Rows of 32 cells as bits (M,) to bytes, given as eights (M, 4); the table spreads 8 bits over 8 bytes."""
     for row in range(begin, end):
@@ -259,7 +261,7 @@ def unpack(rows, table, cells, begin, end):
             cells[row, 3] = table[bits >> np.uint32(24)]
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def shared_cells(one, two, counts):
     """Number of cells in both and in either of the packed grids (B, words)."""
     for pair in range(one.shape[0]):
@@ -270,7 +272,7 @@ def shared_cells(one, two, counts):
         counts[pair, 0], counts[pair, 1] = both, either
 
 
-@njit(cache=True, nogil=True)
+@helper
 def _ones(word):
     """Number of bits that are set."""
     word = word - ((word >> np.uint32(1)) & np.uint32(0x55555555))

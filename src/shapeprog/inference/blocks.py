@@ -10,11 +10,14 @@ from shapeprog.inference.block_layout import (
     COUNT1,
     COUNT2,
     CROSS,
+    EXTENT,
     FIRST,
+    FORM,
     LINE,
     ROTATE,
     SHIFT1,
     SHIFT2,
+    TILT,
 )  # fmt: skip
 from shapeprog.inference.naming import look_around, name_of
 from shapeprog.language.program import Chain, Draw, Loop, Program, nest
@@ -45,8 +48,8 @@ def tidy(block: FloatArray) -> FloatArray:
     A sheared box without shear becomes a box, which may then take any name.
     """
     block = block.copy()
-    if int(block[0]) == BACK and block[FIRST + 6] == 0:
-        block[0] = BOX
+    if int(block[FORM]) == BACK and block[TILT] == 0:
+        block[FORM] = BOX
     for count, shift in ((COUNT1, SHIFT1), (COUNT2, SHIFT2)):
         step = block[shift : shift + 3]
         moving = np.flatnonzero(step)
@@ -55,8 +58,8 @@ def tidy(block: FloatArray) -> FloatArray:
         elif step[moving[0]] < 0:
             reach = (block[count] - 1) * step
             block[FIRST : FIRST + 3] += reach
-            if int(block[0]) == LINE:
-                block[FIRST + 3 : FIRST + 6] += reach
+            if int(block[FORM]) == LINE:
+                block[EXTENT : EXTENT + 3] += reach
             block[shift : shift + 3] = -step
     block += 0.0  # turns -0.0 into 0.0, which prints better
     if block[COUNT1] > 1 and block[COUNT1] >= block[COUNT2] > 1:
@@ -67,11 +70,11 @@ def tidy(block: FloatArray) -> FloatArray:
 def _cells(block: FloatArray) -> float:
     values = block[FIRST : FIRST + 7]
     copies = block[COUNT1] * block[COUNT2] * max(block[ROTATE], 1)
-    if int(block[0]) in (BOX, BACK):
+    if int(block[FORM]) in (BOX, BACK):
         return float(values[3:6].prod() * copies)
-    if int(block[0]) == LINE:
+    if int(block[FORM]) == LINE:
         return float(3 * np.linalg.norm(values[3:6] - values[:3]) * values[6] ** 2 * copies)
-    if int(block[0]) == CROSS:
+    if int(block[FORM]) == CROSS:
         return float(2 * values[3] * values[4] * copies)
     return float(3.14 * values[3] * values[4] ** 2 * copies)
 
@@ -80,7 +83,7 @@ def _node(block: FloatArray, name: str) -> Draw | Loop:
     values = block[FIRST : FIRST + 7]
     low, (up, depth, side) = values[:3], values[3:6]
     even_depth, even_side = depth % 2 == 0, side % 2 == 0
-    if int(block[0]) != BOX:
+    if int(block[FORM]) != BOX:
         length = {"line": 7, "back": 7, "base_cross": 6}.get(name, 5)
         numbers = list(values[:length])
     elif name in CENTRED and even_depth and even_side:

@@ -13,8 +13,8 @@ MIRROR, PERIOD = 1, 2
 def families(size: Sequence[int], planes: int, most: int) -> npt.NDArray[np.int64]:
     """Rows (axis1, kind1, a1, b1, axis2, kind2, a2, b2) of ways to repeat a box in a volume of this size.
 
-    Kind ``MIRROR`` pairs a box with its image in a plane at a / 2 cells, ``PERIOD`` repeats it a times at distance b;
-    an axis of -1 stands for no repetition.  The first row is the single box.
+    Kind ``MIRROR`` pairs a box with its image in plane a (see ``mirrors``), ``PERIOD`` repeats it a times at distance
+    b; an axis of -1 stands for no repetition.  The first row is the single box.
 
     Parameters
     ----------

@@ -18,14 +18,17 @@ ANY = 1 << 20
 
 @njit(cache=True, nogil=True)
 def mirrors(plane):  # type: ignore[no-untyped-def]
-    """The cells left and right of a mirror plane at ``plane`` / 2 cells, which may run through a cell."""
+    """The cells left and right of a mirror plane: between two cells for an even number, through a cell for an odd one.
+
+    The plane is at ``plane`` / 2 cells, a cell farther when odd; the cell that it runs through belongs to no side.
+    """
     left = (plane - 1) // 2 if plane % 2 else plane // 2 - 1
     return left, left + 2 if plane % 2 else left + 1
 
 
 @njit(cache=True, nogil=True)
 def fold(volume, axis, kind, a, b):  # type: ignore[no-untyped-def]
-    """Fold an axis: mirrored at a plane at a / 2 cells, or summed over a copies at distance b."""
+    """Fold an axis: mirrored at plane a, or summed over a copies at distance b."""
     size0, size1, size2 = volume.shape
     size = volume.shape[axis]
     left, right = mirrors(a)

@@ -1,0 +1,120 @@
+"""Refinement and snapping find a planted program again, and inference holds its promises on hard input."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+
+from shapeprog.data.shape import Shape
+from shapeprog.errors import InputError
+from shapeprog.geometry.occupancy import voxels as voxels_of
+from shapeprog.geometry.sampling import sample_surface
+from shapeprog.inference import Schedule, Settings, infer, refine, snap, snapped_from
+from shapeprog.language.tensors import Code, decode, encode
+from shapeprog.language.text import parse
+from shapeprog.language.unroll import unroll
+
+TABLE = """
+top_rectangle(at=(4.2, 0.3, -0.2), thickness=2.3, half=(8.8, 11.3))
+for i in translate(2, by=(0, 0, 18.3)):
+    for j in translate(2, by=(0, 13.8, 0)):
+        leg(at=(-12.1, -7.8, -10.2), size=(16.3, 2.4, 1.8))
+"""
+PAIR = """
+for i in translate(2, by=(0, 0, 10.3)):
+    locker(at=(-6.2, -5.3, -8.1), size=(12.4, 9.7, 6.2))
+"""
+QUICK = Settings(rounds=20)
+
+
+def cells(program):
+    return voxels_of(unroll(program)).numpy().astype(bool)
+
+
+def points(program, count=4000):
+    return sample_surface(unroll(program), count, torch.Generator().manual_seed(0)).points.detach()
+
+
+def numbers(program):
+    return encode(program.flat()).parameters
+
+
+def test_refinement_finds_planted_lengths_and_places():
+    planted = parse(PAIR)
+    found = refine(planted.snap(), points(planted), schedule=Schedule(steps=80, rate=0.1), reach=1.49)
+    assert encode(found.flat()).ids.equal(encode(planted.flat()).ids)
+    assert (found.blocks, found.size) == (planted.blocks, planted.size)
+    assert float((numbers(found) - numbers(planted)).abs().max()) < 0.05
+
+
+def test_refinement_moves_no_number_farther_than_its_reach():
+    planted = parse(TABLE)
+    start = planted.snap()
+    moved = refine(start, points(planted) + 3.0, schedule=Schedule(steps=30, rate=0.3), reach=0.5)
+    assert float((numbers(moved) - numbers(start)).abs().max()) <= 0.5 + 1e-6
+    assert refine(start, points(planted), deadline=0.0) == start
+
+
+def test_refinement_needs_finite_points():
+    with pytest.raises(InputError, match="finite"):
+        refine(parse(TABLE), torch.full((4, 3), torch.nan))
+    with pytest.raises(InputError):
+        refine(parse(TABLE), torch.zeros(0, 3))
+
+
+@pytest.mark.filterwarnings("ignore:future versions will not create a writeable array")
+def test_snapping_brings_a_perturbed_program_back():
+    planted = parse(TABLE).snap()
+    random = np.random.default_rng(0)
+    for _ in range(3):
+        code = encode(planted.flat())
+        free = (code.parameters != 0) & (code.ids[..., None] < 19)
+        moved = code.parameters + free * torch.from_numpy(random.uniform(-0.9, 0.9, free.shape)).float()
+        near = decode(Code(code.ids, moved))[0]
+        back = snap(near, cells(planted))
+        assert snapped_from(near, back)
+        assert np.array_equal(cells(back), cells(planted))
+    assert snap(planted, cells(planted)) == planted
+    assert not snapped_from(parse(TABLE.replace("16.3", "19.3")), planted)
+    assert not snapped_from(parse(PAIR), planted)
+
+
+def check(result, blocks=10):
+    assert snapped_from(result.program, result.snapped)
+    assert result.program.outside_published() == []
+    assert result.scores["blocks"] == result.program.blocks <= blocks
+    assert result.scores["statements"] == result.program.statements
+    assert result.scores["primitives"] == result.program.size
+    assert result.reason.startswith("Stopped because")
+
+
+@pytest.mark.parametrize("with_points", [False, True], ids=["cells", "points"])
+def test_inference_rebuilds_a_table_from_cells_and_from_points(with_points):
+    planted = parse(TABLE).snap()
+    shape = Shape("table", cells(planted), points(planted).numpy() if with_points else None)
+    result = infer(shape, settings=QUICK, schedule=Schedule(steps=10), budget=60)
+    check(result)
+    assert result.scores["iou"] == 1
+    again = infer(shape, settings=QUICK, schedule=Schedule(steps=10), budget=60)
+    assert again.program == result.program
+    assert again.snapped == result.snapped
+
+
+def test_inference_without_time_returns_a_program_and_says_why():
+    planted = parse(TABLE).snap()
+    result = infer(Shape("table", cells(planted)), budget=0.0)
+    check(result)
+    assert "time budget ran out" in result.reason
+    assert "--budget" in result.reason
+    assert result.scores["iou"] > 0.8
+
+
+@pytest.mark.parametrize("kind", ["full", "cell", "sheet"])
+def test_inference_survives_full_grids_single_cells_and_flat_sheets(kind):
+    solid = np.zeros((32, 32, 32), np.bool_)
+    solid[{"full": np.s_[:], "cell": np.s_[16, 16, 16], "sheet": np.s_[16, 4:28, 4:28]}[kind]] = True
+    result = infer(Shape(kind, solid), blocks=1, settings=QUICK, schedule=Schedule(steps=4), budget=60)
+    check(result, 1)
+    assert result.scores["iou"] == 1
+    assert "every one of the 1 blocks is in use" in result.reason

@@ -1,0 +1,162 @@
+"""The structure search finds again what was planted, keeps to its limits, and never makes anything worse."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from shapeprog.geometry.occupancy import pack
+from shapeprog.geometry.occupancy import voxels as voxels_of
+from shapeprog.inference import editing
+from shapeprog.inference.blocks import to_program
+from shapeprog.inference.descent_kernels import improve_block, moves, statements, valid
+from shapeprog.inference.families import families
+from shapeprog.inference.raster_kernels import draw_all, iou_rows
+from shapeprog.inference.structure import MOST_COPIES, PLANES, Settings, search_structure
+from shapeprog.language.text import parse
+from shapeprog.language.unroll import unroll
+
+TABLE = """
+top_rectangle(at=(4, 0, 0), thickness=2, half=(9, 11))
+for i in translate(2, by=(0, 0, 18)):
+    for j in translate(2, by=(0, 14, 0)):
+        leg(at=(-12, -8, -10), size=(16, 2, 2))
+"""
+SHELF = """
+for i in translate(5, by=(5, 0, 0)):
+    layer(at=(-11, 0, 0), thickness=1, half=(4, 10))
+for i in translate(2, by=(0, 0, 18)):
+    sideboard(at=(-12, 0, -10), height=24, half_depth=4, width=2)
+"""
+STAR = """
+top_circle(at=(4, 0, 0), thickness=2, radius=8)
+support_cylinder(at=(-8, 0, 0), height=12, radius=2)
+for i in rotate(4, step=1):
+    base_cross(at=(-10, 0, 0), thickness=2, length=9, turn=0)
+"""
+CHAIR = """
+top_square(at=(-2, 0, 0), thickness=2, half=8)
+for i in translate(2, by=(0, 0, 14)):
+    for j in translate(2, by=(0, 14, 0)):
+        leg(at=(-12, -8, -8), size=(10, 2, 2))
+back(at=(0, 6, -8), size=(12, 2, 16), tilt=2)
+"""
+
+
+def cells(text):
+    return voxels_of(unroll(parse(text))).numpy().astype(bool)
+
+
+def target(solid, price=0.001):
+    places = np.argwhere(solid)
+    low, high = places.min(0), places.max(0) + 1
+    table = families((high - low).tolist(), PLANES, MOST_COPIES)
+    return editing.Target(pack(solid).reshape(-1), low, high, table, price, len(places))
+
+
+@pytest.mark.parametrize(
+    ("text", "iou", "blocks"),
+    [(TABLE, 1, 2), (SHELF, 1, 2), (STAR, 1, 3), (CHAIR, 1, 3)],
+    ids=["table", "shelf", "star", "chair"],
+)
+def test_planted_programs_are_found_again(text, iou, blocks):
+    solid = cells(text)
+    found = search_structure(solid, Settings(blocks=blocks))
+    assert found.iou >= iou
+    assert len(found.blocks) <= blocks
+    program = to_program(found.blocks)
+    assert program.size == parse(text).size or found.iou < 1
+    assert program.outside_published() == []
+    drawn = voxels_of(unroll(program)).numpy().astype(bool)
+    assert (drawn & solid).sum() / (drawn | solid).sum() == pytest.approx(found.iou, abs=1e-12)
+
+
+def test_the_same_seed_gives_the_same_blocks():
+    solid = cells(CHAIR) | cells(TABLE)
+    quick = Settings(rounds=20)
+    first, again = (search_structure(solid, quick, seed=3) for _ in range(2))
+    assert np.array_equal(first.blocks, again.blocks)
+    assert first.iou == again.iou
+
+
+@pytest.mark.parametrize("most", [1, 2, 3])
+def test_no_more_blocks_than_allowed_and_more_are_no_worse(most):
+    solid = cells(CHAIR)
+    quick = Settings(rounds=10, blocks=most)
+    found = search_structure(solid, quick)
+    assert 1 <= len(found.blocks) <= most
+    if most > 1:
+        fewer = search_structure(solid, Settings(rounds=10, blocks=most - 1))
+        assert found.iou >= fewer.iou
+
+
+def test_a_passed_deadline_still_gives_a_structure_and_says_so():
+    found = search_structure(cells(TABLE), Settings(), deadline=0.0)
+    assert len(found.blocks)
+    assert "time budget ran out after 0 of" in found.reason
+    told = []
+    done = search_structure(cells(TABLE), Settings(rounds=2), progress=lambda what, share: told.append((what, share)))
+    assert "all 2 rounds" in done.reason
+    assert told[-1] == ("searching structure", 1.0)
+
+
+def noisy_blocks(solid, seed, count=5):
+    """Random small boxes near a solid, some of them repeated."""
+    random = np.random.default_rng(seed)
+    blocks = np.zeros((count, 20))
+    blocks[:, 8] = blocks[:, 12] = 1
+    blocks[:, 1:4] = random.integers(-10, 6, (count, 3))
+    blocks[:, 4:7] = random.integers(1, 7, (count, 3))
+    blocks[0, 8], blocks[0, 9:12] = 2, (0, 0, 9)
+    return blocks
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_descent_polish_and_rounds_never_lower_the_objective(seed):
+    solid = cells(CHAIR)
+    aim = target(solid)
+    blocks = noisy_blocks(solid, seed)
+    others = draw_all(blocks[1:])
+    better, value = improve_block(blocks[0], aim.occupied, others, aim.price, 2)
+    before = iou_rows(others | draw_all(blocks[:1]), aim.occupied) - aim.price * statements(blocks[0])
+    after = iou_rows(others | draw_all(better[None]), aim.occupied) - aim.price * statements(better)
+    assert value == pytest.approx(after, abs=1e-12)
+    assert after >= before
+    polished = editing.polish(blocks, aim, 1, 3)
+    start = editing.value_of(blocks, aim)
+    assert editing.value_of(polished, aim) >= start
+    plan = editing.Plan(most=6, families=40, forms=0.3, heat=0.004)
+    rebuilt, best = editing.rebuild(polished, aim, plan, 6, seed)
+    assert best == pytest.approx(editing.value_of(rebuilt, aim), abs=1e-12)
+    assert best >= editing.value_of(polished, aim)
+    assert len(rebuilt) <= 6
+
+
+def test_a_move_changes_a_block_and_none_of_its_copies_overlap():
+    block = np.zeros(20)
+    block[4:7], block[8], block[9:12], block[12] = 2, 3, (0, 0, 4), 1
+    out = np.zeros((200, 20))
+    for far in (1, 2, 3):
+        count = moves(block, out, far)
+        assert count <= 200
+        assert not (out[:count] == block).all(1).any()
+    assert valid(block)
+    block[11] = 1
+    assert not valid(block)
+
+
+def test_a_block_that_does_not_pay_is_dropped():
+    solid = cells(TABLE)
+    aim = target(solid)
+    found = search_structure(solid, Settings(rounds=20)).blocks
+    useless = np.concatenate([found, found[:1]])
+    assert len(editing.polish(useless, aim, 1, 2)) == len(found)
+
+
+def test_full_grids_single_cells_and_flat_sheets_are_one_block():
+    full, single, sheet = (np.zeros((32, 32, 32), np.bool_) for _ in range(3))
+    full[:], single[16, 16, 16], sheet[16, 4:28, 4:28] = True, True, True
+    for solid in (full, single, sheet):
+        found = search_structure(solid, Settings(rounds=4))
+        assert found.iou == 1
+        assert len(found.blocks) == 1

@@ -16,7 +16,7 @@ from torch import Tensor
 
 from shapeprog.errors import ShapeProgError
 from shapeprog.geometry.primitive import SIZES, primitives
-from shapeprog.geometry.scene import Scene
+from shapeprog.geometry.scene import Scene, Solids
 from shapeprog.language.program import Program
 from shapeprog.language.statement import EMPTY, END, Statement, language
 from shapeprog.language.tensors import Code, encode
@@ -41,25 +41,34 @@ def unroll(program: Program | Sequence[Program] | Code) -> Scene:
 
 
 @dataclass(frozen=True)
-class _Kind:
-    """All copies that one kind of statement draws: its declaration, their items, rows and steps."""
+class _Level:
+    """All copies, in drawing order, that one kind of loop moves at one level; ``place`` is where its numbers are."""
 
     declared: Statement
-    item: Int[Tensor, " m"]
-    row: Int[Tensor, " m"]
-    step: Int[Tensor, " m"]
+    copies: Int[Tensor, " m"]
+    place: Int[Tensor, " m"]
+    index: Int[Tensor, " m"]
+    quarter: Bool[Tensor, " m"]
 
 
 @dataclass(frozen=True)
-class _Level:
-    """All copies, in drawing order, that one kind of loop moves at one level."""
+class _Layout:
+    """Where the solids that the statements return go, and what of a scene no parameter changes.
 
-    declared: Statement
-    level: int
-    place: Int[Tensor, " m"]
-    row: Int[Tensor, " m"]
-    copy: Int[Tensor, " m"]
-    quarter: Bool[Tensor, " m"]
+    ``source`` is the copy of each solid, ``None`` if they are the same; ``gather`` the solid of each slot, one past the
+    last for padding; ``lengths`` which sizes must not be negative.
+    """
+
+    drawn: tuple[tuple[int, ...], ...]
+    source: Int[Tensor, " S"] | None
+    gather: Int[Tensor, " slots"]
+    padded: bool
+    kind: Int[Tensor, "*batch N"]
+    lengths: Bool[Tensor, "*batch N 4"]
+    mask: Bool[Tensor, "*batch N"]
+    statement: Int[Tensor, "*batch N"]
+    block: Int[Tensor, "*batch N"]
+    copy: Int[Tensor, "*batch N"]
 
 
 class Plan:
@@ -74,144 +83,164 @@ class Plan:
     """
 
     def __init__(self, code: Code) -> None:
-        self._lead, (self._blocks, self._steps) = code.ids.shape[:-2], code.ids.shape[-2:]
-        ids = code.ids.reshape(-1, self._steps)
-        values = code.parameters.detach().reshape(-1, self._steps, code.parameters.shape[-1])
+        self._lead, (self._blocks, steps) = code.ids.shape[:-2], code.ids.shape[-2:]
+        ids = code.ids.reshape(-1, steps)
+        values = code.parameters.detach().reshape(-1, steps, code.parameters.shape[-1])
         row, step, copies = _copies(ids, values)
         self._programs = math.prod(self._lead)
         statement = ids[row].gather(-1, step[:, None])[:, 0] if len(row) else row
         present = [language()[number] for number in torch.unique(ids).tolist() if number in language()]
-        self._kinds = []
-        for declared in present:
-            item = (statement == declared.id).nonzero()[:, 0]
-            if len(item) and not declared.is_loop:
-                self._kinds.append(_Kind(declared, item, row[item], step[item]))
-        item = torch.cat([row[:0], *(kind.item for kind in self._kinds)])
-        quarter = torch.cat(
-            [row[:0].bool(), *(torch.full_like(k.item, k.declared.quarter).bool() for k in self._kinds)]
-        )
+        draws = [(each, (statement == each.id).nonzero()[:, 0]) for each in present if not each.is_loop]
+        draws = [(declared, item) for declared, item in draws if len(item)]
+        self._kinds, self._counts = [declared for declared, _ in draws], [len(item) for _, item in draws]
+        self._item = item = torch.cat([row[:0], *(each for _, each in draws)])
+        quarter = torch.cat([row[:0].bool(), *(torch.full_like(each, d.quarter).bool() for d, each in draws)])
+        self._place = row[item] * steps + step[item]
         self._levels = []
-        for level in reversed(range(self._steps)):
+        for level in reversed(range(steps)):
+            here = ids[row[item], level]
             for declared in present:
-                place = ((ids[row[item], level] == declared.id) & (level < step[item])).nonzero()[:, 0]
-                if len(place) and declared.is_loop:
-                    here = item[place]
-                    self._levels.append(_Level(declared, level, place, row[here], copies[here, level], quarter[place]))
-        self._item, self._row, self._statement = item, row, statement
+                if declared.is_loop:
+                    moved = ((here == declared.id) & (level < step[item])).nonzero()[:, 0]
+                    if len(moved):
+                        place, index = row[item[moved]] * steps + level, copies[item[moved], level]
+                        self._levels.append(_Level(declared, moved, place, index, quarter[moved]))
+        self._row, self._statement = row, statement
         self._copy = torch.arange(len(row), device=row.device) - torch.searchsorted(row, row)
+        self._known: _Layout | None = None
 
     def scene(self, parameters: Float[Tensor, "*batch K J 7"]) -> Scene:
         """The scenes for parameters of the same programs, with gradient."""
-        values = parameters.reshape(-1, self._steps, parameters.shape[-1])
-        if not self._kinds:
-            return self._padded(values.new_zeros(0, SIZES), values.new_zeros(0, 3), None, self._item, self._item)
-        drawn = [kind.declared.solids(values[kind.row, kind.step]) for kind in self._kinds]
-        motion = self._motion(values)
-        sizes, centres, rotations, kinds, items, orders = [], [], [], [], [], []
-        start = 0
-        turned = motion[0] is not None or any(part.rotation is not None for parts in drawn for part in parts)
-        for kind, parts in zip(self._kinds, drawn, strict=True):
-            mine = slice(start, start + len(kind.item))
-            start += len(kind.item)
-            for index, part in enumerate(parts):
-                centre, rotation = part.centre, part.rotation
-                if rotation is None and turned:
-                    rotation = torch.eye(3, device=values.device, dtype=values.dtype).expand(len(kind.item), 3, 3)
-                if motion[0] is not None and rotation is not None:
-                    matrix = motion[0][mine]
-                    centre, rotation = (matrix @ centre[..., None])[..., 0], matrix @ rotation
-                sizes.append(part.size)
-                centres.append(centre + motion[1][mine])
-                rotations.append(rotation)
-                kinds.append(torch.full_like(kind.item, part.kind))
-                items.append(kind.item)
-                orders.append(torch.full_like(kind.item, index))
-        item, order = torch.cat(items), torch.cat(orders)
-        place = torch.argsort(item * (int(order.max()) + 1) + order)
-        rotation = torch.cat([each for each in rotations if each is not None])[place] if turned else None
-        return self._padded(
-            torch.cat(sizes)[place], torch.cat(centres)[place], rotation, torch.cat(kinds)[place], item[place]
-        )
+        values = parameters.reshape(-1, parameters.shape[-1])
+        pieces = values.index_select(0, self._place).split(self._counts) if self._counts else ()
+        drawn = [declared.solids(piece) for declared, piece in zip(self._kinds, pieces, strict=True)]
+        layout = self._layout(tuple(tuple(solids.kind for solids in each) for each in drawn))
+        parts = [solids for each in drawn for solids in each]
+        size = torch.cat([values.new_zeros(0, SIZES), *(part.size for part in parts)])
+        centre = torch.cat([values.new_zeros(0, 3), *(part.centre for part in parts)])
+        rotation = _rotations(parts, values) if any(part.rotation is not None for part in parts) else None
+        turn, shift = self._motion(values)
+        if layout.source is not None:
+            turn = None if turn is None else turn.index_select(0, layout.source)
+            shift = None if shift is None else shift.index_select(0, layout.source)
+        if turn is not None:
+            centre = (turn @ centre[..., None])[..., 0]
+            rotation = turn if rotation is None else turn @ rotation
+        if shift is not None:
+            centre = centre + shift
+        return self._slots(layout, size, centre, rotation)
 
-    def _motion(self, values: Float[Tensor, "R J 7"]) -> tuple[Float[Tensor, "M 3 3"] | None, Float[Tensor, "M 3"]]:
+    def _slots(
+        self,
+        layout: _Layout,
+        size: Float[Tensor, "S 4"],
+        centre: Float[Tensor, "S 3"],
+        rotation: Float[Tensor, "S 3 3"] | None,
+    ) -> Scene:
+        """Solids in the order of programs, blocks and copies as padded slots (..., N)."""
+        table = torch.cat([size, centre] if rotation is None else [size, centre, rotation.flatten(1)], -1)
+        if layout.padded:
+            table = torch.cat([table, table.new_zeros(1, table.shape[1])])
+        slots = table.index_select(0, layout.gather).reshape(*layout.mask.shape, table.shape[1])
+        size = slots[..., :SIZES]
+        mask = layout.mask & ((size.detach() >= 0) | ~layout.lengths).all(-1)
+        identity = torch.eye(3, device=size.device, dtype=size.dtype).expand(*mask.shape, 3, 3)
+        if rotation is not None:
+            identity = torch.where(mask[..., None, None], slots[..., SIZES + 3 :].unflatten(-1, (3, 3)), identity)
+        return Scene(
+            kind=layout.kind, size=size, centre=slots[..., SIZES : SIZES + 3], rotation=identity, mask=mask,
+            statement=layout.statement, block=layout.block, copy=layout.copy,
+        )  # fmt: skip
+
+    def _layout(self, drawn: tuple[tuple[int, ...], ...]) -> _Layout:
+        """The layout for the kinds of primitive that each statement returned; made once."""
+        if self._known is not None and self._known.drawn == drawn:
+            return self._known
+        device, copies = self._item.device, torch.arange(len(self._item), device=self._item.device)
+        pieces = copies.split(self._counts) if self._counts else ()
+        source = torch.cat([copies[:0], *(piece for piece, kinds in zip(pieces, drawn, strict=True) for _ in kinds)])
+        flat = [
+            (kind, n, many) for kinds, many in zip(drawn, self._counts, strict=True) for n, kind in enumerate(kinds)
+        ]
+        kind, number = (
+            torch.cat([copies[:0], *(torch.full((f[2],), f[n], device=device) for f in flat)]) for n in (0, 1)
+        )
+        item = self._item[source]
+        order = torch.argsort(item * (max([0, *(f[1] for f in flat)]) + 1) + number)
+        item = item[order]
+        program = self._row[item].div(max(self._blocks, 1), rounding_mode="floor")
+        counts = torch.bincount(program, minlength=self._programs)
+        slots = int(counts.max()) if len(counts) else 0
+        target = program * slots + torch.arange(len(item), device=device) - (counts.cumsum(0) - counts)[program]
+        gather = torch.full((self._programs * slots,), len(item), device=device).index_copy(0, target, order)
+        owner = torch.zeros_like(gather).index_copy(0, target, item)
+        mask, there = (gather < len(item)).reshape(*self._lead, slots), (gather < len(item)).long()
+
+        def padded(each: Tensor) -> Tensor:
+            return (each * there).reshape(mask.shape)
+
+        kind = padded(torch.cat([kind, kind.new_zeros(1)])[gather])
+        extents = torch.tensor([known.extents for known in primitives], device=device)[kind]
+        row = self._row[owner] if len(item) else owner
+        self._known = _Layout(
+            drawn, None if all(len(kinds) == 1 for kinds in drawn) else source, gather, not bool(mask.all()), kind,
+            torch.arange(SIZES, device=device) < extents[..., None], mask,
+            padded(self._statement[owner] if len(item) else owner), padded(row % max(self._blocks, 1)),
+            padded(self._copy[owner] if len(item) else owner),
+        )  # fmt: skip
+        return self._known
+
+    def _motion(
+        self, values: Float[Tensor, "R 7"]
+    ) -> tuple[Float[Tensor, "M 3 3"] | None, Float[Tensor, "M 3"] | None]:
         """The rigid motion of each copy in drawing order: its loops composed from the innermost outwards."""
+        if not self._levels:
+            return None, None
         shift = values.new_zeros(len(self._item), 3)
         turn: Tensor | None = None
         axis: Tensor | None = None
         for level in self._levels:
             assert level.declared.move is not None
-            named = level.declared.split(values[level.row, level.level])
-            motion = level.declared.move(level.copy.to(values), level.quarter, **named)
+            named = level.declared.split(values.index_select(0, level.place))
+            motion = level.declared.move(level.index.to(values), level.quarter, **named)
             if motion.turn is not None:
                 axis = self._axes(values) if axis is None else axis
-                angle = torch.zeros_like(shift[:, 0]).index_copy(0, level.place, motion.turn.detach())
+                angle = torch.zeros_like(shift[:, 0]).index_copy(0, level.copies, motion.turn.detach())
                 shift = (_turned(angle) @ (shift - axis)[..., None])[..., 0] + axis
                 turn = angle if turn is None else turn + angle
             if motion.shift is not None:
-                shift = shift.index_add(0, level.place, motion.shift)
+                shift = shift.index_add(0, level.copies, motion.shift)
         return (None if turn is None else _turned(turn)), shift
 
-    def _axes(self, values: Float[Tensor, "R J 7"]) -> Float[Tensor, "M 3"]:
+    def _axes(self, values: Float[Tensor, "R 7"]) -> Float[Tensor, "M 3"]:
         """A point at height zero on the axis about which rotation loops turn each copy, in drawing order."""
         points = []
-        for kind in self._kinds:
-            pivot = kind.declared.pivot
-            if pivot is None:
-                points.append(values.new_zeros(len(kind.item), 3))
+        for declared, place in zip(self._kinds, self._place.split(self._counts), strict=True):
+            if declared.pivot is None:
+                points.append(values.new_zeros(len(place), 3))
             else:
-                point = pivot(**kind.declared.split(values[kind.row, kind.step]))
+                point = declared.pivot(**declared.split(values.index_select(0, place)))
                 points.append(torch.cat([torch.zeros_like(point[:, :1]), point[:, 1:]], -1))
         return torch.cat(points)
 
-    def _padded(
-        self,
-        size: Float[Tensor, "M 4"],
-        centre: Float[Tensor, "M 3"],
-        rotation: Float[Tensor, "M 3 3"] | None,
-        kind: Int[Tensor, " M"],
-        item: Int[Tensor, " M"],
-    ) -> Scene:
-        """Primitives in the order of programs, blocks and copies as padded slots (..., N)."""
-        device, dtype = size.device, size.dtype
-        row = self._row[item]
-        program = row.div(max(self._blocks, 1), rounding_mode="floor")
-        counts = torch.bincount(program, minlength=self._programs)
-        slots = int(counts.max()) if len(counts) else 0
-        first = counts.cumsum(0) - counts
-        target = program * slots + torch.arange(len(item), device=device) - first[program]
 
-        def pad(tensor: Tensor) -> Tensor:
-            if self._programs == 1:
-                return tensor.reshape(*self._lead, *tensor.shape)
-            out = torch.zeros(self._programs * slots, *tensor.shape[1:], device=device, dtype=tensor.dtype)
-            return out.index_copy(0, target, tensor).reshape(*self._lead, slots, *tensor.shape[1:])
+def _rotations(parts: list[Solids], like: Tensor) -> Float[Tensor, "S 3 3"]:
+    """Orientations of all solids, the identity where a statement gives none."""
+    identity = torch.eye(3, device=like.device, dtype=like.dtype)
+    return torch.cat([identity.expand(len(p.size), 3, 3) if p.rotation is None else p.rotation for p in parts])
 
-        padded_size, padded_kind = pad(size), pad(kind)
-        extents = torch.tensor([known.extents for known in primitives], device=device)[padded_kind]
-        used = torch.arange(SIZES, device=device) < extents[..., None]
-        drawable = ((padded_size.detach() >= 0) | ~used).all(-1)
-        mask = pad(torch.ones_like(item, dtype=torch.bool)) & drawable
-        identity = torch.eye(3, device=device, dtype=dtype).expand(*mask.shape, 3, 3)
-        return Scene(
-            kind=padded_kind,
-            size=padded_size,
-            centre=pad(centre),
-            rotation=identity if rotation is None else torch.where(mask[..., None, None], pad(rotation), identity),
-            mask=mask,
-            statement=pad(self._statement[item]),
-            block=pad(row % max(self._blocks, 1)),
-            copy=pad(self._copy[item]),
-        )
+
+def _groups(known: list[Statement]) -> tuple[set[int], set[int]]:
+    """Ids of the loops and of the statements that draw."""
+    loops = {declared.id for declared in known if declared.is_loop}
+    return loops, {declared.id for declared in known} - loops
 
 
 def _roles(ids: Int[Tensor, "R J"]) -> tuple[Bool[Tensor, "R J"], Bool[Tensor, "R J"]]:
     """Which steps are loops and which draw."""
     known = list(language())
     top = max([END, *(declared.id for declared in known)]) + 1
-    table = torch.zeros(2, top, dtype=torch.bool)
-    for declared in known:
-        table[0 if declared.is_loop else 1, declared.id] = True
-    table = table.to(ids.device)
+    table = torch.tensor([[number in group for number in range(top)] for group in _groups(known)], device=ids.device)
     inside = ids.clamp(0, top - 1)
     valid = inside == ids
     return table[0][inside] & valid, table[1][inside] & valid
@@ -237,9 +266,11 @@ def _copies(
             f"lower the counts: at most {MOST_PRIMITIVES} primitives can be drawn at once",
         )
     total = total.long()
-    row = torch.repeat_interleave(torch.arange(len(ids), device=ids.device), total)
-    first = total.cumsum(0) - total
-    rest = torch.arange(len(row), device=ids.device) - first[row]
+    last = total.cumsum(0)
+    first = last - total
+    many = torch.arange(int(last[-1]) if len(last) else 0, device=ids.device)
+    row = torch.searchsorted(last, many, right=True)  # repeat_interleave wakes threads for a handful of rows
+    rest = many - first[row]
     index = []
     for level in reversed(range(steps)):
         count = counts[row, level]

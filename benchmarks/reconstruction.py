@@ -63,7 +63,7 @@ def measure(task: Task) -> list[dict[str, Any]]:
         result = infer(shape, blocks=blocks, seed=seed, budget=budget)
         keep(SEARCH, result.program, result.snapped, result.scores["seconds"])
         if ALONE in methods and cloud is not None:  # the structure is searched on cells, so it is the same
-            alone = refine(result.snapped, guessed, reach=REACH, seed=seed)
+            alone = refine(result.snapped, guessed, voxels=shape.voxels, reach=REACH, seed=seed)
             keep(ALONE, alone, result.snapped, result.scores["seconds"])
     return rows
 

@@ -96,8 +96,8 @@ def infer(
     )
     snapped = to_program(structure.blocks)
     refined = refine(
-        snapped, _surface(target, snapped, seed), schedule=schedule, reach=REACH, seed=seed,
-        deadline=started + budget, progress=progress,
+        snapped, _surface(target, snapped, seed), voxels=target.voxels if target.points is None else None,
+        schedule=schedule, reach=REACH, seed=seed, deadline=started + budget, progress=progress,
     )  # fmt: skip
     scores = {
         "iou": structure.iou,

@@ -12,8 +12,11 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 
+import numpy as np
+import numpy.typing as npt
 import torch
 from jaxtyping import Bool, Float, Int
+from scipy import ndimage
 from torch import Tensor
 
 from shapeprog.errors import InputError
@@ -26,6 +29,7 @@ from shapeprog.language.program import Program
 from shapeprog.language.statement import language
 from shapeprog.language.tensors import Code, decode, encode
 from shapeprog.language.unroll import Plan
+from shapeprog.space import HALF
 
 THINNEST = 0.05
 """Smallest length in cells that refinement leaves, so that no part vanishes."""
@@ -39,6 +43,13 @@ REACH = 1.49
 
 TOUCH = 0.03
 """Weight of a squared gap between two parts that touch on the grid, against squared distances of points."""
+
+
+OCCUPANCY = 0.3
+"""Weight of the cross-entropy of a touched cell against squared distances of points."""
+
+SHARPNESS = 6.0
+"""How fast a soft cell fills, per cell of distance."""
 
 
 @dataclass(frozen=True)
@@ -55,18 +66,22 @@ class Schedule:
         Target points that one step looks at, drawn at random.
     samples
         Points sampled on the surface of the program in one step.
+    cells
+        Cells near the surface whose occupancy one step looks at, where the target has cells.
     """
 
     steps: int = 50
     rate: float = 0.12
     points: int = 1000
     samples: int = 1000
+    cells: int = 1000
 
 
 def refine(
     program: Program,
     target: Float[Tensor, "P 3"],
     *,
+    voxels: npt.NDArray[np.bool_] | None = None,
     schedule: Schedule | None = None,
     reach: float | None = None,
     seed: int = 0,
@@ -77,6 +92,9 @@ def refine(
 
     Parameters
     ----------
+    voxels
+        Touched cells (32, 32, 32) of the target, whose soft occupancy the program should match as well; for targets
+        that are known by their cells.
     schedule
         Steps, step size and numbers of points.
     reach
@@ -108,6 +126,7 @@ def refine(
     decay = torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, plan.steps, plan.rate / 10)
     generator = torch.Generator().manual_seed(seed)
     touching = _contacts(render.scene(values))
+    shell = None if voxels is None else _shell(voxels)
     with single_threaded():
         for step in range(plan.steps):
             if time.monotonic() > deadline:
@@ -119,6 +138,9 @@ def refine(
             sample = sample_surface(scene, plan.samples, generator)
             there = (squared_distance(sample.points, points) * sample.weights).mean()
             loss = (signed_distance(scene, some) ** 2).mean() + there + TOUCH * _gaps(scene, touching)
+            if shell is not None:
+                cells = torch.randint(len(shell), (plan.cells,), generator=generator)
+                loss = loss + OCCUPANCY * _occupancy_loss(scene, shell[cells])
             optimiser.zero_grad()
             loss.backward()
             assert moved.grad is not None
@@ -175,6 +197,21 @@ def _gaps(scene: Scene, touching: Int[Tensor, "C 3"]) -> Float[Tensor, ""]:
     low, high = _ends(scene)
     below, above, axis = touching.unbind(-1)
     return ((low[above, axis] - high[below, axis]).clamp(min=0) ** 2).sum()
+
+
+def _shell(voxels: npt.NDArray[np.bool_]) -> Float[Tensor, "S 4"]:
+    """Centres of the cells on either side of the boundary of a solid of cells, and whether they are in it."""
+    inner = ndimage.binary_erosion(voxels)
+    outer = ndimage.binary_dilation(voxels)
+    cells = np.argwhere(outer & ~inner)
+    inside = voxels[tuple(cells.T)]
+    return torch.from_numpy(np.column_stack([cells - HALF + 0.5, inside]).astype(np.float32))
+
+
+def _occupancy_loss(scene: Scene, cells: Float[Tensor, "S 4"]) -> Float[Tensor, ""]:
+    """Cross-entropy of touched cells: a solid touches a cell when it comes within half a cell of its centre."""
+    logits = SHARPNESS * (0.5 - signed_distance(scene, cells[:, :3]))
+    return torch.nn.functional.binary_cross_entropy_with_logits(logits, cells[:, 3])
 
 
 @contextmanager

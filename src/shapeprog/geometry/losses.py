@@ -12,7 +12,7 @@ from jaxtyping import Float
 from torch import Tensor
 
 from shapeprog.geometry.distance import signed_distance
-from shapeprog.geometry.nearest import squared_distance
+from shapeprog.geometry.nearest import mean_squared_distances, squared_distance
 from shapeprog.geometry.primitive import primitives
 from shapeprog.geometry.scene import Scene
 
@@ -54,6 +54,8 @@ def chamfer_directions(
     weights, target_weights
         How much each point counts in the mean, such as the weights of a surface sample; evenly by default.
     """
+    if weights is None and target_weights is None:
+        return Chamfer(*mean_squared_distances(points, target))
     forward = _mean(squared_distance(points, target), weights)
     return Chamfer(forward, _mean(squared_distance(target, points), target_weights))
 

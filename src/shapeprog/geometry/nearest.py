@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 import torch
 from jaxtyping import Float, Int
 from torch import Tensor
 from torch.autograd.function import once_differentiable
 
 from shapeprog.errors import ShapeProgError
-from shapeprog.geometry.arrays import array, over_threads
+from shapeprog.geometry.arrays import array, numbers, over_threads
+from shapeprog.space import Array
 
 Cloud = Float[Tensor, "*batch P 3"]
 
@@ -29,7 +31,11 @@ def nearest(queries: Cloud, points: Cloud) -> Int[Tensor, "*batch P"]:
         If there are no points, or the leading dimensions differ.
     """
     many, few = _pair(queries.detach(), points.detach())
-    index = _by_grid(many, few)[0] if many.device.type == "cpu" else _by_pairs(many, few)
+    if many.device.type == "cpu":
+        rows, clouds = _neighbours(many, few)[0], np.arange(len(few))[:, None]
+        index = torch.from_numpy(rows - clouds * few.shape[1])
+    else:
+        index = _by_pairs(many, few)
     return index.reshape(queries.shape[:-1])
 
 
@@ -52,26 +58,66 @@ def squared_distance(queries: Cloud, points: Cloud) -> Float[Tensor, "*batch P"]
     return found.reshape(queries.shape[:-1])
 
 
+def mean_squared_distances(one: Cloud, two: Cloud) -> tuple[Float[Tensor, "*batch"], Float[Tensor, "*batch"]]:
+    """Means of the squared distances from each cloud to the nearest points of the other, with gradient to both.
+
+    Raises
+    ------
+    ShapeProgError
+        As :func:`nearest`.
+    """
+    if one.device.type != "cpu" or not one.shape[-2]:
+        return squared_distance(one, two).mean(-1), squared_distance(two, one).mean(-1)
+    first, second = _pair(one, two)
+    there, back = _Chamfer.apply(first, second)  # type: ignore[no-untyped-call]
+    return there.reshape(one.shape[:-2]), back.reshape(one.shape[:-2])
+
+
 class _SquaredDistance(torch.autograd.Function):
     """The kernels as one differentiable step."""
 
     @staticmethod
     def forward(ctx: Any, queries: Tensor, points: Tensor) -> Tensor:
-        index, squared = _by_grid(queries, points)
-        ctx.save_for_backward(queries, points, index)
-        return squared
+        index, squared = _neighbours(queries, points)
+        ctx.save_for_backward(queries, points)
+        ctx.index = index
+        return torch.from_numpy(squared).to(queries.dtype)
 
     @staticmethod
     @once_differentiable
     def backward(ctx: Any, slope: Tensor) -> tuple[Tensor, Tensor]:
-        from shapeprog.geometry.neighbour_kernels import pull
+        queries, points = ctx.saved_tensors
+        to_queries, to_points = np.zeros(queries.shape), np.zeros(points.shape)
+        _pull(numbers(queries), numbers(points), ctx.index, numbers(slope), to_queries, to_points)
+        return _cast(to_queries, queries), _cast(to_points, points)
 
-        queries, points, index = ctx.saved_tensors
-        to_queries, to_points = torch.empty_like(queries), torch.zeros_like(points)
-        known = array(queries), array(points), array(index), array(slope)
-        data = *known, to_queries.numpy(), to_points.numpy()
-        over_threads(lambda first, last: pull(*data, first, last), len(index), least=8)
-        return to_queries, to_points
+
+class _Chamfer(torch.autograd.Function):
+    """Both directions and their means in kernels and numpy.
+
+    Torch would share such sums among threads that then wait for more, in the way of those of the kernels.
+    """
+
+    @staticmethod
+    def forward(ctx: Any, one: Tensor, two: Tensor) -> tuple[Tensor, Tensor]:
+        there, back = _neighbours(one, two), _neighbours(two, one)
+        ctx.save_for_backward(one, two)
+        ctx.index = there[0], back[0]
+        return _cast(there[1].mean(-1), one), _cast(back[1].mean(-1), one)
+
+    @staticmethod
+    @once_differentiable
+    def backward(ctx: Any, there: Tensor, back: Tensor) -> tuple[Tensor, Tensor]:
+        one, two = ctx.saved_tensors
+        to_one, to_two = np.zeros(one.shape), np.zeros(two.shape)
+        first, second = numbers(one), numbers(two)
+        _pull(first, second, ctx.index[0], numbers(there)[:, None] / one.shape[1], to_one, to_two)
+        _pull(second, first, ctx.index[1], numbers(back)[:, None] / two.shape[1], to_two, to_one)
+        return _cast(to_one, one), _cast(to_two, two)
+
+
+def _cast(values: Array, like: Tensor) -> Tensor:
+    return torch.from_numpy(values.astype(array(like).dtype, copy=False))
 
 
 def _pair(queries: Cloud, points: Cloud) -> tuple[Float[Tensor, "B P 3"], Float[Tensor, "B Q 3"]]:
@@ -87,15 +133,25 @@ def _pair(queries: Cloud, points: Cloud) -> tuple[Float[Tensor, "B P 3"], Float[
     return many, points.to(many).reshape(count, points.shape[-2], 3).contiguous()
 
 
-def _by_grid(
-    queries: Float[Tensor, "B P 3"], points: Float[Tensor, "B Q 3"]
-) -> tuple[Int[Tensor, "B P"], Float[Tensor, "B P"]]:
+def _neighbours(queries: Tensor, points: Tensor) -> tuple[Array, Array]:
+    """Rows of the nearest points among those of all clouds, and squared distances, (B, P) each."""
     from shapeprog.geometry.neighbour_kernels import neighbours
 
-    index, squared = torch.empty(queries.shape[:2], dtype=torch.long), torch.empty_like(queries[..., 0])
-    data = array(queries), array(points), index.numpy(), squared.numpy()
-    over_threads(lambda first, last: neighbours(*data, first, last), len(index))
-    return index, squared
+    (clouds, many), count = queries.shape[:2], points.shape[1]
+    index, squared = np.empty(clouds * many, np.int64), np.empty(clouds * many)
+    data = numbers(queries).reshape(-1, 3), many, numbers(points).reshape(-1, 3), count, index, squared
+    over_threads(lambda first, last: neighbours(*data, first, last), clouds)
+    return index.reshape(clouds, many), squared.reshape(clouds, many)
+
+
+def _pull(queries: Array, points: Array, index: Array, slope: Array, to_queries: Array, to_points: Array) -> None:
+    from shapeprog.geometry.neighbour_kernels import pull
+
+    data = (
+        queries.reshape(-1, 3), queries.shape[1], points.reshape(-1, 3), index.reshape(-1), slope,
+        to_queries.reshape(-1, 3), to_points.reshape(-1, 3),
+    )  # fmt: skip
+    over_threads(lambda first, last: pull(*data, first, last), len(index), least=8)
 
 
 def _by_pairs(queries: Float[Tensor, "B P 3"], points: Float[Tensor, "B Q 3"]) -> Int[Tensor, "B P"]:

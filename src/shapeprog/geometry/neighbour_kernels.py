@@ -8,17 +8,20 @@ the order of their cells: the neighbour of the one before is a good first guess.
 
 from __future__ import annotations
 
-import numpy as np
-from numba import njit
+import math
 
-PER_CELL = 4.0
+import numpy as np
+
+from shapeprog.geometry.compiling import helper, kernel
+
+PER_CELL = 6.0
 """Points aimed at in each cell that a surface passes through."""
 
 MOST_CELLS = 48
 """Most cells along an axis."""
 
 
-@njit(cache=True, nogil=True)
+@helper
 def _cell(value, low, inverse, cells):
     """Cell of a coordinate, the nearest one if it is outside; the first one if it is no number."""
     place = (value - low) * inverse
@@ -27,23 +30,22 @@ def _cell(value, low, inverse, cells):
     return cells - 1 if place >= cells else int(place)
 
 
-@njit(cache=True, nogil=True)
-def _layout(points, low, cells):
+@helper
+def _layout(points, first, count, low, cells):
     """Low corner, number of cells along each axis, and side of the cells for a cloud."""
     high = np.empty(3)
     for axis in range(3):
         low[axis], high[axis] = np.inf, -np.inf
-    for point in range(points.shape[0]):
+    for point in range(first, first + count):
         for axis in range(3):
-            value = float(points[point, axis])
+            value = points[point, axis]
             if value < low[axis]:
                 low[axis] = value
             if value > high[axis]:
                 high[axis] = value
     x, y, z = high[0] - low[0], high[1] - low[1], high[2] - low[2]
     area = 2 * (x * y + y * z + x * z)
-    longest = max(x, max(y, z))
-    side = max(np.sqrt(area * PER_CELL / points.shape[0]), longest / MOST_CELLS)
+    side = max(math.sqrt(area * PER_CELL / count), max(x, max(y, z)) / MOST_CELLS)
     if not side > 0:
         side = 1.0
     for axis in range(3):
@@ -51,48 +53,48 @@ def _layout(points, low, cells):
     return side
 
 
-@njit(cache=True, nogil=True)
-def _sort(points, low, inverse, cells, starts, order):
+@helper
+def _sort(points, first, count, low, inverse, cells, key, place, starts, order):
     """Counting sort of points by cell: first place of each cell, and the points in that order."""
-    count = points.shape[0]
-    key = np.empty(count, np.int32)
-    starts[:] = 0
+    every = cells[0] * cells[1] * cells[2]
+    for cell in range(every + 1):
+        starts[cell] = 0
     for point in range(count):
-        i = _cell(points[point, 0], low[0], inverse, cells[0])
-        j = _cell(points[point, 1], low[1], inverse, cells[1])
-        k = _cell(points[point, 2], low[2], inverse, cells[2])
+        i = _cell(points[first + point, 0], low[0], inverse, cells[0])
+        j = _cell(points[first + point, 1], low[1], inverse, cells[1])
+        k = _cell(points[first + point, 2], low[2], inverse, cells[2])
         key[point] = (i * cells[1] + j) * cells[2] + k
         starts[key[point] + 1] += 1
-    for cell in range(starts.shape[0] - 1):
+    for cell in range(every):
+        place[cell] = starts[cell]
         starts[cell + 1] += starts[cell]
-    place = starts[:-1].copy()
     for point in range(count):
-        order[place[key[point]]] = point
+        order[place[key[point]]] = first + point
         place[key[point]] += 1
 
 
-@njit(cache=True, nogil=True)
-def _column(x, y, z, sorted_points, starts, base, first, last, best, found):
+@helper
+def _column(x, y, z, ordered, starts, base, first, last, best, found):
     """Best of the points in the cells ``first`` to ``last`` of the column that starts at cell ``base``."""
     for place in range(starts[base + first], starts[base + last + 1]):
-        dx = sorted_points[place, 0] - x
-        dy = sorted_points[place, 1] - y
-        dz = sorted_points[place, 2] - z
+        dx = ordered[place, 0] - x
+        dy = ordered[place, 1] - y
+        dz = ordered[place, 2] - z
         square = dx * dx + dy * dy + dz * dz
         if square < best:
             best, found = square, place
     return best, found
 
 
-@njit(cache=True, nogil=True)
+@helper
 def _gap(value, low, side, cell):
     """Distance along one axis from a coordinate to a cell."""
     start = low + cell * side
     return max(max(start - value, value - start - side), 0.0)
 
 
-@njit(cache=True, nogil=True)
-def _search(x, y, z, sorted_points, starts, low, side, cells, best, found):
+@helper
+def _search(x, y, z, ordered, starts, low, side, cells, best, found):
     """Walk over the columns in rings."""
     inverse = 1 / side
     centre_i = _cell(x, low[0], inverse, cells[0])
@@ -124,46 +126,52 @@ def _search(x, y, z, sorted_points, starts, low, side, cells, best, found):
                         dy = _gap(y, low[1], side, j)
                         left = best - dx * dx - dy * dy
                         if left > 0:
-                            reach = np.sqrt(left)
+                            reach = math.sqrt(left)
                             first = _cell(z - reach, low[2], inverse, cells[2])
                             last = _cell(z + reach, low[2], inverse, cells[2])
-                            best, found = _column(x, y, z, sorted_points, starts, base, first, last, best, found)
+                            best, found = _column(x, y, z, ordered, starts, base, first, last, best, found)
                 j += max(step, 1)
     return best, found
 
 
-@njit(cache=True, nogil=True)
-def neighbours(queries, points, index, squared, begin, end):
-    """Index of the nearest of ``points`` (B, Q, 3) to each of ``queries`` (B, P, 3) and its squared distance."""
-    count = points.shape[1]
+@kernel
+def neighbours(queries, many, points, count, index, squared, begin, end):
+    """Nearest of the ``count`` points to each of the ``many`` queries of the clouds ``begin`` to ``end``.
+
+    Fills the row of ``points`` (B * count, 3), and the squared distance, for each of ``queries`` (B * many, 3).
+    """
     low, cells = np.empty(3), np.empty(3, np.int64)
-    order, visit = np.empty(count, np.int32), np.empty(queries.shape[1], np.int32)
-    sorted_points = np.empty((count, 3), points.dtype)
+    key, order, visit = (
+        np.empty(max(count, many), np.int64), np.empty(count, np.int64), np.empty(many, np.int64)
+    )  # fmt: skip
+    starts, place = np.empty((MOST_CELLS + 1) ** 3, np.int64), np.empty((MOST_CELLS + 1) ** 3, np.int64)
+    ordered = np.empty((count, 3))
     for cloud in range(begin, end):
-        side = _layout(points[cloud], low, cells)
-        starts = np.empty(cells[0] * cells[1] * cells[2] + 1, np.int32)
-        _sort(queries[cloud], low, 1 / side, cells, starts, visit)
-        _sort(points[cloud], low, 1 / side, cells, starts, order)
-        for place in range(count):
+        side = _layout(points, cloud * count, count, low, cells)
+        _sort(queries, cloud * many, many, low, 1 / side, cells, key, place, starts, visit)
+        _sort(points, cloud * count, count, low, 1 / side, cells, key, place, starts, order)
+        for item in range(count):
             for axis in range(3):
-                sorted_points[place, axis] = points[cloud, order[place], axis]
+                ordered[item, axis] = points[order[item], axis]
         found = 0
-        for turn in range(queries.shape[1]):
-            x, y, z = queries[cloud, visit[turn], 0], queries[cloud, visit[turn], 1], queries[cloud, visit[turn], 2]
-            dx, dy, dz = sorted_points[found, 0] - x, sorted_points[found, 1] - y, sorted_points[found, 2] - z
-            best = dx * dx + dy * dy + dz * dz
-            best, found = _search(x, y, z, sorted_points, starts, low, side, cells, best, found)
-            index[cloud, visit[turn]] = order[found]
-            squared[cloud, visit[turn]] = best
+        for turn in range(many):
+            query = visit[turn]
+            x, y, z = queries[query, 0], queries[query, 1], queries[query, 2]
+            dx, dy, dz = ordered[found, 0] - x, ordered[found, 1] - y, ordered[found, 2] - z
+            best, found = _search(x, y, z, ordered, starts, low, side, cells, dx * dx + dy * dy + dz * dz, found)
+            index[query], squared[query] = order[found], best
 
 
-@njit(cache=True, nogil=True)
-def pull(queries, points, index, slope, to_queries, to_points, begin, end):
-    """Gradient of squared distances to known neighbours, given the gradient of a loss by each of them."""
+@kernel
+def pull(queries, many, points, index, slope, to_queries, to_points, begin, end):
+    """Add the gradient of squared distances to known neighbours, given the gradient of a loss by each of them.
+
+    ``slope`` (B, many), or (B, 1) when it is the same for all queries of a cloud.
+    """
     for cloud in range(begin, end):
-        for query in range(queries.shape[1]):
-            point = index[cloud, query]
+        for turn in range(many):
+            query, twice = cloud * many + turn, 2 * slope[cloud, min(turn, slope.shape[1] - 1)]
             for axis in range(3):
-                part = 2 * slope[cloud, query] * (queries[cloud, query, axis] - points[cloud, point, axis])
-                to_queries[cloud, query, axis] = part
-                to_points[cloud, point, axis] -= part
+                part = twice * (queries[query, axis] - points[index[query], axis])
+                to_queries[query, axis] += part
+                to_points[index[query], axis] -= part

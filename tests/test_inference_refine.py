@@ -63,7 +63,6 @@ def test_refinement_needs_finite_points():
         refine(parse(TABLE), torch.zeros(0, 3))
 
 
-@pytest.mark.filterwarnings("ignore:future versions will not create a writeable array")
 def test_snapping_brings_a_perturbed_program_back():
     planted = parse(TABLE).snap()
     random = np.random.default_rng(0)

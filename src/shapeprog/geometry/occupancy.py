@@ -63,12 +63,10 @@ def packed_iou(one: Words, two: Words) -> npt.NDArray[np.float64]:
     """Intersection over union (...) of packed grids (..., 32, 32); leading dimensions broadcast, empty grids agree."""
     from shapeprog.geometry import voxel_kernels as kernels
 
-    one, two = np.broadcast_arrays(one, two)
-    lead = one.shape[:-2]
+    lead = np.broadcast_shapes(one.shape, two.shape)[:-2]
     counts = np.empty((int(np.prod(lead)), 2), np.int64)
-    kernels.shared_cells(
-        np.ascontiguousarray(one).reshape(len(counts), -1), np.ascontiguousarray(two).reshape(len(counts), -1), counts
-    )
+    rows = (np.array(np.broadcast_to(each, lead + each.shape[-2:])) for each in (one, two))
+    kernels.shared_cells(*(each.reshape(len(counts), -1) for each in rows), counts)
     ratio = np.where(counts[:, 1] > 0, counts[:, 0] / np.maximum(counts[:, 1], 1), 1.0)
     return ratio.reshape(lead)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -141,6 +141,16 @@ def propose_form(form: int, covered: Rows, waste: float, box: FloatArray, target
     return float(good - waste * bad - price * statements(block)), block
 
 
+CLUSTERS = 0.25
+"""Share of the rounds that take out a block together with its nearest neighbours."""
+
+CLUSTER, MOST_DROPPED = 3, 6
+"""Fewest and most blocks that such a round takes out."""
+
+CLUSTER_FORMS = 0.7
+"""Share of the proposals of such a round that also try a form other than a box."""
+
+
 @dataclass(frozen=True)
 class Plan:
     """How rounds of ruin and recreate go about it.
@@ -175,7 +185,10 @@ def rebuild(blocks: FloatArray, target: Target, plan: Plan, rounds: int, seed: i
     here, here_value = blocks, value_of(blocks, target)
     best, best_value = here, here_value
     for turn in range(rounds):
-        trial = recreate(*ruin(here, plan), target, plan)
+        if len(here) >= CLUSTER and uniform() < CLUSTERS:
+            trial = recreate(*ruin_cluster(here), target, replace(plan, forms=CLUSTER_FORMS))
+        else:
+            trial = recreate(*ruin(here, plan), target, plan)
         trial = polish(trial, target, 1, 3)
         value = value_of(trial, target)
         if value > here_value - plan.heat * (1 - turn / rounds) * uniform():
@@ -196,6 +209,22 @@ def ruin(blocks: FloatArray, plan: Plan) -> tuple[FloatArray, int]:
     for _ in range(drops):
         blocks = np.delete(blocks, below(len(blocks)), 0)
     return blocks, drops + 1
+
+
+def ruin_cluster(blocks: FloatArray) -> tuple[FloatArray, int]:
+    """The blocks without one and its nearest neighbours, and how many to put in: stairs of boxes become one slope."""
+    centres = np.stack([_centre(block) for block in blocks])
+    around = np.linalg.norm(centres - centres[below(len(blocks))], axis=1)
+    drops = CLUSTER + below(min(len(blocks), MOST_DROPPED) - CLUSTER + 1)
+    return np.delete(blocks, np.argsort(around, kind="stable")[:drops], 0), drops
+
+
+def _centre(block: FloatArray) -> FloatArray:
+    """Mean position of the cells of a block."""
+    rows = np.zeros(ROWS, np.uint32)
+    draw_block(rows, block)
+    cells = cells_of(rows)
+    return cells.mean(0) if len(cells) else np.zeros(3)
 
 
 def recreate(blocks: FloatArray, wanted: int, target: Target, plan: Plan) -> FloatArray:

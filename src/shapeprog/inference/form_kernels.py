@@ -88,13 +88,18 @@ def guess_line(block, a, b, box):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True)
 def guess_back(block, a, b, box):  # type: ignore[no-untyped-def]
-    """A box, or what two cells span, with a random tilt inside it or beyond it."""
+    """A board that leans from the lower to the higher of two cells, or a box with a random tilt in or beyond it."""
+    if box[EXTENT] <= 0 or np.random.random() < 0.5:
+        low, high = (a, b) if a[0] <= b[0] else (b, a)
+        block[FIRST], block[EXTENT] = low[0], high[0] - low[0] + 1
+        block[FIRST + 1] = low[1] - np.random.randint(0, 2)
+        block[EXTENT + 1] = np.random.randint(1, 4)
+        block[FIRST + 2], block[EXTENT + 2] = min(a[2], b[2]), abs(a[2] - b[2]) + 1
+        block[TILT] = high[1] - low[1] + np.random.randint(-1, 2)
+        return
     copy_loops(block, box)
     for axis in range(3):
         block[FIRST + axis], block[EXTENT + axis] = box[FIRST + axis], box[EXTENT + axis]
-        if box[EXTENT] <= 0:
-            block[FIRST + axis] = min(a[axis], b[axis])
-            block[EXTENT + axis] = abs(a[axis] - b[axis]) + 1
     tilt = np.random.randint(1, 6) * (1 if np.random.random() < 0.7 else -1)
     block[TILT] = tilt
     if np.random.random() < 0.5 and block[EXTENT + 1] > abs(tilt):

@@ -55,7 +55,7 @@ class Settings:
 
     blocks: int = 10
     price: float = 0.001
-    rounds: int = 160
+    rounds: int = 200
     chunk: int = 20
     families: int = 200
     forms: float = 0.3

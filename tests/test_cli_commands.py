@@ -114,6 +114,45 @@ def test_the_input_itself_is_never_overwritten(run: Run, tmp_path: Path):
 
 
 @pytest.mark.usefixtures("quick")
+def test_results_of_another_input_or_of_somebody_else_are_spared(run: Run, tmp_path: Path):
+    for folder in ("a", "b", "res"):
+        (tmp_path / folder).mkdir()
+    (tmp_path / "res" / "table.png").write_text("mine")
+    for folder in ("a", "b", "a"):
+        table(tmp_path / folder / "table.obj")
+        assert run("infer", f"{folder}/table.obj", "--out", "res", "--no-picture").code == 0
+    assert sorted(path.name for path in (tmp_path / "res").glob("*.json")) == ["table_2.json", "table_3.json"]
+    assert (tmp_path / "res" / "table.png").read_text() == "mine"
+
+
+@pytest.mark.usefixtures("quick")
+def test_a_disk_that_takes_nothing_ends_the_run(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    from shapeprog.cli import inferring
+    from shapeprog.errors import OutputError
+
+    def full(*_: object) -> list[str]:
+        raise OutputError("the disk is full", "free some space")
+
+    monkeypatch.setattr(inferring, "_write", full)
+    table(tmp_path / "one.obj")
+    ended = run("infer", "one.obj", table(tmp_path / "two.obj"))
+    assert ended.code == 2
+    assert ended.err.count("the disk is full") == 1
+    assert "what was finished is kept: 0 programs" in ended.err
+
+
+@pytest.mark.usefixtures("quick")
+def test_shapes_of_a_pack_are_found_again(run: Run, tmp_path: Path):
+    cells = np.zeros((2, 32, 32, 32), bool)
+    cells[:, 4:28, 10:20, 10:20] = True
+    np.save(tmp_path / "many.npy", cells)
+    ended = run("infer", "many.npy", "--out", "res", "--no-picture")
+    assert "Read as voxels." in ended.out
+    sources = [json.loads(path.read_text())["source"] for path in sorted((tmp_path / "res").glob("*.json"))]
+    assert sources == [f"{tmp_path / 'many.npy'}#{number}" for number in range(2)]
+
+
+@pytest.mark.usefixtures("quick")
 def test_json_is_one_object_a_line_and_quiet_says_nothing(run: Run, tmp_path: Path):
     (tmp_path / "broken.ply").write_text("ply?")
     table(tmp_path / "good.obj")
@@ -142,7 +181,7 @@ def test_a_fault_of_ours_in_one_shape_stops_nothing(run: Run, tmp_path: Path, mo
 
     monkeypatch.setattr(inference, "infer", infer)
     ended = run("infer", table(tmp_path / "table.obj"))
-    assert ended.code == 1
+    assert ended.code == 2
     assert "RuntimeError: a bug" in ended.err
     assert "--debug" in ended.err
     with pytest.raises(RuntimeError, match="a bug"):
@@ -266,6 +305,9 @@ def test_evaluate_tells_what_has_no_partner(run: Run, tmp_path: Path, program: P
         (["evaluate", "gone", "mesh.obj"], "there is no file or folder gone"),
         (["infer", "mesh.obj", "--out", "table.json"], "there is a file of that name"),
         (["infer", "mesh.obj", "--with", "gone.py"], "no file"),
+        (["infer", "mesh.obj", "mesh.obj", "--up", "q"], "'q' is not an axis"),
+        (["prepare", ".", "packs", "--up", "y", "--front", "-y"], "must be perpendicular"),
+        (["infer", "gone.obj"], "there is no file gone.obj"),
     ],
 )
 def test_mistakes_are_told_without_a_traceback(run: Run, tmp_path: Path, program: Path, words: list[str], told: str):
@@ -277,6 +319,12 @@ def test_mistakes_are_told_without_a_traceback(run: Run, tmp_path: Path, program
     assert told in ended.err
     assert "error: " in ended.err
     assert "Traceback" not in ended.err
+
+
+@pytest.mark.parametrize("seed", [-1, 2**63])
+def test_seeds_out_of_range_are_told(run: Run, seed: int):
+    ended = run("infer", "mesh.obj", "--seed", seed)
+    assert (ended.code, "--seed" in ended.err) == (2, True)
 
 
 def test_help_and_version_load_nothing_heavy():

@@ -155,3 +155,19 @@ def test_bad_packs(tmp_path):
         read_pack(tmp_path / "b.npz")
     with pytest.raises(InputError, match="there is no file"):
         read_pack(tmp_path / "c.npz")
+
+
+def test_an_obj_that_ends_within_a_line(tmp_path):
+    (tmp_path / "a.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 3")
+    refused(tmp_path / "a.obj", "ends within a line")
+
+
+def test_faces_without_area(tmp_path):
+    (tmp_path / "a.obj").write_text("v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n")
+    refused(tmp_path / "a.obj", "has no area")
+
+
+def test_text_in_an_older_encoding_is_read(tmp_path):
+    path = tmp_path / "a.obj"
+    path.write_bytes("# Stühle\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n".encode("latin-1"))
+    assert load(path).kind == "mesh"

@@ -13,13 +13,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from shapeprog.cli import terminal
-from shapeprog.errors import InputError, ShapeProgError
+from shapeprog.errors import InputError, OutputError, ShapeProgError
 
 if TYPE_CHECKING:
     from shapeprog.data.shape import Shape
     from shapeprog.language.program import Program
 
 FOLDER = Path("shapeprog-out")
+
+_SUFFIXES = (".json", ".shape", ".glb", ".png")
+_LONGEST = 120
 
 Progress = Callable[[str, float], None]
 
@@ -39,11 +42,9 @@ def infer_command(
     out: Annotated[Path, typer.Option("--out", "-o", help="Folder for the results; made if missing.")] = FOLDER,
     blocks: Annotated[int, typer.Option(help="Most blocks of a program.", min=1)] = 10,
     budget: Annotated[float, typer.Option(help="Seconds of search for each shape.", min=0.1)] = 4.0,
-    seed: Annotated[int, typer.Option(help="Seed of everything random.")] = 0,
-    up: Annotated[
-        str | None, typer.Option(help="World axis that points up, such as +y; by default the format's.")
-    ] = None,
-    front: Annotated[str | None, typer.Option(help="World axis that the front faces, such as -z.")] = None,
+    seed: terminal.Seed = 0,
+    up: terminal.Up = None,
+    front: terminal.Front = None,
     modules: terminal.With = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object per shape, one per line.")] = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
@@ -61,9 +62,11 @@ def infer_command(
     from shapeprog.files import make_folder
 
     terminal.load_modules(modules)
+    terminal.check_axes(up, front)
     folder = make_folder(out)
     search = _baseline if baseline else _search
     failures: list[tuple[Path, ShapeProgError]] = []
+    stopped: OutputError | None = None
     written, taken = 0, set[str]()
     talk = not (quiet or as_json)
     console = terminal.output()
@@ -88,6 +91,9 @@ def infer_command(
                     found = search(shape, blocks, budget, seed, progress)
                     stem = _free_stem(shape, taken, folder)
                     names = _write(found, shape, folder, stem, not no_picture)
+                except OutputError as error:
+                    stopped = error  # a disk that took nothing now takes nothing later
+                    break
                 except ShapeProgError as error:
                     failures.append((path, error))
                     continue
@@ -105,17 +111,18 @@ def infer_command(
                 elif talk:
                     _report(console, found, shape, folder, names)
         except KeyboardInterrupt:
-            done = f"{written} program{'s' if written != 1 else ''} in {folder}"
-            raise terminal.Interrupted(f"what was finished is kept: {done}") from None
+            raise terminal.Interrupted(_kept(written, folder)) from None
     for path, problem in failures:
         if as_json:
             told = {"name": path.name, "source": str(path), "error": problem.message, "hint": problem.hint}
             terminal.print_json(told)
         terminal.complain(_at(path, problem))
+    if len(failures) + written > 1 and failures and not quiet:
+        terminal.errors().print(f"{len(failures)} of {len(failures) + written} inputs failed.", markup=False)
+    if stopped:
+        raise OutputError(stopped.message, f"{stopped.hint}; {_kept(written, folder)}")
     if failures:
-        if len(failures) + written > 1 and not quiet:
-            terminal.errors().print(f"{len(failures)} of {len(failures) + written} inputs failed.", markup=False)
-        raise typer.Exit(1)
+        raise typer.Exit(1 if written else terminal.MISTAKE)
     if not written:
         raise InputError("there was nothing to infer from", "name files or folders that hold shapes")
 
@@ -159,9 +166,8 @@ def _document(found: Found, shape: Shape) -> str:
     from shapeprog.language.json_form import program_to_json
 
     snapped = json.loads(program_to_json(found.snapped))["program"]
-    source = None if shape.source is None else str(shape.source.absolute())
     return result_json(
-        found.program, shape.frame, scores=found.scores, reason=found.reason, source=source, snapped=snapped
+        found.program, shape.frame, scores=found.scores, reason=found.reason, source=_source(shape), snapped=snapped
     )
 
 
@@ -183,22 +189,56 @@ def _write(found: Found, shape: Shape, folder: Path, stem: str, picture: bool) -
     return names
 
 
+def _kept(written: int, folder: Path) -> str:
+    return f"what was finished is kept: {written} program{'s' if written != 1 else ''} in {folder}"
+
+
 def _free_stem(shape: Shape, taken: set[str], folder: Path) -> str:
-    """A file name for a shape that no other shape of this run has, and that spares the input itself."""
-    base = re.sub(r"[^\w.\-]+", "_", shape.name).strip("._") or "shape"
-    source = None if shape.source is None else shape.source.resolve()
+    """A file name that no other shape has, of this run or an earlier one, and that spares what is no result of ours.
+
+    The same input may replace its own results.
+    """
+    base = re.sub(r"[^\w.\-]+", "_", shape.name).strip("._")[:_LONGEST] or "shape"
     stem, number = base, 1
-    while stem in taken or (source is not None and source.parent == folder.resolve() and source.stem == stem):
+    while stem in taken or not _replaceable(shape, folder, stem):
         number += 1
         stem = f"{base}_{number}"
     taken.add(stem)
     return stem
 
 
+def _replaceable(shape: Shape, folder: Path, stem: str) -> bool:
+    """Whether nothing of that name is there, or only what was inferred from the same shape before."""
+    if shape.source is not None and shape.source.resolve() == (folder / f"{stem}{shape.source.suffix}").resolve():
+        return False
+    if not any((folder / f"{stem}{suffix}").exists() for suffix in _SUFFIXES):
+        return True
+    try:
+        kept = json.loads((folder / f"{stem}.json").read_text(encoding="utf-8-sig"))
+        return bool(kept["source"] == _source(shape))
+    except (OSError, ValueError, KeyError, TypeError):
+        return False
+
+
+def _source(shape: Shape) -> str | None:
+    """The file, and in a file of many the name of the shape, as :func:`shapeprog.data.load` finds it again."""
+    from shapeprog.data.loading import ARRAY_SUFFIXES
+
+    if shape.source is None:
+        return None
+    place = str(shape.source.absolute())
+    if shape.source.suffix.lower() not in ARRAY_SUFFIXES or shape.name == shape.source.stem:
+        return place
+    return f"{place}#{shape.name.removeprefix(f'{shape.source.stem}#')}"
+
+
 def _report(console: Any, found: Found, shape: Shape, folder: Path, names: list[str]) -> None:
     from shapeprog.view.page import scores_text
 
     console.print(shape.name, style="bold")
+    if shape.kind != "mesh":
+        held = f"a cloud of {len(shape.points)} points" if shape.points is not None else "voxels"
+        console.print(f"Read as {held}.", style="dim")
     terminal.print_program(console, found.program)
     for line in scores_text(found.scores, found.program):
         console.print(line, style="dim")

@@ -30,9 +30,9 @@ def prepare_command(
     directory: Annotated[Path, typer.Argument(help="ShapeNetCore v2 as distributed, or a folder per category.")],
     output: Annotated[Path, typer.Argument(help="Folder for the packs; made if missing.")],
     points: Annotated[int, typer.Option(help="Points on each surface.", min=1)] = 5000,
-    seed: Annotated[int, typer.Option(help="Seed of the points.")] = 0,
-    up: Annotated[str | None, typer.Option(help="World axis that points up, such as +y.")] = None,
-    front: Annotated[str | None, typer.Option(help="World axis that the front faces, such as -z.")] = None,
+    seed: terminal.Seed = 0,
+    up: terminal.Up = None,
+    front: terminal.Front = None,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
 ) -> None:
     """Turn a directory of models into packs CATEGORY_SPLIT.npz; equal shapes never straddle a split."""
@@ -40,6 +40,7 @@ def prepare_command(
 
     from shapeprog.data import prepare
 
+    terminal.check_axes(up, front)
     last = None
     bar = None if quiet else Progress(console=terminal.errors(), transient=True)
     with bar or nullcontext():
@@ -64,9 +65,9 @@ def evaluate_command(
     predictions: Annotated[Path, typer.Argument(help="Programs, meshes, clouds or voxels: a file, pack or folder.")],
     targets: Annotated[list[Path], typer.Argument(help="Targets of any kind: files, packs or folders.")],
     points: Annotated[int, typer.Option(help="Points on each surface.", min=2)] = 5000,
-    seed: Annotated[int, typer.Option(help="Seed of all samplings.")] = 0,
-    up: Annotated[str | None, typer.Option(help="World axis of the targets that points up.")] = None,
-    front: Annotated[str | None, typer.Option(help="World axis that the front of the targets faces.")] = None,
+    seed: terminal.Seed = 0,
+    up: terminal.Up = None,
+    front: terminal.Front = None,
     each: Annotated[bool, typer.Option("--each", help="A row for every shape as well.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print rows and summary as JSON.")] = False,
     as_csv: Annotated[bool, typer.Option("--csv", help="Print a row per shape as CSV.")] = False,
@@ -87,6 +88,7 @@ def evaluate_command(
     from shapeprog.evaluation.metrics import summarise
 
     terminal.load_modules(modules)
+    terminal.check_axes(up, front)
     missing = [path for path in [predictions, *targets] if not Path(str(path).split("#")[0]).exists()]
     if missing:
         raise InputError(f"there is no file or folder {missing[0]}", "check the path")

@@ -36,6 +36,10 @@ With = Annotated[
     typer.Option("--with", help="A Python module that declares statements of your own; may be given again."),
 ]
 
+Seed = Annotated[int, typer.Option(help="Seed of everything random.", min=0, max=2**63 - 1)]
+Up = Annotated[str | None, typer.Option(help="World axis that points up, such as +y; by default the format's.")]
+Front = Annotated[str | None, typer.Option(help="World axis that the front faces, such as -z.")]
+
 
 class Interrupted(KeyboardInterrupt):
     """An interruption by the user, with a sentence on what was kept."""
@@ -95,6 +99,19 @@ def complain(error: ShapeProgError) -> None:
     console.print(text, style="red", markup=False)
     if error.hint:
         console.print(f"hint: {error.hint}", markup=False)
+
+
+def check_axes(up: str | None, front: str | None) -> None:
+    """Refuse axes that are none before the first file is read.
+
+    Raises
+    ------
+    InputError
+        If a name is not an axis, or both lie on one line.
+    """
+    from shapeprog.data.orientation import axes_of
+
+    axes_of(Path("--up and --front"), up, front)
 
 
 def load_modules(modules: list[Path] | None) -> None:

@@ -49,7 +49,7 @@ def render_command(
     shape: Input = None,
     resolution: Annotated[int, typer.Option(help="Cells along each side, for .npy.", min=1, max=512)] = 32,
     points: Annotated[int, typer.Option(help="How many points, for .xyz.", min=1)] = 5000,
-    seed: Annotated[int, typer.Option(help="Seed of the points.")] = 0,
+    seed: terminal.Seed = 0,
     modules: terminal.With = None,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
 ) -> None:
@@ -202,15 +202,18 @@ def _input_of(program: Path, shape: Path | None) -> Shape | None:
 
 
 def _write_cells(program: Program, path: Path, resolution: int) -> None:
+    import io
+
     import numpy as np
 
-    from shapeprog.files import atomic_path
+    from shapeprog.files import write_bytes
     from shapeprog.geometry.occupancy import voxels
     from shapeprog.language.unroll import unroll
 
     cells = voxels(unroll(program.snap()), resolution).numpy().astype(np.bool_)
-    with atomic_path(path) as temporary, temporary.open("wb") as stream:
-        np.save(stream, cells)
+    content = io.BytesIO()  # numpy itself does not say so plainly when the disk is full
+    np.save(content, cells)
+    write_bytes(path, content.getvalue())
 
 
 def _write_points(program: Program, frame: Any, path: Path, points: int, seed: int) -> None:

@@ -139,7 +139,8 @@ def _open(path: Path, up: str | None, front: str | None, points: int, seed: int)
             return _open_array(path, name, axes, points, seed)
         if suffix not in readable_suffixes():
             known = ", ".join(sorted(readable_suffixes()))
-            raise InputError(f"{path.name}: no shapes are read from files that end in {suffix!r}", f"known: {known}")
+            ending = f"that end in {suffix!r}" if suffix else "without a suffix"
+            raise InputError(f"{path.name}: no shapes are read from files {ending}", f"known: {known}")
         from shapeprog.data.meshes import read_mesh
 
         vertices, faces = read_mesh(path)

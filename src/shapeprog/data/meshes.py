@@ -18,6 +18,8 @@ Array = npt.NDArray[Any]
 _NO_MESH = {"bz2", "dict", "dict64", "dxf", "json", "msgpack", "stl_ascii", "svg", "tar.bz2", "tar.gz", "xyz", "zip"}
 _OFF_COUNTS = re.compile(rb"^\s*(?:C?N?OFF)?\s*(\d+)\s+(\d+)\s+\d+", re.MULTILINE)
 _COMMON = ("obj", "off", "ply", "stl", "glb", "gltf")
+_TEXTS = ("obj", "off")
+_LAST_LINE = re.compile(rb"(?:^|\n)(v|f)[ \t]([^\n]*)$")
 
 
 def mesh_formats() -> set[str]:
@@ -44,6 +46,8 @@ def read_mesh(path: Path) -> tuple[Array, Array]:
     if not content.strip():
         raise InputError(f"{path.name} is empty", "write the file again")
     _check_length(path.name, suffix, content)
+    if suffix in _TEXTS:
+        content = _in_utf8(path.name, suffix, content)
     resolver = _siblings(path) if suffix == "gltf" else None
     try:
         with warnings.catch_warnings():
@@ -76,14 +80,15 @@ def read_mesh(path: Path) -> tuple[Array, Array]:
 
 
 def _joined(name: str, parts: list[tuple[Array, Any]]) -> tuple[Array, Array]:
-    vertices: list[Array] = [np.zeros((0, 3))]
-    faces: list[Array] = [np.zeros((0, 3), np.int64)]
+    vertices: list[Array] = []
+    faces: list[Array] = []
     loose: list[Array] = [np.zeros((0, 3))]
     count = 0
     for matrix, part in parts:
         own = np.asarray(getattr(part, "vertices", np.zeros((0, 3))), np.float64).reshape(-1, 3)
         with np.errstate(invalid="ignore"):  # infinite coordinates are told by name later
-            placed = own @ np.asarray(matrix)[:3, :3].T + np.asarray(matrix)[:3, 3]
+            still = np.array_equal(matrix, np.eye(4))
+            placed = own if still else own @ np.asarray(matrix)[:3, :3].T + np.asarray(matrix)[:3, 3]
         listed = getattr(part, "faces", None)
         if listed is None or len(listed) == 0:
             loose.append(placed)
@@ -95,10 +100,12 @@ def _joined(name: str, parts: list[tuple[Array, Any]]) -> tuple[Array, Array]:
                 "the file is cut short or damaged; write it again",
             )
         vertices.append(placed)
-        faces.append(triangles + count)
+        faces.append(triangles + count if count else triangles)
         count += len(placed)
     if count == 0:
-        return np.concatenate(loose), faces[0]
+        return np.concatenate(loose), np.zeros((0, 3), np.int64)
+    if len(vertices) == 1:
+        return vertices[0], faces[0]
     return np.concatenate(vertices), np.concatenate(faces)
 
 
@@ -111,6 +118,8 @@ def _check_length(name: str, suffix: str, content: bytes) -> None:
         expected = int.from_bytes(content[8:12], "little")
     elif suffix == "stl" and len(content) >= 84 and content[:5].lower() != b"solid":
         expected = 84 + 50 * int.from_bytes(content[80:84], "little")
+    elif suffix == "obj" and (last := _LAST_LINE.search(content)) and len(last[2].split()) < 3:
+        raise InputError(f"{name} is cut short: it ends within a line", "write the file again")
     elif suffix == "stl" and b"facet" in content[:1000] and b"endsolid" not in content[-1000:]:
         raise InputError(f"{name} ends before its 'endsolid': it is cut short", "write the file again")
     if len(content) < expected:
@@ -118,6 +127,17 @@ def _check_length(name: str, suffix: str, content: bytes) -> None:
             f"{name} is cut short: {len(content):,} bytes of the {expected:,} its head announces",
             "write the file again",
         )
+
+
+def _in_utf8(name: str, suffix: str, content: bytes) -> bytes:
+    """A text file as UTF-8 whatever it was written in: only comments and names of materials can tell."""
+    if b"\0" in content:
+        raise InputError(f"{name} is not text, as {suffix.upper()} files are", "check the suffix")
+    try:
+        content.decode("utf-8")
+    except UnicodeDecodeError:
+        return content.decode("latin-1").encode("utf-8")
+    return content
 
 
 def _reason(error: Exception) -> str:

@@ -30,18 +30,22 @@ def shape_from_mesh(
     Raises
     ------
     InputError
-        If it has no faces, no extent, or coordinates that are not finite.
+        If it has no faces, no extent, no area, or coordinates that are not finite.
     """
     from shapeprog.data.sampling import sample_surface
     from shapeprog.data.voxelise import voxelise_mesh
 
     used = np.zeros(len(vertices), np.bool_)
     used[np.asarray(faces, np.int64).reshape(-1)] = True
-    frame = _frame(vertices[used], name, axes)
-    corners = frame.to_grid(np.where(used[:, None], vertices, np.asarray(frame.centre)))
+    everything = bool(used.all())
+    frame = _frame(vertices if everything else vertices[used], name, axes)
+    corners = frame.to_grid(vertices if everything else np.where(used[:, None], vertices, np.asarray(frame.centre)))
+    cells = voxelise_mesh(corners, faces)
+    if not cells.any():
+        raise InputError(f"{name} has no area: its faces are lines or points", "export the model again with its faces")
     return Shape(
         name=name,
-        voxels=voxelise_mesh(corners, faces),
+        voxels=cells,
         points=sample_surface(corners, faces, points, seed),
         frame=frame,
         vertices=corners.astype(np.float32),

@@ -9,6 +9,9 @@ import numpy.typing as npt
 
 Array = npt.NDArray[Any]
 
+_AT_ONCE = 1 << 17
+"""Triangles in memory at once: meshes may have millions."""
+
 
 def sample_surface(vertices: Array, faces: Array, count: int, seed: int = 0) -> npt.NDArray[np.float32]:
     """Points (count, 3) drawn uniformly by area from the triangles.
@@ -26,15 +29,27 @@ def sample_surface(vertices: Array, faces: Array, count: int, seed: int = 0) -> 
     seed
         Seed of the generator.
     """
-    corners = np.asarray(vertices, np.float64)[np.asarray(faces, np.int64)]
-    first, along, across = corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    weight = np.cumsum(np.linalg.norm(np.cross(along, across), axis=1))
+    places, listed = np.asarray(vertices, np.float64), np.asarray(faces, np.int64)
+    weight = np.cumsum(np.concatenate([_areas(places, listed[at : at + _AT_ONCE]) for at in _starts(len(listed))]))
     if weight[-1] <= 0:
-        weight = np.arange(1.0, len(corners) + 1)
+        weight = np.arange(1.0, len(listed) + 1)
     drawn = np.random.default_rng(seed).random((count, 3))
-    face = np.minimum(np.searchsorted(weight, drawn[:, 0] * weight[-1], side="right"), len(corners) - 1)
+    face = np.minimum(np.searchsorted(weight, drawn[:, 0] * weight[-1], side="right"), len(listed) - 1)
+    corners = places[listed[face]]
+    first, along, across = corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     # The square root keeps the density even from the first corner to the opposite edge.
     root, share = np.sqrt(drawn[:, 1:2]), drawn[:, 2:3]
-    points: Array = first[face] + root * ((1 - share) * along[face] + share * across[face])
+    points: Array = first + root * ((1 - share) * along + share * across)
     single: npt.NDArray[np.float32] = points.astype(np.float32)
     return single
+
+
+def _starts(count: int) -> range:
+    return range(0, max(count, 1), _AT_ONCE)
+
+
+def _areas(vertices: Array, faces: Array) -> Array:
+    """Twice the area of each triangle."""
+    corners = vertices[faces]
+    normals: Array = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    return np.linalg.norm(normals, axis=1)

@@ -25,6 +25,10 @@ HOLE = 2
 """Widest hole, in half cells, that lets no view through."""
 
 
+AT_ONCE = 1 << 17
+"""Triangles enlarged at once: meshes may have millions."""
+
+
 def voxelise_mesh(vertices: Array, faces: Array, resolution: int = RESOLUTION) -> BoolArray:
     """Every cell that the surface touches or the solid contains, (R, R, R).
 
@@ -42,12 +46,14 @@ def voxelise_mesh(vertices: Array, faces: Array, resolution: int = RESOLUTION) -
     from shapeprog.data.voxelise_kernels import mark_triangles
 
     corners = np.asarray(vertices, np.float64) + resolution / 2
-    triangles = np.ascontiguousarray(corners[np.asarray(faces, np.int64)].reshape(-1, 3, 3))
+    triangles = corners[np.asarray(faces, np.int64).reshape(-1, 3)]
     touched = np.zeros((resolution,) * 3, np.bool_)
-    mark_triangles(triangles, 0.5 - SHRINK, touched)
     # Half cells that straddle the boundaries of the cells: a wall on a boundary has one clear place among them.
     barrier = np.zeros((2 * resolution + 1,) * 3, np.bool_)
-    mark_triangles(2 * triangles + 0.5, 0.5 + 1e-6, barrier)
+    for start in range(0, len(triangles), AT_ONCE):
+        some = triangles[start : start + AT_ONCE]
+        mark_triangles(some, 0.5 - SHRINK, touched)
+        mark_triangles(2 * some + 0.5, 0.5 + 1e-6, barrier)
     _carve(barrier, HOLE, 1, 2, touched)
     _mark_boundary_sheets(triangles, touched)
     return touched

@@ -22,6 +22,9 @@ INPUT_COLOUR = (212, 215, 220)
 MOST_POINTS = 2500
 """Points of a cloud that are drawn, each as a small ball."""
 
+FINE = 200_000
+"""Triangles from which a mesh is drawn with the normals of its triangles: they are smaller than the pixels."""
+
 
 @dataclass(frozen=True)
 class Model:
@@ -111,8 +114,18 @@ def of_points(points: Array) -> Model:
 
 
 def _plain(vertices: Array, faces: Array, normals: Array | None = None) -> Model:
-    shown = crease_normals(vertices, faces) if normals is None else normals
-    return Model(vertices, faces, shown, np.tile(INPUT_COLOUR, (len(faces), 1)), np.zeros(len(faces), np.int64))
+    if normals is None:
+        normals = crease_normals(vertices, faces) if len(faces) < FINE else _flat_normals(vertices, faces)
+    colours = np.broadcast_to(np.array(INPUT_COLOUR, np.uint8), (len(faces), 3))
+    return Model(vertices, faces, normals, colours, np.zeros(len(faces), np.int64))
+
+
+def _flat_normals(vertices: Array, faces: Array) -> Array:
+    corners = vertices[faces]
+    area = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    length = np.linalg.norm(area, axis=1, keepdims=True)
+    flat: Array = (area / np.where(length > 0, length, 1)).astype(np.float32)
+    return np.broadcast_to(flat[:, None], (len(faces), 3, 3))
 
 
 def _empty() -> Model:

@@ -66,6 +66,9 @@ INKS = np.array([1.0, 0.45, 0.16, 0.1])
 
 GAMMA = 2.2
 
+_AT_ONCE = 1 << 18
+"""Points projected at once: meshes may have millions."""
+
 
 @dataclass(frozen=True)
 class Camera:
@@ -107,23 +110,25 @@ def camera_for(
     models: Sequence[Model], aspect: float = 1.0, direction: tuple[float, float, float] = DIRECTION
 ) -> Camera:
     """The camera that shows all models as large as they fit into a picture of width / height ``aspect``."""
-    points = np.concatenate([*(model.vertices for model in models if len(model.vertices)), np.zeros((1, 3))])
-    if len(points) > 1:
-        points = points[:-1]
-    low, high = points.min(0), points.max(0)
+    clouds = [model.vertices for model in models if len(model.vertices)] or [np.zeros((1, 3))]
+    low, high = np.min([cloud.min(0) for cloud in clouds], 0), np.max([cloud.max(0) for cloud in clouds], 0)
     centre, span = (low + high) / 2, max(float(np.linalg.norm(high - low)) / 2, 1.0)
     back = np.array(direction) / np.linalg.norm(direction)
     right = np.cross(-back, [1.0, 0, 0])
     right /= np.linalg.norm(right)
     up = np.cross(right, -back)
     eye = centre + DISTANCE * span * back
-    offset = points - eye
-    depth = offset @ -back
-    slopes = np.stack([offset @ right / depth, offset @ up / depth], 1)
-    first, last = slopes.min(0), slopes.max(0)
+    first, last, farthest = np.full(2, np.inf), np.full(2, -np.inf), 0.0
+    for cloud in clouds:
+        for start in range(0, len(cloud), _AT_ONCE):
+            points = cloud[start : start + _AT_ONCE]
+            offset = points - eye
+            slopes = offset @ np.stack([right, up], 1) / (offset @ -back)[:, None]
+            first, last = np.minimum(first, slopes.min(0)), np.maximum(last, slopes.max(0))
+            farthest = max(farthest, float(np.linalg.norm(points, axis=1).max()))
     extent = np.maximum(last - first, 1e-6)
     focal = (1 - 2 * MARGIN) * min(1 / extent[0], 1 / (aspect * extent[1]))
-    radius = float(np.linalg.norm(points, axis=1).max()) * 1.02 + 0.5
+    radius = farthest * 1.02 + 0.5
     return Camera(eye, right, up, -back, float(focal), (first + last) / 2, float(low[0]), radius)
 
 

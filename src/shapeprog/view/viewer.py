@@ -17,7 +17,7 @@ from shapeprog.export.parts import crease_normals, parts
 from shapeprog.files import write_text
 from shapeprog.language.program import Program
 from shapeprog.view.listing import listing, parted
-from shapeprog.view.model import of_shape
+from shapeprog.view.model import FINE, of_cells, of_shape
 from shapeprog.view.page import readable, scores_text
 from shapeprog.view.template import HTML
 
@@ -38,7 +38,9 @@ def viewer(
         If the file cannot be written.
     """
     drawn = parts(program)
-    model = None if shape is None else of_shape(shape)
+    # A page of hundreds of megabytes opens nowhere: of such a mesh the cells are shown.
+    large = shape is not None and shape.faces is not None and len(shape.faces) > FINE
+    model = None if shape is None else of_cells(shape.voxels) if large else of_shape(shape)
     places = [part.vertices for part in drawn] + ([] if model is None else [model.vertices])
     points = np.concatenate([*places, np.zeros((0, 3))])
     points = points if len(points) else np.zeros((1, 3))

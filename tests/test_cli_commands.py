@@ -291,6 +291,16 @@ def test_evaluate_tells_what_has_no_partner(run: Run, tmp_path: Path, program: P
     assert (ended.code, "matched by name" in ended.err) == (2, True)
 
 
+def test_evaluate_tells_which_targets_were_left_out(run: Run, tmp_path: Path, program: Path):
+    (tmp_path / "targets").mkdir()
+    for name in ("table", "chair"):
+        table(tmp_path / "targets" / f"{name}.obj")
+    ended = run("evaluate", "table.json", "targets")
+    assert ended.code == 0
+    assert "1 of 2 targets have no prediction and count nowhere: chair" in ended.err
+    assert json.loads(run("evaluate", "table.json", "targets", "--json").out)["missing"] == ["chair"]
+
+
 @pytest.mark.parametrize(
     ("words", "told"),
     [

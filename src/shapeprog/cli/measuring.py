@@ -23,6 +23,7 @@ _LABELS = {
     "iou": "IoU@32", "cd": "CD", "noise_floor": "CD noise floor", "f1": "F1@1cell",
     "blocks": "blocks", "statements": "statements", "primitives": "primitives",
 }  # fmt: skip
+_FEW = 5
 _SIZES = ("blocks", "statements", "primitives")
 
 
@@ -113,6 +114,8 @@ def evaluate_command(
             failures.append(ShapeProgError(f"prediction {name} has no target of that name", "rename one of them"))
         else:
             rows.append(scoring.measure(prediction, target, points, seed))
+    used = {row.name for row in rows}
+    missing_names = [name for name in shapes if name not in used]
     if not rows:
         for error in failures:
             terminal.complain(error)
@@ -122,13 +125,19 @@ def evaluate_command(
         summary = {name: value for name, value in summary.items() if name not in _SIZES}
     if as_json:
         totals = {name: terminal.plain(asdict(value)) for name, value in summary.items()}
-        terminal.print_json({"seed": seed, "rows": [terminal.plain(asdict(row)) for row in rows], "summary": totals})
+        shown = [terminal.plain(asdict(row)) for row in rows]
+        terminal.print_json({"seed": seed, "rows": shown, "summary": totals, "missing": missing_names})
     elif as_csv:
         writer = csv.DictWriter(sys.stdout, asdict(rows[0]).keys(), lineterminator="\n")
         writer.writeheader()
         writer.writerows(asdict(row) for row in rows)
     else:
         _table(rows, summary, each, seed)
+    if missing_names:
+        told = ", ".join(missing_names[:_FEW]) + (", ..." if len(missing_names) > _FEW else "")
+        terminal.errors().print(
+            f"{len(missing_names)} of {len(shapes)} targets have no prediction and count nowhere: {told}", markup=False
+        )
     for error in failures:
         terminal.complain(error)
     if failures:

@@ -1,6 +1,8 @@
 """Speed of the renderer and its losses, each beside the baseline it is measured against in the same run.
 
-    python benchmarks/bench_geometry.py [--quick] [--threads 2]
+    OMP_WAIT_POLICY=PASSIVE python benchmarks/bench_geometry.py [--quick] [--threads 2]
+
+Without that setting torch's idle workers spin on the cores that the kernels want, and figures move by a factor of ten.
 
 Prints one JSON object a line: name, value, unit, which direction is better, what the baseline is, its value, and the
 ratio.  Values are the best of several repetitions in wall time; ``cpu`` is the processor time of one, which other

@@ -5,6 +5,7 @@ Nothing heavy is imported here or by the modules of this room: commands import w
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Sequence
 from typing import Annotated
@@ -12,6 +13,9 @@ from typing import Annotated
 import typer
 
 from shapeprog.cli import inferring, measuring, terminal, writing
+
+# Before torch is loaded: its idle workers would spin on the cores that the kernels of other threads want.
+os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
 
 app = typer.Typer(
     name="shapeprog",

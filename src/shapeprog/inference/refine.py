@@ -7,6 +7,7 @@ grid are asked to keep touching, which no point can tell: contact faces are hidd
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -36,6 +37,9 @@ THINNEST = 0.05
 
 DECIMALS = 2
 """Decimals of a cell that refined parameters keep: a hundredth is .04 % of the longest side."""
+
+BETAS = (0.8, 0.95)
+"""Memory of Adam for slopes and for their squares."""
 
 REACH = 1.49
 """Farthest that refinement moves a parameter from a whole number, in cells: rounding and one step lead back."""
@@ -122,8 +126,7 @@ def refine(
         low, high = torch.maximum(low, values - reach), values + reach
     moved = values.clone().requires_grad_()
     render = Plan(start)
-    optimiser = torch.optim.Adam([moved], lr=plan.rate, betas=(0.8, 0.95))
-    decay = torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, plan.steps, plan.rate / 10)
+    mean, square = torch.zeros_like(values), torch.zeros_like(values)
     generator = torch.Generator().manual_seed(seed)
     touching = _contacts(render.scene(values))
     shell = None if voxels is None else _shell(voxels)
@@ -141,13 +144,16 @@ def refine(
             if shell is not None:
                 cells = torch.randint(len(shell), (plan.cells,), generator=generator)
                 loss = loss + OCCUPANCY * _occupancy_loss(scene, shell[cells])
-            optimiser.zero_grad()
+            moved.grad = None
             loss.backward()
             assert moved.grad is not None
-            moved.grad.nan_to_num_(0).mul_(free)
-            optimiser.step()
-            decay.step()
+            slope = moved.grad.nan_to_num_(0).mul_(free)
+            # Adam (Kingma & Ba 2015), cosine decay, by hand: the first use of torch.optim imports its compiler for 1.5 s.
+            mean.lerp_(slope, 1 - BETAS[0])
+            square.lerp_(slope**2, 1 - BETAS[1])
+            rate = plan.rate * (0.55 + 0.45 * math.cos(math.pi * step / plan.steps)) / (1 - BETAS[0] ** (step + 1))
             with torch.no_grad():
+                moved.sub_(rate * mean / ((square / (1 - BETAS[1] ** (step + 1))).sqrt() + 1e-8))
                 moved.copy_(torch.where(free, torch.minimum(torch.maximum(moved, low), high), values))
             if progress:
                 progress("refining", (step + 1) / plan.steps)

@@ -148,7 +148,7 @@ def refine(
             loss.backward()
             assert moved.grad is not None
             slope = moved.grad.nan_to_num_(0).mul_(free)
-            # Adam (Kingma & Ba 2015), cosine decay, by hand: the first use of torch.optim imports its compiler for 1.5 s.
+            # Adam (Kingma & Ba 2015) by hand: the first use of torch.optim imports its compiler, for 1.5 s.
             mean.lerp_(slope, 1 - BETAS[0])
             square.lerp_(slope**2, 1 - BETAS[1])
             rate = plan.rate * (0.55 + 0.45 * math.cos(math.pi * step / plan.steps)) / (1 - BETAS[0] ** (step + 1))

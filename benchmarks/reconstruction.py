@@ -44,7 +44,6 @@ def measure(task: Task) -> list[dict[str, Any]]:
     pack, index, blocks, methods, seed, budget = task
     shape = read_pack(Path(pack))[index]
     cloud = None if shape.points is None else torch.from_numpy(np.asarray(shape.points, np.float32))
-    guessed = torch.from_numpy(points_of_cells(shape.voxels, seed=seed))
     rows = []
 
     def keep(method: str, program: Any, snapped: Any, seconds: float) -> None:
@@ -63,6 +62,7 @@ def measure(task: Task) -> list[dict[str, Any]]:
         result = infer(shape, blocks=blocks, seed=seed, budget=budget)
         keep(SEARCH, result.program, result.snapped, result.scores["seconds"])
         if ALONE in methods and cloud is not None:  # the structure is searched on cells, so it is the same
+            guessed = torch.from_numpy(points_of_cells(shape.voxels, seed=seed))
             alone = refine(result.snapped, guessed, voxels=shape.voxels, reach=REACH, seed=seed)
             keep(ALONE, alone, result.snapped, result.scores["seconds"])
     return rows

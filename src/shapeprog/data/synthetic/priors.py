@@ -1,0 +1,48 @@
+"""The priors by name."""
+
+from __future__ import annotations
+
+import difflib
+
+from shapeprog.data.synthetic import cases, lounging, seating, tables
+from shapeprog.data.synthetic.mixture import Prior
+from shapeprog.errors import InputError
+
+WIDE = Prior(
+    "wide",
+    blocks=10,
+    templates=(
+        (seating.bench, 0.24),
+        (seating.chair, 0.12),
+        (seating.stool, 0.03),
+        (tables.table, 0.1),
+        (tables.desk, 0.05),
+        (cases.cabinet, 0.24),
+        (cases.television_stand, 0.04),
+        (cases.night_stand, 0.03),
+        (cases.bookshelf, 0.06),
+        (lounging.sofa, 0.05),
+        (lounging.bed, 0.04),
+    ),
+    off_centre=0.05,
+    own=True,
+)
+"""Furniture of many kinds, wider than the published data; statements that users declare take part."""
+
+PRIORS: dict[str, Prior] = {each.name: each for each in (WIDE,)}
+"""All priors by name."""
+
+
+def prior(name: str) -> Prior:
+    """The prior of a name.
+
+    Raises
+    ------
+    InputError
+        If there is none, with the nearest name.
+    """
+    if name not in PRIORS:
+        near = difflib.get_close_matches(name, PRIORS, 1, 0.4)
+        hint = f"did you mean {near[0]!r}? " if near else ""
+        raise InputError(f"there is no prior {name!r}", f"{hint}known are {', '.join(PRIORS)}")
+    return PRIORS[name]

@@ -1,0 +1,1 @@
+"""Networks: the program generators, the neural executor, decoding and checkpoints."""

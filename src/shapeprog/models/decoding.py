@@ -1,0 +1,216 @@
+"""Decoding: programs from targets, by the likeliest ids, by sampling, or by beam search; batched, legal blocks only.
+
+Each block is drawn with whole numbers before the next one is written, so the generator sees what it has done.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import torch
+from jaxtyping import Float, Int, UInt8
+from torch import Tensor
+
+from shapeprog.language.canvas import count, draw_blocks, packed, unpacked
+from shapeprog.language.statement import EMPTY, SLOTS
+from shapeprog.language.tensors import Code
+from shapeprog.models.generator import Generator, Memory
+
+Choice = Literal["argmax", "sample"]
+
+
+@dataclass(frozen=True)
+class Decoded:
+    """Programs that a generator wrote.
+
+    Parameters
+    ----------
+    code
+        The programs (B, K, J), or (B, W, K, J) of a beam, best first.
+    canvases
+        What each block found drawn, packed.
+    log_probability
+        Of the ids of each program.
+    """
+
+    code: Code
+    canvases: Int[Tensor, "*batch K 32 32"]
+    log_probability: Float[Tensor, "*batch"]
+
+
+@torch.no_grad()
+def decode(
+    generator: Generator,
+    target: UInt8[Tensor, "B 32 32 32"],
+    *,
+    blocks: int = 10,
+    choose: Choice = "argmax",
+    temperature: float = 1.0,
+    random: torch.Generator | None = None,
+) -> Decoded:
+    """One program for each target; stops as soon as every program has ended.
+
+    Parameters
+    ----------
+    target
+        Cells, 1 or 0.
+    blocks
+        Most blocks K; the tensors have exactly so many.
+    choose
+        ``argmax`` takes the likeliest id and its number, ``sample`` draws both.
+    temperature
+        Of the ids when sampling: below one keeps closer to the likeliest.
+    random
+        Source of randomness when sampling.
+    """
+    steps, device = generator.vocabulary.steps, target.device
+    ids = torch.zeros(len(target), blocks, steps, dtype=torch.long, device=device)
+    parameters = torch.zeros(len(target), blocks, steps, SLOTS, device=device)
+    canvases = torch.zeros(len(target), blocks, *target.shape[1:3], dtype=torch.int32, device=device)
+    chance = torch.zeros(len(target), device=device)
+    active = torch.arange(len(target), device=device)
+    seen, memory = target.float(), None
+    canvas = canvases[:, 0].clone()
+    for k in range(blocks):
+        feature, memory = generator.perceive(seen[active], unpacked(canvas[active]).float(), memory)
+        said, values, chances = _block(generator, feature, choose, temperature, random)
+        ids[active, k], parameters[active, k] = said, values
+        chance[active] += chances
+        going = said[:, 0] != EMPTY
+        active, memory = active[going], _at(memory, going)
+        if not len(active):
+            break
+        drawn = draw_blocks(Code(said[going][:, None], values[going][:, None]))[:, 0]
+        canvas[active] = canvas[active] | drawn
+        canvases[:, k + 1 :] = canvas[:, None]
+    return Decoded(Code(ids, parameters), canvases, chance)
+
+
+def _block(
+    generator: Generator,
+    feature: Float[Tensor, "B F"],
+    choose: Choice,
+    temperature: float,
+    random: torch.Generator | None,
+) -> tuple[Int[Tensor, "B J"], Float[Tensor, "B J 7"], Float[Tensor, " B"]]:
+    """Ids, parameters and log-probability of one block."""
+    ids: list[Tensor] = []
+    values: list[Tensor] = []
+    chance, state = feature.new_zeros(len(feature)), None
+    for j in range(generator.vocabulary.steps):
+        logits, heads, state = generator.step(feature, ids[-1] if ids else None, j, state)
+        if choose == "argmax":
+            said = logits.argmax(-1)
+            values.append(generator.values(heads, said))
+        else:
+            said = torch.multinomial((logits / temperature).softmax(-1), 1, generator=random)[:, 0]
+            assert random is not None, "sampling needs a source of randomness"
+            values.append(generator.sampled(heads, said, random))
+        chance = chance + logits.gather(-1, said[:, None])[:, 0]
+        ids.append(said)
+    return torch.stack(ids, 1), torch.stack(values, 1).float(), chance
+
+
+@torch.no_grad()
+def beam(
+    generator: Generator,
+    target: UInt8[Tensor, "B 32 32 32"],
+    *,
+    width: int,
+    blocks: int = 10,
+    rank: Literal["iou", "log_probability"] = "iou",
+) -> Decoded:
+    """The ``width`` programs that beam search finds for each target, best first.
+
+    Of all continuations of the programs so far by one block, those with the likeliest ids are kept; numbers are the
+    likeliest for their ids.  A program that has ended stays in the beam as it is.
+
+    Parameters
+    ----------
+    target
+        Cells, 1 or 0.
+    width
+        Programs W kept for each target.
+    rank
+        What orders the programs at the end: intersection over union with the target, or their log-probability.
+    """
+    shapes, steps, device = len(target), generator.vocabulary.steps, target.device
+    ids = torch.zeros(shapes, width, blocks, steps, dtype=torch.long, device=device)
+    parameters = torch.zeros(shapes, width, blocks, steps, SLOTS, device=device)
+    canvases = torch.zeros(shapes, width, blocks + 1, *target.shape[1:3], dtype=torch.int32, device=device)
+    chance = torch.full((shapes, width), -torch.inf, device=device)
+    chance[:, 0] = 0.0  # all start from one empty program
+    going = chance.isfinite()
+    seen = target.float()
+    memory: Memory = None
+    for k in range(blocks):
+        shape, lane = going.nonzero(as_tuple=True)
+        feature, memory = generator.perceive(seen[shape], unpacked(canvases[shape, lane, k]).float(), memory)
+        said, values, chances = _blocks(generator, feature, width)
+        # Every program offers W continuations; one that has ended offers itself.
+        offers = torch.full((shapes, width, width), -torch.inf, device=device)
+        offers[..., 0] = torch.where(going, -torch.inf, chance)
+        offers[shape, lane] = chance[shape, lane][:, None] + chances
+        chance, choice = offers.flatten(1).topk(width)
+        parent, offer = choice.div(width, rounding_mode="floor"), choice % width
+        row = torch.full((shapes, width), -1, device=device)
+        row[shape, lane] = torch.arange(len(shape), device=device)
+        row = row.gather(1, parent)
+        each = torch.arange(shapes, device=device)[:, None]
+        ids, parameters, canvases = ids[each, parent], parameters[each, parent], canvases[each, parent]
+        grown = (row >= 0) & chance.isfinite()
+        ids[:, :, k][grown], parameters[:, :, k][grown] = (
+            said[row[grown], offer[grown]],
+            values[row[grown], offer[grown]],
+        )
+        drawn = draw_blocks(Code(ids[:, :, k : k + 1], parameters[:, :, k : k + 1]))[:, :, 0]
+        canvases[:, :, k + 1] = canvases[:, :, k] | drawn
+        going = grown & (ids[:, :, k, 0] != EMPTY)
+        memory = _at(memory, row[going])
+        if not bool(going.any()):
+            canvases[:, :, k + 1 :] = canvases[:, :, k + 1 : k + 2]
+            break
+    score = chance if rank == "log_probability" else _iou(canvases[:, :, -1], target)
+    order = score.masked_fill(~chance.isfinite(), -torch.inf).argsort(dim=-1, descending=True, stable=True)
+    each = torch.arange(shapes, device=device)[:, None]
+    return Decoded(Code(ids[each, order], parameters[each, order]), canvases[each, order, :-1], chance[each, order])
+
+
+def _blocks(
+    generator: Generator, feature: Float[Tensor, "N F"], width: int
+) -> tuple[Int[Tensor, "N W J"], Float[Tensor, "N W J 7"], Float[Tensor, "N W"]]:
+    """The ``width`` likeliest blocks for each feature, by a beam over their steps."""
+    many = len(feature)
+    chance = feature.new_zeros(many, 1)
+    ids = torch.zeros(many, 1, 0, dtype=torch.long, device=feature.device)
+    values = feature.new_zeros(many, 1, 0, SLOTS)
+    state = None
+    for j in range(generator.vocabulary.steps):
+        lanes = ids.shape[1]
+        previous = ids[:, :, -1].flatten() if j else None
+        wide = feature.repeat_interleave(lanes, 0)
+        logits, heads, state = generator.step(wide, previous, j, state)
+        possible = chance.isfinite()[..., None]
+        total = torch.where(possible, chance[..., None] + logits.unflatten(0, (many, lanes)), -torch.inf)
+        chance, choice = total.flatten(1).topk(min(width, total[0].numel()))
+        parent, said = choice.div(logits.shape[-1], rounding_mode="floor"), choice % logits.shape[-1]
+        row = (torch.arange(many, device=feature.device)[:, None] * lanes + parent).flatten()
+        numbers = generator.values(heads[row], said.flatten()).float().unflatten(0, said.shape)
+        each = torch.arange(many, device=feature.device)[:, None]
+        ids = torch.cat([ids[each, parent], said[..., None]], -1)
+        values = torch.cat([values[each, parent], numbers[:, :, None]], 2)
+        state = _at(state, row)
+    return ids, values, chance
+
+
+def _at(state: Memory, index: Tensor) -> Memory:
+    """The state of some of the programs: a tensor or a tuple of tensors with the batch first."""
+    if state is None:
+        return None
+    return tuple(each[index] for each in state) if isinstance(state, tuple) else state[index]
+
+
+def _iou(canvas: Int[Tensor, "B W 32 32"], target: UInt8[Tensor, "B 32 32 32"]) -> Float[Tensor, "B W"]:
+    cells = packed(target)[:, None]
+    return count(canvas & cells) / count(canvas | cells).clamp(min=1)

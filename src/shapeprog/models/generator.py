@@ -1,0 +1,251 @@
+"""What every program generator has in common: features of blocks in, ids and parameters of their steps out.
+
+A generator looks at the target and at what has been drawn so far, and writes one block of up to J steps.  Designs
+differ in how they look (``perceive``) and in how they say numbers (``values`` and ``parameter_loss``); they register
+under a name with ``design``.
+"""
+
+from __future__ import annotations
+
+import difflib
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+from typing import Any, ClassVar, NamedTuple, TypeVar
+
+import torch
+from jaxtyping import Bool, Float, Int, UInt8
+from torch import Tensor, nn
+
+from shapeprog.errors import ShapeProgError
+from shapeprog.language.canvas import unpacked
+from shapeprog.language.tensors import Code
+from shapeprog.models.vocabulary import Vocabulary
+
+Memory = Any
+"""What a design carries from block to block; ``None`` at the first."""
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """What a generator says when it is told the ids, for the blocks that are live.
+
+    Parameters
+    ----------
+    live
+        Which blocks (B, K) were computed; the rows of everything else are theirs in order.
+    logits
+        Log-probabilities of the ids; illegal ones are minus infinity where the design masks them.
+    values
+        Parameters of the ids that were told, with gradient.
+    heads
+        What the design needs to measure its parameters.
+    """
+
+    live: Bool[Tensor, "B K"]
+    logits: Float[Tensor, "M J V"]
+    values: Float[Tensor, "M J 7"]
+    heads: Tensor
+
+    @property
+    def parameters(self) -> Float[Tensor, "B K J 7"]:
+        """The values at their places; zero in blocks that are not live."""
+        full = self.values.new_zeros(*self.live.shape, *self.values.shape[1:])
+        return full.masked_scatter(self.live[..., None, None], self.values)
+
+    def log_probability(self, ids: Int[Tensor, "B K J"]) -> Float[Tensor, "B K"]:
+        """Log-probability of the ids of each block, zero where it is not live."""
+        told = ids[self.live][..., None]
+        each = self.logits.gather(-1, told)[..., 0].sum(-1)
+        return each.new_zeros(self.live.shape).masked_scatter(self.live, each)
+
+
+class Step(NamedTuple):
+    """Output of one step: log-probabilities of ids, what the parameters are read from, and the state after it."""
+
+    logits: Float[Tensor, "M V"]
+    heads: Tensor
+    state: Any
+
+
+class Generator(nn.Module, ABC):
+    """A network that writes programs block by block.
+
+    Parameters
+    ----------
+    settings
+        An instance of the design's own ``Settings``, a frozen dataclass of JSON values.
+    vocabulary
+        The statements it may use.
+    """
+
+    design: ClassVar[str]
+    Settings: ClassVar[Any]
+
+    def __init__(self, settings: Any, vocabulary: Vocabulary) -> None:
+        super().__init__()
+        self.settings = settings
+        self.vocabulary = vocabulary
+
+    @abstractmethod
+    def perceive(
+        self, target: Float[Tensor, "B 32 32 32"], canvas: Float[Tensor, "B 32 32 32"], memory: Memory
+    ) -> tuple[Float[Tensor, "B F"], Memory]:
+        """The feature of the next block, and the memory after it."""
+
+    @abstractmethod
+    def perceive_all(
+        self, target: UInt8[Tensor, "B 32 32 32"], canvases: Int[Tensor, "B K 32 32"], live: Bool[Tensor, "B K"]
+    ) -> Float[Tensor, "M F"]:
+        """Features of all live blocks at once, for canvases that are known."""
+
+    @abstractmethod
+    def step(self, feature: Float[Tensor, "M F"], previous: Int[Tensor, " M"] | None, step: int, state: Any) -> Step:
+        """One step of each block, after the id ``previous``; ``None`` at the first."""
+
+    @abstractmethod
+    def values(self, heads: Tensor, ids: Int[Tensor, "*batch"]) -> Float[Tensor, "*batch 7"]:
+        """The parameters that the heads give the ids, with gradient."""
+
+    @abstractmethod
+    def parameter_loss(
+        self, heads: Tensor, ids: Int[Tensor, "*batch"], values: Float[Tensor, "*batch 7"]
+    ) -> Float[Tensor, "*batch 7"]:
+        """How far the heads are from the true values of each slot."""
+
+    def sampled(self, heads: Tensor, ids: Int[Tensor, "*batch"], random: torch.Generator) -> Float[Tensor, "*batch 7"]:
+        """Parameters drawn at random, for designs whose heads are a distribution; else those of ``values``."""
+        return self.values(heads, ids)
+
+    def predict(
+        self,
+        target: UInt8[Tensor, "B 32 32 32"],
+        canvases: Int[Tensor, "B K 32 32"],
+        ids: Int[Tensor, "B K J"],
+        live: Bool[Tensor, "B K"] | None = None,
+    ) -> Prediction:
+        """What it says of each block when it is told the canvas and the ids (teacher forcing), with gradient.
+
+        Parameters
+        ----------
+        target
+            Cells, 1 or 0.
+        canvases
+            What each block finds drawn, packed.
+        ids
+            The ids of each step; they pick the parameters and are what later steps are told.
+        live
+            The blocks to compute; by default those that draw, and the empty one after the last, which says stop.
+        """
+        if live is None:
+            live = live_blocks(ids)
+        told = ids[live]
+        feature = self.perceive_all(target, canvases, live)
+        outputs: list[Step] = []
+        for j in range(told.shape[1]):
+            state = outputs[-1].state if outputs else None
+            outputs.append(self.step(feature, told[:, j - 1] if j else None, j, state))
+        heads = torch.stack([each.heads for each in outputs], 1)
+        logits = torch.stack([each.logits for each in outputs], 1)
+        return Prediction(live, logits, self.values(heads, told), heads)
+
+    def losses(
+        self, prediction: Prediction, code: Code, weights: Float[Tensor, "B K"] | None = None
+    ) -> dict[str, Float[Tensor, ""]]:
+        """Cross-entropy of the ids, and loss of the parameters in use, as means over live steps.
+
+        Parameters
+        ----------
+        prediction
+            Of the ids of ``code``.
+        code
+            The right programs.
+        weights
+            How much each block counts; evenly by default.
+        """
+        ids, values = code.ids[prediction.live], code.parameters[prediction.live]
+        share = (torch.ones_like(prediction.live) if weights is None else weights)[prediction.live].float()[:, None]
+        total = (share.sum() * ids.shape[1]).clamp(min=1)
+        surprise = -prediction.logits.gather(-1, ids[..., None])[..., 0]
+        off = self.parameter_loss(prediction.heads, ids, values)
+        used = self.vocabulary.used.to(ids.device)[ids]
+        each = (off * used).sum(-1)
+        return {"ids": (surprise * share).sum() / total, "parameters": (each * share).sum() / total}
+
+    def masked(
+        self, logits: Float[Tensor, "M V"], step: int, previous: Int[Tensor, " M"] | None
+    ) -> Float[Tensor, "M V"]:
+        """Log-probabilities over the legal ids alone."""
+        allowed = self.vocabulary.allowed(step, previous).to(logits.device)
+        return logits.float().masked_fill(~allowed, -torch.inf).log_softmax(-1)
+
+
+def live_blocks(ids: Int[Tensor, "B K J"]) -> Bool[Tensor, "B K"]:
+    """The blocks up to and including the first empty one, which says that the program ends."""
+    empty = (ids == 0).all(-1)
+    before = empty.long().cumsum(-1) - empty.long()
+    return before == 0
+
+
+def stacked(
+    target: UInt8[Tensor, "B 32 32 32"],
+    canvases: Int[Tensor, "B K 32 32"],
+    live: Bool[Tensor, "B K"],
+    dtype: torch.dtype,
+) -> Float[Tensor, "M 2 32 32 32"]:
+    """Target and canvas of every live block as two channels."""
+    shape = live.nonzero()[:, 0]
+    return torch.stack([target.to(dtype)[shape], unpacked(canvases[live]).to(dtype)], 1)
+
+
+Design = TypeVar("Design", bound=type[Generator])
+_designs: dict[str, type[Generator]] = {}
+
+
+def design(name: str) -> Callable[[Design], Design]:
+    """Register a design under a name."""
+
+    def register(kind: Design) -> Design:
+        kind.design = name
+        _designs[name] = kind
+        return kind
+
+    return register
+
+
+def designs() -> dict[str, type[Generator]]:
+    """All designs by name."""
+    from shapeprog.models import swift, tian2019  # noqa: F401  (they register themselves)
+
+    return dict(_designs)
+
+
+def build_generator(
+    name: str, settings: dict[str, Any] | None = None, vocabulary: Vocabulary | None = None
+) -> Generator:
+    """A generator of a design, freshly initialised.
+
+    Parameters
+    ----------
+    name
+        Name of the design.
+    settings
+        Its settings; the defaults of the design where left out.
+    vocabulary
+        By default all statements in force.
+
+    Raises
+    ------
+    ShapeProgError
+        If there is no such design, or no such setting.
+    """
+    known = designs()
+    if name not in known:
+        near = difflib.get_close_matches(name, known, 1)
+        raise ShapeProgError(f"there is no design {name!r}", f"choose {near[0] if near else ', '.join(sorted(known))}")
+    kind = known[name]
+    allowed = {field.name for field in fields(kind.Settings)}
+    for key in settings or {}:
+        if key not in allowed:
+            raise ShapeProgError(f"the design {name} has no setting {key!r}", f"it has {', '.join(sorted(allowed))}")
+    return kind(kind.Settings(**(settings or {})), vocabulary or Vocabulary.current())

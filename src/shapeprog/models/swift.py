@@ -1,0 +1,158 @@
+"""``swift``: a generator made for few cores, without memory from block to block.
+
+Against the published network: the encoder halves the grid at once (a third of the arithmetic), keeps where things are
+by reading all cells of its last layer instead of their mean, and numbers are said as a distribution over whole values
+instead of one regressed value, so that they can be sampled, two answers are not averaged, and each is told the id it
+belongs to.  What has been drawn is on the canvas, so blocks need no memory: any canvas can be continued, and training
+may mix canvases freely.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import torch
+from jaxtyping import Bool, Float, Int, UInt8
+from torch import Tensor, nn
+
+from shapeprog.language.statement import SLOTS
+from shapeprog.models.generator import Generator, Memory, Step, design, stacked
+from shapeprog.models.vocabulary import Vocabulary
+
+WINDOW = 2
+"""Values on either side of the likeliest over which the mean is taken."""
+
+
+@dataclass(frozen=True)
+class SwiftSettings:
+    """Sizes of the network.
+
+    Parameters
+    ----------
+    widths
+        Channels at 16^3, 8^3 and 4^3 cells.
+    squeeze
+        Channels of the last 4^3 cells that are read one by one.
+    feature
+        Width of the feature of a block, of the step LSTM and of its heads.
+    low, high
+        Range of the whole values that numbers are drawn from.
+    """
+
+    widths: tuple[int, int, int] = (24, 48, 96)
+    squeeze: int = 48
+    feature: int = 256
+    low: int = -24
+    high: int = 40
+
+
+@design("swift")
+class Swift(Generator):
+    """The network; see the module."""
+
+    Settings = SwiftSettings
+    ticks: Tensor
+    fits: Tensor
+    whole: Tensor
+    used: Tensor
+
+    def __init__(self, settings: SwiftSettings, vocabulary: Vocabulary) -> None:
+        super().__init__(settings, vocabulary)
+        fine, middle, coarse = settings.widths
+        width, bins = settings.feature, settings.high - settings.low + 1
+        self.encoder = nn.Sequential(
+            _layer(2, fine, 4, 2),
+            _layer(fine, middle, 3, 2),
+            _layer(middle, middle, 3, 1),
+            _layer(middle, coarse, 3, 2),
+            _layer(coarse, coarse, 3, 1),
+            _layer(coarse, settings.squeeze, 1, 1),
+        )
+        self.summary = nn.Sequential(
+            nn.Linear(settings.squeeze * 64, width), nn.ReLU(), nn.Linear(width, width), nn.ReLU()
+        )
+        self.embedding = nn.Embedding(vocabulary.size, width)
+        self.core = nn.LSTMCell(width, width)
+        self.name = nn.Sequential(nn.Linear(2 * width, width), nn.ReLU(), nn.Linear(width, vocabulary.size))
+        self.numbers = nn.Linear(2 * width, width)
+        self.told = nn.Embedding(vocabulary.size, width)
+        self.bins = nn.Sequential(nn.ReLU(), nn.Linear(width, width), nn.ReLU(), nn.Linear(width, SLOTS * bins))
+        self.register_buffer("ticks", torch.arange(settings.low, settings.high + 1.0), persistent=False)
+        low, high = vocabulary.ranges[..., :1], vocabulary.ranges[..., 1:]
+        fits = (self.ticks >= low) & (self.ticks <= high)
+        self.register_buffer("fits", fits | ~fits.any(-1, keepdim=True), persistent=False)
+        self.register_buffer("whole", vocabulary.discrete, persistent=False)
+        self.register_buffer("used", vocabulary.used, persistent=False)
+
+    def perceive(
+        self, target: Float[Tensor, "B 32 32 32"], canvas: Float[Tensor, "B 32 32 32"], memory: Memory
+    ) -> tuple[Float[Tensor, "B F"], Memory]:
+        """The feature of the next block; there is no memory."""
+        return self._encode(torch.stack([target, canvas], 1)), None
+
+    def perceive_all(
+        self, target: UInt8[Tensor, "B 32 32 32"], canvases: Int[Tensor, "B K 32 32"], live: Bool[Tensor, "B K"]
+    ) -> Float[Tensor, "M F"]:
+        """Features of all live blocks at once."""
+        return self._encode(stacked(target, canvases, live, self.ticks.dtype))
+
+    def _encode(self, cells: Float[Tensor, "M 2 32 32 32"]) -> Float[Tensor, "M F"]:
+        seen = self.encoder(cells.to(memory_format=torch.channels_last_3d))
+        feature: Tensor = self.summary(seen.flatten(1))
+        return feature.float()
+
+    def step(self, feature: Float[Tensor, "M F"], previous: Int[Tensor, " M"] | None, step: int, state: Any) -> Step:
+        """One step; the heads hold its output beside the feature of the block."""
+        heard = feature if previous is None else self.embedding(previous)
+        state = self.core(heard, state)
+        heads = torch.cat([state[0], feature], -1)
+        return Step(self.masked(self.name(heads), step, previous), heads, state)
+
+    def values(self, heads: Tensor, ids: Int[Tensor, "*batch"]) -> Float[Tensor, "*batch 7"]:
+        """The mean of the likeliest value and its neighbours; counts and turns are the likeliest itself."""
+        scores = self._scores(heads, ids)
+        best = scores.argmax(-1, keepdim=True)
+        place = torch.arange(scores.shape[-1], device=scores.device)
+        near = (place - best).abs() <= WINDOW
+        mean = (scores.masked_fill(~near, -torch.inf).softmax(-1) * self.ticks).sum(-1)
+        said = torch.where(self.whole[ids], self.ticks[best[..., 0]], mean)
+        return said * self.used[ids]
+
+    def sampled(self, heads: Tensor, ids: Int[Tensor, "*batch"], random: torch.Generator) -> Float[Tensor, "*batch 7"]:
+        """Whole values drawn by their chances."""
+        chances = self._scores(heads, ids).softmax(-1)
+        drawn = torch.multinomial(chances.flatten(0, -2), 1, generator=random).reshape(chances.shape[:-1])
+        return self.ticks[drawn] * self.used[ids]
+
+    def parameter_loss(
+        self, heads: Tensor, ids: Int[Tensor, "*batch"], values: Float[Tensor, "*batch 7"]
+    ) -> Float[Tensor, "*batch 7"]:
+        """Cross-entropy; a value between two whole ones counts for each by its nearness."""
+        surprise = -self._scores(heads, ids).log_softmax(-1)
+        low, high = self._range(ids)
+        inside = torch.minimum(torch.maximum(values, low), high) - self.settings.low
+        below = inside.floor().clamp(max=surprise.shape[-1] - 2)
+        part = inside - below
+        pair = torch.stack([below, below + 1], -1).long()
+        weights = torch.stack([1 - part, part], -1)
+        return torch.where(weights > 0, surprise.gather(-1, pair) * weights, 0).sum(-1)
+
+    def _range(self, ids: Int[Tensor, "*batch"]) -> tuple[Float[Tensor, "*batch 7"], Float[Tensor, "*batch 7"]]:
+        """Lowest and highest value that each slot of an id may take here."""
+        fits = self.fits[ids].long()
+        first = fits.argmax(-1)
+        last = fits.shape[-1] - 1 - fits.flip(-1).argmax(-1)
+        return self.ticks[first], self.ticks[last]
+
+    def _scores(self, heads: Tensor, ids: Int[Tensor, "*batch"]) -> Float[Tensor, "*batch 7 bins"]:
+        mixed = self.bins(self.numbers(heads) + self.told(ids))
+        scores = mixed.unflatten(-1, (SLOTS, len(self.ticks))).float()
+        return scores.masked_fill(~self.fits[ids], -torch.inf)
+
+
+def _layer(inside: int, outside: int, kernel: int, stride: int) -> nn.Sequential:
+    """Convolution, batch norm with running statistics, ReLU; halves the grid where the stride is two."""
+    pad = 1 if kernel > 1 else 0
+    convolution = nn.Conv3d(inside, outside, kernel, stride, pad, bias=False)
+    return nn.Sequential(convolution, nn.BatchNorm3d(outside, momentum=0.02), nn.ReLU(inplace=True))

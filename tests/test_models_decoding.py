@@ -1,0 +1,219 @@
+"""Generators and decoding: legality, teacher forcing agrees with decoding, beams, lessons."""
+
+from __future__ import annotations
+
+import pytest
+import torch
+from torch import Tensor
+
+from shapeprog.errors import ShapeProgError
+from shapeprog.language.canvas import count, draw_blocks, packed, so_far, unpacked
+from shapeprog.language.parameters import Extent, Position
+from shapeprog.language.program import Program
+from shapeprog.language.sampling import random_program
+from shapeprog.language.shapes import box
+from shapeprog.language.statement import Language, language, statement, using
+from shapeprog.language.tensors import Code, encode
+from shapeprog.language.tensors import decode as programs_of
+from shapeprog.models.decoding import beam, decode
+from shapeprog.models.generator import Generator, build_generator, live_blocks
+from shapeprog.models.vocabulary import Vocabulary
+from shapeprog.training.lessons import by_coverage, lesson, relabelled
+
+SMALL = {"widths": (4, 8, 8), "squeeze": 4, "feature": 16}
+
+
+def small(seed: int = 0) -> Generator:
+    torch.manual_seed(seed)
+    return build_generator("swift", SMALL).eval()
+
+
+def targets(count: int, seed: int = 0) -> Tensor:
+    generator = torch.Generator().manual_seed(seed)
+    cells = torch.zeros(count, 32, 32, 32, dtype=torch.uint8)
+    for each in cells:
+        low = torch.randint(4, 12, (3,), generator=generator)
+        high = low + torch.randint(4, 16, (3,), generator=generator)
+        each[low[0] : high[0], low[1] : high[1], low[2] : high[2]] = 1
+    return cells
+
+
+def code_of(seeds: range, blocks: int = 6) -> Code:
+    programs = [
+        random_program(torch.Generator().manual_seed(seed), blocks=1 + seed % blocks, whole=True, published=True)
+        for seed in seeds
+    ]
+    return encode(programs, blocks=blocks)
+
+
+@pytest.mark.parametrize("choose", ["argmax", "sample"])
+def test_only_legal_blocks_are_written(choose: str) -> None:
+    random = torch.Generator().manual_seed(1)
+    for seed in range(3):
+        code = decode(small(seed), targets(8, seed), choose=choose, temperature=3.0, random=random).code  # type: ignore[arg-type]
+        written = programs_of(code)
+        assert [program.outside_published() for program in written] == [[]] * 8
+        drawing = (code.ids[:, :, 0] != 0).sum(-1)
+        assert [program.blocks for program in written] == drawing.tolist()
+
+
+def test_a_program_does_not_depend_on_its_batch() -> None:
+    generator, target = small(), targets(5)
+    together = decode(generator, target).code
+    for n in range(5):
+        alone = decode(generator, target[n : n + 1]).code
+        assert torch.equal(alone.ids[0], together.ids[n])
+        torch.testing.assert_close(alone.parameters[0], together.parameters[n], rtol=1e-4, atol=1e-4)
+
+
+def test_teacher_forcing_on_its_own_program_says_the_same() -> None:
+    generator, target = small(2), targets(4)
+    found = decode(generator, target)
+    told = generator.predict(target, found.canvases, found.code.ids)
+    live = told.live[..., None, None]
+    torch.testing.assert_close(told.parameters, found.code.parameters * live, rtol=1e-4, atol=1e-4)
+    total = told.log_probability(found.code.ids).sum(-1)
+    torch.testing.assert_close(total, found.log_probability, rtol=1e-4, atol=1e-3)
+
+
+def test_the_canvases_are_what_the_blocks_before_draw() -> None:
+    found = decode(small(), targets(4))
+    assert torch.equal(so_far(draw_blocks(found.code)), found.canvases)
+
+
+def test_a_beam_of_one_is_the_greedy_program_and_wider_ones_are_no_less_likely() -> None:
+    generator, target = small(3), targets(4)
+    greedy = decode(generator, target, blocks=3)
+    one = beam(generator, target, width=1, blocks=3)
+    assert torch.equal(one.code.ids[:, 0], greedy.code.ids)
+    torch.testing.assert_close(one.code.parameters[:, 0], greedy.code.parameters, rtol=1e-4, atol=1e-4)
+    wide = beam(generator, target, width=6, blocks=3, rank="log_probability")
+    assert (wide.log_probability[:, :-1] >= wide.log_probability[:, 1:]).all()
+    every = beam(generator, target, width=80, blocks=1, rank="log_probability")
+    likelihood = every.log_probability.exp()
+    assert (likelihood.sum(-1) <= 1 + 1e-4).all()  # different programs: their chances add up to at most one
+    assert every.code.ids.flatten(2).unique(dim=1).shape[1] <= 80
+
+
+def test_a_beam_is_ordered_by_what_it_draws() -> None:
+    target = targets(4)
+    found = beam(small(4), target, width=5)
+    blocks = draw_blocks(found.code)
+    drawn = torch.zeros_like(blocks[:, :, 0])
+    for k in range(blocks.shape[2]):
+        drawn = drawn | blocks[:, :, k]
+    cells = packed(target)[:, None]
+    iou = count(drawn & cells) / count(drawn | cells)
+    assert (iou[:, :-1] >= iou[:, 1:] - 1e-6).all()
+
+
+def test_canvases_pack_and_unpack() -> None:
+    cells = (torch.rand(3, 32, 32, 32, generator=torch.Generator().manual_seed(0)) < 0.5).to(torch.uint8)
+    assert torch.equal(unpacked(packed(cells)), cells)
+    assert torch.equal(count(packed(cells)), cells.flatten(1).sum(1, dtype=torch.int64))
+
+
+def test_blocks_in_order_of_coverage_draw_the_same_and_cover_less_and_less() -> None:
+    code = code_of(range(24))
+    drawn = draw_blocks(code)
+    ordered, cells = by_coverage(code, drawn)
+    assert torch.equal(draw_blocks(ordered), cells)
+    whole, union = so_far(torch.cat([drawn, drawn[:, :1]], 1))[:, -1], so_far(torch.cat([cells, cells[:, :1]], 1))
+    assert torch.equal(union[:, -1], whole)
+    new = count(cells & ~union[:, :-1])
+    assert (new[:, :-1] >= new[:, 1:]).all()
+    kept = (ordered.ids != 0).any(-1)
+    assert torch.equal(new > 0, kept)
+
+
+def test_a_lesson_ends_with_a_stop() -> None:
+    code = code_of(range(12))
+    target = targets(12)
+    taught = lesson(target, code)
+    assert torch.equal(taught.live.sum(-1), (taught.code.ids != 0).any(-1).sum(-1) + 1)
+    assert torch.equal(taught.live, live_blocks(taught.code.ids))
+
+
+def test_relabelling_on_the_canvases_of_the_lesson_changes_nothing() -> None:
+    code, target = code_of(range(12)), targets(12)
+    taught = lesson(target, code)
+    again = relabelled(target, code, taught.canvases, taught.live)
+    assert torch.equal(again.code.ids * again.live[..., None], taught.code.ids * taught.live[..., None])
+
+
+def test_no_more_rows_are_picked_than_asked_for() -> None:
+    taught = lesson(targets(12), code_of(range(12)))
+    picked = taught.pick(2, torch.Generator().manual_seed(0))
+    assert torch.equal(picked.live.sum(-1), taught.live.sum(-1).clamp(max=2))
+    assert not (picked.live & ~taught.live).any()
+
+
+def test_a_perfect_answer_has_the_least_loss() -> None:
+    """The loss falls towards zero where all is learned by heart."""
+    generator = build_generator("swift", SMALL)
+    code, target = code_of(range(4), 2), targets(4)
+    taught = lesson(target, code)
+    optimiser = torch.optim.Adam(generator.parameters(), 1e-2)
+    for _ in range(150):
+        told = generator.predict(taught.target, taught.canvases, taught.code.ids, taught.live)
+        loss = sum(generator.losses(told, taught.code).values(), torch.zeros(()))
+        optimiser.zero_grad()
+        loss.backward()  # type: ignore[no-untyped-call]
+        optimiser.step()
+    assert float(loss.detach()) < 0.2
+
+
+def test_values_between_whole_ones_are_learned_as_such() -> None:
+    generator = small()
+    ids = torch.tensor([[1, 0, 0]])
+    heads = torch.zeros(1, 3, 32)
+    values = torch.full((1, 3, 7), 2.25)
+    assert (generator.parameter_loss(heads, ids, values)[0, 0, :6] > 0).all()
+    assert (generator.values(heads, ids)[0, 1:] == 0).all()  # an empty step has no parameters
+
+
+def test_changed_statements_are_named() -> None:
+    record = Vocabulary.current().record()
+    assert Vocabulary.check(record).size == 22
+    other = Language()
+    for declared in language():
+        if declared.name != "leg":
+            other.register(declared)
+    with using(other):
+        with pytest.raises(ShapeProgError, match="'leg' that is not registered"):
+            Vocabulary.check(record)
+
+        @statement("leg", id=1)
+        def leg(at: Position, extent: Extent) -> object:
+            """A leg with another parameter name."""
+            return box(at, extent)
+
+        with pytest.raises(ShapeProgError, match="'leg' has changed"):
+            Vocabulary.check(record)
+
+
+def test_registered_statements_are_legal_and_sayable() -> None:
+    other = Language()
+    for declared in language():
+        other.register(declared)
+    with using(other):
+
+        @statement("cushion")
+        def cushion(at: Position, size: Extent) -> object:
+            """A soft box."""
+            return box(at, size)
+
+        vocabulary = Vocabulary.current()
+        assert vocabulary.size == 23
+        assert bool(vocabulary.allowed(0, None)[0, 22])
+        assert bool(vocabulary.allowed(1, torch.tensor([19]))[0, 22])
+        assert not bool(vocabulary.allowed(1, torch.tensor([20]))[0, 22])  # it has no axis of its own to turn about
+        generator = build_generator("swift", SMALL, vocabulary).eval()
+        assert all(isinstance(each, Program) for each in programs_of(decode(generator, targets(2)).code))
+
+
+def test_unknown_designs_and_settings_are_named() -> None:
+    with pytest.raises(ShapeProgError, match="no design 'swfit'"):
+        build_generator("swfit")
+    with pytest.raises(ShapeProgError, match="no setting 'width'"):
+        build_generator("swift", {"width": 3})

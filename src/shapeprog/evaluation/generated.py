@@ -1,0 +1,55 @@
+"""How well a generator rebuilds shapes in a single pass, as it comes: IoU of all, CD and F1 where points are known."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import torch
+from jaxtyping import Float, UInt8
+from torch import Tensor
+
+from shapeprog.evaluation.metrics import Metrics, Target, evaluate_program
+from shapeprog.geometry.occupancy import pack, packed_iou
+from shapeprog.language.canvas import draw_blocks
+from shapeprog.language.program import Program
+from shapeprog.language.tensors import Code
+from shapeprog.language.tensors import decode as programs_of
+from shapeprog.models.decoding import decode
+from shapeprog.models.generator import Generator
+
+AT_ONCE = 64
+"""Shapes that are decoded together."""
+
+
+def single_pass(generator: Generator, cells: UInt8[Tensor, "B 32 32 32"], blocks: int = 10) -> Code:
+    """The likeliest programs (B, K, J) of targets, one for each, on the device of the cells."""
+    with torch.no_grad():
+        parts = [decode(generator, part, blocks=blocks).code for part in cells.split(AT_ONCE)]
+    return Code(torch.cat([part.ids for part in parts]), torch.cat([part.parameters for part in parts]))
+
+
+def code_iou(code: Code, cells: UInt8[Tensor, "B 32 32 32"]) -> Float[Tensor, " B"]:
+    """IoU (B,) at 32^3 of programs, rounded to whole numbers, with targets."""
+    union = np.bitwise_or.reduce(draw_blocks(code).cpu().numpy(), axis=1)
+    return torch.from_numpy(packed_iou(union.view(np.uint32), pack(cells.cpu().numpy())))
+
+
+def generated(generator: Generator, targets: Sequence[Target], blocks: int = 10) -> list[Program]:
+    """The likeliest program of each target."""
+    if not targets:
+        return []
+    device = next(generator.parameters()).device
+    cells = torch.from_numpy(np.stack([target.voxels for target in targets])).to(device, torch.uint8)
+    return programs_of(single_pass(generator, cells, blocks))
+
+
+def evaluate_generator(
+    generator: Generator, targets: Sequence[Target], blocks: int = 10, points: int = 5000, seed: int = 0
+) -> list[Metrics]:
+    """The measures of the likeliest program of each target."""
+    programs = generated(generator, targets, blocks)
+    return [
+        evaluate_program(program, target, points=points, seed=seed)
+        for program, target in zip(programs, targets, strict=True)
+    ]

@@ -104,7 +104,7 @@ class Prior:
         return code
 
     def _mixed(self, count: int, generator: torch.Generator) -> Code:
-        weights = torch.tensor([weight for _, weight in self.templates], device=generator.device)
+        weights = torch.tensor([float(weight) for _, weight in self.templates], device=generator.device)
         which = torch.multinomial(weights, count, replacement=True, generator=generator)
         many = torch.bincount(which, minlength=len(weights)).tolist()
         parts = []

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 
-from shapeprog.data.synthetic import cases, lounging, seating, tables
+from shapeprog.data.synthetic import cases, lounging, narrow, seating, tables
 from shapeprog.data.synthetic.mixture import Prior
 from shapeprog.errors import InputError
 
@@ -29,7 +29,29 @@ WIDE = Prior(
 )
 """Furniture of many kinds, wider than the published data; statements that users declare take part."""
 
-PRIORS: dict[str, Prior] = {each.name: each for each in (WIDE,)}
+NARROW = Prior(
+    "narrow",
+    blocks=8,
+    templates=(
+        (narrow.rectangle_on_legs, 4000),
+        (narrow.square_on_legs, 4000),
+        (narrow.circle_on_legs, 4000),
+        (narrow.rectangle_on_legs_with_layer, 4000),
+        (narrow.rectangle_on_legs_with_bars, 4000),
+        (narrow.circle_on_column, 4000),
+        (narrow.square_on_column, 4000),
+        (narrow.circle_on_cross, 4000),
+        (narrow.rectangle_on_boards, 4000),
+        (narrow.rectangle_on_lockers, 4000),
+        (narrow.chair_on_legs, 50000),
+        (narrow.chair_on_cross, 20000),
+        (narrow.chair_on_star, 5000),
+        (narrow.chair_on_boards, 5000),
+    ),
+)
+"""Tables and chairs in the mix of the published synthetic data."""
+
+PRIORS: dict[str, Prior] = {each.name: each for each in (NARROW, WIDE)}
 """All priors by name."""
 
 

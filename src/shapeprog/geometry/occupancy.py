@@ -34,18 +34,13 @@ def voxels(scene: Scene, resolution: int = RESOLUTION) -> UInt8[Tensor, "*batch 
     resolution
         Cells along each side R; the scene is scaled with it.
     """
-    from shapeprog.geometry import voxel_kernels as kernels
-
     words = _words(scene, resolution)
-    shape = (len(words), resolution, resolution, resolution)
     if resolution == RESOLUTION:
-        cells, rows = np.empty(shape, np.uint8), words.reshape(-1)
-        eights = cells.reshape(-1, RESOLUTION).view(np.uint64)
-        over_threads(lambda first, last: kernels.unpack(rows, _SPREAD, eights, first, last), len(rows), least=1 << 15)
+        cells = unpack(words[:, 0])
     else:
         bits = np.unpackbits(words.transpose(0, 2, 3, 1).copy().view(np.uint8), axis=-1, bitorder="little")
         cells = np.ascontiguousarray(bits[..., :resolution])
-    return torch.from_numpy(cells).to(scene.mask.device).reshape(*scene.batch_shape, *shape[1:])
+    return torch.from_numpy(cells).to(scene.mask.device).reshape(*scene.batch_shape, *cells.shape[1:])
 
 
 def packed_rows(scene: Scene) -> Words:
@@ -53,10 +48,29 @@ def packed_rows(scene: Scene) -> Words:
     return _words(scene, RESOLUTION)[:, 0].reshape(*scene.batch_shape, RESOLUTION, RESOLUTION)
 
 
+def packed_blocks(scene: Scene, blocks: int) -> Words:
+    """The cells of each block of each scene on their own, as packed rows (..., blocks, 32, 32)."""
+    flat = scene.flatten()
+    plane = torch.arange(len(flat), device=flat.block.device)[:, None] * blocks + flat.block
+    words = _words(flat, RESOLUTION, plane, len(flat) * blocks)
+    return words.reshape(*scene.batch_shape, blocks, RESOLUTION, RESOLUTION)
+
+
 def pack(cells: npt.ArrayLike) -> Words:
     """Packed rows (..., 32, 32) of grids of cells (..., 32, 32, 32)."""
     bits = np.packbits(np.asarray(cells, dtype=bool), axis=-1, bitorder="little")
     return bits.view("<u4")[..., 0].astype(np.uint32, copy=False)
+
+
+def unpack(words: Words) -> npt.NDArray[np.uint8]:
+    """Grids of cells (..., 32, 32, 32), 1 or 0, of packed rows (..., 32, 32)."""
+    from shapeprog.geometry import voxel_kernels as kernels
+
+    rows = np.ascontiguousarray(words).reshape(-1)
+    cells = np.empty((*words.shape, RESOLUTION), np.uint8)
+    eights = cells.reshape(-1, RESOLUTION).view(np.uint64)
+    over_threads(lambda first, last: kernels.unpack(rows, _SPREAD, eights, first, last), len(rows), least=1 << 15)
+    return cells
 
 
 def packed_iou(one: Words, two: Words) -> npt.NDArray[np.float64]:
@@ -109,26 +123,30 @@ _SPREAD: npt.NDArray[np.uint64] = (
 )
 
 
-def _words(scene: Scene, resolution: int) -> Words:
-    """Words (B, W, R, R) of all scenes."""
+def _words(scene: Scene, resolution: int, plane: Int[Tensor, "B N"] | None = None, planes: int = 0) -> Words:
+    """Words (B, W, R, R) of all scenes, or of planes that gather the primitives which name them."""
     from shapeprog.geometry import voxel_kernels as kernels
 
     if resolution < 1:
         raise ShapeProgError(f"a grid of {resolution} cells a side holds nothing", "ask for a resolution of 1 or more")
     table, many, scenes = solids(scene), scene.mask.shape[-1], scene.batch_shape.numel()
-    words = np.zeros((scenes, (resolution + 31) // 32, resolution, resolution), np.uint32)
-    over_threads(lambda first, last: kernels.fill(table, many, words, first, last), scenes, least=32)
+    if plane is None:
+        plane, planes = torch.arange(scenes, device=scene.mask.device)[:, None].expand(-1, many), scenes
+    words = np.zeros((planes, (resolution + 31) // 32, resolution, resolution), np.uint32)
+    owner = array(plane).reshape(-1)
+    over_threads(lambda first, last: kernels.fill(table, owner, many, words, first, last), scenes, least=32)
     for declared in declared_kinds(scene):
-        _fill_declared(scene.flatten().detach(), declared, words)
+        _fill_declared(scene.flatten().detach(), declared, plane, words)
     return words
 
 
-def _fill_declared(scene: Scene, kind: int, words: Words) -> None:
+def _fill_declared(scene: Scene, kind: int, plane: Int[Tensor, "B N"], words: Words) -> None:
     """Add the cells whose centre a primitive of a declared kind contains, within its bounding box."""
     resolution = words.shape[-1]
     cell = RESOLUTION / resolution
-    program, slot = (scene.mask & (scene.kind == kind)).nonzero(as_tuple=True)
-    size, centre, rotation = (t[program, slot].double() for t in (scene.size, scene.centre, scene.rotation))
+    here = scene.mask & (scene.kind == kind)
+    program = plane[here]
+    size, centre, rotation = (t[here].double() for t in (scene.size, scene.centre, scene.rotation))
     finite = torch.cat([size, centre, rotation.flatten(1)], -1).isfinite().all(-1)
     program, size, centre, rotation = program[finite], size[finite], centre[finite], rotation[finite]
     reach = (rotation.abs() @ primitives[kind].bound(size)[..., None])[..., 0]

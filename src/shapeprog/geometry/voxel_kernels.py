@@ -207,14 +207,17 @@ def _square(rotation):
 
 
 @kernel
-def fill(solids, many, rows, begin, end):
-    """Fill the words of scenes ``begin`` to ``end``, of ``many`` rows of the table each, with their cells."""
+def fill(solids, owner, many, rows, begin, end):
+    """Fill planes of words with the cells of scenes ``begin`` to ``end``, of ``many`` rows of the table each.
+
+    Each row of the table has its owner: the plane that its cells go to.
+    """
     resolution = rows.shape[2]
     scale, origin = resolution / 32, resolution / 2
     size, centre, rotation, reach = np.empty(4), np.empty(3), np.empty((3, 3)), np.empty(3)
     low, high = np.empty(3, np.int64), np.empty(3, np.int64)
     for item in range(begin * many, end * many):
-        scene, kind = item // many, solids[item, 0]
+        scene, kind = owner[item], solids[item, 0]
         if kind < 0:
             continue
         total = 0.0

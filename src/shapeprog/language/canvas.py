@@ -11,7 +11,7 @@ import torch
 from jaxtyping import Int, UInt8
 from torch import Tensor
 
-from shapeprog.geometry.occupancy import packed_rows, voxels
+from shapeprog.geometry.occupancy import packed_blocks, unpack
 from shapeprog.language.tensors import Code
 from shapeprog.language.unroll import unroll
 from shapeprog.space import RESOLUTION
@@ -22,12 +22,9 @@ Canvas = Int[Tensor, "*batch 32 32"]
 
 def draw_blocks(code: Code) -> Int[Tensor, "*batch K 32 32"]:
     """The cells of every block on its own, as an executor of whole numbers draws it: parameters are rounded."""
-    lead, steps = code.ids.shape[:-1], code.ids.shape[-1:]
-    single = Code(code.ids.reshape(-1, 1, *steps), code.parameters.detach().round().reshape(-1, 1, *steps, 7))
-    scene = unroll(single)
-    if code.ids.device.type == "cpu":
-        return torch.from_numpy(packed_rows(scene).view(np.int32)).reshape(*lead, RESOLUTION, RESOLUTION)
-    return packed(voxels(scene)).reshape(*lead, RESOLUTION, RESOLUTION)
+    scene = unroll(Code(code.ids, code.parameters.detach().round()))
+    words = packed_blocks(scene, code.ids.shape[-2])
+    return torch.from_numpy(words.view(np.int32)).to(code.ids.device)
 
 
 def so_far(blocks: Int[Tensor, "*batch K 32 32"]) -> Int[Tensor, "*batch K 32 32"]:
@@ -50,9 +47,7 @@ def packed(cells: UInt8[Tensor, "*batch 32 32 32"]) -> Canvas:
 def unpacked(canvas: Canvas) -> UInt8[Tensor, "*batch 32 32 32"]:
     """A canvas as cells, 1 or 0."""
     if canvas.device.type == "cpu":
-        words = np.ascontiguousarray(canvas.numpy())
-        bits = np.unpackbits(words[..., None].view(np.uint8), axis=-1, bitorder="little")
-        return torch.from_numpy(bits)
+        return torch.from_numpy(unpack(canvas.numpy().view(np.uint32)))
     return ((canvas[..., None] >> _places(canvas.device)) & 1).to(torch.uint8)
 
 

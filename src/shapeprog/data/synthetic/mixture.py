@@ -12,8 +12,9 @@ from torch import Tensor
 from shapeprog.data.synthetic.declared import own_statements, random_blocks
 from shapeprog.data.synthetic.dice import Dice
 from shapeprog.data.synthetic.draft import Draft
+from shapeprog.data.synthetic.hiding import with_own_cells
 from shapeprog.errors import ShapeProgError
-from shapeprog.language.canvas import Canvas, draw_blocks, so_far
+from shapeprog.language.canvas import Canvas, draw_blocks
 from shapeprog.language.program import PUBLISHED_DEPTH
 from shapeprog.language.statement import END, SLOTS, language
 from shapeprog.language.tensors import Code
@@ -120,14 +121,8 @@ class Prior:
 
     def _visible(self, code: Code) -> tuple[Code, Canvas]:
         """The programs without the blocks that the others hide or that lie outside of the grid."""
-        blocks = draw_blocks(code)
-        before, after = so_far(blocks), torch.zeros_like(blocks[:, 0])
-        keep = torch.zeros_like(code.ids[..., 0], dtype=torch.bool)
-        for k in reversed(range(blocks.shape[1])):
-            here = blocks[:, k]
-            keep[:, k] = (here & ~(before[:, k] | after)).flatten(1).any(-1)
-            after = after | here * keep[:, k, None, None]
-        return _front(code, keep, self.blocks), after
+        keep, canvas = with_own_cells(draw_blocks(code))
+        return _front(code, keep, self.blocks), canvas
 
 
 def _front(code: Code, keep: Bool[Tensor, "n K"], blocks: int) -> Code:

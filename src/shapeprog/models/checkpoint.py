@@ -1,0 +1,300 @@
+"""Weights in files: one NAME.safetensors each, whose header carries a card of how they came about.
+
+No pickle is read.  Weights that ship with the package are found by their bare name.
+"""
+
+from __future__ import annotations
+
+import difflib
+import json
+import math
+import os
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass, field, fields
+from pathlib import Path
+from typing import Any, Literal
+
+import torch
+from torch import Tensor, nn
+
+from shapeprog.errors import InputError, OutputError, ShapeProgError
+from shapeprog.files import atomic_path
+from shapeprog.models.executor import NeuralExecutor
+from shapeprog.models.generator import Generator, build_generator
+from shapeprog.models.vocabulary import Vocabulary
+
+SUFFIX = ".safetensors"
+SHIPPED = Path(__file__).with_name("weights")
+"""Folder of the weights that ship with the package."""
+
+_LARGEST_HEADER = 100 << 20
+_LENGTH = 8
+
+
+@dataclass(frozen=True)
+class Card:
+    """What is known of a set of weights.
+
+    Parameters
+    ----------
+    kind
+        ``generator`` or ``executor``.
+    design, settings
+        What rebuilds the network.
+    vocabulary
+        Record of the statements it was trained with.
+    data, seed
+        What it was trained on.
+    version
+        Version of the package that wrote it.
+    command
+        How to make it again.
+    visits
+        Shapes, or blocks of an executor, seen in training.
+    scores
+        Measures by name.
+    """
+
+    kind: Literal["generator", "executor"]
+    design: str
+    settings: dict[str, Any]
+    vocabulary: dict[str, Any]
+    data: str = ""
+    seed: int = 0
+    version: str = ""
+    command: str = ""
+    visits: int = 0
+    scores: dict[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Listed:
+    """A set of weights as its header tells it.
+
+    Parameters
+    ----------
+    name, path
+        What it is called, and where it is.
+    card
+        What is known of it.
+    parameters
+        Numbers that were trained.
+    size
+        Bytes on disk.
+    """
+
+    name: str
+    path: Path
+    card: Card
+    parameters: int
+    size: int
+
+
+def card_of(module: nn.Module, **known: Any) -> Card:
+    """The card of a network: kind, design, settings, vocabulary and version are read from it, the rest is given.
+
+    Parameters
+    ----------
+    known
+        Fields of :class:`Card`, such as ``data``, ``seed``, ``command``, ``visits`` and ``scores``.
+    """
+    from shapeprog import __version__
+
+    if isinstance(module, Generator):
+        built: dict[str, Any] = {"kind": "generator", "design": module.design, "settings": asdict(module.settings)}
+    elif isinstance(module, NeuralExecutor):
+        built = {"kind": "executor", "design": "tian2019", "settings": {}}
+    else:
+        raise TypeError(f"{type(module).__name__} is neither a generator nor an executor")
+    return Card(**built | {"vocabulary": module.vocabulary.record(), "version": __version__} | known)
+
+
+def save_checkpoint(path: str | os.PathLike[str], module: nn.Module, card: Card, *, half: bool = False) -> None:
+    """Write weights and card to ``path``, whole or not at all.
+
+    Parameters
+    ----------
+    half
+        Keep matrices and kernels as float16: half the size on disk, float32 again when loaded.
+
+    Raises
+    ------
+    OutputError
+        If the file cannot be written, or a weight is not finite (as after training that diverged).
+    """
+    from safetensors.torch import save_file
+
+    tensors = {}
+    for name, value in module.state_dict().items():
+        stored = value.detach().to(
+            "cpu", torch.float16 if half and value.is_floating_point() and value.ndim > 1 else None
+        )
+        if not stored.isfinite().all():
+            raise OutputError(f"cannot write {path}: {_bad(stored)} of {name} are not finite", "lower the rate")
+        tensors[name] = stored.contiguous()
+    parameters = sum(each.numel() for each in module.parameters())
+    metadata = {"card": json.dumps(asdict(card), allow_nan=False), "parameters": str(parameters)}
+    with atomic_path(path) as temporary:
+        save_file(tensors, temporary, metadata)
+
+
+def load_checkpoint(name: str | os.PathLike[str], *, device: torch.device | str = "cpu") -> tuple[nn.Module, Card]:
+    """The network of a file, in evaluation mode, and its card.
+
+    Parameters
+    ----------
+    name
+        Path of a file, or the bare name of weights that ship with the package.
+
+    Raises
+    ------
+    InputError
+        If there is no such file, or it does not hold weights of this package, or they are broken.
+    ShapeProgError
+        If the design is not known, or a statement it was trained with has changed.
+    """
+    from safetensors.torch import load_file
+
+    path = _found(name)
+    card = read_card(path).card
+    module = _build(path, card)
+    stored = load_file(path)
+    for key, value in stored.items():
+        if not value.isfinite().all():
+            raise InputError(f"{path}: {_bad(value)} of {key} are not finite", "use weights of an earlier step")
+    _check_shapes(path, stored, module.state_dict())
+    module.load_state_dict(stored)
+    return module.to(device).eval(), card
+
+
+def load_generator(name: str | os.PathLike[str], *, device: torch.device | str = "cpu") -> tuple[Generator, Card]:
+    """As :func:`load_checkpoint`, where only a generator will do."""
+    module, card = load_checkpoint(name, device=device)
+    if not isinstance(module, Generator):
+        raise InputError(f"{name} holds a neural executor, not a generator", "give weights of a generator")
+    return module, card
+
+
+def load_executor(name: str | os.PathLike[str], *, device: torch.device | str = "cpu") -> tuple[NeuralExecutor, Card]:
+    """As :func:`load_checkpoint`, where only a neural executor will do."""
+    module, card = load_checkpoint(name, device=device)
+    if not isinstance(module, NeuralExecutor):
+        raise InputError(f"{name} holds a generator, not a neural executor", "give weights made by train-executor")
+    return module, card
+
+
+def list_checkpoints(
+    folders: Sequence[str | os.PathLike[str]] = (), *, shipped: bool = True
+) -> Iterator[tuple[Path, Listed | ShapeProgError]]:
+    """Weights that ship, then those in folders, with what is wrong with a file instead where it cannot be used.
+
+    Only headers are read.
+
+    Raises
+    ------
+    InputError
+        If a folder does not exist.
+    """
+    for folder in [*([SHIPPED] if shipped and SHIPPED.is_dir() else []), *(Path(each) for each in folders)]:
+        if not folder.exists():
+            raise InputError(f"there is no folder {folder}", "check the path")
+        for path in sorted(folder.glob(f"*{SUFFIX}")) if folder.is_dir() else [folder]:
+            try:
+                yield path, read_card(path)
+            except ShapeProgError as error:
+                yield path, error
+
+
+def read_card(path: str | os.PathLike[str]) -> Listed:
+    """What the header of a file tells of its weights.
+
+    Raises
+    ------
+    InputError
+        If it is no file of weights of this package, or is cut short.
+    """
+    path = Path(path)
+    metadata = _header(path).get("__metadata__", {})
+    if "card" not in metadata:
+        raise InputError(
+            f"{path} holds weights without a card, so nothing tells which network they are for",
+            "use weights written by this package, or turn published ones into them: shapeprog import-weights",
+        )
+    try:
+        told = json.loads(metadata["card"])
+        known = {each.name for each in fields(Card)}
+        card = Card(**{key: value for key, value in told.items() if key in known})
+        return Listed(path.stem, path, card, int(metadata["parameters"]), path.stat().st_size)
+    except (ValueError, TypeError, KeyError, AttributeError) as error:
+        raise InputError(f"the card of {path} cannot be read: {error}", "use weights of this version") from error
+
+
+def _found(name: str | os.PathLike[str]) -> Path:
+    path = Path(name)
+    bare = str(name) == path.name and not path.suffix
+    if bare and not path.is_file():
+        known = sorted(each.stem for each in SHIPPED.glob(f"*{SUFFIX}"))
+        if path.name in known:
+            return SHIPPED / f"{path.name}{SUFFIX}"
+        near = difflib.get_close_matches(path.name, known, 1)
+        cure = f"did you mean {near[0]!r}?" if near else f"there are: {', '.join(known) or 'none'}; or give a path"
+        raise InputError(f"no weights called {path.name!r} ship with shapeprog", cure)
+    return path
+
+
+def _header(path: Path) -> dict[str, Any]:
+    """The header of a safetensors file: 8 bytes of length, then JSON; the last tensor must lie within the file."""
+    if path.is_dir():
+        raise InputError(f"{path} is a folder, not a file of weights", f"list what it holds: shapeprog models {path}")
+    try:
+        size = path.stat().st_size
+        with open(path, "rb") as file:
+            length = int.from_bytes(file.read(_LENGTH), "little")
+            text = file.read(min(length, _LARGEST_HEADER))
+    except FileNotFoundError as error:
+        raise InputError(f"there is no file {path}", "check the path; list weights with: shapeprog models") from error
+    except OSError as error:
+        raise InputError(f"cannot read {path}: {error.strerror}", "check the path and its permissions") from error
+    if not text.startswith(b"{"):
+        raise InputError(
+            f"{path} is no safetensors file", "published .t7 files become one by: shapeprog import-weights"
+        )
+    cut = InputError(f"{path} is cut short: it has only {size} bytes", "copy or download it again")
+    if len(text) < length:
+        raise cut
+    try:
+        header: dict[str, Any] = json.loads(text)
+        end = max((each["data_offsets"][1] for key, each in header.items() if key != "__metadata__"), default=0)
+    except (ValueError, KeyError, TypeError, IndexError) as error:
+        raise InputError(f"{path} is no safetensors file: its header is broken", "copy or make it again") from error
+    if size < _LENGTH + length + end:
+        raise cut
+    return header
+
+
+def _build(path: Path, card: Card) -> nn.Module:
+    vocabulary = Vocabulary.check(card.vocabulary)
+    if card.kind == "executor":
+        return NeuralExecutor(vocabulary)
+    if card.kind != "generator":
+        raise InputError(f"{path} is for a {card.kind!r}", "it was written by a newer version; update shapeprog")
+    settings = {key: tuple(value) if isinstance(value, list) else value for key, value in card.settings.items()}
+    try:
+        return build_generator(card.design, settings, vocabulary)
+    except ShapeProgError as error:
+        raise ShapeProgError(f"{path}: {error.message}", error.hint) from error
+
+
+def _check_shapes(path: Path, stored: dict[str, Tensor], wanted: dict[str, Tensor]) -> None:
+    for key in sorted(stored.keys() | wanted.keys()):
+        one, two = (tuple(each[key].shape) if key in each else None for each in (stored, wanted))
+        if one != two:
+            told = [f"has the shape {shape}" if shape is not None else "is missing" for shape in (one, two)]
+            raise InputError(
+                f"{path} does not fit its network: {key} {told[0]} in the file and {told[1]} in the network",
+                "it was written by another version; make it again",
+            )
+
+
+def _bad(values: Tensor) -> str:
+    return f"{math.prod(values.shape) - int(values.isfinite().sum())} of {values.numel()} values"

@@ -51,6 +51,8 @@ def decode(
 ) -> Decoded:
     """One program for each target; stops as soon as every program has ended.
 
+    Generators whose predictions depend on the batch always write all blocks for all of it, as published.
+
     Parameters
     ----------
     target
@@ -77,7 +79,7 @@ def decode(
         said, values, chances = _block(generator, feature, choose, temperature, random)
         ids[active, k], parameters[active, k] = said, values
         chance[active] += chances
-        going = said[:, 0] != EMPTY
+        going = (said[:, 0] != EMPTY) | generator.by_batch
         active, memory = active[going], _at(memory, going)
         if not len(active):
             break

@@ -81,6 +81,8 @@ class Generator(nn.Module, ABC):
 
     design: ClassVar[str]
     Settings: ClassVar[Any]
+    by_batch: bool = False
+    """Whether a prediction depends on the other shapes of its batch, those that have ended included."""
 
     def __init__(self, settings: Any, vocabulary: Vocabulary) -> None:
         super().__init__()

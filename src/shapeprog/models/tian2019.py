@@ -191,16 +191,12 @@ class Tian2019(Generator):
 
     def __init__(self, settings: Tian2019Settings, vocabulary: Vocabulary) -> None:
         super().__init__(settings, vocabulary)
-        self.shape_feat = ShapeEncoder(settings.statistics == "running")
+        self.by_batch = settings.statistics == "batch"
+        self.shape_feat = ShapeEncoder(running=not self.by_batch)
         self.core = nn.LSTM(WIDTH, WIDTH, bias=False, batch_first=True)
         self.inner_net = StepNet(vocabulary.size)
         self.used: Tensor
         self.register_buffer("used", vocabulary.used, persistent=False)
-
-    @property
-    def by_batch(self) -> bool:
-        """Whether a prediction depends on the other shapes of its batch, ended or not, as published."""
-        return bool(self.settings.statistics == "batch")
 
     def perceive(
         self, target: Float[Tensor, "B 32 32 32"], canvas: Float[Tensor, "B 32 32 32"], memory: Memory

@@ -40,7 +40,7 @@ class SwiftSettings:
         Range of the whole values that numbers are drawn from.
     """
 
-    widths: tuple[int, int, int] = (24, 48, 96)
+    widths: tuple[int, int, int] = (16, 32, 64)
     squeeze: int = 48
     feature: int = 256
     low: int = -24

@@ -10,6 +10,7 @@ from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
 from shapeprog.data.synthetic.declared import own_statements, random_blocks
+from shapeprog.data.synthetic.details import details
 from shapeprog.data.synthetic.dice import Dice
 from shapeprog.data.synthetic.draft import Draft
 from shapeprog.data.synthetic.hiding import with_own_cells
@@ -45,6 +46,8 @@ class Prior:
         What it is mixed from, with the weight of each.
     off_centre
         Share of shapes that are moved by a cell along some axes.
+    details
+        Share of shapes with details on what the template writes.
     own
         Whether statements that users declare take part.
     """
@@ -53,6 +56,7 @@ class Prior:
     blocks: int
     templates: tuple[tuple[Template, float], ...]
     off_centre: float = 0.0
+    details: float = 0.0
     own: bool = False
 
     def __call__(self, count: int, generator: torch.Generator) -> Code:
@@ -70,6 +74,10 @@ class Prior:
     def drawn(self, count: int, generator: torch.Generator) -> tuple[Code, Canvas]:
         """Programs, as by calling, and what they draw: packed cells (count, 32, 32)."""
         code, canvas = self._visible(self._propose(count, generator))
+        if self.details:
+            dice = Dice(count, generator)
+            more, here = details(dice, canvas), dice.chance(self.details)[:, None, None]
+            code, canvas = self._visible(_joined([code, Code(more.ids * here, more.parameters * here[..., None])]))
         for _ in range(ATTEMPTS):
             blank = (code.ids[:, 0, 0] == 0).nonzero()[:, 0]
             if not len(blank):

@@ -25,6 +25,7 @@ WIDE = Prior(
         (lounging.bed, 0.04),
     ),
     off_centre=0.05,
+    details=0.6,
     own=True,
 )
 """Furniture of many kinds, wider than the published data; statements that users declare take part."""

@@ -1,0 +1,96 @@
+"""Details: small boxes put onto finished shapes, as rails, posts, panels and blocks of real furniture are.
+
+Templates are tidy; what is found in the world has more on it.  Each detail touches what is there and stays within the
+box that the shape fills.
+"""
+
+from __future__ import annotations
+
+import torch
+from jaxtyping import Float
+from torch import Tensor
+
+from shapeprog.data.synthetic.dice import Dice, Flag, Whole
+from shapeprog.data.synthetic.draft import Draft
+from shapeprog.data.synthetic.room import mirrored
+from shapeprog.language.canvas import Canvas
+from shapeprog.language.tensors import Code
+from shapeprog.space import DEPTH, HALF, RESOLUTION, SIDE, UP
+
+MOST = 4
+"""Most details of one shape."""
+
+
+def details(dice: Dice, canvas: Canvas) -> Code:
+    """Up to ``MOST`` blocks for each shape of a batch, each touching its cells.
+
+    Parameters
+    ----------
+    dice
+        As many rows as there are shapes.
+    canvas
+        What the shapes draw: packed cells (n, 32, 32).
+    """
+    draft = Draft(dice)
+    low, high = _bounds(canvas)
+    many = dice.whole(1, MOST)
+    for number in range(MOST):
+        _detail(draft, _cell(dice, canvas), low, high, number < many)
+    return draft.code()
+
+
+def _detail(draft: Draft, cell: Float[Tensor, "n 3"], low: Tensor, high: Tensor, here: Flag) -> None:
+    dice = draft.dice
+    bar, rail, post, front, side, chunk = dice.kind(0.26, 0.16, 0.16, 0.16, 0.12, 0.14)
+    thin = [dice.pick(1, 2, 3, weights=(0.6, 0.3, 0.1)) for _ in range(2)]
+    long, other = dice.whole(3, 14), dice.whole(3, 10)
+    wanted = (
+        torch.where(bar | rail, thin[0], torch.where(post, long, torch.where(chunk, dice.whole(2, 6), other))),
+        torch.where(rail | side, long, torch.where(bar | post, thin[1], torch.where(chunk, dice.whole(2, 6), thin[0]))),
+        torch.where(bar | front, long, torch.where(rail | post, thin[1], torch.where(chunk, other, thin[0]))),
+    )
+    start: list[Whole] = []
+    size: list[Whole] = []
+    for axis, length in enumerate(wanted):
+        length = torch.minimum(length, high[:, axis] - low[:, axis])
+        place = cell[:, axis] - torch.floor(dice.uniform() * (length + 1))  # beside the cell, or over it
+        start.append(torch.minimum(torch.maximum(place, low[:, axis]), high[:, axis] - length))
+        size.append(length)
+    corner, extent = (start[UP], start[DEPTH], start[SIDE]), (size[UP], size[DEPTH], size[SIDE])
+    apart = (corner[SIDE] >= 0) | (corner[SIDE] + extent[SIDE] <= 0)
+    twice = mirrored(corner, extent)
+    # The copy of a part on the right is on the left: loops begin there.
+    left = torch.minimum(corner[SIDE], corner[SIDE] + twice[1][2])
+    pair = apart & dice.chance(0.6)
+    corner = (corner[UP], corner[DEPTH], torch.where(pair, left, corner[SIDE]))
+    copies = (torch.where(pair, 2.0, 1.0), (0, 0, -2 * left - extent[SIDE]))
+    for role, chosen in (
+        ("horizontal_bar", bar | rail), ("leg", post), ("vertical_board", front), ("side", side), ("locker", chunk),
+    ):  # fmt: skip
+        draft.box(role, corner, extent, keep=here & chosen, repeat=[copies])
+
+
+def _cell(dice: Dice, canvas: Canvas) -> Float[Tensor, "n 3"]:
+    """The low corner of one drawn cell of each shape, drawn at random by rows."""
+    rows = canvas.flatten(1)
+    key = torch.stack([dice.uniform() for _ in range(2)], -1)
+    drawn = (rows != 0).cumsum(-1)
+    place = torch.searchsorted(drawn, (key[:, :1] * drawn[:, -1:]).floor().long() + 1).clamp(max=rows.shape[1] - 1)
+    word = rows.gather(1, place)
+    bits = ((word >> torch.arange(RESOLUTION, device=word.device)) & 1).cumsum(-1)
+    side = torch.searchsorted(bits, (key[:, 1:2] * bits[:, -1:]).floor().long() + 1).clamp(max=RESOLUTION - 1)
+    return torch.cat([place // RESOLUTION, place % RESOLUTION, side], 1).float() - HALF
+
+
+def _bounds(canvas: Canvas) -> tuple[Float[Tensor, "n 3"], Float[Tensor, "n 3"]]:
+    """Low and high corner of the cells of each shape."""
+    bits = canvas.flatten(1)
+    while bits.shape[1] > 1:  # halves are combined: torch has no reduction by "or"
+        bits = bits[:, ::2] | bits[:, 1::2]
+    bits = bits[:, 0]
+    along_side = (bits[:, None] >> torch.arange(RESOLUTION, device=bits.device)) & 1
+    lows, highs = [], []
+    for drawn in ((canvas != 0).any(2), (canvas != 0).any(1), along_side.bool()):
+        lows.append(drawn.int().argmax(-1))
+        highs.append(RESOLUTION - drawn.flip(-1).int().argmax(-1))
+    return torch.stack(lows, -1).float() - HALF, torch.stack(highs, -1).float() - HALF

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import torch
 from jaxtyping import Float, UInt8
 from torch import Tensor
 
-from shapeprog.evaluation.metrics import Metrics, Target, evaluate_program
+from shapeprog.evaluation.metrics import Metrics, Target, evaluate_program, target_samples, world_scale
 from shapeprog.geometry.occupancy import pack, packed_iou
 from shapeprog.language.canvas import draw_blocks
 from shapeprog.language.program import Program
@@ -45,11 +46,40 @@ def generated(generator: Generator, targets: Sequence[Target], blocks: int = 10)
 
 
 def evaluate_generator(
-    generator: Generator, targets: Sequence[Target], blocks: int = 10, points: int = 5000, seed: int = 0
+    generator: Generator,
+    targets: Sequence[Target],
+    blocks: int = 10,
+    points: int = 5000,
+    seed: int = 0,
+    snapping: bool = False,
 ) -> list[Metrics]:
-    """The measures of the likeliest program of each target."""
+    """The measures of the likeliest program of each target.
+
+    Parameters
+    ----------
+    snapping
+        Whether whole numbers within one of the rounded parameters may be searched for the IoU; else it is that of the
+        rounded program.
+    """
     programs = generated(generator, targets, blocks)
-    return [
-        evaluate_program(program, target, points=points, seed=seed)
-        for program, target in zip(programs, targets, strict=True)
-    ]
+    with torch.autocast(next(generator.parameters()).device.type, enabled=False):
+        return [
+            measured(program, target, points, seed, snapping) for program, target in zip(programs, targets, strict=True)
+        ]
+
+
+def measured(program: Program, target: Target, points: int = 5000, seed: int = 0, snapping: bool = False) -> Metrics:
+    """The measures of a program; one that draws nothing counts as a single point in the centre of the grid.
+
+    An infinite distance would make every mean infinite for the sake of one shape.
+    """
+    from shapeprog.inference.snapping import snap
+
+    snapped = snap(program, target.voxels) if snapping else None
+    row = evaluate_program(program, target, snapped, points, seed)
+    samples = None if np.isfinite(row.cd) else target_samples(target, points, seed)
+    if samples is None:
+        return row
+    squared = (samples[0] ** 2).sum(-1) * world_scale(target) ** 2
+    there, back = float(squared.min()), float(squared.mean())
+    return replace(row, cd=there + back, to_target=there, from_target=back)

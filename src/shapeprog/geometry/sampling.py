@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import torch
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 from torch import Tensor
 from torch.autograd.function import once_differentiable
 
@@ -124,6 +124,12 @@ def sample_surface(scene: Scene, n: int, generator: torch.Generator | None = Non
         points.reshape(*lead, n, 3), weights.reshape(*lead, n), choice.slot.reshape(*lead, n),
         normal.reshape(*lead, n, 3),
     )  # fmt: skip
+
+
+def has_surface(scene: Scene) -> Bool[Tensor, "*batch"]:
+    """Which scenes have a surface to draw points from."""
+    area = _areas(scene.detach().flatten()).double().flatten(1).sum(-1)
+    return ((area > 0) & area.isfinite()).reshape(scene.batch_shape)
 
 
 def _areas(scene: Scene) -> Float[Tensor, "B N F"]:

@@ -17,7 +17,7 @@ from shapeprog.language.statement import EMPTY, SLOTS
 from shapeprog.language.tensors import Code
 from shapeprog.models.generator import Generator, Memory
 
-Choice = Literal["argmax", "sample"]
+Choice = Literal["argmax", "sample", "ids"]
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ def decode(
     blocks
         Most blocks K; the tensors have exactly so many.
     choose
-        ``argmax`` takes the likeliest id and its number, ``sample`` draws both.
+        ``argmax`` takes the likeliest id and its numbers, ``sample`` draws both, ``ids`` draws the ids alone.
     temperature
         Of the ids when sampling: below one keeps closer to the likeliest.
     random
@@ -106,9 +106,10 @@ def _block(
             said = logits.argmax(-1)
             values.append(generator.values(heads, said))
         else:
-            said = torch.multinomial((logits / temperature).softmax(-1), 1, generator=random)[:, 0]
             assert random is not None, "sampling needs a source of randomness"
-            values.append(generator.sampled(heads, said, random))
+            said = torch.multinomial((logits / temperature).softmax(-1), 1, generator=random)[:, 0]
+            drawn = generator.sampled(heads, said, random) if choose == "sample" else generator.values(heads, said)
+            values.append(drawn)
         chance = chance + logits.gather(-1, said[:, None])[:, 0]
         ids.append(said)
     return torch.stack(ids, 1), torch.stack(values, 1).float(), chance

@@ -40,12 +40,15 @@ class Prediction:
         Parameters of the ids that were told, with gradient.
     heads
         What the design needs to measure its parameters.
+    feature
+        What it saw before it wrote each block.
     """
 
     live: Bool[Tensor, "B K"]
     logits: Float[Tensor, "M J V"]
     values: Float[Tensor, "M J 7"]
     heads: Tensor
+    feature: Float[Tensor, "M F"]
 
     @property
     def parameters(self) -> Float[Tensor, "B K J 7"]:
@@ -149,7 +152,7 @@ class Generator(nn.Module, ABC):
             outputs.append(self.step(feature, told[:, j - 1] if j else None, j, state))
         heads = torch.stack([each.heads for each in outputs], 1)
         logits = torch.stack([each.logits for each in outputs], 1)
-        return Prediction(live, logits, self.values(heads, told), heads)
+        return Prediction(live, logits, self.values(heads, told), heads, feature)
 
     def losses(
         self, prediction: Prediction, code: Code, weights: Float[Tensor, "B K"] | None = None

@@ -8,6 +8,7 @@ itself included (scheduled sampling; the relabelling is that of dataset aggregat
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -18,7 +19,8 @@ from torch import Tensor
 
 from shapeprog.language.canvas import count, draw_blocks, so_far, unpacked
 from shapeprog.language.tensors import Code
-from shapeprog.models.generator import live_blocks
+from shapeprog.models.decoding import decode
+from shapeprog.models.generator import Generator, live_blocks
 
 Order = Literal["coverage", "written"]
 
@@ -81,6 +83,28 @@ def relabelled(
     block, enough = _best(draw_blocks(code), canvases)
     stop = torch.full_like(block, code.ids.shape[1] - 1)
     return Lesson(target, canvases, _taken(code, torch.where(enough, block, stop)), live)
+
+
+def on_own_canvases(generator: Generator, taught: Lesson, own: int, random: torch.Generator) -> Lesson:
+    """The lesson with the first ``own`` shapes taught on what the generator draws by sampling (scheduled sampling)."""
+    target, code = taught.target[:own], taught.code[:own]
+    training = generator.training
+    generator.eval()
+    drawn = decode(generator, target, blocks=code.ids.shape[1], choose="sample", random=random)
+    generator.train(training)
+    without_stop = Code(code.ids[:, :-1], code.parameters[:, :-1])
+    new = relabelled(target, without_stop, drawn.canvases, live_blocks(drawn.code.ids))
+    return joined([new, Lesson(taught.target[own:], taught.canvases[own:], taught.code[own:], taught.live[own:])])
+
+
+def joined(lessons: Sequence[Lesson]) -> Lesson:
+    """Lessons one after another as one."""
+    return Lesson(
+        torch.cat([each.target for each in lessons]),
+        torch.cat([each.canvases for each in lessons]),
+        Code(torch.cat([each.code.ids for each in lessons]), torch.cat([each.code.parameters for each in lessons])),
+        torch.cat([each.live for each in lessons]),
+    )
 
 
 def by_coverage(code: Code, drawn: Int[Tensor, "B K 32 32"]) -> tuple[Code, Int[Tensor, "B K 32 32"]]:

@@ -17,13 +17,11 @@ from torch import Tensor
 
 from shapeprog.data.synthetic import Stream, prior
 from shapeprog.errors import ShapeProgError
-from shapeprog.language.tensors import Code
 from shapeprog.models.checkpoint import card_of, load_generator, save_checkpoint
-from shapeprog.models.decoding import decode
-from shapeprog.models.generator import Generator, build_generator, live_blocks
+from shapeprog.models.generator import Generator, build_generator
 from shapeprog.training.engine import Engine
 from shapeprog.training.folder import Record
-from shapeprog.training.lessons import Lesson, lesson, relabelled
+from shapeprog.training.lessons import Lesson, lesson, on_own_canvases
 from shapeprog.training.loop import run
 from shapeprog.training.settings import Settings
 from shapeprog.training.validation import Validation
@@ -53,8 +51,9 @@ class PretrainSettings(Settings):
         How much the two losses count.
     """
 
-    rate: float = 1e-3
-    warm_up: int = 3200
+    batch: int = 48
+    rate: float = 2e-3
+    warm_up: int = 4800
     optimiser: Literal["adam", "adamw"] = "adamw"
     decay: float = 0.01
     clip: float = 1.0
@@ -65,8 +64,8 @@ class PretrainSettings(Settings):
     shapes: int = 0
     blocks: int = 10
     order: Literal["coverage", "written"] = "coverage"
-    rows: int = 0
-    sampled: float = 0.0
+    rows: int = 3
+    sampled: float = 0.3
     ids_weight: float = 1.0
     parameters_weight: float = 1.0
 
@@ -76,9 +75,9 @@ class PretrainSettings(Settings):
 PRESETS: dict[str, PretrainSettings] = {
     "default": PretrainSettings(),
     "tian2019": PretrainSettings(
-        design="tian2019", prior="narrow", shapes=120_000, visits=20 * 120_000, schedule="constant", warm_up=0,
-        optimiser="adam", decay=0.0, clip=0.1, clip_by="value", order="written", parameters_weight=3.0,
-        precision="float32", validate_every=120_000,
+        design="tian2019", prior="narrow", shapes=120_000, visits=20 * 120_000, batch=32, rate=1e-3,
+        schedule="constant", warm_up=0, optimiser="adam", decay=0.0, clip=0.1, clip_by="value", order="written",
+        rows=0, sampled=0.0, parameters_weight=3.0, precision="float32", validate_every=120_000,
     ),
 }  # fmt: skip
 """Settings by name: ours, and those of Tian et al. 2019, section B."""
@@ -125,7 +124,7 @@ class Pretraining:
         """Cross-entropy of ids and loss of parameters, as means over live steps."""
         own = round(self._settings.sampled * min(1.0, 2 * progress) * len(batch.target))
         if own:
-            batch = self._on_own_canvases(batch, own, random)
+            batch = on_own_canvases(self.module, batch, own, random)
         if self._settings.rows:
             batch = batch.pick(self._settings.rows, random)
         prediction = self.module.predict(batch.target, batch.canvases, batch.code.ids, batch.live)
@@ -134,25 +133,6 @@ class Pretraining:
             "ids": terms["ids"] * self._settings.ids_weight,
             "parameters": terms["parameters"] * self._settings.parameters_weight,
         }
-
-    def _on_own_canvases(self, batch: Lesson, own: int, random: torch.Generator) -> Lesson:
-        """The lesson with the first ``own`` shapes taught on what the generator draws by sampling."""
-        target, code = batch.target[:own], batch.code[:own]
-        self.module.eval()
-        drawn = decode(self.module, target, blocks=code.ids.shape[1], choose="sample", random=random)
-        self.module.train()
-        new = relabelled(
-            target, Code(code.ids[:, :-1], code.parameters[:, :-1]), drawn.canvases, live_blocks(drawn.code.ids)
-        )
-        return Lesson(
-            batch.target,
-            torch.cat([new.canvases, batch.canvases[own:]]),
-            Code(
-                torch.cat([new.code.ids, batch.code.ids[own:]]),
-                torch.cat([new.code.parameters, batch.code.parameters[own:]]),
-            ),
-            torch.cat([new.live, batch.live[own:]]),
-        )
 
     def validate(self) -> Record:
         """Scores on fixed synthetic shapes and on the packs."""

@@ -5,21 +5,19 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 import torch
-from jaxtyping import Float, Int, UInt8
+from jaxtyping import Bool, Float, Int, UInt8
 from torch import Tensor
 
 from shapeprog.errors import ShapeProgError
 from shapeprog.geometry.arrays import array, declared_kinds, over_threads, solids
 from shapeprog.geometry.distance import signed_distance
 from shapeprog.geometry.primitive import primitives
+from shapeprog.geometry.raster import cells_within, filled, spread
 from shapeprog.geometry.scene import Scene
 from shapeprog.space import RESOLUTION
 
 Words = npt.NDArray[np.uint32]
 """Rows of cells as bits, lowest cell in the lowest bit."""
-
-AT_ONCE = 1 << 21
-"""Cells that are tested together for primitives known by their declared distance."""
 
 
 def voxels(scene: Scene, resolution: int = RESOLUTION) -> UInt8[Tensor, "*batch R R R"]:
@@ -34,6 +32,8 @@ def voxels(scene: Scene, resolution: int = RESOLUTION) -> UInt8[Tensor, "*batch 
     resolution
         Cells along each side R; the scene is scaled with it.
     """
+    if scene.mask.device.type != "cpu" and resolution == RESOLUTION:
+        return spread(filled(scene))
     words = _words(scene, resolution)
     if resolution == RESOLUTION:
         cells = unpack(words[:, 0])
@@ -142,31 +142,18 @@ def _words(scene: Scene, resolution: int, plane: Int[Tensor, "B N"] | None = Non
 
 def _fill_declared(scene: Scene, kind: int, plane: Int[Tensor, "B N"], words: Words) -> None:
     """Add the cells whose centre a primitive of a declared kind contains, within its bounding box."""
-    resolution = words.shape[-1]
-    cell = RESOLUTION / resolution
     here = scene.mask & (scene.kind == kind)
-    program = plane[here]
     size, centre, rotation = (t[here].double() for t in (scene.size, scene.centre, scene.rotation))
     finite = torch.cat([size, centre, rotation.flatten(1)], -1).isfinite().all(-1)
-    program, size, centre, rotation = program[finite], size[finite], centre[finite], rotation[finite]
+    size, centre, rotation, plane = size[finite], centre[finite], rotation[finite], plane[here][finite]
     reach = (rotation.abs() @ primitives[kind].bound(size)[..., None])[..., 0]
-    first = ((centre - reach + RESOLUTION / 2) / cell - 0.5).floor().clamp(0, resolution).long()
-    last = ((centre + reach + RESOLUTION / 2) / cell + 0.5).ceil().clamp(0, resolution).long()
-    window = (last - first).clamp(min=0)
-    volume = window.prod(-1)
-    place = 0
-    while place < len(program):
-        stop = place + max(1, int((volume[place:].cumsum(0) <= AT_ONCE).sum()))
-        owner = torch.repeat_interleave(torch.arange(place, stop), volume[place:stop].cpu()).to(program.device)
-        begin = (volume[place:stop].cumsum(0) - volume[place:stop])[owner - place]
-        rest = torch.arange(len(owner), device=owner.device) - begin
-        side, depth = window[owner, 2], window[owner, 1]
-        index = torch.stack([rest // (side * depth), rest // side % depth, rest % side], -1) + first[owner]
-        offset = (index + 0.5) * cell - RESOLUTION / 2 - centre[owner]
+
+    def inside(owner: Int[Tensor, " C"], offset: Float[Tensor, "C 3"]) -> Bool[Tensor, " C"]:
         local = (rotation[owner].mT @ offset[..., None])[..., 0]
-        inside = primitives[kind].distance(local, size[owner]) <= 0
-        _set_cells(words, program[owner[inside]], index[inside])
-        place = stop
+        return primitives[kind].distance(local, size[owner]) <= 0
+
+    for owner, index in cells_within(centre, reach, inside, words.shape[-1]):
+        _set_cells(words, plane[owner], index)
 
 
 def _set_cells(words: Words, program: Int[Tensor, " M"], index: Int[Tensor, "M 3"]) -> None:

@@ -11,16 +11,9 @@ import math
 import numpy as np
 
 from shapeprog.geometry.compiling import helper, kernel
+from shapeprog.geometry.raster import CAP, REACH, SQUARE
 
 CYLINDER = 1.0
-REACH = 1.01
-"""A cell belongs to a cylinder when its centre is within this many radii of the axis."""
-
-CAP = 1e-3
-"""Slack in cells along the axis of a cylinder, so that a cap through a cell centre takes that cell."""
-
-SQUARE = 1e-6
-"""How far an entry of a rotation may be from 0 or 1 and still count as a right angle."""
 
 
 @helper

@@ -12,6 +12,7 @@ from jaxtyping import Int, UInt8
 from torch import Tensor
 
 from shapeprog.geometry.occupancy import packed_blocks, unpack
+from shapeprog.geometry.raster import filled_blocks, spread
 from shapeprog.language.tensors import Code
 from shapeprog.language.unroll import unroll
 from shapeprog.space import RESOLUTION
@@ -23,8 +24,10 @@ Canvas = Int[Tensor, "*batch 32 32"]
 def draw_blocks(code: Code) -> Int[Tensor, "*batch K 32 32"]:
     """The cells of every block on its own, as an executor of whole numbers draws it: parameters are rounded."""
     scene = unroll(Code(code.ids, code.parameters.detach().round()))
+    if code.ids.device.type != "cpu":
+        return filled_blocks(scene, code.ids.shape[-2])
     words = packed_blocks(scene, code.ids.shape[-2])
-    return torch.from_numpy(words.view(np.int32)).to(code.ids.device)
+    return torch.from_numpy(words.view(np.int32))
 
 
 def so_far(blocks: Int[Tensor, "*batch K 32 32"]) -> Int[Tensor, "*batch K 32 32"]:
@@ -48,7 +51,7 @@ def unpacked(canvas: Canvas) -> UInt8[Tensor, "*batch 32 32 32"]:
     """A canvas as cells, 1 or 0."""
     if canvas.device.type == "cpu":
         return torch.from_numpy(unpack(canvas.numpy().view(np.uint32)))
-    return ((canvas[..., None] >> _places(canvas.device)) & 1).to(torch.uint8)
+    return spread(canvas)
 
 
 def count(canvas: Canvas) -> Int[Tensor, "*batch"]:

@@ -35,6 +35,7 @@ for name, command, help_line in (
     ("statements", writing.statements_command, "Print the manual of the language."),
     ("prepare", measuring.prepare_command, "Turn a directory of models into packs."),
     ("pretrain", training.pretrain_command, "Pretrain a generator on synthetic furniture."),
+    ("train-executor", training.train_executor_command, "Train the neural executor on synthetic blocks."),
     ("evaluate", measuring.evaluate_command, "Measure predictions against targets."),
 ):
     app.command(name, short_help=help_line)(terminal.guarded(command))

@@ -88,6 +88,41 @@ def pretrain_command(
         _follow(records, folder, settings, engine, stop, quiet)
 
 
+def train_executor_command(
+    folder: Folder,
+    prior: Annotated[str | None, typer.Option(help="Synthetic furniture whose blocks are drawn.")] = None,
+    visits: Annotated[int | None, typer.Option(help="Blocks to learn from, in all.")] = None,
+    batch: Annotated[int | None, typer.Option(help="Blocks of one step in each process.")] = None,
+    rate: Rate = None,
+    widened: Annotated[float | None, typer.Option(help="Share of blocks whose numbers are moved at random.")] = None,
+    spread: Annotated[int | None, typer.Option(help="By how many cells they are moved at most.")] = None,
+    precision: Precision = None,
+    seed: terminal.Seed = 0,
+    validate_every: ValidateEvery = None,
+    device: Device = "auto",
+    threads: Threads = None,
+    restart: Restart = False,
+    tensorboard: TensorBoard = False,
+    modules: terminal.With = None,
+    quiet: Quiet = False,
+) -> None:
+    """Train the neural executor, which guided and hybrid adaptation draw with, on blocks of synthetic programs.
+
+    It goes on where it was when the same command is given again.
+    """
+    from shapeprog.training.engine import Engine
+    from shapeprog.training.executor import ExecutorSettings, train_executor
+
+    terminal.load_modules(modules)
+    settings = _given(ExecutorSettings(), locals())
+    with _stopping() as stop:
+        engine = Engine(device, settings.precision, threads)
+        records = train_executor(
+            folder, settings, engine, command=_command(), restart=restart, stop=stop, tensorboard=tensorboard
+        )
+        _follow(records, folder, settings, engine, stop, quiet)
+
+
 def _given(preset: Known, options: dict[str, Any]) -> Known:
     """The settings of a preset with the options that were given."""
     names = {field.name for field in fields(preset)}

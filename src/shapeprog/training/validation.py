@@ -18,7 +18,8 @@ from shapeprog.training.lessons import Lesson, Order, lesson
 SEED = 2**62
 """Seed of the synthetic shapes, far from any that training uses."""
 
-BATCH = 32
+SHAPES, BATCH = 512, 32
+"""How many synthetic shapes there are, and how many are looked at together."""
 
 
 class Validation:
@@ -36,8 +37,6 @@ class Validation:
         Files of real shapes.
     device
         Where the shapes are kept.
-    shapes
-        How many synthetic ones.
 
     Raises
     ------
@@ -52,11 +51,10 @@ class Validation:
         order: Order,
         packs: Sequence[Path] = (),
         device: torch.device | str = "cpu",
-        shapes: int = 512,
     ) -> None:
         self._blocks = blocks
         stream = Stream(prior(name), BATCH, seed=SEED, blocks=blocks, device=device)
-        made = (stream[index] for index in range(max(1, shapes // BATCH)))
+        made = (stream[index] for index in range(SHAPES // BATCH))
         self._lessons = [lesson(each.voxels, each.code, order) for each in made]
         self._packs = {Path(path).stem: list(read_pack(path)) for path in packs}
 
@@ -91,5 +89,5 @@ def told(generator: Generator, each: Lesson) -> tuple[float, float, float, float
     ids, values = each.code.ids[each.live], each.code.parameters[each.live]
     prediction = generator.predict(each.target, each.canvases, each.code.ids, each.live)
     used = generator.vocabulary.used.to(ids.device)[ids]
-    off = ((prediction.values - values).abs() * used).sum()
+    off = ((prediction.values.detach() - values).abs() * used).sum()
     return float((prediction.logits.argmax(-1) == ids).sum()), ids.numel(), float(off), float(used.sum())

@@ -84,20 +84,28 @@ def _case(draft: Draft, room: Room, solid: Flag, panels: Flag, tub: Flag) -> Non
     proud = covered & dice.chance(0.75)
     eaves = torch.where(proud, 1.0, 0.0)
     bottom = room.floor + raised
-    fronted = ~plain & ~tub & dice.chance(0.55)
+    fronted = solid & ~plain & dice.chance(0.62)
     ahead = torch.where(fronted, 1.0, 0.0)
     body = Room(room.up - raised - lid, room.depth - 2 * eaves - ahead, room.side - 2 * eaves)
     front, rear, left = room.front + eaves + ahead, room.rear - eaves, room.left + eaves
-    draft.box("locker", (bottom, front, left), (body.up, body.depth, body.side), keep=solid)
+    framed = solid & ~plain & ~fronted & dice.chance(0.5)
+    recess = torch.where(framed, dice.whole(1, 2), 0.0)
+    draft.box("locker", (bottom, front + recess, left), (body.up, body.depth - recess, body.side), keep=solid)
+    _frame(draft, body, bottom, front, left, framed)
     _panelled(draft, body, bottom, front, rear, left, panels)
     _tub(draft, body, bottom, front, rear, left, tub)
-    draft.box("top", (room.ceiling - lid, room.front, room.left), (lid, room.depth, room.side), keep=covered)
-    _fronts(draft, body, bottom, front, left, fronted, panels)
+    # A top that may overhang, or only a rim around it.
+    rim = covered & ~proud & dice.chance(0.5)
+    draft.box("top", (room.ceiling - lid, room.front, room.left), (lid, room.depth, room.side), keep=covered & ~rim)
+    draft.box("vertical_board", (room.ceiling - lid, room.rear - 1, room.left), (lid, 1, room.side), keep=rim)
+    low, size = (room.ceiling - lid, front, room.left), (lid, body.depth, draft.column(1))
+    draft.box("side", low, size, keep=rim & dice.chance(0.6), repeat=[mirrored(low, size)])
+    _fronts(draft, body, bottom, front, left, fronted)
     # What it stands on.
     foot = dice.pick(1, 2, 3, weights=(0.3, 0.5, 0.2))
     low, size = (room.floor, front, left), (raised, foot, foot)
-    draft.box("leg", low, size, keep=footed, repeat=[mirrored(low, size), (2, (0, 0 * foot + body.depth - foot, 0))])
-    shrink = dice.pick(0, 1, 2, weights=(0.2, 0.5, 0.3))
+    draft.box("leg", low, size, keep=footed, repeat=[mirrored(low, size), (2, (0, body.depth - foot, 0))])
+    shrink = torch.where(proud & dice.chance(0.6), -1.0, dice.pick(0, 1, 2, weights=(0.2, 0.5, 0.3)))
     draft.box(
         "locker", (room.floor, front + shrink, left + shrink), (raised, body.depth - shrink, body.side - 2 * shrink),
         keep=plinth,
@@ -105,6 +113,25 @@ def _case(draft: Draft, room: Room, solid: Flag, panels: Flag, tub: Flag) -> Non
     slab = dice.pick(1, 2)
     low, size = (room.floor, front, left), (raised, body.depth, slab)
     draft.box("side", low, size, keep=apron, repeat=[mirrored(low, size)])
+
+
+def _frame(draft: Draft, body: Room, bottom: Whole, front: Whole, left: Whole, here: Flag) -> None:
+    """Sides and boards that stand proud of a front."""
+    dice = draft.dice
+    slab = dice.pick(1, 2, 3, weights=(0.5, 0.3, 0.2))
+    low, size = (bottom, front, left), (body.up, body.depth, slab)
+    draft.box("side", low, size, keep=here & dice.chance(0.85), repeat=[mirrored(low, size)])
+    board = dice.pick(1, 2)
+    count = dice.pick(1, 2, 3, 4, weights=(0.2, 0.5, 0.15, 0.15))
+    pitch = spread(count, body.up, board)
+    draft.box(
+        "shelf", (bottom + body.up - board - pitch * (count - 1), front, left), (board, body.depth, body.side),
+        keep=here & dice.chance(0.8), repeat=[(count, (pitch, 0, 0))],
+    )  # fmt: skip
+    thick = dice.pick(1, 2)
+    draft.box(
+        "side", (bottom, front, -torch.ceil(thick / 2)), (body.up, body.depth, thick), keep=here & dice.chance(0.3)
+    )
 
 
 def _panelled(
@@ -160,7 +187,7 @@ def _tub(
 
 
 def _fronts(
-    draft: Draft, body: Room, bottom: Whole, front: Whole, left: Whole, here: Flag, panels: Flag
+    draft: Draft, body: Room, bottom: Whole, front: Whole, left: Whole, here: Flag
 ) -> None:  # fmt: skip
     """Doors, drawers or handles that stand a cell proud of the front."""
     dice = draft.dice

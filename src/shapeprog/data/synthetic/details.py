@@ -49,11 +49,18 @@ def _detail(draft: Draft, cell: Float[Tensor, "n 3"], low: Tensor, high: Tensor,
         torch.where(rail | side, long, torch.where(bar | post, thin[1], torch.where(chunk, dice.whole(2, 6), thin[0]))),
         torch.where(bar | front, long, torch.where(rail | post, thin[1], torch.where(chunk, other, thin[0]))),
     )
+    # Furniture is alike on the left and on the right, but for a few parts.
+    alike = dice.chance(0.9)
+    covers = alike & ((bar | front) | (chunk & dice.chance(0.3)))
     start: list[Whole] = []
     size: list[Whole] = []
     for axis, length in enumerate(wanted):
+        if axis == SIDE:
+            length = torch.where(covers, 2 * torch.maximum(-cell[:, axis], cell[:, axis] + 1), length)
         length = torch.minimum(length, high[:, axis] - low[:, axis])
         place = cell[:, axis] - torch.floor(dice.uniform() * (length + 1))  # beside the cell, or over it
+        if axis == SIDE:
+            place = torch.where(covers, -length / 2, place)
         start.append(torch.minimum(torch.maximum(place, low[:, axis]), high[:, axis] - length))
         size.append(length)
     corner, extent = (start[UP], start[DEPTH], start[SIDE]), (size[UP], size[DEPTH], size[SIDE])
@@ -61,7 +68,7 @@ def _detail(draft: Draft, cell: Float[Tensor, "n 3"], low: Tensor, high: Tensor,
     twice = mirrored(corner, extent)
     # The copy of a part on the right is on the left: loops begin there.
     left = torch.minimum(corner[SIDE], corner[SIDE] + twice[1][2])
-    pair = apart & dice.chance(0.6)
+    pair = apart & alike
     corner = (corner[UP], corner[DEPTH], torch.where(pair, left, corner[SIDE]))
     copies = (torch.where(pair, 2.0, 1.0), (0, 0, -2 * left - extent[SIDE]))
     for role, chosen in (

@@ -39,7 +39,7 @@ def sofa(draft: Draft) -> None:
     # Arms from the floor or from the legs up.
     rise = torch.minimum(dice.whole(1, 4), room.up - seat)
     base = floor + torch.where(dice.chance(0.5), raised, 0.0)
-    back = torch.where(dice.chance(0.75), 0.0, dice.pick(1, 2))
+    back = torch.where(dice.chance(0.75) | (raised > 0), 0.0, dice.pick(1, 2))
     low, size = (base, front + short + back, room.left), (floor + seat + rise - base, room.depth - short - back, arm)
     draft.box("side", low, size, keep=armed, repeat=[mirrored(low, size)])
     # Cushions with a cell between them.
@@ -69,11 +69,10 @@ def sofa(draft: Draft) -> None:
 def bed(draft: Draft) -> None:
     """Beds: a mattress on a frame or slats between head and foot boards, on legs or posts; bunk beds; canopies."""
     dice = draft.dice
-    bunk, plain = dice.chance(0.12), dice.chance(0.8)
-    room = make_room(
-        dice, torch.where(bunk, dice.even(16, 22), dice.even(6, 16)), draft.column(24),
-        torch.where(bunk, dice.even(10, 14), dice.even(12, 24)),
-    )  # fmt: skip
+    bunk, plain = dice.chance(0.12), dice.chance(0.88)
+    high = torch.where(plain, dice.even(6, 16), dice.even(4, 8))
+    wide = torch.where(bunk, dice.even(10, 14), dice.even(12, 24))
+    room = make_room(dice, torch.where(bunk, dice.even(16, 22), high), draft.column(24), wide)
     floor, front, left = room.floor, room.front, room.left
     raised = dice.pick(0, 1, 2, 3, weights=(0.35, 0.2, 0.25, 0.2))
     lying = torch.where(bunk, 3.0, (room.up * (0.4 + 0.3 * dice.uniform())).round())
@@ -87,7 +86,8 @@ def bed(draft: Draft) -> None:
     frame = torch.minimum(dice.pick(1, 2, 3), lying - raised - 1)
     slim = dice.pick(0, 1, weights=(0.4, 0.6))
     slatted = dice.chance(0.12) & (raised > 0)
-    low, size = (floor + raised, front, left), (frame, room.depth, room.side)
+    ahead = torch.where(bunk, 0.0, foot)
+    low, size = (floor + raised, front + ahead, left), (frame, room.depth - ahead - head, room.side)
     draft.box("locker", low, size, keep=~slatted, repeat=[up])
     count = dice.whole(5, 8)
     step = torch.floor(room.depth / count)
@@ -102,13 +102,10 @@ def bed(draft: Draft) -> None:
     size = (lying - raised - frame, room.depth - head - foot, room.side - 2 * slim)
     draft.box("locker", low, size, keep=~slatted | bunk, repeat=[up])
     # Head and foot.
-    tall = torch.where(bunk, room.up, dice.pick(room.up, room.up, lying + 1))
-    draft.box(
-        "back", (floor, room.rear - head, left), (torch.minimum(tall, room.up), head, room.side),
-        keep=dice.chance(0.85) & (plain | bunk),
-    )  # fmt: skip
+    tall = torch.where(plain | bunk, room.up, lying)
+    draft.box("back", (floor, room.rear - head, left), (tall, head, room.side))
     low_foot = torch.minimum(lying + dice.whole(0, 4), room.up)
-    draft.box("vertical_board", (floor, front, left), (low_foot, foot, room.side), keep=(foot > 0) & ~bunk)
+    draft.box("vertical_board", (floor, front, left), (low_foot, foot, room.side), keep=(foot > 0) & ~bunk & plain)
     # Pillows lie at the head.
     pillows = dice.whole(1, 2)
     long = torch.floor((room.side - 2) / pillows) - 1

@@ -74,7 +74,7 @@ class Prior:
     def drawn(self, count: int, generator: torch.Generator) -> tuple[Code, Canvas]:
         """Programs, as by calling, and what they draw: packed cells (count, 32, 32)."""
         code, canvas = self._visible(self._propose(count, generator))
-        if self.details:
+        if self.details and _furniture():
             dice = Dice(count, generator)
             more, here = details(dice, canvas), dice.chance(self.details)[:, None, None]
             code, canvas = self._visible(_joined([code, Code(more.ids * here, more.parameters * here[..., None])]))
@@ -92,9 +92,8 @@ class Prior:
     def _propose(self, count: int, generator: torch.Generator) -> Code:
         """Programs with blocks that may be hidden."""
         dice = Dice(count, generator)
-        furniture = all(number in language() for number in range(1, END))
-        own = own_statements() if self.own or not furniture else []
-        if furniture:
+        own = own_statements() if self.own or not _furniture() else []
+        if _furniture():
             code = self._mixed(count, generator)
             more = random_blocks(dice) if own else None
             if more is not None:
@@ -131,6 +130,11 @@ class Prior:
         """The programs without the blocks that the others hide or that lie outside of the grid."""
         keep, canvas = with_own_cells(draw_blocks(code))
         return _front(code, keep, self.blocks), canvas
+
+
+def _furniture() -> bool:
+    """Whether the language in force has all built-in statements, which templates use."""
+    return all(number in language() for number in range(1, END))
 
 
 def _front(code: Code, keep: Bool[Tensor, "n K"], blocks: int) -> Code:

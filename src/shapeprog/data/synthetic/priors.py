@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 
-from shapeprog.data.synthetic import cases, lounging, narrow, seating, tables
+from shapeprog.data.synthetic import cases, compounds, lounging, narrow, seating, tables
 from shapeprog.data.synthetic.mixture import Prior
 from shapeprog.errors import InputError
 
@@ -12,15 +12,18 @@ WIDE = Prior(
     "wide",
     blocks=10,
     templates=(
-        (seating.bench, 0.24),
+        (seating.bench, 0.23),
         (seating.chair, 0.12),
         (seating.stool, 0.03),
         (tables.table, 0.1),
         (tables.desk, 0.05),
-        (cases.cabinet, 0.24),
+        (cases.cabinet, 0.2),
+        (compounds.hutch, 0.04),
+        (compounds.corner, 0.02),
+        (compounds.pigeonholes, 0.02),
         (cases.television_stand, 0.04),
         (cases.night_stand, 0.03),
-        (cases.bookshelf, 0.06),
+        (cases.bookshelf, 0.05),
         (lounging.sofa, 0.05),
         (lounging.bed, 0.04),
     ),

@@ -77,6 +77,13 @@ def opposite(low: Triple, size: Triple, front: Number, depth: Number) -> Rows:
     return 2, (0, 2 * front + depth - 2 * low[1] - size[1], 0)
 
 
+def row(count: Whole, room: Number, size: Number) -> Rows:
+    """``count`` copies from end to end of a stretch left to right, or two where so many do not fit evenly."""
+    between = (count - 1).clamp(min=1)
+    many = torch.where(torch.remainder(room - size, between) == 0, count, 2.0)
+    return many, (0, 0, spread(many, room, size))
+
+
 def spread(count: Whole, room: Number, size: Number) -> Whole:
     """The step from one to the next of ``count`` equal parts that fill a stretch from end to end, in whole cells."""
     return torch.floor((room - size) / (count - 1).clamp(min=1))

@@ -8,7 +8,7 @@ import torch
 
 from shapeprog.data.synthetic.dice import Flag, Whole
 from shapeprog.data.synthetic.draft import Draft
-from shapeprog.data.synthetic.room import Room, make_room, mirrored, opposite, spread
+from shapeprog.data.synthetic.room import Room, make_room, mirrored, opposite, row, spread
 
 
 @dataclass(frozen=True)
@@ -75,9 +75,9 @@ def _seat_and_all(
         room.side - 2 * torch.where(outside, arm, dice.pick(0, 1, weights=(0.85, 0.15))),
     )
     _surface(draft, room, seat, long=long)
-    _supports(draft, room, seat, panels, long=long)
-    _back(draft, room, seat, backed, tilt)
-    _arms(draft, room, seat, arms, panels, arm)
+    risers = _supports(draft, room, seat, panels, backed & (tilt == 0) & dice.chance(0.25), long=long)
+    _back(draft, room, seat, backed, tilt, risers)
+    _arms(draft, room, seat, arms, backed, panels, outside, arm, long=long)
 
 
 def _surface(draft: Draft, room: Room, seat: Seat, *, long: bool) -> None:
@@ -109,7 +109,8 @@ def _surface(draft: Draft, room: Room, seat: Seat, *, long: bool) -> None:
     )  # fmt: skip
 
 
-def _supports(draft: Draft, room: Room, seat: Seat, panels: Flag, *, long: bool) -> None:
+def _supports(draft: Draft, room: Room, seat: Seat, panels: Flag, risers: Flag, *, long: bool) -> Flag:
+    """What the seat stands on; where asked for, and there are legs, those at the rear rise to carry the back."""
     dice = draft.dice
     legs, sides, trestles, sled, body, central = dice.kind(
         *((0.44, 0.2, 0.1, 0.1, 0.16, 0) if long else (0.55, 0.08, 0, 0.12, 0.07, 0.18))
@@ -121,24 +122,31 @@ def _supports(draft: Draft, room: Room, seat: Seat, panels: Flag, *, long: bool)
     wide, deep = dice.pick(1, 2, 3, weights=(0.35, 0.5, 0.15)), dice.pick(1, 2, 3, weights=(0.4, 0.45, 0.15))
     start = front + torch.where(seat.depth > 8, dice.pick(0, 1, weights=(0.7, 0.3)), 0.0)
     low, size = (floor, start, left), (seat.under, deep, wide)
-    rows = dice.pick(2, 3, 4, weights=(0.85, 0.1, 0.05)) if long else draft.column(2)
-    along = (rows, (0, 0, spread(rows, seat.side - 2 * inset, wide)))
+    along = row(
+        dice.pick(2, 3, 4, weights=(0.75, 0.17, 0.08)) if long else draft.column(2), seat.side - 2 * inset, wide
+    )
     standing = (legs | sled) & ~panels
-    draft.box("leg", low, size, keep=standing, repeat=[along, opposite(low, size, front, seat.depth)])
+    risers = risers & standing
+    behind = opposite(low, size, front, seat.depth)
+    pairs = (torch.where(risers, 1.0, 2.0), behind[1])
+    draft.box("leg", low, size, keep=standing, repeat=[along, pairs])
+    low, size = (floor, start + behind[1][1], left), (room.up, deep, wide)
+    draft.box("leg", low, size, keep=risers, repeat=[along])
     runner = dice.pick(1, 2)
     foot_low, foot_size = (floor, start, left), (runner, seat.depth - 2 * (start - front), wide)
     draft.box("horizontal_bar", foot_low, foot_size, keep=sled & ~panels, repeat=[along])
     # Bars between the legs, lengthwise and from front to rear.
     height = floor + (seat.under * (0.2 + 0.5 * dice.uniform())).round()
     bar = torch.minimum(dice.pick(1, 2, weights=(0.75, 0.25)), wide)
-    middle = dice.chance(0.35)
+    lengthwise, crosswise = dice.chance(0.25), dice.chance(0.3)
+    middle = crosswise & dice.chance(0.5)
     low = (height, torch.where(middle, front + torch.floor((seat.depth - bar) / 2), start), left)
     size = (bar, bar, seat.side - 2 * inset)
     across = opposite(low, size, front, seat.depth)
     twice = (torch.where(middle, 1.0, 2.0), across[1])
-    draft.box("horizontal_bar", low, size, keep=standing & dice.chance(0.25), repeat=[twice])
+    draft.box("horizontal_bar", low, size, keep=standing & lengthwise, repeat=[twice])
     low, size = (height, start, left), (bar, seat.depth - 2 * (start - front), bar)
-    draft.box("horizontal_bar", low, size, keep=standing & dice.chance(0.25), repeat=[along])
+    draft.box("horizontal_bar", low, size, keep=standing & crosswise, repeat=[along])
     # Panels at the sides, boards, or a body.
     thick = dice.pick(1, 2, 3, weights=(0.4, 0.45, 0.15))
     low, size = (floor, front, left), (seat.under, seat.depth, thick)
@@ -150,11 +158,21 @@ def _supports(draft: Draft, room: Room, seat: Seat, panels: Flag, *, long: bool)
         draft.box("leg", low, size, keep=trestles & ~panels & (narrow <= 3), repeat=[mirrored(low, size)])
         draft.box("side", low, size, keep=trestles & ~panels & (narrow > 3), repeat=[mirrored(low, size)])
     shrink = dice.pick(0, 1, weights=(0.6, 0.4))
+    parts = dice.pick(1, 2, 3, weights=(0.75, 0.15, 0.1)) if long else draft.column(1)
+    share = torch.where(parts > 1, dice.whole(4, 6), seat.side - 2 * inset)
+    many, step = row(parts, seat.side - 2 * inset, share)
     draft.box(
-        "locker", (floor, front + shrink, left), (seat.under, seat.depth - 2 * shrink, seat.side - 2 * inset), keep=body
-    )
+        "locker", (floor, front + shrink, left), (seat.under, seat.depth - 2 * shrink, share), keep=body,
+        repeat=[(torch.where(parts > 1, many, 1.0), step)],
+    )  # fmt: skip
+    # A rim under the edges of the seat.
+    tall = torch.minimum(dice.whole(1, 2), (seat.under - 2).clamp(min=1))
+    low, size = (floor + seat.under - tall, start, left), (tall, draft.column(1), seat.side - 2 * inset)
+    rim = opposite(low, size, front, seat.depth)
+    draft.box("horizontal_bar", low, size, keep=(standing | sides) & ~panels & dice.chance(0.15), repeat=[rim])
     if not long:
         _central(draft, room, seat, central & ~panels)
+    return risers
 
 
 def _central(draft: Draft, room: Room, seat: Seat, here: Flag) -> None:
@@ -183,7 +201,7 @@ def _central(draft: Draft, room: Room, seat: Seat, here: Flag) -> None:
     )  # fmt: skip
 
 
-def _back(draft: Draft, room: Room, seat: Seat, backed: Flag, tilt: Whole) -> None:
+def _back(draft: Draft, room: Room, seat: Seat, backed: Flag, tilt: Whole, risers: Flag) -> None:
     dice = draft.dice
     gap = torch.where(dice.chance(0.55), 0.0, dice.whole(1, 3))
     tall = (room.up - seat.top - gap).clamp(min=2)
@@ -195,7 +213,11 @@ def _back(draft: Draft, room: Room, seat: Seat, backed: Flag, tilt: Whole) -> No
     board, rails, spindles, rail = dice.kind(0.5, 0.22, 0.14, 0.14)
     framed = rails | spindles | rail
     # Boards lean; what is made of rails and posts leans by whole steps from rail to rail.
-    draft.box("back", (bottom, start, left), (tall, thick, wide), keep=backed & (board | (tall < 5)), tilt=tilt)
+    solid = backed & (board | (tall < 5))
+    draft.box("back", (bottom, start, left), (tall, thick, wide), keep=solid, tilt=tilt)
+    post = dice.pick(1, 2)
+    low, size = (room.floor + seat.top, start, left + dice.whole(0, 2)), (gap, thick, post)
+    draft.box("back_support", low, size, keep=solid & ~risers & (gap > 0), repeat=[mirrored(low, size)])
     framed = backed & framed & (tall >= 5)
     high = dice.pick(1, 2, weights=(0.4, 0.6))
     space = dice.pick(1, 2)
@@ -208,7 +230,6 @@ def _back(draft: Draft, room: Room, seat: Seat, backed: Flag, tilt: Whole) -> No
     draft.box(
         "chair_beam", (room.ceiling - high - 1, start + tilt, left), (high + 1, thick, wide), keep=framed & ~rails
     )
-    post = dice.pick(1, 2)
     count = torch.where(spindles, dice.whole(3, 8), dice.pick(2, 3, weights=(0.8, 0.2)))
     count = torch.minimum(count, torch.floor(wide / (post + 1)))
     pitch = spread(count, wide - 2 * inset, post)
@@ -217,7 +238,7 @@ def _back(draft: Draft, room: Room, seat: Seat, backed: Flag, tilt: Whole) -> No
     leaning = tilt > 0
     draft.box(
         "back_support", (base, room.rear - thick, -torch.floor(width / 2)), (room.up - seat.top - high, thick, post),
-        keep=framed & ~leaning, repeat=[(count, (0, 0, pitch))],
+        keep=framed & ~leaning & (spindles | ~risers), repeat=[(count, (0, 0, pitch))],
     )  # fmt: skip
     draft.box(
         "back", (base, start, -torch.floor(width / 2)), (room.up - seat.top - high, thick, post),
@@ -225,7 +246,10 @@ def _back(draft: Draft, room: Room, seat: Seat, backed: Flag, tilt: Whole) -> No
     )  # fmt: skip
 
 
-def _arms(draft: Draft, room: Room, seat: Seat, arms: Flag, panels: Flag, width: Whole) -> None:
+def _arms(
+    draft: Draft, room: Room, seat: Seat, arms: Flag, backed: Flag, panels: Flag, outside: Flag, width: Whole, *,
+    long: bool,
+) -> None:  # fmt: skip
     dice = draft.dice
     above = torch.minimum((room.up - seat.top).clamp(min=2), dice.whole(3, 7))
     thick = dice.pick(1, 2, weights=(0.7, 0.3))
@@ -235,10 +259,16 @@ def _arms(draft: Draft, room: Room, seat: Seat, arms: Flag, panels: Flag, width:
     draft.box("side", low, size, keep=arms & panels, repeat=[mirrored(low, size)])
     beams = arms & ~panels
     low, size = (room.floor + seat.top + above - thick, front, left), (thick, seat.depth - short, width)
-    draft.box("chair_beam", low, size, keep=beams, repeat=[mirrored(low, size)])
-    posts, block = dice.chance(0.8), dice.chance(0.15)
+    block = beams & dice.chance(0.2)
+    along = row(dice.pick(2, 3, weights=(0.85, 0.15)) if long else draft.column(2), room.side, width)
+    draft.box("chair_beam", low, size, keep=beams & ~block, repeat=[along])
+    # Posts carry them in front, at both ends where there is no back, and down to the floor beside the seat.
+    posts = beams & ~block & (dice.chance(0.8) | ~backed)
     deep = dice.pick(1, 2)
     low, size = (room.floor + seat.top, front, left), (above - thick, deep, width)
-    draft.box("chair_beam", low, size, keep=beams & posts & ~block, repeat=[mirrored(low, size)])
-    low, size = (room.floor + seat.under, front, left), (above, seat.depth - short, width)
-    draft.box("side", low, size, keep=beams & block, repeat=[mirrored(low, size)])
+    ends = (torch.where(backed, 1.0, 2.0), (0, seat.depth - short - deep, 0))
+    draft.box("chair_beam", low, size, keep=posts & ~outside, repeat=[along, ends])
+    low, size = (room.floor, front, left), (seat.top + above - thick, deep, width)
+    draft.box("leg", low, size, keep=posts & outside, repeat=[mirrored(low, size), ends])
+    low, size = (room.floor + seat.under, front, left), (above + seat.thickness, seat.depth - short, width)
+    draft.box("side", low, size, keep=block, repeat=[mirrored(low, size)])

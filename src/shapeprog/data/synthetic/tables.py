@@ -6,7 +6,7 @@ import torch
 
 from shapeprog.data.synthetic.dice import Flag, Whole
 from shapeprog.data.synthetic.draft import Draft
-from shapeprog.data.synthetic.room import Room, make_room, mirrored, opposite, spread
+from shapeprog.data.synthetic.room import Room, make_room, mirrored, opposite, row
 
 
 def table(draft: Draft) -> None:
@@ -100,8 +100,7 @@ def _legs(draft: Draft, room: Room, under: Whole, inset: Whole, here: Flag) -> N
     thick = dice.pick(1, 2, 3, weights=(0.35, 0.5, 0.15))
     low, size = (room.floor, room.front + inset, room.left + inset), (under, thick, thick)
     wide, deep = room.side - 2 * inset, room.depth - 2 * inset
-    rows = dice.pick(2, 3, weights=(0.93, 0.07))
-    along = (rows, (0, 0, spread(rows, wide, thick)))
+    along = row(dice.pick(2, 3, weights=(0.9, 0.1)), wide, thick)
     draft.box("leg", low, size, keep=here, repeat=[along, opposite(low, size, room.front, room.depth)])
     # Frames: bars from front to rear, and lengthwise.
     height = room.floor + torch.where(dice.chance(0.4), 0.0, (under * 0.6 * dice.uniform()).round())
@@ -110,10 +109,10 @@ def _legs(draft: Draft, room: Room, under: Whole, inset: Whole, here: Flag) -> N
     draft.box("horizontal_bar", low, size, keep=here & dice.chance(0.25), repeat=[mirrored(low, size)])
     low, size = (height, room.front + inset, room.left + inset), (bar, bar, wide)
     rear_only = dice.chance(0.3)
-    middle = (height, torch.floor(-bar / 2), room.left + inset)
+    rear = opposite(low, size, room.front, room.depth)
     long = here & dice.chance(0.25)
-    draft.box("horizontal_bar", low, size, keep=long & ~rear_only, repeat=[opposite(low, size, room.front, room.depth)])
-    draft.box("horizontal_bar", middle, size, keep=long & rear_only)
+    draft.box("horizontal_bar", low, size, keep=long & ~rear_only, repeat=[rear])
+    draft.box("horizontal_bar", (low[0], low[1] + rear[1][1], low[2]), size, keep=long & rear_only)
 
 
 def _panels(draft: Draft, room: Room, under: Whole, inset: Whole, here: Flag) -> None:
@@ -158,17 +157,22 @@ def _column(draft: Draft, room: Room, under: Whole, here: Flag) -> None:
     dice = draft.dice
     most = torch.floor(room.depth / 2)
     radius = torch.minimum(dice.pick(1, 2, 3, 4, weights=(0.35, 0.35, 0.2, 0.1)), most - 1)
-    at, square = (room.floor, 0.0, 0.0), dice.chance(0.35)
-    draft.add("support_cylinder", at=at, height=under, radius=radius, keep=here & ~square)
-    draft.add("support_cuboid", at=at, height=under, half=radius, keep=here & square)
+    square = dice.chance(0.35)
+    # Long tables stand on two.
+    two = room.side > 1.4 * room.depth
+    apart = torch.where(two, torch.floor(room.side / 2) - torch.remainder(torch.floor(room.side / 2), 2), 0.0)
+    at = (room.floor, 0.0, -apart / 2)
+    pair = [(torch.where(two, 2.0, 1.0), (0, 0, apart))]
+    draft.add("support_cylinder", at=at, height=under, radius=radius, keep=here & ~square, repeat=pair)
+    draft.add("support_cuboid", at=at, height=under, half=radius, keep=here & square, repeat=pair)
     reach = torch.maximum((most * (0.4 + 0.5 * dice.uniform())).floor(), radius + 1)
     thick = dice.pick(1, 2, weights=(0.7, 0.3))
     disc, plate, cross, star, _ = dice.kind(0.3, 0.2, 0.25, 0.15, 0.1)
-    draft.add("base_circle", at=at, thickness=thick, radius=reach, keep=here & disc)
-    draft.add("base_square", at=at, thickness=thick, half=reach, keep=here & plate)
-    draft.add("base_cross", at=at, thickness=thick, length=reach, turn=0.0, turns=(4, 1), keep=here & cross)
+    draft.add("base_circle", at=at, thickness=thick, radius=reach, keep=here & disc, repeat=pair)
+    draft.add("base_square", at=at, thickness=thick, half=reach, keep=here & plate, repeat=pair)
+    draft.add("base_cross", at=at, thickness=thick, length=reach, turn=0.0, turns=(4, 1), keep=here & cross & ~two)
     spokes = dice.pick(3, 4, 5, 6)
     draft.add(
         "line", start=(room.floor + dice.whole(0, 3), 0.0, 0.0), end=(room.floor, 1 - reach, 0.0), radius=1.0,
-        turns=(spokes, 0), keep=here & star,
+        turns=(spokes, 0), keep=here & star & ~two,
     )  # fmt: skip

@@ -12,7 +12,7 @@ from typing import Annotated
 
 import typer
 
-from shapeprog.cli import inferring, measuring, terminal, training, writing
+from shapeprog.cli import inferring, measuring, modelling, terminal, training, writing
 
 # Before torch is loaded: its idle workers would spin on the cores that the kernels of other threads want.
 os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
@@ -36,6 +36,8 @@ for name, command, help_line in (
     ("prepare", measuring.prepare_command, "Turn a directory of models into packs."),
     ("pretrain", training.pretrain_command, "Pretrain a generator on synthetic furniture."),
     ("train-executor", training.train_executor_command, "Train the neural executor on synthetic blocks."),
+    ("models", modelling.models_command, "List the weights that ship, and those in folders."),
+    ("import-weights", modelling.import_weights_command, "Turn published weights into a file of this package."),
     ("evaluate", measuring.evaluate_command, "Measure predictions against targets."),
 ):
     app.command(name, short_help=help_line)(terminal.guarded(command))

@@ -11,7 +11,8 @@ training and used in evaluation, unless ``statistics="batch"`` asks for the publ
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import torch
@@ -270,3 +271,27 @@ class Tian2019(Generator):
             "ids": (surprise * counts).sum() / counts.sum().clamp(min=1e-6),
             "parameters": (off * slots).sum() / slots.sum().clamp(min=1e-6),
         }
+
+
+Told = tuple[UInt8[Tensor, "B 32 32 32"], Int[Tensor, "B K 32 32"], Bool[Tensor, "B K"]]
+"""Targets, packed canvases, and which blocks count."""
+
+
+@torch.no_grad()
+def calibrated(generator: Tian2019, batches: Iterable[Told]) -> Tian2019:
+    """The same weights with running statistics: the mean of those of the batches, as after training.
+
+    Published weights have none, and every prediction depends on its batch; with those of many shapes it does not.
+    """
+    settings = replace(generator.settings, statistics="running")
+    made = Tian2019(settings, generator.vocabulary)
+    made.load_state_dict(generator.state_dict(), strict=False)  # all but the statistics
+    norms = [each for each in made.modules() if isinstance(each, nn.BatchNorm3d)]
+    for norm in norms:
+        norm.momentum = None  # a plain mean
+    made.train()
+    for target, canvases, live in batches:
+        made.perceive_all(target, canvases, live)
+    for norm in norms:
+        norm.momentum = MOMENTUM
+    return made.eval()

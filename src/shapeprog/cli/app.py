@@ -12,7 +12,7 @@ from typing import Annotated
 
 import typer
 
-from shapeprog.cli import inferring, measuring, modelling, terminal, training, writing
+from shapeprog.cli import inferring, measuring, modelling, sampling, terminal, training, writing
 
 # Before torch is loaded: its idle workers would spin on the cores that the kernels of other threads want.
 os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
@@ -34,6 +34,7 @@ for name, command, help_line in (
     ("sheet", writing.sheet_command, "Draw a contact sheet of a folder of programs."),
     ("statements", writing.statements_command, "Print the manual of the language."),
     ("prepare", measuring.prepare_command, "Turn a directory of models into packs."),
+    ("sample", sampling.sample_command, "Draw synthetic furniture: a contact sheet or a data set."),
     ("pretrain", training.pretrain_command, "Pretrain a generator on synthetic furniture."),
     ("train-executor", training.train_executor_command, "Train the neural executor on synthetic blocks."),
     ("models", modelling.models_command, "List the weights that ship, and those in folders."),

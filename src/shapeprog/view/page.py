@@ -124,8 +124,9 @@ def contact_sheet(
         raise OutputError("there is nothing to put on the contact sheet", "name a folder that holds programs")
     wide, tall = SMALL
     across = min(columns, len(items))
-    cell, row = 2 * wide + _PAD, tall + 52
     drawn = [_pair(item) for item in items]
+    beside = wide if any(left is not None for left, _, _ in drawn) else 0  # room for inputs only where there are any
+    cell, row = wide + beside + _PAD, tall + 52
     words = sorted({statement for _, _, used in drawn for statement in used})
     width = across * cell + _PAD
     legend = _legend_rows(words, width - 2 * _PAD)
@@ -140,11 +141,12 @@ def contact_sheet(
             _text(draw, corner, language()[statement].name, 15, _INK)
     for number, (item, (left, right, _)) in enumerate(zip(items, drawn, strict=True)):
         x, y = _PAD + number % across * cell, head + number // across * row
-        for offset, image in ((0, left), (wide, right)):
+        for offset, image in ((0, left), (beside, right)):
             if image is not None:
                 _paste(page, image, x + offset, y)
-        _text(draw, (x + wide, y + tall + 2), _cut(item.name, 44), 14, _INK, anchor="ma", bold=True)
-        _text(draw, (x + wide, y + tall + 21), _cut(item.note, 56), 13, _FAINT, anchor="ma")
+        middle = x + (wide + beside) // 2
+        _text(draw, (middle, y + tall + 2), _cut(item.name, 44 if beside else 24), 14, _INK, anchor="ma", bold=True)
+        _text(draw, (middle, y + tall + 21), _cut(item.note, 56 if beside else 32), 13, _FAINT, anchor="ma")
     _save(page, target)
     return target
 

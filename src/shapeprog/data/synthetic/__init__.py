@@ -2,6 +2,7 @@
 
 from shapeprog.data.synthetic.mixture import Prior
 from shapeprog.data.synthetic.priors import PRIORS, prior
+from shapeprog.data.synthetic.store import read_programs, write_programs
 from shapeprog.data.synthetic.stream import Batch, Stream
 
-__all__ = ["PRIORS", "Batch", "Prior", "Stream", "prior"]
+__all__ = ["PRIORS", "Batch", "Prior", "Stream", "prior", "read_programs", "write_programs"]

@@ -77,7 +77,8 @@ class Prior:
         if self.details and _furniture():
             dice = Dice(count, generator)
             more, here = details(dice, canvas), dice.chance(self.details)[:, None, None]
-            code, canvas = self._visible(_joined([code, Code(more.ids * here, more.parameters * here[..., None])]))
+            code = _joined([code, Code(more.ids * here, more.parameters * here[..., None])])
+            code, canvas = self._visible(_front(code, code.ids.any(-1), self.blocks))
         for _ in range(ATTEMPTS):
             blank = (code.ids[:, 0, 0] == 0).nonzero()[:, 0]
             if not len(blank):

@@ -119,6 +119,14 @@ def test_changed_settings_are_refused_by_name(tmp_path: Path, engine: Engine):
     assert len(read_log(tmp_path)) == 20
 
 
+def test_a_run_begun_anew_never_goes_back_to_the_old_one(tmp_path: Path, engine: Engine):
+    train(tmp_path, engine)
+    going = run(Toy(), SETTINGS, tmp_path, engine, restart=True)
+    next(going)
+    assert card_of((tmp_path / folders.STATE).read_bytes(), "")["step"] == 0
+    going.close()
+
+
 def test_another_network_or_a_damaged_state_is_refused(tmp_path: Path, engine: Engine):
     train(tmp_path, engine)
     other = Toy()

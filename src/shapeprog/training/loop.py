@@ -102,6 +102,8 @@ def run(
         settings.check(card["settings"], told, str(folder))
         restore(state, module, optimiser)
         step, best, steps = card["step"], card["best"], settings.steps(engine.processes)
+        if engine.writes and step == 0:
+            write_state(folder, state)  # tells at once where nothing can be written, and replaces an older run
         with Log(folder if engine.writes else None, step, tensorboard) as log:
             saved = clock = time.monotonic()
             for batch in engine.ahead(objective.batch, range(step, steps)):

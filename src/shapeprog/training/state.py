@@ -61,7 +61,8 @@ def restore(content: bytes, module: nn.Module, optimiser: torch.optim.Optimizer)
         start = f"{_OPTIMISER}{place}/"
         for name, value in tensors.items():
             if name.startswith(start):
-                optimiser.state[weight][name.removeprefix(start)] = _placed(value, weight)
+                key = name.removeprefix(start)
+                optimiser.state[weight][key] = value if key == "step" else _placed(value, weight)
 
 
 def card_of(content: bytes, where: str) -> dict[str, Any]:
@@ -94,6 +95,4 @@ def _shape(tensors: dict[str, Tensor], name: str) -> tuple[torch.Size, torch.dty
 
 def _placed(value: Tensor, weight: Tensor) -> Tensor:
     """A tensor of the optimiser where it belongs: like its weight in memory too, for sums to round alike."""
-    if value.shape == weight.shape:
-        return torch.empty_like(weight, dtype=value.dtype).copy_(value)
-    return value
+    return torch.empty_like(weight, dtype=value.dtype).copy_(value)

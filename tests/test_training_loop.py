@@ -227,6 +227,15 @@ def test_clipping_by_norm_keeps_the_direction_and_by_value_bounds_each_element()
     torch.testing.assert_close(gradient, torch.tensor([0.1, -0.05]))
 
 
+def test_a_setting_that_a_run_did_not_know_was_as_by_default():
+    begun = SETTINGS.record()
+    del begun["schedule"]
+    SETTINGS.check(begun, SETTINGS.record(), "here")
+    constant = replace(SETTINGS, schedule="constant")
+    with pytest.raises(ShapeProgError, match="schedule was 'cosine', is now 'constant'"):
+        constant.check(begun, constant.record(), "here")
+
+
 @pytest.mark.parametrize(
     "wrong", [{"schedule": "linear"}, {"visits": 0}, {"rate": float("nan")}, {"precision": "fp16"}]
 )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import MISSING, asdict, dataclass, fields
 from typing import Any, ClassVar, Literal
 
 import torch
@@ -123,7 +123,7 @@ class Settings:
         return {name: list(value) if isinstance(value, tuple) else value for name, value in asdict(self).items()}
 
     def check(self, begun: Mapping[str, Any], now: Mapping[str, Any], where: str) -> None:
-        """Refuse to go on with other settings than a run was begun with.
+        """Refuse to go on with other settings than a run was begun with; one it did not know yet was as by default.
 
         Parameters
         ----------
@@ -137,6 +137,7 @@ class Settings:
         ShapeProgError
             Naming each setting that differs, with both values.
         """
+        begun = {**{each.name: each.default for each in fields(self) if each.default is not MISSING}, **begun}
         names = [name for name in {**begun, **now} if name not in self.MAY_CHANGE]
         other = [name for name in names if begun.get(name) != now.get(name)]
         if other:

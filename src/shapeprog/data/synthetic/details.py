@@ -34,8 +34,8 @@ def details(dice: Dice, canvas: Canvas) -> Code:
     draft = Draft(dice)
     low, high = _bounds(canvas)
     many = dice.whole(1, MOST)
-    for number in range(MOST):
-        _detail(draft, _cell(dice, canvas), low, high, number < many)
+    for number, cell in enumerate(_cells(dice, canvas, MOST)):
+        _detail(draft, cell, low, high, number < many)
     return draft.code()
 
 
@@ -71,22 +71,22 @@ def _detail(draft: Draft, cell: Float[Tensor, "n 3"], low: Tensor, high: Tensor,
     pair = apart & alike
     corner = (corner[UP], corner[DEPTH], torch.where(pair, left, corner[SIDE]))
     copies = (torch.where(pair, 2.0, 1.0), (0, 0, -2 * left - extent[SIDE]))
-    for role, chosen in (
-        ("horizontal_bar", bar | rail), ("leg", post), ("vertical_board", front), ("side", side), ("locker", chunk),
-    ):  # fmt: skip
-        draft.box(role, corner, extent, keep=here & chosen, repeat=[copies])
+    roles = {"horizontal_bar": bar | rail, "leg": post, "vertical_board": front, "locker": chunk, "side": side}
+    draft.box(roles, corner, extent, keep=here, repeat=[copies])
 
 
-def _cell(dice: Dice, canvas: Canvas) -> Float[Tensor, "n 3"]:
-    """The low corner of one drawn cell of each shape, drawn at random by rows."""
+def _cells(dice: Dice, canvas: Canvas, many: int) -> list[Float[Tensor, "n 3"]]:
+    """The low corners of ``many`` drawn cells of each shape, drawn at random by rows."""
     rows = canvas.flatten(1)
-    key = torch.stack([dice.uniform() for _ in range(2)], -1)
-    drawn = (rows != 0).cumsum(-1)
-    place = torch.searchsorted(drawn, (key[:, :1] * drawn[:, -1:]).floor().long() + 1).clamp(max=rows.shape[1] - 1)
-    word = rows.gather(1, place)
-    bits = ((word >> torch.arange(RESOLUTION, device=word.device)) & 1).cumsum(-1)
-    side = torch.searchsorted(bits, (key[:, 1:2] * bits[:, -1:]).floor().long() + 1).clamp(max=RESOLUTION - 1)
-    return torch.cat([place // RESOLUTION, place % RESOLUTION, side], 1).float() - HALF
+    drawn = (rows != 0).cumsum(-1, dtype=torch.int32)
+    key = torch.stack([dice.uniform() for _ in range(many)], -1)
+    place = torch.searchsorted(drawn, (key * drawn[:, -1:]).floor().int() + 1).clamp(max=rows.shape[1] - 1)
+    bits = (rows.gather(1, place)[..., None] >> torch.arange(RESOLUTION, device=rows.device)) & 1
+    filled = bits.cumsum(-1)
+    key = torch.stack([dice.uniform() for _ in range(many)], -1)[..., None]
+    side = torch.searchsorted(filled, (key * filled[..., -1:]).floor().long() + 1)[..., 0].clamp(max=RESOLUTION - 1)
+    cells = torch.stack([place // RESOLUTION, place % RESOLUTION, side], -1).float() - HALF
+    return list(cells.unbind(1))
 
 
 def _bounds(canvas: Canvas) -> tuple[Float[Tensor, "n 3"], Float[Tensor, "n 3"]]:

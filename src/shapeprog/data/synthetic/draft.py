@@ -76,29 +76,37 @@ class Draft:
         self._write(torch.full_like(values[:, 0], declared.id), values, keep, repeat, turns)
 
     def box(
-        self, role: str, low: Triple, size: Triple, *, keep: Flag | None = None, repeat: Sequence[Rows] = (),
+        self,
+        role: str | dict[str, Flag],
+        low: Triple,
+        size: Triple,
+        *,
+        keep: Flag | None = None,
+        repeat: Sequence[Rows] = (),
         tilt: Number = 0,
-    ) -> None:  # fmt: skip
+    ) -> None:
         """Write a box from its low corner and its extents; its role and form give its name.
 
         Parameters
         ----------
         role
-            One of ``ROLES``, or a statement.
+            One of ``ROLES``, or a statement; or several and which programs have each.
         tilt
             Shift of the top to the rear, for statements that have it.
         """
-        names = ROLES.get(role, (role,))
-        ids, values = None, None
-        for name in reversed(names):
-            declared = language()[name]
-            numbers = self._values(declared, _box_numbers(declared, low, size, tilt))
-            column = torch.full_like(numbers[:, 0], declared.id)
-            if ids is None or values is None:
-                ids, values = column, numbers
-                continue
-            fits = self._fits(name, size)
-            ids, values = torch.where(fits, column, ids), torch.where(fits[:, None], numbers, values)
+        roles: dict[str, Flag | None] = {role: None} if isinstance(role, str) else dict(role)
+        ids: Tensor | None = None
+        values: Tensor | None = None
+        for each, chosen in reversed(roles.items()):
+            for name in reversed(ROLES.get(each, (each,))):
+                declared = language()[name]
+                numbers = self._values(declared, _box_numbers(declared, low, size, tilt))
+                column = torch.full_like(numbers[:, 0], declared.id)
+                if ids is None or values is None:
+                    ids, values = column, numbers
+                    continue
+                fits = self._fits(name, size) if chosen is None else self._fits(name, size) & chosen
+                ids, values = torch.where(fits, column, ids), torch.where(fits[:, None], numbers, values)
         assert ids is not None
         assert values is not None
         self._write(ids, values, keep, repeat, None)
@@ -118,11 +126,13 @@ class Draft:
 
     def _fits(self, name: str, size: Triple) -> Flag:
         up, depth, side = (self.column(each) for each in size)
+        even = depth % 2 == 0
         if name == "horizontal_bar":
             return up <= THIN
-        even = depth % 2 == 0
         if name == "sideboard":
             return even
+        if name not in ("top_square", "base_square", "top_rectangle", "layer"):
+            return torch.ones_like(even)
         if name in ("top_square", "base_square"):
             return even & (depth == side)
         return even & (side % 2 == 0)

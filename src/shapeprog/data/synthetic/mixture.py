@@ -75,10 +75,11 @@ class Prior:
         """Programs, as by calling, and what they draw: packed cells (count, 32, 32)."""
         code, canvas = self._visible(self._propose(count, generator))
         if self.details and _furniture():
-            dice = Dice(count, generator)
-            more, here = details(dice, canvas), dice.chance(self.details)[:, None, None]
-            code = _joined([code, Code(more.ids * here, more.parameters * here[..., None])])
-            code, canvas = self._visible(_front(code, code.ids.any(-1), self.blocks))
+            some = Dice(count, generator).chance(self.details).nonzero()[:, 0]
+            more = details(Dice(len(some), generator), canvas[some])
+            full = _joined([Code(code.ids[some], code.parameters[some]), more])
+            full, canvas[some] = self._visible(_front(full, full.ids.any(-1), self.blocks))
+            code.ids[some], code.parameters[some] = full.ids, full.parameters
         for _ in range(ATTEMPTS):
             blank = (code.ids[:, 0, 0] == 0).nonzero()[:, 0]
             if not len(blank):
@@ -108,8 +109,9 @@ class Prior:
             )
         code = _front(code, code.ids.any(-1), self.blocks)
         if self.off_centre:
-            moved = dice.chance(self.off_centre)
-            _move(code, torch.stack([dice.whole(-1, 1) * moved for _ in range(3)], -1))
+            some = dice.chance(self.off_centre).nonzero()[:, 0]
+            shift = torch.stack([dice.whole(-1, 1) for _ in range(3)], -1)
+            code.parameters[some] = _moved(Code(code.ids[some], code.parameters[some]), shift[some])
         return code
 
     def _mixed(self, count: int, generator: torch.Generator) -> Code:
@@ -156,10 +158,12 @@ def _joined(codes: list[Code]) -> Code:
     return Code(torch.cat([code.ids for code in codes], 1), torch.cat([code.parameters for code in codes], 1))
 
 
-def _move(code: Code, shift: Float[Tensor, "n 3"]) -> None:
-    """Move whole shapes: add the shift to every position that a statement names."""
+def _moved(code: Code, shift: Float[Tensor, "n 3"]) -> Float[Tensor, "n K J 7"]:
+    """The parameters of whole shapes that are moved: the shift is added to every position that a statement names."""
+    parameters = code.parameters.clone()
     for declared in language():
         for parameter in declared.parameters:
             if parameter.quantity.kind == "position" and parameter.quantity.width == 3 and not declared.is_loop:
                 here: Int[Tensor, "n K J"] = (code.ids == declared.id).long()
-                code.parameters[..., parameter.slots] += here[..., None] * shift[:, None, None]
+                parameters[..., parameter.slots] += here[..., None] * shift[:, None, None]
+    return parameters

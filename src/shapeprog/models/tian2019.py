@@ -92,15 +92,17 @@ class ShapeEncoder(nn.Module):
         """Features of target and canvas, which are the two channels."""
         return self._features(self._convolved(1, cells))
 
-    def of_target(self, target: Float[Tensor, "B 1 32 32 32"]) -> Float[Tensor, "B 16 32 32 32"]:
+    def of_target(self, target: Float[Tensor, "B 32 32 32"]) -> Float[Tensor, "B 16 32 32 32"]:
         """What the target adds to the first convolution, the same for every canvas."""
-        return self._convolved(1, target, slice(0, 1))
+        return self._convolved(1, target[..., None].movedim(-1, 1), slice(0, 1))
 
     def of_canvas(
-        self, canvas: Float[Tensor, "B 1 32 32 32"], known: Float[Tensor, "B 16 32 32 32"]
+        self, canvas: Float[Tensor, "B 32 32 32"], known: Float[Tensor, "B 16 32 32 32"]
     ) -> Float[Tensor, "B 64"]:
         """Features of a canvas, given what :meth:`of_target` says of the target."""
-        return self._features(self._convolved(1, canvas, slice(1, 2)) + known)
+        # The new axis last in memory: a single channel is else taken for channels first, and so is what follows.
+        first = self._convolved(1, canvas[..., None].movedim(-1, 1), slice(1, 2), shifted=False)
+        return self._features(first.add_(known))
 
     def _features(self, value: Float[Tensor, "B 16 32 32 32"]) -> Float[Tensor, "B 64"]:
         value = self._normalised(1, value)
@@ -108,34 +110,27 @@ class ShapeEncoder(nn.Module):
             value = self._normalised(n, self._convolved(n, value))
         return F.relu(self.fc(value.mean((2, 3, 4)))).to(self.fc.weight.dtype)
 
-    def _layer(self, n: int) -> tuple[nn.Conv3d, nn.BatchNorm3d]:
+    def _convolved(self, n: int, value: Tensor, channels: slice = slice(None), *, shifted: bool = True) -> Tensor:
+        """Convolution ``n``; running statistics are folded into its kernel and bias where they are used."""
         convolution, norm = self.get_submodule(f"conv{n}"), self.get_submodule(f"BN{n}")
         assert isinstance(convolution, nn.Conv3d)
         assert isinstance(norm, nn.BatchNorm3d)
-        return convolution, norm
-
-    def _scale(self, norm: nn.BatchNorm3d) -> Tensor | None:
-        """What running statistics multiply the channels by, which is then done to the kernels; else ``None``."""
-        if self.training or norm.running_var is None:
-            return None
-        return norm.weight * (norm.running_var + norm.eps).rsqrt()
-
-    def _convolved(self, n: int, value: Tensor, channels: slice = slice(None)) -> Tensor:
-        convolution, norm = self._layer(n)
-        kernel, scale = convolution.weight[:, channels], self._scale(norm)
-        if scale is not None:
+        kernel, bias = convolution.weight[:, channels], None
+        if self._folds(norm):
+            assert norm.running_mean is not None
+            assert norm.running_var is not None
+            scale = norm.weight * (norm.running_var + norm.eps).rsqrt()
             kernel = kernel * scale[:, None, None, None, None]
+            bias = norm.bias - norm.running_mean * scale if shifted else None
         value = value.contiguous(memory_format=torch.channels_last_3d)
-        return F.conv3d(value, kernel, None, convolution.stride, convolution.padding)
+        return F.conv3d(value, kernel, bias, convolution.stride, convolution.padding)
 
     def _normalised(self, n: int, value: Tensor) -> Tensor:
-        _, norm = self._layer(n)
-        scale = self._scale(norm)
-        if scale is None:
-            return F.relu(norm(value), inplace=True)
-        assert norm.running_mean is not None
-        shift = norm.bias - norm.running_mean * scale
-        return F.relu(value + shift[:, None, None, None].to(value.dtype), inplace=True)
+        norm = self.get_submodule(f"BN{n}")
+        return F.relu(value if self._folds(norm) else norm(value), inplace=True)
+
+    def _folds(self, norm: nn.Module) -> bool:
+        return not self.training and norm.running_mean is not None
 
 
 class StepNet(nn.Module):
@@ -204,8 +199,8 @@ class Tian2019(Generator):
     ) -> tuple[Float[Tensor, "B F"], Memory]:
         """The memory is what the first layer makes of the target, and the state of the block LSTM."""
         dtype = self.shape_feat.fc.weight.dtype
-        known = self.shape_feat.of_target(target[:, None].to(dtype)) if memory is None else memory[0]
-        feature = self.shape_feat.of_canvas(canvas[:, None].to(dtype), known)
+        known = self.shape_feat.of_target(target.to(dtype)) if memory is None else memory[0]
+        feature = self.shape_feat.of_canvas(canvas.to(dtype), known)
         with torch.autocast(feature.device.type, enabled=False):
             state = advance(self.core, feature, None if memory is None else memory[1:])
         return state[0].relu(), (known, *state)

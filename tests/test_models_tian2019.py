@@ -15,7 +15,7 @@ from shapeprog.models.generator import Generator, build_generator, live_blocks
 from shapeprog.models.tian2019 import PUBLISHED, Tian2019
 from shapeprog.models.vocabulary import Vocabulary
 
-BLOCKS = 3
+BLOCKS = 2
 STRIDES = (1, 2, 1, 2, 1, 2, 1, 1)
 Weights = dict[str, Tensor]
 
@@ -113,7 +113,8 @@ def test_layers_are_those_published() -> None:
     assert set(made.state_dict()) == set(keys)
 
 
-def test_told_ids_and_canvases_it_says_what_the_description_says(shapes: tuple[Tensor, Tensor, Code]) -> None:
+@torch.no_grad()
+def test_told_ids_and_canvases_it_says_and_loses_what_the_description_says(shapes: tuple[Tensor, Tensor, Code]) -> None:
     target, canvases, code = shapes
     made = published().double()
     _, logits, values = reference(made.state_dict(), target, canvases, code.ids)
@@ -121,6 +122,14 @@ def test_told_ids_and_canvases_it_says_what_the_description_says(shapes: tuple[T
     assert found.live.all()
     torch.testing.assert_close(found.logits, logits.flatten(0, 1), rtol=1e-9, atol=1e-9)
     torch.testing.assert_close(found.parameters, values, rtol=1e-9, atol=1e-9)
+    steps = torch.where(code.ids > 0, 1.0, 0.1)
+    surprise = -logits.gather(-1, code.ids[..., None])[..., 0]
+    used = Vocabulary.current().used[code.ids]
+    slots = torch.where(used, 1.0, 0.1)
+    off = 0.5 * (values - code.parameters * used) ** 2
+    losses = made.losses(found, code)
+    torch.testing.assert_close(losses["ids"], (surprise * steps).sum() / steps.sum())
+    torch.testing.assert_close(losses["parameters"], (off * slots).sum() / slots.sum())
     single = made.float().predict(target, canvases, code.ids)
     torch.testing.assert_close(single.logits.double(), found.logits, rtol=1e-3, atol=1e-3)
 
@@ -155,20 +164,7 @@ def test_by_arg_max_it_writes_what_the_description_says(shapes: tuple[Tensor, Te
     torch.testing.assert_close(found.code.parameters, values.float(), rtol=1e-5, atol=1e-5)
 
 
-def test_the_loss_is_the_published_one(shapes: tuple[Tensor, Tensor, Code]) -> None:
-    target, canvases, code = shapes
-    made = published().double()
-    _, logits, values = reference(made.state_dict(), target, canvases, code.ids)
-    steps = torch.where(code.ids > 0, 1.0, 0.1)
-    surprise = -logits.gather(-1, code.ids[..., None])[..., 0]
-    used = Vocabulary.current().used[code.ids]
-    slots = torch.where(used, 1.0, 0.1)
-    off = 0.5 * (values - code.parameters * used) ** 2
-    losses = made.losses(made.predict(target, canvases, code.ids), code)
-    torch.testing.assert_close(losses["ids"], (surprise * steps).sum() / steps.sum())
-    torch.testing.assert_close(losses["parameters"], (off * slots).sum() / slots.sum())
-
-
+@torch.no_grad()
 def test_a_prediction_does_not_depend_on_the_batch(shapes: tuple[Tensor, Tensor, Code]) -> None:
     target, canvases, code = shapes
     made = network().train()
@@ -178,11 +174,11 @@ def test_a_prediction_does_not_depend_on_the_batch(shapes: tuple[Tensor, Tensor,
     alone = made.predict(target[1:2], canvases[1:2], code.ids[1:2])
     torch.testing.assert_close(together.parameters[1:2], alone.parameters, rtol=1e-4, atol=1e-5)
     assert (together.live == live_blocks(code.ids)).all()
-    one, all_at_once = decode(made, target[1:2], blocks=3), decode(made, target, blocks=3)
+    one, all_at_once = decode(made, target[1:2], blocks=2), decode(made, target, blocks=2)
     torch.testing.assert_close(one.code.parameters, all_at_once.code.parameters[1:2], rtol=1e-4, atol=1e-4)
-    by_batch = network(statistics="batch").double()
+    by_batch = network(statistics="batch")
     pair = [by_batch.predict(target[:n], canvases[:n], code.ids[:n]).parameters[:2] for n in (2, 3)]
-    assert (pair[0] - pair[1]).abs().max() > 1e-6
+    assert (pair[0] - pair[1]).abs().max() > 1e-5
 
 
 def test_folded_statistics_are_batch_normalisation(shapes: tuple[Tensor, Tensor, Code]) -> None:
@@ -200,13 +196,13 @@ def test_blocks_are_the_same_one_by_one_and_together(shapes: tuple[Tensor, Tenso
     target, canvases, _ = shapes
     made = network()
     memory, features_of = None, []
-    for k in range(3):
+    for k in range(BLOCKS):
         feature, memory = made.perceive(target.float(), unpacked(canvases[:, k]).float(), memory)
         features_of.append(feature)
-    whole = made.perceive_all(target, canvases[:, :3], torch.ones(3, 3, dtype=torch.bool))
+    whole = made.perceive_all(target, canvases, torch.ones(3, BLOCKS, dtype=torch.bool))
     torch.testing.assert_close(torch.stack(features_of, 1).flatten(0, 1), whole, rtol=1e-4, atol=1e-5)
-    last = torch.tensor([[False, False, True]]).expand(3, 3)
-    torch.testing.assert_close(made.perceive_all(target, canvases[:, :3], last), features_of[-1], rtol=1e-4, atol=1e-5)
+    last = torch.tensor([[False, True]]).expand(3, BLOCKS)
+    torch.testing.assert_close(made.perceive_all(target, canvases, last), features_of[-1], rtol=1e-4, atol=1e-5)
 
 
 def test_every_weight_that_is_trained_learns(shapes: tuple[Tensor, Tensor, Code]) -> None:

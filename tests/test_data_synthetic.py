@@ -53,6 +53,12 @@ def test_every_sample_is_a_published_program_of_whole_numbers(each: Prior, seed:
         assert 1 <= program.blocks == blocks
 
 
+@pytest.mark.parametrize("count", [1, 2, 3])
+def test_a_few_samples_are_as_good_as_many(each: Prior, count: int) -> None:
+    for seed in range(5):
+        assert all(program.blocks for program in decode(drawn(each, seed, count)))
+
+
 def test_empty_blocks_come_last_and_unused_numbers_are_zero(each: Prior) -> None:
     code = drawn(each, 0)
     here = statements(code).int()

@@ -41,7 +41,7 @@ def details(dice: Dice, canvas: Canvas) -> Code:
 
 def _detail(draft: Draft, cell: Float[Tensor, "n 3"], low: Tensor, high: Tensor, here: Flag) -> None:
     dice = draft.dice
-    bar, rail, post, front, side, chunk = dice.kind(0.26, 0.16, 0.16, 0.16, 0.12, 0.14)
+    bar, rail, post, front, side, chunk = dice.kind(0.28, 0.18, 0.17, 0.16, 0.13, 0.08)
     thin = [dice.pick(1, 2, 3, weights=(0.6, 0.3, 0.1)) for _ in range(2)]
     long, other = dice.whole(3, 14), dice.whole(3, 10)
     wanted = (

@@ -76,10 +76,11 @@ class Prior:
         code, canvas = self._visible(self._propose(count, generator))
         if self.details and _furniture():
             some = Dice(count, generator).chance(self.details).nonzero()[:, 0]
-            more = details(Dice(len(some), generator), canvas[some])
-            full = _joined([Code(code.ids[some], code.parameters[some]), more])
-            full, canvas[some] = self._visible(_front(full, full.ids.any(-1), self.blocks))
-            code.ids[some], code.parameters[some] = full.ids, full.parameters
+            if len(some):
+                more = details(Dice(len(some), generator), canvas[some])
+                full = _joined([Code(code.ids[some], code.parameters[some]), more])
+                full, canvas[some] = self._visible(_front(full, full.ids.any(-1), self.blocks))
+                code.ids[some], code.parameters[some] = full.ids, full.parameters
         for _ in range(ATTEMPTS):
             blank = (code.ids[:, 0, 0] == 0).nonzero()[:, 0]
             if not len(blank):

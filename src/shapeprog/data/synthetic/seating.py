@@ -178,12 +178,11 @@ def _supports(draft: Draft, room: Room, seat: Seat, panels: Flag, risers: Flag, 
 def _central(draft: Draft, room: Room, seat: Seat, here: Flag) -> None:
     """A column under the middle of the seat, on a plate, a cross or a star."""
     dice = draft.dice
-    middle = room.front + seat.depth / 2
-    middle = torch.floor(middle)
+    middle = torch.floor(room.front + seat.depth / 2)
     radius = dice.pick(1, 2)
     draft.add(
         "support_cylinder", at=(room.floor, middle, 0.0), height=seat.under, radius=radius,
-        keep=here & dice.chance(0.7),
+        keep=here,
     )  # fmt: skip
     cross, star, plate = dice.kind(0.4, 0.3, 0.3)
     reach = torch.floor(torch.minimum(seat.depth, seat.side) / 2) - dice.pick(0, 1)

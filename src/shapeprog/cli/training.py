@@ -78,14 +78,14 @@ def pretrain_command(
     terminal.load_modules(modules)
     if preset not in PRESETS:
         raise InputError(f"there is no preset {preset!r}", f"choose one of {', '.join(PRESETS)}")
-    settings = _given(PRESETS[preset], locals())
-    with _stopping() as stop:
+    settings = given(PRESETS[preset], locals())
+    with stopping() as stop:
         engine = Engine(device, settings.precision, threads)
         records = pretrain(
-            folder, settings, engine, packs=val or (), start=start, command=_command(), restart=restart, stop=stop,
+            folder, settings, engine, packs=val or (), start=start, command=command_line(), restart=restart, stop=stop,
             tensorboard=tensorboard,
         )  # fmt: skip
-        _follow(records, folder, settings, engine, stop, quiet)
+        follow(records, folder, settings, engine, stop, quiet)
 
 
 def train_executor_command(
@@ -114,27 +114,28 @@ def train_executor_command(
     from shapeprog.training.executor import ExecutorSettings, train_executor
 
     terminal.load_modules(modules)
-    settings = _given(ExecutorSettings(), locals())
-    with _stopping() as stop:
+    settings = given(ExecutorSettings(), locals())
+    with stopping() as stop:
         engine = Engine(device, settings.precision, threads)
         records = train_executor(
-            folder, settings, engine, command=_command(), restart=restart, stop=stop, tensorboard=tensorboard
+            folder, settings, engine, command=command_line(), restart=restart, stop=stop, tensorboard=tensorboard
         )
-        _follow(records, folder, settings, engine, stop, quiet)
+        follow(records, folder, settings, engine, stop, quiet)
 
 
-def _given(preset: Known, options: dict[str, Any]) -> Known:
+def given(preset: Known, options: dict[str, Any]) -> Known:
     """The settings of a preset with the options that were given."""
     names = {field.name for field in fields(preset)}
     return replace(preset, **{name: value for name, value in options.items() if name in names and value is not None})
 
 
-def _command() -> str:
+def command_line() -> str:
+    """The command as it was given, for the card of the weights."""
     return shlex.join(["shapeprog", *sys.argv[1:]])
 
 
 @contextmanager
-def _stopping() -> Iterator[threading.Event]:
+def stopping() -> Iterator[threading.Event]:
     """An event that the first Ctrl-C, or a request to terminate, sets; a second one interrupts at once.
 
     Memory is kept between steps, which these commands alone want, and which must be said before any is used.
@@ -157,7 +158,7 @@ def _stopping() -> Iterator[threading.Event]:
             signal.signal(each, handler)
 
 
-def _follow(
+def follow(
     records: Iterator[Record], folder: Path, settings: Settings, engine: Engine, stop: threading.Event, quiet: bool
 ) -> None:
     """Show the progress of a run, and at its end what came of it."""
@@ -167,7 +168,9 @@ def _follow(
     columns = [TextColumn("{task.completed}/{task.total} visits"), BarColumn(), TextColumn("{task.fields[told]}")]
     silent = quiet or not engine.writes
     last: Record = {}
-    with Progress(*columns, TimeRemainingColumn(), console=console, disable=silent, transient=True) as bar:
+    with Progress(
+        *columns, TimeRemainingColumn(), console=console, disable=silent or not console.is_terminal, transient=True
+    ) as bar:
         together = settings.batch * engine.processes
         task = bar.add_task("", total=settings.steps(engine.processes) * together, told="")
         seconds = loss = 0.0

@@ -259,10 +259,11 @@ def _arms(
     beams = arms & ~panels
     low, size = (room.floor + seat.top + above - thick, front, left), (thick, seat.depth - short, width)
     block = beams & dice.chance(0.2)
-    along = row(dice.pick(2, 3, weights=(0.85, 0.15)) if long else draft.column(2), room.side, width)
+    count = torch.where(outside, 2.0, dice.pick(2, 3, weights=(0.8, 0.2))) if long else draft.column(2)
+    along = row(count, room.side, width)
     draft.box("chair_beam", low, size, keep=beams & ~block, repeat=[along])
     # Posts carry them in front, at both ends where there is no back, and down to the floor beside the seat.
-    posts = beams & ~block & (dice.chance(0.8) | ~backed)
+    posts = beams & ~block & (dice.chance(0.85) | ~backed | outside)
     deep = dice.pick(1, 2)
     low, size = (room.floor + seat.top, front, left), (above - thick, deep, width)
     ends = (torch.where(backed, 1.0, 2.0), (0, seat.depth - short - deep, 0))

@@ -12,7 +12,7 @@ import os
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import torch
 from torch import Tensor, nn
@@ -55,7 +55,7 @@ class Card:
         Measures by name.
     """
 
-    kind: Literal["generator", "executor"]
+    kind: str
     design: str
     settings: dict[str, Any]
     vocabulary: dict[str, Any]

@@ -71,7 +71,7 @@ class Vocabulary:
         return table
 
     @cached_property
-    def legal(self) -> Bool[Tensor, "J 1+V V"]:
+    def legal(self) -> Bool[Tensor, "J previous V"]:
         """Which id may stand at a step after which previous id; row V is for the first step, which has none.
 
         A block is empty, or up to J - 1 loops and then one drawing statement.  A loop that turns stands alone around

@@ -37,6 +37,9 @@ class Found:
     reason: str
 
 
+Inference = Callable[["Shape", int, float, int, Progress], Found]
+
+
 def infer_command(
     inputs: Annotated[list[Path], typer.Argument(help="Meshes, point clouds, voxels, packs, or folders of them.")],
     out: Annotated[Path, typer.Option("--out", "-o", help="Folder for the results; made if missing.")] = FOLDER,
@@ -49,6 +52,13 @@ def infer_command(
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object per shape, one per line.")] = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
     no_picture: Annotated[bool, typer.Option("--no-picture", help="Write no PNG.")] = False,
+    weights: Annotated[
+        str, typer.Option(help="Generator that helps the search: weights that ship, a file, or none.")
+    ] = "default",
+    proposals: Annotated[int, typer.Option(help="Blocks the generator suggests for each place.", min=0)] = 16,
+    no_search: Annotated[
+        bool, typer.Option("--no-search", help="What the generator writes in a single pass, as it is.")
+    ] = False,
     baseline: Annotated[bool, typer.Option("--baseline", help="Greedy boxes instead of the search.")] = False,
 ) -> None:
     """Infer a program from each shape and write NAME.shape, NAME.json, NAME.glb and NAME.png.
@@ -63,8 +73,8 @@ def infer_command(
 
     terminal.load_modules(modules)
     terminal.check_axes(up, front)
+    infer_one = _baseline if baseline else _chosen(weights, proposals, no_search)
     folder = make_folder(out)
-    search = _baseline if baseline else _search
     failures: list[tuple[Path, ShapeProgError]] = []
     stopped: OutputError | None = None
     written, taken = 0, set[str]()
@@ -88,7 +98,7 @@ def infer_command(
                         bar.update(task, completed=share, description=f"{name}: {stage}")
 
                 try:
-                    found = search(shape, blocks, budget, seed, progress)
+                    found = infer_one(shape, blocks, budget, seed, progress)
                     stem = _free_stem(shape, taken, folder)
                     names = _write(found, shape, folder, stem, not no_picture)
                 except OutputError as error:
@@ -127,16 +137,23 @@ def infer_command(
         raise InputError("there was nothing to infer from", "name files or folders that hold shapes")
 
 
-def _search(shape: Shape, blocks: int, budget: float, seed: int, progress: Progress) -> Found:
+def _chosen(weights: str, proposals: int, no_search: bool) -> Inference:
+    """Inference with what was asked for, which is looked at before any shape is."""
     from shapeprog.inference import infer
+    from shapeprog.inference.proposing import ready_generator
 
-    result = infer(shape, blocks=blocks, budget=budget, seed=seed, progress=progress)
-    return Found(
-        result.program,
-        result.snapped,
-        _scores(result.program, result.snapped, shape, result.scores, seed),
-        result.reason,
-    )
+    asked = None if weights == "none" else weights
+    ready_generator(asked, needed=no_search)
+
+    def one(shape: Shape, blocks: int, budget: float, seed: int, progress: Progress) -> Found:
+        result = infer(
+            shape, blocks=blocks, budget=budget, seed=seed, generator=asked, proposals=proposals,
+            search=not no_search, progress=progress,
+        )  # fmt: skip
+        scores = _scores(result.program, result.snapped, shape, result.scores, seed)
+        return Found(result.program, result.snapped, scores, result.reason)
+
+    return one
 
 
 def _baseline(shape: Shape, blocks: int, budget: float, seed: int, progress: Progress) -> Found:

@@ -11,6 +11,7 @@ from shapeprog.inference.block_layout import COUNT1
 from shapeprog.inference.chance_kernels import below, shuffled, start, uniform
 from shapeprog.inference.descent_kernels import GAIN, gains, improve_block, statements, valid
 from shapeprog.inference.form_kernels import cells_of, guess, plain, repeat
+from shapeprog.inference.pool import Pool
 from shapeprog.inference.proposal_kernels import propose
 from shapeprog.inference.raster_kernels import ROWS, draw_all, draw_block, iou_rows
 from shapeprog.space import FloatArray
@@ -165,12 +166,18 @@ class Plan:
         Share of proposals that also try a form other than a box.
     heat
         Largest loss of the objective that the first round may accept; it cools linearly.
+    recall
+        Share of proposals that are taken from the pool where one of its blocks gains, instead of sought anew.
+    pool
+        Blocks that were suggested or were of use before.
     """
 
     most: int
     families: int
     forms: float
     heat: float
+    recall: float = 0.0
+    pool: Pool | None = None
 
 
 def rebuild(blocks: FloatArray, target: Target, plan: Plan, rounds: int, seed: int) -> tuple[FloatArray, float]:
@@ -234,12 +241,11 @@ def recreate(blocks: FloatArray, wanted: int, target: Target, plan: Plan) -> Flo
         waste = _single(1.0 + 3.0 * uniform())
         wanted += below(3)
     for _ in range(min(wanted, plan.most - len(blocks))):
-        picks = shuffled(len(target.table))[: plan.families]
-        picks[0] = 0
-        covered = draw_all(blocks)
-        gain, block = propose(
-            target.occupied, covered, waste, target.low, target.high, target.table, picks, target.price * target.cells
-        )
+        covered, gain = draw_all(blocks), 0.0
+        if plan.pool is not None and uniform() < plan.recall:
+            gain, block = plan.pool.best(target.occupied, covered, waste)
+        if gain <= 0:
+            gain, block = _sought(covered, waste, target, plan)
         if uniform() < plan.forms:
             other_gain, other = propose_form(1 + below(5), covered, waste, block, target)
             if other_gain > gain or (other_gain > 0 and uniform() < 0.3):
@@ -249,6 +255,16 @@ def recreate(blocks: FloatArray, wanted: int, target: Target, plan: Plan) -> Flo
         better, _value = improve_block(block, target.occupied, covered, target.price, 1)
         blocks = np.concatenate([blocks, better[None]])
     return blocks
+
+
+def _sought(covered: Rows, waste: float, target: Target, plan: Plan) -> tuple[float, FloatArray]:
+    """The repeated box that gains most among families drawn at random, the single box always among them."""
+    picks = shuffled(len(target.table))[: plan.families]
+    picks[0] = 0
+    gain, block = propose(
+        target.occupied, covered, waste, target.low, target.high, target.table, picks, target.price * target.cells
+    )
+    return gain, block
 
 
 def _single(value: float) -> float:

@@ -1,4 +1,7 @@
-"""Inference: a shape in, a program out, with its scores and a sentence that says why the search stopped."""
+"""Inference: a shape in, a program out, with its scores and a sentence that says why the search stopped.
+
+Where there are weights, a generator proposes programs and blocks, and the search keeps what helps.
+"""
 
 from __future__ import annotations
 
@@ -7,6 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import torch
@@ -15,6 +19,7 @@ from torch import Tensor
 
 from shapeprog.data.shape import Shape
 from shapeprog.geometry.distance import union_distance
+from shapeprog.geometry.occupancy import pack, packed_iou, packed_rows
 from shapeprog.inference.blocks import to_program
 from shapeprog.inference.refine import REACH, Schedule, refine
 from shapeprog.inference.structure import Settings, search_structure
@@ -23,8 +28,17 @@ from shapeprog.language.program import Program
 from shapeprog.language.unroll import unroll
 from shapeprog.space import RESOLUTION
 
+if TYPE_CHECKING:
+    from shapeprog.models.generator import Generator
+
 SEARCH_SHARE = 0.65
 """Share of the time budget after which the structure search hands over to refinement."""
+
+PROPOSAL_SHARE = 0.2
+"""Share of the time budget after which the generator is not asked again."""
+
+PROPOSALS = 16
+"""Blocks that the generator suggests for each place; chosen on val."""
 
 DEEP = 2.5
 """Depth in cells below the surface of the snapped program beyond which points are inner faces; chosen on val."""
@@ -43,9 +57,10 @@ class Result:
     snapped
         The same statements with whole numbers, each within one of the rounded parameter of ``program``.
     scores
-        ``iou`` of the snapped program at 32^3, and ``blocks``, ``statements``, ``primitives``, ``seconds``.
+        ``iou`` of the snapped program at 32^3, and ``blocks``, ``statements``, ``primitives``, ``seconds``; with a
+        generator its ``generator_seconds``, and ``proposed``: 1 if the program is its own or grew from it, else 0.
     reason
-        Why the search stopped and what to try next.
+        Why the search stopped, where the program came from, and what to try next.
     """
 
     program: Program
@@ -62,12 +77,16 @@ def infer(
     seed: int = 0,
     settings: Settings | None = None,
     schedule: Schedule | None = None,
+    generator: Generator | str | Path | None = "default",
+    proposals: int = PROPOSALS,
+    search: bool = True,
     progress: Progress | None = None,
 ) -> Result:
     """A short program of at most ``blocks`` blocks that rebuilds a shape.
 
-    Structure is searched on the touched cells, with whole numbers; then all parameters are refined together on
-    surface points through the renderer.  The result is the same for the same seed unless the time budget cuts in.
+    Structure is searched on the touched cells, with whole numbers, with the help of a generator where there is one;
+    then all parameters are refined together on surface points through the renderer.  The result is the same for the
+    same seed unless the time budget cuts in.
 
     Parameters
     ----------
@@ -79,34 +98,73 @@ def infer(
         Seconds after which neither search nor refinement starts another step.
     settings, schedule
         What search and refinement may spend; the defaults were chosen on validation shapes.
+    generator
+        A generator, the path of its weights, or the name of weights that ship.  The search goes without for ``None``,
+        and as long as no default weights ship.
+    proposals
+        Blocks that the generator suggests for each place; none leaves it out of the search.
+    search
+        Whether to search; else the program is what the generator writes in a single pass, refined only when a
+        ``schedule`` is given.
     progress
         Called with what is being done and the share of it that is done.
 
     Raises
     ------
     InputError
-        If the path is no readable shape.
+        If the path is no readable shape, or there are no such weights.
+    ShapeProgError
+        If there is neither a search nor a generator.
     """
+    from shapeprog.inference.proposing import propose_program, ready_generator, single_pass
+
     prepare_kernels()
+    writer, hindered = ready_generator(generator if proposals or not search else None, needed=not search)
     started = time.monotonic()
     target = _load(shape)
-    chosen = replace(settings or Settings(), blocks=blocks)
-    structure = search_structure(
-        target.voxels, chosen, seed=seed, deadline=started + SEARCH_SHARE * budget, progress=progress
-    )
-    snapped = to_program(structure.blocks)
-    refined = refine(
-        snapped, _surface(target, snapped, seed), voxels=target.voxels if target.points is None else None,
-        schedule=schedule, reach=REACH, seed=seed, deadline=started + budget, progress=progress,
-    )  # fmt: skip
-    scores = {
-        "iou": structure.iou,
+    scores: dict[str, float] = {}
+    if search:
+        chosen = replace(settings or Settings(), blocks=blocks)
+        offered = None
+        if writer is not None:
+            offered = propose_program(
+                writer, target.voxels, blocks=blocks, suggestions=proposals, price=chosen.price, seed=seed,
+                deadline=started + PROPOSAL_SHARE * budget,
+            )  # fmt: skip
+            scores["generator_seconds"] = time.monotonic() - started
+        structure = search_structure(
+            target.voxels, chosen, proposals=offered, seed=seed, deadline=started + SEARCH_SHARE * budget,
+            progress=progress,
+        )  # fmt: skip
+        program = snapped = to_program(structure.blocks)
+        reason = _advice(structure.reason, snapped.blocks, blocks)
+        if writer is not None:
+            scores["proposed"] = float(structure.proposed)
+            grown = (
+                "the generator's program" if structure.proposed else "greedy boxes, which fitted better than its own"
+            )
+            reason += f" The generator took part; the program grew from {grown}."
+    else:
+        assert writer is not None
+        program = single_pass(writer, target.voxels, blocks)
+        snapped = program.snap()
+        scores |= {"generator_seconds": time.monotonic() - started, "proposed": 1.0}
+        reason = "A single pass of the generator wrote this; the search would improve it."
+    if hindered:
+        reason += f" The generator was left out: {hindered}."
+    if search or schedule is not None:
+        program = refine(
+            snapped, _surface(target, snapped, seed), voxels=target.voxels if target.points is None else None,
+            schedule=schedule, reach=REACH, seed=seed, deadline=started + budget, progress=progress,
+        )  # fmt: skip
+    scores |= {
+        "iou": float(packed_iou(packed_rows(unroll(snapped)), pack(target.voxels))),
         "blocks": float(snapped.blocks),
         "statements": float(snapped.statements),
         "primitives": float(snapped.size),
         "seconds": time.monotonic() - started,
     }
-    return Result(refined, snapped, scores, _advice(structure.reason, snapped.blocks, blocks))
+    return Result(program, snapped, scores, reason)
 
 
 @cache
@@ -117,7 +175,7 @@ def prepare_kernels() -> None:
     """
     cells = np.zeros((RESOLUTION,) * 3, np.bool_)
     cells[14:18, 14:18, 14:18] = True
-    found = search_structure(cells, Settings(blocks=2, rounds=2, forms=1.0))
+    found = search_structure(cells, Settings(blocks=2, rounds=2, forms=1.0, recall=1.0))
     refine(to_program(found.blocks), torch.from_numpy(points_of_cells(cells)), schedule=Schedule(steps=1))
 
 

@@ -1,14 +1,16 @@
 """Structure search: voxels to blocks of whole numbers that maximise IoU minus price x statements.
 
 Blocks are first added one by one, each the repeated box that gains most on what is still uncovered; then rounds of
-ruin and recreate take some out and put others in, discs, sheared backs, bars, stars and crosses among them.
+ruin and recreate take some out and put others in, discs, sheared backs, bars, stars and crosses among them.  Programs
+and blocks that somebody else proposes, such as a generator, take part in both.
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -16,7 +18,12 @@ import numpy.typing as npt
 from shapeprog.geometry.occupancy import pack
 from shapeprog.inference.block_layout import WIDTH
 from shapeprog.inference.families import families
+from shapeprog.inference.reading import from_program
+from shapeprog.language.program import Program
 from shapeprog.space import FloatArray
+
+if TYPE_CHECKING:
+    from shapeprog.inference.editing import Target
 
 PLANES = 3
 """Mirror planes nearest the middle that may pair a second loop with a first."""
@@ -29,6 +36,9 @@ STARTS = (0.9, 2.0, 5.0)
 """Weights of an empty cell against an occupied one, from which greedy starts are made; the best start is kept.
 
 A light weight finds solid bodies, a heavy one the boards of a shelf that a single filled box would swallow."""
+
+KEPT = 12
+"""Programs of its own, the latest, whose blocks the search may recall."""
 
 
 @dataclass(frozen=True)
@@ -51,6 +61,10 @@ class Settings:
         Share of proposals that also try a form other than a box.
     heat
         Largest loss of the objective that a first round may accept; it cools linearly.
+    recall
+        Share of the blocks put in that were suggested or were of use before, instead of sought anew.
+    patience
+        Rounds without a gain after which the search stops.
     """
 
     blocks: int = 10
@@ -60,21 +74,51 @@ class Settings:
     families: int = 200
     forms: float = 0.3
     heat: float = 0.004
+    recall: float = 0.0
+    patience: int = 1000
+
+
+def _no_blocks() -> FloatArray:
+    return np.zeros((0, WIDTH))
+
+
+@dataclass(frozen=True)
+class Proposals:
+    """What the structure search may begin with and draw from.
+
+    Parameters
+    ----------
+    programs
+        Whole programs as blocks (K, 20), each a start of the search.
+    loose
+        Blocks (P, 20) to put in one by one.
+    """
+
+    programs: tuple[FloatArray, ...] = ()
+    loose: FloatArray = field(default_factory=_no_blocks)
+
+    @classmethod
+    def of(cls, programs: Sequence[Program]) -> Proposals:
+        """Whole programs, whose blocks are loose ones as well; what the search cannot draw is left out."""
+        read = tuple(from_program(program) for program in programs)
+        return cls(read, np.concatenate([_no_blocks(), *read]))
 
 
 @dataclass(frozen=True)
 class Structure:
-    """Blocks (K, 20), their IoU, and why the search stopped."""
+    """Blocks (K, 20), their IoU, why the search stopped, and whether it grew from a proposed program."""
 
     blocks: FloatArray
     iou: float
     reason: str
+    proposed: bool = False
 
 
 def search_structure(
     voxels: npt.NDArray[np.bool_],
     settings: Settings,
     *,
+    proposals: Proposals | None = None,
     seed: int = 0,
     deadline: float = float("inf"),
     progress: Callable[[str, float], None] | None = None,
@@ -83,48 +127,72 @@ def search_structure(
 
     Parameters
     ----------
+    proposals
+        Programs to start from beside the greedy ones, and blocks to put in; what does not help is not kept.
     deadline
         Value of ``time.monotonic()`` after which no further round starts.
     progress
         Called with what is being done and the share done.
     """
     from shapeprog.inference import editing
-    from shapeprog.inference.proposal_kernels import propose
+    from shapeprog.inference.pool import Pool
     from shapeprog.inference.raster_kernels import draw_all, iou_rows
 
     cells = np.argwhere(voxels)
     low, high = cells.min(0), cells.max(0) + 1
     table = families((high - low).tolist(), PLANES, MOST_COPIES)
     target = editing.Target(pack(voxels).reshape(-1), low, high, table, settings.price, len(cells))
-    everything = np.arange(len(table))
-    best, best_value = np.zeros((0, WIDTH)), -np.inf
-    for waste in STARTS:
-        blocks = np.zeros((0, WIDTH))
-        while len(blocks) < settings.blocks:
-            gain, block = propose(
-                target.occupied, draw_all(blocks), float(np.float32(waste)), low, high, table, everything,
-                target.price * target.cells,
-            )  # fmt: skip
-            if gain <= 0:
-                break
-            blocks = np.concatenate([blocks, block[None]])
-        blocks = editing.polish(blocks, target, 1, 3)
-        value = editing.value_of(blocks, target)
-        if value > best_value:
-            best, best_value = blocks, value
-    done, reason = 0, f"all {settings.rounds} rounds of editing were done"
+    offered = proposals or Proposals()
+    rough = [each[: settings.blocks] for each in offered.programs] + greedy_starts(target, settings.blocks)
+    starts = [editing.polish(each, target, 1, 3) for each in rough]
+    values = [editing.value_of(each, target) for each in starts]
+    first = int(np.argmax(values))
+    best, best_value = starts[first], values[first]
+    own = [*rough[len(offered.programs) :], *starts]
+    done, gained, reason = 0, 0, f"all {settings.rounds} rounds of editing were done"
     while done < settings.rounds:
         if time.monotonic() > deadline:
             reason = f"the time budget ran out after {done} of {settings.rounds} rounds of editing"
             break
+        if done - gained >= settings.patience:
+            reason = f"{done - gained} rounds of editing in a row gained nothing"
+            break
         rounds = min(settings.chunk, settings.rounds - done)
         heat = settings.heat * (1 - done / settings.rounds)
-        plan = editing.Plan(settings.blocks, min(settings.families, len(table)), settings.forms, heat)
+        pool = Pool.of([offered.loose, *own[-KEPT:]], target.price * target.cells) if settings.recall else None
+        plan = editing.Plan(
+            settings.blocks, min(settings.families, len(table)), settings.forms, heat, settings.recall, pool
+        )
         blocks, value = editing.rebuild(best, target, plan, rounds, seed + done)
+        done += rounds
+        if value > best_value:
+            own.append(blocks)
+            gained = done
         if value >= best_value:
             best, best_value = blocks, value
-        done += rounds
         if progress:
             progress("searching structure", done / settings.rounds)
     found = editing.polish(best, target, 3, 5)
-    return Structure(found, float(iou_rows(draw_all(found), target.occupied)), reason)
+    proposed = first < len(offered.programs)
+    return Structure(found, float(iou_rows(draw_all(found), target.occupied)), reason, proposed)
+
+
+def greedy_starts(target: Target, most: int) -> list[FloatArray]:
+    """For each weight of an empty cell, the repeated boxes that gain most, one after another."""
+    from shapeprog.inference.proposal_kernels import propose
+    from shapeprog.inference.raster_kernels import draw_all
+
+    everything = np.arange(len(target.table))
+    starts = []
+    for waste in STARTS:
+        blocks = np.zeros((0, WIDTH))
+        while len(blocks) < most:
+            gain, block = propose(
+                target.occupied, draw_all(blocks), float(np.float32(waste)), target.low, target.high, target.table,
+                everything, target.price * target.cells,
+            )  # fmt: skip
+            if gain <= 0:
+                break
+            blocks = np.concatenate([blocks, block[None]])
+        starts.append(blocks)
+    return starts

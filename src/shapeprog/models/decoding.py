@@ -217,3 +217,29 @@ def _at(state: Memory, index: Tensor) -> Memory:
 def _iou(canvas: Int[Tensor, "B W 32 32"], target: UInt8[Tensor, "B 32 32 32"]) -> Float[Tensor, "B W"]:
     cells = packed(target)[:, None]
     return count(canvas & cells) / count(canvas | cells).clamp(min=1)
+
+
+@torch.no_grad()
+def suggest(
+    generator: Generator,
+    target: UInt8[Tensor, "1 32 32 32"],
+    canvas: Int[Tensor, "1 32 32"],
+    memory: Memory,
+    number: int,
+    random: torch.Generator,
+) -> tuple[Code, Memory]:
+    """Blocks that may come next on one canvas, as programs (number, 1, J): drawn at random, a single one the likeliest.
+
+    The canvas is seen once for all of them, which is what costs.
+
+    Parameters
+    ----------
+    canvas
+        What has been drawn, packed, by whomever.
+    memory
+        What the call for the block before returned; ``None`` at the first.
+    """
+    feature, memory = generator.perceive(target.float(), unpacked(canvas).float(), memory)
+    choose: Choice = "sample" if number > 1 else "argmax"
+    ids, values, _ = _block(generator, feature.expand(number, -1), choose, 1.0, random)
+    return Code(ids[:, None], values[:, None]), memory

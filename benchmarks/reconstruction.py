@@ -34,10 +34,13 @@ def measure(task: Task) -> list[dict[str, Any]]:
     """Rows of one shape for all methods that were asked for."""
     from shapeprog.data import read_pack
     from shapeprog.evaluation.metrics import evaluate_program
+    from shapeprog.geometry.occupancy import pack as packed
+    from shapeprog.geometry.occupancy import packed_iou, packed_rows
     from shapeprog.inference import greedy_boxes, infer, refine, snapped_from
     from shapeprog.inference.infer import prepare_kernels
     from shapeprog.inference.refine import REACH
     from shapeprog.inference.surface import points_of_cells
+    from shapeprog.language.unroll import unroll
 
     torch.set_num_threads(1)
     prepare_kernels()
@@ -50,11 +53,13 @@ def measure(task: Task) -> list[dict[str, Any]]:
         assert snapped_from(program, snapped), (pack, shape.name, method)
         row = asdict(evaluate_program(program, shape, snapped, seed=seed))
         row |= {"pack": Path(pack).stem, "method": method, "allowed": blocks, "seconds": seconds, "seed": seed}
+        row["rounded_iou"] = float(packed_iou(packed_rows(unroll(program.snap())), packed(shape.voxels)))
         rows.append(row)
 
+    started = time.monotonic()
     boxes = greedy_boxes(shape.voxels, blocks)
     if GREEDY in methods:
-        keep(GREEDY, boxes, boxes, float("nan"))
+        keep(GREEDY, boxes, boxes, time.monotonic() - started)
     if REFINED in methods and cloud is not None:
         started = time.monotonic()
         keep(REFINED, refine(boxes, cloud, reach=REACH, seed=seed), boxes, time.monotonic() - started)

@@ -64,7 +64,10 @@ def prepare_command(
 
 def evaluate_command(
     predictions: Annotated[Path, typer.Argument(help="Programs, meshes, clouds or voxels: a file, pack or folder.")],
-    targets: Annotated[list[Path], typer.Argument(help="Targets of any kind: files, packs or folders.")],
+    targets: Annotated[list[Path] | None, typer.Argument(help="Targets of any kind: files, packs or folders.")] = None,
+    weights: Annotated[
+        str | None, typer.Option(help="A generator instead of predictions, which rebuilds all targets in one pass.")
+    ] = None,
     points: Annotated[int, typer.Option(help="Points on each surface.", min=2)] = 5000,
     seed: terminal.Seed = 0,
     up: terminal.Up = None,
@@ -81,6 +84,9 @@ def evaluate_command(
     program as it is, 5,000 points each, bounding box of the target scaled to diagonal 1, squared distances, both
     directions added. The noise floor is the CD between two samplings of the target itself. Predicted meshes and
     clouds must lie in the world of their target. One prediction and one target need not have the same name.
+
+    With --weights all arguments are targets: shapeprog evaluate --weights default bench_test.npz. The IoU is then that
+    of the rounded program, with no search at all, and an empty program counts as a single point in the centre.
     """
     from rich.progress import track
 
@@ -90,19 +96,23 @@ def evaluate_command(
 
     terminal.load_modules(modules)
     terminal.check_axes(up, front)
-    missing = [path for path in [predictions, *targets] if not Path(str(path).split("#")[0]).exists()]
+    wanted = [*([predictions] if weights else []), *(targets or [])]
+    missing = [path for path in [predictions, *wanted] if not Path(str(path).split("#")[0]).exists()]
     if missing:
         raise InputError(f"there is no file or folder {missing[0]}", "check the path")
+    if not wanted:
+        raise InputError("there are no targets", "name them after the predictions, or give --weights")
     failures: list[ShapeProgError] = []
     shapes: dict[str, Shape] = {}
-    for path, shape in load_all(targets, up=up, front=front, points=2 * points, seed=seed):
+    for path, shape in load_all(wanted, up=up, front=front, points=2 * points, seed=seed):
         if isinstance(shape, ShapeProgError):
             failures.append(ShapeProgError(f"target {path}: {shape.message}", shape.hint))
         elif shape.name in shapes:
             failures.append(ShapeProgError(f"two targets are called {shape.name}", "only the first is used"))
         else:
             shapes[shape.name] = shape
-    found = list(scoring.predictions(predictions))
+    generates = weights is not None
+    found = list(scoring.generated(weights, shapes) if weights else scoring.predictions(predictions))
     rows: list[Metrics] = []
     console = terminal.errors()
     silent = quiet or as_json or as_csv
@@ -113,7 +123,7 @@ def evaluate_command(
         elif target is None:
             failures.append(ShapeProgError(f"prediction {name} has no target of that name", "rename one of them"))
         else:
-            rows.append(scoring.measure(prediction, target, points, seed))
+            rows.append(scoring.measure(prediction, target, points, seed, finite=generates))
     used = {row.name for row in rows}
     missing_names = [name for name in shapes if name not in used]
     if not rows:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -43,10 +43,30 @@ def predictions(path: Path) -> Iterator[tuple[str, Prediction | ShapeProgError]]
             yield (file.stem if isinstance(shape, ShapeProgError) else shape.name), shape
 
 
-def measure(prediction: Prediction, target: Shape, points: int, seed: int) -> Metrics:
-    """The measures of one prediction; sizes are 0 for what is no program."""
+def generated(weights: str, shapes: Mapping[str, Shape]) -> Iterator[tuple[str, Prediction]]:
+    """Names and single-pass programs of shapes; ``weights`` is a file, or the name of weights that ship."""
+    from shapeprog.evaluation.generated import generated as programs_of
+    from shapeprog.models.checkpoint import load_generator
+
+    generator, _ = load_generator(weights)
+    programs = programs_of(generator, list(shapes.values()))
+    yield from ((name, (program, None)) for name, program in zip(shapes, programs, strict=True))
+
+
+def measure(prediction: Prediction, target: Shape, points: int, seed: int, *, finite: bool = False) -> Metrics:
+    """The measures of one prediction; sizes are 0 for what is no program.
+
+    Parameters
+    ----------
+    finite
+        Whether a program that draws nothing counts as a point in the centre, instead of an infinite CD.
+    """
     if isinstance(prediction, Shape):
         return _measure_shape(prediction, target, points, seed)
+    if finite:
+        from shapeprog.evaluation.generated import measured
+
+        return measured(prediction[0], target, points, seed)
     return evaluate_program(prediction[0], target, prediction[1], points, seed)
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 import torch
+from safetensors.torch import save_file
 from torch import nn
 
 from shapeprog.cli import main
@@ -101,8 +102,6 @@ def test_a_file_that_is_cut_short(part: float, tmp_path: Path) -> None:
 
 
 def test_files_of_other_kinds(tmp_path: Path) -> None:
-    from safetensors.torch import save_file
-
     path = tmp_path / "other.safetensors"
     path.write_bytes(b"PK\x03\x04 this is a zip, or a picture, or anything else " * 10)
     with pytest.raises(InputError, match="no safetensors file"):
@@ -168,8 +167,8 @@ def test_a_changed_vocabulary_is_refused_by_name(tmp_path: Path) -> None:
 
 
 def test_listing_reads_headers_and_names_what_is_wrong(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    path = written(tmp_path, data="blocks", seed=7, visits=1200, scores={"iou": 0.875})
-    path.write_bytes(path.read_bytes())
+    written(tmp_path, data="blocks", seed=7, visits=1200, scores={"iou": 0.875})
+    save_file({"step": torch.zeros(3)}, tmp_path / "state.safetensors")
     found = [each for _, each in list_checkpoints([tmp_path], shipped=False)]
     assert [type(each) for each in found] == [Listed]
     for words, part in ((["models", str(tmp_path)], "iou 0.875"), (["models", str(tmp_path), "--json"], "862272")):

@@ -200,6 +200,8 @@ def list_checkpoints(
             raise InputError(f"there is no folder {folder}", "check the path")
         for path in sorted(folder.glob(f"*{SUFFIX}")) if folder.is_dir() else [folder]:
             try:
+                if folder.is_dir() and "card" not in _header(path).get("__metadata__", {}):
+                    continue  # something else, such as the state of a run
                 yield path, read_card(path)
             except ShapeProgError as error:
                 yield path, error

@@ -14,7 +14,7 @@ from benchmarks.experiment.document import extrapolation_table
 from benchmarks.experiment.efficiency import Curve, mean_curve, visits_to_reach
 from benchmarks.experiment.recipes import CATEGORIES, RECIPES
 from benchmarks.experiment.stages import Experiment, Run, runs
-from benchmarks.experiment.tables import ORDER, cell, table
+from benchmarks.experiment.tables import ORDER, cell, reached, table
 from shapeprog.cli import main
 from shapeprog.geometry.occupancy import voxels
 from shapeprog.language.statement import language
@@ -58,6 +58,13 @@ def test_a_table_holds_the_rows_of_its_pack_in_order() -> None:
     assert [line.split("|")[1].strip() for line in lines[2:4]] == ["greedy boxes", "guided"]
     assert lines[-1].startswith("1 shapes; noise floor of CD x 1000: 0.10")
     assert table(rows, "chair_test") == ""
+
+
+def test_what_was_missed_is_said() -> None:
+    rows = [row(0.0079), row(0.0092, pack="cabinet_test"), row(0.0015, method="hybrid", seed=2)]
+    lines = reached(rows, {"bench": ("hybrid", 2)}).splitlines()
+    assert lines[3].endswith("| <= 7.80 | 7.90 (missed) | <= 9.20 | 9.20 |")
+    assert lines[5].endswith("| <= 1.40 | 1.50 (missed) | <= 1.90 | - |")
 
 
 def test_every_row_has_a_place() -> None:

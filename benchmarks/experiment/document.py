@@ -79,9 +79,13 @@ def _sections(experiment: Experiment, docs: Path) -> Iterator[str]:
         found = tables.table(rows, f"{category}_test")
         if found:
             yield f"### {category}\n\n{found}"
-            best = experiment.best(category)
-            if best is not None:
-                yield f"The best on val is *{best.recipe.row}*, seed {best.seed}."
+            chosen = experiment.best(category)
+            if chosen is not None:
+                yield f"The best on val is *{chosen.recipe.row}*, seed {chosen.seed}."
+    if rows:
+        best = {category: experiment.best(category) for category in CATEGORIES}
+        known = {category: (run.recipe.row, run.seed) for category, run in best.items() if run is not None}
+        yield f"### What was to be reached\n\n{tables.reached(rows, known)}"
     told = efficiency.summary(experiment)
     if told and (docs / "adaptation_efficiency.png").exists():
         yield "\n".join([EFFICIENCY, "", *(f"- {line}" for line in told)])

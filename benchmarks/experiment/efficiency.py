@@ -72,7 +72,8 @@ def summary(experiment: Experiment) -> list[str]:
         if guided.visits[best] > 0 and np.isfinite(needed):
             told += f"; direct adaptation is as good after {needed:,.0f}"
             told += f", {guided.visits[best] / needed:.0f} times sooner" if 0 < needed < guided.visits[best] else ""
-        lines.append(f"{told}, and ends at {direct.cd[-1]:.5f} after {direct.visits[-1]:,.0f}.")
+        last = int(direct.cd.argmin())
+        lines.append(f"{told}, and best after {direct.visits[last]:,.0f} (CD {direct.cd[last]:.5f}).")
     return lines
 
 

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from typing import Any
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from benchmarks.experiment.measuring import REFINED_BEST, WIDE, WITH_GENERATOR
-from benchmarks.experiment.recipes import RECIPES
+from benchmarks.experiment.recipes import CATEGORIES, RECIPES
 from benchmarks.reconstruction import GREEDY, REFINED, SEARCH
 
 Row = dict[str, Any]
@@ -82,7 +83,58 @@ def table(rows: Iterable[Row], pack: str) -> str:
     return "\n".join(lines)
 
 
-def mean_of(rows: Iterable[Row], pack: str, method: str, measure: str) -> float:
-    """Mean of a measure over seeds and shapes; not a number where there is no row."""
-    found = [row[measure] for row in rows if row["pack"] == pack and row["method"] == method]
-    return float(np.mean(found)) if found else float("nan")
+class Wanted(NamedTuple):
+    """What a row must reach: a measure of it, and its bound for each category.
+
+    Parameters
+    ----------
+    row
+        The row; empty for the best on val.
+    most
+        Whether the bound is the most that the measure may be, or the least.
+    """
+
+    what: str
+    row: str
+    measure: str
+    bounds: tuple[float, float]
+    most: bool = True
+
+
+WANTED = [
+    Wanted("no adaptation, CD: the paper's", WIDE, "cd", (0.0135, 0.0104)),
+    Wanted("guided, CD: the paper's", RECIPES["guided"].row, "cd", (0.0078, 0.0092)),
+    Wanted("direct (chamfer), CD: half of the paper's", RECIPES["direct"].row, "cd", (0.0018, 0.0022)),
+    Wanted("best single pass, CD", "", "cd", (0.0014, 0.0019)),
+    Wanted("best single pass, IoU", "", "iou", (0.72, 0.85), most=False),
+    Wanted("best single pass, ms per shape", "", "seconds", (1 / 45, 1 / 45)),
+]
+
+
+def reached(rows: Sequence[Row], best: Mapping[str, tuple[str, int]]) -> str:
+    """What was to be reached beside what was, as markdown.
+
+    Parameters
+    ----------
+    best
+        For each category the row, and the seed, of what is best on val.
+    """
+    lines = ["| | " + " | ".join(f"{each}: wanted | reached" for each in CATEGORIES) + " |", "|---|" + "---|" * 4]
+    for wanted in WANTED:
+        cells = []
+        factor, digits = COLUMNS[wanted.measure][1:]
+        for category, bound in zip(CATEGORIES, wanted.bounds, strict=True):
+            row, seed = (wanted.row, None) if wanted.row else best.get(category, ("", None))
+            value = mean_of(rows, f"{category}_test", row, wanted.measure, seed)
+            mark = "" if math.isnan(value) or (value <= bound) == wanted.most else " (missed)"
+            cells += [f"{'<=' if wanted.most else '>='} {bound * factor:.{digits}f}"]
+            cells += ["-" if math.isnan(value) else f"{value * factor:.{digits}f}{mark}"]
+        unit = " x 1000" if wanted.measure == "cd" else ""
+        lines.append(f"| {wanted.what}{unit} | " + " | ".join(cells) + " |")
+    return "\n".join(lines)
+
+
+def mean_of(rows: Iterable[Row], pack: str, method: str, measure: str, seed: int | None = None) -> float:
+    """Mean of a measure over shapes, and over seeds unless one is named; not a number where there is no row."""
+    few = [row for row in rows if (row["pack"], row["method"]) == (pack, method) and seed in (None, row["seed"])]
+    return float(np.mean([row[measure] for row in few])) if few else float("nan")

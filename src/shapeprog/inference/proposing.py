@@ -21,7 +21,7 @@ from shapeprog.inference.block_layout import WIDTH
 from shapeprog.inference.descent_kernels import improve_block
 from shapeprog.inference.pool import Pool
 from shapeprog.inference.raster_kernels import ROWS, draw_block
-from shapeprog.inference.reading import from_program
+from shapeprog.inference.reading import from_code
 from shapeprog.inference.refine import single_threaded
 from shapeprog.inference.structure import Proposals
 from shapeprog.language.program import Program
@@ -80,7 +80,7 @@ def propose_program(
                 break
             canvas = torch.from_numpy(covered.view(np.int32).reshape(1, RESOLUTION, RESOLUTION)).to(device)
             code, memory = suggest(generator, target, canvas, memory, suggestions, random)
-            suggested = from_program(Program(tuple(node for each in decode(code) for node in each.body)))
+            suggested = from_code(code)
             pool, improved = Pool.of([suggested], cost), []
             for block in pool.several(occupied, covered, WASTE, BEST):
                 improved.append(improve_block(block, occupied, covered, price, 1)[0][None])

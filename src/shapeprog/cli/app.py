@@ -12,7 +12,7 @@ from typing import Annotated
 
 import typer
 
-from shapeprog.cli import inferring, measuring, modelling, sampling, terminal, training, writing
+from shapeprog.cli import adapting, inferring, measuring, modelling, sampling, terminal, training, writing
 
 # Before torch is loaded: its idle workers would spin on the cores that the kernels of other threads want.
 os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
@@ -37,6 +37,8 @@ for name, command, help_line in (
     ("sample", sampling.sample_command, "Draw synthetic furniture: a contact sheet or a data set."),
     ("pretrain", training.pretrain_command, "Pretrain a generator on synthetic furniture."),
     ("train-executor", training.train_executor_command, "Train the neural executor on synthetic blocks."),
+    ("label", adapting.label_command, "Find programs for a pack by search, as labels."),
+    ("adapt", adapting.adapt_command, "Adapt a generator to real shapes."),
     ("models", modelling.models_command, "List the weights that ship, and those in folders."),
     ("import-weights", modelling.import_weights_command, "Turn published weights into a file of this package."),
     ("evaluate", measuring.evaluate_command, "Measure predictions against targets."),

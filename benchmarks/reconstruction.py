@@ -6,7 +6,10 @@
 
 One line of JSON is kept for every shape, method and number of blocks; a run that was stopped goes on where it was.
 Packs with points give the methods ``search`` (mesh points given) and ``search, voxels alone``; packs without give
-``search``.  ``greedy boxes`` and ``greedy boxes, refined`` are the baselines of the measuring protocol.
+``search``.  ``greedy boxes`` and ``greedy boxes, refined`` are the baselines of the measuring protocol.  ``search`` is
+the search without a generator and without a memory, ``search, recalling`` the one with a memory alone, ``generator`` a
+single pass of the weights, and ``generator + search`` what ``shapeprog infer`` does with them, at about the time of
+``search`` or at half of it.  What has no weights or no points to work with is left out.
 """
 
 from __future__ import annotations
@@ -23,37 +26,42 @@ from typing import Any
 import numpy as np
 import torch
 
-Task = tuple[str, int, int, tuple[str, ...], int, float]
-"""Pack, index, most blocks, methods, seed, seconds."""
+Task = tuple[str, int, int, tuple[str, ...], int, float, str]
+"""Pack, index, most blocks, methods, seed, seconds, weights."""
 
 GREEDY, REFINED, SEARCH, ALONE = "greedy boxes", "greedy boxes, refined", "search", "search, voxels alone"
-COLUMNS = ("iou", "cd", "f1", "noise_floor", "blocks", "statements", "primitives", "seconds")
+RECALLING, SINGLE = "search, recalling", "generator"
+BOTH, HALF = "generator + search", "generator + search, half the time"
+HALF_ROUNDS = 60
+"""Rounds of editing in which search and generator take half the time of the search alone."""
+
+COLUMNS = ("iou", "cd", "f1", "noise_floor", "blocks", "statements", "primitives", "seconds", "cpu_seconds")
 
 
 def measure(task: Task) -> list[dict[str, Any]]:
     """Rows of one shape for all methods that were asked for."""
     from shapeprog.data import read_pack
     from shapeprog.evaluation.metrics import evaluate_program
-    from shapeprog.geometry.occupancy import pack as packed
-    from shapeprog.geometry.occupancy import packed_iou, packed_rows
     from shapeprog.inference import greedy_boxes, infer, refine, snapped_from
     from shapeprog.inference.infer import prepare_kernels
+    from shapeprog.inference.proposing import ready_generator
     from shapeprog.inference.refine import REACH
+    from shapeprog.inference.structure import PLAIN, Settings
     from shapeprog.inference.surface import points_of_cells
-    from shapeprog.language.unroll import unroll
 
     torch.set_num_threads(1)
     prepare_kernels()
-    pack, index, blocks, methods, seed, budget = task
+    pack, index, blocks, methods, seed, budget, weights = task
+    writer, _ = ready_generator(weights)
     shape = read_pack(Path(pack))[index]
     cloud = None if shape.points is None else torch.from_numpy(np.asarray(shape.points, np.float32))
     rows = []
 
-    def keep(method: str, program: Any, snapped: Any, seconds: float) -> None:
+    def keep(method: str, program: Any, snapped: Any, seconds: float, cpu_seconds: float = float("nan")) -> None:
         assert snapped_from(program, snapped), (pack, shape.name, method)
         row = asdict(evaluate_program(program, shape, snapped, seed=seed))
         row |= {"pack": Path(pack).stem, "method": method, "allowed": blocks, "seconds": seconds, "seed": seed}
-        row["rounded_iou"] = float(packed_iou(packed_rows(unroll(program.snap())), packed(shape.voxels)))
+        row["cpu_seconds"] = cpu_seconds
         rows.append(row)
 
     started = time.monotonic()
@@ -63,10 +71,22 @@ def measure(task: Task) -> list[dict[str, Any]]:
     if REFINED in methods and cloud is not None:
         started = time.monotonic()
         keep(REFINED, refine(boxes, cloud, reach=REACH, seed=seed), boxes, time.monotonic() - started)
-    if SEARCH in methods:
-        result = infer(shape, blocks=blocks, seed=seed, budget=budget)
-        keep(SEARCH, result.program, result.snapped, result.scores["seconds"])
-        if ALONE in methods and cloud is not None:  # the structure is searched on cells, so it is the same
+    for method, settings, generator in (
+        (SEARCH, PLAIN, None),
+        (RECALLING, Settings(), None),
+        (BOTH, Settings(), writer),
+        (HALF, Settings(rounds=HALF_ROUNDS), writer),
+        (SINGLE, None, writer),
+    ):
+        if method not in methods or (method in (BOTH, HALF, SINGLE) and writer is None):
+            continue
+        before = time.thread_time()
+        result = infer(
+            shape, blocks=blocks, seed=seed, budget=budget, settings=settings, generator=generator,
+            search=method != SINGLE,
+        )  # fmt: skip
+        keep(method, result.program, result.snapped, result.scores["seconds"], time.thread_time() - before)
+        if method == SEARCH and ALONE in methods and cloud is not None:  # the same structure: it is found on cells
             guessed = torch.from_numpy(points_of_cells(shape.voxels, seed=seed))
             alone = refine(result.snapped, guessed, voxels=shape.voxels, reach=REACH, seed=seed)
             keep(ALONE, alone, result.snapped, result.scores["seconds"])
@@ -83,7 +103,7 @@ def tasks(args: argparse.Namespace, done: set[tuple[str, str, int]]) -> Iterator
         for index in chosen[: args.shapes]:
             for blocks in args.blocks:
                 if (Path(pack).stem, str(shapes.ids[index]), blocks) not in done:
-                    yield pack, index, blocks, tuple(args.methods), args.seed, args.budget
+                    yield pack, index, blocks, tuple(args.methods), args.seed, args.budget, args.weights
 
 
 def run(args: argparse.Namespace) -> None:
@@ -132,7 +152,9 @@ def main() -> None:
     parser.add_argument("--split", default="test", help="split to use of packs that name one")
     parser.add_argument("--shapes", type=int, default=None, help="only the first so many of each pack")
     parser.add_argument("--blocks", type=int, nargs="*", default=[10], help="most blocks, one run for each")
-    parser.add_argument("--methods", nargs="*", default=[GREEDY, REFINED, SEARCH, ALONE])
+    every = [GREEDY, REFINED, SEARCH, ALONE, RECALLING, SINGLE, BOTH, HALF]
+    parser.add_argument("--methods", nargs="*", default=every, choices=every)
+    parser.add_argument("--weights", default="default", help="generator: weights that ship, or a file")
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--budget", type=float, default=60.0, help="seconds; ample, so that the seed alone decides")

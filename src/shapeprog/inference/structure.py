@@ -52,7 +52,7 @@ class Settings:
     price
         IoU that one more statement has to earn.
     rounds
-        Rounds of ruin and recreate.
+        Most rounds of ruin and recreate.
     chunk
         Rounds between two looks at the clock.
     families
@@ -69,13 +69,17 @@ class Settings:
 
     blocks: int = 10
     price: float = 0.001
-    rounds: int = 200
+    rounds: int = 400
     chunk: int = 20
     families: int = 200
     forms: float = 0.3
     heat: float = 0.004
-    recall: float = 0.0
-    patience: int = 1000
+    recall: float = 0.5
+    patience: int = 100
+
+
+PLAIN = Settings(rounds=200, recall=0.0, patience=200)
+"""The search without a memory, as it was measured before a generator took part; the baseline of what came after."""
 
 
 def _no_blocks() -> FloatArray:

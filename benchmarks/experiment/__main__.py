@@ -3,6 +3,7 @@
     python -m benchmarks.experiment list PACKS RESULTS            # what is made and what is not
     python -m benchmarks.experiment train PACKS RESULTS           # every run that is missing, or some of them:
     python -m benchmarks.experiment train PACKS RESULTS --only guided direct --category bench --seed 1
+    python -m benchmarks.experiment baselines PACKS RESULTS       # measures boxes and search, which need no training
     python -m benchmarks.experiment table PACKS RESULTS           # measures what is missing on test, prints tables
     python -m benchmarks.experiment efficiency PACKS RESULTS      # docs/adaptation_efficiency.png
     python -m benchmarks.experiment extrapolation PACKS RESULTS   # docs/extrapolation.png
@@ -75,7 +76,12 @@ def _train(experiment: Experiment, args: argparse.Namespace) -> None:
             experiment.make(run, *args.extra)
 
 
+def _baselines(experiment: Experiment, args: argparse.Namespace) -> None:
+    measuring.measure_baselines(experiment, args.workers)
+
+
 def _table(experiment: Experiment, args: argparse.Namespace) -> None:
+    measuring.measure_baselines(experiment, args.workers)
     measuring.measure(experiment, args.workers)
     for category in CATEGORIES:
         rows = measuring.read_rows(measuring.baselines_file(experiment))
@@ -114,9 +120,15 @@ def _document(experiment: Experiment, args: argparse.Namespace) -> None:
 
 
 WORK = {
-    "list": _list, "train": _train, "table": _table, "efficiency": _efficiency, "extrapolation": _extrapolation,
-    "figure": _figure, "document": _document,
-}  # fmt: skip
+    "list": _list,
+    "train": _train,
+    "baselines": _baselines,
+    "table": _table,
+    "efficiency": _efficiency,
+    "extrapolation": _extrapolation,
+    "figure": _figure,
+    "document": _document,
+}
 
 if __name__ == "__main__":
     main()

@@ -8,10 +8,11 @@ as the protocol allows, by at most one cell in each parameter.
 from __future__ import annotations
 
 import argparse
+import hashlib
 import json
 import multiprocessing
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -22,12 +23,17 @@ import torch
 from benchmarks import reconstruction
 from benchmarks.experiment.recipes import CATEGORIES
 from benchmarks.experiment.stages import RESULTS, Experiment, Run, runs
+from benchmarks.reconstruction import GREEDY, REFINED, SEARCH
+from shapeprog.files import write_text
 
 BLOCKS, BATCH = 10, 32
 
 WIDE = "no adaptation, wide prior"
 REFINED_BEST = "the best on val, refined"
-WITH_GENERATOR = "search with the generator"
+WITH_GENERATOR = "generator + search"
+
+ROUNDED_UNKNOWN = {"rounded_iou": float("nan")}
+"""Refinement moves numbers to where the surface is, off the cells, so that rounding them tells nothing."""
 
 Row = dict[str, Any]
 Job = tuple[str, int, Any, str, float, int]
@@ -35,8 +41,8 @@ Job = tuple[str, int, Any, str, float, int]
 
 
 @dataclass(frozen=True)
-class Weights:
-    """Weights that make a row.
+class Group:
+    """All shapes of a category as one generator rebuilds them.
 
     Parameters
     ----------
@@ -45,70 +51,89 @@ class Weights:
     category
         The pack they are measured on.
     seed
-        Of the run that made them.
+        Of the run that made the weights.
     source
         A file, or the name of weights that ship.
+    work
+        What is done with each shape, in another process: a :data:`Job` in, a row out.
     """
 
     row: str
     category: str
     seed: int
     source: str
+    work: Callable[[Job], Row]
+
+    @property
+    def key(self) -> tuple[str, str, int]:
+        """What tells its rows from others."""
+        return f"{self.category}_test", self.row, self.seed
 
 
-def all_weights(experiment: Experiment) -> Iterator[Weights]:
-    """The weights that are there, for every category."""
+def groups(experiment: Experiment) -> Iterator[Group]:
+    """What can be measured with the weights that are there."""
     for category in CATEGORIES:
-        yield Weights(WIDE, category, 0, experiment.start)
+        yield Group(WIDE, category, 0, experiment.start, measured)
         for run in runs():
             if run.recipe.row and run.category in ("", category) and experiment.finished(run):
-                yield Weights(run.recipe.row, category, run.seed, str(experiment.made(run)))
+                yield Group(run.recipe.row, category, run.seed, str(experiment.made(run)), measured)
+        best = experiment.best(category)
+        if best is not None:
+            yield Group(REFINED_BEST, category, best.seed, str(experiment.made(best)), refined)
+    for category in CATEGORIES:
+        yield Group(WITH_GENERATOR, category, 0, experiment.start, searched)
+
+
+def measure_baselines(experiment: Experiment, workers: int = 2) -> None:
+    """Measure the baselines, as far as they are not measured yet."""
+    reconstruction.run(
+        argparse.Namespace(
+            packs=[str(experiment.pack(category, "test")) for category in CATEGORIES], split="test",
+            shapes=experiment.shapes, blocks=[BLOCKS], methods=[GREEDY, REFINED, SEARCH], workers=workers,
+            seed=0, budget=60.0, weights=experiment.start, out=str(baselines_file(experiment)),
+        )
+    )  # fmt: skip
 
 
 def measure(experiment: Experiment, workers: int = 2) -> None:
-    """Measure whatever is not measured yet."""
+    """Measure what generators do, as far as it is not measured yet; rows of weights that have changed are dropped."""
     from shapeprog.data import read_pack
 
-    experiment.results.mkdir(parents=True, exist_ok=True)
-    packs = [str(experiment.pack(category, "test")) for category in CATEGORIES]
-    methods = [reconstruction.GREEDY, reconstruction.REFINED, reconstruction.SEARCH]
-    reconstruction.run(
-        argparse.Namespace(
-            packs=packs, split="test", shapes=experiment.shapes, blocks=[BLOCKS], methods=methods, workers=workers,
-            seed=0, budget=60.0, out=str(baselines_file(experiment)),
-        )
-    )  # fmt: skip
+    wanted = list(groups(experiment))
+    prints = {source: fingerprint(source) for source in {group.source for group in wanted}}
+    now = {group.key: prints[group.source] for group in wanted}
     out = rows_file(experiment)
-    known = {(row["pack"], row["method"], row["seed"]) for row in read_rows(out)}
+    kept = [row for row in read_rows(out) if now.get((row["pack"], row["method"], row["seed"])) == row["weights"]]
+    write_text(out, "".join(json.dumps(row) + "\n" for row in kept))
+    known = {(row["pack"], row["method"], row["seed"], row["name"]) for row in kept}
     context = multiprocessing.get_context("spawn")
     with context.Pool(workers) as pool, out.open("a") as file:
+        for group in wanted:
+            pack = experiment.pack(group.category, "test")
+            shapes = list(read_pack(pack))[: experiment.shapes]
+            todo = [place for place, shape in enumerate(shapes) if (*group.key, shape.name) not in known]
+            if not todo:
+                continue
+            print(f"{group.row}, {group.category}, seed {group.seed}: {len(todo)} shapes", flush=True)
+            programs: list[Any] = [group.source] * len(shapes)
+            seconds = 0.0
+            if group.work is not searched:
+                programs, seconds = decoded(group.source, shapes)
+            jobs = [(str(pack), place, programs[place], group.row, seconds, group.seed) for place in todo]
+            for row in pool.imap_unordered(group.work, jobs, chunksize=2):
+                file.write(json.dumps(row | {"weights": prints[group.source]}) + "\n")
+                file.flush()
 
-        def keep(jobs: list[Job], work: Any) -> None:
-            rows = pool.map(work, jobs, chunksize=4)
-            file.writelines(json.dumps(row) + "\n" for row in rows)
-            file.flush()
 
-        for weights in all_weights(experiment):
-            pack = experiment.pack(weights.category, "test")
-            if (pack.stem, weights.row, weights.seed) not in known:
-                print(f"{weights.row}, {weights.category}, seed {weights.seed}", flush=True)
-                programs, seconds = decoded(weights.source, list(read_pack(pack))[: experiment.shapes])
-                told = (weights.row, seconds, weights.seed)
-                keep([(str(pack), place, program, *told) for place, program in enumerate(programs)], measured)
-        for category in CATEGORIES:
-            pack, best = experiment.pack(category, "test"), experiment.best(category)
-            few = list(read_pack(pack))[: experiment.shapes]
-            if best is not None and (pack.stem, REFINED_BEST, best.seed) not in known:
-                print(f"{REFINED_BEST}: {best.name}", flush=True)
-                programs, seconds = decoded(str(experiment.made(best)), few)
-                told = (REFINED_BEST, seconds, best.seed)
-                keep([(str(pack), place, program, *told) for place, program in enumerate(programs)], refined)
-            if (pack.stem, WITH_GENERATOR, 0) not in known:
-                print(f"{WITH_GENERATOR}, {category}", flush=True)
-                keep(
-                    [(str(pack), place, experiment.start, WITH_GENERATOR, 0.0, 0) for place in range(len(few))],
-                    searched,
-                )
+def fingerprint(source: str) -> str:
+    """A short name for the very numbers of a set of weights."""
+    from shapeprog.models.checkpoint import load_generator
+
+    found = hashlib.sha256()
+    for name, value in load_generator(source)[0].state_dict().items():
+        found.update(name.encode())
+        found.update(value.contiguous().numpy().tobytes())
+    return found.hexdigest()[:12]
 
 
 def decoded(source: str, shapes: list[Any]) -> tuple[list[Any], float]:
@@ -126,21 +151,14 @@ def decoded(source: str, shapes: list[Any]) -> tuple[list[Any], float]:
 
 def measured(job: Job) -> Row:
     """The measures of a program, rounded and snapped."""
-    from shapeprog.evaluation.generated import measured as measures
-    from shapeprog.geometry.occupancy import pack as packed
-    from shapeprog.geometry.occupancy import packed_iou, packed_rows
     from shapeprog.inference.snapping import snap
-    from shapeprog.language.unroll import unroll
 
     shape, program, told = _prepared(job)
-    row = asdict(measures(program, shape))
-    snapped = packed_rows(unroll(snap(program, shape.voxels)))
-    return row | told | {"rounded_iou": row["iou"], "iou": float(packed_iou(snapped, packed(shape.voxels)))}
+    return _row(program, snap(program, shape.voxels), shape) | told
 
 
 def refined(job: Job) -> Row:
     """The measures of a program after it is snapped and refined through the renderer, as the search refines."""
-    from shapeprog.evaluation.metrics import evaluate_program
     from shapeprog.inference import refine
     from shapeprog.inference.refine import REACH
     from shapeprog.inference.snapping import snap
@@ -150,7 +168,7 @@ def refined(job: Job) -> Row:
     snapped = snap(program, shape.voxels)
     better = refine(snapped, outer_points(shape, snapped), reach=REACH)
     told["seconds"] += time.monotonic() - started
-    return asdict(evaluate_program(better, shape, snapped)) | told
+    return _row(better, snapped, shape) | told | ROUNDED_UNKNOWN
 
 
 def outer_points(shape: Any, snapped: Any) -> torch.Tensor:
@@ -166,13 +184,23 @@ def outer_points(shape: Any, snapped: Any) -> torch.Tensor:
 
 def searched(job: Job) -> Row:
     """The measures of what search finds when a generator proposes programs to it."""
-    from shapeprog.evaluation.metrics import evaluate_program
     from shapeprog.inference import infer
 
     shape, weights, told = _prepared(job)
     result = infer(shape, blocks=BLOCKS, budget=60.0, generator=weights)
     told["seconds"] = result.scores["seconds"]
-    return asdict(evaluate_program(result.program, shape, result.snapped)) | told
+    return _row(result.program, result.snapped, shape) | told | ROUNDED_UNKNOWN
+
+
+def _row(program: Any, snapped: Any, shape: Any) -> Row:
+    """The measures of a program, with the IoU of its snapped form and that of its rounded one."""
+    from shapeprog.evaluation.generated import measured as measures
+    from shapeprog.geometry.occupancy import pack, packed_iou, packed_rows
+    from shapeprog.language.unroll import unroll
+
+    row = asdict(measures(program, shape))
+    iou = float(packed_iou(packed_rows(unroll(snapped)), pack(shape.voxels)))
+    return row | {"rounded_iou": row["iou"], "iou": iou}
 
 
 def _prepared(job: Job) -> tuple[Any, Any, Row]:

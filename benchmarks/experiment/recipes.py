@@ -50,20 +50,20 @@ THREE = (0, 1, 2)
 START = "default"
 """What adaptation begins from: the weights that ship, which have seen synthetic furniture alone."""
 
-GUIDED = {"visits": 20_000, "validate-every": 1000}
-DIRECT = {"visits": 12_000, "validate-every": 600, "rate": 2e-4}
+GUIDED = {"visits": 4000, "validate-every": 500, "rate": 1e-4}
+DIRECT = {"visits": 4000, "validate-every": 500, "rate": 2e-4}
 BEST_LOSS = "chamfer=1,occupancy=1"
 
 RECIPES: dict[str, Recipe] = {
     "narrow": Recipe(
-        "pretrain", {"prior": "narrow", "visits": 60_000, "validate-every": 10_000}, seeds=THREE,
+        "pretrain", {"prior": "narrow", "visits": 48_000, "validate-every": 12_000}, seeds=THREE,
         row="no adaptation, narrow prior",
     ),
-    "executor": Recipe("train-executor", {"visits": 200_000, "validate-every": 20_000}),
-    "executor-published": Recipe("train-executor", {"visits": 200_000, "validate-every": 20_000, "widened": 0.0}),
+    "executor": Recipe("train-executor", {"visits": 150_000, "validate-every": 25_000}),
+    "executor-published": Recipe("train-executor", {"visits": 150_000, "validate-every": 25_000, "widened": 0.0}),
     "labels": Recipe("label", {}, per_category=True),
     "guided": adapting(
-        "guided", seeds=THREE, method="guided", **{"from": START, "executor": "{executor}", "rate": 1e-4}, **GUIDED
+        "guided", seeds=THREE, method="guided", **{"from": START, "executor": "{executor}"}, **GUIDED
     ),
     "direct": adapting("direct (chamfer)", seeds=THREE, method="direct", **{"from": START}, **DIRECT),
     "best-loss": adapting("direct (best loss)", method="direct", loss=BEST_LOSS, **{"from": START}, **DIRECT),
@@ -72,7 +72,7 @@ RECIPES: dict[str, Recipe] = {
     ),
     "hybrid": adapting("hybrid", method="hybrid", **{"from": START, "executor": "{executor}"}, **DIRECT),
     "distill": adapting(
-        "distilled", method="distill", labels="{labels}", visits=30_000, **{"from": START, "validate-every": 3000}
+        "distilled", method="distill", labels="{labels}", visits=8000, **{"from": START, "validate-every": 2000}
     ),
     "distill-direct": adapting(
         "distilled, then direct (best loss)", method="direct", loss=BEST_LOSS, **{"from": "{distill}"}, **DIRECT

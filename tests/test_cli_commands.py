@@ -60,7 +60,7 @@ def run(capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     """Inference that always finds the same table, at once."""
 
-    def infer(shape, *, blocks, budget, seed, progress):
+    def infer(shape, *, blocks, budget, seed, progress, **generator):
         progress("searching", 0.5)
         return inference.Result(PROGRAM, PROGRAM.snap(), {"seconds": 0.1, "odd": float("nan")}, "Stopped at once.")
 

@@ -11,6 +11,7 @@ import torch
 from test_inference_blocks import random_block
 from test_inference_search import CHAIR, SHELF, STAR, TABLE, cells, target
 
+from shapeprog.cli import main
 from shapeprog.data.shape import Shape
 from shapeprog.errors import InputError, ShapeProgError
 from shapeprog.geometry.occupancy import pack, packed_rows
@@ -270,3 +271,23 @@ def test_default_weights_for_another_language_are_left_out_with_a_reason(weights
     assert "'leg' has changed" in hindered
     with pytest.raises(ShapeProgError, match="leg"):
         ready_generator(weights)
+
+
+def test_the_command_writes_what_a_generator_says_in_a_single_pass(weights, tmp_path, capsys):
+    np.save(tmp_path / "chair.npy", cells(CHAIR))
+
+    def run(*more):
+        words = ["infer", tmp_path / "chair.npy", "--out", tmp_path / "out", "--no-picture", "--no-search"]
+        with pytest.raises(SystemExit) as end:
+            main([str(word) for word in (*words, *more)])
+        return end.value.code, capsys.readouterr()
+
+    code, told = run("--json", "--weights", weights)
+    assert code in (None, 0)
+    assert "single pass of the generator" in json.loads(told.out)["reason"]
+    code, told = run("--weights", "none")
+    assert code == 2
+    assert "there is no generator to write a program" in told.err
+    code, told = run("--weights", tmp_path / "missing.safetensors")
+    assert code == 2
+    assert "missing.safetensors" in told.err

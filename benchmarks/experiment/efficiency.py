@@ -108,6 +108,6 @@ def _plain_ticks(axis: object) -> None:
     from matplotlib.ticker import LogLocator, NullFormatter, ScalarFormatter
 
     vertical = axis.yaxis  # type: ignore[attr-defined]
-    vertical.set_major_locator(LogLocator(subs=(1, 2, 3, 5)))
+    vertical.set_major_locator(LogLocator(subs=(1, 1.5, 2, 3, 4, 5, 7)))
     vertical.set_major_formatter(ScalarFormatter())
     vertical.set_minor_formatter(NullFormatter())

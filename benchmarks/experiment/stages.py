@@ -119,7 +119,7 @@ class Experiment:
 
     def command(self, run: Run) -> str:
         """The command of a run as a person would write it, with the two folders by their names."""
-        words = [START.upper() if START != word == self.start else word for word in self.words(run)]
+        words = [START if word == self.start else word for word in self.words(run)]
         told = shlex.join(["shapeprog", *words])
         return told.replace(str(self.results), RESULTS).replace(str(self.packs), PACKS)
 

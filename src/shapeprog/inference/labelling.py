@@ -124,7 +124,7 @@ def _labelled(place: int, path: str, blocks: int, budget: float, seed: int) -> d
     from shapeprog.language.text import format_program
 
     shape = _pack(path)[place]
-    found = infer(shape, blocks=blocks, budget=budget, seed=seed)
+    found = infer(shape, blocks=blocks, budget=budget, seed=seed, generator=None)  # labels owe nothing to any weights
     return {
         "name": shape.name, "program": format_program(found.program), "snapped": format_program(found.snapped),
         **found.scores,

@@ -75,7 +75,7 @@ class Settings:
     forms: float = 0.3
     heat: float = 0.004
     recall: float = 0.5
-    patience: int = 100
+    patience: int = 120
 
 
 PLAIN = Settings(rounds=200, recall=0.0, patience=200)

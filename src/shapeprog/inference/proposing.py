@@ -39,6 +39,9 @@ DEFAULT = "default"
 WASTE = 0.9
 """Weight of an empty cell against an occupied one."""
 
+FRUITLESS = 2
+"""Looks in a row of which nothing gained, after which the generator is not asked again."""
+
 BEST = 3
 """Suggestions for one place that descent improves before they are compared."""
 
@@ -58,7 +61,7 @@ def propose_program(
     Parameters
     ----------
     blocks
-        Most blocks of the program, and how often the generator looks: where nothing gained, it is asked for others.
+        Most blocks of the program.
     suggestions
         Blocks that the generator suggests each time it looks.
     price
@@ -73,11 +76,9 @@ def propose_program(
     random = torch.Generator(device).manual_seed(seed)
     covered, program = np.zeros(ROWS, np.uint32), np.zeros((0, WIDTH))
     loose: list[FloatArray] = []
-    memory = None
+    memory, fruitless = None, 0
     with single_threaded():
-        for _ in range(blocks):
-            if time.monotonic() > deadline:
-                break
+        while len(program) < blocks and fruitless < FRUITLESS and time.monotonic() < deadline:
             canvas = torch.from_numpy(covered.view(np.int32).reshape(1, RESOLUTION, RESOLUTION)).to(device)
             code, memory = suggest(generator, target, canvas, memory, suggestions, random)
             suggested = from_code(code)
@@ -86,7 +87,9 @@ def propose_program(
                 improved.append(improve_block(block, occupied, covered, price, 1)[0][None])
             gain, best = Pool.of(improved, cost).best(occupied, covered, WASTE)
             loose.append(suggested)
+            fruitless += 1
             if gain > 0:
+                fruitless = 0
                 program = np.concatenate([program, best[None]])
                 draw_block(covered, best)
     return Proposals((program,), np.concatenate([np.zeros((0, WIDTH)), *loose]))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import pytest
 import torch
 from torch import Tensor
@@ -23,9 +25,15 @@ from shapeprog.training.lessons import by_coverage, lesson, relabelled
 SMALL = {"widths": (4, 8, 8), "squeeze": 4, "feature": 16}
 
 
-def small(seed: int = 0) -> Generator:
-    torch.manual_seed(seed)
-    return build_generator("swift", SMALL).eval()
+@pytest.fixture(params=["swift", "chained"])
+def small(request: pytest.FixtureRequest) -> Callable[..., Generator]:
+    """Makes tiny generators of each design."""
+
+    def make(seed: int = 0, vocabulary: Vocabulary | None = None) -> Generator:
+        torch.manual_seed(seed)
+        return build_generator(request.param, SMALL, vocabulary).eval()
+
+    return make
 
 
 def targets(count: int, seed: int = 0) -> Tensor:
@@ -47,7 +55,7 @@ def code_of(seeds: range, blocks: int = 6) -> Code:
 
 
 @pytest.mark.parametrize("choose", ["argmax", "sample"])
-def test_only_legal_blocks_are_written(choose: str) -> None:
+def test_only_legal_blocks_are_written(small: Callable[..., Generator], choose: str) -> None:
     random = torch.Generator().manual_seed(1)
     for seed in range(3):
         code = decode(small(seed), targets(8, seed), choose=choose, temperature=3.0, random=random).code  # type: ignore[arg-type]
@@ -57,7 +65,7 @@ def test_only_legal_blocks_are_written(choose: str) -> None:
         assert [program.blocks for program in written] == drawing.tolist()
 
 
-def test_a_program_does_not_depend_on_its_batch() -> None:
+def test_a_program_does_not_depend_on_its_batch(small: Callable[..., Generator]) -> None:
     generator, target = small(), targets(5)
     together = decode(generator, target).code
     for n in range(5):
@@ -66,24 +74,36 @@ def test_a_program_does_not_depend_on_its_batch() -> None:
         torch.testing.assert_close(alone.parameters[0], together.parameters[n], rtol=1e-4, atol=1e-4)
 
 
-def test_teacher_forcing_on_its_own_program_says_the_same() -> None:
+def test_teacher_forcing_on_its_own_program_says_the_same(small: Callable[..., Generator]) -> None:
     generator, target = small(2), targets(4)
-    found = decode(generator, target)
-    told = generator.predict(target, found.canvases, found.code.ids)
+    found = decode(generator, target, every=True)
+    told = generator.predict(target, found.canvases, found.code)
     live = told.live[..., None, None]
     torch.testing.assert_close(told.parameters, found.code.parameters * live, rtol=1e-4, atol=1e-4)
     total = told.log_probability(found.code.ids).sum(-1)
     torch.testing.assert_close(total, found.log_probability, rtol=1e-4, atol=1e-3)
 
 
-def test_the_canvases_are_what_the_blocks_before_draw() -> None:
+def test_blocks_that_do_not_help_are_not_written(small: Callable[..., Generator]) -> None:
+    target = targets(6)
+    for seed in range(4):
+        found = decode(small(seed), target)
+        drawn, cells = draw_blocks(found.code), packed(target)[:, None]
+        before = found.canvases
+        iou = [count(each & cells) / count(each | cells) for each in (before, before | drawn)]
+        written = found.code.ids[..., 0] != 0
+        assert (iou[1] > iou[0])[written].all()
+        assert torch.equal(written, live_blocks(found.code.ids) & written)  # nothing after the end
+
+
+def test_the_canvases_are_what_the_blocks_before_draw(small: Callable[..., Generator]) -> None:
     found = decode(small(), targets(4))
     assert torch.equal(so_far(draw_blocks(found.code)), found.canvases)
 
 
-def test_a_beam_of_one_is_the_greedy_program_and_wider_ones_are_no_less_likely() -> None:
+def test_a_beam_of_one_is_the_greedy_program_and_wider_ones_are_no_less_likely(small: Callable[..., Generator]) -> None:
     generator, target = small(3), targets(4)
-    greedy = decode(generator, target, blocks=3)
+    greedy = decode(generator, target, blocks=3, every=True)
     one = beam(generator, target, width=1, blocks=3)
     assert torch.equal(one.code.ids[:, 0], greedy.code.ids)
     torch.testing.assert_close(one.code.parameters[:, 0], greedy.code.parameters, rtol=1e-4, atol=1e-4)
@@ -95,7 +115,7 @@ def test_a_beam_of_one_is_the_greedy_program_and_wider_ones_are_no_less_likely()
     assert every.code.ids.flatten(2).unique(dim=1).shape[1] <= 80
 
 
-def test_a_beam_is_ordered_by_what_it_draws() -> None:
+def test_a_beam_is_ordered_by_what_it_draws(small: Callable[..., Generator]) -> None:
     target = targets(4)
     found = beam(small(4), target, width=5)
     blocks = draw_blocks(found.code)
@@ -148,14 +168,14 @@ def test_no_more_rows_are_picked_than_asked_for() -> None:
     assert not (picked.live & ~taught.live).any()
 
 
-def test_a_perfect_answer_has_the_least_loss() -> None:
+def test_a_perfect_answer_has_the_least_loss(small: Callable[..., Generator]) -> None:
     """The loss falls towards zero where all is learned by heart."""
-    generator = build_generator("swift", SMALL)
+    generator = small().train()
     code, target = code_of(range(4), 2), targets(4)
     taught = lesson(target, code)
     optimiser = torch.optim.Adam(generator.parameters(), 1e-2)
     for _ in range(150):
-        told = generator.predict(taught.target, taught.canvases, taught.code.ids, taught.live)
+        told = generator.predict(taught.target, taught.canvases, taught.code, taught.live)
         loss = sum(generator.losses(told, taught.code).values(), torch.zeros(()))
         optimiser.zero_grad()
         loss.backward()  # type: ignore[no-untyped-call]
@@ -163,7 +183,7 @@ def test_a_perfect_answer_has_the_least_loss() -> None:
     assert float(loss.detach()) < 0.2
 
 
-def test_values_between_whole_ones_are_learned_as_such() -> None:
+def test_values_between_whole_ones_are_learned_as_such(small: Callable[..., Generator]) -> None:
     generator = small()
     ids = torch.tensor([[1, 0, 0]])
     heads = torch.zeros(1, 3, 32)
@@ -192,7 +212,7 @@ def test_changed_statements_are_named() -> None:
             Vocabulary.check(record)
 
 
-def test_registered_statements_are_legal_and_sayable() -> None:
+def test_registered_statements_are_legal_and_sayable(small: Callable[..., Generator]) -> None:
     other = Language()
     for declared in language():
         other.register(declared)
@@ -208,7 +228,7 @@ def test_registered_statements_are_legal_and_sayable() -> None:
         assert bool(vocabulary.allowed(0, None)[0, 22])
         assert bool(vocabulary.allowed(1, torch.tensor([19]))[0, 22])
         assert not bool(vocabulary.allowed(1, torch.tensor([20]))[0, 22])  # it has no axis of its own to turn about
-        generator = build_generator("swift", SMALL, vocabulary).eval()
+        generator = small(0, vocabulary)
         assert all(isinstance(each, Program) for each in programs_of(decode(generator, targets(2)).code))
 
 

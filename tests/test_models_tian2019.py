@@ -11,7 +11,7 @@ from shapeprog.language import Code, encode, unroll
 from shapeprog.language.canvas import draw_blocks, so_far, unpacked
 from shapeprog.language.sampling import random_program
 from shapeprog.models.decoding import decode
-from shapeprog.models.generator import Generator, build_generator, live_blocks
+from shapeprog.models.generator import Generator, Said, build_generator, live_blocks
 from shapeprog.models.tian2019 import PUBLISHED, Tian2019
 from shapeprog.models.vocabulary import Vocabulary
 
@@ -118,7 +118,7 @@ def test_told_ids_and_canvases_it_says_and_loses_what_the_description_says(shape
     target, canvases, code = shapes
     made = published().double()
     _, logits, values = reference(made.state_dict(), target, canvases, code.ids)
-    found = made.predict(target, canvases, code.ids)
+    found = made.predict(target, canvases, code)
     assert found.live.all()
     torch.testing.assert_close(found.logits, logits.flatten(0, 1), rtol=1e-9, atol=1e-9)
     torch.testing.assert_close(found.parameters, values, rtol=1e-9, atol=1e-9)
@@ -130,7 +130,7 @@ def test_told_ids_and_canvases_it_says_and_loses_what_the_description_says(shape
     losses = made.losses(found, code)
     torch.testing.assert_close(losses["ids"], (surprise * steps).sum() / steps.sum())
     torch.testing.assert_close(losses["parameters"], (off * slots).sum() / slots.sum())
-    single = made.float().predict(target, canvases, code.ids)
+    single = made.float().predict(target, canvases, code)
     torch.testing.assert_close(single.logits.double(), found.logits, rtol=1e-3, atol=1e-3)
 
 
@@ -143,7 +143,7 @@ def taught(made: Tian2019, target: Tensor, canvases: Tensor, code: Code) -> None
     for _ in range(120):
         loss, state = torch.zeros(()), None
         for j in range(3):
-            logits, heads, state = made.step(feature, ids[:, j - 1] if j else None, j, state)
+            logits, heads, state = made.step(feature, Said(ids[:, j - 1], values[:, j - 1]) if j else None, j, state)
             off = made.parameter_loss(heads, ids[:, j], values[:, j]).mean()
             loss = loss + F.nll_loss(logits, ids[:, j]) + off
         optimiser.zero_grad()
@@ -168,16 +168,16 @@ def test_by_arg_max_it_writes_what_the_description_says(shapes: tuple[Tensor, Te
 def test_a_prediction_does_not_depend_on_the_batch(shapes: tuple[Tensor, Tensor, Code]) -> None:
     target, canvases, code = shapes
     made = network().train()
-    made.predict(target, canvases, code.ids)
+    made.predict(target, canvases, code)
     made.eval()
-    together = made.predict(target, canvases, code.ids)
-    alone = made.predict(target[1:2], canvases[1:2], code.ids[1:2])
+    together = made.predict(target, canvases, code)
+    alone = made.predict(target[1:2], canvases[1:2], code[1:2])
     torch.testing.assert_close(together.parameters[1:2], alone.parameters, rtol=1e-4, atol=1e-5)
     assert (together.live == live_blocks(code.ids)).all()
     one, all_at_once = decode(made, target[1:2], blocks=2), decode(made, target, blocks=2)
     torch.testing.assert_close(one.code.parameters, all_at_once.code.parameters[1:2], rtol=1e-4, atol=1e-4)
     by_batch = network(statistics="batch")
-    pair = [by_batch.predict(target[:n], canvases[:n], code.ids[:n]).parameters[:2] for n in (2, 3)]
+    pair = [by_batch.predict(target[:n], canvases[:n], code[:n]).parameters[:2] for n in (2, 3)]
     assert (pair[0] - pair[1]).abs().max() > 1e-5
 
 
@@ -187,8 +187,8 @@ def test_folded_statistics_are_batch_normalisation(shapes: tuple[Tensor, Tensor,
     for each in made.modules():
         if isinstance(each, torch.nn.BatchNorm3d):
             each.momentum = 1.0  # the running statistics are those of the last batch, but for n - 1 instead of n
-    taught = made.predict(target[:2], canvases[:2, :1], code.ids[:2, :1]).parameters
-    told = made.eval().predict(target[:2], canvases[:2, :1], code.ids[:2, :1]).parameters
+    taught = made.predict(target[:2], canvases[:2, :1], Code(code.ids[:2, :1], code.parameters[:2, :1])).parameters
+    told = made.eval().predict(target[:2], canvases[:2, :1], Code(code.ids[:2, :1], code.parameters[:2, :1])).parameters
     torch.testing.assert_close(told, taught, rtol=0.02, atol=0.002)
 
 
@@ -208,7 +208,7 @@ def test_blocks_are_the_same_one_by_one_and_together(shapes: tuple[Tensor, Tenso
 def test_every_weight_that_is_trained_learns(shapes: tuple[Tensor, Tensor, Code]) -> None:
     target, canvases, code = shapes
     made = network().train()
-    losses = made.losses(made.predict(target, canvases, code.ids), code)
+    losses = made.losses(made.predict(target, canvases, code), code)
     (losses["ids"] + losses["parameters"]).backward()
     silent = {name for name, each in made.named_parameters() if each.grad is None}
     assert silent == {f"shape_feat.conv{n}.bias" for n in range(1, 9)}

@@ -59,7 +59,8 @@ def test_alternatives_are_all_legal_blocks_with_their_probabilities():
     assert float(other.chance.exp().sum()) == pytest.approx(1, abs=1e-5)
     ids, many = other.ids[0][:, None], other.ids.shape[1]
     nothing = torch.zeros(many, 1, 32, 32, dtype=torch.int32)
-    told = generator.predict(cells.expand(many, -1, -1, -1), nothing, ids, torch.ones(many, 1).bool())
+    code = Code(ids, other.values[0][:, None])
+    told = generator.predict(cells.expand(many, -1, -1, -1), nothing, code, torch.ones(many, 1).bool())
     torch.testing.assert_close(told.log_probability(ids)[:, 0], other.chance[0], atol=1e-4, rtol=0)
     used = generator.vocabulary.used[other.ids[0]]
     torch.testing.assert_close(other.values[0] * used, told.values, atol=1e-3, rtol=0)
@@ -124,7 +125,7 @@ def test_alternatives_in_place_are_drawn_as_whole_programs():
     random = torch.Generator().manual_seed(3)
     code = decode(generator, cells, blocks=4, choose="sample", random=random).code
     live = live_blocks(code.ids)
-    feature = generator.predict(cells, torch.zeros(3, 4, 32, 32, dtype=torch.int32), code.ids).feature
+    feature = generator.predict(cells, torch.zeros(3, 4, 32, 32, dtype=torch.int32), code).feature
     other = choices.alternatives(generator, feature, 6)
     drawn, owner = choices.in_place(code, live, other)
     for choice in range(6):

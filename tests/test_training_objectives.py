@@ -71,7 +71,7 @@ def test_scores_of_a_prediction_that_is_right_are_perfect():
 
         def predict(self, *_: Any) -> Any:
             logits = torch.nn.functional.one_hot(ids, generator.vocabulary.size).float().log()
-            told = generator.predict(each.target, each.canvases, each.code.ids, each.live)
+            told = generator.predict(each.target, each.canvases, each.code, each.live)
             return replace(told, logits=logits, values=each.code.parameters[each.live])
 
     right, number, off, slots = validation.told(Knowing(), each)  # type: ignore[arg-type]

@@ -15,7 +15,7 @@ from torch import Tensor
 from shapeprog.language.canvas import count, draw_blocks, packed, unpacked
 from shapeprog.language.statement import EMPTY, SLOTS
 from shapeprog.language.tensors import Code
-from shapeprog.models.generator import Generator, Memory
+from shapeprog.models.generator import Generator, Memory, Said
 
 Choice = Literal["argmax", "sample", "ids"]
 
@@ -48,9 +48,12 @@ def decode(
     choose: Choice = "argmax",
     temperature: float = 1.0,
     random: torch.Generator | None = None,
+    every: bool | None = None,
 ) -> Decoded:
     """One program for each target; stops as soon as every program has ended.
 
+    Each block is drawn and compared with the target before the next.  One that does not raise the IoU is not written,
+    and the program ends: on the same canvas most generators would say the same again.
     Generators whose predictions depend on the batch always write all blocks for all of it, as published.
 
     Parameters
@@ -65,26 +68,30 @@ def decode(
         Of the ids when sampling: below one keeps closer to the likeliest.
     random
         Source of randomness when sampling.
+    every
+        Write every block, whether it helps or not; by default only when sampling, or where all is as published.
     """
+    every = (choose != "argmax" or generator.by_batch) if every is None else every
     steps, device = generator.vocabulary.steps, target.device
     ids = torch.zeros(len(target), blocks, steps, dtype=torch.long, device=device)
     parameters = torch.zeros(len(target), blocks, steps, SLOTS, device=device)
     canvases = torch.zeros(len(target), blocks, *target.shape[1:3], dtype=torch.int32, device=device)
     chance = torch.zeros(len(target), device=device)
     active = torch.arange(len(target), device=device)
-    seen, memory = target.float(), None
+    seen, cells, memory = target.float(), packed(target), None
     canvas = canvases[:, 0].clone()
     for k in range(blocks):
         feature, memory = generator.perceive(seen[active], unpacked(canvas[active]).float(), memory)
         said, values, chances = _block(generator, feature, choose, temperature, random)
-        ids[active, k], parameters[active, k] = said, values
+        union = canvas[active] | draw_blocks(Code(said[:, None], values[:, None]))[:, 0]
+        better = every | (_iou(union, cells[active]) > _iou(canvas[active], cells[active]))
+        ids[active, k], parameters[active, k] = said * better[:, None], values * better[:, None, None]
         chance[active] += chances
-        going = (said[:, 0] != EMPTY) | generator.by_batch
+        going = ((said[:, 0] != EMPTY) | generator.by_batch) & better
+        canvas[active] = torch.where(better[:, None, None], union, canvas[active])
         active, memory = active[going], _at(memory, going)
         if not len(active):
             break
-        drawn = draw_blocks(Code(said[going][:, None], values[going][:, None]))[:, 0]
-        canvas[active] = canvas[active] | drawn
         canvases[:, k + 1 :] = canvas[:, None]
     return Decoded(Code(ids, parameters), canvases, chance)
 
@@ -101,7 +108,7 @@ def _block(
     values: list[Tensor] = []
     chance, state = feature.new_zeros(len(feature)), None
     for j in range(generator.vocabulary.steps):
-        logits, heads, state = generator.step(feature, ids[-1] if ids else None, j, state)
+        logits, heads, state = generator.step(feature, Said(ids[-1], values[-1]) if ids else None, j, state)
         if choose == "argmax":
             said = logits.argmax(-1)
             values.append(generator.values(heads, said))
@@ -174,7 +181,7 @@ def beam(
         if not bool(going.any()):
             canvases[:, :, k + 1 :] = canvases[:, :, k + 1 : k + 2]
             break
-    score = chance if rank == "log_probability" else _iou(canvases[:, :, -1], target)
+    score = chance if rank == "log_probability" else _iou(canvases[:, :, -1], packed(target)[:, None])
     order = score.masked_fill(~chance.isfinite(), -torch.inf).argsort(dim=-1, descending=True, stable=True)
     each = torch.arange(shapes, device=device)[:, None]
     return Decoded(Code(ids[each, order], parameters[each, order]), canvases[each, order, :-1], chance[each, order])
@@ -191,7 +198,7 @@ def _blocks(
     state = None
     for j in range(generator.vocabulary.steps):
         lanes = ids.shape[1]
-        previous = ids[:, :, -1].flatten() if j else None
+        previous = Said(ids[:, :, -1].flatten(), values[:, :, -1].flatten(0, 1)) if j else None
         wide = feature.repeat_interleave(lanes, 0)
         logits, heads, state = generator.step(wide, previous, j, state)
         possible = chance.isfinite()[..., None]
@@ -214,8 +221,7 @@ def _at(state: Memory, index: Tensor) -> Memory:
     return tuple(each[index] for each in state) if isinstance(state, tuple) else state[index]
 
 
-def _iou(canvas: Int[Tensor, "B W 32 32"], target: UInt8[Tensor, "B 32 32 32"]) -> Float[Tensor, "B W"]:
-    cells = packed(target)[:, None]
+def _iou(canvas: Int[Tensor, "*batch 32 32"], cells: Int[Tensor, "*batch 32 32"]) -> Float[Tensor, "*batch"]:
     return count(canvas & cells) / count(canvas | cells).clamp(min=1)
 
 

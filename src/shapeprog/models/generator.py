@@ -11,6 +11,7 @@ import difflib
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, fields
+from functools import cached_property
 from typing import Any, ClassVar, NamedTuple, TypeVar
 
 import torch
@@ -26,9 +27,16 @@ Memory = Any
 """What a design carries from block to block; ``None`` at the first."""
 
 
+class Said(NamedTuple):
+    """What has been said at a step: ids (...) and parameters (..., 7)."""
+
+    ids: Int[Tensor, "*batch"]
+    values: Float[Tensor, "*batch 7"]
+
+
 @dataclass(frozen=True)
 class Prediction:
-    """What a generator says when it is told the ids, for the blocks that are live.
+    """What a generator says when it is told the programs, for the blocks that are live.
 
     Parameters
     ----------
@@ -36,19 +44,27 @@ class Prediction:
         Which blocks (B, K) were computed; the rows of everything else are theirs in order.
     logits
         Log-probabilities of the ids; illegal ones are minus infinity where the design masks them.
-    values
-        Parameters of the ids that were told, with gradient.
     heads
         What the design needs to measure its parameters.
     feature
         What it saw before it wrote each block.
+    told
+        The ids and parameters that it was told.
+    generator
+        Whose prediction it is.
     """
 
     live: Bool[Tensor, "B K"]
     logits: Float[Tensor, "M J V"]
-    values: Float[Tensor, "M J 7"]
     heads: Tensor
     feature: Float[Tensor, "M F"]
+    told: Said
+    generator: Generator
+
+    @cached_property
+    def values(self) -> Float[Tensor, "M J 7"]:
+        """Parameters of the ids that were told, with gradient."""
+        return self.generator.values(self.heads, self.told.ids, self.told.values)
 
     @property
     def parameters(self) -> Float[Tensor, "B K J 7"]:
@@ -105,12 +121,20 @@ class Generator(nn.Module, ABC):
         """Features of all live blocks at once, for canvases that are known."""
 
     @abstractmethod
-    def step(self, feature: Float[Tensor, "M F"], previous: Int[Tensor, " M"] | None, step: int, state: Any) -> Step:
-        """One step of each block, after the id ``previous``; ``None`` at the first."""
+    def step(self, feature: Float[Tensor, "M F"], previous: Said | None, step: int, state: Any) -> Step:
+        """One step of each block, after what was said before it; ``None`` at the first."""
 
     @abstractmethod
-    def values(self, heads: Tensor, ids: Int[Tensor, "*batch"]) -> Float[Tensor, "*batch 7"]:
-        """The parameters that the heads give the ids, with gradient."""
+    def values(
+        self, heads: Tensor, ids: Int[Tensor, "*batch"], told: Float[Tensor, "*batch 7"] | None = None
+    ) -> Float[Tensor, "*batch 7"]:
+        """The parameters that the heads give the ids, with gradient.
+
+        Parameters
+        ----------
+        told
+            What designs that say one number after the other take the earlier ones to be; by default what they said.
+        """
 
     @abstractmethod
     def parameter_loss(
@@ -126,10 +150,10 @@ class Generator(nn.Module, ABC):
         self,
         target: UInt8[Tensor, "B 32 32 32"],
         canvases: Int[Tensor, "B K 32 32"],
-        ids: Int[Tensor, "B K J"],
+        code: Code,
         live: Bool[Tensor, "B K"] | None = None,
     ) -> Prediction:
-        """What it says of each block when it is told the canvas and the ids (teacher forcing), with gradient.
+        """What it says of each block when it is told the canvas and the program (teacher forcing), with gradient.
 
         Parameters
         ----------
@@ -137,22 +161,23 @@ class Generator(nn.Module, ABC):
             Cells, 1 or 0.
         canvases
             What each block finds drawn, packed.
-        ids
-            The ids of each step; they pick the parameters and are what later steps are told.
+        code
+            The programs; their ids pick the parameters, and each step is told those before it.
         live
             The blocks to compute; by default those that draw, and the empty one after the last, which says stop.
         """
         if live is None:
-            live = live_blocks(ids)
-        told = ids[live]
+            live = live_blocks(code.ids)
+        told = Said(code.ids[live], code.parameters[live].detach())
         feature = self.perceive_all(target, canvases, live)
         outputs: list[Step] = []
-        for j in range(told.shape[1]):
+        for j in range(told.ids.shape[1]):
             state = outputs[-1].state if outputs else None
-            outputs.append(self.step(feature, told[:, j - 1] if j else None, j, state))
+            previous = Said(told.ids[:, j - 1], told.values[:, j - 1]) if j else None
+            outputs.append(self.step(feature, previous, j, state))
         heads = torch.stack([each.heads for each in outputs], 1)
         logits = torch.stack([each.logits for each in outputs], 1)
-        return Prediction(live, logits, self.values(heads, told), heads, feature)
+        return Prediction(live, logits, heads, feature, told, self)
 
     def losses(
         self, prediction: Prediction, code: Code, weights: Float[Tensor, "B K"] | None = None
@@ -162,7 +187,7 @@ class Generator(nn.Module, ABC):
         Parameters
         ----------
         prediction
-            Of the ids of ``code``.
+            Of the programs of ``code``.
         code
             The right programs.
         weights
@@ -220,7 +245,7 @@ def design(name: str) -> Callable[[Design], Design]:
 
 def designs() -> dict[str, type[Generator]]:
     """All designs by name."""
-    from shapeprog.models import swift, tian2019  # noqa: F401  (they register themselves)
+    from shapeprog.models import chained, swift, tian2019  # noqa: F401  (they register themselves)
 
     return dict(_designs)
 

@@ -17,7 +17,7 @@ from jaxtyping import Bool, Float, Int, UInt8
 from torch import Tensor, nn
 
 from shapeprog.language.statement import SLOTS
-from shapeprog.models.generator import Generator, Memory, Step, design, stacked
+from shapeprog.models.generator import Generator, Memory, Said, Step, design, stacked
 from shapeprog.models.vocabulary import Vocabulary
 
 WINDOW = 2
@@ -102,22 +102,37 @@ class Swift(Generator):
         feature: Tensor = self.summary(seen.flatten(1))
         return feature.float()
 
-    def step(self, feature: Float[Tensor, "M F"], previous: Int[Tensor, " M"] | None, step: int, state: Any) -> Step:
+    def step(self, feature: Float[Tensor, "M F"], previous: Said | None, step: int, state: Any) -> Step:
         """One step; the heads hold its output beside the feature of the block."""
-        heard = feature if previous is None else self.embedding(previous)
-        state = self.core(heard, state)
+        state = self.core(feature if previous is None else self.heard(previous), state)
         heads = torch.cat([state[0], feature], -1)
-        return Step(self.masked(self.name(heads), step, previous), heads, state)
+        return Step(self.masked(self.name(heads), step, None if previous is None else previous.ids), heads, state)
 
-    def values(self, heads: Tensor, ids: Int[Tensor, "*batch"]) -> Float[Tensor, "*batch 7"]:
+    def heard(self, previous: Said) -> Float[Tensor, "M F"]:
+        """What the step LSTM is told of the step before: its id."""
+        return self.embedding(previous.ids)
+
+    def values(
+        self, heads: Tensor, ids: Int[Tensor, "*batch"], told: Float[Tensor, "*batch 7"] | None = None
+    ) -> Float[Tensor, "*batch 7"]:
         """The mean of the likeliest value and its neighbours; counts and turns are the likeliest itself."""
-        scores = self._scores(heads, ids)
+        return self.likeliest(self._scores(heads, ids), ids)
+
+    def likeliest(
+        self, scores: Float[Tensor, "*batch 7 bins"], ids: Int[Tensor, "*batch"]
+    ) -> Float[Tensor, "*batch 7"]:
+        """The values of scores; those of slots that are not used are zero."""
+        return self.mean_near_best(scores, self.whole[ids]) * self.used[ids]
+
+    def mean_near_best(
+        self, scores: Float[Tensor, "*batch bins"], whole: Bool[Tensor, "*batch"]
+    ) -> Float[Tensor, "*batch"]:
+        """The mean of the likeliest value and its neighbours, or itself where the value is ``whole``."""
         best = scores.argmax(-1, keepdim=True)
         place = torch.arange(scores.shape[-1], device=scores.device)
         near = (place - best).abs() <= WINDOW
         mean = (scores.masked_fill(~near, -torch.inf).softmax(-1) * self.ticks).sum(-1)
-        said = torch.where(self.whole[ids], self.ticks[best[..., 0]], mean)
-        return said * self.used[ids]
+        return torch.where(whole, self.ticks[best[..., 0]], mean)
 
     def sampled(self, heads: Tensor, ids: Int[Tensor, "*batch"], random: torch.Generator) -> Float[Tensor, "*batch 7"]:
         """Whole values drawn by their chances."""
@@ -128,8 +143,14 @@ class Swift(Generator):
     def parameter_loss(
         self, heads: Tensor, ids: Int[Tensor, "*batch"], values: Float[Tensor, "*batch 7"]
     ) -> Float[Tensor, "*batch 7"]:
-        """Cross-entropy; a value between two whole ones counts for each by its nearness."""
-        surprise = -self._scores(heads, ids).log_softmax(-1)
+        """Cross-entropy of each number."""
+        return self.surprise(self._scores(heads, ids), ids, values)
+
+    def surprise(
+        self, scores: Float[Tensor, "*batch 7 bins"], ids: Int[Tensor, "*batch"], values: Float[Tensor, "*batch 7"]
+    ) -> Float[Tensor, "*batch 7"]:
+        """Minus the log-probability of values; one between two whole ones counts for each by its nearness."""
+        surprise = -scores.log_softmax(-1)
         low, high = self._range(ids)
         inside = torch.minimum(torch.maximum(values, low), high) - self.settings.low
         below = inside.floor().clamp(max=surprise.shape[-1] - 2)

@@ -23,7 +23,7 @@ from torch import Tensor, nn
 from shapeprog.language.canvas import unpacked
 from shapeprog.language.statement import EMPTY, SLOTS
 from shapeprog.language.tensors import Code
-from shapeprog.models.generator import Generator, Memory, Prediction, Step, design, stacked
+from shapeprog.models.generator import Generator, Memory, Prediction, Said, Step, design, stacked
 from shapeprog.models.vocabulary import Vocabulary
 
 WIDTH = 64
@@ -221,14 +221,17 @@ class Tian2019(Generator):
         with torch.autocast(features.device.type, enabled=False):
             return self.core(features)[0][live].relu()
 
-    def step(self, feature: Float[Tensor, "M F"], previous: Int[Tensor, " M"] | None, step: int, state: Any) -> Step:
+    def step(self, feature: Float[Tensor, "M F"], previous: Said | None, step: int, state: Any) -> Step:
         """One step; the heads are the parameters for every id (M, V, 7)."""
+        before = None if previous is None else previous.ids
         with torch.autocast(feature.device.type, enabled=False):
-            scores, heads, state = self.inner_net(feature, previous, state)
-            logits = self.masked(scores, step, previous) if self.settings.legal else scores.log_softmax(-1)
+            scores, heads, state = self.inner_net(feature, before, state)
+            logits = self.masked(scores, step, before) if self.settings.legal else scores.log_softmax(-1)
         return Step(logits, heads, state)
 
-    def values(self, heads: Tensor, ids: Int[Tensor, "*batch"]) -> Float[Tensor, "*batch 7"]:
+    def values(
+        self, heads: Tensor, ids: Int[Tensor, "*batch"], told: Float[Tensor, "*batch 7"] | None = None
+    ) -> Float[Tensor, "*batch 7"]:
         """The row of each id."""
         row = ids[..., None, None].expand(*ids.shape, 1, SLOTS)
         return heads.gather(-2, row)[..., 0, :]
@@ -243,13 +246,13 @@ class Tian2019(Generator):
         self,
         target: UInt8[Tensor, "B 32 32 32"],
         canvases: Int[Tensor, "B K 32 32"],
-        ids: Int[Tensor, "B K J"],
+        code: Code,
         live: Bool[Tensor, "B K"] | None = None,
     ) -> Prediction:
         """As for every generator; all blocks are live by default where statistics are those of the batch."""
         if live is None and self.by_batch:
-            live = torch.ones(ids.shape[:2], dtype=torch.bool, device=ids.device)
-        return super().predict(target, canvases, ids, live)
+            live = torch.ones(code.ids.shape[:2], dtype=torch.bool, device=code.ids.device)
+        return super().predict(target, canvases, code, live)
 
     def losses(
         self, prediction: Prediction, code: Code, weights: Float[Tensor, "B K"] | None = None

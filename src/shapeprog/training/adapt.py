@@ -124,8 +124,15 @@ class Adaptation:
             parts = (torch.cat([each] * settings.tries) for each in _parts(targets))
             targets = Targets(*parts)
         choose = "ids" if settings.ids in ("nvil", "rloo") else "argmax"
-        drawn = decode(generator, targets.cells, blocks=settings.blocks, choose=choose, random=random)  # type: ignore[arg-type]
-        prediction = generator.predict(targets.cells, drawn.canvases, drawn.code.ids)
+        drawn = decode(  # every block: one that does not help yet is to learn to
+            generator,
+            targets.cells,
+            blocks=settings.blocks,
+            choose=choose,
+            random=random,
+            every=True,  # type: ignore[arg-type]
+        )
+        prediction = generator.predict(targets.cells, drawn.canvases, drawn.code)
         with torch.autocast(self._device.type, enabled=False):
             values = prediction.parameters.float()
             code = Code(drawn.code.ids, values)

@@ -17,7 +17,7 @@ from torch import Tensor, nn
 from shapeprog.language.canvas import draw_blocks, so_far
 from shapeprog.language.statement import EMPTY, language
 from shapeprog.language.tensors import Code
-from shapeprog.models.generator import Generator, Step
+from shapeprog.models.generator import Generator, Said, Step
 
 DECAY = 0.9
 """How slowly the running mean and variance of the costs change, as published for NVIL."""
@@ -110,7 +110,7 @@ def alternatives(generator: Generator, feature: Float[Tensor, "M F"], most: int 
     while queue:
         prefix, chance, path, before = queue.pop()
         place = len(prefix)
-        previous = torch.full_like(feature[:, 0], prefix[-1], dtype=torch.long) if prefix else None
+        previous = None if before is None else _said(generator, before, prefix[-1])
         step = generator.step(feature, previous, place, None if before is None else before.state)
         visits.append(step)
         path = [*path, len(visits) - 1]
@@ -132,6 +132,12 @@ def alternatives(generator: Generator, feature: Float[Tensor, "M F"], most: int 
         rows = torch.arange(len(feature), device=feature.device)[:, None, None]
         values = generator.values(heads[rows, which], table[chosen]).float()
     return Alternatives(table[chosen], among.gather(1, chosen).log_softmax(-1), values)
+
+
+def _said(generator: Generator, step: Step, number: int) -> Said:
+    """What a step says, if it says that id."""
+    ids = torch.full_like(step.logits[:, 0], number, dtype=torch.long)
+    return Said(ids, generator.values(step.heads, ids).detach())
 
 
 def in_place(

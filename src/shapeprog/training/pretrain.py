@@ -127,7 +127,7 @@ class Pretraining:
             batch = on_own_canvases(self.module, batch, own, random)
         if self._settings.rows:
             batch = batch.pick(self._settings.rows, random)
-        prediction = self.module.predict(batch.target, batch.canvases, batch.code.ids, batch.live)
+        prediction = self.module.predict(batch.target, batch.canvases, batch.code, batch.live)
         terms = self.module.losses(prediction, batch.code)
         return {
             "ids": terms["ids"] * self._settings.ids_weight,

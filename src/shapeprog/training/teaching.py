@@ -81,6 +81,6 @@ def teach(
     if settings.rows:
         taught = taught.pick(settings.rows, random)
     generator.train(settings.statistics == "moving")
-    prediction = generator.predict(taught.target, taught.canvases, taught.code.ids, taught.live)
+    prediction = generator.predict(taught.target, taught.canvases, taught.code, taught.live)
     terms = generator.losses(prediction, taught.code)
     return {f"label_{name}": settings.labels_weight * value for name, value in terms.items()}

@@ -87,7 +87,7 @@ class Validation:
 def told(generator: Generator, each: Lesson) -> tuple[float, float, float, float]:
     """Ids that are right, ids, absolute errors of parameters added, and parameters, when told what comes before."""
     ids, values = each.code.ids[each.live], each.code.parameters[each.live]
-    prediction = generator.predict(each.target, each.canvases, each.code.ids, each.live)
+    prediction = generator.predict(each.target, each.canvases, each.code, each.live)
     used = generator.vocabulary.used.to(ids.device)[ids]
     off = ((prediction.values.detach() - values).abs() * used).sum()
     return float((prediction.logits.argmax(-1) == ids).sum()), ids.numel(), float(off), float(used.sum())

@@ -1,0 +1,93 @@
+"""``chained``: as ``swift``, but each number is said knowing those before it in its block.
+
+Two answers to one shape, such as feet at both ends or a bar along all of it, differ in several numbers together: where
+each number is drawn on its own, the count and shift of one come with the size of the other.  Here the chance of a
+block's numbers is a product of conditional ones, as in the neural autoregressive density estimator (Larochelle and
+Murray, AISTATS 2011): numbers of the same step are added to the hidden layer of the next, those of the steps before
+are told to the step LSTM.
+"""
+
+from __future__ import annotations
+
+import torch
+from jaxtyping import Float, Int
+from torch import Tensor, nn
+
+from shapeprog.language.statement import SLOTS
+from shapeprog.models.generator import Said, design
+from shapeprog.models.swift import Swift, SwiftSettings
+from shapeprog.models.vocabulary import Vocabulary
+
+
+@design("chained")
+class Chained(Swift):
+    """The network; see the module."""
+
+    def __init__(self, settings: SwiftSettings, vocabulary: Vocabulary) -> None:
+        super().__init__(settings, vocabulary)
+        width, bins = settings.feature, len(self.ticks)
+        self.bins = nn.Sequential(nn.Linear(width, width), nn.ReLU(), nn.Linear(width, bins))
+        self.slot = nn.Parameter(torch.zeros(SLOTS, width))
+        self.link = nn.Embedding(SLOTS * bins, width)
+        self.before = nn.Embedding(SLOTS * bins, width)
+        for table in (self.link, self.before):
+            nn.init.normal_(table.weight, std=0.05)  # up to seven are added
+
+    def heard(self, previous: Said) -> Float[Tensor, "M F"]:
+        """What the step LSTM is told of the step before: its id and its numbers."""
+        rows = self.before(self._row(previous.values)) * self.used[previous.ids][..., None]
+        return super().heard(previous) + rows.sum(-2)
+
+    def values(
+        self, heads: Tensor, ids: Int[Tensor, "*batch"], told: Float[Tensor, "*batch 7"] | None = None
+    ) -> Float[Tensor, "*batch 7"]:
+        """The likeliest value of each slot and its neighbours, given the slots before it."""
+        if told is not None:
+            return self.likeliest(self._chained(heads, ids, told), ids)
+        return self._in_turn(heads, ids, None)
+
+    def sampled(self, heads: Tensor, ids: Int[Tensor, "*batch"], random: torch.Generator) -> Float[Tensor, "*batch 7"]:
+        """Whole values drawn by their chances, one after the other."""
+        return self._in_turn(heads, ids, random)
+
+    def parameter_loss(
+        self, heads: Tensor, ids: Int[Tensor, "*batch"], values: Float[Tensor, "*batch 7"]
+    ) -> Float[Tensor, "*batch 7"]:
+        """Cross-entropy of each number, given the right ones before it."""
+        return self.surprise(self._chained(heads, ids, values), ids, values)
+
+    def _chained(
+        self, heads: Tensor, ids: Int[Tensor, "*batch"], told: Float[Tensor, "*batch 7"]
+    ) -> Float[Tensor, "*batch 7 bins"]:
+        """Scores of all slots at once, given the numbers that were told."""
+        links = self.link(self._row(told)) * self.used[ids][..., None]
+        known = links.cumsum(-2) - links
+        start = self.numbers(heads) + self.told(ids)
+        scores: Tensor = self.bins((start[..., None, :] + self.slot + known).relu()).float()
+        return scores.masked_fill(~self.fits[ids], -torch.inf)
+
+    def _in_turn(
+        self, heads: Tensor, ids: Int[Tensor, "*batch"], random: torch.Generator | None
+    ) -> Float[Tensor, "*batch 7"]:
+        """Values slot by slot: the likeliest, or drawn at random."""
+        known = self.numbers(heads) + self.told(ids)
+        fits, used, whole = self.fits[ids], self.used[ids], self.whole[ids]
+        said = []
+        for slot in range(SLOTS):
+            scores = self.bins((known + self.slot[slot]).relu()).float()
+            scores = scores.masked_fill(~fits[..., slot, :], -torch.inf)
+            if random is None:
+                value = self.mean_near_best(scores, whole[..., slot])
+            else:
+                drawn = torch.multinomial(scores.softmax(-1).flatten(0, -2), 1, generator=random)
+                value = self.ticks[drawn.reshape(scores.shape[:-1])]
+            value = value * used[..., slot]
+            said.append(value)
+            known = known + self.link(self._row(value, slot)) * used[..., slot, None]
+        return torch.stack(said, -1)
+
+    def _row(self, values: Tensor, slot: int | None = None) -> Int[Tensor, ...]:
+        """Row of the tables for a value (...) of one slot, or values (..., 7) of all."""
+        bins = len(self.ticks)
+        place = (values.detach().round() - self.settings.low).clamp(0, bins - 1).long()
+        return place + bins * (torch.arange(SLOTS, device=values.device) if slot is None else slot)

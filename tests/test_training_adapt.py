@@ -189,7 +189,6 @@ def test_what_does_not_fit_together_is_refused(boxes: Path):
         ({"loss": ""}, "nothing to learn from"),
         ({"loss": "neural"}, "needs a neural executor"),
         ({"loss": "", "labels": ("x",), "ids": "nvil"}, "ids are judged by a loss"),
-        ({"ids": "gumbel"}, "choose one of"),
         ({"mirror": 2.0}, "a share between 0 and 1"),
         ({"tries": 1}, "give 2 or more"),
         ({"loss": "chamfre"}, "did you mean 'chamfer'"),

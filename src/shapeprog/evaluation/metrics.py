@@ -19,7 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
@@ -45,6 +45,7 @@ CELL = 1.0
 Cloud = Float[Tensor, "P 3"]
 
 
+@runtime_checkable
 class Target(Protocol):
     """What a target must have; ``shapeprog.data.Shape`` does.
 

@@ -18,6 +18,8 @@ from shapeprog.geometry.scene import Scene
 
 Cloud = Float[Tensor, "*batch P 3"]
 Weights = Float[Tensor, "*batch P"]
+Target = Float[Tensor, "*batch Q 3"]
+TargetWeights = Float[Tensor, "*batch Q"]
 Values = Float[Tensor, "*batch"]
 Grid = Float[Tensor, "*batch R R R"]
 
@@ -43,7 +45,7 @@ class Chamfer(NamedTuple):
 
 
 def chamfer_directions(
-    points: Cloud, target: Cloud, *, weights: Weights | None = None, target_weights: Weights | None = None
+    points: Cloud, target: Target, *, weights: Weights | None = None, target_weights: TargetWeights | None = None
 ) -> Chamfer:
     """Both directions of the chamfer distance, as means of squared distances (..., ).
 
@@ -61,7 +63,7 @@ def chamfer_directions(
 
 
 def chamfer(
-    points: Cloud, target: Cloud, *, weights: Weights | None = None, target_weights: Weights | None = None
+    points: Cloud, target: Target, *, weights: Weights | None = None, target_weights: TargetWeights | None = None
 ) -> Values:
     """Chamfer distance: mean squared distance to the nearest neighbour, points to target plus target to points."""
     return chamfer_directions(points, target, weights=weights, target_weights=target_weights).total
@@ -82,7 +84,7 @@ def coverage(scene: Scene, target: Cloud, *, surface: bool = False) -> Values:
     return (distance.abs() if surface else distance.clamp(min=0)).mean(-1)
 
 
-def excess(points: Cloud, target: Cloud, *, weights: Weights | None = None) -> Values:
+def excess(points: Cloud, target: Target, *, weights: Weights | None = None) -> Values:
     """How far points of the prediction are from the target on average: the reverse of coverage."""
     squared = squared_distance(points, target)
     return _mean(torch.sqrt(squared.clamp(min=1e-12)), weights)

@@ -15,12 +15,13 @@ from shapeprog.geometry.arrays import array, numbers, over_threads
 from shapeprog.space import Array
 
 Cloud = Float[Tensor, "*batch P 3"]
+Other = Float[Tensor, "*batch Q 3"]
 
 AT_ONCE = 1 << 26
 """Pairs of points that are compared together on a device without the kernel."""
 
 
-def nearest(queries: Cloud, points: Cloud) -> Int[Tensor, "*batch P"]:
+def nearest(queries: Cloud, points: Other) -> Int[Tensor, "*batch P"]:
     """Index of the nearest of ``points`` (..., Q, 3) to each of ``queries``; exact, without gradient.
 
     On the CPU a uniform grid is searched by threads over the batch; elsewhere all pairs are compared in pieces.
@@ -39,7 +40,7 @@ def nearest(queries: Cloud, points: Cloud) -> Int[Tensor, "*batch P"]:
     return index.reshape(queries.shape[:-1])
 
 
-def squared_distance(queries: Cloud, points: Cloud) -> Float[Tensor, "*batch P"]:
+def squared_distance(queries: Cloud, points: Other) -> Float[Tensor, "*batch P"]:
     """Squared distance of each query to its nearest point, with gradient to both.
 
     Neighbours are found without gradient; the gradient of the distance to them is that of the minimum.
@@ -58,7 +59,7 @@ def squared_distance(queries: Cloud, points: Cloud) -> Float[Tensor, "*batch P"]
     return found.reshape(queries.shape[:-1])
 
 
-def mean_squared_distances(one: Cloud, two: Cloud) -> tuple[Float[Tensor, "*batch"], Float[Tensor, "*batch"]]:
+def mean_squared_distances(one: Cloud, two: Other) -> tuple[Float[Tensor, "*batch"], Float[Tensor, "*batch"]]:
     """Means of the squared distances from each cloud to the nearest points of the other, with gradient to both.
 
     Raises
@@ -120,7 +121,7 @@ def _cast(values: Array, like: Tensor) -> Tensor:
     return torch.from_numpy(values.astype(array(like).dtype, copy=False))
 
 
-def _pair(queries: Cloud, points: Cloud) -> tuple[Float[Tensor, "B P 3"], Float[Tensor, "B Q 3"]]:
+def _pair(queries: Cloud, points: Other) -> tuple[Float[Tensor, "B P 3"], Float[Tensor, "B Q 3"]]:
     if not points.shape[-2]:
         raise ShapeProgError("there are no points to be near to", "give at least one point for each shape")
     if queries.shape[:-2] != points.shape[:-2] or queries.shape[-1] != 3 or points.shape[-1] != 3:

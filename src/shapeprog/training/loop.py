@@ -10,7 +10,7 @@ import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, Protocol, TypeVar
+from typing import Any, Protocol, TypeVar, runtime_checkable
 
 import torch
 from torch import Tensor, nn
@@ -24,6 +24,7 @@ from shapeprog.training.state import capture, card_of, restore
 Batch = TypeVar("Batch")
 
 
+@runtime_checkable
 class Objective(Protocol[Batch]):
     """What is learned, from what, and how well."""
 

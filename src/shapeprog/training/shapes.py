@@ -96,13 +96,13 @@ class TargetStream:
         places = np.array([orders[n][at] for n, at in zip(rounds.tolist(), within, strict=True)])
         random = np.random.default_rng((self._seed, 1, index))
         mirrored = random.random(self._batch) < self._mirror
-        cells, points = zip(*(self._drawn(place, random) for place in places), strict=True)
+        cells, points = zip(*(self._drawn(int(place), random) for place in places), strict=True)
         turned, clouds = torch.from_numpy(np.stack(cells)), torch.from_numpy(np.stack(points))
         which = torch.from_numpy(mirrored)
         return Targets(*mirror(turned, clouds, which), torch.from_numpy(places), which)
 
     def _drawn(self, place: int, random: np.random.Generator) -> tuple[npt.NDArray[np.uint8], npt.NDArray[np.float32]]:
-        shape = self.shape(int(place))
+        shape = self.shape(place)
         cloud = shape.points
         if cloud is None or not len(cloud):
             cloud = points_of_cells(shape.voxels, GUESSED)

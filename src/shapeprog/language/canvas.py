@@ -62,5 +62,15 @@ def count(canvas: Canvas) -> Int[Tensor, "*batch"]:
     return unpacked(canvas).flatten(-3).sum(-1, dtype=torch.int64)
 
 
+def widened(canvas: Canvas) -> Canvas:
+    """All cells that share a face with a drawn one, and these themselves."""
+    wide = canvas | (canvas << 1) | ((canvas >> 1) & 0x7FFFFFFF)  # the sign must not be drawn in
+    wide[..., 1:, :] |= canvas[..., :-1, :]
+    wide[..., :-1, :] |= canvas[..., 1:, :]
+    wide[..., 1:] |= canvas[..., :-1]
+    wide[..., :-1] |= canvas[..., 1:]
+    return wide
+
+
 def _places(device: torch.device) -> Int[Tensor, " 32"]:
     return torch.arange(RESOLUTION, dtype=torch.int32, device=device)

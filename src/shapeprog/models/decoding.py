@@ -1,6 +1,8 @@
-"""Decoding: programs from targets, by the likeliest ids, by sampling, or by beam search; batched, legal blocks only.
+"""Decoding: programs from targets, by drawing, by the likeliest ids, by sampling, or by beam search.
 
-Each block is drawn with whole numbers before the next one is written, so the generator sees what it has done.
+All are batched and write legal blocks only.  Each block is drawn with whole numbers before the next one is written, so
+the generator sees what it has done.  *By drawing*, which is the default, the likeliest few blocks are drawn and the
+one that helps most is written: the network is run once for each block all the same.
 """
 
 from __future__ import annotations
@@ -12,12 +14,18 @@ import torch
 from jaxtyping import Float, Int, UInt8
 from torch import Tensor
 
-from shapeprog.language.canvas import count, draw_blocks, packed, unpacked
+from shapeprog.language.canvas import count, draw_blocks, packed, unpacked, widened
 from shapeprog.language.statement import EMPTY, SLOTS
 from shapeprog.language.tensors import Code
 from shapeprog.models.generator import Generator, Memory, Said
 
-Choice = Literal["argmax", "sample", "ids"]
+Choice = Literal["drawn", "argmax", "sample", "ids"]
+
+WIDTH = 8
+"""Blocks that are drawn to choose one of them; chosen on val."""
+
+EXACT = 0.5
+"""What an exact cell counts beside one that is right within a cell; chosen on val."""
 
 
 @dataclass(frozen=True)
@@ -45,15 +53,13 @@ def decode(
     target: UInt8[Tensor, "B 32 32 32"],
     *,
     blocks: int = 10,
-    choose: Choice = "argmax",
+    choose: Choice = "drawn",
+    width: int = WIDTH,
     temperature: float = 1.0,
     random: torch.Generator | None = None,
-    every: bool | None = None,
 ) -> Decoded:
     """One program for each target; stops as soon as every program has ended.
 
-    Each block is drawn and compared with the target before the next.  One that does not raise the IoU is not written,
-    and the program ends: on the same canvas most generators would say the same again.
     Generators whose predictions depend on the batch always write all blocks for all of it, as published.
 
     Parameters
@@ -63,15 +69,15 @@ def decode(
     blocks
         Most blocks K; the tensors have exactly so many.
     choose
-        ``argmax`` takes the likeliest id and its numbers, ``sample`` draws both, ``ids`` draws the ids alone.
+        ``drawn`` draws the likeliest blocks and takes the one that helps most, or ends where none does; ``argmax``
+        takes the likeliest ids and their numbers, ``sample`` samples both, ``ids`` samples the ids alone.
+    width
+        How many blocks are drawn.
     temperature
         Of the ids when sampling: below one keeps closer to the likeliest.
     random
         Source of randomness when sampling.
-    every
-        Write every block, whether it helps or not; by default only when sampling, or where all is as published.
     """
-    every = (choose != "argmax" or generator.by_batch) if every is None else every
     steps, device = generator.vocabulary.steps, target.device
     ids = torch.zeros(len(target), blocks, steps, dtype=torch.long, device=device)
     parameters = torch.zeros(len(target), blocks, steps, SLOTS, device=device)
@@ -82,18 +88,46 @@ def decode(
     canvas = canvases[:, 0].clone()
     for k in range(blocks):
         feature, memory = generator.perceive(seen[active], unpacked(canvas[active]).float(), memory)
-        said, values, chances = _block(generator, feature, choose, temperature, random)
-        union = canvas[active] | draw_blocks(Code(said[:, None], values[:, None]))[:, 0]
-        better = every | (_iou(union, cells[active]) > _iou(canvas[active], cells[active]))
-        ids[active, k], parameters[active, k] = said * better[:, None], values * better[:, None, None]
+        if choose == "drawn":
+            said, values, chances = _helping(generator, feature, width, canvas[active], cells[active])
+        else:
+            said, values, chances = _block(generator, feature, choose, temperature, random)
+        ids[active, k], parameters[active, k] = said, values
         chance[active] += chances
-        going = ((said[:, 0] != EMPTY) | generator.by_batch) & better
-        canvas[active] = torch.where(better[:, None, None], union, canvas[active])
+        going = (said[:, 0] != EMPTY) | generator.by_batch
         active, memory = active[going], _at(memory, going)
         if not len(active):
             break
+        canvas[active] = canvas[active] | draw_blocks(Code(said[going][:, None], values[going][:, None]))[:, 0]
         canvases[:, k + 1 :] = canvas[:, None]
     return Decoded(Code(ids, parameters), canvases, chance)
+
+
+def _helping(
+    generator: Generator,
+    feature: Float[Tensor, "B F"],
+    width: int,
+    canvas: Int[Tensor, "B 32 32"],
+    cells: Int[Tensor, "B 32 32"],
+) -> tuple[Int[Tensor, "B J"], Float[Tensor, "B J 7"], Float[Tensor, " B"]]:
+    """Of the likeliest blocks the one that helps most, or an empty one where none helps, and its log-probability.
+
+    What helps is counted in cells that are drawn anew: those that the target has less those that it has not, and the
+    same with a cell of tolerance, so that a part which is a little off still counts for more than none.
+    """
+    ids, values, chance = _blocks(generator, feature, width)
+    drawn = draw_blocks(Code(ids.flatten(0, 1)[:, None], values.flatten(0, 1)[:, None]))[:, 0].unflatten(
+        0, ids.shape[:2]
+    )
+    wanted, before = cells[:, None], canvas[:, None]
+    new = drawn & ~before
+    exact = 2 * count(new & wanted) - count(new)
+    near = count(wanted & widened(drawn) & ~widened(before)) - count(new & ~widened(wanted))
+    worth = (EXACT * exact + near).masked_fill(~chance.isfinite(), 0.0)
+    best = worth.argmax(-1)  # the likeliest of equals
+    row = torch.arange(len(ids), device=ids.device)
+    helps = (worth[row, best] > 0) & (ids[row, best, 0] != EMPTY)
+    return ids[row, best] * helps[:, None], values[row, best] * helps[:, None, None], chance[row, best] * helps
 
 
 def _block(

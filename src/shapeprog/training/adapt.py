@@ -25,7 +25,7 @@ from shapeprog.geometry.sampling import has_surface
 from shapeprog.language.tensors import Code
 from shapeprog.language.unroll import Plan
 from shapeprog.models.checkpoint import card_of, load_executor, load_generator, save_checkpoint
-from shapeprog.models.decoding import decode
+from shapeprog.models.decoding import Choice, decode
 from shapeprog.models.executor import NeuralExecutor
 from shapeprog.models.generator import Generator, Prediction
 from shapeprog.training import choices
@@ -123,15 +123,8 @@ class Adaptation:
         if settings.ids == "rloo":
             parts = (torch.cat([each] * settings.tries) for each in _parts(targets))
             targets = Targets(*parts)
-        choose = "ids" if settings.ids in ("nvil", "rloo") else "argmax"
-        drawn = decode(  # every block: one that does not help yet is to learn to
-            generator,
-            targets.cells,
-            blocks=settings.blocks,
-            choose=choose,
-            random=random,
-            every=True,  # type: ignore[arg-type]
-        )
+        choose: Choice = "ids" if settings.ids in ("nvil", "rloo") else settings.choose
+        drawn = decode(generator, targets.cells, blocks=settings.blocks, choose=choose, random=random)
         prediction = generator.predict(targets.cells, drawn.canvases, drawn.code)
         with torch.autocast(self._device.type, enabled=False):
             values = prediction.parameters.float()

@@ -31,6 +31,9 @@ class AdaptSettings(Settings):
         How much the estimator counts.
     tries
         Programs that ``rloo`` samples for each shape; blocks that ``expected`` looks at in each place.
+    choose
+        How programs are written where ids are not sampled: of the likeliest blocks the one that helps most
+        (``drawn``), or the likeliest (``argmax``).
     points
         Points of the target, points on the prediction, and cells, that one step looks at in each shape.
     mirror
@@ -69,6 +72,7 @@ class AdaptSettings(Settings):
     cost: Literal["loss", "iou"] = "loss"
     ids_weight: float = 1.0
     tries: int = 4
+    choose: Literal["drawn", "argmax"] = "drawn"
     points: int = 1000
     mirror: float = 0.0
     blocks: int = 10
@@ -87,7 +91,8 @@ class AdaptSettings(Settings):
 
     CHOICES: ClassVar[Mapping[str, tuple[str, ...]]] = {
         **Settings.CHOICES, "ids": ("none", "nvil", "rloo", "expected"), "cost": ("loss", "iou"),
-        "select": ("iou", "cd"), "form": ("snapped", "program"), "statistics": ("frozen", "moving"),
+        "select": ("iou", "cd"), "form": ("snapped", "program"), "choose": ("drawn", "argmax"),
+        "statistics": ("frozen", "moving"),
     }  # fmt: skip
     MAY_CHANGE: ClassVar[frozenset[str]] = Settings.MAY_CHANGE | {"select"}
 
@@ -117,7 +122,7 @@ class AdaptSettings(Settings):
 METHODS: Mapping[str, Mapping[str, object]] = {
     "guided": {
         "loss": NEURAL, "rate": 2e-5, "decay": 1e-5, "clip": 0.1, "clip_by": "value", "schedule": "constant",
-        "precision": "float32", "select": "cd",
+        "precision": "float32", "select": "cd", "choose": "argmax",
     },
     "direct": {"loss": "chamfer", "select": "cd"},
     "hybrid": {"loss": f"chamfer=1,{NEURAL}=10", "select": "cd"},

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 import torch
-from jaxtyping import Int, UInt8
+from jaxtyping import Bool, Int, UInt8
 from torch import Tensor
 
 from shapeprog.geometry.occupancy import packed_blocks, unpack
@@ -28,6 +28,14 @@ def draw_blocks(code: Code) -> Int[Tensor, "*batch K 32 32"]:
         return filled_blocks(scene, code.ids.shape[-2])
     words = packed_blocks(scene, code.ids.shape[-2])
     return torch.from_numpy(words.view(np.int32))
+
+
+def stays_inside(code: Code) -> Bool[Tensor, "*batch K"]:
+    """Which blocks have the centre of every copy within the grid; what lies outside of it no canvas shows."""
+    lead, (steps, slots) = code.ids.shape[:-1], code.parameters.shape[-2:]
+    scene = unroll(Code(code.ids.reshape(-1, 1, steps), code.parameters.detach().reshape(-1, 1, steps, slots)))
+    within = (scene.centre.abs() <= RESOLUTION / 2).all(-1) | ~scene.mask
+    return within.all(-1).reshape(lead)
 
 
 def so_far(blocks: Int[Tensor, "*batch K 32 32"]) -> Int[Tensor, "*batch K 32 32"]:

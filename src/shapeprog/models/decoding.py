@@ -14,7 +14,7 @@ import torch
 from jaxtyping import Float, Int, UInt8
 from torch import Tensor
 
-from shapeprog.language.canvas import count, draw_blocks, packed, unpacked, widened
+from shapeprog.language.canvas import count, draw_blocks, packed, stays_inside, unpacked, widened
 from shapeprog.language.statement import EMPTY, SLOTS
 from shapeprog.language.tensors import Code
 from shapeprog.models.generator import Generator, Memory, Said
@@ -113,17 +113,17 @@ def _helping(
     """Of the likeliest blocks the one that helps most, or an empty one where none helps, and its log-probability.
 
     What helps is counted in cells that are drawn anew: those that the target has less those that it has not, and the
-    same with a cell of tolerance, so that a part which is a little off still counts for more than none.
+    same with a cell of tolerance, so that a part which is a little off still counts for more than none.  A block with
+    copies outside of the grid does not help: there they are not seen, and far from everything.
     """
     ids, values, chance = _blocks(generator, feature, width)
-    drawn = draw_blocks(Code(ids.flatten(0, 1)[:, None], values.flatten(0, 1)[:, None]))[:, 0].unflatten(
-        0, ids.shape[:2]
-    )
+    candidates = Code(ids[:, :, None], values[:, :, None])
+    drawn, possible = draw_blocks(candidates)[:, :, 0], stays_inside(candidates)[..., 0] & chance.isfinite()
     wanted, before = cells[:, None], canvas[:, None]
     new = drawn & ~before
     exact = 2 * count(new & wanted) - count(new)
     near = count(wanted & widened(drawn) & ~widened(before)) - count(new & ~widened(wanted))
-    worth = (EXACT * exact + near).masked_fill(~chance.isfinite(), 0.0)
+    worth = (EXACT * exact + near).masked_fill(~possible, 0.0)
     best = worth.argmax(-1)  # the likeliest of equals
     row = torch.arange(len(ids), device=ids.device)
     helps = (worth[row, best] > 0) & (ids[row, best, 0] != EMPTY)

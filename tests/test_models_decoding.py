@@ -8,6 +8,7 @@ import pytest
 import torch
 from torch import Tensor
 
+from shapeprog.data.synthetic import Stream, prior
 from shapeprog.errors import ShapeProgError
 from shapeprog.language.canvas import count, draw_blocks, packed, so_far, unpacked, widened
 from shapeprog.language.parameters import Extent, Position
@@ -96,12 +97,12 @@ def test_blocks_that_do_not_help_are_not_written(small: Callable[..., Generator]
         assert torch.equal(written, live_blocks(found.code.ids) & written)  # nothing after the end
 
 
-def test_by_drawing_a_perfect_block_is_found_among_those_that_are_drawn() -> None:
-    """Where a generator knows the program by heart, drawing takes nothing else."""
+def test_by_drawing_what_is_known_by_heart_is_rebuilt() -> None:
     generator, _, target = known_by_heart()
-    found = decode(generator, target, width=4)
-    plain = decode(generator, target, choose="argmax")
-    assert torch.equal(found.code.ids, plain.code.ids)
+    code = decode(generator, target, width=4).code
+    drawn = so_far(torch.nn.functional.pad(draw_blocks(code), (0, 0, 0, 0, 0, 1)))[:, -1]
+    iou = count(drawn & packed(target)) / count(drawn | packed(target))
+    assert (iou > 0.9).all()
 
 
 def test_widened_cells_are_those_within_one_face() -> None:
@@ -190,11 +191,10 @@ def known_by_heart(design: str = "swift") -> tuple[Generator, Code, Tensor]:
     """A generator that has learned four programs by heart, these, and what they draw."""
     torch.manual_seed(0)
     generator = build_generator(design, SMALL)
-    code = code_of(range(4), 2)
-    drawn = draw_blocks(code)
-    taught = lesson(unpacked(drawn[:, 0] | drawn[:, 1]), code)
+    made = Stream(prior("narrow"), 4, seed=0)[0]
+    taught = lesson(made.voxels, made.code)
     optimiser = torch.optim.Adam(generator.parameters(), 1e-2)
-    for _ in range(200):
+    for _ in range(150):
         told = generator.predict(taught.target, taught.canvases, taught.code, taught.live)
         loss = sum(generator.losses(told, taught.code).values(), torch.zeros(()))
         optimiser.zero_grad()
@@ -209,7 +209,8 @@ def test_what_is_learned_by_heart_is_said_again(design: str) -> None:
     generator, code, target = known_by_heart(design)
     told = generator.predict(target, so_far(draw_blocks(code)), code)
     used = generator.vocabulary.used[told.told.ids]
-    assert float(((told.values - told.told.values).abs() * used).max()) < 0.5
+    off = (told.values - told.told.values).detach().abs() * used
+    assert float(off.max()) < 0.5
 
 
 def test_values_between_whole_ones_are_learned_as_such(small: Callable[..., Generator]) -> None:

@@ -16,17 +16,19 @@ from shapeprog.language.canvas import draw_blocks
 from shapeprog.language.program import Program
 from shapeprog.language.tensors import Code
 from shapeprog.language.tensors import decode as programs_of
-from shapeprog.models.decoding import decode
+from shapeprog.models.decoding import Choice, decode
 from shapeprog.models.generator import Generator
 
 AT_ONCE = 64
 """Shapes that are decoded together."""
 
 
-def single_pass(generator: Generator, cells: UInt8[Tensor, "B 32 32 32"], blocks: int = 10) -> Code:
-    """The likeliest programs (B, K, J) of targets, one for each, on the device of the cells."""
+def single_pass(
+    generator: Generator, cells: UInt8[Tensor, "B 32 32 32"], blocks: int = 10, choose: Choice = "drawn"
+) -> Code:
+    """Programs (B, K, J) of targets in a single pass, one for each, on the device of the cells; see ``decode``."""
     with torch.no_grad():
-        parts = [decode(generator, part, blocks=blocks).code for part in cells.split(AT_ONCE)]
+        parts = [decode(generator, part, blocks=blocks, choose=choose).code for part in cells.split(AT_ONCE)]
     return Code(torch.cat([part.ids for part in parts]), torch.cat([part.parameters for part in parts]))
 
 
@@ -36,13 +38,15 @@ def code_iou(code: Code, cells: UInt8[Tensor, "B 32 32 32"]) -> Float[Tensor, " 
     return torch.from_numpy(packed_iou(union.view(np.uint32), pack(cells.cpu().numpy())))
 
 
-def generated(generator: Generator, targets: Sequence[Target], blocks: int = 10) -> list[Program]:
-    """The likeliest program of each target."""
+def generated(
+    generator: Generator, targets: Sequence[Target], blocks: int = 10, choose: Choice = "drawn"
+) -> list[Program]:
+    """The program of each target in a single pass."""
     if not targets:
         return []
     device = next(generator.parameters()).device
     cells = torch.from_numpy(np.stack([target.voxels for target in targets])).to(device, torch.uint8)
-    return programs_of(single_pass(generator, cells, blocks))
+    return programs_of(single_pass(generator, cells, blocks, choose))
 
 
 def evaluate_generator(
@@ -52,16 +56,19 @@ def evaluate_generator(
     points: int = 5000,
     seed: int = 0,
     snapping: bool = False,
+    choose: Choice = "drawn",
 ) -> list[Metrics]:
-    """The measures of the likeliest program of each target.
+    """The measures of the program of each target in a single pass.
 
     Parameters
     ----------
+    choose
+        How blocks are chosen, see :func:`shapeprog.models.decoding.decode`.
     snapping
         Whether whole numbers within one of the rounded parameters may be searched for the IoU; else it is that of the
         rounded program.
     """
-    programs = generated(generator, targets, blocks)
+    programs = generated(generator, targets, blocks, choose)
     with torch.autocast(next(generator.parameters()).device.type, enabled=False):
         return [
             measured(program, target, points, seed, snapping) for program, target in zip(programs, targets, strict=True)

@@ -60,7 +60,7 @@ def decode(
 ) -> Decoded:
     """One program for each target; stops as soon as every program has ended.
 
-    Generators whose predictions depend on the batch always write all blocks for all of it, as published.
+    Generators whose predictions depend on the batch write all of the likeliest blocks for all of it, as published.
 
     Parameters
     ----------
@@ -88,12 +88,12 @@ def decode(
     canvas = canvases[:, 0].clone()
     for k in range(blocks):
         feature, memory = generator.perceive(seen[active], unpacked(canvas[active]).float(), memory)
-        if choose == "drawn":
+        if choose == "drawn" and not generator.by_batch:
             said, values, chances = _helping(generator, feature, width, canvas[active], cells[active])
         else:
             said, values, chances = _block(generator, feature, choose, temperature, random)
-        ids[active, k], parameters[active, k] = said, values
-        chance[active] += chances
+        ids[active, k], parameters[active, k] = said, values.to(parameters)
+        chance[active] += chances.to(chance)
         going = (said[:, 0] != EMPTY) | generator.by_batch
         active, memory = active[going], _at(memory, going)
         if not len(active):
@@ -143,7 +143,7 @@ def _block(
     chance, state = feature.new_zeros(len(feature)), None
     for j in range(generator.vocabulary.steps):
         logits, heads, state = generator.step(feature, Said(ids[-1], values[-1]) if ids else None, j, state)
-        if choose == "argmax":
+        if choose in ("argmax", "drawn"):
             said = logits.argmax(-1)
             values.append(generator.values(heads, said))
         else:

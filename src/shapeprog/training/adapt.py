@@ -132,7 +132,8 @@ class Adaptation:
             each = self._judged(code, targets, random)
             if NEURAL in settings.terms:
                 each[NEURAL] = settings.terms[NEURAL] * self._neural(prediction, code, targets)
-            terms = {name: value.mean() for name, value in each.items()}
+            idle = 0 * prediction.values.sum()  # where nothing is drawn, there is a gradient all the same: none
+            terms = {name: value.mean() + idle for name, value in each.items()}
             if settings.ids != "none":
                 total = torch.stack(list(each.values())).sum(0).detach()
                 terms |= self._chosen(prediction, code, total, targets, random)

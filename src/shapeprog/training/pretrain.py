@@ -59,7 +59,7 @@ class PretrainSettings(Settings):
     clip: float = 1.0
     precision: Literal["bf16", "float32"] = "bf16"
     validate_every: int = 20_000
-    design: str = "swift"
+    design: str = "chained"
     prior: str = "wide"
     shapes: int = 0
     blocks: int = 10

@@ -125,7 +125,7 @@ def test_weights_make_a_beginning_and_carry_their_card(tmp_path: Path, engine: E
     after = load_generator(tmp_path / "on" / WEIGHTS)[0]
     for name, value in generator.named_parameters():
         torch.testing.assert_close(dict(after.named_parameters())[name], value)
-    with pytest.raises(ShapeProgError, match="of the design swift, not tian2019"):
+    with pytest.raises(ShapeProgError, match="of the design chained, not tian2019"):
         next(pretrain(tmp_path / "x", PRESETS["tian2019"], engine, start=str(tmp_path / "run" / WEIGHTS)))
 
 

@@ -55,7 +55,7 @@ class AdaptSettings(Settings):
     perturbed, jitter
         Share of the labels whose parameters are moved by a cell, each with the chance ``jitter``, and drawn anew.
     sampled
-        Share of the programs taught on canvases that the generator draws itself.
+        Share of the steps that teach on canvases which the generator draws itself, reached halfway.
     rows
         Canvases that are learned from in each program, drawn at random; 0 for all.
     statistics

@@ -8,7 +8,6 @@ itself included (scheduled sampling; the relabelling is that of dataset aggregat
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -85,26 +84,19 @@ def relabelled(
     return Lesson(target, canvases, _taken(code, torch.where(enough, block, stop)), live)
 
 
-def on_own_canvases(generator: Generator, taught: Lesson, own: int, random: torch.Generator) -> Lesson:
-    """The lesson with the first ``own`` shapes taught on what the generator draws by sampling (scheduled sampling)."""
-    target, code = taught.target[:own], taught.code[:own]
+def scheduled(generator: Generator, taught: Lesson, share: float, random: torch.Generator) -> Lesson:
+    """With the chance ``share`` the lesson on what the generator draws by sampling instead (scheduled sampling).
+
+    All shapes of a batch or none: a network that draws a few costs about as much as one that draws many.
+    """
+    if float(torch.rand((), generator=random, device=random.device)) >= share:
+        return taught
     training = generator.training
     generator.eval()
-    drawn = decode(generator, target, blocks=code.ids.shape[1], choose="sample", random=random)
+    drawn = decode(generator, taught.target, blocks=taught.code.ids.shape[1], choose="sample", random=random)
     generator.train(training)
-    without_stop = Code(code.ids[:, :-1], code.parameters[:, :-1])
-    new = relabelled(target, without_stop, drawn.canvases, live_blocks(drawn.code.ids))
-    return joined([new, Lesson(taught.target[own:], taught.canvases[own:], taught.code[own:], taught.live[own:])])
-
-
-def joined(lessons: Sequence[Lesson]) -> Lesson:
-    """Lessons one after another as one."""
-    return Lesson(
-        torch.cat([each.target for each in lessons]),
-        torch.cat([each.canvases for each in lessons]),
-        Code(torch.cat([each.code.ids for each in lessons]), torch.cat([each.code.parameters for each in lessons])),
-        torch.cat([each.live for each in lessons]),
-    )
+    without_stop = Code(taught.code.ids[:, :-1], taught.code.parameters[:, :-1])
+    return relabelled(taught.target, without_stop, drawn.canvases, live_blocks(drawn.code.ids))
 
 
 def by_coverage(code: Code, drawn: Int[Tensor, "B K 32 32"]) -> tuple[Code, Int[Tensor, "B K 32 32"]]:

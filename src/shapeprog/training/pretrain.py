@@ -21,7 +21,7 @@ from shapeprog.models.checkpoint import card_of, load_generator, save_checkpoint
 from shapeprog.models.generator import Generator, build_generator
 from shapeprog.training.engine import Engine
 from shapeprog.training.folder import Record
-from shapeprog.training.lessons import Lesson, lesson, on_own_canvases
+from shapeprog.training.lessons import Lesson, lesson, scheduled
 from shapeprog.training.loop import run
 from shapeprog.training.settings import Settings
 from shapeprog.training.validation import Validation
@@ -46,7 +46,7 @@ class PretrainSettings(Settings):
     rows
         Canvases that are learned from in each shape, drawn at random; 0 for all.
     sampled
-        Share of the shapes on whose canvases the generator draws itself, reached halfway.
+        Share of the steps on whose canvases the generator draws itself, reached halfway.
     ids_weight, parameters_weight
         How much the two losses count.
     """
@@ -122,9 +122,7 @@ class Pretraining:
 
     def loss(self, batch: Lesson, progress: float, random: torch.Generator) -> dict[str, Tensor]:
         """Cross-entropy of ids and loss of parameters, as means over live steps."""
-        own = round(self._settings.sampled * min(1.0, 2 * progress) * len(batch.target))
-        if own:
-            batch = on_own_canvases(self.module, batch, own, random)
+        batch = scheduled(self.module, batch, self._settings.sampled * min(1.0, 2 * progress), random)
         if self._settings.rows:
             batch = batch.pick(self._settings.rows, random)
         prediction = self.module.predict(batch.target, batch.canvases, batch.code, batch.live)

@@ -14,7 +14,7 @@ from shapeprog.models.vocabulary import Vocabulary
 from shapeprog.training.adapt_settings import AdaptSettings
 from shapeprog.training.engine import scrambled
 from shapeprog.training.labels import perturbed, read_labels
-from shapeprog.training.lessons import Lesson, lesson, on_own_canvases
+from shapeprog.training.lessons import Lesson, lesson, scheduled
 from shapeprog.training.shapes import TargetStream
 
 
@@ -75,9 +75,7 @@ def teach(
     generator: Generator, taught: Lesson, settings: AdaptSettings, progress: float, random: torch.Generator
 ) -> dict[str, Tensor]:
     """The losses of a lesson: cross-entropy of ids and loss of parameters, weighted."""
-    own = round(settings.sampled * min(1.0, 2 * progress) * len(taught.target))
-    if own:
-        taught = on_own_canvases(generator, taught, own, random)
+    taught = scheduled(generator, taught, settings.sampled * min(1.0, 2 * progress), random)
     if settings.rows:
         taught = taught.pick(settings.rows, random)
     generator.train(settings.statistics == "moving")

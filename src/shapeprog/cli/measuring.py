@@ -68,6 +68,7 @@ def evaluate_command(
     weights: Annotated[
         str | None, typer.Option(help="A generator instead of predictions, which rebuilds all targets in one pass.")
     ] = None,
+    choose: Annotated[str, typer.Option(help="How it chooses blocks: drawn or argmax.")] = "drawn",
     points: Annotated[int, typer.Option(help="Points on each surface.", min=2)] = 5000,
     seed: terminal.Seed = 0,
     up: terminal.Up = None,
@@ -102,6 +103,8 @@ def evaluate_command(
         raise InputError(f"there is no file or folder {missing[0]}", "check the path")
     if not wanted:
         raise InputError("there are no targets", "name them after the predictions, or give --weights")
+    if choose not in ("drawn", "argmax"):
+        raise InputError(f"blocks cannot be chosen by {choose!r}", "give --choose drawn or --choose argmax")
     failures: list[ShapeProgError] = []
     shapes: dict[str, Shape] = {}
     for path, shape in load_all(wanted, up=up, front=front, points=2 * points, seed=seed):
@@ -112,7 +115,7 @@ def evaluate_command(
         else:
             shapes[shape.name] = shape
     generates = weights is not None
-    found = list(scoring.generated(weights, shapes) if weights else scoring.predictions(predictions))
+    found = list(scoring.generated(weights, shapes, choose) if weights else scoring.predictions(predictions))
     rows: list[Metrics] = []
     console = terminal.errors()
     silent = quiet or as_json or as_csv

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
@@ -21,6 +21,8 @@ from shapeprog.language.program import Program
 
 if TYPE_CHECKING:
     from torch import Tensor
+
+    from shapeprog.models.decoding import Choice
 
 PROGRAMS = (".shape", ".json")
 
@@ -43,13 +45,13 @@ def predictions(path: Path) -> Iterator[tuple[str, Prediction | ShapeProgError]]
             yield (file.stem if isinstance(shape, ShapeProgError) else shape.name), shape
 
 
-def generated(weights: str, shapes: Mapping[str, Shape]) -> Iterator[tuple[str, Prediction]]:
+def generated(weights: str, shapes: Mapping[str, Shape], choose: str) -> Iterator[tuple[str, Prediction]]:
     """Names and single-pass programs of shapes; ``weights`` is a file, or the name of weights that ship."""
     from shapeprog.evaluation.generated import generated as programs_of
     from shapeprog.models.checkpoint import load_generator
 
     generator, _ = load_generator(weights)
-    programs = programs_of(generator, list(shapes.values()))
+    programs = programs_of(generator, list(shapes.values()), choose=cast("Choice", choose))
     yield from ((name, (program, None)) for name, program in zip(shapes, programs, strict=True))
 
 

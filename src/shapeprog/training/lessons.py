@@ -127,8 +127,8 @@ def _best(
         fresh = drawn.numpy()[:, None] & ~canvases.numpy()[:, :, None]
         new = torch.from_numpy(np.bitwise_count(fresh.view(np.uint32)).sum((-2, -1), dtype=np.int64))
     else:
-        cells, covered = (unpacked(each).flatten(2).half() for each in (drawn, canvases))
-        new = count(drawn)[:, None] - torch.bmm(covered, cells.mT, out_dtype=torch.float32).round().long()
+        cells, covered = (unpacked(each).flatten(2).float() for each in (drawn, canvases))
+        new = count(drawn)[:, None] - (covered @ cells.mT).round().long()
     words = drawn.flatten(2) != 0
     lowest = words.int().argmax(-1)
     worth = new * words.shape[-1] - lowest[:, None]

@@ -18,7 +18,8 @@ from torch import Tensor
 from shapeprog.data.synthetic import Stream, prior
 from shapeprog.models.checkpoint import SHIPPED, load_generator
 from shapeprog.models.decoding import decode
-from shapeprog.models.generator import Generator, build_generator
+from shapeprog.models.designs import build_generator
+from shapeprog.models.generator import Generator
 from shapeprog.training.engine import tune_allocator
 from shapeprog.training.lessons import Lesson, lesson
 

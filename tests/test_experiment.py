@@ -21,7 +21,7 @@ from shapeprog.language.statement import language
 from shapeprog.language.tensors import Code
 from shapeprog.language.unroll import unroll
 from shapeprog.models.checkpoint import card_of, save_checkpoint
-from shapeprog.models.generator import build_generator
+from shapeprog.models.designs import build_generator
 
 MEASURES = {"f1": 0.5, "blocks": 3, "statements": 4, "primitives": 5, "seconds": 0.02, "noise_floor": 0.0001}
 

@@ -33,7 +33,7 @@ from shapeprog.language.text import parse
 from shapeprog.language.unroll import unroll
 from shapeprog.models.checkpoint import card_of, save_checkpoint
 from shapeprog.models.decoding import decode
-from shapeprog.models.generator import build_generator
+from shapeprog.models.designs import build_generator
 
 EXAMPLES = {"table": TABLE, "shelf": SHELF, "star": STAR, "chair": CHAIR}
 QUICK = Settings(rounds=20)

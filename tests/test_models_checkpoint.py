@@ -28,8 +28,8 @@ from shapeprog.models.checkpoint import (
     read_card,
     save_checkpoint,
 )
+from shapeprog.models.designs import build_generator
 from shapeprog.models.executor import NeuralExecutor
-from shapeprog.models.generator import build_generator
 from shapeprog.models.vocabulary import Vocabulary
 
 

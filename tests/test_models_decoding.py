@@ -19,7 +19,8 @@ from shapeprog.language.statement import Language, language, statement, using
 from shapeprog.language.tensors import Code, encode
 from shapeprog.language.tensors import decode as programs_of
 from shapeprog.models.decoding import beam, decode
-from shapeprog.models.generator import Generator, build_generator, live_blocks
+from shapeprog.models.designs import build_generator
+from shapeprog.models.generator import Generator, live_blocks
 from shapeprog.models.vocabulary import Vocabulary
 from shapeprog.training.lessons import by_coverage, lesson, relabelled
 

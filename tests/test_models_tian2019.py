@@ -11,7 +11,8 @@ from shapeprog.language import Code, encode, unroll
 from shapeprog.language.canvas import draw_blocks, so_far, unpacked
 from shapeprog.language.sampling import random_program
 from shapeprog.models.decoding import decode
-from shapeprog.models.generator import Generator, Said, build_generator, live_blocks
+from shapeprog.models.designs import build_generator
+from shapeprog.models.generator import Generator, Said, live_blocks
 from shapeprog.models.tian2019 import PUBLISHED, Tian2019
 from shapeprog.models.vocabulary import Vocabulary
 

@@ -20,8 +20,9 @@ from shapeprog.geometry.sampling import sample_surface
 from shapeprog.language.text import parse
 from shapeprog.language.unroll import unroll
 from shapeprog.models.checkpoint import card_of, load_generator, save_checkpoint
+from shapeprog.models.designs import build_generator
 from shapeprog.models.executor import NeuralExecutor
-from shapeprog.models.generator import Generator, build_generator
+from shapeprog.models.generator import Generator
 from shapeprog.models.vocabulary import Vocabulary
 from shapeprog.training.adapt import Adaptation
 from shapeprog.training.adapt_settings import METHODS, AdaptSettings

@@ -12,7 +12,8 @@ from shapeprog.geometry.occupancy import pack, packed_iou
 from shapeprog.language.canvas import draw_blocks
 from shapeprog.language.tensors import Code
 from shapeprog.models.decoding import decode
-from shapeprog.models.generator import Generator, build_generator, live_blocks
+from shapeprog.models.designs import build_generator
+from shapeprog.models.generator import Generator, live_blocks
 from shapeprog.training import choices
 
 SMALL = {"widths": (4, 4, 4), "squeeze": 4, "feature": 8}

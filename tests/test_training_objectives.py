@@ -20,8 +20,8 @@ from shapeprog.evaluation.metrics import evaluate_program
 from shapeprog.language.canvas import draw_blocks, unpacked
 from shapeprog.language.tensors import Code, decode
 from shapeprog.models.checkpoint import load_executor, load_generator
+from shapeprog.models.designs import build_generator
 from shapeprog.models.executor import NeuralExecutor
-from shapeprog.models.generator import build_generator
 from shapeprog.models.vocabulary import Vocabulary
 from shapeprog.training import validation
 from shapeprog.training.engine import Engine

@@ -14,14 +14,15 @@ from jaxtyping import Float, Int
 from torch import Tensor, nn
 
 from shapeprog.language.statement import SLOTS
-from shapeprog.models.generator import Said, design
+from shapeprog.models.generator import Said
 from shapeprog.models.swift import Swift, SwiftSettings
 from shapeprog.models.vocabulary import Vocabulary
 
 
-@design("chained")
 class Chained(Swift):
     """The network; see the module."""
+
+    design = "chained"
 
     def __init__(self, settings: SwiftSettings, vocabulary: Vocabulary) -> None:
         super().__init__(settings, vocabulary)

@@ -19,8 +19,9 @@ from torch import Tensor, nn
 
 from shapeprog.errors import InputError, OutputError, ShapeProgError
 from shapeprog.files import atomic_path
+from shapeprog.models.designs import build_generator
 from shapeprog.models.executor import NeuralExecutor
-from shapeprog.models.generator import Generator, build_generator
+from shapeprog.models.generator import Generator
 from shapeprog.models.vocabulary import Vocabulary
 
 SUFFIX = ".safetensors"

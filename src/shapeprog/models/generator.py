@@ -1,24 +1,20 @@
 """What every program generator has in common: features of blocks in, ids and parameters of their steps out.
 
 A generator looks at the target and at what has been drawn so far, and writes one block of up to J steps.  Designs
-differ in how they look (``perceive``) and in how they say numbers (``values`` and ``parameter_loss``); they register
-under a name with ``design``.
+differ in how they look (``perceive``) and in how they say numbers (``values`` and ``parameter_loss``).
 """
 
 from __future__ import annotations
 
-import difflib
 from abc import ABC, abstractmethod
-from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, ClassVar, NamedTuple, TypeVar
+from typing import Any, ClassVar, NamedTuple
 
 import torch
 from jaxtyping import Bool, Float, Int, UInt8
 from torch import Tensor, nn
 
-from shapeprog.errors import ShapeProgError
 from shapeprog.language.canvas import unpacked
 from shapeprog.language.tensors import Code
 from shapeprog.models.vocabulary import Vocabulary
@@ -226,56 +222,3 @@ def stacked(
     """Target and canvas of every live block as two channels."""
     shape = live.nonzero()[:, 0]
     return torch.stack([target.to(dtype)[shape], unpacked(canvases[live]).to(dtype)], 1)
-
-
-Design = TypeVar("Design", bound=type[Generator])
-_designs: dict[str, type[Generator]] = {}
-
-
-def design(name: str) -> Callable[[Design], Design]:
-    """Register a design under a name."""
-
-    def register(kind: Design) -> Design:
-        kind.design = name
-        _designs[name] = kind
-        return kind
-
-    return register
-
-
-def designs() -> dict[str, type[Generator]]:
-    """All designs by name."""
-    from shapeprog.models import chained, swift, tian2019  # noqa: F401  (they register themselves)
-
-    return dict(_designs)
-
-
-def build_generator(
-    name: str, settings: dict[str, Any] | None = None, vocabulary: Vocabulary | None = None
-) -> Generator:
-    """A generator of a design, freshly initialised.
-
-    Parameters
-    ----------
-    name
-        Name of the design.
-    settings
-        Its settings; the defaults of the design where left out.
-    vocabulary
-        By default all statements in force.
-
-    Raises
-    ------
-    ShapeProgError
-        If there is no such design, or no such setting.
-    """
-    known = designs()
-    if name not in known:
-        near = difflib.get_close_matches(name, known, 1)
-        raise ShapeProgError(f"there is no design {name!r}", f"choose {near[0] if near else ', '.join(sorted(known))}")
-    kind = known[name]
-    allowed = {field.name for field in fields(kind.Settings)}
-    for key in settings or {}:
-        if key not in allowed:
-            raise ShapeProgError(f"the design {name} has no setting {key!r}", f"it has {', '.join(sorted(allowed))}")
-    return kind(kind.Settings(**(settings or {})), vocabulary or Vocabulary.current())

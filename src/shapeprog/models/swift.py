@@ -17,7 +17,7 @@ from jaxtyping import Bool, Float, Int, UInt8
 from torch import Tensor, nn
 
 from shapeprog.language.statement import SLOTS
-from shapeprog.models.generator import Generator, Memory, Said, Step, design, stacked
+from shapeprog.models.generator import Generator, Memory, Said, Step, stacked
 from shapeprog.models.vocabulary import Vocabulary
 
 WINDOW = 2
@@ -47,10 +47,10 @@ class SwiftSettings:
     high: int = 40
 
 
-@design("swift")
 class Swift(Generator):
     """The network; see the module."""
 
+    design = "swift"
     Settings = SwiftSettings
     ticks: Tensor
     fits: Tensor

@@ -23,7 +23,7 @@ from torch import Tensor, nn
 from shapeprog.language.canvas import unpacked
 from shapeprog.language.statement import EMPTY, SLOTS
 from shapeprog.language.tensors import Code
-from shapeprog.models.generator import Generator, Memory, Prediction, Said, Step, design, stacked
+from shapeprog.models.generator import Generator, Memory, Prediction, Said, Step, stacked
 from shapeprog.models.vocabulary import Vocabulary
 
 WIDTH = 64
@@ -179,10 +179,10 @@ def advance(core: nn.LSTM, heard: Tensor, state: tuple[Tensor, Tensor] | None) -
     return torch.lstm_cell(heard, state, of_input, of_output)
 
 
-@design("tian2019")
 class Tian2019(Generator):
     """The network; see the module.  1,417,404 parameters for the built-in statements."""
 
+    design = "tian2019"
     Settings = Tian2019Settings
 
     def __init__(self, settings: Tian2019Settings, vocabulary: Vocabulary) -> None:

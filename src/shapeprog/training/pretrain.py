@@ -18,7 +18,8 @@ from torch import Tensor
 from shapeprog.data.synthetic import Stream, prior
 from shapeprog.errors import ShapeProgError
 from shapeprog.models.checkpoint import card_of, load_generator, save_checkpoint
-from shapeprog.models.generator import Generator, build_generator
+from shapeprog.models.designs import build_generator
+from shapeprog.models.generator import Generator
 from shapeprog.training.engine import Engine
 from shapeprog.training.folder import Record
 from shapeprog.training.lessons import Lesson, lesson, scheduled

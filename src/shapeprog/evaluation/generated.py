@@ -15,8 +15,7 @@ from shapeprog.geometry.occupancy import pack, packed_iou
 from shapeprog.language.canvas import draw_blocks
 from shapeprog.language.program import Program
 from shapeprog.language.tensors import Code
-from shapeprog.language.tensors import decode as programs_of
-from shapeprog.models.decoding import Choice, decode
+from shapeprog.models.decoding import Choice, decode, programs
 from shapeprog.models.generator import Generator
 
 AT_ONCE = 64
@@ -46,7 +45,7 @@ def generated(
         return []
     device = next(generator.parameters()).device
     cells = torch.from_numpy(np.stack([target.voxels for target in targets])).to(device, torch.uint8)
-    return programs_of(single_pass(generator, cells, blocks, choose))
+    return programs(single_pass(generator, cells, blocks, choose))
 
 
 def evaluate_generator(
@@ -68,10 +67,10 @@ def evaluate_generator(
         Whether whole numbers within one of the rounded parameters may be searched for the IoU; else it is that of the
         rounded program.
     """
-    programs = generated(generator, targets, blocks, choose)
+    written = generated(generator, targets, blocks, choose)
     with torch.autocast(next(generator.parameters()).device.type, enabled=False):
         return [
-            measured(program, target, points, seed, snapping) for program, target in zip(programs, targets, strict=True)
+            measured(program, target, points, seed, snapping) for program, target in zip(written, targets, strict=True)
         ]
 
 

@@ -25,10 +25,9 @@ from shapeprog.inference.reading import from_code
 from shapeprog.inference.refine import single_threaded
 from shapeprog.inference.structure import Proposals
 from shapeprog.language.program import Program
-from shapeprog.language.tensors import decode
 from shapeprog.models.checkpoint import SHIPPED, SUFFIX, load_generator
 from shapeprog.models.decoding import decode as write
-from shapeprog.models.decoding import suggest
+from shapeprog.models.decoding import programs, suggest
 from shapeprog.models.generator import Generator
 from shapeprog.models.vocabulary import Vocabulary
 from shapeprog.space import RESOLUTION, FloatArray
@@ -96,11 +95,11 @@ def propose_program(
 
 
 def single_pass(generator: Generator, voxels: npt.NDArray[np.bool_], blocks: int) -> Program:
-    """The program of at most ``blocks`` blocks that the generator finds likeliest, as it wrote it."""
+    """The program of at most ``blocks`` blocks that the generator writes in a single pass."""
     device = next(generator.parameters()).device
     target = torch.from_numpy(voxels.astype(np.uint8))[None].to(device)
     with single_threaded():
-        return decode(write(generator, target, blocks=blocks).code)[0]
+        return programs(write(generator, target, blocks=blocks).code)[0]
 
 
 def ready_generator(asked: Generator | str | Path | None, *, needed: bool = False) -> tuple[Generator | None, str]:

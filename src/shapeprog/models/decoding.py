@@ -15,8 +15,10 @@ from jaxtyping import Float, Int, UInt8
 from torch import Tensor
 
 from shapeprog.language.canvas import count, draw_blocks, packed, stays_inside, unpacked, widened
+from shapeprog.language.program import Program
 from shapeprog.language.statement import EMPTY, SLOTS
 from shapeprog.language.tensors import Code
+from shapeprog.language.tensors import decode as programs_of
 from shapeprog.models.generator import Generator, Memory, Said
 
 Choice = Literal["drawn", "argmax", "sample", "ids"]
@@ -45,6 +47,12 @@ class Decoded:
     code: Code
     canvases: Int[Tensor, "*batch K 32 32"]
     log_probability: Float[Tensor, "*batch"]
+
+
+def programs(code: Code) -> list[Program]:
+    """What a generator wrote as programs for people to read: numbers end at the hundredth of a cell."""
+    tidy = code.parameters.double().round(decimals=2) + 0.0  # no minus zero
+    return programs_of(Code(code.ids, tidy))
 
 
 @torch.no_grad()

@@ -55,6 +55,16 @@ def trained(generator: Generator, taught: Lesson, half: bool) -> float:
     return seconds(step)
 
 
+def alone(generator: Generator, target: Tensor, choose: str = "argmax") -> float:
+    """Milliseconds of writing one program as ``shapeprog infer`` does: in float32, on one thread."""
+    threads = torch.get_num_threads()
+    torch.set_num_threads(1)
+    try:
+        return 1000 * decoded(generator, target[:1], False, choose)
+    finally:
+        torch.set_num_threads(threads)
+
+
 def decoded(generator: Generator, target: Tensor, half: bool, choose: str = "argmax") -> float:
     """Seconds of writing programs of ten blocks."""
     generator.eval()
@@ -98,16 +108,14 @@ def main() -> None:
     for name, (generator, half) in designs.items():
         rate = BATCH / decoded(endless(generator), made.voxels, half)
         base = base or rate
-        alone = decoded(generator, made.voxels[:1], half)
-        print(f"decoding,    {name:12} {rate:8.1f} shapes/s  {rate / base:6.1f} x   one shape {1000 * alone:6.1f} ms")
+        one = alone(generator, made.voxels)
+        print(f"decoding,    {name:12} {rate:8.1f} shapes/s  {rate / base:6.1f} x   one shape {one:6.1f} ms")
     if (SHIPPED / "default.safetensors").exists():
         generator, _ = load_generator("default")
         shapes = Stream(prior("wide"), BATCH, seed=0)[0].voxels
         rate = BATCH / decoded(generator, shapes, True, "drawn")
-        alone = decoded(generator, shapes[:1], True, "drawn")
-        print(
-            f"by drawing,  default      {rate:8.1f} shapes/s  {rate / base:6.1f} x   one shape {1000 * alone:6.1f} ms"
-        )
+        one = alone(generator, shapes, "drawn")
+        print(f"by drawing,  default      {rate:8.1f} shapes/s  {rate / base:6.1f} x   one shape {one:6.1f} ms")
     for name in ("narrow", "wide"):
         # A stream keeps the group that it drew last, so each batch here is of another one.
         many, places = Stream(prior(name), 2048, seed=1), iter(range(1 << 30))

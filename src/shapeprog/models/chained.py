@@ -73,8 +73,9 @@ class Chained(Swift):
         """Values slot by slot: the likeliest, or drawn at random."""
         known = self.numbers(heads) + self.told(ids)
         fits, used, whole = self.fits[ids], self.used[ids], self.whole[ids]
-        said = []
-        for slot in range(SLOTS):
+        said: list[Tensor] = []
+        needed = int(used.flatten(0, -2).any(0).sum())  # slots in use come first
+        for slot in range(needed):
             scores = self.bins((known + self.slot[slot]).relu()).float()
             scores = scores.masked_fill(~fits[..., slot, :], -torch.inf)
             if random is None:
@@ -85,7 +86,8 @@ class Chained(Swift):
             value = value * used[..., slot]
             said.append(value)
             known = known + self.link(self._row(value, slot)) * used[..., slot, None]
-        return torch.stack(said, -1)
+        rest = [torch.zeros_like(ids, dtype=self.ticks.dtype)] * (SLOTS - needed)
+        return torch.stack([*said, *rest], -1)
 
     def _row(self, values: Tensor, slot: int | None = None) -> Int[Tensor, ...]:
         """Row of the tables for a value (...) of one slot, or values (..., 7) of all."""

@@ -138,14 +138,20 @@ def test_the_published_recipe_is_a_preset():
 
 def test_the_executor_learns_a_few_blocks_by_heart(tmp_path: Path, engine: Engine):
     settings = ExecutorSettings(
-        visits=8 * 60, batch=8, prior="wide", precision="float32", schedule="cosine", rate=5e-3, validate_every=0
+        visits=8 * 60,
+        batch=8,
+        prior="wide",
+        precision="float32",
+        rate=5e-3,
+        warm_up=0,
+        validate_every=0,
     )
     torch.manual_seed(0)
     objective = ExecutorTraining(NeuralExecutor(Vocabulary.current(), width=32), settings)
     blocks = objective.batch(0)
     objective.batch = lambda index: blocks  # type: ignore[method-assign]
     records = list(run(objective, settings, tmp_path, engine))
-    assert records[-1]["loss"] < 0.5 * records[0]["loss"]
+    assert records[-1]["loss"] < 0.6 * records[0]["loss"]
     assert 0 <= records[-1]["val_widened_iou"] <= 1
 
 

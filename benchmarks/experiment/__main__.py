@@ -28,7 +28,7 @@ from benchmarks.experiment.recipes import CATEGORIES, RECIPES, START
 from benchmarks.experiment.stages import Experiment, Run, runs
 from shapeprog.models.checkpoint import load_executor, load_generator, read_card, save_checkpoint
 
-EXECUTORS = {"executor-published": "neural executor, trained as published", "executor": "neural executor, widened"}
+EXECUTORS = {"executor-unwidened": "neural executor", "executor": "neural executor, trained on widened blocks"}
 """Runs whose executors extrapolate, and what the plot calls them."""
 
 

@@ -11,13 +11,14 @@ from benchmarks.experiment.measuring import start_on_val
 from benchmarks.experiment.recipes import CATEGORIES
 from benchmarks.experiment.stages import Experiment, runs
 
+GUIDED, DIRECT = "narrow-guided", "narrow-direct"
 SHOWN = {
-    "guided": "guided, through the neural executor",
-    "direct": "direct, through the renderer (chamfer)",
+    GUIDED: "guided, through the neural executor",
+    DIRECT: "direct, through the renderer (chamfer)",
 }
 """Stages that are compared, and what the plot calls them."""
 
-COLOURS = {"guided": "#b0413e", "direct": "#1f4e79"}
+COLOURS = {GUIDED: "#b0413e", DIRECT: "#1f4e79"}
 
 
 class Curve(NamedTuple):
@@ -63,7 +64,7 @@ def summary(experiment: Experiment) -> list[str]:
         each = {stage: curves(experiment, stage, category) for stage in SHOWN}
         if not all(each.values()):
             continue
-        guided, direct = mean_curve(each["guided"]), mean_curve(each["direct"])
+        guided, direct = mean_curve(each[GUIDED]), mean_curve(each[DIRECT])
         best = int(guided.cd.argmin())
         needed = visits_to_reach(direct, float(guided.cd[best]))
         told = (

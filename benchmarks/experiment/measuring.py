@@ -25,12 +25,15 @@ from benchmarks.experiment.recipes import CATEGORIES
 from benchmarks.experiment.stages import RESULTS, Experiment, Run, runs
 from benchmarks.reconstruction import GREEDY, REFINED, SEARCH
 from shapeprog.files import write_text
+from shapeprog.models.decoding import Choice
 
 BLOCKS, BATCH = 10, 32
 
 WIDE = "no adaptation, wide prior"
 REFINED_BEST = "the best on val, refined"
 WITH_GENERATOR = "generator + search"
+ARGMAX = ", arg-max"
+"""Ends the name of a row whose programs are written by the likeliest ids; all others are written by drawing."""
 
 ROUNDED_UNKNOWN = {"rounded_iou": float("nan")}
 """Refinement moves numbers to where the surface is, off the cells, so that rounding them tells nothing."""
@@ -56,6 +59,8 @@ class Group:
         A file, or the name of weights that ship.
     work
         What is done with each shape, in another process: a :data:`Job` in, a row out.
+    choose
+        How programs are written, see :func:`shapeprog.models.decoding.decode`.
     """
 
     row: str
@@ -63,6 +68,7 @@ class Group:
     seed: int
     source: str
     work: Callable[[Job], Row]
+    choose: Choice = "drawn"
 
     @property
     def key(self) -> tuple[str, str, int]:
@@ -73,15 +79,24 @@ class Group:
 def groups(experiment: Experiment) -> Iterator[Group]:
     """What can be measured with the weights that are there."""
     for category in CATEGORIES:
-        yield Group(WIDE, category, 0, experiment.start, measured)
+        yield from written(WIDE, category, 0, experiment.start, True)
         for run in runs():
-            if run.recipe.row and run.category in ("", category) and experiment.finished(run):
-                yield Group(run.recipe.row, category, run.seed, str(experiment.made(run)), measured)
+            recipe = run.recipe
+            if recipe.row and run.category in ("", category) and experiment.finished(run):
+                source = str(experiment.made(run))
+                yield from written(recipe.row, category, run.seed, source, recipe.as_published)
         best = experiment.best(category)
         if best is not None:
             yield Group(REFINED_BEST, category, best.seed, str(experiment.made(best)), refined)
     for category in CATEGORIES:
         yield Group(WITH_GENERATOR, category, 0, experiment.start, searched)
+
+
+def written(row: str, category: str, seed: int, source: str, as_published: bool) -> Iterator[Group]:
+    """Single passes by drawing, and as the paper writes programs if that is wanted too."""
+    if as_published:
+        yield Group(row + ARGMAX, category, seed, source, measured, "argmax")
+    yield Group(row, category, seed, source, measured)
 
 
 def measure_baselines(experiment: Experiment, workers: int = 2) -> None:
@@ -118,7 +133,7 @@ def measure(experiment: Experiment, workers: int = 2) -> None:
             programs: list[Any] = [group.source] * len(shapes)
             seconds = 0.0
             if group.work is not searched:
-                programs, seconds = decoded(group.source, shapes)
+                programs, seconds = decoded(group.source, shapes, group.choose)
             jobs = [(str(pack), place, programs[place], group.row, seconds, group.seed) for place in todo]
             for row in pool.imap_unordered(group.work, jobs, chunksize=2):
                 file.write(json.dumps(row | {"weights": prints[group.source]}) + "\n")
@@ -136,16 +151,16 @@ def fingerprint(source: str) -> str:
     return found.hexdigest()[:12]
 
 
-def decoded(source: str, shapes: list[Any]) -> tuple[list[Any], float]:
+def decoded(source: str, shapes: list[Any], choose: Choice = "drawn") -> tuple[list[Any], float]:
     """The single-pass programs of shapes, and seconds for each when 32 are decoded together."""
     from shapeprog.evaluation.generated import generated
     from shapeprog.models.checkpoint import load_generator
 
     generator, _ = load_generator(source)
-    generated(generator, shapes[:BATCH], BLOCKS)  # kernels are compiled before anything is timed
+    generated(generator, shapes[:BATCH], BLOCKS, choose)  # kernels are compiled before anything is timed
     programs, started = [], time.monotonic()
     for first in range(0, len(shapes), BATCH):
-        programs += generated(generator, shapes[first : first + BATCH], BLOCKS)
+        programs += generated(generator, shapes[first : first + BATCH], BLOCKS, choose)
     return programs, (time.monotonic() - started) / len(shapes)
 
 
@@ -160,26 +175,16 @@ def measured(job: Job) -> Row:
 def refined(job: Job) -> Row:
     """The measures of a program after it is snapped and refined through the renderer, as the search refines."""
     from shapeprog.inference import refine
+    from shapeprog.inference.infer import outer_points
     from shapeprog.inference.refine import REACH
     from shapeprog.inference.snapping import snap
 
     shape, program, told = _prepared(job)
     started = time.monotonic()
     snapped = snap(program, shape.voxels)
-    better = refine(snapped, outer_points(shape, snapped), reach=REACH)
+    better = refine(snapped, outer_points(shape, snapped, told["seed"]), reach=REACH)
     told["seconds"] += time.monotonic() - started
     return _row(better, snapped, shape) | told | ROUNDED_UNKNOWN
-
-
-def outer_points(shape: Any, snapped: Any) -> torch.Tensor:
-    """The points of a shape that the surface of a program can meet, as the search chooses them."""
-    from shapeprog.geometry.distance import union_distance
-    from shapeprog.inference.infer import DEEP
-    from shapeprog.language.unroll import unroll
-
-    points = torch.from_numpy(np.asarray(shape.points, np.float32))
-    outer = points[union_distance(unroll(snapped), points) > -DEEP] if snapped.size else points
-    return outer if len(outer) else points
 
 
 def searched(job: Job) -> Row:

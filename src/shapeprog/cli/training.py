@@ -55,7 +55,7 @@ def pretrain_command(
     blocks: Annotated[int | None, typer.Option(help="Most blocks of a program.")] = None,
     order: Annotated[str | None, typer.Option(help="Order of the blocks: coverage or written.")] = None,
     rows: Annotated[int | None, typer.Option(help="Canvases learned from in each shape; 0: all.")] = None,
-    sampled: Annotated[float | None, typer.Option(help="Share of shapes on canvases of its own drawing.")] = None,
+    sampled: Annotated[float | None, typer.Option(help="Share of steps on canvases of its own drawing.")] = None,
     seed: terminal.Seed = 0,
     val: Annotated[list[Path] | None, typer.Option("--val", help="A pack to validate on; may be given again.")] = None,
     start: Annotated[str | None, typer.Option("--from", help="Weights to begin from: a file or a name.")] = None,

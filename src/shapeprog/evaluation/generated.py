@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -10,9 +10,9 @@ import torch
 from jaxtyping import Float, UInt8
 from torch import Tensor
 
-from shapeprog.evaluation.metrics import Metrics, Target, evaluate_program, target_samples, world_scale
+from shapeprog.evaluation.metrics import Metrics, Target, evaluate_program, summarise, target_samples, world_scale
 from shapeprog.geometry.occupancy import pack, packed_iou
-from shapeprog.language.canvas import draw_blocks
+from shapeprog.language.canvas import draw_blocks, union
 from shapeprog.language.program import Program
 from shapeprog.language.tensors import Code
 from shapeprog.models.decoding import Choice, decode, programs
@@ -33,8 +33,8 @@ def single_pass(
 
 def code_iou(code: Code, cells: UInt8[Tensor, "B 32 32 32"]) -> Float[Tensor, " B"]:
     """IoU (B,) at 32^3 of programs, rounded to whole numbers, with targets."""
-    union = np.bitwise_or.reduce(draw_blocks(code).cpu().numpy(), axis=1)
-    return torch.from_numpy(packed_iou(union.view(np.uint32), pack(cells.cpu().numpy())))
+    drawn = union(draw_blocks(code)).cpu().numpy().view(np.uint32)
+    return torch.from_numpy(packed_iou(drawn, pack(cells.cpu().numpy())))
 
 
 def generated(
@@ -72,6 +72,16 @@ def evaluate_generator(
         return [
             measured(program, target, points, seed, snapping) for program, target in zip(written, targets, strict=True)
         ]
+
+
+def scores_on_packs(generator: Generator, packs: Mapping[str, Sequence[Target]], blocks: int = 10) -> dict[str, float]:
+    """Means over the shapes of each pack: ``PACK_iou``, ``PACK_cd``, ``PACK_cd_median`` and ``PACK_blocks``."""
+    scores: dict[str, float] = {}
+    for name, shapes in packs.items():
+        summary = summarise(evaluate_generator(generator, shapes, blocks))
+        scores |= {f"{name}_{each}": summary[each].mean for each in ("iou", "cd", "blocks")}
+        scores[f"{name}_cd_median"] = summary["cd"].median
+    return scores
 
 
 def measured(program: Program, target: Target, points: int = 5000, seed: int = 0, snapping: bool = False) -> Metrics:

@@ -154,7 +154,7 @@ def infer(
         reason += f" The generator was left out: {hindered}."
     if search or schedule is not None:
         program = refine(
-            snapped, _surface(target, snapped, seed), voxels=target.voxels if target.points is None else None,
+            snapped, outer_points(target, snapped, seed), voxels=target.voxels if target.points is None else None,
             schedule=schedule, reach=REACH, seed=seed, deadline=started + budget, progress=progress,
         )  # fmt: skip
     scores |= {
@@ -187,7 +187,7 @@ def _load(shape: Shape | str | Path) -> Shape:
     return load(shape)
 
 
-def _surface(target: Shape, snapped: Program, seed: int) -> Float[Tensor, "P 3"]:
+def outer_points(target: Shape, snapped: Program, seed: int) -> Float[Tensor, "P 3"]:
     """Points that the surface of the program should meet.
 
     Points deep inside the solid lie on inner faces of the mesh, such as the back of a drawer.  The surface of a union

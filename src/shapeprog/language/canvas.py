@@ -46,6 +46,14 @@ def so_far(blocks: Int[Tensor, "*batch K 32 32"]) -> Int[Tensor, "*batch K 32 32
     return canvas
 
 
+def union(blocks: Int[Tensor, "*batch K 32 32"]) -> Canvas:
+    """The canvas on which all blocks are drawn."""
+    canvas = torch.zeros_like(blocks[..., 0, :, :])
+    for block in blocks.unbind(-3):
+        canvas |= block
+    return canvas
+
+
 def packed(cells: UInt8[Tensor, "*batch 32 32 32"]) -> Canvas:
     """Cells, 1 or 0, as a canvas."""
     if cells.device.type == "cpu":

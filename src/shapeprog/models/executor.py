@@ -13,6 +13,9 @@ from torch import Tensor, nn
 from shapeprog.language.statement import SLOTS
 from shapeprog.models.vocabulary import Vocabulary
 
+FIRST = 0.1
+"""Factor of the first weights of parameters."""
+
 NOTHING = -20.0
 """Logit of a cell that no block draws: a chance of 2e-9, whose cross-entropy is still finite."""
 
@@ -33,6 +36,8 @@ class NeuralExecutor(nn.Module):
         self.vocabulary = vocabulary
         self.pgm_embed = nn.Linear(vocabulary.size, width // 2)
         self.param_embed = nn.Linear(SLOTS, width - width // 2)
+        with torch.no_grad():
+            self.param_embed.weight *= FIRST  # numbers of up to 32 would saturate the LSTM from the start
         self.lstm = nn.LSTM(width, width, bias=False, batch_first=True)
         self.pgm_param_feat = nn.Linear(width, width)
         self.decoder = nn.Sequential(

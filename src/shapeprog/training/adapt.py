@@ -18,8 +18,7 @@ from jaxtyping import Float
 from torch import Tensor, nn
 
 from shapeprog.data.packs import read_pack
-from shapeprog.evaluation.generated import code_iou, evaluate_generator
-from shapeprog.evaluation.metrics import summarise
+from shapeprog.evaluation.generated import code_iou, scores_on_packs
 from shapeprog.geometry.occupancy import pack, packed_iou
 from shapeprog.geometry.sampling import has_surface
 from shapeprog.language.tensors import Code
@@ -205,11 +204,7 @@ class Adaptation:
 
     def validate(self) -> Record:
         """IoU and CD of single-pass programs on each pack; ``score`` is their mean IoU, or minus their mean CD."""
-        scores: Record = {}
-        for name, shapes in self._val.items():
-            summary = summarise(evaluate_generator(self._generator, shapes, self._settings.blocks))
-            scores |= {f"{name}_iou": summary["iou"].mean, f"{name}_cd": summary["cd"].mean}
-            scores |= {f"{name}_cd_median": summary["cd"].median, f"{name}_blocks": summary["blocks"].mean}
+        scores = scores_on_packs(self._generator, self._val, self._settings.blocks)
         if self._val:
             chosen = [scores[f"{name}_{self._settings.select}"] for name in self._val]
             scores["score"] = sum(chosen) / len(chosen) * (1 if self._settings.select == "iou" else -1)

@@ -17,7 +17,7 @@ from jaxtyping import Bool, Int, UInt8
 from torch import Tensor
 
 from shapeprog.errors import InputError
-from shapeprog.language.canvas import draw_blocks, unpacked
+from shapeprog.language.canvas import draw_blocks, union, unpacked
 from shapeprog.language.program import Program
 from shapeprog.language.tensors import Code, encode
 from shapeprog.models.vocabulary import Vocabulary
@@ -125,11 +125,7 @@ def perturbed(
 
 def rendered(code: Code) -> UInt8[Tensor, "B 32 32 32"]:
     """The cells that programs draw."""
-    blocks = draw_blocks(code)
-    union = blocks[:, 0].clone()
-    for block in blocks.unbind(1)[1:]:
-        union |= block
-    return unpacked(union)
+    return unpacked(union(draw_blocks(code)))
 
 
 def _read(source: Path, form: Form) -> Iterator[tuple[str, Program]]:

@@ -99,6 +99,27 @@ def scheduled(generator: Generator, taught: Lesson, share: float, random: torch.
     return relabelled(taught.target, without_stop, drawn.canvases, live_blocks(drawn.code.ids))
 
 
+def lesson_losses(
+    generator: Generator, taught: Lesson, *, sampled: float, rows: int, progress: float, random: torch.Generator
+) -> dict[str, Tensor]:
+    """Cross-entropy of the ids and loss of the parameters, means over the canvases that are learned from.
+
+    Parameters
+    ----------
+    sampled
+        Chance that the canvases are of the generator's own drawing, reached halfway.
+    rows
+        Canvases that are learned from in each shape, drawn at random; 0 for all.
+    progress
+        Share of the training that is done.
+    """
+    taught = scheduled(generator, taught, sampled * min(1.0, 2 * progress), random)
+    if rows:
+        taught = taught.pick(rows, random)
+    prediction = generator.predict(taught.target, taught.canvases, taught.code, taught.live)
+    return generator.losses(prediction, taught.code)
+
+
 def by_coverage(code: Code, drawn: Int[Tensor, "B K 32 32"]) -> tuple[Code, Int[Tensor, "B K 32 32"]]:
     """Programs with their blocks in order of coverage, and the cells of each; blocks that add nothing are emptied."""
     blocks = code.ids.shape[1]

@@ -22,7 +22,7 @@ from shapeprog.models.designs import build_generator
 from shapeprog.models.generator import Generator
 from shapeprog.training.engine import Engine
 from shapeprog.training.folder import Record
-from shapeprog.training.lessons import Lesson, lesson, scheduled
+from shapeprog.training.lessons import Lesson, lesson, lesson_losses
 from shapeprog.training.loop import run
 from shapeprog.training.settings import Settings
 from shapeprog.training.validation import Validation
@@ -123,15 +123,12 @@ class Pretraining:
 
     def loss(self, batch: Lesson, progress: float, random: torch.Generator) -> dict[str, Tensor]:
         """Cross-entropy of ids and loss of parameters, as means over live steps."""
-        batch = scheduled(self.module, batch, self._settings.sampled * min(1.0, 2 * progress), random)
-        if self._settings.rows:
-            batch = batch.pick(self._settings.rows, random)
-        prediction = self.module.predict(batch.target, batch.canvases, batch.code, batch.live)
-        terms = self.module.losses(prediction, batch.code)
-        return {
-            "ids": terms["ids"] * self._settings.ids_weight,
-            "parameters": terms["parameters"] * self._settings.parameters_weight,
-        }
+        settings = self._settings
+        terms = lesson_losses(
+            self.module, batch, sampled=settings.sampled, rows=settings.rows, progress=progress, random=random
+        )
+        weights = {"ids": settings.ids_weight, "parameters": settings.parameters_weight}
+        return {name: weights[name] * value for name, value in terms.items()}
 
     def validate(self) -> Record:
         """Scores on fixed synthetic shapes and on the packs."""

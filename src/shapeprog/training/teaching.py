@@ -14,7 +14,7 @@ from shapeprog.models.vocabulary import Vocabulary
 from shapeprog.training.adapt_settings import AdaptSettings
 from shapeprog.training.engine import scrambled
 from shapeprog.training.labels import perturbed, read_labels
-from shapeprog.training.lessons import Lesson, lesson, scheduled
+from shapeprog.training.lessons import Lesson, lesson, lesson_losses
 from shapeprog.training.shapes import TargetStream
 
 
@@ -75,10 +75,8 @@ def teach(
     generator: Generator, taught: Lesson, settings: AdaptSettings, progress: float, random: torch.Generator
 ) -> dict[str, Tensor]:
     """The losses of a lesson: cross-entropy of ids and loss of parameters, weighted."""
-    taught = scheduled(generator, taught, settings.sampled * min(1.0, 2 * progress), random)
-    if settings.rows:
-        taught = taught.pick(settings.rows, random)
     generator.train(settings.statistics == "moving")
-    prediction = generator.predict(taught.target, taught.canvases, taught.code, taught.live)
-    terms = generator.losses(prediction, taught.code)
+    terms = lesson_losses(
+        generator, taught, sampled=settings.sampled, rows=settings.rows, progress=progress, random=random
+    )
     return {f"label_{name}": settings.labels_weight * value for name, value in terms.items()}

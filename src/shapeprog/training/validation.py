@@ -9,8 +9,7 @@ import torch
 
 from shapeprog.data.packs import read_pack
 from shapeprog.data.synthetic import Stream, prior
-from shapeprog.evaluation.generated import code_iou, evaluate_generator, single_pass
-from shapeprog.evaluation.metrics import summarise
+from shapeprog.evaluation.generated import code_iou, scores_on_packs, single_pass
 from shapeprog.models.generator import Generator
 from shapeprog.training.folder import Record
 from shapeprog.training.lessons import Lesson, Order, lesson
@@ -62,8 +61,8 @@ class Validation:
         """Scores by name, ``score`` among them: the mean IoU over the packs, or the synthetic one without packs.
 
         ``ids``: share of the statement ids that are right when those before are told; ``parameters``: mean absolute
-        error, in cells, of the parameters of the true ids; ``iou``: of single-pass programs; and for each pack
-        ``PACK_iou``, ``PACK_cd`` and ``PACK_cd_median``.
+        error, in cells, of the parameters of the true ids; ``iou``: of single-pass programs; and what
+        :func:`shapeprog.evaluation.generated.scores_on_packs` says of each pack.
         """
         right, steps, off, slots = (torch.zeros((), dtype=torch.float64) for _ in range(4))
         overlaps = []
@@ -76,10 +75,7 @@ class Validation:
             "parameters": float(off / slots),
             "iou": float(torch.cat(overlaps).mean()),
         }
-        for name, shapes in self._packs.items():
-            summary = summarise(evaluate_generator(generator, shapes, self._blocks))
-            scores |= {f"{name}_iou": summary["iou"].mean, f"{name}_cd": summary["cd"].mean}
-            scores[f"{name}_cd_median"] = summary["cd"].median
+        scores |= scores_on_packs(generator, self._packs, self._blocks)
         real = [scores[f"{name}_iou"] for name in self._packs]
         return {**scores, "score": sum(real) / len(real) if real else scores["iou"]}
 

@@ -53,7 +53,7 @@ experiment-efficiency: $(READY)
 	$(EXPERIMENT) document $(PACKS) $(RESULTS) $(OPTIONS)
 
 experiment-extrapolation: $(READY)
-	$(EXPERIMENT) train $(PACKS) $(RESULTS) $(OPTIONS) --only executor executor-published
+	$(EXPERIMENT) train $(PACKS) $(RESULTS) $(OPTIONS) --only executor executor-unwidened
 	$(EXPERIMENT) extrapolation $(PACKS) $(RESULTS) $(OPTIONS)
 	$(EXPERIMENT) document $(PACKS) $(RESULTS) $(OPTIONS)
 

@@ -10,6 +10,7 @@ from torch import Tensor
 
 from shapeprog.data.synthetic import Stream, prior
 from shapeprog.errors import ShapeProgError
+from shapeprog.inference.snapping import snapped_from
 from shapeprog.language.canvas import count, draw_blocks, packed, so_far, unpacked, widened
 from shapeprog.language.parameters import Extent, Position
 from shapeprog.language.program import Program
@@ -65,6 +66,44 @@ def test_only_legal_blocks_are_written(small: Callable[..., Generator], choose: 
         assert [program.outside_published() for program in written] == [[]] * 8
         drawing = (code.ids[:, :, 0] != 0).sum(-1)
         assert [program.blocks for program in written] == drawing.tolist()
+
+
+@pytest.mark.parametrize("choose", ["drawn", "argmax"])
+def test_offsets_move_the_surface_by_less_than_a_cell_and_change_nothing_that_is_drawn(choose: str) -> None:
+    torch.manual_seed(0)
+    generator, target = build_generator("chained", SMALL).eval(), targets(6)
+    plain = decode(generator, target, choose=choose)  # type: ignore[arg-type]
+    assert torch.equal(plain.code.parameters, plain.drawn.parameters), "offsets are zero before anything moved them"
+    with torch.no_grad():
+        for weight in generator.offset_weights():
+            weight.normal_(std=3.0)
+    moved = decode(generator, target, choose=choose)  # type: ignore[arg-type]
+    assert torch.equal(moved.canvases, plain.canvases)
+    assert torch.equal(moved.drawn.parameters, plain.drawn.parameters)
+    assert torch.equal(moved.code.ids, plain.code.ids)
+    off = moved.code.parameters - moved.drawn.parameters
+    assert 0.5 < float(off.abs().max()) < 1
+    known = generator.vocabulary
+    live = live_blocks(moved.code.ids)
+    assert not bool(off[live][known.discrete[moved.code.ids[live]]].any())
+    low, high = known.ranges[moved.code.ids[live]].unbind(-1)
+    values, used = moved.code.parameters[live], known.used[moved.code.ids[live]]
+    assert bool(((values >= low) & (values <= high))[used].all())
+    told = generator.predict(target, moved.canvases, moved.drawn)
+    torch.testing.assert_close(told.parameters[live], moved.code.parameters[live])
+    whole = programs_of(Code(moved.code.ids, moved.drawn.parameters.round()))
+    for program, snapped in zip(programs_of(moved.code), whole, strict=True):
+        assert snapped_from(program, snapped)
+
+
+def test_beams_end_in_the_offsets_of_their_blocks() -> None:
+    torch.manual_seed(0)
+    generator, target = build_generator("chained", SMALL).eval(), targets(3)
+    with torch.no_grad():
+        for weight in generator.offset_weights():
+            weight.normal_(std=3.0)
+    best, alone = beam(generator, target, width=1), decode(generator, target, choose="argmax")
+    torch.testing.assert_close(best.code.parameters[:, 0], alone.code.parameters)
 
 
 def test_a_program_does_not_depend_on_its_batch(small: Callable[..., Generator]) -> None:

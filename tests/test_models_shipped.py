@@ -44,8 +44,8 @@ def test_nine_in_ten_statements_are_right_when_told_what_comes_before(generator:
 
 
 def test_synthetic_shapes_are_rebuilt_in_a_single_pass(generator: Generator, shapes: Batch) -> None:
-    code = single_pass(generator, shapes.voxels)
-    assert float(code_iou(code, shapes.voxels).mean()) > 0.75
+    _, drawn = single_pass(generator, shapes.voxels)
+    assert float(code_iou(drawn, shapes.voxels).mean()) > 0.75
 
 
 def test_a_table_is_a_top_on_legs(generator: Generator) -> None:
@@ -54,6 +54,6 @@ def test_a_table_is_a_top_on_legs(generator: Generator) -> None:
     for depth in (8, 22):
         for side in (4, 26):
             cells[4:19, depth : depth + 2, side : side + 2] = True
-    chains = generated(generator, [Shape("table", cells)])[0].chains
+    chains = generated(generator, [Shape("table", cells)])[0].program.chains
     assert [node.name for node in chains[0]] == ["top_rectangle"]
     assert [node.name for node in chains[1]] == ["translate", "translate", "leg"]

@@ -12,10 +12,10 @@ import torch
 from torch import Tensor
 
 from shapeprog.cli import main
-from shapeprog.data.packs import write_pack
+from shapeprog.data.packs import read_pack, write_pack
 from shapeprog.data.shape import Shape
 from shapeprog.errors import ShapeProgError
-from shapeprog.evaluation.generated import evaluate_generator
+from shapeprog.evaluation.generated import evaluate_generator, generated
 from shapeprog.geometry.sampling import sample_surface
 from shapeprog.language.text import parse
 from shapeprog.language.unroll import unroll
@@ -105,6 +105,25 @@ def test_direct_adaptation_brings_a_box_closer(loss: str, boxes: Path, engine: E
     assert records[-1]["loss"] < 0.8 * records[0]["loss"]
     assert records[-1]["val_box_cd"] < 0.6 * before["box_cd"]
     assert float(id_gradient(objective.module.generator).abs().max()) == 0, "direct adaptation leaves ids alone"
+
+
+def test_offsets_alone_bring_a_surface_closer_and_leave_what_is_drawn(boxes: Path, engine: Engine, tmp_path: Path):
+    torch.manual_seed(3)
+    generator = build_generator("chained", TINY)
+    settings = settings_for(boxes, blocks=3, visits=4 * 40, rate=1e-2, learn="offsets")
+    objective = Adaptation(generator, settings, val=[boxes])
+    before, scores = generated(generator.eval(), read_pack(boxes)), objective.validate()
+    assert any(each.program.blocks for each in before)
+    *_, last = run(objective, settings, tmp_path, engine)
+    after = generated(generator.eval(), read_pack(boxes))
+    assert [each.whole for each in after] == [each.whole for each in before]
+    assert last["val_boxes_iou"] == scores["boxes_iou"]
+    assert last["val_boxes_cd"] < scores["boxes_cd"]
+
+
+def test_a_design_without_offsets_says_so(boxes: Path):
+    with pytest.raises(ShapeProgError, match="the design swift says no offsets"):
+        Adaptation(biased(LEG), settings_for(boxes, learn="offsets"))
 
 
 def test_the_gradient_of_guided_adaptation_reaches_ids_and_not_the_executor(boxes: Path, engine: Engine):

@@ -95,8 +95,8 @@ def test_shapes_are_measured_in_their_order():
     cells = Stream(prior("wide"), 3, seed=2)[0].voxels.numpy().astype(np.bool_)
     shapes = [Shape(str(n), each, np.argwhere(each).astype(np.float32) - 15.5) for n, each in enumerate(cells)]
     rows = evaluate_generator(generator, shapes, blocks=3, points=50)
-    programs = generated(generator, shapes, blocks=3)
-    assert rows == [measured(p, s, points=50) for p, s in zip(programs, shapes, strict=True)]
+    written = generated(generator, shapes, blocks=3)
+    assert rows == [measured(p, s, points=50) for p, s in zip(written, shapes, strict=True)]
     assert generated(generator, []) == []
 
 

@@ -8,8 +8,10 @@ from pathlib import Path
 
 from benchmarks.experiment import efficiency, tables
 from benchmarks.experiment.measuring import baselines_file, read_rows, rows_file
-from benchmarks.experiment.recipes import CATEGORIES
+from benchmarks.experiment.recipes import CATEGORIES, DESIGNS
 from benchmarks.experiment.stages import Experiment, runs
+from shapeprog.models.checkpoint import read_card
+from shapeprog.training.folder import WEIGHTS
 
 INTRODUCTION = """\
 # The experiment
@@ -37,7 +39,17 @@ TABLE = """\
 
 Mean over all test shapes ± standard error (median).  With several seeds: mean of their means ± standard deviation of
 these.  CD and F1 are of the program as it is; IoU of the program snapped to whole numbers, by at most one cell in each
-parameter, and *rounded* as it comes.  Times are of a batch of 32 for single passes, of one process for the rest."""
+parameter, and *as drawn* on the canvas of the generator, which is one such snapping.
+Times are of a batch of 32 for single passes, of one process for the rest."""
+
+DESIGNED = """\
+## Designs at equal training time
+
+`python -m benchmarks.experiment train PACKS RESULTS --only {names}`
+
+Wide prior, one thread, eight minutes of a core each (shapes a second measured on a quiet machine times 480), the same
+recipe but for what its line below says.  Synthetic: 512 shapes of the prior; real: val, single pass by drawing
+(`tian2019`, whose memory has to see every block it writes, too)."""
 
 EFFICIENCY = """\
 ## Sample efficiency
@@ -86,12 +98,16 @@ def _sections(experiment: Experiment, docs: Path) -> Iterator[str]:
         best = {category: experiment.best(category) for category in CATEGORIES}
         known = {category: (run.recipe.row, run.seed) for category, run in best.items() if run is not None}
         yield f"### What was to be reached\n\n{tables.reached(rows, known)}"
+    compared = list(_designs(experiment))
+    if compared:
+        yield DESIGNED.format(names=" ".join(f"design-{name}" for name in DESIGNS))
+        yield "\n".join([*DESIGN_HEAD, *compared])
     told = efficiency.summary(experiment)
     if told and (docs / "adaptation_efficiency.png").exists():
         yield "\n".join([EFFICIENCY, "", *(f"- {line}" for line in told)])
-    compared = extrapolation_file(experiment)
-    if compared.exists():
-        yield f"{EXTRAPOLATION}\n\n{extrapolation_table(json.loads(compared.read_text()))}"
+    moved = extrapolation_file(experiment)
+    if moved.exists():
+        yield f"{EXTRAPOLATION}\n\n{extrapolation_table(json.loads(moved.read_text()))}"
     if (docs / "figure.png").exists():
         from benchmarks.experiment.figure import QUANTILES
 
@@ -99,6 +115,30 @@ def _sections(experiment: Experiment, docs: Path) -> Iterator[str]:
     made = list(_runs(experiment))
     if made:
         yield "\n".join(["## Every run", "", "| command | shapes seen | minutes |", "|---|---|---|", *made])
+
+
+DESIGN_HEAD = [
+    "| design | shapes seen | ids right | parameters off, cells | IoU, synthetic | "
+    + " | ".join(f"{category}: IoU | CD x 1000 (median)" for category in CATEGORIES) + " |",
+    "|---|" + "---|" * (4 + 2 * len(CATEGORIES)),
+]  # fmt: skip
+
+
+def _designs(experiment: Experiment) -> Iterator[str]:
+    """A row for each design that was trained for the comparison."""
+    for name in DESIGNS:
+        (run,) = runs([f"design-{name}"])
+        if experiment.finished(run):
+            card = read_card(experiment.folder(run) / WEIGHTS).card
+            each = card.scores
+            real = " | ".join(
+                f"{each[f'{pack}_iou']:.3f} | {1000 * each[f'{pack}_cd']:.2f} ({1000 * each[f'{pack}_cd_median']:.2f})"
+                for pack in (f"{category}_val" for category in CATEGORIES)
+            )
+            yield (
+                f"| `{name}` | {card.visits:,} | {each['ids']:.3f} | {each['parameters']:.2f} | {each['iou']:.3f} | "
+                f"{real} |"
+            )
 
 
 def _runs(experiment: Experiment) -> Iterator[str]:

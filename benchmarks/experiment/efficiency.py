@@ -11,7 +11,7 @@ from benchmarks.experiment.measuring import start_on_val
 from benchmarks.experiment.recipes import CATEGORIES
 from benchmarks.experiment.stages import Experiment, runs
 
-GUIDED, DIRECT = "narrow-guided", "narrow-direct"
+GUIDED, DIRECT = "guided", "direct"
 SHOWN = {
     GUIDED: "guided, through the neural executor",
     DIRECT: "direct, through the renderer (chamfer)",

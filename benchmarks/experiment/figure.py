@@ -12,6 +12,7 @@ import torch
 from benchmarks.experiment.measuring import decoded
 from benchmarks.experiment.recipes import CATEGORIES
 from benchmarks.experiment.stages import Experiment
+from shapeprog.evaluation.generated import Written
 
 QUANTILES = (0.1, 0.3, 0.5)
 """Which shapes of each category are shown: at these quantiles of CD, so that nobody picked them."""
@@ -30,18 +31,18 @@ INK, FAINT, RULE = (38, 40, 44), (124, 128, 136), (222, 224, 228)
 HEADINGS = ("target", "program", "hard voxels", f"{POINTS:,} surface points")
 
 
-def chosen(experiment: Experiment, category: str) -> list[tuple[Any, Any, Any]]:
+def chosen(experiment: Experiment, category: str) -> list[tuple[Any, Written, Any]]:
     """Test shapes at the quantiles of CD of the best generator, its single-pass programs, and their measures."""
     from shapeprog.data import read_pack
     from shapeprog.evaluation.generated import measured
 
     best = experiment.best(category)
     shapes = list(read_pack(experiment.pack(category, "test")))[: experiment.shapes]
-    programs, _ = decoded(experiment.start if best is None else str(experiment.made(best)), shapes)
-    found = [measured(program, shape) for program, shape in zip(programs, shapes, strict=True)]
+    written, _ = decoded(experiment.start if best is None else str(experiment.made(best)), shapes)
+    found = [measured(each, shape) for each, shape in zip(written, shapes, strict=True)]
     order = np.argsort([each.cd for each in found])
     places = [int(order[round(each * (len(order) - 1))]) for each in QUANTILES]
-    return [(shapes[place], programs[place], found[place]) for place in places]
+    return [(shapes[place], written[place], found[place]) for place in places]
 
 
 def draw(experiment: Experiment, picture: Path) -> None:
@@ -55,37 +56,37 @@ def draw(experiment: Experiment, picture: Path) -> None:
     pen = ImageDraw.Draw(page)
     for place, wide, heading in zip(left, (VIEW, TEXT, VIEW, VIEW), HEADINGS, strict=True):
         pen.text((SCALE * (place + wide / 2), SCALE * 9), heading, font=_font(SCALE * 12), fill=FAINT, anchor="ma")
-    for number, (shape, program, scores) in enumerate(rows):
+    for number, (shape, written, scores) in enumerate(rows):
         top = HEAD + number * VIEW
         pen.line([(SCALE * PAD, SCALE * top), (SCALE * (width - PAD), SCALE * top)], fill=RULE, width=SCALE)
-        for place, view in zip((left[0], left[2], left[3]), views(shape, program), strict=True):
+        for place, view in zip((left[0], left[2], left[3]), views(shape, written), strict=True):
             page.paste(Image.fromarray(view), (SCALE * place, SCALE * (top + LINE)))
         told = f"IoU {scores.iou:.2f}, CD {scores.cd:.4f}"
         pen.text((SCALE * PAD, SCALE * (top + 7)), told, font=_font(SCALE * 8), fill=FAINT)
-        _write(pen, program, left[1], top, VIEW)
+        _write(pen, written.program, left[1], top, VIEW)
     picture.parent.mkdir(parents=True, exist_ok=True)
     page.save(picture, optimize=True)
 
 
-def views(shape: Any, program: Any) -> list[np.ndarray]:
-    """Target cells, cells and surface points of a program, from one camera, in the colours of its statements."""
+def views(shape: Any, written: Written) -> list[np.ndarray]:
+    """Target cells, drawn cells and surface points of a program, from one camera, in the colours of its statements."""
     from shapeprog.geometry.sampling import sample_surface
     from shapeprog.language.unroll import unroll
     from shapeprog.view.model import of_cells
     from shapeprog.view.render import camera_for, render
 
     size = SCALE * (VIEW - LINE - 4)
-    target, cells = of_cells(shape.voxels), _coloured_cells(program)
+    target, cells = of_cells(shape.voxels), _coloured_cells(written.whole)
     camera = camera_for([target, cells])
-    sample = sample_surface(unroll(program), POINTS, torch.Generator().manual_seed(0))
+    sample = sample_surface(unroll(written.program), POINTS, torch.Generator().manual_seed(0))
     points, towards = sample.points.double().numpy(), sample.normals.double().numpy()
     seen = ((camera.eye - points) * towards).sum(-1) > 0
-    dots = _dots(points, unroll(program).statement[sample.slot].tolist(), seen, camera, size)
+    dots = _dots(points, unroll(written.program).statement[sample.slot].tolist(), seen, camera, size)
     return [render(target, camera, size, size), render(cells, camera, size, size), dots]
 
 
 def _coloured_cells(program: Any) -> Any:
-    """The cells of a rounded program, each in the colour of the last statement that draws it."""
+    """The cells of a program of whole numbers, each in the colour of the last statement that draws it."""
     from dataclasses import replace
 
     from shapeprog.export.colours import colour
@@ -93,7 +94,7 @@ def _coloured_cells(program: Any) -> Any:
     from shapeprog.language.tensors import encode
     from shapeprog.view.model import of_cells
 
-    whole = encode(program.flat().snap())
+    whole = encode(program.flat())
     blocks = unpacked(draw_blocks(whole)).numpy().astype(bool)
     owner = np.zeros(blocks.shape[1:], np.int64)
     for ids, cells in zip(whole.ids.tolist(), blocks, strict=True):

@@ -1,7 +1,7 @@
 """All rows of the table on the test packs, one line of JSON for each shape; what is there is not measured again.
 
 Baselines are measured by ``benchmarks/reconstruction.py``, in the same columns.  A generator decodes all shapes in
-batches of 32; its time is that of decoding.  Its IoU is measured twice: rounded, which is the single pass, and snapped
+batches of 32; its time is that of decoding.  Its IoU is measured twice: as drawn, which is the single pass, and snapped
 as the protocol allows, by at most one cell in each parameter.
 """
 
@@ -24,7 +24,12 @@ from benchmarks import reconstruction
 from benchmarks.experiment.recipes import CATEGORIES
 from benchmarks.experiment.stages import RESULTS, Experiment, Run, runs
 from benchmarks.reconstruction import GREEDY, REFINED, SEARCH
+from shapeprog.evaluation.generated import Written
+from shapeprog.evaluation.generated import measured as measures
 from shapeprog.files import write_text
+from shapeprog.geometry.occupancy import pack, packed_iou, packed_rows
+from shapeprog.language.program import Program
+from shapeprog.language.unroll import unroll
 from shapeprog.models.decoding import Choice
 
 BLOCKS, BATCH = 10, 32
@@ -35,8 +40,8 @@ WITH_GENERATOR = "generator + search"
 ARGMAX = ", arg-max"
 """Ends the name of a row whose programs are written by the likeliest ids; all others are written by drawing."""
 
-ROUNDED_UNKNOWN = {"rounded_iou": float("nan")}
-"""Refinement moves numbers to where the surface is, off the cells, so that rounding them tells nothing."""
+AS_DRAWN_UNKNOWN = {"drawn_iou": float("nan")}
+"""What is searched or refined was not drawn on a canvas block by block."""
 
 Row = dict[str, Any]
 Job = tuple[str, int, Any, str, float, int]
@@ -165,11 +170,12 @@ def decoded(source: str, shapes: list[Any], choose: Choice = "drawn") -> tuple[l
 
 
 def measured(job: Job) -> Row:
-    """The measures of a program, rounded and snapped."""
+    """The measures of a program, as it was drawn and snapped."""
     from shapeprog.inference.snapping import snap
 
-    shape, program, told = _prepared(job)
-    return _row(program, snap(program, shape.voxels), shape) | told
+    shape, written, told = _prepared(job)
+    choices = (written.whole, snap(written.program, shape.voxels))
+    return _row(written, max(choices, key=lambda each: iou_of(each, shape)), shape) | told
 
 
 def refined(job: Job) -> Row:
@@ -179,12 +185,12 @@ def refined(job: Job) -> Row:
     from shapeprog.inference.refine import REACH
     from shapeprog.inference.snapping import snap
 
-    shape, program, told = _prepared(job)
+    shape, written, told = _prepared(job)
     started = time.monotonic()
-    snapped = snap(program, shape.voxels)
+    snapped = snap(written.whole, shape.voxels)
     better = refine(snapped, outer_points(shape, snapped, told["seed"]), reach=REACH)
     told["seconds"] += time.monotonic() - started
-    return _row(better, snapped, shape) | told | ROUNDED_UNKNOWN
+    return _row(Written(better, snapped), snapped, shape) | told | AS_DRAWN_UNKNOWN
 
 
 def searched(job: Job) -> Row:
@@ -194,18 +200,18 @@ def searched(job: Job) -> Row:
     shape, weights, told = _prepared(job)
     result = infer(shape, blocks=BLOCKS, budget=60.0, generator=weights)
     told["seconds"] = result.scores["seconds"]
-    return _row(result.program, result.snapped, shape) | told | ROUNDED_UNKNOWN
+    return _row(Written(result.program, result.snapped), result.snapped, shape) | told | AS_DRAWN_UNKNOWN
 
 
-def _row(program: Any, snapped: Any, shape: Any) -> Row:
-    """The measures of a program, with the IoU of its snapped form and that of its rounded one."""
-    from shapeprog.evaluation.generated import measured as measures
-    from shapeprog.geometry.occupancy import pack, packed_iou, packed_rows
-    from shapeprog.language.unroll import unroll
+def _row(written: Written, snapped: Program, shape: Any) -> Row:
+    """The measures of a program, with the IoU of its snapped form and that of what was drawn on the canvas."""
+    row = asdict(measures(written, shape))
+    return row | {"drawn_iou": row["iou"], "iou": iou_of(snapped, shape)}
 
-    row = asdict(measures(program, shape))
-    iou = float(packed_iou(packed_rows(unroll(snapped)), pack(shape.voxels)))
-    return row | {"rounded_iou": row["iou"], "iou": iou}
+
+def iou_of(program: Program, shape: Any) -> float:
+    """IoU of the cells of a program of whole numbers."""
+    return float(packed_iou(packed_rows(unroll(program)), pack(shape.voxels)))
 
 
 def _prepared(job: Job) -> tuple[Any, Any, Row]:
@@ -213,9 +219,9 @@ def _prepared(job: Job) -> tuple[Any, Any, Row]:
     from shapeprog.data import read_pack
 
     torch.set_num_threads(1)
-    pack, place, program, row, seconds, seed = job
-    shape = read_pack(Path(pack))[place]
-    return shape, program, {"pack": Path(pack).stem, "method": row, "allowed": BLOCKS, "seconds": seconds, "seed": seed}
+    path, place, program, row, seconds, seed = job
+    shape = read_pack(Path(path))[place]
+    return shape, program, {"pack": Path(path).stem, "method": row, "allowed": BLOCKS, "seconds": seconds, "seed": seed}
 
 
 def rows_file(experiment: Experiment) -> Path:

@@ -67,6 +67,7 @@ def adapt_command(
     sampled: Annotated[float | None, typer.Option(help="Share taught on canvases of its own drawing.")] = None,
     rows: Annotated[int | None, typer.Option(help="Canvases learned from in each program; 0: all.")] = None,
     statistics: Annotated[str | None, typer.Option(help="Of normalisation while teaching: frozen or moving.")] = None,
+    learn: Annotated[str | None, typer.Option(help="What learns: all weights, or those of the offsets.")] = None,
     choose: Annotated[str | None, typer.Option(help="How blocks are chosen: drawn or argmax.")] = None,
     points: Annotated[int | None, typer.Option(help="Points on each surface in one step.")] = None,
     mirror: Annotated[float | None, typer.Option(help="Share of shapes mirrored left to right.")] = None,

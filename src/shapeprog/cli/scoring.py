@@ -51,8 +51,8 @@ def generated(weights: str, shapes: Mapping[str, Shape], choose: str) -> Iterato
     from shapeprog.models.checkpoint import load_generator
 
     generator, _ = load_generator(weights)
-    programs = programs_of(generator, list(shapes.values()), choose=cast("Choice", choose))
-    yield from ((name, (program, None)) for name, program in zip(shapes, programs, strict=True))
+    written = programs_of(generator, list(shapes.values()), choose=cast("Choice", choose))
+    yield from zip(shapes, written, strict=True)
 
 
 def measure(prediction: Prediction, target: Shape, points: int, seed: int, *, finite: bool = False) -> Metrics:
@@ -66,9 +66,10 @@ def measure(prediction: Prediction, target: Shape, points: int, seed: int, *, fi
     if isinstance(prediction, Shape):
         return _measure_shape(prediction, target, points, seed)
     if finite:
-        from shapeprog.evaluation.generated import measured
+        from shapeprog.evaluation.generated import Written, measured
 
-        return measured(prediction[0], target, points, seed)
+        program, whole = prediction
+        return measured(Written(program, program.snap() if whole is None else whole), target, points, seed)
     return evaluate_program(prediction[0], target, prediction[1], points, seed)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 import torch
@@ -22,12 +23,23 @@ AT_ONCE = 64
 """Shapes that are decoded together."""
 
 
+class Written(NamedTuple):
+    """A program of a generator, and the same in whole numbers as it was drawn on the canvas."""
+
+    program: Program
+    whole: Program
+
+
 def single_pass(
     generator: Generator, cells: UInt8[Tensor, "B 32 32 32"], blocks: int = 10, choose: Choice = "drawn"
-) -> Code:
-    """Programs (B, K, J) of targets in a single pass, one for each, on the device of the cells; see ``decode``."""
+) -> tuple[Code, Code]:
+    """Programs (B, K, J) of targets in a single pass, and the same as drawn; see :class:`Decoded`."""
     with torch.no_grad():
-        parts = [decode(generator, part, blocks=blocks, choose=choose).code for part in cells.split(AT_ONCE)]
+        parts = [decode(generator, part, blocks=blocks, choose=choose) for part in cells.split(AT_ONCE)]
+    return _joined([part.code for part in parts]), _joined([part.drawn for part in parts])
+
+
+def _joined(parts: Sequence[Code]) -> Code:
     return Code(torch.cat([part.ids for part in parts]), torch.cat([part.parameters for part in parts]))
 
 
@@ -39,13 +51,15 @@ def code_iou(code: Code, cells: UInt8[Tensor, "B 32 32 32"]) -> Float[Tensor, " 
 
 def generated(
     generator: Generator, targets: Sequence[Target], blocks: int = 10, choose: Choice = "drawn"
-) -> list[Program]:
+) -> list[Written]:
     """The program of each target in a single pass."""
     if not targets:
         return []
     device = next(generator.parameters()).device
     cells = torch.from_numpy(np.stack([target.voxels for target in targets])).to(device, torch.uint8)
-    return programs(single_pass(generator, cells, blocks, choose))
+    code, drawn = single_pass(generator, cells, blocks, choose)
+    whole = programs(Code(drawn.ids, drawn.parameters.round()))
+    return [Written(*each) for each in zip(programs(code), whole, strict=True)]
 
 
 def evaluate_generator(
@@ -65,13 +79,11 @@ def evaluate_generator(
         How blocks are chosen, see :func:`shapeprog.models.decoding.decode`.
     snapping
         Whether whole numbers within one of the rounded parameters may be searched for the IoU; else it is that of the
-        rounded program.
+        program as it was drawn.
     """
     written = generated(generator, targets, blocks, choose)
     with torch.autocast(next(generator.parameters()).device.type, enabled=False):
-        return [
-            measured(program, target, points, seed, snapping) for program, target in zip(written, targets, strict=True)
-        ]
+        return [measured(each, target, points, seed, snapping) for each, target in zip(written, targets, strict=True)]
 
 
 def scores_on_packs(generator: Generator, packs: Mapping[str, Sequence[Target]], blocks: int = 10) -> dict[str, float]:
@@ -84,15 +96,15 @@ def scores_on_packs(generator: Generator, packs: Mapping[str, Sequence[Target]],
     return scores
 
 
-def measured(program: Program, target: Target, points: int = 5000, seed: int = 0, snapping: bool = False) -> Metrics:
+def measured(written: Written, target: Target, points: int = 5000, seed: int = 0, snapping: bool = False) -> Metrics:
     """The measures of a program; one that draws nothing counts as a single point in the centre of the grid.
 
     An infinite distance would make every mean infinite for the sake of one shape.
     """
     from shapeprog.inference.snapping import snap
 
-    snapped = snap(program, target.voxels) if snapping else None
-    row = evaluate_program(program, target, snapped, points, seed)
+    snapped = snap(written.program, target.voxels) if snapping else written.whole
+    row = evaluate_program(written.program, target, snapped, points, seed)
     samples = None if np.isfinite(row.cd) else target_samples(target, points, seed)
     if samples is None:
         return row

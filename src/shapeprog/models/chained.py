@@ -5,18 +5,26 @@ each number is drawn on its own, the count and shift of one come with the size o
 block's numbers is a product of conditional ones, as in the neural autoregressive density estimator (Larochelle and
 Murray, AISTATS 2011): numbers of the same step are added to the hidden layer of the next, those of the steps before
 are told to the step LSTM.
+
+A confident distribution has no gradient to give: its likeliest value stays what it is, whatever is next to it.  So the
+surface is meant to be at the numbers and their *offsets*, a plain regression that is zero until a loss moves it.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import torch
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 from torch import Tensor, nn
 
 from shapeprog.language.statement import SLOTS
 from shapeprog.models.generator import Said
 from shapeprog.models.swift import Swift, SwiftSettings
 from shapeprog.models.vocabulary import Vocabulary
+
+REACH = 0.95
+"""Most cells of an offset: rounded, numbers are within one of what was drawn, as snapping asks."""
 
 
 class Chained(Swift):
@@ -28,6 +36,9 @@ class Chained(Swift):
         super().__init__(settings, vocabulary)
         width, bins = settings.feature, len(self.ticks)
         self.bins = nn.Sequential(nn.Linear(width, width), nn.ReLU(), nn.Linear(width, bins))
+        self.offset = nn.Sequential(nn.Linear(width, width), nn.ReLU(), nn.Linear(width, 1))
+        for weight in self.offset[-1].parameters():
+            nn.init.zeros_(weight)
         self.slot = nn.Parameter(torch.zeros(SLOTS, width))
         self.link = nn.Embedding(SLOTS * bins, width)
         self.before = nn.Embedding(SLOTS * bins, width)
@@ -43,9 +54,23 @@ class Chained(Swift):
         self, heads: Tensor, ids: Int[Tensor, "*batch"], told: Float[Tensor, "*batch 7"] | None = None
     ) -> Float[Tensor, "*batch 7"]:
         """The likeliest value of each slot and its neighbours, given the slots before it."""
-        if told is not None:
-            return self.likeliest(self._chained(heads, ids, told), ids)
-        return self._in_turn(heads, ids, None)
+        if told is None:
+            return self._in_turn(heads, ids, None)
+        mixed = self._mixed(heads, ids, told)
+        return self.likeliest(self._scored(mixed, self.fits[ids]), ids)
+
+    def offsets(
+        self, heads: Tensor, ids: Int[Tensor, "*batch"], told: Float[Tensor, "*batch 7"]
+    ) -> Float[Tensor, "*batch 7"]:
+        """Less than a cell; none for whole numbers, and none that leaves the range."""
+        low, high = self._range(ids)
+        free = self.used[ids] & ~self.whole[ids]
+        offset = REACH * self.offset(self._mixed(heads, ids, told))[..., 0].float().tanh() * free
+        return torch.minimum(torch.maximum(offset, (low - told).clamp(max=0)), (high - told).clamp(min=0))
+
+    def offset_weights(self) -> Iterator[nn.Parameter]:
+        """Those of the regression."""
+        yield from self.offset.parameters()
 
     def sampled(self, heads: Tensor, ids: Int[Tensor, "*batch"], random: torch.Generator) -> Float[Tensor, "*batch 7"]:
         """Whole values drawn by their chances, one after the other."""
@@ -55,17 +80,21 @@ class Chained(Swift):
         self, heads: Tensor, ids: Int[Tensor, "*batch"], values: Float[Tensor, "*batch 7"]
     ) -> Float[Tensor, "*batch 7"]:
         """Cross-entropy of each number, given the right ones before it."""
-        return self.surprise(self._chained(heads, ids, values), ids, values)
+        return self.surprise(self._scored(self._mixed(heads, ids, values), self.fits[ids]), ids, values)
 
-    def _chained(
+    def _mixed(
         self, heads: Tensor, ids: Int[Tensor, "*batch"], told: Float[Tensor, "*batch 7"]
-    ) -> Float[Tensor, "*batch 7 bins"]:
-        """Scores of all slots at once, given the numbers that were told."""
+    ) -> Float[Tensor, "*batch 7 F"]:
+        """What scores and offsets of all slots are read from, given the numbers that were told."""
         links = self.link(self._row(told)) * self.used[ids][..., None]
         known = links.cumsum(-2) - links
         start = self.numbers(heads) + self.told(ids)
-        scores: Tensor = self.bins((start[..., None, :] + self.slot + known).relu()).float()
-        return scores.masked_fill(~self.fits[ids], -torch.inf)
+        return (start[..., None, :] + self.slot + known).relu()
+
+    def _scored(self, mixed: Tensor, fits: Bool[Tensor, "*batch bins"]) -> Float[Tensor, "*batch bins"]:
+        """Scores of the whole values that a slot may take."""
+        scores: Tensor = self.bins(mixed).float()
+        return scores.masked_fill(~fits, -torch.inf)
 
     def _in_turn(
         self, heads: Tensor, ids: Int[Tensor, "*batch"], random: torch.Generator | None
@@ -76,8 +105,8 @@ class Chained(Swift):
         said: list[Tensor] = []
         needed = int(used.flatten(0, -2).any(0).sum())  # slots in use come first
         for slot in range(needed):
-            scores = self.bins((known + self.slot[slot]).relu()).float()
-            scores = scores.masked_fill(~fits[..., slot, :], -torch.inf)
+            mixed = (known + self.slot[slot]).relu()
+            scores = self._scored(mixed, fits[..., slot, :])
             if random is None:
                 value = self.mean_near_best(scores, whole[..., slot])
             else:

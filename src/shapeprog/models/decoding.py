@@ -38,6 +38,8 @@ class Decoded:
     ----------
     code
         The programs (B, K, J), or (B, W, K, J) of a beam, best first.
+    drawn
+        The same as they were drawn on the canvas, before offsets moved them: rounded, within one of the programs.
     canvases
         What each block found drawn, packed.
     log_probability
@@ -45,6 +47,7 @@ class Decoded:
     """
 
     code: Code
+    drawn: Code
     canvases: Int[Tensor, "*batch K 32 32"]
     log_probability: Float[Tensor, "*batch"]
 
@@ -89,6 +92,7 @@ def decode(
     steps, device = generator.vocabulary.steps, target.device
     ids = torch.zeros(len(target), blocks, steps, dtype=torch.long, device=device)
     parameters = torch.zeros(len(target), blocks, steps, SLOTS, device=device)
+    offsets = torch.zeros_like(parameters)
     canvases = torch.zeros(len(target), blocks, *target.shape[1:3], dtype=torch.int32, device=device)
     chance = torch.zeros(len(target), device=device)
     active = torch.arange(len(target), device=device)
@@ -101,6 +105,7 @@ def decode(
         else:
             said, values, chances = _block(generator, feature, choose, temperature, random)
         ids[active, k], parameters[active, k] = said, values.to(parameters)
+        offsets[active, k] = _offsets(generator, feature, said, values)
         chance[active] += chances.to(chance)
         going = (said[:, 0] != EMPTY) | generator.by_batch
         active, memory = active[going], _at(memory, going)
@@ -108,7 +113,17 @@ def decode(
             break
         canvas[active] = canvas[active] | draw_blocks(Code(said[going][:, None], values[going][:, None]))[:, 0]
         canvases[:, k + 1 :] = canvas[:, None]
-    return Decoded(Code(ids, parameters), canvases, chance)
+    return Decoded(Code(ids, parameters + offsets), Code(ids, parameters), canvases, chance)
+
+
+def _offsets(
+    generator: Generator, feature: Float[Tensor, "N F"], ids: Int[Tensor, "N J"], values: Float[Tensor, "N J 7"]
+) -> Float[Tensor, "N J 7"]:
+    """How far the surface of blocks is meant to be from what is drawn of them; zero where a design does not say."""
+    if not any(True for _ in generator.offset_weights()):
+        return torch.zeros_like(values)
+    found = generator.offsets(generator.tell(feature, Said(ids, values))[1], ids, values)
+    return torch.zeros_like(values) if found is None else found
 
 
 def _helping(
@@ -190,6 +205,7 @@ def beam(
     shapes, steps, device = len(target), generator.vocabulary.steps, target.device
     ids = torch.zeros(shapes, width, blocks, steps, dtype=torch.long, device=device)
     parameters = torch.zeros(shapes, width, blocks, steps, SLOTS, device=device)
+    offsets = torch.zeros_like(parameters)
     canvases = torch.zeros(shapes, width, blocks + 1, *target.shape[1:3], dtype=torch.int32, device=device)
     chance = torch.full((shapes, width), -torch.inf, device=device)
     chance[:, 0] = 0.0  # all start from one empty program
@@ -211,10 +227,14 @@ def beam(
         row = row.gather(1, parent)
         each = torch.arange(shapes, device=device)[:, None]
         ids, parameters, canvases = ids[each, parent], parameters[each, parent], canvases[each, parent]
+        offsets = offsets[each, parent]
         grown = (row >= 0) & chance.isfinite()
         ids[:, :, k][grown], parameters[:, :, k][grown] = (
             said[row[grown], offer[grown]],
             values[row[grown], offer[grown]],
+        )
+        offsets[:, :, k][grown] = _offsets(
+            generator, feature[row[grown]], ids[:, :, k][grown], parameters[:, :, k][grown]
         )
         drawn = draw_blocks(Code(ids[:, :, k : k + 1], parameters[:, :, k : k + 1]))[:, :, 0]
         canvases[:, :, k + 1] = canvases[:, :, k] | drawn
@@ -226,7 +246,10 @@ def beam(
     score = chance if rank == "log_probability" else _iou(canvases[:, :, -1], packed(target)[:, None])
     order = score.masked_fill(~chance.isfinite(), -torch.inf).argsort(dim=-1, descending=True, stable=True)
     each = torch.arange(shapes, device=device)[:, None]
-    return Decoded(Code(ids[each, order], parameters[each, order]), canvases[each, order, :-1], chance[each, order])
+    ids, parameters, offsets = ids[each, order], parameters[each, order], offsets[each, order]
+    return Decoded(
+        Code(ids, parameters + offsets), Code(ids, parameters), canvases[each, order, :-1], chance[each, order]
+    )
 
 
 def _blocks(

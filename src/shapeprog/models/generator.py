@@ -1,12 +1,13 @@
 """What every program generator has in common: features of blocks in, ids and parameters of their steps out.
 
 A generator looks at the target and at what has been drawn so far, and writes one block of up to J steps.  Designs
-differ in how they look (``perceive``) and in how they say numbers (``values`` and ``parameter_loss``).
+differ in how they look (``perceive``) and in how they say numbers (``values`` and ``parameter_loss``, ``offsets``).
 """
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, ClassVar, NamedTuple
@@ -62,11 +63,17 @@ class Prediction:
         """Parameters of the ids that were told, with gradient."""
         return self.generator.values(self.heads, self.told.ids, self.told.values)
 
+    @cached_property
+    def offsets(self) -> Float[Tensor, "M J 7"] | None:
+        """How far the surface is meant to be from what was told, with gradient; none for designs that do not say."""
+        return self.generator.offsets(self.heads, self.told.ids, self.told.values)
+
     @property
     def parameters(self) -> Float[Tensor, "B K J 7"]:
-        """The values at their places; zero in blocks that are not live."""
-        full = self.values.new_zeros(*self.live.shape, *self.values.shape[1:])
-        return full.masked_scatter(self.live[..., None, None], self.values)
+        """Parameters of the surface that is meant, with gradient, at their places; zero in blocks that are not live."""
+        meant = self.values if self.offsets is None else self.told.values + self.offsets
+        full = meant.new_zeros(*self.live.shape, *meant.shape[1:])
+        return full.masked_scatter(self.live[..., None, None], meant)
 
     def log_probability(self, ids: Int[Tensor, "B K J"]) -> Float[Tensor, "B K"]:
         """Log-probability of the ids of each block, zero where it is not live."""
@@ -138,6 +145,20 @@ class Generator(nn.Module, ABC):
     ) -> Float[Tensor, "*batch 7"]:
         """How far the heads are from the true values of each slot."""
 
+    def offsets(
+        self, heads: Tensor, ids: Int[Tensor, "*batch"], told: Float[Tensor, "*batch 7"]
+    ) -> Float[Tensor, "*batch 7"] | None:
+        """How far the surface is meant to be from the parameters, with gradient; ``None``: the design does not say.
+
+        Cells say where something is to a cell, a surface may be anywhere in it.  A block is drawn on the canvas with
+        its parameters alone, so that offsets may change without changing what is written next.
+        """
+        return None
+
+    def offset_weights(self) -> Iterator[nn.Parameter]:
+        """The weights that say offsets and nothing else."""
+        yield from ()
+
     def sampled(self, heads: Tensor, ids: Int[Tensor, "*batch"], random: torch.Generator) -> Float[Tensor, "*batch 7"]:
         """Parameters drawn at random, for designs whose heads are a distribution; else those of ``values``."""
         return self.values(heads, ids)
@@ -166,14 +187,17 @@ class Generator(nn.Module, ABC):
             live = live_blocks(code.ids)
         told = Said(code.ids[live], code.parameters[live].detach())
         feature = self.perceive_all(target, canvases, live)
+        logits, heads = self.tell(feature, told)
+        return Prediction(live, logits, heads, feature, told, self)
+
+    def tell(self, feature: Float[Tensor, "M F"], told: Said) -> tuple[Float[Tensor, "M J V"], Tensor]:
+        """Log-probabilities and heads of all steps, each told what was said at those before it."""
         outputs: list[Step] = []
         for j in range(told.ids.shape[1]):
             state = outputs[-1].state if outputs else None
             previous = Said(told.ids[:, j - 1], told.values[:, j - 1]) if j else None
             outputs.append(self.step(feature, previous, j, state))
-        heads = torch.stack([each.heads for each in outputs], 1)
-        logits = torch.stack([each.logits for each in outputs], 1)
-        return Prediction(live, logits, heads, feature, told, self)
+        return torch.stack([each.logits for each in outputs], 1), torch.stack([each.heads for each in outputs], 1)
 
     def losses(
         self, prediction: Prediction, code: Code, weights: Float[Tensor, "B K"] | None = None

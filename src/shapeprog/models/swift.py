@@ -54,6 +54,7 @@ class Swift(Generator):
     Settings = SwiftSettings
     ticks: Tensor
     fits: Tensor
+    bounds: Tensor
     whole: Tensor
     used: Tensor
 
@@ -81,7 +82,10 @@ class Swift(Generator):
         self.register_buffer("ticks", torch.arange(settings.low, settings.high + 1.0), persistent=False)
         low, high = vocabulary.ranges[..., :1], vocabulary.ranges[..., 1:]
         fits = (self.ticks >= low) & (self.ticks <= high)
-        self.register_buffer("fits", fits | ~fits.any(-1, keepdim=True), persistent=False)
+        fits = fits | ~fits.any(-1, keepdim=True)
+        self.register_buffer("fits", fits, persistent=False)
+        ends = torch.stack([fits.int().argmax(-1), bins - 1 - fits.flip(-1).int().argmax(-1)])
+        self.register_buffer("bounds", self.ticks[ends], persistent=False)
         self.register_buffer("whole", vocabulary.discrete, persistent=False)
         self.register_buffer("used", vocabulary.used, persistent=False)
 
@@ -161,10 +165,8 @@ class Swift(Generator):
 
     def _range(self, ids: Int[Tensor, "*batch"]) -> tuple[Float[Tensor, "*batch 7"], Float[Tensor, "*batch 7"]]:
         """Lowest and highest value that each slot of an id may take here."""
-        fits = self.fits[ids].long()
-        first = fits.argmax(-1)
-        last = fits.shape[-1] - 1 - fits.flip(-1).argmax(-1)
-        return self.ticks[first], self.ticks[last]
+        low, high = self.bounds
+        return low[ids], high[ids]
 
     def _scores(self, heads: Tensor, ids: Int[Tensor, "*batch"]) -> Float[Tensor, "*batch 7 bins"]:
         mixed = self.bins(self.numbers(heads) + self.told(ids))

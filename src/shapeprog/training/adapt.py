@@ -18,6 +18,7 @@ from jaxtyping import Float
 from torch import Tensor, nn
 
 from shapeprog.data.packs import read_pack
+from shapeprog.errors import ShapeProgError
 from shapeprog.evaluation.generated import code_iou, scores_on_packs
 from shapeprog.geometry.occupancy import pack, packed_iou
 from shapeprog.geometry.sampling import has_surface
@@ -90,6 +91,8 @@ class Adaptation:
         self._generator = generator
         baseline = choices.Baseline(_width(generator)) if settings.ids == "nvil" else None
         self.module = Learner(generator, baseline)
+        if settings.learn == "offsets":
+            _freeze_all_but_offsets(generator)
         self._executor = None if executor is None else executor.to(device).eval().requires_grad_(False)
         self._targets = self._teaching = None
         if settings.terms:
@@ -124,7 +127,7 @@ class Adaptation:
             targets = Targets(*parts)
         choose: Choice = "ids" if settings.ids in ("nvil", "rloo") else settings.choose
         drawn = decode(generator, targets.cells, blocks=settings.blocks, choose=choose, random=random)
-        prediction = generator.predict(targets.cells, drawn.canvases, drawn.code)
+        prediction = generator.predict(targets.cells, drawn.canvases, drawn.drawn)
         with torch.autocast(self._device.type, enabled=False):
             values = prediction.parameters.float()
             code = Code(drawn.code.ids, values)
@@ -135,7 +138,7 @@ class Adaptation:
             terms = {name: value.mean() + idle for name, value in each.items()}
             if settings.ids != "none":
                 total = torch.stack(list(each.values())).sum(0).detach()
-                terms |= self._chosen(prediction, code, total, targets, random)
+                terms |= self._chosen(prediction, code, drawn.drawn, total, targets, random)
         return terms
 
     def _judged(self, code: Code, targets: Targets, random: torch.Generator) -> dict[str, Float[Tensor, " B"]]:
@@ -165,15 +168,22 @@ class Adaptation:
         return each.flatten(1).mean(1)
 
     def _chosen(
-        self, prediction: Prediction, code: Code, total: Float[Tensor, " B"], targets: Targets, random: torch.Generator
+        self,
+        prediction: Prediction,
+        code: Code,
+        drawn: Code,
+        total: Float[Tensor, " B"],
+        targets: Targets,
+        random: torch.Generator,
     ) -> dict[str, Tensor]:
-        """What teaches the ids; see :mod:`shapeprog.training.choices`."""
+        """What teaches the ids, see :mod:`shapeprog.training.choices`; cells are those of the programs as drawn."""
         settings = self._settings
         if settings.ids == "expected":
             other = choices.alternatives(self._generator, prediction.feature, settings.tries)
-            costs = self._costs_in_place(code, prediction, other, targets, random)
+            judged = drawn if settings.cost == "iou" else code
+            costs = self._costs_in_place(judged, prediction, other, targets, random)
             return {"choice": settings.ids_weight * choices.expected(other.chance, costs, len(total))}
-        costs = (total + FLOOR).log() if settings.cost == "loss" else 1 - code_iou(code, targets.cells).to(total)
+        costs = (total + FLOOR).log() if settings.cost == "loss" else 1 - code_iou(drawn, targets.cells).to(total)
         chance = prediction.log_probability(code.ids)
         if settings.ids == "rloo":
             surprise = choices.leave_one_out(costs.reshape(settings.tries, -1)).flatten()[:, None].expand_as(chance)
@@ -253,6 +263,16 @@ def adapt(
     executor = load_executor(settings.executor)[0] if NEURAL in settings.terms else None
     objective = Adaptation(generator, settings, executor, val, engine.device, card.data or str(start), command)
     return run(objective, settings, folder, engine, restart=restart, stop=stop, tensorboard=tensorboard)
+
+
+def _freeze_all_but_offsets(generator: Generator) -> None:
+    """Let only those weights learn that say offsets."""
+    offsets = list(generator.offset_weights())
+    if not offsets:
+        raise ShapeProgError(f"the design {generator.design} says no offsets", "adapt all of it with --learn all")
+    generator.requires_grad_(False)
+    for weight in offsets:
+        weight.requires_grad_(True)
 
 
 def _parts(targets: Targets) -> tuple[Tensor, Tensor, Tensor, Tensor]:

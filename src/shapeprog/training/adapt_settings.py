@@ -31,6 +31,9 @@ class AdaptSettings(Settings):
         How much the estimator counts.
     tries
         Programs that ``rloo`` samples for each shape; blocks that ``expected`` looks at in each place.
+    learn
+        ``all`` weights, or those of the ``offsets`` alone: programs stay as they are but for their last fraction of a
+        cell.
     choose
         How programs are written where ids are not sampled: of the likeliest blocks the one that helps most
         (``drawn``), or the likeliest (``argmax``).
@@ -72,6 +75,7 @@ class AdaptSettings(Settings):
     cost: Literal["loss", "iou"] = "loss"
     ids_weight: float = 1.0
     tries: int = 4
+    learn: Literal["all", "offsets"] = "all"
     choose: Literal["drawn", "argmax"] = "drawn"
     points: int = 1000
     mirror: float = 0.0
@@ -92,6 +96,7 @@ class AdaptSettings(Settings):
     CHOICES: ClassVar[Mapping[str, tuple[str, ...]]] = {
         **Settings.CHOICES, "ids": ("none", "nvil", "rloo", "expected"), "cost": ("loss", "iou"),
         "select": ("iou", "cd"), "form": ("snapped", "program"), "choose": ("drawn", "argmax"),
+        "learn": ("all", "offsets"),
         "statistics": ("frozen", "moving"),
     }  # fmt: skip
     MAY_CHANGE: ClassVar[frozenset[str]] = Settings.MAY_CHANGE | {"select"}

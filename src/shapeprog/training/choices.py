@@ -83,11 +83,14 @@ class Alternatives(NamedTuple):
         Log-probability of each among those that are looked at.
     values
         The parameters that the generator would give them, without gradient.
+    meant
+        The same with their offsets.
     """
 
     ids: Int[Tensor, "M A J"]
     chance: Float[Tensor, "M A"]
     values: Float[Tensor, "M A J 7"]
+    meant: Float[Tensor, "M A J 7"]
 
 
 def alternatives(generator: Generator, feature: Float[Tensor, "M F"], most: int = 0) -> Alternatives:
@@ -130,8 +133,11 @@ def alternatives(generator: Generator, feature: Float[Tensor, "M F"], most: int 
         heads = torch.stack([each.heads for each in visits], 1)
         which = torch.tensor(places, device=feature.device)[chosen]
         rows = torch.arange(len(feature), device=feature.device)[:, None, None]
-        values = generator.values(heads[rows, which], table[chosen]).float()
-    return Alternatives(table[chosen], among.gather(1, chosen).log_softmax(-1), values)
+        there = heads[rows, which]
+        values = generator.values(there, table[chosen]).float()
+        offsets = generator.offsets(there, table[chosen], values)
+    meant = values if offsets is None else values + offsets
+    return Alternatives(table[chosen], among.gather(1, chosen).log_softmax(-1), values, meant)
 
 
 def _said(generator: Generator, step: Step, number: int) -> Said:
@@ -169,7 +175,7 @@ def replaced(code: Code, live: Bool[Tensor, "B K"], other: Alternatives, choice:
     owner, place = live.nonzero(as_tuple=True)
     row = torch.arange(len(owner), device=owner.device)
     ids, values = code.ids[owner].clone(), code.parameters.detach()[owner].clone()
-    ids[row, place], values[row, place] = other.ids[:, choice], other.values[:, choice].to(values)
+    ids[row, place], values[row, place] = other.ids[:, choice], other.meant[:, choice].to(values)
     block = torch.arange(ids.shape[1], device=owner.device)
     ended = (ids[row, place, 0] == EMPTY)[:, None] & (block > place[:, None])
     return Code(torch.where(ended[..., None], EMPTY, ids), values), owner

@@ -69,7 +69,7 @@ class Validation:
         for each in self._lessons:
             for total, more in zip((right, steps, off, slots), told(generator, each), strict=True):
                 total += more
-            overlaps.append(code_iou(single_pass(generator, each.target, self._blocks), each.target))
+            overlaps.append(code_iou(single_pass(generator, each.target, self._blocks)[1], each.target))
         scores = {
             "ids": float(right / steps),
             "parameters": float(off / slots),

@@ -232,7 +232,22 @@ def test_the_command_adapts_and_chooses_on_val(boxes: Path, tmp_path: Path, caps
     generator = biased(LEG)
     save_checkpoint(tmp_path / "start.safetensors", generator, card_of(generator, data="nothing"))
     words = ["adapt", tmp_path / "run", "--from", tmp_path / "start.safetensors", "--pack", boxes, "--val", boxes]
-    words += ["--device", "cpu", "--batch", 4, "--points", 100, "--blocks", 1, "--visits", 12, "--rate", 0.01]
+    words += [
+        "--device",
+        "cpu",
+        "--batch",
+        4,
+        "--points",
+        100,
+        "--learn",
+        "all",
+        "--blocks",
+        1,
+        "--visits",
+        12,
+        "--rate",
+        0.01,
+    ]
     with pytest.raises(SystemExit) as end:
         main([str(word) for word in [*words, "--validate-every", 4, "--precision", "float32"]])
     assert not end.value.code
@@ -259,3 +274,9 @@ def test_evaluation_can_snap_to_the_grid():
     )
     assert snapped.iou > as_it_is.iou
     assert snapped.blocks == as_it_is.blocks == 1
+
+
+@pytest.mark.parametrize("more", [{"ids": "nvil"}, {"labels": ("some",)}])
+def test_ids_and_labels_need_all_weights(more: dict[str, Any], boxes: Path):
+    with pytest.raises(ShapeProgError, match="where offsets alone learn"):
+        settings_for(boxes, learn="offsets", **more)

@@ -47,7 +47,7 @@ DESIGNED = """\
 
 `python -m benchmarks.experiment train PACKS RESULTS --only {names}`
 
-Wide prior, one thread, eight minutes of a core each (shapes a second measured on a quiet machine times 480), the same
+Wide prior, one thread, five minutes of a core each (shapes a second measured on a quiet machine times 300), the same
 recipe but for what its line below says.  Synthetic: 512 shapes of the prior; real: val, single pass by drawing
 (`tian2019`, whose memory has to see every block it writes, too)."""
 

@@ -14,6 +14,7 @@ import multiprocessing
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -216,12 +217,18 @@ def iou_of(program: Program, shape: Any) -> float:
 
 def _prepared(job: Job) -> tuple[Any, Any, Row]:
     """The shape, the program or weights, and what the row says besides its measures."""
-    from shapeprog.data import read_pack
-
     torch.set_num_threads(1)
     path, place, program, row, seconds, seed = job
-    shape = read_pack(Path(path))[place]
+    shape = _shapes(path)[place]
     return shape, program, {"pack": Path(path).stem, "method": row, "allowed": BLOCKS, "seconds": seconds, "seed": seed}
+
+
+@lru_cache(maxsize=1)
+def _shapes(path: str) -> Any:
+    """The shapes of a pack; jobs come pack by pack."""
+    from shapeprog.data import read_pack
+
+    return read_pack(Path(path))
 
 
 def rows_file(experiment: Experiment) -> Path:

@@ -115,6 +115,10 @@ class AdaptSettings(Settings):
             )
         if not self.terms and not self.labels:
             raise ShapeProgError("there is nothing to learn from", "give a loss, or labels, or both")
+        if self.learn == "offsets" and (self.ids != "none" or self.labels):
+            raise ShapeProgError(
+                "ids and labels cannot be learned where offsets alone learn", "let all weights learn: --learn all"
+            )
         if self.ids != "none" and not self.terms:
             raise ShapeProgError("ids are judged by a loss, and there is none", "give one, such as --loss chamfer")
 
@@ -124,13 +128,15 @@ class AdaptSettings(Settings):
         return parse_terms(self.loss) if self.loss else {}
 
 
+OFFSETS = {"learn": "offsets", "rate": 1e-3, "warm_up": 320, "select": "cd"}
+
 METHODS: Mapping[str, Mapping[str, object]] = {
     "guided": {
         "loss": NEURAL, "rate": 2e-5, "decay": 1e-5, "clip": 0.1, "clip_by": "value", "schedule": "constant",
         "precision": "float32", "select": "cd", "choose": "argmax",
     },
-    "direct": {"loss": "chamfer", "select": "cd"},
-    "hybrid": {"loss": f"chamfer=1,{NEURAL}=10", "select": "cd"},
+    "direct": {"loss": "chamfer", **OFFSETS},
+    "hybrid": {"loss": f"chamfer=1,{NEURAL}=10", **OFFSETS},
     "distill": {"loss": "", "rate": 1e-3, "optimiser": "adamw", "decay": 0.01, "warm_up": 1600},
 }  # fmt: skip
 """Settings of each method: those of guided adaptation as published by Tian et al. 2019, the others ours."""

@@ -107,6 +107,7 @@ RECIPES: dict[str, Recipe] = {
     "ids-nvil": adapting("direct with ids, NVIL", START, "direct", ids="nvil", **IDS),
     "ids-rloo": adapting("direct with ids, leave one out", START, "direct", ids="rloo", **IDS),
     "ids-expected": adapting("direct with ids, expected", START, "direct", ids="expected", **IDS),
+    "ids-direct": adapting("direct with ids, expected, then offsets", "{ids-expected}", "direct", **OFFSETS),
     "hybrid": adapting("hybrid", START, "hybrid", executor="{executor}", **OFFSETS),
     "distill": adapting("distilled", START, "distill", **DISTILL),
     "distill-direct": adapting("distilled, then direct", "{distill}", "direct", **LONGER),

@@ -31,6 +31,7 @@ class Chained(Swift):
     """The network; see the module."""
 
     design = "chained"
+    says_offsets = True
 
     def __init__(self, settings: SwiftSettings, vocabulary: Vocabulary) -> None:
         super().__init__(settings, vocabulary)

@@ -120,9 +120,8 @@ def _offsets(
     generator: Generator, feature: Float[Tensor, "N F"], ids: Int[Tensor, "N J"], values: Float[Tensor, "N J 7"]
 ) -> Float[Tensor, "N J 7"]:
     """How far the surface of blocks is meant to be from what is drawn of them; zero where a design does not say."""
-    if not any(True for _ in generator.offset_weights()):
-        return torch.zeros_like(values)
-    found = generator.offsets(generator.tell(feature, Said(ids, values))[1], ids, values)
+    heads = generator.tell(feature, Said(ids, values))[1] if generator.says_offsets else feature
+    found = generator.offsets(heads, ids, values)
     return torch.zeros_like(values) if found is None else found
 
 

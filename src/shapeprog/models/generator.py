@@ -105,6 +105,8 @@ class Generator(nn.Module, ABC):
     Settings: ClassVar[Any]
     by_batch: bool = False
     """Whether a prediction depends on the other shapes of its batch, those that have ended included."""
+    says_offsets: ClassVar[bool] = False
+    """Whether it says how far surfaces are meant to be from what is drawn."""
 
     def __init__(self, settings: Any, vocabulary: Vocabulary) -> None:
         super().__init__()
@@ -148,7 +150,7 @@ class Generator(nn.Module, ABC):
     def offsets(
         self, heads: Tensor, ids: Int[Tensor, "*batch"], told: Float[Tensor, "*batch 7"]
     ) -> Float[Tensor, "*batch 7"] | None:
-        """How far the surface is meant to be from the parameters, with gradient; ``None``: the design does not say.
+        """How far the surface is meant to be from the parameters, with gradient; ``None`` for designs that do not say.
 
         Cells say where something is to a cell, a surface may be anywhere in it.  A block is drawn on the canvas with
         its parameters alone, so that offsets may change without changing what is written next.

@@ -267,11 +267,10 @@ def adapt(
 
 def _freeze_all_but_offsets(generator: Generator) -> None:
     """Let only those weights learn that say offsets."""
-    offsets = list(generator.offset_weights())
-    if not offsets:
+    if not generator.says_offsets:
         raise ShapeProgError(f"the design {generator.design} says no offsets", "adapt all of it with --learn all")
     generator.requires_grad_(False)
-    for weight in offsets:
+    for weight in generator.offset_weights():
         weight.requires_grad_(True)
 
 

@@ -24,7 +24,7 @@ from shapeprog.language.unroll import unroll
 from shapeprog.models.checkpoint import card_of, save_checkpoint
 from shapeprog.models.designs import build_generator
 
-MEASURES = {"f1": 0.5, "blocks": 3, "statements": 4, "primitives": 5, "seconds": 0.02, "noise_floor": 0.0001}
+MEASURES = {"f1": 0.5, "blocks": 3, "statements": 4, "primitives": 5, "cpu_seconds": 0.02, "noise_floor": 0.0001}
 
 
 def row(

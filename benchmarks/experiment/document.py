@@ -40,7 +40,8 @@ TABLE = """\
 Mean over all test shapes ± standard error (median).  With several seeds: mean of their means ± standard deviation of
 these.  CD and F1 are of the program as it is; IoU of the program snapped to whole numbers, by at most one cell in each
 parameter, and *as drawn* on the canvas of the generator, which is one such snapping.
-Times are of a batch of 32 for single passes, of one process for the rest."""
+Times are of one core,
+of a batch of 32 for single passes and shape by shape for the rest."""
 
 DESIGNED = """\
 ## Designs at equal training time

@@ -48,7 +48,7 @@ experiment-table: $(READY)
 	$(EXPERIMENT) document $(PACKS) $(RESULTS) $(OPTIONS)
 
 experiment-efficiency: $(READY)
-	$(EXPERIMENT) train $(PACKS) $(RESULTS) $(OPTIONS) --only executor guided direct
+	$(EXPERIMENT) train $(PACKS) $(RESULTS) $(OPTIONS) --only executor guided guided-offsets direct
 	$(EXPERIMENT) efficiency $(PACKS) $(RESULTS) $(OPTIONS)
 	$(EXPERIMENT) document $(PACKS) $(RESULTS) $(OPTIONS)
 

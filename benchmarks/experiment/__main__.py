@@ -19,6 +19,7 @@ from __future__ import annotations
 import argparse
 import json
 import os
+from dataclasses import replace
 from pathlib import Path
 
 os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")  # before torch: its idle workers would spin
@@ -90,8 +91,11 @@ def _table(experiment: Experiment, args: argparse.Namespace) -> None:
         best = experiment.best(category)
         if best is not None:
             generator, card = load_generator(experiment.made(best))
-            save_checkpoint(experiment.results / f"{category}.safetensors", generator, card, half=True)
-            print(f"\nThe best on val is {best.name}; kept as {category}.safetensors.")
+            card = replace(card, command=experiment.command(best))  # names both folders, wherever they are here
+            kept = args.docs / "results" / f"{category}.safetensors"
+            kept.parent.mkdir(parents=True, exist_ok=True)
+            save_checkpoint(kept, generator, card, half=True)
+            print(f"\nThe best on val is {best.name}; kept as {kept}.")
 
 
 def _efficiency(experiment: Experiment, args: argparse.Namespace) -> None:

@@ -40,8 +40,7 @@ TABLE = """\
 Mean over all test shapes ± standard error (median).  With several seeds: mean of their means ± standard deviation of
 these.  CD and F1 are of the program as it is; IoU of the program snapped to whole numbers, by at most one cell in each
 parameter, and *as drawn* on the canvas of the generator, which is one such snapping.
-Times are of one core,
-of a batch of 32 for single passes and shape by shape for the rest."""
+Times are of one core, of a batch of 32 for single passes and shape by shape for the rest."""
 
 DESIGNED = """\
 ## Designs at equal training time
@@ -94,7 +93,10 @@ def _sections(experiment: Experiment, docs: Path) -> Iterator[str]:
             yield f"### {category}\n\n{found}"
             chosen = experiment.best(category)
             if chosen is not None:
-                yield f"The best on val is *{chosen.recipe.row}*, seed {chosen.seed}."
+                kept = f"results/{category}.safetensors"
+                told = f"; its weights, which saw research data and so are not in the wheel: [{kept}]({kept})"
+                told = told if (docs / kept).exists() else ""
+                yield f"The best on val is *{chosen.recipe.row}*, seed {chosen.seed}{told}."
     if rows:
         best = {category: experiment.best(category) for category in CATEGORIES}
         known = {category: (run.recipe.row, run.seed) for category, run in best.items() if run is not None}

@@ -11,14 +11,15 @@ from benchmarks.experiment.measuring import start_on_val
 from benchmarks.experiment.recipes import CATEGORIES
 from benchmarks.experiment.stages import Experiment, runs
 
-GUIDED, DIRECT = "guided", "direct"
+GUIDED, OFFSETS, DIRECT = "guided", "guided-offsets", "direct"
 SHOWN = {
-    GUIDED: "guided, through the neural executor",
-    DIRECT: "direct, through the renderer (chamfer)",
+    GUIDED: "guided, all weights",
+    OFFSETS: "guided, offsets alone",
+    DIRECT: "direct (chamfer)",
 }
 """Stages that are compared, and what the plot calls them."""
 
-COLOURS = {GUIDED: "#b0413e", DIRECT: "#1f4e79"}
+COLOURS = {GUIDED: "#b0413e", OFFSETS: "#e0a458", DIRECT: "#1f4e79"}
 
 
 class Curve(NamedTuple):
@@ -67,14 +68,15 @@ def summary(experiment: Experiment) -> list[str]:
         guided, direct = mean_curve(each[GUIDED]), mean_curve(each[DIRECT])
         best = int(guided.cd.argmin())
         needed = visits_to_reach(direct, float(guided.cd[best]))
-        told = (
-            f"{category}: guided adaptation is best after {guided.visits[best]:,.0f} visits (CD {guided.cd[best]:.5f})"
-        )
-        if guided.visits[best] > 0 and np.isfinite(needed):
+        told = f"{category}: guided adaptation is best after {guided.visits[best]:,.0f} visits"
+        if best == 0:
+            told = f"{category}: guided adaptation never gets below what it began with"
+        told += f" (CD {guided.cd[best]:.5f})"
+        if best > 0 and np.isfinite(needed):
             told += f"; direct adaptation is as good after {needed:,.0f}"
             told += f", {guided.visits[best] / needed:.0f} times sooner" if 0 < needed < guided.visits[best] else ""
         last = int(direct.cd.argmin())
-        lines.append(f"{told}, and best after {direct.visits[last]:,.0f} (CD {direct.cd[last]:.5f}).")
+        lines.append(f"{told}; direct adaptation is best after {direct.visits[last]:,.0f} (CD {direct.cd[last]:.5f}).")
     return lines
 
 
@@ -99,7 +101,9 @@ def plot(experiment: Experiment, picture: Path) -> bool:
         tidy(axis, category, "shapes seen in adaptation, thousands")
     axes[0].set_ylabel("CD on val $\\times$ 1000", fontsize=8)
     handles = {label: handle for axis in axes for handle, label in zip(*axis.get_legend_handles_labels(), strict=True)}
-    figure.legend(handles.values(), handles.keys(), fontsize=8, frameon=False, loc="outside lower center", ncols=2)
+    figure.legend(
+        handles.values(), handles.keys(), fontsize=8, frameon=False, loc="outside lower center", ncols=len(SHOWN)
+    )
     picture.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(picture, dpi=200)
     return True

@@ -56,10 +56,7 @@ def published(recipe: Recipe) -> Recipe:
 
 
 START = "default"
-"""What adaptation begins from, but where the paper is repeated: the weights that ship, of the wide prior."""
-
-NARROW = "{narrow}"
-"""What it begins from there: weights of the narrow prior, which is the paper's."""
+"""What adaptation begins from: the weights that ship, which have seen synthetic furniture alone."""
 
 BEST_LOSS = "chamfer=1,surface=1,excess=1"
 
@@ -96,8 +93,6 @@ RECIPES: dict[str, Recipe] = {
         for design, options in DESIGNS.items()
     },
     "labels": Recipe("label", per_category=True),
-    "narrow-guided": adapting("guided, from narrow", NARROW, "guided", **GUIDED),
-    "narrow-direct": adapting("direct (chamfer), from narrow", NARROW, "direct", **OFFSETS),
     "guided": published(adapting("guided", START, "guided", **GUIDED)),
     "guided-offsets": adapting(
         "guided, offsets alone", START, "guided", **GUIDED | OFFSETS, schedule="cosine"

@@ -92,7 +92,7 @@ def decode(
     steps, device = generator.vocabulary.steps, target.device
     ids = torch.zeros(len(target), blocks, steps, dtype=torch.long, device=device)
     parameters = torch.zeros(len(target), blocks, steps, SLOTS, device=device)
-    offsets = torch.zeros_like(parameters)
+    features: list[tuple[Tensor, Tensor]] = []
     canvases = torch.zeros(len(target), blocks, *target.shape[1:3], dtype=torch.int32, device=device)
     chance = torch.zeros(len(target), device=device)
     active = torch.arange(len(target), device=device)
@@ -105,7 +105,7 @@ def decode(
         else:
             said, values, chances = _block(generator, feature, choose, temperature, random)
         ids[active, k], parameters[active, k] = said, values.to(parameters)
-        offsets[active, k] = _offsets(generator, feature, said, values)
+        features.append((active, feature))
         chance[active] += chances.to(chance)
         going = (said[:, 0] != EMPTY) | generator.by_batch
         active, memory = active[going], _at(memory, going)
@@ -113,7 +113,20 @@ def decode(
             break
         canvas[active] = canvas[active] | draw_blocks(Code(said[going][:, None], values[going][:, None]))[:, 0]
         canvases[:, k + 1 :] = canvas[:, None]
-    return Decoded(Code(ids, parameters + offsets), Code(ids, parameters), canvases, chance)
+    drawn = Code(ids, parameters)
+    return Decoded(_meant(generator, drawn, features), drawn, canvases, chance)
+
+
+def _meant(generator: Generator, drawn: Code, features: list[tuple[Tensor, Tensor]]) -> Code:
+    """Programs with their offsets, all at once; which shapes each block was written for, and what was seen of them."""
+    if not generator.says_offsets:
+        return drawn
+    row = torch.cat([active for active, _ in features])
+    block = torch.cat([torch.full_like(active, k) for k, (active, _) in enumerate(features)])
+    seen = torch.cat([feature for _, feature in features])
+    meant = drawn.parameters.clone()
+    meant[row, block] += _offsets(generator, seen, drawn.ids[row, block], drawn.parameters[row, block])
+    return Code(drawn.ids, meant)
 
 
 def _offsets(

@@ -77,6 +77,11 @@ def test_only_the_kind_that_is_asked_for(tmp_path: Path) -> None:
         load_generator(path)
 
 
+def test_weights_are_as_readable_as_other_files(tmp_path: Path) -> None:
+    (tmp_path / "plain").touch()
+    assert written(tmp_path).stat().st_mode == (tmp_path / "plain").stat().st_mode
+
+
 def test_a_missing_file_and_an_unknown_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     written(tmp_path).rename(tmp_path / "default.safetensors")
     monkeypatch.setattr(checkpoint, "SHIPPED", tmp_path)

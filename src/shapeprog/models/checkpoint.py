@@ -18,7 +18,7 @@ import torch
 from torch import Tensor, nn
 
 from shapeprog.errors import InputError, OutputError, ShapeProgError
-from shapeprog.files import atomic_path
+from shapeprog.files import write_bytes
 from shapeprog.models.designs import build_generator
 from shapeprog.models.executor import NeuralExecutor
 from shapeprog.models.generator import Generator
@@ -123,7 +123,7 @@ def save_checkpoint(path: str | os.PathLike[str], module: nn.Module, card: Card,
     OutputError
         If the file cannot be written, or a weight is not finite (as after training that diverged).
     """
-    from safetensors.torch import save_file
+    from safetensors.torch import save
 
     tensors = {}
     for name, value in module.state_dict().items():
@@ -135,8 +135,7 @@ def save_checkpoint(path: str | os.PathLike[str], module: nn.Module, card: Card,
         tensors[name] = stored.contiguous()
     parameters = sum(each.numel() for each in module.parameters())
     metadata = {"card": json.dumps(asdict(card), allow_nan=False), "parameters": str(parameters)}
-    with atomic_path(path) as temporary:
-        save_file(tensors, temporary, metadata)
+    write_bytes(path, save(tensors, metadata))  # safetensors' own files are for their owner alone
 
 
 def load_checkpoint(name: str | os.PathLike[str], *, device: torch.device | str = "cpu") -> tuple[nn.Module, Card]:

@@ -68,6 +68,15 @@ def test_a_stopped_run_goes_on_as_if_nothing_had_happened(tmp_path: Path, engine
     assert train(tmp_path / "parts", engine)[1] == [], "a run that is done has nothing left to do"
 
 
+def test_a_run_that_shall_end_where_it_is_leaves_its_weights(tmp_path: Path, engine: Engine):
+    for record in run(Toy(), SETTINGS, tmp_path, engine):
+        if record["step"] == 4:
+            break
+    assert not (tmp_path / folders.WEIGHTS).exists()
+    assert train(tmp_path, engine, replace(SETTINGS, visits=12))[1] == []
+    assert (tmp_path / folders.WEIGHTS).read_text() == "16"
+
+
 def test_a_killed_run_goes_on_exactly(tmp_path: Path, engine: Engine):
     folder = tmp_path / "killed"
     words = [sys.executable, SCRIPT, "noisy", str(folder), "160"]

@@ -105,6 +105,8 @@ def run(
         step, best, steps = card["step"], card["best"], settings.steps(engine.processes)
         if engine.writes and step == 0:
             write_state(folder, state)  # tells at once where nothing can be written, and replaces an older run
+        if engine.writes and step >= steps and not (folder / WEIGHTS).exists():
+            objective.save(folder / WEIGHTS, step * together, _validate(objective, engine))  # fewer visits than before
         with Log(folder if engine.writes else None, step, tensorboard) as log:
             saved = clock = time.monotonic()
             for batch in engine.ahead(objective.batch, range(step, steps)):

@@ -121,6 +121,15 @@ def test_offsets_alone_bring_a_surface_closer_and_leave_what_is_drawn(boxes: Pat
     assert last["val_boxes_cd"] < scores["boxes_cd"]
 
 
+def test_offsets_of_programs_that_draw_nothing_have_no_gradient(boxes: Path, engine: Engine):
+    generator: Any = build_generator("chained", TINY)
+    with torch.no_grad():
+        generator.name[2].bias[0] += 50
+    objective = Adaptation(generator, settings_for(boxes, learn="offsets"))
+    terms_of(objective, engine)["chamfer"].backward()
+    assert all(weight.grad is not None and not bool(weight.grad.any()) for weight in generator.offset_weights())
+
+
 def test_a_design_without_offsets_says_so(boxes: Path):
     with pytest.raises(ShapeProgError, match="the design swift says no offsets"):
         Adaptation(biased(LEG), settings_for(boxes, learn="offsets"))

@@ -12,7 +12,7 @@ import torch
 from benchmarks.experiment.measuring import decoded
 from benchmarks.experiment.recipes import CATEGORIES
 from benchmarks.experiment.stages import Experiment
-from shapeprog.evaluation.generated import Written
+from shapeprog.evaluation.generated import Written, measured
 
 QUANTILES = (0.1, 0.3, 0.5)
 """Which shapes of each category are shown: at these quantiles of CD, so that nobody picked them."""
@@ -34,7 +34,6 @@ HEADINGS = ("target", "program", "hard voxels", f"{POINTS:,} surface points")
 def chosen(experiment: Experiment, category: str) -> list[tuple[Any, Written, Any]]:
     """Test shapes at the quantiles of CD of the best generator, its single-pass programs, and their measures."""
     from shapeprog.data import read_pack
-    from shapeprog.evaluation.generated import measured
 
     best = experiment.best(category)
     shapes = list(read_pack(experiment.pack(category, "test")))[: experiment.shapes]

@@ -25,7 +25,7 @@ from benchmarks import reconstruction
 from benchmarks.experiment.recipes import CATEGORIES
 from benchmarks.experiment.stages import RESULTS, Experiment, Run, runs
 from benchmarks.reconstruction import GREEDY, REFINED, SEARCH
-from shapeprog.evaluation.generated import Written
+from shapeprog.evaluation.generated import Written, generated
 from shapeprog.evaluation.generated import measured as measures
 from shapeprog.files import write_text
 from shapeprog.geometry.occupancy import pack, packed_iou, packed_rows
@@ -85,12 +85,12 @@ class Group:
 def groups(experiment: Experiment) -> Iterator[Group]:
     """What can be measured with the weights that are there."""
     for category in CATEGORIES:
-        yield from written(WIDE, category, 0, experiment.start, True)
+        yield from single_passes(WIDE, category, 0, experiment.start, True)
         for run in runs():
             recipe = run.recipe
             if recipe.row and run.category in ("", category) and experiment.finished(run):
                 source = str(experiment.made(run))
-                yield from written(recipe.row, category, run.seed, source, recipe.as_published)
+                yield from single_passes(recipe.row, category, run.seed, source, recipe.as_published)
         best = experiment.best(category)
         if best is not None:
             yield Group(REFINED_BEST, category, best.seed, str(experiment.made(best)), refined)
@@ -98,8 +98,8 @@ def groups(experiment: Experiment) -> Iterator[Group]:
         yield Group(WITH_GENERATOR, category, 0, experiment.start, searched)
 
 
-def written(row: str, category: str, seed: int, source: str, as_published: bool) -> Iterator[Group]:
-    """Single passes by drawing, and as the paper writes programs if that is wanted too."""
+def single_passes(row: str, category: str, seed: int, source: str, as_published: bool) -> Iterator[Group]:
+    """By drawing, and as the paper writes programs if that is wanted too."""
     if as_published:
         yield Group(row + ARGMAX, category, seed, source, measured, "argmax")
     yield Group(row, category, seed, source, measured)
@@ -159,7 +159,6 @@ def fingerprint(source: str) -> str:
 
 def decoded(source: str, shapes: list[Any], choose: Choice = "drawn") -> tuple[list[Any], float]:
     """The single-pass programs of shapes, and seconds of one core for each when 32 are decoded together."""
-    from shapeprog.evaluation.generated import generated
     from shapeprog.models.checkpoint import load_generator
 
     torch.set_num_threads(1)

@@ -118,9 +118,13 @@ def decode(
 
 
 def _meant(generator: Generator, drawn: Code, features: list[tuple[Tensor, Tensor]]) -> Code:
-    """Programs with their offsets, all at once; which shapes each block was written for, and what was seen of them."""
-    if not generator.says_offsets:
-        return drawn
+    """Programs with their offsets, all at once.
+
+    Parameters
+    ----------
+    features
+        For each block in turn, which shapes it was written for and what was seen of them.
+    """
     row = torch.cat([active for active, _ in features])
     block = torch.cat([torch.full_like(active, k) for k, (active, _) in enumerate(features)])
     seen = torch.cat([feature for _, feature in features])
@@ -133,9 +137,9 @@ def _offsets(
     generator: Generator, feature: Float[Tensor, "N F"], ids: Int[Tensor, "N J"], values: Float[Tensor, "N J 7"]
 ) -> Float[Tensor, "N J 7"]:
     """How far the surface of blocks is meant to be from what is drawn of them; zero where a design does not say."""
-    heads = generator.tell(feature, Said(ids, values))[1] if generator.says_offsets else feature
-    found = generator.offsets(heads, ids, values)
-    return torch.zeros_like(values) if found is None else found
+    if not generator.says_offsets:
+        return torch.zeros_like(values)
+    return generator.offsets(generator.tell(feature, Said(ids, values))[1], ids, values)
 
 
 def _helping(

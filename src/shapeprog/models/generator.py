@@ -64,14 +64,14 @@ class Prediction:
         return self.generator.values(self.heads, self.told.ids, self.told.values)
 
     @cached_property
-    def offsets(self) -> Float[Tensor, "M J 7"] | None:
-        """How far the surface is meant to be from what was told, with gradient; none for designs that do not say."""
+    def offsets(self) -> Float[Tensor, "M J 7"]:
+        """How far the surface is meant to be from what was told, with gradient; zero for designs that do not say."""
         return self.generator.offsets(self.heads, self.told.ids, self.told.values)
 
     @property
     def parameters(self) -> Float[Tensor, "B K J 7"]:
         """Parameters of the surface that is meant, with gradient, at their places; zero in blocks that are not live."""
-        meant = self.values if self.offsets is None else self.told.values + self.offsets
+        meant = self.told.values + self.offsets if self.generator.says_offsets else self.values
         full = meant.new_zeros(*self.live.shape, *meant.shape[1:])
         return full.masked_scatter(self.live[..., None, None], meant)
 
@@ -149,13 +149,13 @@ class Generator(nn.Module, ABC):
 
     def offsets(
         self, heads: Tensor, ids: Int[Tensor, "*batch"], told: Float[Tensor, "*batch 7"]
-    ) -> Float[Tensor, "*batch 7"] | None:
-        """How far the surface is meant to be from the parameters, with gradient; ``None`` for designs that do not say.
+    ) -> Float[Tensor, "*batch 7"]:
+        """How far the surface is meant to be from the parameters, with gradient; zero for designs that do not say.
 
         Cells say where something is to a cell, a surface may be anywhere in it.  A block is drawn on the canvas with
         its parameters alone, so that offsets may change without changing what is written next.
         """
-        return None
+        return torch.zeros_like(told)
 
     def offset_weights(self) -> Iterator[nn.Parameter]:
         """The weights that say offsets and nothing else."""

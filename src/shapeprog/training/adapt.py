@@ -134,7 +134,8 @@ class Adaptation:
             each = self._judged(code, targets, random)
             if NEURAL in settings.terms:
                 each[NEURAL] = settings.terms[NEURAL] * self._neural(prediction, code, targets)
-            idle = 0 * prediction.values.sum()  # where nothing is drawn, there is a gradient all the same: none
+            # Where nothing is drawn, numbers and offsets have a gradient all the same: none.
+            idle = 0 * (prediction.values.sum() + values.sum())
             terms = {name: value.mean() + idle for name, value in each.items()}
             if settings.ids != "none":
                 total = torch.stack(list(each.values())).sum(0).detach()

@@ -129,6 +129,7 @@ class AdaptSettings(Settings):
 
 
 OFFSETS = {"learn": "offsets", "rate": 1e-3, "warm_up": 320, "select": "cd"}
+"""Settings with which offsets are learned."""
 
 METHODS: Mapping[str, Mapping[str, object]] = {
     "guided": {

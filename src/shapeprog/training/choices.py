@@ -135,8 +135,7 @@ def alternatives(generator: Generator, feature: Float[Tensor, "M F"], most: int 
         rows = torch.arange(len(feature), device=feature.device)[:, None, None]
         there = heads[rows, which]
         values = generator.values(there, table[chosen]).float()
-        offsets = generator.offsets(there, table[chosen], values)
-    meant = values if offsets is None else values + offsets
+        meant = values + generator.offsets(there, table[chosen], values)
     return Alternatives(table[chosen], among.gather(1, chosen).log_softmax(-1), values, meant)
 
 

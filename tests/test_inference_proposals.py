@@ -216,7 +216,7 @@ def test_a_single_pass_is_what_the_generator_writes():
     solid = cells(CHAIR)
     said = decode(writer, torch.from_numpy(solid.astype(np.uint8))[None], blocks=4)
     found = infer(shape(), blocks=4, generator=writer, search=False)
-    assert found.program == decode_code(said.code)[0] == single_pass(writer, solid, 4)
+    assert found.program == decode_code(said.code)[0] == single_pass(writer, solid, 4)[0]
     assert found.snapped == found.program.snap()
     assert "single pass" in found.reason
     refined = infer(shape(), blocks=4, generator=writer, search=False, schedule=Schedule(steps=2))

@@ -16,7 +16,7 @@ from shapeprog.geometry.occupancy import pack, packed_iou
 from shapeprog.language.canvas import draw_blocks, union
 from shapeprog.language.program import Program
 from shapeprog.language.tensors import Code
-from shapeprog.models.decoding import Choice, decode, programs
+from shapeprog.models.decoding import Choice, decode, programs, whole_programs
 from shapeprog.models.generator import Generator
 
 AT_ONCE = 64
@@ -58,8 +58,7 @@ def generated(
     device = next(generator.parameters()).device
     cells = torch.from_numpy(np.stack([target.voxels for target in targets])).to(device, torch.uint8)
     code, drawn = single_pass(generator, cells, blocks, choose)
-    whole = programs(Code(drawn.ids, drawn.parameters.round()))
-    return [Written(*each) for each in zip(programs(code), whole, strict=True)]
+    return [Written(*each) for each in zip(programs(code), whole_programs(drawn), strict=True)]
 
 
 def evaluate_generator(

@@ -146,8 +146,7 @@ def infer(
             reason += f" The generator took part; the program grew from {grown}."
     else:
         assert writer is not None
-        program = single_pass(writer, target.voxels, blocks)
-        snapped = program.snap()
+        program, snapped = single_pass(writer, target.voxels, blocks)
         scores |= {"generator_seconds": time.monotonic() - started, "proposed": 1.0}
         reason = "A single pass of the generator wrote this; the search would improve it."
     if hindered:

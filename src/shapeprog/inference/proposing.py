@@ -27,7 +27,7 @@ from shapeprog.inference.structure import Proposals
 from shapeprog.language.program import Program
 from shapeprog.models.checkpoint import SHIPPED, SUFFIX, load_generator
 from shapeprog.models.decoding import decode as write
-from shapeprog.models.decoding import programs, suggest
+from shapeprog.models.decoding import programs, suggest, whole_programs
 from shapeprog.models.generator import Generator
 from shapeprog.models.vocabulary import Vocabulary
 from shapeprog.space import RESOLUTION, FloatArray
@@ -94,12 +94,13 @@ def propose_program(
     return Proposals((program,), np.concatenate([np.zeros((0, WIDTH)), *loose]))
 
 
-def single_pass(generator: Generator, voxels: npt.NDArray[np.bool_], blocks: int) -> Program:
-    """The program of at most ``blocks`` blocks that the generator writes in a single pass."""
+def single_pass(generator: Generator, voxels: npt.NDArray[np.bool_], blocks: int) -> tuple[Program, Program]:
+    """The program of at most ``blocks`` blocks that the generator writes in a single pass, and the same as drawn."""
     device = next(generator.parameters()).device
     target = torch.from_numpy(voxels.astype(np.uint8))[None].to(device)
     with single_threaded():
-        return programs(write(generator, target, blocks=blocks).code)[0]
+        said = write(generator, target, blocks=blocks)
+    return programs(said.code)[0], whole_programs(said.drawn)[0]
 
 
 def ready_generator(asked: Generator | str | Path | None, *, needed: bool = False) -> tuple[Generator | None, str]:

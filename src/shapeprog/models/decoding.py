@@ -58,6 +58,11 @@ def programs(code: Code) -> list[Program]:
     return programs_of(Code(code.ids, tidy))
 
 
+def whole_programs(drawn: Code) -> list[Program]:
+    """Programs in whole numbers, as they were drawn on the canvas."""
+    return programs(Code(drawn.ids, drawn.parameters.round()))
+
+
 @torch.no_grad()
 def decode(
     generator: Generator,

@@ -1,0 +1,241 @@
+"""How kernels are declared, compiled and kept: the one convention of all compiled loops.
+
+    @helper
+    def square(x):
+        return x * x
+
+    @kernel("void(f8[::1], f8[::1])")
+    def squares(values, out):
+        for k in range(len(values)):
+            out[k] = square(values[k])
+
+A *kernel* is called from Python and has the one signature it declares, so nothing is ever compiled twice; a call with
+other types is an error.  A *helper* is a plain Python function that kernels call.  Neither needs numba to be imported:
+it is loaded when the first kernel is called.  Compiled kernels are kept in numba's cache; a kernel counts as changed
+when its own code, that of any helper it reaches, or a constant that these read has changed, in whatever file.
+"""
+
+from __future__ import annotations
+
+import gc
+import importlib
+import inspect
+import subprocess
+import sys
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from hashlib import sha256
+from types import CodeType, FunctionType
+from typing import Any
+
+Function = Callable[..., Any]
+
+OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
+"""Kernels run without the interpreter's lock, and divide as numpy does, without a check before each division."""
+
+APART = 2
+"""Kernels to compile from which a second process takes a share of them."""
+
+_lock = threading.RLock()
+_helpers: dict[Function, dict[str, Any]] = {}
+_known: set[Function] = set()
+_kernels: dict[str, Kernel] = {}
+
+
+def helper(function: Function | None = None, **options: Any) -> Any:
+    """Declare a function that only kernels call; it stays a plain Python function.
+
+    Parameters
+    ----------
+    options
+        More options of numba, such as ``fastmath`` or ``inline``.
+    """
+    if function is None:
+        return lambda wanted: helper(wanted, **options)
+    plain = inspect.unwrap(function)
+    _helpers[plain] = options
+    return plain
+
+
+def kernel(signature: str, **options: Any) -> Callable[[Function], Kernel]:
+    """Declare a kernel by its one signature in numba's short words, such as ``"void(f8[:, ::1], i8)"``."""
+    return lambda function: Kernel(inspect.unwrap(function), signature, options)
+
+
+class Kernel:
+    """A compiled function, loaded from the cache or compiled when it is first called.
+
+    Parameters
+    ----------
+    function
+        The loop in Python.
+    signature
+        Its types.
+    options
+        More options of numba.
+    """
+
+    def __init__(self, function: Function, signature: str, options: dict[str, Any]) -> None:
+        self.function, self.signature = function, signature
+        self._options = options
+        self._compiled: Any = None
+        self.__name__, self.__doc__ = function.__name__, function.__doc__
+        self.name = f"{function.__module__}:{function.__qualname__}"
+        _kernels[self.name] = self
+
+    def __call__(self, *arguments: Any) -> Any:
+        """Run it."""
+        if self._compiled is None:
+            self.compile()
+        return self._compiled(*arguments)
+
+    def compile(self) -> None:
+        """Load it from the cache, or compile it and keep it there."""
+        with _lock, _without_collector():
+            if self._compiled is None:
+                dispatcher = self._dispatcher()
+                dispatcher.compile(self._types())
+                dispatcher.disable_compile()
+                self._compiled = dispatcher
+
+    def load(self) -> bool:
+        """Load it from the cache; whether it was there."""
+        with _lock, _without_collector():
+            if self._compiled is None:
+                dispatcher = self._dispatcher()
+                types = self._types()
+                kept = dispatcher._cache.load_overload(types, dispatcher.targetctx)
+                if kept is not None:
+                    dispatcher.add_overload(kept)
+                    dispatcher.targetctx.insert_user_function(kept.entry_point, kept.fndesc, [kept.library])
+                    dispatcher.disable_compile()
+                    self._compiled = dispatcher
+            return self._compiled is not None
+
+    @property
+    def weight(self) -> int:
+        """About how long it takes to compile: its instructions and those of all helpers it reaches."""
+        return sum(len(code.co_code) for code, _ in _reached(self.function))
+
+    def _dispatcher(self) -> Any:
+        numba: Any = importlib.import_module("numba")
+        _declare_helpers()
+        dispatcher = numba.njit(cache=True, **OPTIONS, **self._options)(self.function)
+        # numba looks at the file of the kernel alone; what is compiled is the kernel with all helpers in it
+        stamp = _digest(self.function, f"{numba.__version__}, bounds checked: {numba.config.BOUNDSCHECK}")
+        dispatcher._cache._cache_file._source_stamp = stamp
+        return dispatcher
+
+    def _types(self) -> Any:
+        sigutils: Any = importlib.import_module("numba.core.sigutils")
+        return sigutils.normalize_signature(self.signature)[0]
+
+
+def prepare(modules: Sequence[str], tell: Callable[[str], None] | None = None) -> None:
+    """Make all kernels of some modules ready, so that nobody waits for them later.
+
+    What the cache lacks is compiled by two processes at once.
+
+    Parameters
+    ----------
+    modules
+        Full names of the modules that declare kernels.
+    tell
+        Called with a sentence before anything is compiled, which takes seconds.
+    """
+    wanted = set(modules)
+    for name in modules:
+        importlib.import_module(name)
+    lacking = [each for each in list(_kernels.values()) if each.function.__module__ in wanted and not each.load()]
+    if not lacking:
+        return
+    if tell:
+        tell(f"compiling {len(lacking)} kernels for this machine, which is done once and takes about 20 seconds")
+    mine, other = _halves(lacking)
+    process = None
+    if len(lacking) >= APART:
+        names = [each.name for each in other]
+        command = [sys.executable, "-m", "shapeprog.kernels.compile", *names]
+        process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    try:
+        for each in mine:
+            each.compile()
+        if process is not None:
+            process.wait()
+    finally:
+        if process is not None and process.poll() is None:
+            process.kill()
+            process.wait()
+    for each in other:  # from the cache now; compiled here should the other process have failed
+        each.compile()
+
+
+def _halves(kernels: Sequence[Kernel]) -> tuple[list[Kernel], list[Kernel]]:
+    """Two shares of about the same weight."""
+    shares: tuple[list[Kernel], list[Kernel]] = ([], [])
+    weights = [0, 0]
+    for each in sorted(kernels, key=lambda one: -one.weight):
+        least = 0 if weights[0] <= weights[1] else 1
+        shares[least].append(each)
+        weights[least] += each.weight
+    return shares
+
+
+def _declare_helpers() -> None:
+    """Let kernels call the helpers declared since the last time."""
+    from numba.extending import register_jitable
+
+    for function, options in _helpers.items():
+        if function not in _known:
+            _known.add(function)
+            register_jitable(no_cpython_wrapper=True, **OPTIONS, **options)(function)
+
+
+def _reached(function: Function) -> Iterator[tuple[CodeType, dict[str, Any]]]:
+    """Code and read constants of a function and, one after another, of all helpers that it reaches."""
+    seen: set[Function] = set()
+    stack = [function]
+    while stack:
+        current = stack.pop()
+        if current in seen or not isinstance(current, FunctionType):
+            continue
+        seen.add(current)
+        names = [name for name in current.__code__.co_names if name in current.__globals__]
+        values = {name: current.__globals__[name] for name in names}
+        yield current.__code__, values
+        stack += [value for value in values.values() if isinstance(value, FunctionType)]
+
+
+def _digest(function: Function, compiler: str) -> str:
+    """Changes with the code of a kernel, of its helpers, and with every number or text that these read."""
+    found = sha256(compiler.encode())
+    for code, values in _reached(function):
+        read = sorted((name, repr(value)) for name, value in values.items() if isinstance(value, (int, float, str)))
+        found.update(repr((code.co_name, code.co_code, code.co_consts, code.co_names, read)).encode())
+    return found.hexdigest()
+
+
+@contextmanager
+def _without_collector() -> Iterator[None]:
+    """The compiler makes objects faster than anything else, and the collector only looks through them in vain."""
+    before = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if before:
+            gc.enable()
+
+
+def _main(names: Sequence[str]) -> None:
+    """The second process: compile some kernels into the cache."""
+    from shapeprog.kernels import compile as room  # not the copy of this module that runs as a script
+
+    for name in names:
+        importlib.import_module(name.partition(":")[0])
+        room._kernels[name].compile()
+
+
+if __name__ == "__main__":
+    _main(sys.argv[1:])

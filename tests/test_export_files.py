@@ -18,7 +18,7 @@ from shapeprog.export.colours import colour
 from shapeprog.export.frames import frame_comment, frame_in, upright
 from shapeprog.export.parts import crease_normals, parts, solid
 from shapeprog.export.text import read_program, result_json
-from shapeprog.geometry.cylinder import mesh as cylinder_mesh
+from shapeprog.geometry.primitives.cylinder import mesh as cylinder_mesh
 from shapeprog.language.program import Program
 from shapeprog.language.text import format_program, parse
 from shapeprog.space import Frame, grid_axes

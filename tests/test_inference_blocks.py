@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shapeprog.geometry.occupancy import pack, packed_rows, voxels
+from shapeprog.geometry.cells import pack, rasterise, voxels, words_of
 from shapeprog.inference.block_layout import (
     BACK,
     BOX,
@@ -53,7 +53,7 @@ def random_block(form, random):
 
 
 def rows_of(program):
-    return np.asarray(packed_rows(unroll(program))).reshape(-1)
+    return words_of(rasterise(unroll(program))).reshape(-1)
 
 
 @pytest.mark.parametrize("form", [BOX, DISC, BACK, LINE, CROSS])
@@ -76,7 +76,7 @@ def test_names_change_no_cell():
 def test_gains_count_the_cells_that_a_block_covers():
     random = np.random.default_rng(1)
     occupied, others = random.random((2, 32, 32, 32)) < 0.5
-    gained, wasted = pack(occupied & ~others).reshape(-1), pack(~occupied & ~others).reshape(-1)
+    gained, wasted = words_of(pack(occupied & ~others)).reshape(-1), words_of(pack(~occupied & ~others)).reshape(-1)
     scratch = random.integers(0, 2**32, ROWS, dtype=np.uint32)
     for form in range(5):
         block = random_block(form, random)
@@ -89,7 +89,9 @@ def test_gains_count_the_cells_that_a_block_covers():
         assert gains(scratch, block, gained, wasted) == (
             (cells & occupied & ~others).sum(), (cells & ~occupied & ~others).sum(),
         )  # fmt: skip
-        assert iou_rows(rows, pack(occupied).reshape(-1)) == (cells & occupied).sum() / (cells | occupied).sum()
+        assert (
+            iou_rows(rows, words_of(pack(occupied)).reshape(-1)) == (cells & occupied).sum() / (cells | occupied).sum()
+        )
 
 
 def box(low, size, *loops):

@@ -91,8 +91,8 @@ def _shapes(names: list[str], programs: list[Program], points: int, seed: int) -
     import torch
 
     from shapeprog.data.shape import Shape
-    from shapeprog.geometry.occupancy import voxels
-    from shapeprog.geometry.sampling import sample_surface
+    from shapeprog.geometry.cells import voxels
+    from shapeprog.geometry.surface import sample_surface
     from shapeprog.language.unroll import unroll
 
     scene = unroll(programs)

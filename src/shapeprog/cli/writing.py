@@ -207,7 +207,7 @@ def _write_cells(program: Program, path: Path, resolution: int) -> None:
     import numpy as np
 
     from shapeprog.files import write_bytes
-    from shapeprog.geometry.occupancy import voxels
+    from shapeprog.geometry.cells import voxels
     from shapeprog.language.unroll import unroll
 
     cells = voxels(unroll(program.snap()), resolution).numpy().astype(np.bool_)
@@ -222,7 +222,7 @@ def _write_points(program: Program, frame: Any, path: Path, points: int, seed: i
 
     from shapeprog.export.frames import upright
     from shapeprog.files import atomic_path
-    from shapeprog.geometry.sampling import sample_surface
+    from shapeprog.geometry.surface import sample_surface
     from shapeprog.language.unroll import unroll
 
     place = upright(path.suffix.lower()) if frame is None else frame

@@ -18,7 +18,7 @@ POINTS = 5000
 
 def cells(program: Program) -> npt.NDArray[np.bool_]:
     """The 32^3 cells of a program snapped to the grid, as the measure of the project takes them."""
-    from shapeprog.geometry.occupancy import voxels
+    from shapeprog.geometry.cells import voxels
     from shapeprog.language.unroll import unroll
 
     return voxels(unroll(program.snap())).numpy().astype(np.bool_)
@@ -45,7 +45,7 @@ def write_arrays(program: Program, path: Path, frame: Frame) -> None:
     """
     import torch
 
-    from shapeprog.geometry.sampling import sample_surface
+    from shapeprog.geometry.surface import sample_surface
     from shapeprog.language.tensors import encode
     from shapeprog.language.unroll import unroll
 

@@ -11,7 +11,7 @@ from shapeprog.export.colours import colour
 from shapeprog.export.plan import Heading, Plan, Repetition, Solid, Variable, plan
 from shapeprog.export.symbolic import number
 from shapeprog.files import write_text
-from shapeprog.geometry.cylinder import SEGMENTS
+from shapeprog.geometry.primitives.cylinder import SEGMENTS
 from shapeprog.language.program import Program
 from shapeprog.space import Frame
 

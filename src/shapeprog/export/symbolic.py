@@ -14,8 +14,8 @@ import numpy as np
 import numpy.typing as npt
 import torch
 
+from shapeprog.geometry.batch import Solids
 from shapeprog.geometry.primitive import primitives
-from shapeprog.geometry.scene import Solids
 from shapeprog.language.statement import SLOTS, Statement
 
 Array = npt.NDArray[np.float64]

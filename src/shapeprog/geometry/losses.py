@@ -11,10 +11,10 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
+from shapeprog.geometry.batch import Batch
 from shapeprog.geometry.distance import signed_distance
 from shapeprog.geometry.nearest import mean_squared_distances, squared_distance
 from shapeprog.geometry.primitive import primitives
-from shapeprog.geometry.scene import Scene
 
 Cloud = Float[Tensor, "*batch P 3"]
 Weights = Float[Tensor, "*batch P"]
@@ -69,7 +69,7 @@ def chamfer(
     return chamfer_directions(points, target, weights=weights, target_weights=target_weights).total
 
 
-def coverage(scene: Scene, target: Cloud, *, surface: bool = False) -> Values:
+def coverage(scene: Batch, target: Cloud, *, surface: bool = False) -> Values:
     """How far the target is from the union on average: the paper's coverage loss (equation of section 3.4).
 
     A target point inside a primitive is covered and costs nothing, so alone it is minimised by one box that fills
@@ -90,7 +90,7 @@ def excess(points: Cloud, target: Target, *, weights: Weights | None = None) -> 
     return _mean(torch.sqrt(squared.clamp(min=1e-12)), weights)
 
 
-def volume(scene: Scene) -> Values:
+def volume(scene: Batch) -> Values:
     """Price of volume: the volumes of all primitives added, in cubic cells; overlaps are paid for twice."""
     total = torch.zeros_like(scene.centre[..., 0])
     for kind in torch.unique(scene.kind[scene.mask]).tolist():
@@ -99,7 +99,7 @@ def volume(scene: Scene) -> Values:
     return total.sum(-1)
 
 
-def parts(scene: Scene, presence: Float[Tensor, "*batch N"] | None = None) -> Values:
+def parts(scene: Batch, presence: Float[Tensor, "*batch N"] | None = None) -> Values:
     """Price of parts: how many primitives there are, or are expected where ``presence`` gives their probabilities."""
     mask = scene.mask.to(scene.size)
     return (mask if presence is None else mask * presence).sum(-1)

@@ -18,8 +18,8 @@ from jaxtyping import Float
 from torch import Tensor
 
 from shapeprog.data.shape import Shape
+from shapeprog.geometry.cells import iou, pack, rasterise
 from shapeprog.geometry.distance import union_distance
-from shapeprog.geometry.occupancy import pack, packed_iou, packed_rows
 from shapeprog.inference.blocks import to_program
 from shapeprog.inference.refine import REACH, Schedule, refine
 from shapeprog.inference.structure import Settings, search_structure
@@ -157,7 +157,7 @@ def infer(
             schedule=schedule, reach=REACH, seed=seed, deadline=started + budget, progress=progress,
         )  # fmt: skip
     scores |= {
-        "iou": float(packed_iou(packed_rows(unroll(snapped)), pack(target.voxels))),
+        "iou": float(iou(rasterise(unroll(snapped)), pack(target.voxels))),
         "blocks": float(snapped.blocks),
         "statements": float(snapped.statements),
         "primitives": float(snapped.size),

@@ -24,8 +24,8 @@ from shapeprog.errors import InputError
 from shapeprog.geometry.distance import signed_distance
 from shapeprog.geometry.nearest import squared_distance
 from shapeprog.geometry.primitive import primitives
-from shapeprog.geometry.sampling import sample_surface
 from shapeprog.geometry.scene import Scene
+from shapeprog.geometry.surface import sample_surface
 from shapeprog.language.program import Program
 from shapeprog.language.statement import language
 from shapeprog.language.tensors import Code, decode, encode

@@ -20,8 +20,8 @@ from torch import Tensor, nn
 from shapeprog.data.packs import read_pack
 from shapeprog.errors import ShapeProgError
 from shapeprog.evaluation.generated import code_iou, scores_on_packs
-from shapeprog.geometry.occupancy import pack, packed_iou
-from shapeprog.geometry.sampling import has_surface
+from shapeprog.geometry.cells import iou, pack
+from shapeprog.geometry.surface import has_surface
 from shapeprog.language.tensors import Code
 from shapeprog.language.unroll import Plan
 from shapeprog.models.checkpoint import card_of, load_executor, load_generator, save_checkpoint
@@ -201,9 +201,7 @@ class Adaptation:
         live = prediction.live
         if self._settings.cost == "iou":
             cells, owner = choices.in_place(code, live, other)
-            wanted = torch.from_numpy(pack(targets.cells.cpu().numpy()).view("i4"))[owner.cpu()][:, None]
-            found = packed_iou(cells.cpu().numpy().view("u4"), wanted.numpy().view("u4"))
-            return 1 - torch.from_numpy(found).to(other.chance)
+            return 1 - iou(cells, pack(targets.cells)[owner][:, None]).to(other.chance)
         costs = []
         for choice in range(other.ids.shape[1]):
             trial, owner = choices.replaced(code, live, other, choice)

@@ -17,9 +17,10 @@ from jaxtyping import Bool, Int, UInt8
 from torch import Tensor
 
 from shapeprog.errors import InputError
-from shapeprog.language.canvas import draw_blocks, union, unpacked
+from shapeprog.geometry.cells import union, unpack
 from shapeprog.language.program import Program
 from shapeprog.language.tensors import Code, encode
+from shapeprog.language.unroll import draw_blocks
 from shapeprog.models.vocabulary import Vocabulary
 
 Form = Literal["snapped", "program"]
@@ -125,7 +126,7 @@ def perturbed(
 
 def rendered(code: Code) -> UInt8[Tensor, "B 32 32 32"]:
     """The cells that programs draw."""
-    return unpacked(union(draw_blocks(code)))
+    return unpack(union(draw_blocks(code)))
 
 
 def _read(source: Path, form: Form) -> Iterator[tuple[str, Program]]:

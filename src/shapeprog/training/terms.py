@@ -18,8 +18,8 @@ from torch import Tensor
 from shapeprog.errors import ShapeProgError
 from shapeprog.geometry import losses
 from shapeprog.geometry.distance import signed_distance
-from shapeprog.geometry.sampling import SurfaceSample, sample_surface
 from shapeprog.geometry.scene import Scene
+from shapeprog.geometry.surface import SurfaceSample, sample_surface
 from shapeprog.space import HALF, RESOLUTION
 
 NEURAL = "neural"

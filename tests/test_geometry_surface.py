@@ -2,19 +2,14 @@ import math
 
 import pytest
 import torch
-from geometry_helpers import ellipsoid_kind, make_scene, primitives_restored, random_scene, require, with_leaves
+from geometry_helpers import any_order as any_order
+from geometry_helpers import ellipsoid_kind, make_scene, random_scene, require, with_leaves
 
 from shapeprog.errors import ShapeProgError
-from shapeprog.geometry import sampling as room
-from shapeprog.geometry.arrays import solids
+from shapeprog.geometry import surface as room
+from shapeprog.geometry.arrays import table_of
 from shapeprog.geometry.distance import each_distance
-from shapeprog.geometry.sampling import sample_surface
-
-
-@pytest.fixture(autouse=True)
-def restored():
-    with primitives_restored():
-        yield
+from shapeprog.geometry.surface import sample_surface
 
 
 def seeded(seed=0):
@@ -37,22 +32,21 @@ def test_points_lie_on_their_own_surface_and_in_no_other_part(dtype, user):
 
 def test_the_kernel_draws_what_the_declarations_draw():
     scene = random_scene(2, lead=(3,), slots=6, dtype=torch.float64)
-    shares = room._shares(room._areas(scene), scene)
-    fast, slow = room._by_kernel(solids(scene), shares, 300, 7), room._by_declaration(scene, shares, 300, 7)
-    assert (fast.slot == slow.slot).all()
-    assert (fast.face == slow.face).all()
+    shares = room.area_shares(room.face_areas(scene), scene)
+    fast, slow = room.choose_by_kernel(table_of(scene), shares, 300, 7), room.choose(scene, shares, 300, 7)
+    assert (fast.chosen == slow.chosen).all()
+    assert (fast.found == slow.found).all()
     torch.testing.assert_close(fast.places, slow.places)
 
 
 def test_gradient_of_placing_is_that_of_the_declarations():
     scene, leaves = with_leaves(random_scene(3, lead=(2,), slots=5, dtype=torch.float64))
-    table, areas = solids(scene), room._areas(scene)
-    choice = room._by_kernel(table, room._shares(areas.detach(), scene), 200, 5)
+    table, areas = table_of(scene), room.face_areas(scene)
+    choice = room.choose_by_kernel(table, room.area_shares(areas.detach(), scene), 200, 5)
     slope = torch.randn(2, 200, 3, dtype=torch.float64, generator=seeded())
     weigh = torch.randn(2, 200, dtype=torch.float64, generator=seeded())
-    fast = room._Place.apply(*leaves, areas, table, choice)
-    area = areas.flatten(-2).gather(-1, choice.slot * areas.shape[-1] + choice.face)
-    slow = room._place(scene, choice.slot, choice.unit), area / area.detach()
+    fast = room._Placed.apply(*leaves, areas, table, choice)
+    slow = room.place(scene, areas, choice)
     torch.testing.assert_close(fast, slow)
     fast, slow = (torch.autograd.grad(each, leaves, (slope, weigh), retain_graph=True) for each in (fast, slow))
     for got, expected in zip(fast, slow, strict=True):

@@ -5,7 +5,6 @@ Lengths are in cells, so a chamfer of 1 is a mean squared distance of one cell, 
 
 from __future__ import annotations
 
-import difflib
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -15,7 +14,7 @@ import torch
 from jaxtyping import Float, Int, UInt8
 from torch import Tensor
 
-from shapeprog.errors import ShapeProgError
+from shapeprog.errors import ShapeProgError, did_you_mean
 from shapeprog.geometry import losses
 from shapeprog.geometry.distance import signed_distance
 from shapeprog.geometry.sampling import SurfaceSample, sample_surface
@@ -127,8 +126,7 @@ def parse_terms(text: str) -> dict[str, float]:
         name, _, number = (each.strip() for each in part.partition("="))
         known = [*TERMS, NEURAL]
         if name not in known:
-            near = difflib.get_close_matches(name, known, 1)
-            cure = f"did you mean {near[0]!r}?" if near else f"choose from {', '.join(known)}"
+            cure = did_you_mean(name, known, f"choose from {', '.join(known)}", quoted=True)
             raise ShapeProgError(f"there is no loss {name!r}", cure)
         try:
             weight = float(number or 1)

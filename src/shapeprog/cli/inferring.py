@@ -172,7 +172,7 @@ def _scores(program: Program, snapped: Program, shape: Shape, known: dict[str, f
     """Everything that was said about the program, and how close it comes to the input."""
     from shapeprog.evaluation.metrics import evaluate_program
 
-    measured = evaluate_program(program, shape, snapped, seed=seed)
+    measured = evaluate_program(program, shape, snapped, seed=seed, iou=known.get("iou"))
     found = {"iou": measured.iou, "cd": measured.cd, "noise_floor": measured.noise_floor, "f1": measured.f1}
     sizes = {"blocks": measured.blocks, "statements": measured.statements, "primitives": measured.primitives}
     return terminal.plain({**known, **found, **sizes})

@@ -114,7 +114,13 @@ class Summary:
 
 
 def evaluate_program(
-    program: Program, target: Target, snapped: Program | None = None, points: int = POINTS, seed: int = 0
+    program: Program,
+    target: Target,
+    snapped: Program | None = None,
+    points: int = POINTS,
+    seed: int = 0,
+    *,
+    iou: float | None = None,
 ) -> Metrics:
     """Measure a program against a target.
 
@@ -130,10 +136,13 @@ def evaluate_program(
         Points on each surface.
     seed
         Seed of all samplings; the same seed gives the same figures.
+    iou
+        The IoU where it has been measured already, as inference has.
     """
     scene = unroll(program)
-    rows = packed_rows(unroll(program.snap() if snapped is None else snapped))
-    iou = float(packed_iou(rows, pack(target.voxels)))
+    if iou is None:
+        rows = packed_rows(unroll(program.snap() if snapped is None else snapped))
+        iou = float(packed_iou(rows, pack(target.voxels)))
     to_target, from_target, f1, floor = _distances(scene, target, points, seed)
     return Metrics(
         name=target.name, cd=to_target + from_target, to_target=to_target, from_target=from_target,

@@ -88,16 +88,12 @@ class Comparison:
 
 def _occupancy(seen: Comparison) -> Values:
     """Cross-entropy of soft cells, occupied and empty ones counting alike."""
-    each = torch.nn.functional.binary_cross_entropy_with_logits(seen.logits, seen.wanted, reduction="none")
-    return each.mean(-1)
+    return losses.cell_cross_entropy(seen.logits, seen.wanted).mean(-1)
 
 
 def _soft_iou(seen: Comparison) -> Values:
     """One minus the IoU of soft cells, estimated from those that are looked at."""
-    share, weight = seen.logits.sigmoid(), seen.places[1]
-    both = (share * seen.wanted * weight).sum(-1)
-    either = ((share + seen.wanted - share * seen.wanted) * weight).sum(-1)
-    return 1 - both / either.clamp(min=1e-6)
+    return 1 - losses.weighted_iou(seen.logits.sigmoid(), seen.wanted, seen.places[1])
 
 
 TERMS: dict[str, Callable[[Comparison], Values]] = {

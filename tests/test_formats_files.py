@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import errno
+import importlib
+import inspect
 import json
 import os
 import re
@@ -17,7 +19,7 @@ from shapeprog.cli import main
 from shapeprog.data import load
 from shapeprog.data.loading import ARRAY_SUFFIXES
 from shapeprog.errors import InputError, OutputError, ProgramError
-from shapeprog.formats import FORMATS, export, format_of, listed, load_with_frame, suffixes
+from shapeprog.formats import FORMATS, Format, export, format_of, listed, load_with_frame, suffixes
 from shapeprog.formats.colours import colour
 from shapeprog.formats.frames import frame_comment, frame_in
 from shapeprog.formats.frames import upright as upright_in
@@ -207,6 +209,16 @@ def test_each_suffix_has_one_declaration_and_every_readable_shape_states_its_axe
     assert all(grid_axes(*each.axes).shape == (3, 3) for each in FORMATS if each.axes is not None)
     stated = {suffix for each in FORMATS if each.axes for suffix in each.suffixes}
     assert {*ARRAY_SUFFIXES, ".binvox", ".glb", ".gltf", ".obj", ".off", ".ply", ".stl"} <= stated
+
+
+@pytest.mark.parametrize("each", FORMATS, ids=lambda each: each.name)
+def test_the_functions_that_a_declaration_names_are_there_and_take_its_options(each: Format):
+    for place, first in ((each.reader, ["path"]), (each.writer, ["program", "path", "frame"])):
+        if place:
+            module, _, name = place.partition(":")
+            function = getattr(importlib.import_module(f"shapeprog.formats.{module}"), name)
+            options = each.options if place == each.writer else ()
+            assert list(inspect.signature(function).parameters) == [*first, *options]
 
 
 def test_help_readme_and_errors_list_the_declared_formats(tmp_path: Path, capsys: pytest.CaptureFixture[str]):

@@ -75,55 +75,78 @@ class Format:
 
 FORMATS = (
     Format(
-        "program text", "program", (".shape",), None, "the program, with its frame in a comment where one is known",
-        "shape:read_shape", "shape:write_shape",
+        "program text", "program", (".shape",), None,
+        "the program, with its frame in a comment where one is known",
+        reader="shape:read_shape", writer="shape:write_shape",
     ),
     Format(
-        "JSON", "program", (".json",), None, "the same with names for everything, for other programs to read",
-        "json_form:read_json", "json_form:write_json",
+        "JSON", "program", (".json",), None,
+        "the same with names for everything, for other programs to read",
+        reader="json_form:read_json", writer="json_form:write_json",
     ),
     Format(
-        "notation", "program", (".notation",), None, "the same in the notation of the paper",
-        "notation:read_notation", "notation:write_notation",
+        "notation", "program", (".notation",), None,
+        "the same in the notation of the paper",
+        reader="notation:read_notation", writer="notation:write_notation",
     ),
-    Format("plain text", "program", (".txt",), None, "program text under another suffix", "shape:read_shape"),
     Format(
-        "GLB", "solid", (".glb",), Y_UP, "one named node per part, coloured by statement",
+        "plain text", "program", (".txt",), None,
+        "program text under another suffix",
+        reader="shape:read_shape",
+    ),
+    Format(
+        "GLB", "solid", (".glb",), Y_UP,
+        "one named node per part, coloured by statement",
         writer="meshes:write_glb",
     ),
     Format(
-        "OBJ", "solid", (".obj",), Y_UP, "one object per part, colours in an .mtl file beside it",
+        "OBJ", "solid", (".obj",), Y_UP,
+        "one object per part, colours in an .mtl file beside it",
         writer="meshes:write_obj",
     ),
     Format(
-        "PLY", "solid", (".ply",), Y_UP, "all parts in one mesh, colours at the vertices", writer="meshes:write_ply"
+        "PLY", "solid", (".ply",), Y_UP,
+        "all parts in one mesh, colours at the vertices",
+        writer="meshes:write_ply",
     ),
     Format(
-        "STL", "solid", (".stl",), Z_UP, "the union of all parts: one watertight solid", writer="meshes:write_stl"
+        "STL", "solid", (".stl",), Z_UP,
+        "the union of all parts: one watertight solid",
+        writer="meshes:write_stl",
     ),
     Format(
-        "OpenSCAD", "solid", (".scad",), Z_UP, "loops as loops, numbers as named variables at the top",
+        "OpenSCAD", "solid", (".scad",), Z_UP,
+        "loops as loops, numbers as named variables at the top",
         writer="openscad:write_scad",
     ),
     Format(
-        "build123d", "solid", (".py",), Z_UP, "the same as a Python script, which writes a STEP file when run",
+        "build123d", "solid", (".py",), Z_UP,
+        "the same as a Python script, which writes a STEP file when run",
         writer="build123d:write_script",
     ),
     Format(
         "STEP", "solid", (".step", ".stp"), Z_UP,
-        "named, coloured solids, through build123d (pip install 'shapeprog[step]')", writer="build123d:write_step",
+        "named, coloured solids, through build123d (pip install 'shapeprog[step]')",
+        writer="build123d:write_step",
     ),
-    Format("binvox", "sample", (".binvox",), Y_UP, "the 32^3 cells", writer="samples:write_cells"),
     Format(
-        "NPZ", "sample", (".npz",), GRID, "the 32^3 cells, points with normals, ids, parameters and the frame",
+        "binvox", "sample", (".binvox",), Y_UP,
+        "the 32^3 cells",
+        writer="samples:write_cells",
+    ),
+    Format(
+        "NPZ", "sample", (".npz",), GRID,
+        "the 32^3 cells, points with normals, ids, parameters and the frame",
         writer="samples:write_arrays",
     ),
     Format(
-        "NPY", "sample", (".npy",), GRID, "the cells at any resolution", writer="samples:write_grid",
-        options=("resolution",),
+        "NPY", "sample", (".npy",), GRID,
+        "the cells at any resolution",
+        writer="samples:write_grid", options=("resolution",),
     ),
     Format(
-        "XYZ", "sample", (".xyz",), Z_UP, "points on the surface, one line 'x y z nx ny nz' each",
+        "XYZ", "sample", (".xyz",), Z_UP,
+        "points on the surface, one line 'x y z nx ny nz' each",
         writer="samples:write_points", options=("points", "seed"),
     ),
     Format("OFF", "shape", (".off",), Y_UP, "a mesh"),

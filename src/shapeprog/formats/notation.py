@@ -38,7 +38,10 @@ _REST = re.compile(rf"{_COPIES}\s*:?\s*$")
 
 
 def read_notation(path: Path) -> tuple[Program, Frame | None]:
-    """The program of a file in the notation of the paper, and its frame where a comment keeps it."""
+    """The program of a file in the notation of the paper, and its frame where a comment keeps it.
+
+    What the published printer leaves out is filled in without a word; :func:`parse_notation` can tell.
+    """
     text = read_text(path)
     return parse_notation(text, str(path)), frame_in(text, str(path))
 

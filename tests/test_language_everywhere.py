@@ -9,7 +9,7 @@ import torch
 from declared import MODULES, STATEMENTS, middle, name_of
 
 import shapeprog as sp
-from shapeprog.export import suffixes
+from shapeprog.formats import suffixes
 from shapeprog.geometry.cells import voxels
 from shapeprog.geometry.distance import signed_distance
 from shapeprog.geometry.mesh import part_meshes, union_mesh

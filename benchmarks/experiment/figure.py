@@ -88,7 +88,7 @@ def _coloured_cells(program: Any) -> Any:
     """The cells of a program of whole numbers, each in the colour of the last statement that draws it."""
     from dataclasses import replace
 
-    from shapeprog.export.colours import colour
+    from shapeprog.formats.colours import colour
     from shapeprog.geometry.cells import unpack
     from shapeprog.language.tensors import encode
     from shapeprog.language.unroll import draw_blocks
@@ -110,7 +110,7 @@ def _dots(points: np.ndarray, statements: Sequence[int], seen: np.ndarray, camer
     """Points as dots in the colours of their statements, near ones over far ones, those on far sides pale."""
     from PIL import Image, ImageDraw
 
-    from shapeprog.export.colours import colour
+    from shapeprog.formats.colours import colour
 
     fine = 2
     page = Image.new("RGB", (fine * size, fine * size), "white")

@@ -22,6 +22,8 @@ Target = Float[Tensor, "*batch Q 3"]
 TargetWeights = Float[Tensor, "*batch Q"]
 Values = Float[Tensor, "*batch"]
 Grid = Float[Tensor, "*batch R R R"]
+Row = Float[Tensor, "*batch S"]
+Cells = Float[Tensor, "*cells"]
 
 
 class Chamfer(NamedTuple):
@@ -105,6 +107,17 @@ def parts(scene: Batch, presence: Float[Tensor, "*batch N"] | None = None) -> Va
     return (mask if presence is None else mask * presence).sum(-1)
 
 
+def cell_cross_entropy(logits: Cells, target: Cells, reduction: str = "none") -> Tensor:
+    """Cross-entropy of the occupancy of each cell against what it is in the target, from logits.
+
+    Parameters
+    ----------
+    reduction
+        ``none``, or ``mean`` for the mean over all cells.
+    """
+    return torch.nn.functional.binary_cross_entropy_with_logits(logits, target, reduction=reduction)
+
+
 def occupancy_cross_entropy(logits: Grid, target: Grid) -> Values:
     """Cross-entropy of soft occupancy against target cells, as a mean over cells.
 
@@ -116,16 +129,21 @@ def occupancy_cross_entropy(logits: Grid, target: Grid) -> Values:
         Cells, 0 or 1 or a share between.
     """
     logits = logits.clamp(-1e4, 1e4)
-    loss = torch.nn.functional.binary_cross_entropy_with_logits(logits, target.to(logits), reduction="none")
-    return loss.flatten(-3).mean(-1)
+    return cell_cross_entropy(logits, target.to(logits)).flatten(-3).mean(-1)
 
 
 def soft_iou(occupancy: Grid, target: Grid) -> Values:
     """Intersection over union of soft cells against target cells; 1 when both are empty, exact for hard cells."""
-    target = target.to(occupancy)
-    both = (occupancy * target).flatten(-3).sum(-1)
-    either = (occupancy + target - occupancy * target).flatten(-3).sum(-1)
-    return torch.where(either > 0, both / either.clamp(min=1e-12), 1.0)
+    return weighted_iou(occupancy.flatten(-3), target.to(occupancy).flatten(-3))
+
+
+def weighted_iou(occupancy: Row, target: Row, weights: Row | None = None) -> Values:
+    """The same for some cells in a row, each of which stands for as many as its weight says."""
+    both, either = occupancy * target, occupancy + target - occupancy * target
+    if weights is not None:
+        both, either = both * weights, either * weights
+    shared, all_cells = both.sum(-1), either.sum(-1)
+    return torch.where(all_cells > 0, shared / all_cells.clamp(min=1e-12), 1.0)
 
 
 def _mean(values: Weights, weights: Weights | None) -> Values:

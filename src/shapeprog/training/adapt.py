@@ -21,6 +21,7 @@ from shapeprog.data.packs import read_pack
 from shapeprog.errors import ShapeProgError
 from shapeprog.evaluation.generated import code_iou, scores_on_packs
 from shapeprog.geometry.cells import iou, pack
+from shapeprog.geometry.losses import occupancy_cross_entropy
 from shapeprog.geometry.surface import has_surface
 from shapeprog.language.tensors import Code
 from shapeprog.language.unroll import Plan
@@ -164,9 +165,7 @@ class Adaptation:
         ids = soft.new_zeros(*prediction.live.shape, *soft.shape[1:])
         ids = ids.masked_scatter(prediction.live[..., None, None], soft)
         logits = self._executor.union(ids, code.parameters, prediction.live & (code.ids[..., 0] > 0))
-        wanted = targets.cells.to(logits)
-        each = torch.nn.functional.binary_cross_entropy_with_logits(logits, wanted, reduction="none")
-        return each.flatten(1).mean(1)
+        return occupancy_cross_entropy(logits, targets.cells)
 
     def _chosen(
         self,

@@ -17,10 +17,11 @@ from typing import Literal, NamedTuple
 import torch
 from jaxtyping import Float, Int, UInt8
 from torch import Tensor
-from torch.nn.functional import binary_cross_entropy_with_logits, one_hot
+from torch.nn.functional import one_hot
 
 from shapeprog.data.synthetic import Stream, prior
 from shapeprog.geometry.cells import unpack
+from shapeprog.geometry.losses import cell_cross_entropy
 from shapeprog.language.tensors import Code
 from shapeprog.language.unroll import draw_blocks
 from shapeprog.models.checkpoint import card_of, save_checkpoint
@@ -132,7 +133,7 @@ class ExecutorTraining:
         cells, logits = batch.cells.float(), self._drawn(batch)
         emphasis = OCCUPIED + (self._settings.emphasis - OCCUPIED) * (1 - progress)
         weights = 1 + (emphasis - 1) * cells
-        each = binary_cross_entropy_with_logits(logits, cells, reduction="none")
+        each = cell_cross_entropy(logits, cells)
         chance = logits.sigmoid()
         both, sizes = ((one).flatten(1).sum(-1) for one in (chance * cells, chance + cells))
         dice = (2 * both + 1) / (sizes + 1)

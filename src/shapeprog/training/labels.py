@@ -131,7 +131,8 @@ def rendered(code: Code) -> UInt8[Tensor, "B 32 32 32"]:
 
 def _read(source: Path, form: Form) -> Iterator[tuple[str, Program]]:
     """Names and programs of a file of JSON lines or of a folder."""
-    from shapeprog.language.text import parse, read_text
+    from shapeprog.formats.shape import read_text
+    from shapeprog.language.text import parse
 
     if source.is_dir():
         for path in sorted(source.glob("*.shape")):
@@ -143,7 +144,7 @@ def _read(source: Path, form: Form) -> Iterator[tuple[str, Program]]:
 
 
 def _entry(line: str, form: Form, where: str) -> tuple[str, Program]:
-    from shapeprog.language.json_form import FORMAT, VERSION, program_from_json
+    from shapeprog.formats.json_form import FORMAT, VERSION, program_from_json
     from shapeprog.language.text import parse
 
     try:

@@ -3,21 +3,28 @@
 from __future__ import annotations
 
 import errno
+import importlib
+import inspect
 import json
 import os
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 import trimesh
 
+import shapeprog as sp
+from shapeprog.cli import main
 from shapeprog.data import load
+from shapeprog.data.loading import ARRAY_SUFFIXES
 from shapeprog.errors import InputError, OutputError, ProgramError
-from shapeprog.export import export, suffixes
-from shapeprog.export.colours import colour
-from shapeprog.export.frames import frame_comment, frame_in, upright
-from shapeprog.export.parts import crease_normals, parts, solid
-from shapeprog.export.text import read_program, result_json
+from shapeprog.formats import FORMATS, Format, export, format_of, listed, load_with_frame, suffixes
+from shapeprog.formats.colours import colour
+from shapeprog.formats.frames import frame_comment, frame_in
+from shapeprog.formats.frames import upright as upright_in
+from shapeprog.formats.json_form import result_json
+from shapeprog.formats.parts import crease_normals, parts, solid
 from shapeprog.geometry.primitives.cylinder import mesh as cylinder_mesh
 from shapeprog.language.program import Program
 from shapeprog.language.text import format_program, parse
@@ -30,9 +37,18 @@ for i in translate(2, by=(0, 0, 14)):
         leg(at=(-12, -11, -8), size=(22, 2, 2))
 line(start=(-6, -10, -8), end=(-6, 9, -8), radius=0.75)
 """
+ROOT = Path(__file__).parents[1]
 PROGRAM = parse(TEXT)
 FRAME = Frame.around([1, 2, 3], [3, 4, 4.5], grid_axes("+y", "-z"))
 MESHES = [".glb", ".obj", ".ply", ".stl"]
+
+
+def upright(suffix: str) -> Frame:
+    chosen = format_of(f"a{suffix}")
+    assert chosen is not None
+    frame = upright_in(chosen)
+    assert frame is not None
+    return frame
 
 
 @pytest.mark.parametrize("suffix", MESHES)
@@ -86,15 +102,15 @@ def test_a_program_without_a_frame_stands_upright_for_the_loader(tmp_path: Path)
 
 
 def test_text_and_json_come_back_with_their_frame(tmp_path: Path):
-    for suffix in (".shape", ".json"):
-        assert read_program(export(PROGRAM, tmp_path / f"a{suffix}", FRAME)) == (PROGRAM, FRAME)
-        assert read_program(export(PROGRAM, tmp_path / f"b{suffix}")) == (PROGRAM, None)
+    for suffix in suffixes("program"):
+        assert load_with_frame(export(PROGRAM, tmp_path / f"a{suffix}", FRAME)) == (PROGRAM, FRAME)
+        assert load_with_frame(export(PROGRAM, tmp_path / f"b{suffix}")) == (PROGRAM, None)
     assert (tmp_path / "b.shape").read_text() == format_program(PROGRAM)
     assert json.loads(result_json(PROGRAM, FRAME, reason="done"))["reason"] == "done"
 
 
 def test_binvox_lies_where_the_input_lies(tmp_path: Path):
-    from shapeprog.data.binvox import read_binvox
+    from shapeprog.formats.binvox import read_binvox
 
     cells, corner, cell = read_binvox(export(PROGRAM, tmp_path / "table.binvox", FRAME))
     low, high = np.argwhere(cells).min(0), np.argwhere(cells).max(0) + 1
@@ -145,9 +161,79 @@ def test_errors_say_what_to_do(tmp_path: Path):
         frame_in('# frame: {"scale": -1, "centre": [0, 0, 0], "axes": []}')
     (tmp_path / "cut.json").write_text(result_json(PROGRAM)[:-30])
     with pytest.raises(ProgramError, match="cut off"):
-        read_program(tmp_path / "cut.json")
+        load_with_frame(tmp_path / "cut.json")
     with pytest.raises(InputError, match=r"\.shape or \.json"):
-        read_program(tmp_path / "table.glb")
+        load_with_frame(tmp_path / "table.glb")
+
+
+def test_every_program_file_reads_back_with_its_frame(tmp_path: Path):
+    for suffix in suffixes("program"):
+        path = tmp_path / f"table{suffix}"
+        for frame in (FRAME, None):
+            sp.save(PROGRAM, path, frame)
+            assert sp.load_with_frame(path) == (PROGRAM, frame)
+            assert sp.load(path) == PROGRAM
+    text = tmp_path / "table.txt"
+    text.write_text(TEXT)
+    assert sp.load(text) == PROGRAM
+
+
+def test_files_that_hold_no_program_are_refused_in_words(tmp_path: Path):
+    (tmp_path / "other.json").write_text('{"chair": 4}')
+    with pytest.raises(InputError, match="not in the form 'shapeprog'"):
+        sp.load(tmp_path / "other.json")
+    for name in ("chair.glb", "chair"):
+        with pytest.raises(InputError, match=r"holds no program.*\n.*\.shape or \.json or \.notation"):
+            sp.load(tmp_path / name)
+    with pytest.raises(InputError, match="there is no file"):
+        sp.load(tmp_path / "missing.json")
+    for name in ("chair.glb", "chair.txt", "chair"):
+        with pytest.raises(OutputError, match="could not be read back"):
+            sp.save(PROGRAM, tmp_path / name)
+    assert [each.name for each in tmp_path.iterdir()] == ["other.json"]
+
+
+def test_samples_take_their_options_and_other_formats_refuse_them(tmp_path: Path):
+    assert np.load(export(PROGRAM, tmp_path / "cells.npy", resolution=16)).shape == (16, 16, 16)
+    one, two = (export(PROGRAM, tmp_path / f"{seed}.xyz", FRAME, points=100, seed=seed) for seed in (1, 2))
+    assert np.loadtxt(one).shape == (100, 6)
+    assert (np.loadtxt(one) != np.loadtxt(two)).any()
+    with pytest.raises(OutputError, match=r"\.glb takes no points"):
+        export(PROGRAM, tmp_path / "table.glb", points=100)
+
+
+def test_each_suffix_has_one_declaration_and_every_readable_shape_states_its_axes():
+    every = [suffix for each in FORMATS for suffix in each.suffixes]
+    assert len(every) == len(set(every))
+    assert all(each.axes is None for each in FORMATS if each.kind == "program")
+    assert all(grid_axes(*each.axes).shape == (3, 3) for each in FORMATS if each.axes is not None)
+    stated = {suffix for each in FORMATS if each.axes for suffix in each.suffixes}
+    assert {*ARRAY_SUFFIXES, ".binvox", ".glb", ".gltf", ".obj", ".off", ".ply", ".stl"} <= stated
+
+
+@pytest.mark.parametrize("each", FORMATS, ids=lambda each: each.name)
+def test_the_functions_that_a_declaration_names_are_there_and_take_its_options(each: Format):
+    for place, first in ((each.reader, ["path"]), (each.writer, ["program", "path", "frame"])):
+        if place:
+            module, _, name = place.partition(":")
+            function = getattr(importlib.import_module(f"shapeprog.formats.{module}"), name)
+            options = each.options if place == each.writer else ()
+            assert list(inspect.signature(function).parameters) == [*first, *options]
+
+
+def test_help_readme_and_errors_list_the_declared_formats(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    helped = {}
+    for command in ("export", "render"):
+        with pytest.raises(SystemExit):
+            main([command, "--help"])
+        helped[command] = " ".join(capsys.readouterr().out.replace("│", " ").split())
+    assert " ".join(suffixes()) in helped["export"]
+    assert " ".join(suffixes("sample")) in helped["render"]
+    assert listed() in readme
+    assert listed().splitlines()[0] in str(sp.export.__doc__)
+    with pytest.raises(OutputError, match=re.escape(", ".join(suffixes()))):
+        export(PROGRAM, tmp_path / "table.unheard")
 
 
 def test_step_without_its_library_names_the_extra(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):

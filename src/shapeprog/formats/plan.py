@@ -10,14 +10,13 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
-from shapeprog.export.symbolic import Affine, Piece, Repeat, number, pieces, point, repeat
+from shapeprog.formats.symbolic import Affine, Piece, Repeat, number, pieces, point, repeat
 from shapeprog.language.parameters import Quantity
 from shapeprog.language.program import Loop, Node, Program
 from shapeprog.language.statement import Statement, language
 from shapeprog.language.text import variable
 from shapeprog.language.values import written
-
-Array = npt.NDArray[np.float64]
+from shapeprog.space import FloatArray
 
 
 @dataclass(frozen=True)
@@ -47,7 +46,7 @@ class Solid:
     statement: int
     kind: str
     arguments: tuple[str, ...]
-    axes: Array | None
+    axes: FloatArray | None
     shell: str | None
 
 
@@ -68,8 +67,8 @@ class Plan:
 
     headings: list[Heading] = field(default_factory=list)
     body: list[Solid | Repetition] = field(default_factory=list)
-    shells: dict[str, tuple[Array, npt.NDArray[np.int64]]] = field(default_factory=dict)
-    tables: dict[str, Array] = field(default_factory=dict)
+    shells: dict[str, tuple[FloatArray, npt.NDArray[np.int64]]] = field(default_factory=dict)
+    tables: dict[str, FloatArray] = field(default_factory=dict)
 
     def solids(self) -> Iterator[Solid]:
         """Every solid in the order it is drawn."""

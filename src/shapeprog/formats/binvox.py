@@ -8,16 +8,12 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from shapeprog.errors import InputError
 from shapeprog.files import write_bytes
-from shapeprog.space import HALF, Frame
-
-Array = npt.NDArray[Any]
+from shapeprog.space import HALF, Array, Frame
 
 _CURE = "write the file again; binvox files start with '#binvox 1' and hold runs of 0 and 1"
 

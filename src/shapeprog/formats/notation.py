@@ -11,15 +11,20 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from pathlib import Path
 
-from shapeprog.errors import ProgramError, ShapeProgError
+from shapeprog.errors import ProgramError, ShapeProgError, did_you_mean
+from shapeprog.files import write_text
+from shapeprog.formats.frames import frame_comment, frame_in
+from shapeprog.formats.published import COUNT, Groups, is_published, restored
+from shapeprog.formats.shape import read_text
 from shapeprog.language.parameters import Parameter
 from shapeprog.language.program import Draw, Loop, Node, Program
-from shapeprog.language.published import COUNT, Groups, is_published, restored
 from shapeprog.language.statement import Statement, language
-from shapeprog.language.syntax import DEEPEST, nearest, proper_text
+from shapeprog.language.syntax import DEEPEST, proper_text
 from shapeprog.language.text import INDENT, variable
 from shapeprog.language.values import checked, written
+from shapeprog.space import Frame
 
 _NUMBER = r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?"
 _VALUE = rf"\(\s*{_NUMBER}(?:\s*,\s*{_NUMBER})*\s*,?\s*\)|{_NUMBER}\s*\N{{DEGREE SIGN}}?"
@@ -30,6 +35,20 @@ _TURN = re.compile(r"\s*(?:theta\s*\*\s*[a-z]|axis)\s*(,|\)|$)")
 _DRAW = re.compile(r"draw\s*\(")
 _FOR = re.compile(rf"for\s*\(\s*[a-z]\w*\s*<\s*({_NUMBER})\s*(,|\))")
 _REST = re.compile(rf"{_COPIES}\s*:?\s*$")
+
+
+def read_notation(path: Path) -> tuple[Program, Frame | None]:
+    """The program of a file in the notation of the paper, and its frame where a comment keeps it.
+
+    What the published printer leaves out is filled in without a word; :func:`parse_notation` can tell.
+    """
+    text = read_text(path)
+    return parse_notation(text, str(path)), frame_in(text, str(path))
+
+
+def write_notation(program: Program, path: Path, frame: Frame | None) -> None:
+    """Write a program in the notation of the paper."""
+    write_text(path, frame_comment(frame) + format_notation(program))
 
 
 def format_notation(program: Program) -> str:
@@ -227,7 +246,7 @@ class _Reader:
                 spelled = [_quoted(_words(declared)) for declared in known]
                 what = "loop" if is_loop else "statement"
                 raise ShapeProgError(
-                    f"no {what} is called {_quoted(words) or 'nothing'}", nearest(_quoted(words), spelled)
+                    f"no {what} is called {_quoted(words) or 'nothing'}", did_you_mean(_quoted(words), spelled)
                 )
             return fitting, self._sorted(fitting, found)
         except ShapeProgError as mistake:

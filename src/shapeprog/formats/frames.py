@@ -18,26 +18,23 @@ from typing import Any
 import numpy as np
 
 from shapeprog.errors import InputError
+from shapeprog.formats.format import Format
 from shapeprog.space import Frame, grid_axes
 
-_UP_Z = {".stl", ".scad", ".py", ".step", ".stp"}
-_GRID = {".npz", ".npy"}
 _HEADER = re.compile(r"^#\s*frame:(.*)$", re.MULTILINE)
 _CURE = (
     'write it as # frame: {"scale": 1, "centre": [0, 0, 0], "axes": [[1, 0, 0], [0, 1, 0], [0, 0, 1]]}, or remove it'
 )
 
 
-def upright(suffix: str) -> Frame:
-    """The frame for files of this suffix when none is known: one cell is one unit, up and front as readers expect.
+def upright(chosen: Format) -> Frame | None:
+    """The frame for files of a format when none is known: one cell is one unit, up and front as the format says.
 
-    Meshes are +Y up with the front towards +Z, as glTF asks; STL and CAD formats +Z up with the front towards -Y;
-    arrays keep the grid's axes.
+    Program files go without.
     """
-    if suffix in _GRID:
-        return Frame()
-    axes = grid_axes("+z", "-y") if suffix in _UP_Z else grid_axes("+y", "+z")
-    return Frame(axes=tuple((float(a), float(b), float(c)) for a, b, c in axes))
+    if chosen.axes is None:
+        return None
+    return Frame(axes=tuple((float(a), float(b), float(c)) for a, b, c in grid_axes(*chosen.axes)))
 
 
 def frame_dict(frame: Frame) -> dict[str, Any]:
@@ -67,9 +64,9 @@ def frame_from(data: Any, name: str) -> Frame:
     return Frame(scale, (centre[0], centre[1], centre[2]), tuple((a, b, c) for a, b, c in axes))
 
 
-def frame_comment(frame: Frame) -> str:
-    """The line that keeps a frame in program text."""
-    return f"# frame: {json.dumps(frame_dict(frame))}\n"
+def frame_comment(frame: Frame | None) -> str:
+    """The line that keeps a frame in program text; nothing where there is no frame."""
+    return "" if frame is None else f"# frame: {json.dumps(frame_dict(frame))}\n"
 
 
 def frame_in(text: str, name: str = "<program>") -> Frame | None:

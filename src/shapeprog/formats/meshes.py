@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from shapeprog.export.colours import colour
-from shapeprog.export.parts import Faces, Part, Vertices, crease_normals, drawn_parts, solid
 from shapeprog.files import write_bytes, write_text
+from shapeprog.formats.colours import colour
+from shapeprog.formats.parts import Faces, Part, Vertices, crease_normals, drawn_parts, solid
 from shapeprog.language.program import Program
 from shapeprog.space import Frame
 

@@ -8,19 +8,45 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 from typing import Any, NoReturn
 
 import torch
 
-from shapeprog.errors import InputError, ProgramError, ShapeProgError
+from shapeprog.errors import InputError, ProgramError, ShapeProgError, did_you_mean
+from shapeprog.files import write_text
+from shapeprog.formats.frames import frame_dict, frame_from
+from shapeprog.formats.shape import read_text
 from shapeprog.language.program import Draw, Loop, Node, Program
 from shapeprog.language.statement import SLOTS, Statement, language
-from shapeprog.language.syntax import DEEPEST, nearest, proper_text
+from shapeprog.language.syntax import DEEPEST, proper_text
 from shapeprog.language.tensors import Code
 from shapeprog.language.values import checked, written
+from shapeprog.space import Frame
 
 FORMAT, CODE_FORMAT = "shapeprog", "shapeprog-code"
 VERSION = 1
+
+
+def read_json(path: Path) -> tuple[Program, Frame | None]:
+    """The program of a JSON file, and its frame where it keeps one."""
+    text = read_text(path)
+    program = program_from_json(text, str(path))
+    kept = json.loads(text.removeprefix("\ufeff")).get("frame")
+    return program, None if kept is None else frame_from(kept, str(path))
+
+
+def write_json(program: Program, path: Path, frame: Frame | None) -> None:
+    """Write the JSON form."""
+    write_text(path, result_json(program, frame))
+
+
+def result_json(program: Program, frame: Frame | None = None, **more: Any) -> str:
+    """The JSON form of a program with its frame and whatever else there is to say, such as scores."""
+    content = json.loads(program_to_json(program))
+    if frame is not None:
+        content["frame"] = frame_dict(frame)
+    return json.dumps({**content, **more}, indent=2, allow_nan=False) + "\n"
 
 
 def program_to_json(program: Program, indent: int | None = 2) -> str:
@@ -155,7 +181,7 @@ def _node(entry: Any, name: str, place: str, depth: int) -> Node:
         raise InputError(f"{name}: {place} is not a statement", 'write {"statement": name, "parameters": {...}}')
     known, word = language(), entry["statement"]
     if word not in known:
-        raise InputError(f"{name}: {place}: no statement is called {word!r}", nearest(word, known.names))
+        raise InputError(f"{name}: {place}: no statement is called {word!r}", did_you_mean(word, known.names))
     declared = known[word]
     allowed = {"statement", "parameters", "body"} if declared.is_loop else {"statement", "parameters"}
     extra = sorted(set(entry) - allowed)
@@ -173,7 +199,7 @@ def _values(declared: Statement, given: Any, name: str, place: str) -> tuple[flo
         raise InputError(f"{name}: {place}: {declared.name} lacks its parameters", f"they are {', '.join(words)}")
     for word in given:
         if word not in words:
-            raise InputError(f"{name}: {place}: {declared.name} has no parameter {word!r}", nearest(word, words))
+            raise InputError(f"{name}: {place}: {declared.name} has no parameter {word!r}", did_you_mean(word, words))
     values: list[float] = []
     for parameter in declared.parameters:
         if parameter.name not in given:

@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 
 from shapeprog.errors import OutputError
-from shapeprog.export.colours import colour
-from shapeprog.export.parts import drawn_parts
-from shapeprog.export.plan import Repetition, Solid, Variable, plan
-from shapeprog.export.symbolic import number
 from shapeprog.files import atomic_path, write_text
+from shapeprog.formats.colours import colour
+from shapeprog.formats.parts import drawn_parts
+from shapeprog.formats.plan import Repetition, Solid, Variable, plan
+from shapeprog.formats.symbolic import number
 from shapeprog.language.program import Program
 from shapeprog.space import Frame
 

@@ -13,11 +13,11 @@ import pytest
 import torch
 import trimesh
 
-from shapeprog.export import export
-from shapeprog.export.build123d import script_text
-from shapeprog.export.openscad import scad_text
-from shapeprog.export.parts import parts, solid
-from shapeprog.export.plan import Repetition, plan
+from shapeprog.formats import export
+from shapeprog.formats.build123d import script_text
+from shapeprog.formats.openscad import scad_text
+from shapeprog.formats.parts import parts, solid
+from shapeprog.formats.plan import Repetition, plan
 from shapeprog.geometry.primitive import Primitive, primitives
 from shapeprog.geometry.primitives.cuboid import CUBOID
 from shapeprog.language import Draw, Language, Loop, Program, language, loop, statement, unroll, using

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
-from shapeprog.export.colours import colour
-from shapeprog.export.plan import Heading, Plan, Repetition, Solid, Variable, plan
-from shapeprog.export.symbolic import number
 from shapeprog.files import write_text
+from shapeprog.formats.colours import colour
+from shapeprog.formats.plan import Heading, Plan, Repetition, Solid, Variable, plan
+from shapeprog.formats.symbolic import number
 from shapeprog.geometry.primitives.cylinder import SEGMENTS
 from shapeprog.language.program import Program
 from shapeprog.space import Frame

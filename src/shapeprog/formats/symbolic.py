@@ -17,8 +17,8 @@ import torch
 from shapeprog.geometry.batch import Solids
 from shapeprog.geometry.primitive import primitives
 from shapeprog.language.statement import SLOTS, Statement
+from shapeprog.space import FloatArray
 
-Array = npt.NDArray[np.float64]
 Measure = Callable[[torch.Tensor], "list[_Measured]"]
 
 STEP = 0.5
@@ -67,8 +67,8 @@ class Piece:
 
     kind: str
     groups: tuple[tuple[Affine, ...], ...]
-    axes: Array | None = None
-    vertices: Array | None = None
+    axes: FloatArray | None = None
+    vertices: FloatArray | None = None
     faces: npt.NDArray[np.int64] | None = None
 
 
@@ -117,7 +117,7 @@ class Repeat:
     turn: Affine | None = None
     even: bool = False
     shift: tuple[Affine, ...] | None = None
-    table: Array | None = None
+    table: FloatArray | None = None
 
     @property
     def turns(self) -> bool:
@@ -128,7 +128,7 @@ class Repeat:
 def repeat(declared: Statement, values: Sequence[float], quarter: bool) -> tuple[Repeat, frozenset[int]]:
     """The motion of a loop as expressions in its slots, and the slots that are fixed (the count is never)."""
 
-    def moved(rows: torch.Tensor, copy: torch.Tensor) -> Array:
+    def moved(rows: torch.Tensor, copy: torch.Tensor) -> FloatArray:
         assert declared.move is not None
         flags = torch.full((len(rows),), quarter)
         motion = declared.move(copy, flags, **declared.split(rows))
@@ -173,10 +173,10 @@ class _Measured:
 
     kind: str
     widths: tuple[int, ...]
-    linear: Array
-    still: Array
-    axes: Array | None = None
-    vertices: Array | None = None
+    linear: FloatArray
+    still: FloatArray
+    axes: FloatArray | None = None
+    vertices: FloatArray | None = None
     faces: npt.NDArray[np.int64] | None = None
 
 
@@ -246,7 +246,7 @@ class _Probe:
         return Affine(constant if abs(constant) > 1e-9 else 0.0, tuple(terms))
 
 
-def _evaluate(measure: Measure, rows: Array) -> tuple[list[_Measured], Array, Array]:
+def _evaluate(measure: Measure, rows: FloatArray) -> tuple[list[_Measured], FloatArray, FloatArray]:
     with torch.no_grad():
         parts = measure(torch.from_numpy(rows))
     linear = np.concatenate([part.linear for part in parts], 1)

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from shapeprog.errors import ShapeProgError
-from shapeprog.language.notation import groups
+from shapeprog.errors import ShapeProgError, did_you_mean
+from shapeprog.formats.notation import groups
 from shapeprog.language.parameters import Parameter
 from shapeprog.language.statement import Statement, language
-from shapeprog.language.syntax import nearest
 from shapeprog.language.values import range_text, signature
 
 _UNITS = {"position": "cells", "length": "cells", "shift": "cells", "count": "copies", "turn": "quarter turns"}
@@ -27,7 +26,7 @@ def manual(name: str | None = None) -> str:
         loops = [declared for declared in known if declared.is_loop]
         return "\n".join([*_index("Statements", drawing), "", *_index("Loops", loops), ""])
     if name not in known:
-        raise ShapeProgError(f"no statement is called {name!r}", nearest(name, known.names))
+        raise ShapeProgError(f"no statement is called {name!r}", did_you_mean(name, known.names))
     return page(known[name])
 
 

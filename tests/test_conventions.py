@@ -7,6 +7,7 @@ import importlib
 import re
 import subprocess
 import sys
+from graphlib import TopologicalSorter
 from pathlib import Path
 
 import pytest
@@ -79,6 +80,34 @@ def test_rooms_on_one_floor_import_each_other_one_way_only() -> None:
                 if name.startswith("shapeprog.") and other != room and FLOORS.get(other) == FLOORS.get(room):
                     pairs.add((room, other))
     assert [pair for pair in pairs if pair[::-1] in pairs] == []
+
+
+def module_of(path: Path) -> str:
+    return ".".join(path.relative_to(SOURCE.parent).with_suffix("").parts).removesuffix(".__init__")
+
+
+def test_no_files_import_each_other_in_a_circle() -> None:
+    """Imports inside functions count too: an import that must wait is a circle all the same."""
+    modules = {module_of(path): path for path in FILES}
+    graph: dict[str, set[str]] = {}
+    for module, path in modules.items():
+        names = [name for node in ast.walk(tree_of(path)) for name in imported(node)]
+        found = {name if name in modules else name.rpartition(".")[0] for name in names}
+        graph[module] = found & modules.keys() - {module}
+    TopologicalSorter(graph).prepare()  # says which files are in a circle
+
+
+def test_the_core_imports_inside_functions_only_what_is_heavy() -> None:
+    wrong = []
+    for path in FILES:
+        if FLOORS.get(room_of(path), EDGE) > FLOORS["language"]:
+            continue
+        for function in ast.walk(tree_of(path)):
+            for node in ast.walk(function) if isinstance(function, ast.FunctionDef) else ():
+                heavy = {name.split(".")[0] for name in imported(node)} <= HEAVY | LAZY
+                if not heavy and module_of(path) not in ("shapeprog.kernels.compile",):
+                    wrong.append(place(path, node))
+    assert wrong == []
 
 
 def test_only_the_edges_print() -> None:

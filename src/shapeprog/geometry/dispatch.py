@@ -21,7 +21,7 @@ def _by_kind(question: str, arguments: str) -> Callable[..., Any]:
     for number, name in enumerate(answers):
         condition = f"if table[row, {KIND}] == {number}: " if number < len(answers) - 1 else ""
         lines.append(f"    {condition}return {name}(table, row{arguments})")
-    made: dict[str, Any] = dict(answers)
+    made: dict[str, Any] = {"__name__": __name__, **answers}
     exec("\n".join(lines), made)
     return helper(made[question])
 

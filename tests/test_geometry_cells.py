@@ -135,7 +135,7 @@ def test_packed_cells_hold_every_cell_and_are_the_same_on_every_device(resolutio
     cells = random_cells(resolution, (2,) if resolution > 100 else (2, 3))
     packed = pack(cells)
     assert packed.dtype == torch.int32
-    assert packed.shape == (*cells.shape[:-2], resolution * -(-resolution // 32))
+    assert packed.shape == (*cells.shape[:-3], -(-resolution // 32) * resolution, resolution)
     assert (unpack(packed) == cells).all()
     assert (unpack.twin(packed) == cells).all()
     assert (pack_rows(cells) == pack_rows.twin(cells)).all()

@@ -45,7 +45,7 @@ def test_every_kernel_takes_every_number(numbers):
     slots = nearest_slot(scene, points)
     assert ((slots >= 0) & (slots < 6)).all()
     assert rasterise(scene).shape == (2, 32, 32)
-    assert rasterise(scene, 40).shape == (2, 40, 80)
+    assert rasterise(scene, 40).shape == (2, 80, 40)
     try:
         sample = sample_surface(scene, 20)
         torch.autograd.grad(sample.points.sum() + sample.weights.sum(), leaves)

@@ -59,7 +59,8 @@ def numbers(tensor: Tensor) -> Array:
 
 def cast(values: Array, like: Tensor) -> Tensor:
     """An array as a tensor of another's type, cast by numpy: torch wakes threads that stand in the way of kernels."""
-    return torch.from_numpy(np.ascontiguousarray(values, array(like).dtype))
+    with np.errstate(over="ignore"):  # beyond single precision is infinite
+        return torch.from_numpy(np.ascontiguousarray(values, array(like).dtype))
 
 
 def table_of(batch: Batch) -> Array:

@@ -90,6 +90,8 @@ class Batch:
     def flatten(self: Some) -> Some:
         """The same with exactly one batch dimension."""
         lead, count = len(self.batch_shape), self.batch_shape.numel()
+        if lead == 1:
+            return self
         tensors = {field.name: getattr(self, field.name) for field in fields(self)}
         return type(self)(**{name: tensor.reshape(count, *tensor.shape[lead:]) for name, tensor in tensors.items()})
 

@@ -49,7 +49,7 @@ def _fill_turned(planes, plane, row, half, low, high):
 
     Primitives are convex, so the cells of a row are a stretch: it is found for the box and its ends are tested.
     """
-    resolution, reach = planes.shape[1], 0.0
+    resolution, reach = planes.shape[2], 0.0
     half[0], half[1], half[2] = bound(row, 0)
     for axis in range(3):
         reach = 0.0
@@ -74,28 +74,30 @@ def _fill_turned(planes, plane, row, half, low, high):
             fill_row(planes, plane, i, j, first, last)
 
 
-@kernel("void(f8[:, ::1], i8[::1], i8, u4[:, :, ::1], i8, i8)")
+@kernel("void(f8[:, ::1], i8[::1], i8, u4[:, :, :, ::1], i8, i8)")
 def fill(table, owner, many, planes, begin, end):
-    """Fill planes of words (P, R, R * W) with the cells of scenes ``begin`` to ``end``, of ``many`` rows each.
+    """Fill planes of words (P, W, R, R) with the cells of scenes ``begin`` to ``end``, of ``many`` rows each.
 
     Each row of the table has its owner: the plane that its cells go to.
     """
-    resolution = planes.shape[1]
+    resolution = planes.shape[2]
+    scale, origin = resolution / 32, resolution / 2
     row, half = np.empty((1, WIDTH)), np.empty(3)
     low, high = np.empty(3, np.int64), np.empty(3, np.int64)
     for item in range(begin * many, end * many):
         if table[item, KIND] < 0:
             continue
         total, square = 0.0, True
-        for column in range(WIDTH):
-            value = table[item, column]
-            if column >= ROTATION:
-                square = square and abs(value - np.rint(value)) <= SQUARE
-            elif column >= CENTRE:
-                value = value * (resolution / 32) + resolution / 2
-            elif column >= SIZE:
-                value *= resolution / 32
-            row[0, column] = value
+        row[0, KIND] = table[item, KIND]
+        for column in range(SIZE, CENTRE):
+            row[0, column] = table[item, column] * scale
+            total += row[0, column]
+        for column in range(CENTRE, ROTATION):
+            row[0, column] = table[item, column] * scale + origin
+            total += row[0, column]
+        for column in range(ROTATION, WIDTH):
+            row[0, column] = value = table[item, column]
+            square = square and abs(value - np.rint(value)) <= SQUARE
             total += value
         if math.isfinite(total) and not cells(row, 0, square, planes, owner[item], low, high):
             _fill_turned(planes, owner[item], row, half, low, high)

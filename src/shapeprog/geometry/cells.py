@@ -1,7 +1,8 @@
 """Cells of the grid, packed: 32 to a word, so that a union is one ``|`` and a grid of 32^3 takes 4 kB.
 
-Packed cells are int32 tensors (..., R, R * W): for every height and depth the W = R / 32 words, rounded up, of a row
-along left-right, lowest cell in the lowest bit.  On the CPU kernels do the work, elsewhere their twins in torch.
+Packed cells are int32 tensors (..., W * R, R): a row of R cells along left-right takes W = R / 32 words, rounded up,
+the lowest cell in the lowest bit; the first words of the rows at all heights and depths come first, then the second.
+On the CPU kernels do the work, elsewhere their twins in torch.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ WORD = 32
 AT_ONCE = 1 << 21
 """Cells, or words, that are worked on together."""
 
-Cells = Int[Tensor, "*batch R words"]
+Cells = Int[Tensor, "*batch words R"]
 """Packed cells."""
 
 _SPREAD: npt.NDArray[np.uint64] = (
@@ -44,7 +45,7 @@ def rasterise(batch: Batch, resolution: int = RESOLUTION) -> Cells:
 
 
 def rasterise_apart(batch: Batch, part: Int[Tensor, "*batch N"], parts: int, resolution: int = RESOLUTION) -> Cells:
-    """The packed cells (..., parts, R, R * W) of groups of primitives, each on its own.
+    """The packed cells (..., parts, W * R, R) of groups of primitives, each on its own.
 
     Parameters
     ----------
@@ -85,7 +86,7 @@ def cells_of(words: npt.NDArray[np.uint32]) -> Cells:
 
 def pack(voxels: Shaped[Tensor, "*batch R R R"] | Array) -> Cells:
     """Packed cells of grids of cells, given as booleans or as 1 and 0."""
-    packed: Cells = pack_rows(torch.as_tensor(voxels) != 0).flatten(-2)
+    packed: Cells = pack_rows(torch.as_tensor(voxels) != 0).movedim(-1, -3).flatten(-3, -2)
     return packed
 
 
@@ -103,20 +104,24 @@ def pack_rows(rows: Bool[Tensor, "*batch places"]) -> Int[Tensor, "*batch words"
 
 
 def _unpack_by_kernel(cells: Cells) -> UInt8[Tensor, "*batch R R R"]:
-    resolution = cells.shape[-2]
-    words = words_of(cells).reshape(-1)
+    rows = _rows(cells)
+    words = words_of(rows).reshape(-1)
     eights = np.empty((len(words), 4), np.uint64)
     over_threads(lambda first, last: kernels.unpack(words, _SPREAD, eights, first, last), len(words), least=1 << 15)
-    voxels = torch.from_numpy(eights.view(np.uint8)).reshape(*cells.shape[:-1], resolution, -1)
-    return voxels[..., :resolution].contiguous()
+    voxels = torch.from_numpy(eights.view(np.uint8)).reshape(*rows.shape[:-1], -1)
+    return voxels[..., : cells.shape[-1]].contiguous()
 
 
 @twin_of(_unpack_by_kernel)
 def unpack(cells: Cells) -> UInt8[Tensor, "*batch R R R"]:
     """Grids of cells, 1 or 0, of packed ones."""
-    resolution = cells.shape[-2]
-    bits = (cells[..., None] >> torch.arange(WORD, dtype=torch.int32, device=cells.device)) & 1
-    return bits.to(torch.uint8).reshape(*cells.shape[:-1], resolution, -1)[..., :resolution]
+    bits = (_rows(cells)[..., None] >> torch.arange(WORD, dtype=torch.int32, device=cells.device)) & 1
+    return bits.to(torch.uint8).flatten(-2)[..., : cells.shape[-1]]
+
+
+def _rows(cells: Cells) -> Int[Tensor, "*batch R R W"]:
+    """The words of every row side by side."""
+    return cells.unflatten(-2, (-1, cells.shape[-1])).movedim(-3, -1)
 
 
 def _count_by_numpy(cells: Cells) -> Int[Tensor, "*batch"]:
@@ -145,7 +150,7 @@ def iou(one: Cells, two: Cells) -> Float[Tensor, "*batch"]:
     return torch.where(either > 0, both / either.clamp(min=1), 1.0)
 
 
-def union(parts: Int[Tensor, "*batch K R words"]) -> Cells:
+def union(parts: Int[Tensor, "*batch K words R"]) -> Cells:
     """The cells of all parts together."""
     cells = torch.zeros_like(parts[..., 0, :, :])
     for part in parts.unbind(-3):
@@ -153,7 +158,7 @@ def union(parts: Int[Tensor, "*batch K R words"]) -> Cells:
     return cells
 
 
-def preceding(parts: Int[Tensor, "*batch K R words"]) -> Int[Tensor, "*batch K R words"]:
+def preceding(parts: Int[Tensor, "*batch K words R"]) -> Int[Tensor, "*batch K words R"]:
     """For each part, the cells of all parts before it."""
     cells = torch.zeros_like(parts)
     for k in range(1, parts.shape[-3]):
@@ -163,49 +168,49 @@ def preceding(parts: Int[Tensor, "*batch K R words"]) -> Int[Tensor, "*batch K R
 
 def widen(cells: Cells) -> Cells:
     """All cells that share a face with a filled one, and these themselves."""
-    resolution = cells.shape[-2]
-    rows = cells.unflatten(-1, (resolution, -1))
-    up, down = rows << 1, (rows >> 1) & 0x7FFFFFFF  # the sign must not be drawn in
-    up[..., 1:] |= (rows[..., :-1] >> 31) & 1
-    down[..., :-1] |= rows[..., 1:] << 31
-    wide = rows | up | down
+    resolution = cells.shape[-1]
+    words = cells.unflatten(-2, (-1, resolution))
+    wide = words | (words << 1) | ((words >> 1) & 0x7FFFFFFF)  # the sign must not be drawn in
+    wide[..., 1:, :, :] |= (words[..., :-1, :, :] >> 31) & 1
+    wide[..., :-1, :, :] |= words[..., 1:, :, :] << 31
     if resolution % WORD:
-        wide[..., -1] &= (1 << resolution % WORD) - 1
-    wide[..., 1:, :, :] |= rows[..., :-1, :, :]
-    wide[..., :-1, :, :] |= rows[..., 1:, :, :]
-    wide[..., 1:, :] |= rows[..., :-1, :]
-    wide[..., :-1, :] |= rows[..., 1:, :]
-    return wide.flatten(-2)
+        wide[..., -1, :, :] &= (1 << resolution % WORD) - 1
+    wide[..., 1:, :] |= words[..., :-1, :]
+    wide[..., :-1, :] |= words[..., 1:, :]
+    wide[..., 1:] |= words[..., :-1]
+    wide[..., :-1] |= words[..., 1:]
+    return wide.flatten(-3, -2)
 
 
-def _filled(flat: Batch, plane: Int[Tensor, "B N"], planes: int, resolution: int) -> Int[Tensor, "planes R words"]:
+def _filled(flat: Batch, plane: Int[Tensor, "B N"], planes: int, resolution: int) -> Int[Tensor, "planes words R"]:
     if resolution < 1:
         raise ShapeProgError(f"a grid of {resolution} cells a side holds nothing", "ask for a resolution of 1 or more")
-    cells = torch.zeros(planes, resolution, resolution * -(-resolution // WORD), dtype=torch.int32, device=flat.device)
-    (fill_by_kernel if by_kernel(flat.mask) else fill)(flat.detach(), plane, cells)
+    cells = torch.zeros(planes, -(-resolution // WORD) * resolution, resolution, dtype=torch.int32, device=flat.device)
+    (fill_by_kernel if by_kernel(flat.mask) else fill)(flat, plane, cells)
     return cells
 
 
-def fill_by_kernel(flat: Batch, plane: Int[Tensor, "B N"], cells: Int[Tensor, "planes R words"]) -> None:
+def fill_by_kernel(flat: Batch, plane: Int[Tensor, "B N"], cells: Int[Tensor, "planes words R"]) -> None:
     """Add the cells of all primitives to the planes that they name, by the kernel as far as it knows them."""
-    table, owner, words = table_of(flat), array(plane).reshape(-1), words_of(cells)
+    table, owner = table_of(flat), array(plane).reshape(-1)
+    words = words_of(cells.unflatten(-2, (-1, cells.shape[-1])))
     many, scenes = flat.mask.shape[-1], len(flat)
     over_threads(lambda first, last: kernels.fill(table, owner, many, words, first, last), scenes, least=32)
     _fill_kinds(flat, plane, cells, declared_kinds(flat))
 
 
-def fill(flat: Batch, plane: Int[Tensor, "B N"], cells: Int[Tensor, "planes R words"]) -> None:
+def fill(flat: Batch, plane: Int[Tensor, "B N"], cells: Int[Tensor, "planes words R"]) -> None:
     """The same from the declarations, for any kind of primitive on any device; the twin of the kernel."""
     _fill_kinds(flat, plane, cells, flat.kinds)
 
 
 def _fill_kinds(flat: Batch, plane: Tensor, cells: Tensor, kinds: list[int]) -> None:
     """Primitives whose rule is to fill rows are filled row by row, the others tested cell by cell."""
-    resolution = cells.shape[-2]
+    resolution = cells.shape[-1]
     scale, origin = resolution / RESOLUTION, resolution / 2
     for kind in kinds:
         declared, here = primitives[kind], flat.mask & (flat.kind == kind)
-        size, centre, rotation = (each[here].double() for each in (flat.size, flat.centre, flat.rotation))
+        size, centre, rotation = (each.detach()[here].double() for each in (flat.size, flat.centre, flat.rotation))
         size, centre = declared.cell_size(size * scale), centre * scale + origin
         finite = torch.cat([size, centre, rotation.flatten(1)], -1).isfinite().all(-1)
         size, centre, rotation, target = size[finite], centre[finite], rotation[finite], plane[here][finite]
@@ -220,7 +225,7 @@ def _fill_kinds(flat: Batch, plane: Tensor, cells: Tensor, kinds: list[int]) -> 
 
 def _fill_rows(cells: Tensor, plane: Int[Tensor, " M"], *covers: Float[Tensor, "M R"]) -> None:
     """Add solids to their planes: the first of each plane together, then the second, and so on."""
-    resolution = cells.shape[-2]
+    resolution = cells.shape[-1]
     order = plane.argsort()
     plane = plane[order]
     rank = torch.arange(len(plane), device=plane.device) - torch.searchsorted(plane, plane)
@@ -231,8 +236,8 @@ def _fill_rows(cells: Tensor, plane: Int[Tensor, " M"], *covers: Float[Tensor, "
             layers = (places >= up) & (places < top)
             depth = (places >= front[..., None]) & (places < rear[..., None]) & layers[..., None]
             side = (places >= left[..., None]) & (places < right[..., None])
-            words = pack_rows.twin(side)  # type: ignore[attr-defined]
-            cells[plane[part]] |= torch.where(depth[..., None], words[:, :, None], 0).flatten(-2)
+            words = pack_rows.twin(side).movedim(-1, 1)  # type: ignore[attr-defined]
+            cells[plane[part]] |= torch.where(depth[:, None], words[..., None], 0).flatten(1, 2)
 
 
 def _fill_tested(
@@ -245,13 +250,15 @@ def _fill_tested(
 ) -> None:
     """Add the cells whose centre is inside, looking at those in the boxes around the solids."""
     reach = (rotation.abs() @ declared.bound(size)[..., None])[..., 0]
-    words = cells.shape[-1] // cells.shape[-2]
-    for owner, index in _within(centre - reach, centre + reach, cells.shape[-2]):
+    resolution = cells.shape[-1]
+    for owner, index in _within(centre - reach, centre + reach, resolution):
         offset = index + 0.5 - centre[owner]
         inside = declared.distance((rotation[owner].mT @ offset[..., None])[..., 0], size[owner]) <= 0
         up, depth, side = index[inside].unbind(-1)
-        row = ((plane[owner[inside]] * cells.shape[-2] + up) * cells.shape[-2] + depth) * words + side // WORD
-        bit = torch.unique(row * WORD + side % WORD)  # each bit once, so that adding bits is joining them
+        row = plane[owner[inside]] * cells.shape[-2] + side // WORD * resolution + up
+        bit = torch.unique(
+            (row * resolution + depth) * WORD + side % WORD
+        )  # each bit once, so that adding bits is joining them
         added = torch.zeros_like(cells).flatten().index_add(0, bit // WORD, (1 << bit % WORD).to(torch.int32))
         cells |= added.view_as(cells)
 

@@ -23,7 +23,7 @@ def _by_kind(question: str, arguments: str) -> Callable[..., Any]:
         lines.append(f"    {condition}return {name}(table, row{arguments})")
     made: dict[str, Any] = {"__name__": __name__, **answers}
     exec("\n".join(lines), made)
-    return helper(made[question])
+    return helper(made[question], forceinline=True)
 
 
 distance = _by_kind("distance", ", a, b, c")

@@ -127,20 +127,18 @@ def nearest(table, many, points, count, slots, values, begin, end):
             slots[item], values[item] = 0, np.inf
             continue
         x, y, z = points[item, 0], points[item, 1], points[item, 2]
-        if not abs(x) + abs(y) + abs(z) + extent < FARTHEST:
-            for n in range(used):
-                lower[n] = -np.inf
-            values[item], found = _best(table, scene * many, all_kept, lower, used, x, y, z)
-            slots[item], px = all_kept[found], np.inf
-            continue
-        if (x - px) * (x - px) + (y - py) * (y - py) + (z - pz) * (z - pz) < STRIDE * STRIDE:
+        far = not abs(x) + abs(y) + abs(z) + extent < FARTHEST
+        if not far and (x - px) * (x - px) + (y - py) * (y - py) + (z - pz) * (z - pz) < STRIDE * STRIDE:
             if number == 0:
                 number = _few(all_kept, all_box, lower, used, least + 2 * STRIDE + 1e-3, kept, box)
             of, some, those = number, kept, box
         else:
             px, py, pz, number = x, y, z, 0
             of, some, those = used, all_kept, all_box
-        _bounds(those, of, x, y, z, extent, up, depth, lower)
+        if far:
+            lower[:of], px = -np.inf, np.inf
+        else:
+            _bounds(those, of, x, y, z, extent, up, depth, lower)
         best, found = _best(table, scene * many, some, lower, of, x, y, z)
         slots[item], values[item] = some[found], best
         if number == 0:

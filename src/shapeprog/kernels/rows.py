@@ -1,4 +1,4 @@
-"""Rows of cells that kernels fill: planes of words (B, R, R * W), the W words of a row side by side.
+"""Rows of cells that kernels fill: planes of words (P, W, R, R), W of them for every row.
 
 Positions are in cells from the low corner of the grid, so cell k covers [k, k + 1) and its centre is k + 0.5.
 """
@@ -24,17 +24,15 @@ def clip(value, high):
 @helper
 def fill_row(planes, plane, i, j, first, last):
     """Fill the cells ``first`` to ``last - 1`` of one row."""
-    start = j * (planes.shape[2] // planes.shape[1])
     for word in range(first >> 5, (last + 31) >> 5):
-        planes[plane, i, start + word] |= span(first - 32 * word, last - 32 * word)
+        planes[plane, word, i, j] |= span(first - 32 * word, last - 32 * word)
 
 
 @helper
 def fill_box(planes, plane, low, high):
     """Fill the cells from ``low`` to ``high`` (excluded) along the three axes."""
-    words = planes.shape[2] // planes.shape[1]
     for word in range(low[2] >> 5, (high[2] + 31) >> 5):
         bits = span(low[2] - 32 * word, high[2] - 32 * word)
         for i in range(low[0], high[0]):
             for j in range(low[1], high[1]):
-                planes[plane, i, j * words + word] |= bits
+                planes[plane, word, i, j] |= bits

@@ -230,10 +230,13 @@ def bound_kernel(table: Array, row: int) -> tuple[float, float, float]:
 
 @helper
 def excess_kernel(table: Array, row: int, a: float, b: float, c: float) -> float:
-    """How far a point is beyond the farthest pair of faces; the lean is measured along depth."""
-    half_up = table[row, SIZE]
-    lean = table[row, SIZE + 3] / 2 * a / half_up if half_up > 0 else 0.0
-    return max(max(abs(a) - half_up, abs(b - lean) - table[row, SIZE + 1]), abs(c) - table[row, SIZE + 2])
+    """How far a point is beyond the caps, the ends, or the slanted faces, there times the half height."""
+    half_up, half_depth = table[row, SIZE], table[row, SIZE + 1]
+    over_up = abs(a) - half_up
+    if over_up > 0:
+        return over_up
+    over_depth = abs(b * half_up - a * (table[row, SIZE + 3] / 2)) - half_depth * half_up
+    return max(max(over_up, over_depth), abs(c) - table[row, SIZE + 2])
 
 
 @helper
@@ -286,7 +289,7 @@ def cells_kernel(table: Array, row: int, square: bool, planes: Array, plane: int
     """Twin of :func:`spans`; fills nothing where a length is not positive."""
     if table[row, SIZE] <= 0 or table[row, SIZE + 1] <= 0 or table[row, SIZE + 2] <= 0:
         return True
-    resolution, lean = planes.shape[1], table[row, SIZE + 3]
+    resolution, lean = planes.shape[2], table[row, SIZE + 3]
     if not square or (lean != 0 and abs(table[row, ROTATION]) < 0.5):
         return False
     for axis in range(3):

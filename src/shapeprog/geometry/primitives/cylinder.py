@@ -137,8 +137,8 @@ def bound_kernel(table: Array, row: int) -> tuple[float, float, float]:
 @helper
 def excess_kernel(table: Array, row: int, a: float, b: float, c: float) -> float:
     """How far a point is beyond the caps, or its squared distance from the axis beyond that of the side."""
-    radius = table[row, SIZE + 1]
-    return max(abs(a) - table[row, SIZE], b * b + c * c - radius * radius)
+    over, radius = abs(a) - table[row, SIZE], table[row, SIZE + 1]
+    return over if over > 0 else max(over, b * b + c * c - radius * radius)
 
 
 @helper
@@ -183,7 +183,7 @@ def cells_kernel(table: Array, row: int, square: bool, planes: Array, plane: int
     table[row, SIZE + 1] *= REACH
     if not square or abs(table[row, ROTATION]) < 0.5:
         return False
-    resolution, half, reach = planes.shape[1], table[row, SIZE], table[row, SIZE + 1]
+    resolution, half, reach = planes.shape[2], table[row, SIZE], table[row, SIZE + 1]
     up, depth, side = table[row, CENTRE], table[row, CENTRE + 1], table[row, CENTRE + 2]
     bottom, top = clip(np.ceil(up - half - 0.5), resolution), clip(np.floor(up + half + 0.5), resolution)
     for j in range(clip(depth - reach - 0.5, resolution), clip(np.ceil(depth + reach + 0.5), resolution)):

@@ -20,6 +20,7 @@ from torch import Tensor
 from shapeprog.data.shape import Shape
 from shapeprog.geometry.distance import union_distance
 from shapeprog.geometry.occupancy import pack, packed_iou, packed_rows
+from shapeprog.inference.block_layout import COUNT1, COUNT2, EXTENT, WIDTH
 from shapeprog.inference.blocks import to_program
 from shapeprog.inference.refine import REACH, Schedule, refine
 from shapeprog.inference.structure import Settings, search_structure
@@ -170,12 +171,19 @@ def infer(
 def prepare_kernels() -> None:
     """Compile, or load from the cache, all kernels that inference runs, so that no time budget pays for it.
 
-    The first call on a machine takes some tens of seconds, the first in a process well below one.
+    The first call on a machine takes some seconds, the first in a process a fraction of one.
     """
-    cells = np.zeros((RESOLUTION,) * 3, np.bool_)
-    cells[14:18, 14:18, 14:18] = True
-    found = search_structure(cells, Settings(blocks=2, rounds=2, forms=1.0, recall=1.0))
-    refine(to_program(found.blocks), torch.from_numpy(points_of_cells(cells)), schedule=Schedule(steps=1))
+    from shapeprog.kernels.compile import prepare
+    from shapeprog.kernels.modules import GEOMETRY, INFERENCE
+
+    prepare(INFERENCE)
+    if not GEOMETRY:  # until the kernels of geometry are converted; then this goes
+        block = np.zeros((1, WIDTH))
+        block[:, COUNT1] = block[:, COUNT2] = 1
+        block[:, EXTENT : EXTENT + 3] = 4
+        cells = np.zeros((RESOLUTION,) * 3, np.bool_)
+        cells[14:18, 14:18, 14:18] = True
+        refine(to_program(block), torch.from_numpy(points_of_cells(cells)), schedule=Schedule(steps=1))
 
 
 def _load(shape: Shape | str | Path) -> Shape:

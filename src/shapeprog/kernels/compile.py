@@ -34,8 +34,11 @@ Function = Callable[..., Any]
 OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 """Kernels run without the interpreter's lock, and divide as numpy does, without a check before each division."""
 
-APART = 2
+APART = 3
 """Kernels to compile from which a second process takes a share of them."""
+
+SECONDS_PER_BYTE = 5e-4
+"""About how long compiling takes for each byte of the instructions of a function."""
 
 _lock = threading.RLock()
 _helpers: dict[Function, dict[str, Any]] = {}
@@ -113,10 +116,9 @@ class Kernel:
                     self._compiled = dispatcher
             return self._compiled is not None
 
-    @property
-    def weight(self) -> int:
-        """About how long it takes to compile: its instructions and those of all helpers it reaches."""
-        return sum(len(code.co_code) for code, _ in _reached(self.function))
+    def weights(self) -> dict[CodeType, int]:
+        """Bytes of instructions of its function and of each helper it reaches; compiling takes about as long."""
+        return {code: len(code.co_code) for code, _ in _reached(self.function)}
 
     def _dispatcher(self) -> Any:
         numba: Any = importlib.import_module("numba")
@@ -150,16 +152,18 @@ def prepare(modules: Sequence[str], tell: Callable[[str], None] | None = None) -
     lacking = [each for each in list(_kernels.values()) if each.function.__module__ in wanted and not each.load()]
     if not lacking:
         return
+    shares, heaviest = _shares(lacking, 2 if len(lacking) >= APART else 1)
     if tell:
-        tell(f"compiling {len(lacking)} kernels for this machine, which is done once and takes about 20 seconds")
-    mine, other = _halves(lacking)
+        seconds = max(1, round(heaviest * SECONDS_PER_BYTE))
+        tell(f"compiling {len(lacking)} kernels for this machine, which is done once and takes about {seconds} s")
     process = None
-    if len(lacking) >= APART:
-        names = [each.name for each in other]
-        command = [sys.executable, "-m", "shapeprog.kernels.compile", *names]
-        process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    if len(shares) > 1:
+        command = [sys.executable, "-m", "shapeprog.kernels.compile", *(each.name for each in shares[1])]
+        process = subprocess.Popen(
+            command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+        )  # fmt: skip
     try:
-        for each in mine:
+        for each in shares[0]:
             each.compile()
         if process is not None:
             process.wait()
@@ -167,19 +171,23 @@ def prepare(modules: Sequence[str], tell: Callable[[str], None] | None = None) -
         if process is not None and process.poll() is None:
             process.kill()
             process.wait()
-    for each in other:  # from the cache now; compiled here should the other process have failed
+    for each in lacking:  # from the cache now; compiled here should the other process have failed
         each.compile()
 
 
-def _halves(kernels: Sequence[Kernel]) -> tuple[list[Kernel], list[Kernel]]:
-    """Two shares of about the same weight."""
-    shares: tuple[list[Kernel], list[Kernel]] = ([], [])
-    weights = [0, 0]
-    for each in sorted(kernels, key=lambda one: -one.weight):
-        least = 0 if weights[0] <= weights[1] else 1
+def _shares(kernels: Sequence[Kernel], number: int) -> tuple[list[list[Kernel]], int]:
+    """Kernels in shares that take about as long, and the weight of the heaviest.
+
+    A helper is compiled once for all kernels of a share, so kernels with the same helpers tend to stay together.
+    """
+    shares: list[list[Kernel]] = [[] for _ in range(number)]
+    compiled: list[dict[CodeType, int]] = [{} for _ in range(number)]
+    for each in sorted(kernels, key=lambda one: -sum(one.weights().values())):
+        weights = each.weights()
+        least = min(range(number), key=lambda k: sum((compiled[k] | weights).values()))
         shares[least].append(each)
-        weights[least] += each.weight
-    return shares
+        compiled[least] |= weights
+    return shares, max(sum(each.values()) for each in compiled)
 
 
 def _declare_helpers() -> None:

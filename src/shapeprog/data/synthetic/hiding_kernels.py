@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from shapeprog.geometry.compiling import kernel
+from shapeprog.kernels.compile import kernel
 
 
-@kernel
+@kernel("void(u4[:, :, ::1], b1[:, ::1], u4[:, ::1], i8, i8)")
 def unhide(blocks, keep, union, begin, end):
     """Of the blocks (B, K, words), mark in (B, K) those with cells of their own, and gather what they draw.
 

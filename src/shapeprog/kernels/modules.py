@@ -1,0 +1,35 @@
+"""Which modules hold the kernels of a piece of work: what :func:`shapeprog.kernels.compile.prepare` is given.
+
+They are named, not imported: kernels are the lowest room.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+# Until the kernels of geometry are converted they are made ready by a dummy refinement; then this line goes.
+_CONVERTED = (Path(__file__).parents[1] / "geometry" / "cell_kernels.py").exists()
+
+GEOMETRY = (
+    "shapeprog.geometry.distance_kernels",
+    "shapeprog.geometry.surface_kernels",
+    "shapeprog.geometry.cell_kernels",
+    "shapeprog.geometry.neighbour_kernels",
+) * _CONVERTED
+"""Distances, samples, cells and neighbours of scenes."""
+
+INFERENCE = (
+    *GEOMETRY,
+    "shapeprog.inference.chance_kernels",
+    "shapeprog.inference.raster_kernels",
+    "shapeprog.inference.descent_kernels",
+    "shapeprog.inference.form_kernels",
+    "shapeprog.inference.proposal_kernels",
+)
+"""Search and refinement of a program."""
+
+READING = ("shapeprog.data.voxelise_kernels",)
+"""Meshes and points into cells."""
+
+PICTURES = ("shapeprog.view.raster_kernels",)
+"""Pictures of shapes and programs."""

@@ -21,11 +21,12 @@ import numpy as np
 import torch
 from scipy.spatial import cKDTree
 
+from shapeprog.geometry.cells import iou, rasterise, voxels
 from shapeprog.geometry.distance import each_distance, signed_distance
 from shapeprog.geometry.losses import chamfer, coverage
-from shapeprog.geometry.occupancy import cell_centres, packed_iou, packed_rows, soft_occupancy, voxels
-from shapeprog.geometry.sampling import sample_surface
+from shapeprog.geometry.occupancy import cell_centres, soft_occupancy
 from shapeprog.geometry.scene import Scene
+from shapeprog.geometry.surface import sample_surface
 from shapeprog.language import Code, Draw, Loop, Program, encode, unroll
 
 POINTS = 5000
@@ -128,18 +129,18 @@ def bench_voxels(batch: int) -> None:
     base = "numpy slices, one primitive at a time"
     report(f"hard voxels as uint8, batch {batch}, from the scene", clock(lambda: voxels(scene), 15), per, "us/program",
            base, slices)  # fmt: skip
-    report(f"hard voxels as bits, batch {batch}, from the scene", clock(lambda: packed_rows(scene), 15), per,
+    report(f"hard voxels as bits, batch {batch}, from the scene", clock(lambda: rasterise(scene), 15), per,
            "us/program", base, slices)  # fmt: skip
     both = clock(lambda: voxels(unroll(code)), 7)
     report(f"hard voxels as uint8, batch {batch}, from the program tensors", both, per, "us/program")
     report(f"unroll, batch {batch}", clock(lambda: unroll(code), 7), per, "us/program")
-    rows, cells = packed_rows(scene), voxels(scene).numpy().astype(bool)
-    other = np.roll(rows, 1, 0).copy(), np.roll(cells, 1, 0)
+    rows, cells = rasterise(scene), voxels(scene).numpy().astype(bool)
+    other = rows.roll(1, 0), np.roll(cells, 1, 0)
     slow = clock(
         lambda: [np.logical_and(a, b).sum() / np.logical_or(a, b).sum() for a, b in zip(cells, other[1], strict=True)],
         2,
     )
-    report("IoU of packed grids", clock(lambda: packed_iou(rows, other[0])), per, "us/pair", "numpy bool", slow)
+    report("IoU of packed grids", clock(lambda: iou(rows, other[0])), per, "us/pair", "numpy bool", slow)
 
 
 def _slices(scene: Scene) -> np.ndarray:

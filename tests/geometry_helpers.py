@@ -4,10 +4,14 @@ import dataclasses
 from contextlib import contextmanager
 
 import numpy as np
+import pytest
 import torch
 
 from shapeprog.geometry.primitive import Primitive, primitives, safe_norm
+from shapeprog.geometry.primitives import BUILT_IN, built_in_names
 from shapeprog.geometry.scene import Scene
+
+NAMES = tuple(primitive.name for primitive in BUILT_IN)
 
 
 def make_scene(kinds, sizes, centres, rotation=None, dtype=torch.float32, lead=()):
@@ -23,17 +27,16 @@ def make_scene(kinds, sizes, centres, rotation=None, dtype=torch.float32, lead=(
     return Scene(*(part.expand(*lead, *part.shape) for part in parts))
 
 
-def random_scene(seed, lead=(), slots=5, dtype=torch.float32, user=False):
-    """Turned and upright cuboids, sheared ones and cylinders; the last slot is padding."""
+def random_scene(seed, lead=(), slots=5, dtype=torch.float32, user=False, names=NAMES):
+    """Primitives of these names, turned and upright, sheared cuboids among them; the last slot is padding."""
     g = torch.Generator().manual_seed(seed)
-    kinds = 3 if user else 2
-    if user:
-        ellipsoid_kind()
-    kind = torch.randint(0, kinds, (*lead, slots), generator=g)
+    kinds = torch.tensor([*map(primitives.kind, names), *([ellipsoid_kind()] if user else [])])
+    kind = kinds[torch.randint(0, len(kinds), (*lead, slots), generator=g)]
     if user:
         kind[..., 0] = ellipsoid_kind()
     size = torch.rand(*lead, slots, 4, generator=g, dtype=torch.float64) * 4 + 0.5
-    size[..., 3] = torch.where(torch.rand(*lead, slots, generator=g) < 0.5, size[..., 3] - 2, 0) * (kind == 0)
+    size[..., 3] = torch.where(torch.rand(*lead, slots, generator=g) < 0.5, size[..., 3] - 2, 0)
+    size[..., 3] *= kind == primitives.kind("cuboid")
     centre = torch.rand(*lead, slots, 3, generator=g, dtype=torch.float64) * 16 - 8
     rotation = torch.linalg.qr(torch.randn(*lead, slots, 3, 3, generator=g, dtype=torch.float64))[0]
     upright = torch.rand(*lead, slots, generator=g) < 0.4
@@ -88,7 +91,7 @@ def _ball_normal(size, unit, face):
 def ellipsoid_kind():
     """Index of the test's ellipsoid, declared on first use."""
     name = "test_ellipsoid"
-    if name not in [each.name for each in primitives]:
+    if name not in primitives.names:
         primitives.register(
             Primitive(
                 name, ("r_up", "r_depth", "r_side"), 3,
@@ -105,9 +108,32 @@ def ellipsoid_kind():
     return primitives.kind(name)
 
 
+@pytest.fixture(autouse=True, params=["as registered", "the other way round"])
+def any_order(request):
+    """Every law holds whatever number a primitive has; import this fixture to have it so."""
+    with primitives_restored():
+        if request.param == "as registered":
+            yield
+        else:
+            with primitives_in_another_order():
+                yield
+
+
 @contextmanager
 def primitives_restored():
     """Forget afterwards what was declared inside, so that no other test sees it."""
-    known = list(primitives)
-    yield
-    primitives._kinds[:] = known
+    with primitives.using(built_in_names()):
+        yield
+
+
+@contextmanager
+def primitives_in_another_order():
+    """The built-in primitives as if they had been registered the other way round."""
+    known, names = list(primitives._kinds), dict(primitives.names)
+    primitives._kinds[: len(BUILT_IN)] = reversed(BUILT_IN)
+    primitives.names.update({name: len(BUILT_IN) - 1 - names[name] for name in built_in_names()})
+    try:
+        yield
+    finally:
+        primitives._kinds[:] = known
+        primitives.names.update(names)

@@ -17,8 +17,7 @@ import trimesh
 
 from shapeprog import inference
 from shapeprog.cli import main, terminal
-from shapeprog.export import export
-from shapeprog.export.text import read_program
+from shapeprog.formats import export, load_with_frame
 from shapeprog.language.text import parse
 from shapeprog.space import Frame, grid_axes
 
@@ -193,7 +192,7 @@ def test_the_baseline_runs_greedy_boxes(run: Run, tmp_path: Path):
     ended = run("infer", table(tmp_path / "table.obj"), "--baseline", "--blocks", 3, "--no-picture")
     assert ended.code == 0, ended.err
     assert "greedy boxes" in ended.out
-    assert read_program(tmp_path / "shapeprog-out" / "table.json")[0].blocks == 3
+    assert load_with_frame(tmp_path / "shapeprog-out" / "table.json")[0].blocks == 3
 
 
 @pytest.fixture

@@ -15,12 +15,11 @@ from shapeprog.data import read_pack
 from shapeprog.data.synthetic import PRIORS, Prior, Stream, prior, read_programs, write_programs
 from shapeprog.data.synthetic.hiding import with_own_cells, with_own_cells_by_torch
 from shapeprog.errors import InputError, OutputError, ShapeProgError
-from shapeprog.geometry.occupancy import voxels
+from shapeprog.geometry.cells import preceding, voxels
 from shapeprog.language import Language, standard, using
-from shapeprog.language.canvas import draw_blocks, so_far
 from shapeprog.language.statement import END
 from shapeprog.language.tensors import Code, decode
-from shapeprog.language.unroll import unroll
+from shapeprog.language.unroll import draw_blocks, unroll
 from shapeprog.space import HALF, SPAN
 
 TRANSLATE, ROTATE = 19, 20
@@ -74,8 +73,8 @@ def test_empty_blocks_come_last_and_unused_numbers_are_zero(each: Prior) -> None
 def test_every_block_has_cells_of_its_own(each: Prior) -> None:
     code = drawn(each, 1)
     blocks = draw_blocks(code)
-    after = so_far(blocks.flip(1)).flip(1)
-    own = (blocks & ~(so_far(blocks) | after)).flatten(2).any(-1)
+    after = preceding(blocks.flip(1)).flip(1)
+    own = (blocks & ~(preceding(blocks) | after)).flatten(2).any(-1)
     assert torch.equal(own, statements(code))
 
 

@@ -6,8 +6,8 @@ import pytest
 import torch
 
 from shapeprog.evaluation.metrics import Metrics, evaluate_program, summarise, target_samples, world_scale
+from shapeprog.geometry.cells import voxels
 from shapeprog.geometry.mesh import union_mesh
-from shapeprog.geometry.occupancy import voxels
 from shapeprog.language import Draw, Loop, Program, unroll
 
 TABLE = Program(

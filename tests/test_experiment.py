@@ -17,7 +17,7 @@ from benchmarks.experiment.recipes import CATEGORIES, RECIPES
 from benchmarks.experiment.stages import Experiment, Run, runs
 from benchmarks.experiment.tables import DIRECT, GUIDED, ORDER, cell, reached, table
 from shapeprog.cli import main
-from shapeprog.geometry.occupancy import voxels
+from shapeprog.geometry.cells import voxels
 from shapeprog.language.statement import language
 from shapeprog.language.tensors import Code
 from shapeprog.language.unroll import unroll

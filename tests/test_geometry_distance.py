@@ -1,18 +1,13 @@
 import pytest
 import torch
-from geometry_helpers import ellipsoid_kind, make_scene, primitives_restored, random_scene, require, with_leaves
+from geometry_helpers import any_order as any_order
+from geometry_helpers import ellipsoid_kind, make_scene, random_scene, require, with_leaves
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from shapeprog.geometry import distance as room
 from shapeprog.geometry.distance import each_distance, nearest_slot, signed_distance, union_distance
 from shapeprog.geometry.primitive import primitives
-
-
-@pytest.fixture(autouse=True)
-def restored():
-    with primitives_restored():
-        yield
 
 
 def cloud(seed, count=200, lead=(), dtype=torch.float64, reach=12):
@@ -41,9 +36,9 @@ def test_the_way_without_kernels_is_the_same(user):
     points = cloud(0, lead=(2,), dtype=torch.float32)
     expected = each_distance(scene, points).min(-1)
     torch.testing.assert_close(signed_distance(scene, points), expected.values, rtol=1e-5, atol=1e-5)
-    torch.testing.assert_close(room._gathered_distance(scene, points), expected.values, rtol=1e-5, atol=1e-5)
+    torch.testing.assert_close(room.gathered_distance(scene, points), expected.values, rtol=1e-5, atol=1e-5)
     torch.testing.assert_close(union_distance(scene, points), expected.values, rtol=1e-5, atol=1e-5)
-    slot, value = room._nearest_pairs(scene, points)
+    slot, value = room.nearest_of_pairs(scene, points)
     assert (slot == expected.indices).all()
     torch.testing.assert_close(value, expected.values)
     assert (nearest_slot(scene, points) == expected.indices).double().mean() > 0.99

@@ -1,17 +1,13 @@
 import pytest
 import torch
-from geometry_helpers import ellipsoid_kind, make_scene, primitives_restored, random_scene, require, with_leaves
+from geometry_helpers import any_order as any_order
+from geometry_helpers import ellipsoid_kind, make_scene, random_scene, require, with_leaves
 
+from shapeprog.geometry.cells import voxels
 from shapeprog.geometry.distance import each_distance
 from shapeprog.geometry.losses import coverage, excess, occupancy_cross_entropy, parts, soft_iou, volume
-from shapeprog.geometry.occupancy import cell_centres, soft_logits, soft_occupancy, voxels
+from shapeprog.geometry.occupancy import cell_centres, soft_logits, soft_occupancy
 from shapeprog.language import Draw, Loop, Program, unroll
-
-
-@pytest.fixture(autouse=True)
-def restored():
-    with primitives_restored():
-        yield
 
 
 @pytest.mark.parametrize("user", [False, True])

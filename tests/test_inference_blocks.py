@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shapeprog.geometry.occupancy import pack, packed_rows, voxels
+from shapeprog.geometry.cells import pack, rasterise, voxels, words_of
 from shapeprog.inference.block_layout import (
     BACK,
     BOX,
@@ -26,7 +26,7 @@ from shapeprog.inference.block_layout import (
 )
 from shapeprog.inference.blocks import to_program
 from shapeprog.inference.descent_kernels import layers
-from shapeprog.inference.drawing import count, draw_all, draw_each, places
+from shapeprog.inference.drawing import cells_shared, draw_all, draw_each, places
 from shapeprog.language.unroll import unroll
 
 
@@ -46,14 +46,14 @@ def random_block(form, random):
     if form in (LINE, CROSS) and random.random() < 0.5:
         block[ROTATE] = random.integers(1, 7)
         return block
-    for count, shift in ((COUNT1, SHIFT1), (COUNT2, SHIFT2)):
-        block[count] = random.integers(1, 4)
+    for slot, shift in ((COUNT1, SHIFT1), (COUNT2, SHIFT2)):
+        block[slot] = random.integers(1, 4)
         block[shift : shift + 3] = random.integers(-7, 8, 3)
     return block
 
 
 def rows_of(program):
-    return np.asarray(packed_rows(unroll(program))).reshape(-1)
+    return words_of(rasterise(unroll(program))).reshape(-1)
 
 
 @pytest.mark.parametrize("form", [BOX, DISC, BACK, LINE, CROSS])
@@ -78,7 +78,7 @@ def test_the_cells_that_blocks_cover_are_counted_and_lie_within_their_layers():
     first, second = random.random((2, 32, 32, 32)) < 0.5
     blocks = np.stack([random_block(form, random) for form in range(5)])
     drawn = draw_each(blocks)
-    counts = count(drawn, pack(first).reshape(-1), pack(second).reshape(-1))
+    counts = cells_shared(drawn, words_of(pack(first)).reshape(-1), words_of(pack(second)).reshape(-1))
     for rows, block, (one, other) in zip(drawn, blocks, counts, strict=True):
         cells = voxels(unroll(to_program(block[None]))).numpy().astype(bool)
         low, high = layers(block)

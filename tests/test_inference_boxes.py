@@ -7,7 +7,7 @@ import itertools
 import numpy as np
 import pytest
 
-from shapeprog.geometry.occupancy import voxels as voxels_of
+from shapeprog.geometry.cells import voxels as voxels_of
 from shapeprog.inference.box_kernels import heaviest
 from shapeprog.inference.families import MIRROR, families
 from shapeprog.inference.fold_kernels import VOLUMES, mirrors, search_family

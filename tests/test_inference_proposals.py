@@ -14,7 +14,7 @@ from test_inference_search import CHAIR, SHELF, STAR, TABLE, cells, target
 from shapeprog.cli import main
 from shapeprog.data.shape import Shape
 from shapeprog.errors import InputError, ShapeProgError
-from shapeprog.geometry.occupancy import pack, packed_rows
+from shapeprog.geometry.cells import pack, rasterise, words_of
 from shapeprog.inference import Schedule, Settings, infer, proposing, snapped_from
 from shapeprog.inference.blocks import to_program
 from shapeprog.inference.chance_kernels import start
@@ -46,7 +46,7 @@ def generator(seed=0):
 
 
 def rows_of(program):
-    return packed_rows(unroll(program)).reshape(-1)
+    return words_of(rasterise(unroll(program))).reshape(-1)
 
 
 def random_program(rng, length):
@@ -105,7 +105,7 @@ def test_what_blocks_have_no_words_for_is_left_out(node):
 
 def test_a_pool_finds_its_best_block_and_loses_no_cells():
     rng = np.random.default_rng(0)
-    occupied, covered = (pack(rng.random((32, 32, 32)) < 0.3).reshape(-1) for _ in range(2))
+    occupied, covered = (words_of(pack(rng.random((32, 32, 32)) < 0.3)).reshape(-1) for _ in range(2))
     blocks = np.stack([random_block(rng.integers(5), rng) for _ in range(20)])
     pool = Pool.of([blocks[:10], blocks], 3.0)
     gains = []

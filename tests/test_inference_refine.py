@@ -8,8 +8,8 @@ import torch
 
 from shapeprog.data.shape import Shape
 from shapeprog.errors import InputError
-from shapeprog.geometry.occupancy import voxels as voxels_of
-from shapeprog.geometry.sampling import sample_surface
+from shapeprog.geometry.cells import voxels as voxels_of
+from shapeprog.geometry.surface import sample_surface
 from shapeprog.inference import Schedule, Settings, infer, refine, snap, snapped_from
 from shapeprog.language.tensors import Code, decode, encode
 from shapeprog.language.text import parse

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shapeprog.geometry.occupancy import pack
-from shapeprog.geometry.occupancy import voxels as voxels_of
+from shapeprog.geometry.cells import pack, words_of
+from shapeprog.geometry.cells import voxels as voxels_of
 from shapeprog.inference import editing
 from shapeprog.inference.blocks import to_program
 from shapeprog.inference.descent_kernels import moves, statements, valid
@@ -51,7 +51,7 @@ def target(solid, price=0.001):
     places = np.argwhere(solid)
     low, high = places.min(0), places.max(0) + 1
     table = families((high - low).tolist(), PLANES, MOST_COPIES)
-    return editing.Target(pack(solid).reshape(-1), low, high, table, price, len(places))
+    return editing.Target(words_of(pack(solid)).reshape(-1), low, high, table, price, len(places))
 
 
 @pytest.mark.parametrize(

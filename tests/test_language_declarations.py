@@ -11,16 +11,17 @@ import torch
 from declared import MODULES
 
 from shapeprog.errors import DeclarationError, InputError, ShapeProgError
+from shapeprog.formats.notation import format_notation, parse_notation
 from shapeprog.geometry import Primitive, Solids, primitives
+from shapeprog.geometry.primitives import built_in_names
 from shapeprog.language import Language, decode, encode, loop, standard, statement, unroll, using
-from shapeprog.language.manual import manual
-from shapeprog.language.notation import format_notation, parse_notation
 from shapeprog.language.parameters import Count, Extent, Length, Position, Quantity, Shift3
 from shapeprog.language.plugins import load_statements
 from shapeprog.language.sampling import random_program
 from shapeprog.language.shapes import box
 from shapeprog.language.statement import Motion
 from shapeprog.language.text import format_program, parse
+from shapeprog.view.manual import manual
 
 
 @pytest.fixture
@@ -176,12 +177,16 @@ def test_the_examples_declare_in_at_most_15_lines(module: Path) -> None:
 
 def test_modules_load_into_any_language_once(empty: Language) -> None:
     kinds = len(primitives)
+    assert set(primitives.names) == set(built_in_names())
     for module in MODULES:
         first = load_statements(module)
         assert load_statements(str(module)) == first
         assert all(empty[declared.name] is declared for declared in first)
     assert len(primitives) == kinds
-    assert sorted(empty.names) == ["arch", "cone_leg", "cushion"]
+    assert sorted(empty.names) == ["arch", "bolster", "cone_leg", "cushion"]
+    assert primitives[primitives.kind("capsule")].name == "capsule"
+    with using(Language()), pytest.raises(DeclarationError, match="no primitive is called 'capsule'"):
+        primitives.kind("capsule")
     program = random_program(torch.Generator().manual_seed(0))
     assert parse(format_program(program)) == program
 
@@ -215,12 +220,12 @@ TWIN = "\nimport dataclasses\nprimitives.register(dataclasses.replace(primitives
     ],
 )
 def test_failing_modules_leave_nothing(empty: Language, tmp_path: Path, code: str, words: str) -> None:
-    kinds = len(primitives)
+    solids = dict(primitives.names)
     path = tmp_path / "bad.py"
     path.write_text(code)
     with pytest.raises(DeclarationError, match=words):
         load_statements(path)
-    assert (empty.names, len(primitives)) == ([], kinds)
+    assert (empty.names, primitives.names) == ([], solids)
     path.write_text(CRATE)
     assert [declared.name for declared in load_statements(path)] == ["crate"]
 

@@ -7,9 +7,9 @@ import json
 import pytest
 
 from shapeprog.errors import InputError, ProgramError, ShapeProgError
+from shapeprog.formats.json_form import code_from_json, program_from_json
+from shapeprog.formats.notation import parse_notation
 from shapeprog.language import Draw, Language, Loop, Program, using
-from shapeprog.language.json_form import code_from_json, program_from_json
-from shapeprog.language.notation import parse_notation
 from shapeprog.language.text import format_program, parse
 
 LEG = "leg(at=(1, 2, 3), size=(1, 2, 3))"

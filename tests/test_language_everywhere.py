@@ -9,11 +9,11 @@ import torch
 from declared import MODULES, STATEMENTS, middle, name_of
 
 import shapeprog as sp
-from shapeprog.export import suffixes
+from shapeprog.formats import suffixes
+from shapeprog.geometry.cells import voxels
 from shapeprog.geometry.distance import signed_distance
 from shapeprog.geometry.mesh import part_meshes, union_mesh
-from shapeprog.geometry.occupancy import voxels
-from shapeprog.geometry.sampling import sample_surface
+from shapeprog.geometry.surface import sample_surface
 from shapeprog.language import Draw, Language, Program, Statement, standard, using
 from shapeprog.language.plugins import load_statements
 

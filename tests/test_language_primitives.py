@@ -11,7 +11,7 @@ from declared import LANGUAGE
 
 from shapeprog.geometry import Primitive, primitives
 
-KINDS = [primitives[primitives.kind(name)] for name in ("cuboid", "cylinder", "ellipsoid", "frustum")]
+KINDS = [primitives[kind] for kind in LANGUAGE.primitives.values()]
 SIZES = [(4.0, 9.0, 1.0, 0.0), (1.0, 1.0, 1.0, 0.0), (5.0, 0.01, 3.0, 0.0), (0.02, 7.0, 7.0, 0.0), (6.0, 3.0, 2.0, 4.5)]
 FLAT = [(6.0, 3.0, 0.0, 0.0), (0.0, 2.0, 3.0, 0.0), (3.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0)]
 
@@ -31,7 +31,8 @@ def surface(kind: Primitive, size: torch.Tensor, count: int) -> tuple[torch.Tens
 
 
 def test_the_examples_are_among_them() -> None:
-    assert {"cushion", "cone_leg", "arch"} <= set(LANGUAGE.names)
+    assert {"cushion", "cone_leg", "arch", "bolster"} <= set(LANGUAGE.names)
+    assert {"cuboid", "cylinder", "ellipsoid", "frustum", "capsule"} == {kind.name for kind in KINDS}
 
 
 @pytest.mark.parametrize("size", [*SIZES, *FLAT[:2]], ids=str)

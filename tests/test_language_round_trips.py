@@ -12,13 +12,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import shapeprog as sp
+from shapeprog.formats import load, save
+from shapeprog.formats.json_form import code_from_json, code_to_json, program_from_json, program_to_json
+from shapeprog.formats.notation import format_notation, parse_notation
 from shapeprog.language import Draw, Loop, Program, Statement, decode, encode, using
-from shapeprog.language.json_form import code_from_json, code_to_json, program_from_json, program_to_json
-from shapeprog.language.manual import manual, page
-from shapeprog.language.notation import format_notation, parse_notation
 from shapeprog.language.sampling import random_program
-from shapeprog.language.text import format_program, load, parse, save
+from shapeprog.language.text import format_program, parse
 from shapeprog.language.values import shortest, signature, to_float32
+from shapeprog.view.manual import manual, page
 
 
 @pytest.fixture(autouse=True)

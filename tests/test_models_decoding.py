@@ -10,8 +10,8 @@ from torch import Tensor
 
 from shapeprog.data.synthetic import Stream, prior
 from shapeprog.errors import ShapeProgError
+from shapeprog.geometry.cells import count, pack, preceding, unpack, widen
 from shapeprog.inference.snapping import snapped_from
-from shapeprog.language.canvas import count, draw_blocks, packed, so_far, unpacked, widened
 from shapeprog.language.parameters import Extent, Position
 from shapeprog.language.program import Program
 from shapeprog.language.sampling import random_program
@@ -19,6 +19,7 @@ from shapeprog.language.shapes import box
 from shapeprog.language.statement import Language, language, statement, using
 from shapeprog.language.tensors import Code, encode
 from shapeprog.language.tensors import decode as programs_of
+from shapeprog.language.unroll import draw_blocks
 from shapeprog.models.decoding import beam, decode
 from shapeprog.models.designs import build_generator
 from shapeprog.models.generator import Generator, live_blocks
@@ -129,10 +130,10 @@ def test_blocks_that_do_not_help_are_not_written(small: Callable[..., Generator]
     target = targets(6)
     for seed in range(3):
         found = decode(small(seed), target)
-        drawn, cells = draw_blocks(found.code), packed(target)[:, None]
+        drawn, cells = draw_blocks(found.code), pack(target)[:, None]
         before, written = found.canvases, (found.code.ids != 0).any(-1)
         new = drawn & ~before
-        near = count(cells & widened(drawn) & ~widened(before))
+        near = count(cells & widen(drawn) & ~widen(before))
         assert (near + count(new & cells) > 0)[written].all()  # something of the target is new, or newly near
         assert torch.equal(written, live_blocks(found.code.ids) & written)  # nothing after the end
 
@@ -140,15 +141,15 @@ def test_blocks_that_do_not_help_are_not_written(small: Callable[..., Generator]
 def test_by_drawing_what_is_known_by_heart_is_rebuilt() -> None:
     generator, _, target = known_by_heart()
     code = decode(generator, target, width=4).code
-    drawn = so_far(torch.nn.functional.pad(draw_blocks(code), (0, 0, 0, 0, 0, 1)))[:, -1]
-    iou = count(drawn & packed(target)) / count(drawn | packed(target))
+    drawn = preceding(torch.nn.functional.pad(draw_blocks(code), (0, 0, 0, 0, 0, 1)))[:, -1]
+    iou = count(drawn & pack(target)) / count(drawn | pack(target))
     assert (iou > 0.9).all()
 
 
 def test_widened_cells_are_those_within_one_face() -> None:
     cells = torch.zeros(1, 32, 32, 32, dtype=torch.uint8)
     cells[0, 5, 6, 31] = cells[0, 0, 0, 0] = 1
-    wide = unpacked(widened(packed(cells)))
+    wide = unpack(widen(pack(cells)))
     kernel = torch.zeros(1, 1, 3, 3, 3)
     kernel[0, 0, [0, 1, 1, 1, 1, 1, 2], [1, 0, 1, 1, 1, 2, 1], [1, 1, 0, 1, 2, 1, 1]] = 1
     expected = torch.nn.functional.conv3d(cells[:, None].float(), kernel, padding=1)[:, 0] > 0
@@ -157,7 +158,7 @@ def test_widened_cells_are_those_within_one_face() -> None:
 
 def test_the_canvases_are_what_the_blocks_before_draw(small: Callable[..., Generator]) -> None:
     found = decode(small(), targets(4))
-    assert torch.equal(so_far(draw_blocks(found.code)), found.canvases)
+    assert torch.equal(preceding(draw_blocks(found.code)), found.canvases)
 
 
 def test_a_beam_of_one_is_the_greedy_program_and_wider_ones_are_no_less_likely(small: Callable[..., Generator]) -> None:
@@ -181,15 +182,15 @@ def test_a_beam_is_ordered_by_what_it_draws(small: Callable[..., Generator]) -> 
     drawn = torch.zeros_like(blocks[:, :, 0])
     for k in range(blocks.shape[2]):
         drawn = drawn | blocks[:, :, k]
-    cells = packed(target)[:, None]
+    cells = pack(target)[:, None]
     iou = count(drawn & cells) / count(drawn | cells)
     assert (iou[:, :-1] >= iou[:, 1:] - 1e-6).all()
 
 
 def test_canvases_pack_and_unpack() -> None:
     cells = (torch.rand(3, 32, 32, 32, generator=torch.Generator().manual_seed(0)) < 0.5).to(torch.uint8)
-    assert torch.equal(unpacked(packed(cells)), cells)
-    assert torch.equal(count(packed(cells)), cells.flatten(1).sum(1, dtype=torch.int64))
+    assert torch.equal(unpack(pack(cells)), cells)
+    assert torch.equal(count(pack(cells)), cells.flatten(1).sum(1, dtype=torch.int64))
 
 
 def test_blocks_in_order_of_coverage_draw_the_same_and_cover_less_and_less() -> None:
@@ -197,7 +198,7 @@ def test_blocks_in_order_of_coverage_draw_the_same_and_cover_less_and_less() -> 
     drawn = draw_blocks(code)
     ordered, cells = by_coverage(code, drawn)
     assert torch.equal(draw_blocks(ordered), cells)
-    whole, union = so_far(torch.cat([drawn, drawn[:, :1]], 1))[:, -1], so_far(torch.cat([cells, cells[:, :1]], 1))
+    whole, union = preceding(torch.cat([drawn, drawn[:, :1]], 1))[:, -1], preceding(torch.cat([cells, cells[:, :1]], 1))
     assert torch.equal(union[:, -1], whole)
     new = count(cells & ~union[:, :-1])
     assert (new[:, :-1] >= new[:, 1:]).all()
@@ -247,7 +248,7 @@ def known_by_heart(design: str = "swift") -> tuple[Generator, Code, Tensor]:
 @pytest.mark.parametrize("design", ["swift", "chained"])
 def test_what_is_learned_by_heart_is_said_again(design: str) -> None:
     generator, code, target = known_by_heart(design)
-    told = generator.predict(target, so_far(draw_blocks(code)), code)
+    told = generator.predict(target, preceding(draw_blocks(code)), code)
     used = generator.vocabulary.used[told.told.ids]
     off = (told.values - told.told.values).detach().abs() * used
     assert float(off.max()) < 0.5

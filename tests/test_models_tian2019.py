@@ -7,9 +7,10 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor
 
+from shapeprog.geometry.cells import preceding, unpack
 from shapeprog.language import Code, encode, unroll
-from shapeprog.language.canvas import draw_blocks, so_far, unpacked
 from shapeprog.language.sampling import random_program
+from shapeprog.language.unroll import draw_blocks
 from shapeprog.models.decoding import decode
 from shapeprog.models.designs import build_generator
 from shapeprog.models.generator import Generator, Said, live_blocks
@@ -42,8 +43,8 @@ def shapes() -> tuple[Tensor, Tensor, Code]:
     programs = [random_program(random, blocks=1 + n % 2, published=True, whole=True, copies=3) for n in range(3)]
     code = encode(programs, blocks=BLOCKS)
     drawn = draw_blocks(code)
-    canvases = so_far(drawn)
-    return unpacked(canvases[:, -1] | drawn[:, -1]), canvases, code
+    canvases = preceding(drawn)
+    return unpack(canvases[:, -1] | drawn[:, -1]), canvases, code
 
 
 # ---------------------------------------------------------------- the reference, straight from the description
@@ -84,7 +85,7 @@ def reference(w: Weights, target: Tensor, canvases: Tensor | None, ids: Tensor |
     cells, blocks = torch.zeros_like(target), []
     outer: tuple[Tensor, Tensor] | None = None
     for k in range(BLOCKS):
-        seen = cells if canvases is None else unpacked(canvases[:, k])
+        seen = cells if canvases is None else unpack(canvases[:, k])
         outer = lstm(w, "core", features(w, target, seen), outer)
         x, inner, said = F.relu(outer[0]), None, []
         for j in range(3):
@@ -161,7 +162,7 @@ def test_by_arg_max_it_writes_what_the_description_says(shapes: tuple[Tensor, Te
         found = decode(made, target, blocks=BLOCKS)
     assert (found.code.ids == ids).all()
     assert len(ids.unique()) > 1
-    assert unpacked(found.canvases[:, -1]).any()
+    assert unpack(found.canvases[:, -1]).any()
     torch.testing.assert_close(found.code.parameters, values.float(), rtol=1e-5, atol=1e-5)
 
 
@@ -198,7 +199,7 @@ def test_blocks_are_the_same_one_by_one_and_together(shapes: tuple[Tensor, Tenso
     made = network()
     memory, features_of = None, []
     for k in range(BLOCKS):
-        feature, memory = made.perceive(target.float(), unpacked(canvases[:, k]).float(), memory)
+        feature, memory = made.perceive(target.float(), unpack(canvases[:, k]).float(), memory)
         features_of.append(feature)
     whole = made.perceive_all(target, canvases, torch.ones(3, BLOCKS, dtype=torch.bool))
     torch.testing.assert_close(torch.stack(features_of, 1).flatten(0, 1), whole, rtol=1e-4, atol=1e-5)

@@ -16,7 +16,7 @@ from shapeprog.data.packs import read_pack, write_pack
 from shapeprog.data.shape import Shape
 from shapeprog.errors import ShapeProgError
 from shapeprog.evaluation.generated import evaluate_generator, generated
-from shapeprog.geometry.sampling import sample_surface
+from shapeprog.geometry.surface import sample_surface
 from shapeprog.language.text import parse
 from shapeprog.language.unroll import unroll
 from shapeprog.models.checkpoint import card_of, load_generator, save_checkpoint

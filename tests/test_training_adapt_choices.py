@@ -8,9 +8,9 @@ import pytest
 import torch
 from torch import Tensor
 
-from shapeprog.geometry.occupancy import pack, packed_iou
-from shapeprog.language.canvas import draw_blocks
+from shapeprog.geometry.cells import iou, pack
 from shapeprog.language.tensors import Code
+from shapeprog.language.unroll import draw_blocks
 from shapeprog.models.decoding import decode
 from shapeprog.models.designs import build_generator
 from shapeprog.models.generator import Generator, live_blocks
@@ -35,8 +35,7 @@ def seen(generator: Generator, cells: Tensor) -> Tensor:
 
 
 def cost_of(code: Code, cells: Tensor) -> Tensor:
-    union = draw_blocks(code)[..., 0, :, :].numpy().view("u4")
-    return 1 - torch.from_numpy(packed_iou(union, pack(cells.numpy()))).float()
+    return 1 - iou(draw_blocks(code)[..., 0, :, :], pack(cells)).float()
 
 
 def last_bias(generator: Generator) -> Tensor:
@@ -81,8 +80,8 @@ def test_the_expected_cost_has_the_exact_gradient():
     other = choices.alternatives(generator, seen(generator, cells))
     code = decode(generator, cells, blocks=1).code
     drawn, owner = choices.in_place(code, torch.ones(1, 1, dtype=torch.bool), other)
-    found = packed_iou(drawn.numpy().view("u4"), pack(cells.numpy())[owner.numpy()][:, None])
-    loss = choices.expected(other.chance, 1 - torch.from_numpy(found).float(), 1)
+    found = iou(drawn, pack(cells)[owner][:, None])
+    loss = choices.expected(other.chance, 1 - found.float(), 1)
     (gradient,) = torch.autograd.grad(loss, bias)
     torch.testing.assert_close(gradient, exact(generator, cells))
 

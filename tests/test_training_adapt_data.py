@@ -14,9 +14,9 @@ from shapeprog.cli import main
 from shapeprog.data.packs import write_pack
 from shapeprog.data.shape import Shape
 from shapeprog.errors import InputError, ShapeProgError
+from shapeprog.formats.json_form import program_to_json
 from shapeprog.geometry.losses import chamfer
-from shapeprog.geometry.sampling import sample_surface
-from shapeprog.language.json_form import program_to_json
+from shapeprog.geometry.surface import sample_surface
 from shapeprog.language.text import parse
 from shapeprog.language.unroll import unroll
 from shapeprog.models.vocabulary import Vocabulary

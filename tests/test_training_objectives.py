@@ -17,8 +17,9 @@ from shapeprog.data.synthetic import Stream, prior
 from shapeprog.errors import ShapeProgError
 from shapeprog.evaluation.generated import code_iou, evaluate_generator, generated, measured
 from shapeprog.evaluation.metrics import evaluate_program
-from shapeprog.language.canvas import draw_blocks, unpacked
+from shapeprog.geometry.cells import unpack
 from shapeprog.language.tensors import Code, decode
+from shapeprog.language.unroll import draw_blocks
 from shapeprog.models.checkpoint import load_executor, load_generator
 from shapeprog.models.designs import build_generator
 from shapeprog.models.executor import NeuralExecutor
@@ -168,7 +169,7 @@ def test_blocks_are_drawn_as_they_are_told():
     blocks, again = objective.batch(3), objective.batch(3)
     assert all(torch.equal(one, two) for one, two in zip(blocks, again, strict=True))
     drawn = draw_blocks(Code(blocks.ids[:, None], blocks.parameters[:, None]))[:, 0]
-    assert torch.equal(unpacked(drawn), blocks.cells)
+    assert torch.equal(unpack(drawn), blocks.cells)
     assert (blocks.ids > 0).any(-1).all()
 
 

@@ -14,9 +14,9 @@ from PIL import Image
 from shapeprog.data import shape_from_mesh
 from shapeprog.data.shape import Shape
 from shapeprog.errors import OutputError
-from shapeprog.export.colours import colour
-from shapeprog.export.parts import parts
-from shapeprog.geometry.cuboid import mesh as box_mesh
+from shapeprog.formats.colours import colour
+from shapeprog.formats.parts import parts
+from shapeprog.geometry.primitives.cuboid import mesh as box_mesh
 from shapeprog.language.program import Program
 from shapeprog.language.text import format_program, parse
 from shapeprog.view import Item, contact_sheet, picture, viewer

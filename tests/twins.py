@@ -4,6 +4,8 @@ import math
 
 import numpy as np
 
+from shapeprog.geometry import primitives
+
 SIZE, HALF = 32, 16
 
 # ---------------------------------------------------------------- the published executor, as specified
@@ -101,7 +103,7 @@ def cells(scene, resolution=SIZE):
             continue
         size = scene.size[n].double().numpy() * scale
         local = (centres - scene.centre[n].double().numpy() * scale) @ scene.rotation[n].double().numpy()
-        if scene.kind[n] == 1:
+        if primitives[int(scene.kind[n])].name == "cylinder":
             inside = (np.abs(local[..., 0]) <= size[0] + 1e-3) & (
                 np.hypot(local[..., 1], local[..., 2]) <= 1.01 * size[1]
             )

@@ -18,13 +18,13 @@ from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
 from shapeprog.data.synthetic import prior
-from shapeprog.geometry.occupancy import pack, packed_iou, soft_occupancy, voxels
+from shapeprog.geometry.cells import iou, pack, voxels
+from shapeprog.geometry.occupancy import soft_occupancy
 from shapeprog.geometry.primitive import primitives
 from shapeprog.geometry.scene import Scene
-from shapeprog.language.canvas import draw_blocks
 from shapeprog.language.statement import SLOTS, language
 from shapeprog.language.tensors import Code
-from shapeprog.language.unroll import unroll
+from shapeprog.language.unroll import draw_blocks, unroll
 from shapeprog.models.executor import NeuralExecutor
 from shapeprog.space import HALF
 
@@ -141,23 +141,21 @@ def compared(
 ) -> dict[str, np.ndarray]:
     """IoU (N,) with the exact cells, by who drew."""
     one = Code(ids[:, None], parameters[:, None])
-    exact = draw_blocks(one)[:, 0].numpy().view(np.uint32)
+    exact = draw_blocks(one)[:, 0]
     free = slots_of(("length", "position"))[ids]  # a step's fraction would add up over copies
     off = (2 * torch.rand(parameters.shape, generator=random) - 1) * FRACTION * free
     found = {
-        "renderer, soft cells": pack(
-            torch.cat([soft_occupancy(unroll(Code(*each))) > 0.5 for each in _parts(one)]).numpy()
-        ),
+        "renderer, soft cells": pack(torch.cat([soft_occupancy(unroll(Code(*each))) > 0.5 for each in _parts(one)])),
         "renderer, hard cells of fractional numbers": pack(
-            voxels(unroll(Code(one.ids, one.parameters + off[:, None]))).numpy()
+            voxels(unroll(Code(one.ids, one.parameters + off[:, None])))
         ),
     }
     for name, executor in executors.items():
         soft = torch.nn.functional.one_hot(ids, executor.vocabulary.size).float()
         with torch.no_grad():
             logits = [executor(*each) for each in zip(*(t.split(TOGETHER) for t in (soft, parameters)), strict=True)]
-        found[name] = pack((torch.cat(logits) > 0).numpy())
-    return {name: packed_iou(cells, exact) for name, cells in found.items()}
+        found[name] = pack(torch.cat(logits) > 0)
+    return {name: iou(cells, exact).numpy() for name, cells in found.items()}
 
 
 def run(executors: dict[str, NeuralExecutor], out: Path, *, name: str = "narrow", count: int = 256) -> None:

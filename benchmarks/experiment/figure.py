@@ -69,7 +69,7 @@ def draw(experiment: Experiment, picture: Path) -> None:
 
 def views(shape: Any, written: Written) -> list[np.ndarray]:
     """Target cells, drawn cells and surface points of a program, from one camera, in the colours of its statements."""
-    from shapeprog.geometry.sampling import sample_surface
+    from shapeprog.geometry.surface import sample_surface
     from shapeprog.language.unroll import unroll
     from shapeprog.view.model import of_cells
     from shapeprog.view.render import camera_for, render
@@ -88,13 +88,14 @@ def _coloured_cells(program: Any) -> Any:
     """The cells of a program of whole numbers, each in the colour of the last statement that draws it."""
     from dataclasses import replace
 
-    from shapeprog.export.colours import colour
-    from shapeprog.language.canvas import draw_blocks, unpacked
+    from shapeprog.formats.colours import colour
+    from shapeprog.geometry.cells import unpack
     from shapeprog.language.tensors import encode
+    from shapeprog.language.unroll import draw_blocks
     from shapeprog.view.model import of_cells
 
     whole = encode(program.flat())
-    blocks = unpacked(draw_blocks(whole)).numpy().astype(bool)
+    blocks = unpack(draw_blocks(whole)).numpy().astype(bool)
     owner = np.zeros(blocks.shape[1:], np.int64)
     for ids, cells in zip(whole.ids.tolist(), blocks, strict=True):
         owner[cells] = next(number for number in reversed(ids) if number)
@@ -109,7 +110,7 @@ def _dots(points: np.ndarray, statements: Sequence[int], seen: np.ndarray, camer
     """Points as dots in the colours of their statements, near ones over far ones, those on far sides pale."""
     from PIL import Image, ImageDraw
 
-    from shapeprog.export.colours import colour
+    from shapeprog.formats.colours import colour
 
     fine = 2
     page = Image.new("RGB", (fine * size, fine * size), "white")

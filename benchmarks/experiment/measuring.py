@@ -28,7 +28,7 @@ from benchmarks.reconstruction import GREEDY, REFINED, SEARCH
 from shapeprog.evaluation.generated import Written, generated
 from shapeprog.evaluation.generated import measured as measures
 from shapeprog.files import write_text
-from shapeprog.geometry.occupancy import pack, packed_iou, packed_rows
+from shapeprog.geometry.cells import iou, pack, rasterise
 from shapeprog.language.program import Program
 from shapeprog.language.unroll import unroll
 from shapeprog.models.decoding import Choice
@@ -213,7 +213,7 @@ def _row(written: Written, snapped: Program, shape: Any) -> Row:
 
 def iou_of(program: Program, shape: Any) -> float:
     """IoU of the cells of a program of whole numbers."""
-    return float(packed_iou(packed_rows(unroll(program)), pack(shape.voxels)))
+    return float(iou(rasterise(unroll(program)), pack(shape.voxels)))
 
 
 def _prepared(job: Job) -> tuple[Any, Any, Row]:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import difflib
+from collections.abc import Iterable
+
 
 class ShapeProgError(Exception):
     """A mistake that the user can mend.
@@ -61,3 +64,20 @@ class ProgramError(ShapeProgError):
         place = f"{self.name}, line {self.line}, column {self.column}: {self.message}"
         shown = f"\n  {self.source}\n  {' ' * (self.column - 1)}^" if self.source else ""
         return f"{place}{shown}" + (f"\n  hint: {self.hint}" if self.hint else "")
+
+
+def did_you_mean(word: str, known: Iterable[str], otherwise: str = "", *, quoted: bool = False) -> str:
+    """A hint that proposes the known word nearest to ``word``, whatever its case.
+
+    Parameters
+    ----------
+    otherwise
+        The hint where no word is near; by default it lists all that are known.
+    quoted
+        Whether the word stands in quotation marks.
+    """
+    words = {each.lower(): each for each in known}
+    near = difflib.get_close_matches(word.lower(), words, 1)
+    if near:
+        return f"did you mean {words[near[0]]!r}?" if quoted else f"did you mean {words[near[0]]}?"
+    return otherwise or (f"known are {', '.join(words.values())}" if words else "nothing is declared")

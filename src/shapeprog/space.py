@@ -32,7 +32,10 @@ UP, DEPTH, SIDE = 0, 1, 2
 """Grid axes: up, depth (positive = rear), left-right."""
 
 Array = npt.NDArray[Any]
+"""An array of any numbers."""
+
 FloatArray = npt.NDArray[np.float64]
+"""An array of float64."""
 
 _AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 

@@ -184,15 +184,14 @@ def _scores(program: Program, snapped: Program, shape: Shape, known: dict[str, f
     """Everything that was said about the program, and how close it comes to the input."""
     from shapeprog.evaluation.metrics import evaluate_program
 
-    measured = evaluate_program(program, shape, snapped, seed=seed)
+    measured = evaluate_program(program, shape, snapped, seed=seed, iou=known.get("iou"))
     found = {"iou": measured.iou, "cd": measured.cd, "noise_floor": measured.noise_floor, "f1": measured.f1}
     sizes = {"blocks": measured.blocks, "statements": measured.statements, "primitives": measured.primitives}
     return terminal.plain({**known, **found, **sizes})
 
 
 def _document(found: Found, shape: Shape) -> str:
-    from shapeprog.export.text import result_json
-    from shapeprog.language.json_form import program_to_json
+    from shapeprog.formats.json_form import program_to_json, result_json
 
     snapped = json.loads(program_to_json(found.snapped))["program"]
     return result_json(
@@ -201,8 +200,8 @@ def _document(found: Found, shape: Shape) -> str:
 
 
 def _write(found: Found, shape: Shape, folder: Path, stem: str, picture: bool) -> list[str]:
-    from shapeprog.export import export
     from shapeprog.files import write_text
+    from shapeprog.formats import export
 
     write_text(folder / f"{stem}.json", _document(found, shape))
     names = [f"{stem}.json", f"{stem}.shape"]

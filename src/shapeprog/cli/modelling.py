@@ -81,13 +81,14 @@ def import_weights_command(
 def _synthetic(count: int, seed: int) -> Iterator[Told]:
     """Targets and canvases of the prior that the published weights were trained on."""
     from shapeprog.data.synthetic import Stream, prior
-    from shapeprog.language.canvas import draw_blocks, so_far
+    from shapeprog.geometry.cells import preceding
+    from shapeprog.language.unroll import draw_blocks
     from shapeprog.models.generator import live_blocks
 
     stream = Stream(prior("narrow"), CALIBRATION, seed=seed)
     for index in range(-(-count // CALIBRATION)):
         batch = stream[index]
-        yield batch.voxels, so_far(draw_blocks(batch.code)), live_blocks(batch.code.ids)
+        yield batch.voxels, preceding(draw_blocks(batch.code)), live_blocks(batch.code.ids)
 
 
 def _described(listed: Listed) -> dict[str, Any]:

@@ -78,7 +78,7 @@ def _write_sheet(names: list[str], programs: list[Program], path: Path, columns:
 
 def _write_folder(names: list[str], programs: list[Program], folder: Path) -> Path:
     from shapeprog.files import make_folder
-    from shapeprog.language.text import save
+    from shapeprog.formats import save
 
     made = make_folder(folder)
     for name, program in zip(names, programs, strict=True):
@@ -91,8 +91,8 @@ def _shapes(names: list[str], programs: list[Program], points: int, seed: int) -
     import torch
 
     from shapeprog.data.shape import Shape
-    from shapeprog.geometry.occupancy import voxels
-    from shapeprog.geometry.sampling import sample_surface
+    from shapeprog.geometry.cells import voxels
+    from shapeprog.geometry.surface import sample_surface
     from shapeprog.language.unroll import unroll
 
     scene = unroll(programs)

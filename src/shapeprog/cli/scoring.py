@@ -16,6 +16,7 @@ from shapeprog.data.shape import Shape
 from shapeprog.data.voxelise import voxelise_mesh, voxelise_points
 from shapeprog.errors import ShapeProgError
 from shapeprog.evaluation.metrics import CELL, Metrics, evaluate_program, target_samples, world_scale
+from shapeprog.formats.format import suffixes
 from shapeprog.geometry.nearest import squared_distance
 from shapeprog.language.program import Program
 
@@ -24,16 +25,14 @@ if TYPE_CHECKING:
 
     from shapeprog.models.decoding import Choice
 
-PROGRAMS = (".shape", ".json")
-
 Prediction = tuple[Program, Program | None] | Shape
 """A program with its whole-numbered form where the file holds one, or a shape."""
 
 
 def predictions(path: Path) -> Iterator[tuple[str, Prediction | ShapeProgError]]:
     """Names and predictions of a file, a pack or a folder; a folder that holds programs is read for those alone."""
-    files = [path] if path.suffix.lower() in PROGRAMS else []
-    if path.is_dir() and any(any(path.glob(f"*{suffix}")) for suffix in PROGRAMS):
+    files = [path] if path.suffix.lower() in suffixes("program") else []
+    if path.is_dir() and any(any(path.glob(f"*{suffix}")) for suffix in suffixes("program")):
         files = program_files(path)
     for file in files:
         try:
@@ -74,7 +73,7 @@ def measure(prediction: Prediction, target: Shape, points: int, seed: int, *, fi
 
 
 def _program(path: Path) -> tuple[Program, Program | None]:
-    from shapeprog.language.json_form import FORMAT, VERSION, program_from_json
+    from shapeprog.formats.json_form import FORMAT, VERSION, program_from_json
 
     program, _ = read_program_file(path)
     if path.suffix.lower() != ".json":

@@ -132,12 +132,12 @@ def read_program_file(path: Path) -> tuple[Program, Any]:
     InputError
         Where the file holds a shape instead, with the command that makes a program of it.
     """
-    from shapeprog.export.text import read_program
+    from shapeprog.formats import load_with_frame, program_suffixes
 
     try:
-        return read_program(path)
+        return load_with_frame(path)
     except InputError as error:
-        if path.is_file() and path.suffix.lower() not in (".shape", ".json", ".txt"):
+        if path.is_file() and path.suffix.lower() not in program_suffixes():
             raise InputError(error.message, f"make a program of it first: shapeprog infer {path}") from None
         raise
 
@@ -146,7 +146,7 @@ def print_program(console: Console, program: Program) -> None:
     """Print a program with each statement in its colour, numbers rounded for reading."""
     from rich.text import Text
 
-    from shapeprog.export.colours import hexadecimal
+    from shapeprog.formats.colours import hexadecimal
     from shapeprog.view.listing import listing, parted
 
     for line in listing(program):

@@ -10,12 +10,17 @@ import typer
 
 from shapeprog.cli import terminal
 from shapeprog.errors import InputError, OutputError, ShapeProgError
+from shapeprog.formats.format import format_of, program_suffixes, suffixes
 
 if TYPE_CHECKING:
     from shapeprog.data.shape import Shape
-    from shapeprog.language.program import Program
 
-ProgramFile = Annotated[Path, typer.Argument(help="A .shape or .json file.")]
+_SAMPLES = " ".join(suffixes("sample"))
+
+ProgramFile = Annotated[Path, typer.Argument(help=f"A program: {' '.join(program_suffixes())}.")]
+Outputs = Annotated[
+    list[Path], typer.Argument(help=f"Files to write; the suffix of each names its format: {' '.join(suffixes())}.")
+]
 Input = Annotated[
     Path | None, typer.Option("--shape", help="The input to show beside it; by default the one a .json file names.")
 ]
@@ -23,17 +28,17 @@ Input = Annotated[
 
 def export_command(
     program: ProgramFile,
-    outputs: Annotated[list[Path], typer.Argument(help="Files to write; the suffix of each names its format.")],
+    outputs: Outputs,
     modules: terminal.With = None,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
 ) -> None:
-    """Write a program as .glb .obj .ply .stl .scad .py .step .binvox .npz .shape or .json.
+    """Write a program for other tools: as a mesh, for CAD, as cells or points, or in another form of program.
 
     Where the program file keeps its frame (every .json and .shape written by infer does), the export lies on the
     input. A .shape file without one is exported upright, one cell one unit; to place it, put the comment
     '# frame: {"scale": ..., "centre": [...], "axes": [[...], [...], [...]]}' at its top.
     """
-    from shapeprog.export import export
+    from shapeprog.formats import export
 
     terminal.load_modules(modules)
     found, frame = terminal.read_program_file(program)
@@ -45,7 +50,7 @@ def export_command(
 
 def render_command(
     program: ProgramFile,
-    output: Annotated[Path, typer.Argument(help="A picture (.png .jpg .pdf), cells (.npy .binvox) or points (.xyz).")],
+    output: Annotated[Path, typer.Argument(help=f"A picture (.png .jpg .pdf), or cells or points ({_SAMPLES}).")],
     shape: Input = None,
     resolution: Annotated[int, typer.Option(help="Cells along each side, for .npy.", min=1, max=512)] = 32,
     points: Annotated[int, typer.Option(help="How many points, for .xyz.", min=1)] = 5000,
@@ -56,26 +61,23 @@ def render_command(
     """Draw a program: as a picture, as hard voxels, or as points on its surface.
 
     Cells are those of the program snapped to whole numbers. Points come as lines 'x y z nx ny nz' in the world of the
-    input, or in the grid where no frame is known.
+    input, or as a .xyz file is read, z up, where no frame is known.
     """
-    from shapeprog.export.writing import export
+    from shapeprog.formats import export
     from shapeprog.view.page import SUFFIXES, picture
 
     terminal.load_modules(modules)
     found, frame = terminal.read_program_file(program)
-    suffix = output.suffix.lower()
+    suffix, chosen = output.suffix.lower(), format_of(output)
     if suffix in SUFFIXES:
         scores = _kept(program).get("scores")
         beside = _input_of(program, shape)
         picture(beside, found, output, title=program.stem, scores=scores if isinstance(scores, dict) else None)
-    elif suffix == ".npy":
-        _write_cells(found, output, resolution)
-    elif suffix == ".xyz":
-        _write_points(found, frame, output, points, seed)
-    elif suffix in (".binvox", ".npz"):
-        export(found, output, frame)
+    elif chosen is not None and chosen.kind == "sample":
+        given = {"resolution": resolution, "points": points, "seed": seed}
+        export(found, output, frame, **{name: given[name] for name in chosen.options})
     else:
-        known = " ".join((*SUFFIXES, ".npy", ".binvox", ".npz", ".xyz"))
+        known = " ".join((*SUFFIXES, *suffixes("sample")))
         raise OutputError(f"nothing is rendered to {suffix or 'a file without a suffix'}", f"known are {known}")
     if not quiet:
         terminal.output().print(f"wrote {output}")
@@ -107,7 +109,7 @@ def show_command(
 
 
 def sheet_command(
-    folder: Annotated[Path, typer.Argument(help="A folder with .json or .shape files, such as infer writes.")],
+    folder: Annotated[Path, typer.Argument(help="A folder with programs, such as infer writes.")],
     output: Annotated[Path, typer.Argument(help="The picture, such as sheet.png.")],
     columns: Annotated[int, typer.Option(help="Pairs in a row.", min=1)] = 4,
     most: Annotated[int, typer.Option("--most", help="Most programs to show.", min=1)] = 96,
@@ -147,26 +149,27 @@ def statements_command(
     modules: terminal.With = None,
 ) -> None:
     """Print the manual of the language, or of one statement, drawn from the declarations."""
-    from shapeprog.language.manual import manual
+    from shapeprog.view.manual import manual
 
     terminal.load_modules(modules)
     terminal.output().print(manual(name).rstrip("\n"))
 
 
 def program_files(folder: Path) -> list[Path]:
-    """The programs in a folder in the order of their names; of NAME.json and NAME.shape only the first.
+    """The programs in a folder in the order of their names; NAME.json, which keeps most, stands for all of that name.
 
     Raises
     ------
     InputError
         If there is no such folder, or it holds no programs.
     """
+    cure = f"give a folder that holds {' or '.join(suffixes('program'))} files"
     if not folder.is_dir():
-        raise InputError(f"there is no folder {folder}", "give a folder that holds .json or .shape files")
-    found = {path.with_suffix(""): path for path in folder.glob("*.shape")}
-    found |= {path.with_suffix(""): path for path in folder.glob("*.json")}
+        raise InputError(f"there is no folder {folder}", cure)
+    json_last = sorted(suffixes("program"), key=".json".__eq__)
+    found = {path.with_suffix(""): path for suffix in json_last for path in folder.glob(f"*{suffix}")}
     if not found:
-        raise InputError(f"the folder {folder} holds no programs", "give a folder that holds .json or .shape files")
+        raise InputError(f"the folder {folder} holds no programs", cure)
     return [found[key] for key in sorted(found)]
 
 
@@ -199,35 +202,3 @@ def _input_of(program: Path, shape: Path | None) -> Shape | None:
         return found
     # It was inferred with --up or --front: show it as it was seen then.
     return replace(found, vertices=frame.to_grid(found.frame.to_world(found.vertices)))
-
-
-def _write_cells(program: Program, path: Path, resolution: int) -> None:
-    import io
-
-    import numpy as np
-
-    from shapeprog.files import write_bytes
-    from shapeprog.geometry.occupancy import voxels
-    from shapeprog.language.unroll import unroll
-
-    cells = voxels(unroll(program.snap()), resolution).numpy().astype(np.bool_)
-    content = io.BytesIO()  # numpy itself does not say so plainly when the disk is full
-    np.save(content, cells)
-    write_bytes(path, content.getvalue())
-
-
-def _write_points(program: Program, frame: Any, path: Path, points: int, seed: int) -> None:
-    import numpy as np
-    import torch
-
-    from shapeprog.export.frames import upright
-    from shapeprog.files import atomic_path
-    from shapeprog.geometry.sampling import sample_surface
-    from shapeprog.language.unroll import unroll
-
-    place = upright(path.suffix.lower()) if frame is None else frame
-    sample = sample_surface(unroll(program), points, torch.Generator().manual_seed(seed))
-    normals = sample.normals.numpy() @ np.asarray(place.axes).T
-    rows = np.concatenate([place.to_world(sample.points.detach().numpy()), normals], 1)
-    with atomic_path(path) as temporary:
-        np.savetxt(temporary, rows, fmt="%.7g")

@@ -1,21 +1,5 @@
 """Shapes from files, into the grid and back."""
 
-from shapeprog.data.loading import load, load_all
-from shapeprog.data.packs import Pack, read_pack, write_pack
-from shapeprog.data.placement import shape_from_mesh, shape_from_points, shape_from_voxels
-from shapeprog.data.preparation import Prepared, prepare
-from shapeprog.data.shape import Shape
+import lazy_loader
 
-__all__ = [
-    "Pack",
-    "Prepared",
-    "Shape",
-    "load",
-    "load_all",
-    "prepare",
-    "read_pack",
-    "shape_from_mesh",
-    "shape_from_points",
-    "shape_from_voxels",
-    "write_pack",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -10,11 +10,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from shapeprog.errors import InputError
-
-Array = npt.NDArray[Any]
+from shapeprog.space import Array
 
 _SHAPES = "give points as (P, 3), voxels as (R, R, R), or many voxel grids as (N, R, R, R)"
 

@@ -7,14 +7,11 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
-import numpy.typing as npt
-
 from shapeprog.data.orientation import axes_of, in_shapenet_layout
 from shapeprog.data.placement import shape_from_mesh, shape_from_points, shape_from_voxels
 from shapeprog.data.shape import Shape
 from shapeprog.errors import InputError, ShapeProgError
-
-Array = npt.NDArray[Any]
+from shapeprog.space import Array
 
 ARRAY_SUFFIXES = frozenset({".xyz", ".npy", ".npz", ".h5", ".hdf5"})
 """Suffixes of files that hold arrays of points or voxels."""
@@ -58,6 +55,10 @@ def load(
             )
         return held[0]
     return held[_number(file, index, held)]
+
+
+load_shape = load
+"""The same under the name that the package gives it, where ``load`` reads programs."""
 
 
 def load_all(
@@ -130,7 +131,7 @@ def _open(path: Path, up: str | None, front: str | None, points: int, seed: int)
     suffix, axes, name = path.suffix.lower(), axes_of(path, up, front), _name(path)
     try:
         if suffix == ".binvox":
-            from shapeprog.data.binvox import read_binvox
+            from shapeprog.formats.binvox import read_binvox
 
             cells, corner, cell = read_binvox(path)
             grid = shape_from_voxels(cells, name=name, axes=axes, corner=corner, cell=cell, source=path)

@@ -9,11 +9,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from shapeprog.errors import InputError
-
-Array = npt.NDArray[Any]
+from shapeprog.space import Array
 
 _NO_MESH = {"bz2", "dict", "dict64", "dxf", "json", "msgpack", "stl_ascii", "svg", "tar.bz2", "tar.gz", "xyz", "zip"}
 _OFF_COUNTS = re.compile(rb"^\s*(?:C?N?OFF)?\s*(\d+)\s+(\d+)\s+\d+", re.MULTILINE)

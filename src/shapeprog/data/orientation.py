@@ -1,41 +1,31 @@
 """Which way is up: the axes of a file by its format, unless the user says otherwise.
 
-==========================================  ====  ======
-file                                        up    front
-==========================================  ====  ======
-OBJ, OFF, PLY, GLB, GLTF, binvox, others    +y    +z
-STL, XYZ                                    +z    -y
-ShapeNet layout ``synset/id/models/file``   +y    -z
-NPY, NPZ, HDF5                              axes 0, 1, 2 are up, depth (+ is the rear) and left-right already
-==========================================  ====  ======
+The axes of every format stand with its declaration (:mod:`shapeprog.formats.format`): mesh files are mostly +y up with
+the front towards +z, STL and XYZ +z up with the front towards -y, and arrays lie in the grid already.  Files in the
+layout of ShapeNet, ``synset/id/models/file``, are +y up with the front towards -z.
 """
 
 from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import Any
-
-import numpy.typing as npt
 
 from shapeprog.errors import InputError
-from shapeprog.space import grid_axes
+from shapeprog.formats.format import OTHER_MESHES, Axes, format_of
+from shapeprog.space import Array, grid_axes
 
-Array = npt.NDArray[Any]
+SHAPENET: Axes = ("+y", "-z")
+"""Axes of the files of ShapeNet, whatever their format."""
 
-_UP_Z = {".stl", ".xyz"}
-_ARRAYS = {".npy", ".npz", ".h5", ".hdf5"}
 _SYNSET = re.compile(r"\d{8}")
 
 
-def default_axes(path: Path) -> tuple[str, str]:
-    """The usual (up, front) of a file, from the table above."""
+def default_axes(path: Path) -> Axes:
+    """The usual (up, front) of a file: those of its layout, else of its format."""
     if in_shapenet_layout(path):
-        return "+y", "-z"
-    suffix = path.suffix.lower()
-    if suffix in _UP_Z:
-        return "+z", "-y"
-    return ("+x", "-y") if suffix in _ARRAYS else ("+y", "+z")
+        return SHAPENET
+    declared = format_of(path)
+    return OTHER_MESHES if declared is None or declared.axes is None else declared.axes
 
 
 def in_shapenet_layout(path: Path) -> bool:

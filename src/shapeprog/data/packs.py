@@ -19,7 +19,7 @@ import os
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, overload
+from typing import overload
 
 import numpy as np
 import numpy.typing as npt
@@ -28,9 +28,7 @@ from shapeprog.data.arrays import read_numpy
 from shapeprog.data.shape import Shape
 from shapeprog.errors import InputError
 from shapeprog.files import atomic_path
-from shapeprog.space import RESOLUTION, SPAN, Frame
-
-Array = npt.NDArray[Any]
+from shapeprog.space import RESOLUTION, SPAN, Array, Frame
 
 _BYTES = RESOLUTION**3 // 8
 _LEVELS = 65535

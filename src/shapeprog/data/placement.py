@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from shapeprog.data.shape import Shape
 from shapeprog.errors import InputError
-from shapeprog.space import HALF, RESOLUTION, SPAN, Frame
-
-Array = npt.NDArray[Any]
+from shapeprog.space import HALF, RESOLUTION, SPAN, Array, Frame
 
 
 def shape_from_mesh(

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import numpy.typing as npt
 
-Array = npt.NDArray[Any]
+from shapeprog.space import Array
 
 _AT_ONCE = 1 << 17
 """Triangles in memory at once: meshes may have millions."""

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
 
 from shapeprog.space import Frame
-
-Array = npt.NDArray[Any]
 
 
 @dataclass(frozen=True)

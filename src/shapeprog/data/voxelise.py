@@ -7,15 +7,12 @@ ShapeNet is distributed with); the views meet the surface on a lattice of half c
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import numpy.typing as npt
 
 from shapeprog.errors import InputError
-from shapeprog.space import RESOLUTION
+from shapeprog.space import RESOLUTION, Array
 
-Array = npt.NDArray[Any]
 BoolArray = npt.NDArray[np.bool_]
 
 SHRINK = 1 / 256

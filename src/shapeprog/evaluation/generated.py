@@ -12,10 +12,10 @@ from jaxtyping import Float, UInt8
 from torch import Tensor
 
 from shapeprog.evaluation.metrics import Metrics, Target, evaluate_program, summarise, target_samples, world_scale
-from shapeprog.geometry.occupancy import pack, packed_iou
-from shapeprog.language.canvas import draw_blocks, union
+from shapeprog.geometry.cells import iou, pack, union
 from shapeprog.language.program import Program
 from shapeprog.language.tensors import Code
+from shapeprog.language.unroll import draw_blocks
 from shapeprog.models.decoding import Choice, decode, programs, whole_programs
 from shapeprog.models.generator import Generator
 
@@ -45,8 +45,7 @@ def _joined(parts: Sequence[Code]) -> Code:
 
 def code_iou(code: Code, cells: UInt8[Tensor, "B 32 32 32"]) -> Float[Tensor, " B"]:
     """IoU (B,) at 32^3 of programs, rounded to whole numbers, with targets."""
-    drawn = union(draw_blocks(code)).cpu().numpy().view(np.uint32)
-    return torch.from_numpy(packed_iou(drawn, pack(cells.cpu().numpy())))
+    return iou(union(draw_blocks(code)), pack(cells)).cpu()
 
 
 def generated(

@@ -29,10 +29,10 @@ from torch import Tensor
 
 from shapeprog.data.sampling import sample_surface as sample_triangles
 from shapeprog.errors import ShapeProgError
+from shapeprog.geometry import cells
 from shapeprog.geometry.nearest import squared_distance
-from shapeprog.geometry.occupancy import pack, packed_iou, packed_rows
-from shapeprog.geometry.sampling import sample_surface
 from shapeprog.geometry.scene import Scene
+from shapeprog.geometry.surface import sample_surface
 from shapeprog.language.program import Program
 from shapeprog.language.unroll import unroll
 
@@ -114,7 +114,13 @@ class Summary:
 
 
 def evaluate_program(
-    program: Program, target: Target, snapped: Program | None = None, points: int = POINTS, seed: int = 0
+    program: Program,
+    target: Target,
+    snapped: Program | None = None,
+    points: int = POINTS,
+    seed: int = 0,
+    *,
+    iou: float | None = None,
 ) -> Metrics:
     """Measure a program against a target.
 
@@ -130,15 +136,18 @@ def evaluate_program(
         Points on each surface.
     seed
         Seed of all samplings; the same seed gives the same figures.
+    iou
+        The IoU where it has been measured already, as inference has.
     """
     scene = unroll(program)
-    rows = packed_rows(unroll(program.snap() if snapped is None else snapped))
-    iou = float(packed_iou(rows, pack(target.voxels)))
+    if iou is None:
+        drawn = cells.rasterise(unroll(program.snap() if snapped is None else snapped))
+        iou = float(cells.iou(drawn, cells.pack(target.voxels)))
     to_target, from_target, f1, floor = _distances(scene, target, points, seed)
     return Metrics(
         name=target.name, cd=to_target + from_target, to_target=to_target, from_target=from_target,
-        noise_floor=floor, f1=f1, iou=iou, blocks=program.blocks, statements=program.statements,
-        primitives=int(scene.mask.sum()),
+        noise_floor=floor, f1=f1, iou=iou,
+        blocks=program.blocks, statements=program.statements, primitives=int(scene.mask.sum()),
     )  # fmt: skip
 
 

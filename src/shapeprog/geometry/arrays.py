@@ -1,29 +1,48 @@
-"""Scenes as plain arrays for the kernels, and the pool of threads that runs them."""
+"""Between tensors and kernels: the table of primitives, the choice between a kernel and its twin, and threads."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any
+from functools import wraps
+from typing import Any, TypeVar
 
 import numpy as np
-import numpy.typing as npt
 import torch
 from torch import Tensor
 
+from shapeprog.geometry.batch import Batch
 from shapeprog.geometry.primitive import primitives
-from shapeprog.geometry.scene import Scene
+from shapeprog.geometry.primitives import BUILT_IN
+from shapeprog.kernels.table import CENTRE, KIND, ROTATION, SIZE, WIDTH
+from shapeprog.space import Array
 
-Array = npt.NDArray[Any]
-
-BUILT_IN = 2
-"""The first kinds of primitive, cuboid and cylinder, are known to the kernels; later ones use their declaration."""
-
-ROW = 17
-"""Numbers of one primitive in the table for the kernels."""
+Function = TypeVar("Function", bound=Callable[..., Any])
 
 _pool: ThreadPoolExecutor | None = None
+
+
+def by_kernel(of: Tensor | Batch) -> bool:
+    """Whether kernels do the work: on the CPU, for built-in primitives.  Else it is done in torch."""
+    return of.device.type == "cpu" and not (isinstance(of, Batch) and declared_kinds(of))
+
+
+def twin_of(kernel: Callable[..., Any]) -> Callable[[Function], Function]:
+    """Make a function in torch the twin of one that runs kernels, and choose between them by the first argument.
+
+    The decorated function is the readable one; it is kept as ``.twin``, to be compared with what the CPU does.
+    """
+
+    def decorate(twin: Function) -> Function:
+        @wraps(twin)
+        def choose(first: Any, *rest: Any, **named: Any) -> Any:
+            return (kernel if by_kernel(first) else twin)(first, *rest, **named)
+
+        choose.twin = twin  # type: ignore[attr-defined]
+        return choose  # type: ignore[return-value]
+
+    return decorate
 
 
 def array(tensor: Tensor) -> Array:
@@ -38,32 +57,39 @@ def numbers(tensor: Tensor) -> Array:
     return values
 
 
-def solids(scene: Scene) -> Array:
-    """The primitives of all scenes as rows (B * N, 17) of float64: kind, 4 sizes, centre, rotation row by row.
+def cast(values: Array, like: Tensor) -> Tensor:
+    """An array as a tensor of another's type, cast by numpy: torch wakes threads that stand in the way of kernels."""
+    return torch.from_numpy(np.ascontiguousarray(values, array(like).dtype))
 
-    The kind is negative for padding and for kinds that only their declaration knows.
+
+def table_of(batch: Batch) -> Array:
+    """All primitives as rows of the table (B * N, WIDTH) of float64 for kernels, see ``kernels.table``.
+
+    Kernels know a primitive by its number among the built-in ones.  It is negative for padding and for kinds that only
+    their declaration knows.
     """
-    count = scene.mask.numel()
-    kind = array(scene.kind).reshape(count)
-    table: Array = np.empty((count, ROW))
-    table[:, 0] = np.where(array(scene.mask).reshape(count) & (kind < BUILT_IN), kind, -1)
-    table[:, 1:5] = array(scene.size).reshape(count, 4)
-    table[:, 5:8] = array(scene.centre).reshape(count, 3)
-    table[:, 8:] = array(scene.rotation).reshape(count, 9)
+    count = batch.mask.numel()
+    known = {id(primitive): number for number, primitive in enumerate(BUILT_IN)}
+    number = np.array([known.get(id(primitive), -1) for primitive in primitives], np.float64)
+    table: Array = np.empty((count, WIDTH))
+    table[:, KIND] = np.where(array(batch.mask).reshape(count), number[array(batch.kind).reshape(count)], -1)
+    table[:, SIZE:CENTRE] = array(batch.size).reshape(count, CENTRE - SIZE)
+    table[:, CENTRE:ROTATION] = array(batch.centre).reshape(count, 3)
+    table[:, ROTATION:] = array(batch.rotation).reshape(count, 9)
     return table
 
 
-def slopes(table: Array, like: Tensor, *shape: int) -> tuple[Tensor, Tensor, Tensor]:
-    """Gradient by sizes, centres and rotations of scenes (B, N) from rows of gradient by :func:`solids`."""
-    found = torch.from_numpy(table).to(like).reshape(*shape, ROW)
-    return found[..., 1:5], found[..., 5:8], found[..., 8:].unflatten(-1, (3, 3))
+def gradients(table: Array, like: Tensor, *shape: int) -> tuple[Tensor, Tensor, Tensor]:
+    """Gradient by sizes, centres and rotations of primitives (B, N) from rows of gradient by :func:`table_of`."""
+    found = torch.from_numpy(table).to(like).reshape(*shape, WIDTH)
+    return found[..., SIZE:CENTRE], found[..., CENTRE:ROTATION], found[..., ROTATION:].unflatten(-1, (3, 3))
 
 
-def declared_kinds(scene: Scene) -> list[int]:
+def declared_kinds(batch: Batch) -> list[int]:
     """Kinds of primitive in use that only their declaration knows."""
-    if len(primitives) <= BUILT_IN:
+    if len(primitives) == len(BUILT_IN):
         return []
-    return [kind for kind in torch.unique(scene.kind[scene.mask]).tolist() if kind >= BUILT_IN]
+    return [kind for kind in batch.kinds if not any(primitives[kind] is known for known in BUILT_IN)]
 
 
 def over_threads(work: Callable[[int, int], None], count: int, *, least: int = 1) -> None:

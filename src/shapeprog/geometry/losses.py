@@ -11,10 +11,10 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
+from shapeprog.geometry.batch import Batch
 from shapeprog.geometry.distance import signed_distance
 from shapeprog.geometry.nearest import mean_squared_distances, squared_distance
 from shapeprog.geometry.primitive import primitives
-from shapeprog.geometry.scene import Scene
 
 Cloud = Float[Tensor, "*batch P 3"]
 Weights = Float[Tensor, "*batch P"]
@@ -22,6 +22,8 @@ Target = Float[Tensor, "*batch Q 3"]
 TargetWeights = Float[Tensor, "*batch Q"]
 Values = Float[Tensor, "*batch"]
 Grid = Float[Tensor, "*batch R R R"]
+Row = Float[Tensor, "*batch S"]
+Cells = Float[Tensor, "*cells"]
 
 
 class Chamfer(NamedTuple):
@@ -69,7 +71,7 @@ def chamfer(
     return chamfer_directions(points, target, weights=weights, target_weights=target_weights).total
 
 
-def coverage(scene: Scene, target: Cloud, *, surface: bool = False) -> Values:
+def coverage(scene: Batch, target: Cloud, *, surface: bool = False) -> Values:
     """How far the target is from the union on average: the paper's coverage loss (equation of section 3.4).
 
     A target point inside a primitive is covered and costs nothing, so alone it is minimised by one box that fills
@@ -90,7 +92,7 @@ def excess(points: Cloud, target: Target, *, weights: Weights | None = None) -> 
     return _mean(torch.sqrt(squared.clamp(min=1e-12)), weights)
 
 
-def volume(scene: Scene) -> Values:
+def volume(scene: Batch) -> Values:
     """Price of volume: the volumes of all primitives added, in cubic cells; overlaps are paid for twice."""
     total = torch.zeros_like(scene.centre[..., 0])
     for kind in torch.unique(scene.kind[scene.mask]).tolist():
@@ -99,10 +101,21 @@ def volume(scene: Scene) -> Values:
     return total.sum(-1)
 
 
-def parts(scene: Scene, presence: Float[Tensor, "*batch N"] | None = None) -> Values:
+def parts(scene: Batch, presence: Float[Tensor, "*batch N"] | None = None) -> Values:
     """Price of parts: how many primitives there are, or are expected where ``presence`` gives their probabilities."""
     mask = scene.mask.to(scene.size)
     return (mask if presence is None else mask * presence).sum(-1)
+
+
+def cell_cross_entropy(logits: Cells, target: Cells, reduction: str = "none") -> Tensor:
+    """Cross-entropy of the occupancy of each cell against what it is in the target, from logits.
+
+    Parameters
+    ----------
+    reduction
+        ``none``, or ``mean`` for the mean over all cells.
+    """
+    return torch.nn.functional.binary_cross_entropy_with_logits(logits, target, reduction=reduction)
 
 
 def occupancy_cross_entropy(logits: Grid, target: Grid) -> Values:
@@ -116,16 +129,21 @@ def occupancy_cross_entropy(logits: Grid, target: Grid) -> Values:
         Cells, 0 or 1 or a share between.
     """
     logits = logits.clamp(-1e4, 1e4)
-    loss = torch.nn.functional.binary_cross_entropy_with_logits(logits, target.to(logits), reduction="none")
-    return loss.flatten(-3).mean(-1)
+    return cell_cross_entropy(logits, target.to(logits)).flatten(-3).mean(-1)
 
 
 def soft_iou(occupancy: Grid, target: Grid) -> Values:
     """Intersection over union of soft cells against target cells; 1 when both are empty, exact for hard cells."""
-    target = target.to(occupancy)
-    both = (occupancy * target).flatten(-3).sum(-1)
-    either = (occupancy + target - occupancy * target).flatten(-3).sum(-1)
-    return torch.where(either > 0, both / either.clamp(min=1e-12), 1.0)
+    return weighted_iou(occupancy.flatten(-3), target.to(occupancy).flatten(-3))
+
+
+def weighted_iou(occupancy: Row, target: Row, weights: Row | None = None) -> Values:
+    """The same for some cells in a row, each of which stands for as many as its weight says."""
+    both, either = occupancy * target, occupancy + target - occupancy * target
+    if weights is not None:
+        both, either = both * weights, either * weights
+    shared, all_cells = both.sum(-1), either.sum(-1)
+    return torch.where(all_cells > 0, shared / all_cells.clamp(min=1e-12), 1.0)
 
 
 def _mean(values: Weights, weights: Weights | None) -> Values:

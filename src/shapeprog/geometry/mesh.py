@@ -9,8 +9,8 @@ import numpy.typing as npt
 
 from shapeprog.errors import ShapeProgError
 from shapeprog.geometry.arrays import array
+from shapeprog.geometry.batch import Batch
 from shapeprog.geometry.primitive import primitives
-from shapeprog.geometry.scene import Scene
 
 FLAT = 1e-6
 """A part whose box is thinner than this, in cells, has no solid to mesh and is left out."""
@@ -32,7 +32,7 @@ class PartMesh(NamedTuple):
     faces: npt.NDArray[np.int64]
 
 
-def part_meshes(scene: Scene) -> list[PartMesh]:
+def part_meshes(scene: Batch) -> list[PartMesh]:
     """A watertight mesh of every primitive of one scene, in the order of the slots; degenerate ones are left out.
 
     Raises
@@ -57,7 +57,7 @@ def part_meshes(scene: Scene) -> list[PartMesh]:
     return found
 
 
-def union_mesh(scene: Scene) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.int64]]:
+def union_mesh(scene: Batch) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.int64]]:
     """One watertight mesh of the union of all primitives of one scene: vertices (V, 3) and triangles (F, 3).
 
     Raises

@@ -11,7 +11,8 @@ from torch import Tensor
 from torch.autograd.function import once_differentiable
 
 from shapeprog.errors import ShapeProgError
-from shapeprog.geometry.arrays import array, numbers, over_threads
+from shapeprog.geometry import neighbour_kernels as kernels
+from shapeprog.geometry.arrays import by_kernel, cast, numbers, over_threads
 from shapeprog.space import Array
 
 Cloud = Float[Tensor, "*batch P 3"]
@@ -32,7 +33,7 @@ def nearest(queries: Cloud, points: Other) -> Int[Tensor, "*batch P"]:
         If there are no points, or the leading dimensions differ.
     """
     many, few = _pair(queries.detach(), points.detach())
-    if many.device.type == "cpu":
+    if by_kernel(many):
         rows, clouds = _neighbours(many, few)[0], np.arange(len(few))[:, None]
         index = torch.from_numpy(rows - clouds * few.shape[1])
     else:
@@ -51,7 +52,7 @@ def squared_distance(queries: Cloud, points: Other) -> Float[Tensor, "*batch P"]
         As :func:`nearest`.
     """
     many, few = _pair(queries, points)
-    if many.device.type == "cpu":
+    if by_kernel(many):
         found: Tensor = _SquaredDistance.apply(many, few)  # type: ignore[no-untyped-call]
     else:
         index = _by_pairs(many.detach(), few.detach())
@@ -67,7 +68,7 @@ def mean_squared_distances(one: Cloud, two: Other) -> tuple[Float[Tensor, "*batc
     ShapeProgError
         As :func:`nearest`.
     """
-    if one.device.type != "cpu" or not one.shape[-2]:
+    if not by_kernel(one) or not one.shape[-2]:
         return squared_distance(one, two).mean(-1), squared_distance(two, one).mean(-1)
     first, second = _pair(one, two)
     there, back = _Chamfer.apply(first, second)  # type: ignore[no-untyped-call]
@@ -90,7 +91,7 @@ class _SquaredDistance(torch.autograd.Function):
         queries, points = ctx.saved_tensors
         to_queries, to_points = np.zeros(queries.shape), np.zeros(points.shape)
         _pull(numbers(queries), numbers(points), ctx.index, numbers(slope), to_queries, to_points)
-        return _cast(to_queries, queries), _cast(to_points, points)
+        return cast(to_queries, queries), cast(to_points, points)
 
 
 class _Chamfer(torch.autograd.Function):
@@ -104,7 +105,7 @@ class _Chamfer(torch.autograd.Function):
         there, back = _neighbours(one, two), _neighbours(two, one)
         ctx.save_for_backward(one, two)
         ctx.index = there[0], back[0]
-        return _cast(there[1].mean(-1), one), _cast(back[1].mean(-1), one)
+        return cast(there[1].mean(-1), one), cast(back[1].mean(-1), one)
 
     @staticmethod
     @once_differentiable
@@ -114,11 +115,7 @@ class _Chamfer(torch.autograd.Function):
         first, second = numbers(one), numbers(two)
         _pull(first, second, ctx.index[0], numbers(there)[:, None] / one.shape[1], to_one, to_two)
         _pull(second, first, ctx.index[1], numbers(back)[:, None] / two.shape[1], to_two, to_one)
-        return _cast(to_one, one), _cast(to_two, two)
-
-
-def _cast(values: Array, like: Tensor) -> Tensor:
-    return torch.from_numpy(values.astype(array(like).dtype, copy=False))
+        return cast(to_one, one), cast(to_two, two)
 
 
 def _pair(queries: Cloud, points: Other) -> tuple[Float[Tensor, "B P 3"], Float[Tensor, "B Q 3"]]:
@@ -136,23 +133,19 @@ def _pair(queries: Cloud, points: Other) -> tuple[Float[Tensor, "B P 3"], Float[
 
 def _neighbours(queries: Tensor, points: Tensor) -> tuple[Array, Array]:
     """Rows of the nearest points among those of all clouds, and squared distances, (B, P) each."""
-    from shapeprog.geometry.neighbour_kernels import neighbours
-
     (clouds, many), count = queries.shape[:2], points.shape[1]
     index, squared = np.empty(clouds * many, np.int64), np.empty(clouds * many)
     data = numbers(queries).reshape(-1, 3), many, numbers(points).reshape(-1, 3), count, index, squared
-    over_threads(lambda first, last: neighbours(*data, first, last), clouds)
+    over_threads(lambda first, last: kernels.neighbours(*data, first, last), clouds)
     return index.reshape(clouds, many), squared.reshape(clouds, many)
 
 
 def _pull(queries: Array, points: Array, index: Array, slope: Array, to_queries: Array, to_points: Array) -> None:
-    from shapeprog.geometry.neighbour_kernels import pull
-
     data = (
         queries.reshape(-1, 3), queries.shape[1], points.reshape(-1, 3), index.reshape(-1), slope,
         to_queries.reshape(-1, 3), to_points.reshape(-1, 3),
     )  # fmt: skip
-    over_threads(lambda first, last: pull(*data, first, last), len(index), least=8)
+    over_threads(lambda first, last: kernels.pull(*data, first, last), len(index), least=8)
 
 
 def _by_pairs(queries: Float[Tensor, "B P 3"], points: Float[Tensor, "B Q 3"]) -> Int[Tensor, "B P"]:

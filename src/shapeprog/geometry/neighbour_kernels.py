@@ -12,7 +12,7 @@ import math
 
 import numpy as np
 
-from shapeprog.geometry.compiling import helper, kernel
+from shapeprog.kernels.compile import helper, kernel
 
 PER_CELL = 6.0
 """Points aimed at in each cell that a surface passes through."""
@@ -134,7 +134,7 @@ def _search(x, y, z, ordered, starts, low, side, cells, best, found):
     return best, found
 
 
-@kernel
+@kernel("void(f8[:, ::1], i8, f8[:, ::1], i8, i8[::1], f8[::1], i8, i8)")
 def neighbours(queries, many, points, count, index, squared, begin, end):
     """Nearest of the ``count`` points to each of the ``many`` queries of the clouds ``begin`` to ``end``.
 
@@ -162,7 +162,7 @@ def neighbours(queries, many, points, count, index, squared, begin, end):
             index[query], squared[query] = order[found], best
 
 
-@kernel
+@kernel("void(f8[:, ::1], i8, f8[:, ::1], i8[::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], i8, i8)")
 def pull(queries, many, points, index, slope, to_queries, to_points, begin, end):
     """Add the gradient of squared distances to known neighbours, given the gradient of a loss by each of them.
 

@@ -6,13 +6,16 @@ four sizes.  All functions are vectorised over leading batch dimensions and diff
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 import torch
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
 from shapeprog.errors import DeclarationError
@@ -26,6 +29,66 @@ Mesh = tuple[npt.NDArray[np.float64], npt.NDArray[np.int64]]
 Points = Float[Tensor, "*batch 3"]
 Sizes = Float[Tensor, "*batch 4"]
 Scalars = Float[Tensor, "*batch"]
+Helper = Callable[..., Any]
+
+
+@dataclass(frozen=True)
+class Kernels:
+    """What kernels ask a primitive: the twins, one row of the table at a time, of its functions of the same name.
+
+    All take ``(table, row, ...)``, see :mod:`shapeprog.kernels.table`, and are declared with ``@helper``.
+
+    Parameters
+    ----------
+    distance
+        ``(..., a, b, c)``: signed distance of a local point.
+    slopes
+        ``(..., a, b, c, out)``: fill out (7,) with the derivatives of that distance by a, b, c and the four sizes.
+    bound
+        ``(...)``: three half extents of the local bounding box.
+    excess
+        ``(..., a, b, c)``: negative inside, zero on the surface, positive outside; need not be a distance.
+    sample, place, normal
+        ``(..., face, one, two, three)`` to a unit place; ``(..., u, v, w)`` to a local point; ``(..., face, u, v, w)``
+        to a local normal.
+    pull
+        ``(..., u, v, w, da, db, dc, out)``: add to out (rows, WIDTH) the gradient by the sizes of a placed point,
+        given that by its local coordinates.
+    cells
+        ``(..., square, planes, plane, low, high) -> bool``: where cells follow a rule of their own, fill them and say
+        so, or change the sizes in the row to those by which they are tested; ``low`` and ``high`` (3,) are scratch,
+        ``square`` says whether all axes stand along those of the grid.  Positions and sizes are in cells.
+    """
+
+    distance: Helper
+    slopes: Helper
+    bound: Helper
+    excess: Helper
+    sample: Helper
+    place: Helper
+    normal: Helper
+    pull: Helper
+    cells: Helper
+
+
+@dataclass(frozen=True)
+class Spans:
+    """Cells of M solids that fill rows from low to high in every layer, R layers each, by a rule of their own.
+
+    Parameters
+    ----------
+    known
+        Which of the solids the rule is for; the others are tested cell by cell.
+    layers
+        First layer and the one after the last, (M, 1) each.
+    depth, side
+        Along depth and left-right the first cell and the one after the last in every layer, (M, R) each.
+    """
+
+    known: Bool[Tensor, " M"]
+    layers: tuple[Float[Tensor, "M 1"], Float[Tensor, "M 1"]]
+    depth: tuple[Float[Tensor, "M R"], Float[Tensor, "M R"]]
+    side: tuple[Float[Tensor, "M R"], Float[Tensor, "M R"]]
 
 
 @dataclass(frozen=True)
@@ -58,6 +121,13 @@ class Primitive:
         ``size (4,) -> Mesh``: watertight triangles.
     volume
         ``size -> (...)``: exact volume.
+    cell_size
+        ``size -> size``: the sizes by which cells are tested, in cells; a cell is filled when its centre is inside.
+    spans
+        ``(size, centre, rotation, square, resolution) -> Spans``: cells by another rule, see :class:`Spans`; centres
+        and sizes are in cells from the low corner of the grid.
+    kernels
+        Its twins for kernels; without them the functions above are used everywhere, which is slower.
     """
 
     name: str
@@ -71,13 +141,20 @@ class Primitive:
     normal: Callable[[Sizes, Points, Int[Tensor, "*batch"]], Points]
     mesh: Callable[[npt.NDArray[np.float64]], Mesh]
     volume: Callable[[Sizes], Scalars]
+    cell_size: Callable[[Sizes], Sizes] = lambda size: size
+    spans: Callable[..., Spans] | None = None
+    kernels: Kernels | None = None
 
 
 class Primitives:
-    """The registry of primitives: a kind is the index of its declaration."""
+    """The registry: the kind of a primitive is its number in this process, which no other ever gets.
+
+    Names are those of the language in force; what a language does not name is still drawn where a scene holds it.
+    """
 
     def __init__(self) -> None:
         self._kinds: list[Primitive] = []
+        self._names: ContextVar[dict[str, int]] = ContextVar("names", default={})  # noqa: B039
 
     def register(self, primitive: Primitive) -> Primitive:
         """Add a primitive and return it.
@@ -87,7 +164,7 @@ class Primitives:
         DeclarationError
             If the name is taken, the sizes do not fit the four slots, or a function fails or returns a wrong shape.
         """
-        if any(known.name == primitive.name for known in self._kinds):
+        if primitive.name in self.names:
             raise DeclarationError(f"primitive {primitive.name!r} is declared twice", "give one of them another name")
         if not 1 <= len(primitive.sizes) <= SIZES or not 0 <= primitive.extents <= len(primitive.sizes):
             raise DeclarationError(
@@ -96,25 +173,43 @@ class Primitives:
             )
         _try(primitive)
         self._kinds.append(primitive)
+        self.names[primitive.name] = len(self._kinds) - 1
         return primitive
 
-    def shorten(self, length: int) -> None:
-        """Forget the newest primitives beyond ``length``, as when the module that declares them fails."""
-        del self._kinds[length:]
+    @property
+    def names(self) -> dict[str, int]:
+        """Kinds by the names in force."""
+        return self._names.get()
+
+    @contextmanager
+    def using(self, names: dict[str, int]) -> Iterator[None]:
+        """Put other names in force for a while; what is registered meanwhile is added to them."""
+        token = self._names.set(names)
+        try:
+            yield
+        finally:
+            self._names.reset(token)
+
+    def restore(self, names: Mapping[str, int]) -> None:
+        """Forget the names declared since, as when the module that declares them fails."""
+        for name in set(self.names) - set(names):
+            del self.names[name]
 
     def kind(self, name: str) -> int:
-        """Index of the primitive called ``name``.
+        """Number of the primitive called ``name``.
 
         Raises
         ------
         DeclarationError
             If there is none.
         """
-        for index, primitive in enumerate(self._kinds):
-            if primitive.name == name:
-                return index
-        known = ", ".join(primitive.name for primitive in self._kinds)
-        raise DeclarationError(f"no primitive is called {name!r}", f"known are {known}")
+        if name not in self.names:
+            raise DeclarationError(f"no primitive is called {name!r}", f"known are {', '.join(self.names)}")
+        return self.names[name]
+
+    def number(self, primitive: Primitive) -> int:
+        """The kind of a registered primitive, whatever language is in force."""
+        return next(kind for kind, known in enumerate(self._kinds) if known is primitive)
 
     def __getitem__(self, kind: int) -> Primitive:
         return self._kinds[kind]
@@ -127,7 +222,7 @@ class Primitives:
 
 
 primitives = Primitives()
-"""All primitives known to this process, cuboid and cylinder first."""
+"""All primitives known to this process; the built-in ones are those of :mod:`shapeprog.geometry.primitives`."""
 
 
 def safe_norm(squared: Scalars) -> Scalars:
@@ -149,6 +244,7 @@ def _try(primitive: Primitive) -> None:
             "place": (lambda: primitive.place(size, unit), (2, 3)),
             "normal": (lambda: primitive.normal(size, unit, face), (2, 3)),
             "volume": (lambda: primitive.volume(size), (2,)),
+            "cell_size": (lambda: primitive.cell_size(size), (2, SIZES)),
             "mesh": (lambda: torch.as_tensor(primitive.mesh(np.ones(SIZES))[0]), (None, 3)),
         }
         for word, (call, wanted) in calls.items():

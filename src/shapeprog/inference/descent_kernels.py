@@ -18,9 +18,10 @@ from shapeprog.inference.block_layout import (
     ROTATE,
     TILT,
 )
-from shapeprog.inference.raster_kernels import REACH, draw_block
+from shapeprog.inference.raster_kernels import draw_block
 from shapeprog.kernels.bits import ones
 from shapeprog.kernels.compile import helper, kernel
+from shapeprog.kernels.rows import REACH
 
 MOST_MOVES = 200
 """At least the number of neighbours that any block has."""
@@ -57,7 +58,7 @@ def valid(block):
         if block[level] > 1:
             apart = False
             for axis in range(3):
-                if form == BOX or form == BACK:
+                if form in (BOX, BACK):
                     extent = block[EXTENT + axis]
                 elif form == DISC:
                     extent = block[EXTENT] if axis == 0 else 2 * block[RADIUS]
@@ -66,7 +67,7 @@ def valid(block):
                 apart = apart or abs(block[level + 1 + axis]) >= extent
             if not apart:
                 return False
-    if form == BOX or form == BACK:
+    if form in (BOX, BACK):
         return block[EXTENT] >= 1 and block[EXTENT + 1] >= 1 and block[EXTENT + 2] >= 1
     if form == LINE:
         return block[TILT] >= 1
@@ -121,7 +122,7 @@ def moves(block, out, far):
     last = RADIUS if form == DISC else (TILT if form == LINE else TILT - 1)
     for which in range(2 * far):
         delta = (which // 2 + 1.0) * (1.0 if which % 2 else -1.0)
-        if form == BOX or form == BACK:
+        if form in (BOX, BACK):
             for axis in range(3):
                 place, extent = FIRST + axis, EXTENT + axis
                 n = put(out, n, block, place, delta, place, 0.0)

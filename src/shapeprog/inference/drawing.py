@@ -26,7 +26,7 @@ def draw_all(blocks: FloatArray) -> Rows:
     return rows[0]
 
 
-def count(drawn: Rows, first: Rows, second: Rows) -> Whole:
+def cells_shared(drawn: Rows, first: Rows, second: Rows) -> Whole:
     """How many cells each of several sets of rows (P, 1024) shares with two others: (P, 2)."""
     counts = np.empty((len(drawn), 2), np.int64)
     count_cells(drawn.view(np.uint64), first.view(np.uint64), second.view(np.uint64), counts)

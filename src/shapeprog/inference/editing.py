@@ -9,7 +9,7 @@ import numpy as np
 from shapeprog.inference.block_layout import COUNT1, ROTATE, SHIFT1, WIDTH
 from shapeprog.inference.chance_kernels import below, shuffle, start, uniform
 from shapeprog.inference.descent_kernels import GAIN, MOST_MOVES, descend, statements
-from shapeprog.inference.drawing import Rows, Whole, count, draw_all, draw_each, places
+from shapeprog.inference.drawing import Rows, Whole, cells_shared, draw_all, draw_each, places
 from shapeprog.inference.fold_kernels import VOLUMES
 from shapeprog.inference.form_kernels import guess
 from shapeprog.inference.pool import Pool
@@ -62,7 +62,7 @@ def iou(blocks: FloatArray, target: Target) -> float:
 
 def _ious(drawn: Rows, target: Target) -> FloatArray:
     """IoU of each of several sets of rows (P, 1024) with the target."""
-    counts = count(drawn, target.occupied, ~target.occupied)
+    counts = cells_shared(drawn, target.occupied, ~target.occupied)
     return counts[:, 0] / (target.cells + counts[:, 1])
 
 
@@ -166,7 +166,7 @@ def propose_form(form: int, covered: Rows, waste: float, box: FloatArray, target
 
 def _nets(blocks: FloatArray, gained: Rows, wasted: Rows, waste: float) -> FloatArray:
     """Cells of ``gained`` that each block covers, minus ``waste`` times those of ``wasted``."""
-    counts = count(draw_each(blocks), gained, wasted)
+    counts = cells_shared(draw_each(blocks), gained, wasted)
     return counts[:, 0] - waste * counts[:, 1]
 
 

@@ -18,16 +18,14 @@ from jaxtyping import Float
 from torch import Tensor
 
 from shapeprog.data.shape import Shape
+from shapeprog.geometry.cells import iou, pack, rasterise
 from shapeprog.geometry.distance import union_distance
-from shapeprog.geometry.occupancy import pack, packed_iou, packed_rows
-from shapeprog.inference.block_layout import COUNT1, COUNT2, EXTENT, WIDTH
 from shapeprog.inference.blocks import to_program
 from shapeprog.inference.refine import REACH, Schedule, refine
 from shapeprog.inference.structure import Settings, search_structure
 from shapeprog.inference.surface import points_of_cells
 from shapeprog.language.program import Program
 from shapeprog.language.unroll import unroll
-from shapeprog.space import RESOLUTION
 
 if TYPE_CHECKING:
     from shapeprog.models.generator import Generator
@@ -158,7 +156,7 @@ def infer(
             schedule=schedule, reach=REACH, seed=seed, deadline=started + budget, progress=progress,
         )  # fmt: skip
     scores |= {
-        "iou": float(packed_iou(packed_rows(unroll(snapped)), pack(target.voxels))),
+        "iou": float(iou(rasterise(unroll(snapped)), pack(target.voxels))),
         "blocks": float(snapped.blocks),
         "statements": float(snapped.statements),
         "primitives": float(snapped.size),
@@ -174,16 +172,9 @@ def prepare_kernels() -> None:
     The first call on a machine takes some seconds, the first in a process a fraction of one.
     """
     from shapeprog.kernels.compile import prepare
-    from shapeprog.kernels.modules import GEOMETRY, INFERENCE
+    from shapeprog.kernels.modules import INFERENCE
 
     prepare(INFERENCE)
-    if not GEOMETRY:  # until the kernels of geometry are converted; then this goes
-        block = np.zeros((1, WIDTH))
-        block[:, COUNT1] = block[:, COUNT2] = 1
-        block[:, EXTENT : EXTENT + 3] = 4
-        cells = np.zeros((RESOLUTION,) * 3, np.bool_)
-        cells[14:18, 14:18, 14:18] = True
-        refine(to_program(block), torch.from_numpy(points_of_cells(cells)), schedule=Schedule(steps=1))
 
 
 def _load(shape: Shape | str | Path) -> Shape:

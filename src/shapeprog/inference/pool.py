@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from shapeprog.inference.block_layout import WIDTH
 from shapeprog.inference.descent_kernels import sound, statements
-from shapeprog.inference.drawing import count, draw_each
+from shapeprog.inference.drawing import cells_shared, draw_each
 from shapeprog.space import FloatArray
 
 
@@ -65,5 +65,5 @@ class Pool:
 
     def _gains(self, occupied: npt.NDArray[np.uint32], covered: npt.NDArray[np.uint32], waste: float) -> FloatArray:
         """Cells that each block gains."""
-        counts = count(self.drawn, occupied & ~covered, ~occupied & ~covered)
+        counts = cells_shared(self.drawn, occupied & ~covered, ~occupied & ~covered)
         return counts[:, 0] - waste * counts[:, 1] - self.prices

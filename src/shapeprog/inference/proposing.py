@@ -16,7 +16,7 @@ import numpy.typing as npt
 import torch
 
 from shapeprog.errors import ShapeProgError
-from shapeprog.geometry.occupancy import pack
+from shapeprog.geometry.cells import cells_of, pack, words_of
 from shapeprog.inference.block_layout import WIDTH
 from shapeprog.inference.drawing import draw_all
 from shapeprog.inference.editing import improve_block
@@ -69,7 +69,7 @@ def propose_program(
     deadline
         Value of ``time.monotonic()`` after which the generator is not asked again.
     """
-    occupied = pack(voxels).reshape(-1)
+    occupied = words_of(pack(voxels)).reshape(-1)
     cost = price * int(voxels.sum())
     device = next(generator.parameters()).device
     target = torch.from_numpy(voxels.astype(np.uint8))[None].to(device)
@@ -79,7 +79,7 @@ def propose_program(
     memory, fruitless = None, 0
     with single_threaded():
         while len(program) < blocks and fruitless < FRUITLESS and time.monotonic() < deadline:
-            canvas = torch.from_numpy(covered.view(np.int32).reshape(1, RESOLUTION, RESOLUTION)).to(device)
+            canvas = cells_of(covered).reshape(1, RESOLUTION, RESOLUTION).to(device)
             code, memory = suggest(generator, target, canvas, memory, suggestions, random)
             suggested = from_code(code)
             pool, improved = Pool.of([suggested], cost), []

@@ -22,18 +22,13 @@ from shapeprog.inference.block_layout import (
 )  # fmt: skip
 from shapeprog.kernels.bits import ones, span
 from shapeprog.kernels.compile import helper, kernel
+from shapeprog.kernels.rows import CAP, REACH
 
 ROWS = 1024
 """Rows of the grid: row 32 i + j holds the cells at height i and depth j."""
 
 ARM = 2
 """Cells that an arm of a cross base is wide."""
-
-REACH = 1.01
-"""A cell belongs to a cylinder when its centre is within this many radii of the axis (``geometry.raster.REACH``)."""
-
-CAP = 1e-3
-"""Slack in cells along the axis of a cylinder (``geometry.raster.CAP``)."""
 
 
 @helper
@@ -113,7 +108,7 @@ def draw_block(rows, block):
             s1 = int(i1 * block[SHIFT1 + 1] + i2 * block[SHIFT2 + 1])
             s2 = int(i1 * block[SHIFT1 + 2] + i2 * block[SHIFT2 + 2])
             a, b, c = int(p0) + s0, int(p1) + s1, int(p2) + s2
-            if form == BOX or form == BACK:
+            if form in (BOX, BACK):
                 draw_back(rows, a, b, c, ta, tb, tc, int(radius) if form == BACK else 0)
                 continue
             if form == DISC:

@@ -22,10 +22,11 @@ from torch import Tensor
 
 from shapeprog.errors import InputError
 from shapeprog.geometry.distance import signed_distance
+from shapeprog.geometry.losses import cell_cross_entropy
 from shapeprog.geometry.nearest import squared_distance
 from shapeprog.geometry.primitive import primitives
-from shapeprog.geometry.sampling import sample_surface
 from shapeprog.geometry.scene import Scene
+from shapeprog.geometry.surface import sample_surface
 from shapeprog.language.program import Program
 from shapeprog.language.statement import language
 from shapeprog.language.tensors import Code, decode, encode
@@ -217,7 +218,7 @@ def _shell(voxels: npt.NDArray[np.bool_]) -> Float[Tensor, "S 4"]:
 def _occupancy_loss(scene: Scene, cells: Float[Tensor, "S 4"]) -> Float[Tensor, ""]:
     """Cross-entropy of touched cells: a solid touches a cell when it comes within half a cell of its centre."""
     logits = SHARPNESS * (0.5 - signed_distance(scene, cells[:, :3]))
-    return torch.nn.functional.binary_cross_entropy_with_logits(logits, cells[:, 3])
+    return cell_cross_entropy(logits, cells[:, 3], "mean")
 
 
 @contextmanager

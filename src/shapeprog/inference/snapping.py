@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 import torch
+from jaxtyping import Float
+from torch import Tensor
 
-from shapeprog.geometry.occupancy import pack, packed_iou, packed_rows
+from shapeprog.geometry.cells import Cells, iou, pack, rasterise
 from shapeprog.language.program import Program
 from shapeprog.language.statement import language
 from shapeprog.language.tensors import Code, decode, encode
@@ -46,7 +48,7 @@ def snap(program: Program, voxels: npt.NDArray[np.bool_]) -> Program:
                             trial[block, step, slot] = wanted
                             trials.append(trial)
             ious = _ious(Code(start.ids.expand(len(trials), -1, -1), torch.stack(trials)), target)
-            chosen = int(np.argmax(ious))
+            chosen = int(ious.argmax())
             if ious[chosen] > best_iou:
                 best, best_iou = trials[chosen], ious[chosen]
         if best_iou <= before:
@@ -63,5 +65,5 @@ def snapped_from(program: Program, snapped: Program) -> bool:
     return whole and bool(((theirs.parameters - mine.parameters.round()).abs() <= 1).all())
 
 
-def _ious(code: Code, target: npt.NDArray[np.uint32]) -> npt.NDArray[np.float64]:
-    return packed_iou(packed_rows(unroll(code)), target)
+def _ious(code: Code, target: Cells) -> Float[Tensor, " B"]:
+    return iou(rasterise(unroll(code)), target)

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from shapeprog.geometry.occupancy import pack
+from shapeprog.geometry.cells import pack, words_of
 from shapeprog.inference.block_layout import WIDTH
 from shapeprog.inference.families import families
 from shapeprog.inference.reading import from_program
@@ -144,7 +144,7 @@ def search_structure(
     cells = np.argwhere(voxels)
     low, high = cells.min(0), cells.max(0) + 1
     table = families((high - low).tolist(), PLANES, MOST_COPIES)
-    target = editing.Target(pack(voxels).reshape(-1), low, high, table, settings.price, len(cells))
+    target = editing.Target(words_of(pack(voxels)).reshape(-1), low, high, table, settings.price, len(cells))
     offered = proposals or Proposals()
     rough = [each[: settings.blocks] for each in offered.programs] + greedy_starts(target, settings.blocks)
     starts = [editing.polish(each, target, 1, 3) for each in rough]

@@ -5,17 +5,12 @@ They are named, not imported: kernels are the lowest room.
 
 from __future__ import annotations
 
-from pathlib import Path
-
-# Until the kernels of geometry are converted they are made ready by a dummy refinement; then this line goes.
-_CONVERTED = (Path(__file__).parents[1] / "geometry" / "cell_kernels.py").exists()
-
 GEOMETRY = (
     "shapeprog.geometry.distance_kernels",
     "shapeprog.geometry.surface_kernels",
     "shapeprog.geometry.cell_kernels",
     "shapeprog.geometry.neighbour_kernels",
-) * _CONVERTED
+)
 """Distances, samples, cells and neighbours of scenes."""
 
 INFERENCE = (

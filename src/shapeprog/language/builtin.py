@@ -5,7 +5,7 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
-from shapeprog.geometry.scene import Solids
+from shapeprog.geometry.batch import Solids
 from shapeprog.language.parameters import Count, Extent, Half, Length, Position, Radius, Shift, Shift3, Turn
 from shapeprog.language.shapes import bar, box, cuboid, disc, slab
 from shapeprog.language.statement import Motion, loop, statement

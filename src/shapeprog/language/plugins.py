@@ -13,7 +13,7 @@ from shapeprog.errors import DeclarationError, InputError, ShapeProgError
 from shapeprog.geometry.primitive import primitives
 from shapeprog.language.statement import Statement, language
 
-_loaded: dict[Path, tuple[Statement, ...]] = {}
+_loaded: dict[Path, tuple[tuple[Statement, ...], dict[str, int]]] = {}
 
 
 def load_statements(path: str | os.PathLike[str]) -> tuple[Statement, ...]:
@@ -35,7 +35,7 @@ def load_statements(path: str | os.PathLike[str]) -> tuple[Statement, ...]:
     if not file.is_file():
         found = "a folder" if file.is_dir() else "no file"
         raise InputError(f"{path} is {found}", "give the path of a Python file that declares statements")
-    before, kinds = set(language().names), len(primitives)
+    before, solids = set(language().names), dict(primitives.names)
     module_name = f"shapeprog_statements_{len(_loaded)}_{file.stem}"
     try:
         _run(file, module_name)
@@ -45,12 +45,12 @@ def load_statements(path: str | os.PathLike[str]) -> tuple[Statement, ...]:
     except BaseException as cause:
         for name in set(language().names) - before:
             language().forget(name)
-        primitives.shorten(kinds)
+        primitives.restore(solids)
         sys.modules.pop(module_name, None)
         if isinstance(cause, (Exception, SystemExit)):
             raise _in_words(path, file, cause) from cause
         raise
-    _loaded[file] = declared
+    _loaded[file] = declared, {name: kind for name, kind in primitives.names.items() if name not in solids}
     return declared
 
 
@@ -66,7 +66,9 @@ def _run(file: Path, module_name: str) -> None:
 def _declare_again(file: Path) -> tuple[Statement, ...]:
     known = language()
     declared = []
-    for each in _loaded[file]:
+    statements, solids = _loaded[file]
+    primitives.names.update(solids)
+    for each in statements:
         if each.name not in known:
             known.register(replace(each, id=known.free_id()) if each.id in known else each)
         declared.append(known[each.name])

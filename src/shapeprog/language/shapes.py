@@ -6,10 +6,10 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from shapeprog.geometry.cuboid import CUBOID
-from shapeprog.geometry.cylinder import CYLINDER
+from shapeprog.geometry.batch import Solids
 from shapeprog.geometry.primitive import SIZES, Primitive, primitives, safe_norm
-from shapeprog.geometry.scene import Solids
+from shapeprog.geometry.primitives.cuboid import CUBOID
+from shapeprog.geometry.primitives.cylinder import CYLINDER
 
 Scalar = Float[Tensor, "*batch"]
 Vector = Float[Tensor, "*batch 3"]
@@ -21,7 +21,7 @@ def solid(
     """A solid of any declared primitive from its sizes in the order it declares them."""
     zero = torch.zeros_like(centre[..., 0])
     padded = [*sizes, *[zero] * (SIZES - len(sizes))]
-    return Solids(primitives.kind(primitive.name), torch.stack(padded, -1), centre, rotation)
+    return Solids(primitives.number(primitive), torch.stack(padded, -1), centre, rotation)
 
 
 def cuboid(centre: Vector, half: Vector, lean: Scalar | None = None) -> Solids:

@@ -23,7 +23,9 @@ from jaxtyping import Float
 from torch import Tensor
 
 from shapeprog.errors import DeclarationError
-from shapeprog.geometry.scene import Solids
+from shapeprog.geometry.batch import Solids
+from shapeprog.geometry.primitive import primitives
+from shapeprog.geometry.primitives import built_in_names
 from shapeprog.language.parameters import Parameter, Quantity
 
 SLOTS = 7
@@ -117,11 +119,12 @@ class Statement:
 
 
 class Language:
-    """A registry of statements and loops, found by name or by id."""
+    """A registry of statements and loops, found by name or by id, and the names of its primitives."""
 
     def __init__(self) -> None:
         self._by_id: dict[int, Statement] = {}
         self._by_name: dict[str, Statement] = {}
+        self.primitives = built_in_names()
 
     def register(self, declared: Statement) -> Statement:
         """Add a declaration and return it.
@@ -178,6 +181,7 @@ class Language:
 
 
 standard = Language()
+standard.primitives = primitives.names
 """The language of this process: the built-in statements and those that users register."""
 
 _active: ContextVar[Language] = ContextVar("language", default=standard)
@@ -190,10 +194,11 @@ def language() -> Language:
 
 @contextmanager
 def using(other: Language) -> Iterator[Language]:
-    """Put another language in force for a while."""
+    """Put another language in force for a while, its names of primitives included."""
     token = _active.set(other)
     try:
-        yield other
+        with primitives.using(other.primitives):
+            yield other
     finally:
         _active.reset(token)
 

@@ -6,12 +6,10 @@ A program holds calls of drawing statements with literal numbers, and ``for`` lo
 from __future__ import annotations
 
 import ast
-import difflib
 import re
 import warnings
-from collections.abc import Sequence
 
-from shapeprog.errors import ProgramError, ShapeProgError
+from shapeprog.errors import ProgramError, ShapeProgError, did_you_mean
 from shapeprog.language.parameters import Parameter
 from shapeprog.language.program import Draw, Loop, Node
 from shapeprog.language.statement import Statement, language
@@ -53,15 +51,6 @@ def proper_text(text: str, name: str) -> str:
             "this line holds half a character", line=line, hint="is this a text file in UTF-8?", name=name
         ) from None
     return text.removeprefix("\ufeff")
-
-
-def nearest(word: str, known: Sequence[str]) -> str:
-    """A hint that proposes the known word nearest to ``word``, or lists them all."""
-    lower = {each.lower(): each for each in known}
-    close = difflib.get_close_matches(word.lower(), lower, 1)
-    if close:
-        return f"did you mean {lower[close[0]]}?"
-    return f"known are {', '.join(known)}" if known else "nothing is declared"
 
 
 class _Reader:
@@ -139,7 +128,7 @@ class _Reader:
             )
         if function.id not in known:
             fitting = [declared.name for declared in known if declared.is_loop == (wanted == "loop")]
-            raise self._error(function, f"no {wanted} is called {function.id!r}", nearest(function.id, fitting))
+            raise self._error(function, f"no {wanted} is called {function.id!r}", did_you_mean(function.id, fitting))
         declared = known[function.id]
         if not isinstance(node, ast.Call):
             raise self._error(node, f"{declared.name} lacks its parameters", f"write {signature(declared)}")
@@ -158,7 +147,7 @@ class _Reader:
         for word in call.keywords:
             if word.arg is None or word.arg not in parameters:
                 what = f"parameter {word.arg!r}" if word.arg else "parameter **"
-                hint = nearest(word.arg or "", list(parameters))
+                hint = did_you_mean(word.arg or "", list(parameters))
                 raise self._error(word, f"{declared.name} has no {what}", hint)
             if word.arg in found:
                 raise self._error(word, f"{word.arg} of {declared.name} is given twice", "leave one of them out")

@@ -1,4 +1,4 @@
-"""Program text: reading, canonical printing, and ``.shape`` files.
+"""Program text: reading and canonical printing.
 
 Every float32 survives: ``parse(format_program(program)) == program`` for all finite numbers, negative zero and
 negative lengths included (which draw nothing); counts and turns are whole.
@@ -6,12 +6,9 @@ negative lengths included (which draw nothing); counts and turns are whole.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator
-from pathlib import Path
 
-from shapeprog.errors import InputError, ShapeProgError
-from shapeprog.files import write_text
+from shapeprog.errors import ShapeProgError
 from shapeprog.language.program import Loop, Node, Program
 from shapeprog.language.statement import language
 from shapeprog.language.syntax import DEEPEST, read
@@ -51,52 +48,6 @@ def format_program(program: Program) -> str:
         If a number is not finite, a statement is not declared, or loops nest deeper than text can.
     """
     return "".join(f"{line}\n" for node in program.body for line in _lines(node, 0))
-
-
-def load(path: str | os.PathLike[str]) -> Program:
-    """The program in a ``.shape`` file.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read or is not UTF-8.
-    ProgramError
-        If its text is not in the language.
-    """
-    return parse(read_text(path), str(path))
-
-
-def save(program: Program, path: str | os.PathLike[str]) -> None:
-    """Write a program to a ``.shape`` file, whole or not at all.
-
-    Raises
-    ------
-    OutputError
-        If the file cannot be written.
-    """
-    write_text(path, format_program(program))
-
-
-def read_text(path: str | os.PathLike[str]) -> str:
-    """The text of a UTF-8 file, with or without a byte order mark.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read or is not UTF-8.
-    """
-    try:
-        return Path(path).read_bytes().decode("utf-8-sig")
-    except FileNotFoundError as error:
-        raise InputError(f"there is no file {path}", "check the path") from error
-    except IsADirectoryError as error:
-        raise InputError(f"{path} is a folder, not a file", "name a file in it") from error
-    except UnicodeDecodeError as error:
-        raise InputError(
-            f"{path} is not text: byte {error.start} is not UTF-8", "save it as UTF-8, or check that it is a program"
-        ) from error
-    except (OSError, ValueError) as error:
-        raise InputError(f"cannot read {path}: {error}", "check the path and its permissions") from error
 
 
 def call_text(node: Node, name: str) -> str:

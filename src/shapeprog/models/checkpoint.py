@@ -5,7 +5,6 @@ No pickle is read.  Weights that ship with the package are found by their bare n
 
 from __future__ import annotations
 
-import difflib
 import json
 import math
 import os
@@ -17,7 +16,7 @@ from typing import Any
 import torch
 from torch import Tensor, nn
 
-from shapeprog.errors import InputError, OutputError, ShapeProgError
+from shapeprog.errors import InputError, OutputError, ShapeProgError, did_you_mean
 from shapeprog.files import write_bytes
 from shapeprog.models.designs import build_generator
 from shapeprog.models.executor import NeuralExecutor
@@ -238,8 +237,7 @@ def _found(name: str | os.PathLike[str]) -> Path:
         known = sorted(each.stem for each in SHIPPED.glob(f"*{SUFFIX}"))
         if path.name in known:
             return SHIPPED / f"{path.name}{SUFFIX}"
-        near = difflib.get_close_matches(path.name, known, 1)
-        cure = f"did you mean {near[0]!r}?" if near else f"there are: {', '.join(known) or 'none'}; or give a path"
+        cure = did_you_mean(path.name, known, f"there are: {', '.join(known) or 'none'}; or give a path", quoted=True)
         raise InputError(f"no weights called {path.name!r} ship with shapeprog", cure)
     return path
 

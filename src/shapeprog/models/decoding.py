@@ -14,11 +14,12 @@ import torch
 from jaxtyping import Float, Int, UInt8
 from torch import Tensor
 
-from shapeprog.language.canvas import count, draw_blocks, packed, stays_inside, unpacked, widened
+from shapeprog.geometry.cells import count, iou, pack, unpack, widen
 from shapeprog.language.program import Program
 from shapeprog.language.statement import EMPTY, SLOTS
 from shapeprog.language.tensors import Code
 from shapeprog.language.tensors import decode as programs_of
+from shapeprog.language.unroll import draw_blocks, stays_inside
 from shapeprog.models.generator import Generator, Memory, Said
 
 Choice = Literal["drawn", "argmax", "sample", "ids"]
@@ -101,10 +102,10 @@ def decode(
     canvases = torch.zeros(len(target), blocks, *target.shape[1:3], dtype=torch.int32, device=device)
     chance = torch.zeros(len(target), device=device)
     active = torch.arange(len(target), device=device)
-    seen, cells, memory = target.float(), packed(target), None
+    seen, cells, memory = target.float(), pack(target), None
     canvas = canvases[:, 0].clone()
     for k in range(blocks):
-        feature, memory = generator.perceive(seen[active], unpacked(canvas[active]).float(), memory)
+        feature, memory = generator.perceive(seen[active], unpack(canvas[active]).float(), memory)
         if choose == "drawn" and not generator.by_batch:
             said, values, chances = _helping(generator, feature, width, canvas[active], cells[active])
         else:
@@ -166,7 +167,7 @@ def _helping(
     wanted, before = cells[:, None], canvas[:, None]
     new = drawn & ~before
     exact = 2 * count(new & wanted) - count(new)
-    near = count(wanted & widened(drawn) & ~widened(before)) - count(new & ~widened(wanted))
+    near = count(wanted & widen(drawn) & ~widen(before)) - count(new & ~widen(wanted))
     worth = (EXACT * exact + near).masked_fill(~possible, 0.0)
     best = worth.argmax(-1)  # the likeliest of equals
     row = torch.arange(len(ids), device=ids.device)
@@ -235,7 +236,7 @@ def beam(
     memory: Memory = None
     for k in range(blocks):
         shape, lane = going.nonzero(as_tuple=True)
-        feature, memory = generator.perceive(seen[shape], unpacked(canvases[shape, lane, k]).float(), memory)
+        feature, memory = generator.perceive(seen[shape], unpack(canvases[shape, lane, k]).float(), memory)
         said, values, chances = _blocks(generator, feature, width)
         # Every program offers W continuations; one that has ended offers itself.
         offers = torch.full((shapes, width, width), -torch.inf, device=device)
@@ -264,7 +265,7 @@ def beam(
         if not bool(going.any()):
             canvases[:, :, k + 1 :] = canvases[:, :, k + 1 : k + 2]
             break
-    score = chance if rank == "log_probability" else _iou(canvases[:, :, -1], packed(target)[:, None])
+    score = chance if rank == "log_probability" else iou(canvases[:, :, -1], pack(target)[:, None])
     order = score.masked_fill(~chance.isfinite(), -torch.inf).argsort(dim=-1, descending=True, stable=True)
     each = torch.arange(shapes, device=device)[:, None]
     ids, parameters, offsets = ids[each, order], parameters[each, order], offsets[each, order]
@@ -307,10 +308,6 @@ def _at(state: Memory, index: Tensor) -> Memory:
     return tuple(each[index] for each in state) if isinstance(state, tuple) else state[index]
 
 
-def _iou(canvas: Int[Tensor, "*batch 32 32"], cells: Int[Tensor, "*batch 32 32"]) -> Float[Tensor, "*batch"]:
-    return count(canvas & cells) / count(canvas | cells).clamp(min=1)
-
-
 @torch.no_grad()
 def suggest(
     generator: Generator,
@@ -331,7 +328,7 @@ def suggest(
     memory
         What the call for the block before returned; ``None`` at the first.
     """
-    feature, memory = generator.perceive(target.float(), unpacked(canvas).float(), memory)
+    feature, memory = generator.perceive(target.float(), unpack(canvas).float(), memory)
     choose: Choice = "sample" if number > 1 else "argmax"
     ids, values, _ = _block(generator, feature.expand(number, -1), choose, 1.0, random)
     return Code(ids[:, None], values[:, None]), memory

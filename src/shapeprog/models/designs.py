@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import difflib
 from dataclasses import fields
 from typing import Any
 
-from shapeprog.errors import ShapeProgError
+from shapeprog.errors import ShapeProgError, did_you_mean
 from shapeprog.models.chained import Chained
 from shapeprog.models.generator import Generator
 from shapeprog.models.swift import Swift
@@ -37,8 +36,7 @@ def build_generator(
         If there is no such design, or no such setting.
     """
     if name not in DESIGNS:
-        near = difflib.get_close_matches(name, DESIGNS, 1)
-        raise ShapeProgError(f"there is no design {name!r}", f"choose {near[0] if near else ', '.join(DESIGNS)}")
+        raise ShapeProgError(f"there is no design {name!r}", did_you_mean(name, DESIGNS))
     kind = DESIGNS[name]
     allowed = {field.name for field in fields(kind.Settings)}
     for key in settings or {}:

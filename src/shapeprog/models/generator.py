@@ -16,7 +16,7 @@ import torch
 from jaxtyping import Bool, Float, Int, UInt8
 from torch import Tensor, nn
 
-from shapeprog.language.canvas import unpacked
+from shapeprog.geometry.cells import unpack
 from shapeprog.language.tensors import Code
 from shapeprog.models.vocabulary import Vocabulary
 
@@ -247,4 +247,4 @@ def stacked(
 ) -> Float[Tensor, "M 2 32 32 32"]:
     """Target and canvas of every live block as two channels."""
     shape = live.nonzero()[:, 0]
-    return torch.stack([target.to(dtype)[shape], unpacked(canvases[live]).to(dtype)], 1)
+    return torch.stack([target.to(dtype)[shape], unpack(canvases[live]).to(dtype)], 1)

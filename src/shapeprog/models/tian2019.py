@@ -20,7 +20,7 @@ import torch.nn.functional as F
 from jaxtyping import Bool, Float, Int, UInt8
 from torch import Tensor, nn
 
-from shapeprog.language.canvas import unpacked
+from shapeprog.geometry.cells import unpack
 from shapeprog.language.statement import EMPTY, SLOTS
 from shapeprog.language.tensors import Code
 from shapeprog.models.generator import Generator, Memory, Prediction, Said, Step, stacked
@@ -213,7 +213,7 @@ class Tian2019(Generator):
         needed = live.flip(-1).cummax(-1).values.flip(-1)
         dtype = self.shape_feat.fc.weight.dtype
         if self.by_batch:
-            pairs = ([target, unpacked(canvas)] for canvas in canvases.unbind(1))
+            pairs = ([target, unpack(canvas)] for canvas in canvases.unbind(1))
             features = torch.stack([self.shape_feat(torch.stack(pair, 1).to(dtype)) for pair in pairs], 1)
         else:
             each = self.shape_feat(stacked(target, canvases, needed, dtype))

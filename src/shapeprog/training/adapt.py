@@ -20,8 +20,9 @@ from torch import Tensor, nn
 from shapeprog.data.packs import read_pack
 from shapeprog.errors import ShapeProgError
 from shapeprog.evaluation.generated import code_iou, scores_on_packs
-from shapeprog.geometry.occupancy import pack, packed_iou
-from shapeprog.geometry.sampling import has_surface
+from shapeprog.geometry.cells import iou, pack
+from shapeprog.geometry.losses import occupancy_cross_entropy
+from shapeprog.geometry.surface import has_surface
 from shapeprog.language.tensors import Code
 from shapeprog.language.unroll import Plan
 from shapeprog.models.checkpoint import card_of, load_executor, load_generator, save_checkpoint
@@ -164,9 +165,7 @@ class Adaptation:
         ids = soft.new_zeros(*prediction.live.shape, *soft.shape[1:])
         ids = ids.masked_scatter(prediction.live[..., None, None], soft)
         logits = self._executor.union(ids, code.parameters, prediction.live & (code.ids[..., 0] > 0))
-        wanted = targets.cells.to(logits)
-        each = torch.nn.functional.binary_cross_entropy_with_logits(logits, wanted, reduction="none")
-        return each.flatten(1).mean(1)
+        return occupancy_cross_entropy(logits, targets.cells)
 
     def _chosen(
         self,
@@ -201,9 +200,7 @@ class Adaptation:
         live = prediction.live
         if self._settings.cost == "iou":
             cells, owner = choices.in_place(code, live, other)
-            wanted = torch.from_numpy(pack(targets.cells.cpu().numpy()).view("i4"))[owner.cpu()][:, None]
-            found = packed_iou(cells.cpu().numpy().view("u4"), wanted.numpy().view("u4"))
-            return 1 - torch.from_numpy(found).to(other.chance)
+            return 1 - iou(cells, pack(targets.cells)[owner][:, None]).to(other.chance)
         costs = []
         for choice in range(other.ids.shape[1]):
             trial, owner = choices.replaced(code, live, other, choice)

@@ -14,9 +14,10 @@ import torch
 from jaxtyping import Bool, Float, Int
 from torch import Tensor, nn
 
-from shapeprog.language.canvas import draw_blocks, so_far
+from shapeprog.geometry.cells import preceding
 from shapeprog.language.statement import EMPTY, language
 from shapeprog.language.tensors import Code
+from shapeprog.language.unroll import draw_blocks
 from shapeprog.models.generator import Generator, Said, Step
 
 DECAY = 0.9
@@ -153,8 +154,8 @@ def in_place(
     All other blocks stay as they are; an empty block ends the program there.
     """
     drawn = draw_blocks(code)
-    before = so_far(drawn)
-    after = so_far(drawn.flip(1)).flip(1)
+    before = preceding(drawn)
+    after = preceding(drawn.flip(1)).flip(1)
     alone = draw_blocks(Code(other.ids[:, :, None], other.values[:, :, None]))[:, :, 0]
     going = (other.ids[..., 0] != EMPTY)[..., None, None]
     rest = torch.where(going, after[live][:, None], 0)

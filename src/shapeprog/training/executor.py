@@ -17,11 +17,13 @@ from typing import Literal, NamedTuple
 import torch
 from jaxtyping import Float, Int, UInt8
 from torch import Tensor
-from torch.nn.functional import binary_cross_entropy_with_logits, one_hot
+from torch.nn.functional import one_hot
 
 from shapeprog.data.synthetic import Stream, prior
-from shapeprog.language.canvas import draw_blocks, unpacked
+from shapeprog.geometry.cells import unpack
+from shapeprog.geometry.losses import cell_cross_entropy
 from shapeprog.language.tensors import Code
+from shapeprog.language.unroll import draw_blocks
 from shapeprog.models.checkpoint import card_of, save_checkpoint
 from shapeprog.models.executor import NeuralExecutor
 from shapeprog.models.vocabulary import Vocabulary
@@ -124,14 +126,14 @@ class ExecutorTraining:
         moved = widened(ids, parameters, self.module.vocabulary, self._settings.spread, random)
         parameters = torch.where((rows < round(share * len(rows)))[:, None, None], moved, parameters)
         drawn = draw_blocks(Code(ids[:, None], parameters[:, None]))[:, 0]
-        return Blocks(ids, parameters, unpacked(drawn))
+        return Blocks(ids, parameters, unpack(drawn))
 
     def loss(self, batch: Blocks, progress: float, random: torch.Generator) -> dict[str, Tensor]:
         """Cross-entropy of the cells, weighted, and what is missing of their overlap."""
         cells, logits = batch.cells.float(), self._drawn(batch)
         emphasis = OCCUPIED + (self._settings.emphasis - OCCUPIED) * (1 - progress)
         weights = 1 + (emphasis - 1) * cells
-        each = binary_cross_entropy_with_logits(logits, cells, reduction="none")
+        each = cell_cross_entropy(logits, cells)
         chance = logits.sigmoid()
         both, sizes = ((one).flatten(1).sum(-1) for one in (chance * cells, chance + cells))
         dice = (2 * both + 1) / (sizes + 1)

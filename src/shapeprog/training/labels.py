@@ -17,9 +17,10 @@ from jaxtyping import Bool, Int, UInt8
 from torch import Tensor
 
 from shapeprog.errors import InputError
-from shapeprog.language.canvas import draw_blocks, union, unpacked
+from shapeprog.geometry.cells import union, unpack
 from shapeprog.language.program import Program
 from shapeprog.language.tensors import Code, encode
+from shapeprog.language.unroll import draw_blocks
 from shapeprog.models.vocabulary import Vocabulary
 
 Form = Literal["snapped", "program"]
@@ -125,12 +126,13 @@ def perturbed(
 
 def rendered(code: Code) -> UInt8[Tensor, "B 32 32 32"]:
     """The cells that programs draw."""
-    return unpacked(union(draw_blocks(code)))
+    return unpack(union(draw_blocks(code)))
 
 
 def _read(source: Path, form: Form) -> Iterator[tuple[str, Program]]:
     """Names and programs of a file of JSON lines or of a folder."""
-    from shapeprog.language.text import parse, read_text
+    from shapeprog.formats.shape import read_text
+    from shapeprog.language.text import parse
 
     if source.is_dir():
         for path in sorted(source.glob("*.shape")):
@@ -142,7 +144,7 @@ def _read(source: Path, form: Form) -> Iterator[tuple[str, Program]]:
 
 
 def _entry(line: str, form: Form, where: str) -> tuple[str, Program]:
-    from shapeprog.language.json_form import FORMAT, VERSION, program_from_json
+    from shapeprog.formats.json_form import FORMAT, VERSION, program_from_json
     from shapeprog.language.text import parse
 
     try:

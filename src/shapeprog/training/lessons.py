@@ -16,8 +16,9 @@ import torch
 from jaxtyping import Bool, Int, UInt8
 from torch import Tensor
 
-from shapeprog.language.canvas import count, draw_blocks, so_far, unpacked
+from shapeprog.geometry.cells import count, preceding, unpack
 from shapeprog.language.tensors import Code
+from shapeprog.language.unroll import draw_blocks
 from shapeprog.models.decoding import decode
 from shapeprog.models.generator import Generator, live_blocks
 
@@ -71,7 +72,7 @@ def lesson(target: UInt8[Tensor, "B 32 32 32"], code: Code, order: Order = "cove
     drawn = draw_blocks(code)
     if order == "coverage":
         code, drawn = by_coverage(code, drawn)
-    return Lesson(target, so_far(drawn), code, live_blocks(code.ids))
+    return Lesson(target, preceding(drawn), code, live_blocks(code.ids))
 
 
 def relabelled(
@@ -148,7 +149,7 @@ def _best(
         fresh = drawn.numpy()[:, None] & ~canvases.numpy()[:, :, None]
         new = torch.from_numpy(np.bitwise_count(fresh.view(np.uint32)).sum((-2, -1), dtype=np.int64))
     else:
-        cells, covered = (unpacked(each).flatten(2).float() for each in (drawn, canvases))
+        cells, covered = (unpack(each).flatten(2).float() for each in (drawn, canvases))
         new = count(drawn)[:, None] - (covered @ cells.mT).round().long()
     words = drawn.flatten(2) != 0
     lowest = words.int().argmax(-1)

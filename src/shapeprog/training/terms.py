@@ -5,7 +5,6 @@ Lengths are in cells, so a chamfer of 1 is a mean squared distance of one cell, 
 
 from __future__ import annotations
 
-import difflib
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -15,11 +14,11 @@ import torch
 from jaxtyping import Float, Int, UInt8
 from torch import Tensor
 
-from shapeprog.errors import ShapeProgError
+from shapeprog.errors import ShapeProgError, did_you_mean
 from shapeprog.geometry import losses
 from shapeprog.geometry.distance import signed_distance
-from shapeprog.geometry.sampling import SurfaceSample, sample_surface
 from shapeprog.geometry.scene import Scene
+from shapeprog.geometry.surface import SurfaceSample, sample_surface
 from shapeprog.space import HALF, RESOLUTION
 
 NEURAL = "neural"
@@ -89,16 +88,12 @@ class Comparison:
 
 def _occupancy(seen: Comparison) -> Values:
     """Cross-entropy of soft cells, occupied and empty ones counting alike."""
-    each = torch.nn.functional.binary_cross_entropy_with_logits(seen.logits, seen.wanted, reduction="none")
-    return each.mean(-1)
+    return losses.cell_cross_entropy(seen.logits, seen.wanted).mean(-1)
 
 
 def _soft_iou(seen: Comparison) -> Values:
     """One minus the IoU of soft cells, estimated from those that are looked at."""
-    share, weight = seen.logits.sigmoid(), seen.places[1]
-    both = (share * seen.wanted * weight).sum(-1)
-    either = ((share + seen.wanted - share * seen.wanted) * weight).sum(-1)
-    return 1 - both / either.clamp(min=1e-6)
+    return 1 - losses.weighted_iou(seen.logits.sigmoid(), seen.wanted, seen.places[1])
 
 
 TERMS: dict[str, Callable[[Comparison], Values]] = {
@@ -127,8 +122,7 @@ def parse_terms(text: str) -> dict[str, float]:
         name, _, number = (each.strip() for each in part.partition("="))
         known = [*TERMS, NEURAL]
         if name not in known:
-            near = difflib.get_close_matches(name, known, 1)
-            cure = f"did you mean {near[0]!r}?" if near else f"choose from {', '.join(known)}"
+            cure = did_you_mean(name, known, f"choose from {', '.join(known)}", quoted=True)
             raise ShapeProgError(f"there is no loss {name!r}", cure)
         try:
             weight = float(number or 1)

@@ -1,6 +1,5 @@
 """Pictures, contact sheets and pages of shapes and programs, drawn without a GPU or a display."""
 
-from shapeprog.view.page import Item, contact_sheet, picture
-from shapeprog.view.viewer import viewer
+import lazy_loader
 
-__all__ = ["Item", "contact_sheet", "picture", "viewer"]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -7,14 +7,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from shapeprog.data.shape import Shape
-from shapeprog.export.colours import colour
-from shapeprog.export.parts import Part, crease_normals
-from shapeprog.space import RESOLUTION
-
-Array = npt.NDArray[Any]
+from shapeprog.formats.colours import colour
+from shapeprog.formats.parts import Part, crease_normals
+from shapeprog.space import RESOLUTION, Array
 
 INPUT_COLOUR = (212, 215, 220)
 """Light grey of everything that was given."""

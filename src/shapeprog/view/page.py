@@ -15,9 +15,9 @@ import numpy as np
 
 from shapeprog.data.shape import Shape
 from shapeprog.errors import OutputError
-from shapeprog.export.colours import colour
-from shapeprog.export.parts import parts
 from shapeprog.files import atomic_path
+from shapeprog.formats.colours import colour
+from shapeprog.formats.parts import parts
 from shapeprog.language.program import Program
 from shapeprog.language.statement import language
 from shapeprog.view.listing import Line, listing, parted

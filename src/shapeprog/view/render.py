@@ -9,14 +9,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from shapeprog.space import Array
 from shapeprog.view.model import Model
 
-Array = npt.NDArray[Any]
 Image = npt.NDArray[np.uint8]
 
 DIRECTION = (0.62, -1.0, -0.72)

@@ -9,19 +9,17 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from shapeprog.data.shape import Shape
-from shapeprog.export.colours import colour
-from shapeprog.export.parts import crease_normals, parts
 from shapeprog.files import write_text
+from shapeprog.formats.colours import colour
+from shapeprog.formats.parts import crease_normals, parts
 from shapeprog.language.program import Program
+from shapeprog.space import Array
 from shapeprog.view.listing import listing, parted
 from shapeprog.view.model import FINE, of_cells, of_shape
 from shapeprog.view.page import readable, scores_text
 from shapeprog.view.template import HTML
-
-Array = npt.NDArray[Any]
 
 _TO_PAGE = np.array([[0.0, 0.0, -1.0], [1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
 """From up, depth, left-right to the page's right, up, towards the viewer."""

@@ -13,7 +13,7 @@ from torch import Tensor
 from shapeprog.data.synthetic.dice import Dice, Flag, Whole
 from shapeprog.data.synthetic.draft import Draft
 from shapeprog.data.synthetic.room import mirrored
-from shapeprog.language.canvas import Canvas
+from shapeprog.geometry.cells import Cells
 from shapeprog.language.tensors import Code
 from shapeprog.space import DEPTH, HALF, RESOLUTION, SIDE, UP
 
@@ -21,7 +21,7 @@ MOST = 4
 """Most details of one shape."""
 
 
-def details(dice: Dice, canvas: Canvas) -> Code:
+def details(dice: Dice, canvas: Cells) -> Code:
     """Up to ``MOST`` blocks for each shape of a batch, each touching its cells.
 
     Parameters
@@ -75,7 +75,7 @@ def _detail(draft: Draft, cell: Float[Tensor, "n 3"], low: Tensor, high: Tensor,
     draft.box(roles, corner, extent, keep=here, repeat=[copies])
 
 
-def _cells(dice: Dice, canvas: Canvas, many: int) -> list[Float[Tensor, "n 3"]]:
+def _cells(dice: Dice, canvas: Cells, many: int) -> list[Float[Tensor, "n 3"]]:
     """The low corners of ``many`` drawn cells of each shape, drawn at random by rows."""
     rows = canvas.flatten(1)
     drawn = (rows != 0).cumsum(-1, dtype=torch.int32)
@@ -89,7 +89,7 @@ def _cells(dice: Dice, canvas: Canvas, many: int) -> list[Float[Tensor, "n 3"]]:
     return list(cells.unbind(1))
 
 
-def _bounds(canvas: Canvas) -> tuple[Float[Tensor, "n 3"], Float[Tensor, "n 3"]]:
+def _bounds(canvas: Cells) -> tuple[Float[Tensor, "n 3"], Float[Tensor, "n 3"]]:
     """Low and high corner of the cells of each shape."""
     bits = canvas.flatten(1)
     while bits.shape[1] > 1:  # halves are combined: torch has no reduction by "or"

@@ -8,10 +8,10 @@ from jaxtyping import Bool, Int
 from torch import Tensor
 
 from shapeprog.geometry.arrays import over_threads
-from shapeprog.language.canvas import Canvas, so_far
+from shapeprog.geometry.cells import Cells, cells_of, preceding, words_of
 
 
-def with_own_cells(blocks: Int[Tensor, "B K 32 32"]) -> tuple[Bool[Tensor, "B K"], Canvas]:
+def with_own_cells(blocks: Int[Tensor, "B K 32 32"]) -> tuple[Bool[Tensor, "B K"], Cells]:
     """Which blocks to keep so that each has cells of its own and the shape stays the same, and that shape (B, 32, 32).
 
     Of blocks that hide one another the earlier stay.
@@ -20,15 +20,15 @@ def with_own_cells(blocks: Int[Tensor, "B K 32 32"]) -> tuple[Bool[Tensor, "B K"
         return with_own_cells_by_torch(blocks)
     from shapeprog.data.synthetic import hiding_kernels as kernels
 
-    words = np.ascontiguousarray(blocks.numpy()).view(np.uint32).reshape(*blocks.shape[:2], -1)
+    words = words_of(blocks).reshape(*blocks.shape[:2], -1)
     keep, union = np.empty(words.shape[:2], np.bool_), np.zeros((len(words), words.shape[2]), np.uint32)
     over_threads(lambda first, last: kernels.unhide(words, keep, union, first, last), len(words), least=64)
-    return torch.from_numpy(keep), torch.from_numpy(union.view(np.int32)).unflatten(-1, tuple(blocks.shape[2:]))
+    return torch.from_numpy(keep), cells_of(union).unflatten(-1, tuple(blocks.shape[2:]))
 
 
-def with_own_cells_by_torch(blocks: Int[Tensor, "B K 32 32"]) -> tuple[Bool[Tensor, "B K"], Canvas]:
+def with_own_cells_by_torch(blocks: Int[Tensor, "B K 32 32"]) -> tuple[Bool[Tensor, "B K"], Cells]:
     """The same on any device: the readable twin of the kernel."""
-    before, union = so_far(blocks), torch.zeros_like(blocks[:, 0])
+    before, union = preceding(blocks), torch.zeros_like(blocks[:, 0])
     keep = torch.zeros_like(blocks[..., 0, 0], dtype=torch.bool)
     for k in reversed(range(blocks.shape[1])):
         keep[:, k] = (blocks[:, k] & ~(before[:, k] | union)).flatten(1).any(-1)

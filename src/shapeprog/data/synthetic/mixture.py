@@ -15,10 +15,11 @@ from shapeprog.data.synthetic.dice import Dice
 from shapeprog.data.synthetic.draft import Draft
 from shapeprog.data.synthetic.hiding import with_own_cells
 from shapeprog.errors import ShapeProgError
-from shapeprog.language.canvas import Canvas, draw_blocks
+from shapeprog.geometry.cells import Cells
 from shapeprog.language.program import PUBLISHED_DEPTH
 from shapeprog.language.statement import END, SLOTS, language
 from shapeprog.language.tensors import Code
+from shapeprog.language.unroll import draw_blocks
 
 Template = Callable[[Draft], None]
 
@@ -71,7 +72,7 @@ class Prior:
         """
         return self.drawn(count, generator)[0]
 
-    def drawn(self, count: int, generator: torch.Generator) -> tuple[Code, Canvas]:
+    def drawn(self, count: int, generator: torch.Generator) -> tuple[Code, Cells]:
         """Programs, as by calling, and what they draw: packed cells (count, 32, 32)."""
         code, canvas = self._visible(self._propose(count, generator))
         if self.details and _furniture():
@@ -130,7 +131,7 @@ class Prior:
         ids = torch.cat([part.ids for part in parts])
         return Code(ids[order], torch.cat([part.parameters for part in parts])[order])
 
-    def _visible(self, code: Code) -> tuple[Code, Canvas]:
+    def _visible(self, code: Code) -> tuple[Code, Cells]:
         """The programs without the blocks that the others hide or that lie outside of the grid."""
         keep, canvas = with_own_cells(draw_blocks(code))
         return _front(code, keep, self.blocks), canvas

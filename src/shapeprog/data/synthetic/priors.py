@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import difflib
-
 from shapeprog.data.synthetic import cases, compounds, lounging, narrow, seating, tables
 from shapeprog.data.synthetic.mixture import Prior
-from shapeprog.errors import InputError
+from shapeprog.errors import InputError, did_you_mean
 
 WIDE = Prior(
     "wide",
@@ -68,7 +66,5 @@ def prior(name: str) -> Prior:
         If there is none, with the nearest name.
     """
     if name not in PRIORS:
-        near = difflib.get_close_matches(name, PRIORS, 1, 0.4)
-        hint = f"did you mean {near[0]!r}? " if near else ""
-        raise InputError(f"there is no prior {name!r}", f"{hint}known are {', '.join(PRIORS)}")
+        raise InputError(f"there is no prior {name!r}", did_you_mean(name, PRIORS, quoted=True))
     return PRIORS[name]

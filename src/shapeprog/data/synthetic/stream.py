@@ -10,8 +10,8 @@ from torch import Tensor
 
 from shapeprog.data.synthetic.mixture import Prior
 from shapeprog.errors import InputError
-from shapeprog.geometry.sampling import sample_surface
-from shapeprog.language.canvas import unpacked
+from shapeprog.geometry.cells import unpack
+from shapeprog.geometry.surface import sample_surface
 from shapeprog.language.tensors import Code
 from shapeprog.language.unroll import unroll
 
@@ -97,7 +97,7 @@ class Stream:
         points = None
         if self.points:
             points = sample_surface(unroll(code), self.points, self._random(2 * index + 1)).points
-        return Batch(code, unpacked(self._known[2][rows]), points)
+        return Batch(code, unpack(self._known[2][rows]), points)
 
     def _random(self, number: int) -> torch.Generator:
         """Randomness of its own for each group of batches, and for the points of each batch."""

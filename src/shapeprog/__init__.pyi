@@ -1,0 +1,28 @@
+from .data.loading import load_shape
+from .data.shape import Shape
+from .errors import InputError, OutputError, ProgramError, ShapeProgError
+from .formats.files import export, load, load_with_frame, save
+from .formats.json_form import program_from_json, program_to_json
+from .formats.notation import format_notation, parse_notation
+from .geometry.losses import chamfer
+from .geometry.scene import Scene
+from .inference.infer import infer
+from .inference.refine import refine
+from .language.plugins import load_statements
+from .language.program import Draw, Loop, Program
+from .language.sampling import random_program
+from .language.statement import loop, statement, using
+from .language.tensors import Code, decode, encode
+from .language.text import format_program, parse
+from .language.unroll import unroll
+from .space import Frame
+
+__version__: str
+
+__all__ = [
+    "Code", "Draw", "Frame", "InputError", "Loop", "OutputError", "Program", "ProgramError", "Scene", "Shape",
+    "ShapeProgError",
+    "chamfer", "decode", "encode", "export", "format_notation", "format_program", "infer", "load", "load_shape",
+    "load_statements", "load_with_frame", "loop", "parse", "parse_notation", "program_from_json", "program_to_json",
+    "random_program", "refine", "save", "statement", "unroll", "using",
+]  # fmt: skip

@@ -1,0 +1,7 @@
+from .files import export, load, load_with_frame, save
+from .format import FORMATS, Format, format_of, listed, program_suffixes, suffixes
+
+__all__ = [
+    "FORMATS", "Format",
+    "export", "format_of", "listed", "load", "load_with_frame", "program_suffixes", "save", "suffixes",
+]  # fmt: skip

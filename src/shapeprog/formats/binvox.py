@@ -1,0 +1,82 @@
+"""Binvox files, read and written: runs of full and empty cells, the axes x, z, y from slowest to fastest.
+
+The format is Patrick Min's; its cubes are anchored at a corner: cell ``(i, j, k)`` along x, y, z covers
+``translate + scale * [i, i + 1) / d`` along x, and so on.
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import numpy as np
+
+from shapeprog.errors import InputError
+from shapeprog.files import write_bytes
+from shapeprog.space import HALF, Array, Frame
+
+_CURE = "write the file again; binvox files start with '#binvox 1' and hold runs of 0 and 1"
+
+
+def read_binvox(path: str | os.PathLike[str]) -> tuple[Array, Array, float]:
+    """Occupied cells (d, d, d) along x, y and z, the corner of the cube and the side of a cell.
+
+    Raises
+    ------
+    InputError
+        If the file is no binvox file, is cut short, or holds anything but 0 and 1.
+    """
+    name = Path(path).name
+    content = Path(path).read_bytes()
+    head, mark, body = content.partition(b"data\n")
+    lines = {line.split()[0]: line.split()[1:] for line in head.decode("latin-1").splitlines() if line.strip()}
+    if not mark or "#binvox" not in lines:
+        raise InputError(f"{name} is not a binvox file", _CURE)
+    try:
+        shape = tuple(int(word) for word in lines["dim"])
+        corner = np.array([float(word) for word in lines.get("translate", ["0", "0", "0"])])
+        scale = float(lines.get("scale", ["1"])[0])
+    except (KeyError, ValueError, IndexError):
+        raise InputError(f"{name}: the head of the binvox file cannot be read", _CURE) from None
+    good_shape = len(shape) == 3 and shape[0] == shape[1] == shape[2] and 0 < shape[0] <= 1024
+    if not good_shape or corner.shape != (3,) or not np.isfinite([*corner, scale]).all() or scale <= 0:
+        raise InputError(f"{name}: dim {shape}, translate {corner}, scale {scale} is no cube of cells", _CURE)
+    runs = np.frombuffer(body, np.uint8)
+    values, lengths = runs[: len(runs) // 2 * 2 : 2], runs[1::2].astype(np.int64)
+    total = int(np.prod(shape))
+    if len(runs) % 2 or lengths.sum() != total:
+        raise InputError(f"{name} holds {lengths.sum()} cells where its head says {total}: it is cut short", _CURE)
+    if (values > 1).any():
+        raise InputError(f"{name} holds cells with the value {values.max()}; only 0 and 1 have a meaning", _CURE)
+    cells = np.repeat(values.astype(np.bool_), lengths).reshape(shape)
+    return cells.transpose(0, 2, 1), corner, scale / shape[0]
+
+
+def write_binvox(path: str | os.PathLike[str], voxels: Array, frame: Frame | None = None) -> None:
+    """Write cells of the grid as a binvox file that lies where the shape's own file lies.
+
+    Parameters
+    ----------
+    path
+        Where to.
+    voxels
+        Occupied cells (R, R, R), axes up, depth, left-right.
+    frame
+        From the grid to the world; its axes are signed world axes, as :func:`~shapeprog.space.grid_axes` gives them.
+    """
+    frame = frame or Frame()
+    cells, axes = np.asarray(voxels, np.bool_), np.asarray(frame.axes)
+    order = np.abs(axes).argmax(1)  # the grid axis that runs along each world axis
+    turned = cells.transpose(order)
+    turned = np.flip(turned, tuple(axis for axis in range(3) if axes[axis, order[axis]] < 0))
+    size = cells.shape[0]
+    corner = np.asarray(frame.centre) - frame.scale * HALF
+    flat = np.ascontiguousarray(turned.transpose(0, 2, 1)).reshape(-1).astype(np.uint8)
+    starts = np.flatnonzero(np.diff(flat, prepend=1 - flat[:1]))
+    runs = bytearray()
+    for value, length in zip(flat[starts], np.diff(starts, append=len(flat)), strict=True):
+        whole, rest = divmod(int(length), 255)
+        runs += bytes((value, 255)) * whole + (bytes((value, rest)) if rest else b"")
+    translate = " ".join(f"{number:.9g}" for number in corner)
+    head = f"#binvox 1\ndim {size} {size} {size}\ntranslate {translate}\nscale {frame.scale * 2 * HALF:.9g}\ndata\n"
+    write_bytes(path, head.encode() + bytes(runs))

@@ -1,0 +1,190 @@
+"""build123d out: a Python script with the loops kept, and STEP files made by running that same script."""
+
+from __future__ import annotations
+
+import importlib.util
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from shapeprog.errors import OutputError
+from shapeprog.files import atomic_path, write_text
+from shapeprog.formats.colours import colour
+from shapeprog.formats.parts import drawn_parts
+from shapeprog.formats.plan import Repetition, Solid, Variable, plan
+from shapeprog.formats.symbolic import number
+from shapeprog.language.program import Program
+from shapeprog.space import Frame
+
+_HEAD = '''"""Made by shapeprog. Change the numbers, then run this file to write {stem}.step (pip install build123d)."""
+
+from math import dist
+
+from build123d import Color, Compound, Face, Location, Plane, Shell, Solid, Vector, Wire, export_step
+'''
+
+_TOOLS = '''
+parts = []
+
+
+def scaled(values):
+    """Cells as units of the world."""
+    return tuple(scale * value for value in values)
+
+
+def cuboid(low, size, lean=0):
+    """A box from its low corner and its extents; its top is shifted by lean along y (a shear, not a turn)."""
+    if min(size) <= 0:
+        return None
+    (x, y, z), (a, b, c), lean = scaled(low), scaled(size), scale * lean
+    corners = [(x, y, z), (x + a, y + lean, z), (x + a, y + lean + b, z), (x, y + b, z)]
+    return Solid.extrude(Face(Wire.make_polygon([Vector(*corner) for corner in corners])), Vector(0, 0, c))
+
+
+def cylinder_between(start, end, radius):
+    """A round bar between two points."""
+    height = dist(start, end)
+    if min(height, radius) <= 0:
+        return None
+    along = tuple(b - a for a, b in zip(start, end))
+    return Solid.make_cylinder(scale * radius, scale * height, Plane(origin=scaled(start), z_dir=along))
+
+
+def shell(centre, half, mesh):
+    """Any other solid: its mesh in a box of half extents 1, stretched and put at its centre."""
+    if min(half) <= 0:
+        return None
+    points = [Vector(*scaled(c + h * v for c, h, v in zip(centre, half, vertex))) for vertex in mesh[0]]
+    return Solid(Shell([Face(Wire.make_polygon([points[k] for k in face])) for face in mesh[1]]))
+
+
+def posed(centre, axes):
+    """Local axes as columns of a rotation, about a point."""
+    x, _, z = zip(*axes)
+    return Location(Plane(origin=scaled(centre), x_dir=x, z_dir=z))
+
+
+def move(i, by):
+    """Copy i of a translation loop."""
+    return Location(scaled(i * step for step in by))
+
+
+def turn(degrees, about):
+    """A turn about the vertical axis (x) through a point."""
+    there, back = scaled((0, about[1], about[2])), scaled((0, -about[1], -about[2]))
+    return Location(there) * Location((0, 0, 0), (degrees, 0, 0)) * Location(back)
+
+
+def draw(name, colour, solid, at=Location()):
+    """Put a solid into the world and keep it; one without volume draws nothing."""
+    if solid is not None:
+        part = world * at * solid
+        number = 1 + sum(other.label.rpartition("_")[0] == name for other in parts)
+        part.label, part.color = f"{name}_{number}", Color(*colour)
+        parts.append(part)
+
+
+'''
+
+_TAIL = '''
+model = Compound(label="{stem}", children=parts)
+
+
+def union():
+    """All parts as one solid."""
+    return parts[0].fuse(*parts[1:]) if len(parts) > 1 else parts[0]
+
+
+if __name__ == "__main__":
+    export_step(model, "{stem}.step")
+'''
+
+
+def write_script(program: Program, path: Path, frame: Frame) -> None:
+    """Write a build123d script; run, it makes a compound of named, coloured solids and writes it as STEP."""
+    write_text(path, script_text(program, frame, path.stem))
+
+
+def write_step(program: Program, path: Path, frame: Frame) -> None:
+    """Write named, coloured solids as STEP; a world unit counts as a millimetre.
+
+    Raises
+    ------
+    OutputError
+        If build123d is not installed or the program draws nothing.
+    """
+    if importlib.util.find_spec("build123d") is None:
+        raise OutputError(
+            f"cannot write {path}: STEP needs the library build123d, which is not installed",
+            "pip install 'shapeprog[step]', or export a .py script and run it where build123d is",
+        )
+    drawn_parts(program)
+    made: dict[str, Any] = {"__name__": "shapeprog_model"}
+    # The script is made by this module from checked names and numbers; running it keeps one home for the geometry.
+    exec(compile(script_text(program, frame, path.stem), f"{path.stem}.py", "exec"), made)
+    with atomic_path(path) as temporary:
+        if not made["export_step"](made["model"], str(temporary)):
+            raise OutputError(f"cannot write {path}: build123d could not write the STEP file", "check path and disk")
+
+
+def script_text(program: Program, frame: Frame, stem: str = "model") -> str:
+    """The build123d script of a program.
+
+    Inside the model x is up, y is depth (positive = rear) and z is left-right, in cells, as in the program.
+    """
+    made = plan(program)
+    stem = "".join(letter for letter in stem if letter.isprintable() and letter not in "\"'\\{}") or "model"
+    axes = np.asarray(frame.axes)
+    lines = [_HEAD.format(stem=stem)]
+    for heading in made.headings:
+        lines += [f"# {heading.name}: {heading.doc}"]
+        lines += [f"{each.name} = {each.text}{_note(each)}" for each in heading.variables]
+        lines += [""]
+    columns = [_tuple(axes[:, column]) for column in (0, 2)]
+    lines += ["# From cells to the world of the input.", f"scale = {number(frame.scale)}"]
+    lines += [f"world = Location(Plane(origin={_tuple(frame.centre)}, x_dir={columns[0]}, z_dir={columns[1]}))"]
+    for name, (vertices, faces) in made.shells.items():
+        points = ", ".join(_tuple(np.round(vertex, 9)) for vertex in vertices)
+        lines += [f"{name} = ([{points}], {[tuple(face) for face in faces.tolist()]})"]
+    for name, table in made.tables.items():
+        lines += [f"{name} = {table.tolist()}"]
+    steps = [line for step in made.body for line in _step(step, 0, "")]
+    return "\n".join(lines) + _TOOLS + "\n".join([*steps, ""]) + _TAIL.format(stem=stem)
+
+
+def _note(each: Variable) -> str:
+    return "  # not used below: another value here changes nothing" if each.fixed else ""
+
+
+def _tuple(values: Any) -> str:
+    return f"({', '.join(number(float(value)) for value in values)})"
+
+
+def _step(step: Solid | Repetition, depth: int, place: str) -> Iterator[str]:
+    indent = "    " * depth
+    if isinstance(step, Repetition):
+        words = [place] if place else []
+        words += [f"move({step.shift[0]}, {step.shift[1]})"] if step.shift else []
+        words += [f"turn({', '.join(step.turn)})"] if step.turn else []
+        yield f"{indent}for {step.letter} in range({step.count}):"
+        if words[1 if place else 0 :]:
+            yield f"{indent}    at_{step.letter} = {' * '.join(words)}"
+            place = f"at_{step.letter}"
+        for inner in step.body:
+            yield from _step(inner, depth + 1, place)
+        return
+    arguments, around = list(step.arguments), place
+    function = "cylinder_between" if step.kind == "cylinder" else step.kind
+    if step.axes is not None:
+        axes = f"({', '.join(_tuple(np.round(row, 12)) for row in step.axes)})"
+        around = f"{place} * posed({arguments[0]}, {axes})" if place else f"posed({arguments[0]}, {axes})"
+        lean = f" - ({arguments[2]}) / 2" if len(arguments) > 2 else ""
+        half = [f"-({arguments[1]})[{k}] / 2" for k in range(3)]
+        half[1] += lean
+        arguments[0] = f"[{', '.join(half)}]" if step.kind == "cuboid" else "(0, 0, 0)"
+    call = f"{function}({', '.join([*arguments, *([step.shell] if step.shell else [])])})"
+    name = step.name.rpartition("_")[0]
+    shade = "({:.3f}, {:.3f}, {:.3f})".format(*(channel / 255 for channel in colour(step.statement)))
+    yield f'{indent}draw("{name}", {shade}, {call}{f", {around}" if around else ""})'

@@ -1,0 +1,188 @@
+"""The file formats: one declaration each says what it holds, its suffixes, its axes, and who reads and writes it.
+
+A new format is one entry of :data:`FORMATS` and the functions that it names; what commands print, what errors propose
+and what the manual lists come from here.  Nothing heavy is imported: readers and writers load when they are used.
+"""
+
+from __future__ import annotations
+
+import importlib
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+if TYPE_CHECKING:
+    from shapeprog.language.program import Program
+    from shapeprog.space import Frame
+
+Kind = Literal["program", "solid", "sample", "shape"]
+
+Axes = tuple[str, str]
+"""World axes that point up and that the front faces, such as ``("+y", "+z")``."""
+
+Y_UP: Axes = ("+y", "+z")
+"""Axes of glTF, and of most mesh files."""
+
+Z_UP: Axes = ("+z", "-y")
+"""Axes of CAD and of 3D printing."""
+
+GRID: Axes = ("+x", "-y")
+"""Axes of arrays: axis 0 is up, axis 1 is depth (positive = rear), axis 2 is left-right already."""
+
+
+@dataclass(frozen=True)
+class Format:
+    """A file format.
+
+    Parameters
+    ----------
+    name
+        What it is called.
+    kind
+        ``program`` can be read back as the program it was; ``solid`` is what it draws, for other tools; ``sample`` are
+        cells or points of it; ``shape`` is only ever read, as the shape to infer a program from.
+    suffixes
+        Ends of file names, the usual one first.
+    axes
+        Up and front of a file that does not say where it lies; ``None`` where a program keeps its frame or has none.
+    doc
+        What is in such a file, in one line.
+    reader, writer
+        ``module:function`` of this room: ``(path) -> (program, frame or None)`` and ``(program, path, frame)``.
+    options
+        Further arguments of the writer.
+    """
+
+    name: str
+    kind: Kind
+    suffixes: tuple[str, ...]
+    axes: Axes | None
+    doc: str
+    reader: str = ""
+    writer: str = ""
+    options: tuple[str, ...] = ()
+
+    def read(self, path: Path) -> tuple[Program, Frame | None]:
+        """The program in a file of this format, and its frame where the file keeps one."""
+        found: tuple[Program, Frame | None] = _function(self.reader)(path)
+        return found
+
+    def write(self, program: Program, path: Path, frame: Frame | None, **options: int) -> None:
+        """Write a program; ``frame`` leads from the grid to the world of the file."""
+        _function(self.writer)(program, path, frame, **options)
+
+
+FORMATS = (
+    Format(
+        "program text", "program", (".shape",), None,
+        "the program, with its frame in a comment where one is known",
+        reader="shape:read_shape", writer="shape:write_shape",
+    ),
+    Format(
+        "JSON", "program", (".json",), None,
+        "the same with names for everything, for other programs to read",
+        reader="json_form:read_json", writer="json_form:write_json",
+    ),
+    Format(
+        "notation", "program", (".notation",), None,
+        "the same in the notation of the paper",
+        reader="notation:read_notation", writer="notation:write_notation",
+    ),
+    Format(
+        "plain text", "program", (".txt",), None,
+        "program text under another suffix",
+        reader="shape:read_shape",
+    ),
+    Format(
+        "GLB", "solid", (".glb",), Y_UP,
+        "one named node per part, coloured by statement",
+        writer="meshes:write_glb",
+    ),
+    Format(
+        "OBJ", "solid", (".obj",), Y_UP,
+        "one object per part, colours in an .mtl file beside it",
+        writer="meshes:write_obj",
+    ),
+    Format(
+        "PLY", "solid", (".ply",), Y_UP,
+        "all parts in one mesh, colours at the vertices",
+        writer="meshes:write_ply",
+    ),
+    Format(
+        "STL", "solid", (".stl",), Z_UP,
+        "the union of all parts: one watertight solid",
+        writer="meshes:write_stl",
+    ),
+    Format(
+        "OpenSCAD", "solid", (".scad",), Z_UP,
+        "loops as loops, numbers as named variables at the top",
+        writer="openscad:write_scad",
+    ),
+    Format(
+        "build123d", "solid", (".py",), Z_UP,
+        "the same as a Python script, which writes a STEP file when run",
+        writer="build123d:write_script",
+    ),
+    Format(
+        "STEP", "solid", (".step", ".stp"), Z_UP,
+        "named, coloured solids, through build123d (pip install 'shapeprog[step]')",
+        writer="build123d:write_step",
+    ),
+    Format(
+        "binvox", "sample", (".binvox",), Y_UP,
+        "the 32^3 cells",
+        writer="samples:write_cells",
+    ),
+    Format(
+        "NPZ", "sample", (".npz",), GRID,
+        "the 32^3 cells, points with normals, ids, parameters and the frame",
+        writer="samples:write_arrays",
+    ),
+    Format(
+        "NPY", "sample", (".npy",), GRID,
+        "the cells at any resolution",
+        writer="samples:write_grid", options=("resolution",),
+    ),
+    Format(
+        "XYZ", "sample", (".xyz",), Z_UP,
+        "points on the surface, one line 'x y z nx ny nz' each",
+        writer="samples:write_points", options=("points", "seed"),
+    ),
+    Format("OFF", "shape", (".off",), Y_UP, "a mesh"),
+    Format("glTF", "shape", (".gltf",), Y_UP, "a mesh and the files beside it"),
+    Format("HDF5", "shape", (".h5", ".hdf5"), GRID, "many grids of cells, as published"),
+)  # fmt: skip
+"""Every format that is known by its suffix."""
+
+OTHER_MESHES: Axes = Y_UP
+"""Axes of the mesh files that trimesh reads besides."""
+
+_BY_SUFFIX = {suffix: each for each in FORMATS for suffix in each.suffixes}
+
+
+def format_of(path: str | os.PathLike[str]) -> Format | None:
+    """The format that the suffix of a path names, whatever its case."""
+    return _BY_SUFFIX.get(Path(path).suffix.lower())
+
+
+def suffixes(*kinds: Kind) -> tuple[str, ...]:
+    """The suffixes that can be written, of the kinds given or of all."""
+    return tuple(s for each in FORMATS if each.writer and (not kinds or each.kind in kinds) for s in each.suffixes)
+
+
+def program_suffixes() -> tuple[str, ...]:
+    """The suffixes of files that a program can be read from."""
+    return tuple(suffix for each in FORMATS if each.reader for suffix in each.suffixes)
+
+
+def listed() -> str:
+    """The formats that can be written, one line each with its suffixes and what is in such a file."""
+    rows = [(" ".join(each.suffixes), each.doc) for each in FORMATS if each.writer]
+    width = max(len(names) for names, _ in rows)
+    return "\n".join(f"{names:<{width}}  {doc}" for names, doc in rows)
+
+
+def _function(place: str) -> Any:
+    module, _, name = place.partition(":")
+    return getattr(importlib.import_module(f"shapeprog.formats.{module}"), name)

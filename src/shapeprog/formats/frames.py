@@ -1,0 +1,87 @@
+"""Where an export lies: on the input when its frame is known, upright on the format's own axes when not.
+
+A ``.shape`` file may carry its frame as a comment in its first lines, which the parser ignores:
+
+    # frame: {"scale": 0.0417, "centre": [0, 0.5, 0], "axes": [[0, 0, 1], [1, 0, 0], [0, 1, 0]]}
+
+``shapeprog infer`` writes it there, so that ``shapeprog export chair.shape chair.glb`` lies on the mesh it was
+inferred from.  Without it one cell is one unit, the grid's centre is the origin, and up is what the format calls up.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from typing import Any
+
+import numpy as np
+
+from shapeprog.errors import InputError
+from shapeprog.formats.format import Format
+from shapeprog.space import Frame, grid_axes
+
+_HEADER = re.compile(r"^#\s*frame:(.*)$", re.MULTILINE)
+_CURE = (
+    'write it as # frame: {"scale": 1, "centre": [0, 0, 0], "axes": [[1, 0, 0], [0, 1, 0], [0, 0, 1]]}, or remove it'
+)
+
+
+def upright(chosen: Format) -> Frame | None:
+    """The frame for files of a format when none is known: one cell is one unit, up and front as the format says.
+
+    Program files go without.
+    """
+    if chosen.axes is None:
+        return None
+    return Frame(axes=tuple((float(a), float(b), float(c)) for a, b, c in grid_axes(*chosen.axes)))
+
+
+def frame_dict(frame: Frame) -> dict[str, Any]:
+    """A frame as plain numbers for JSON: scale, centre and the rows of its axes, exact."""
+    return {"scale": frame.scale, "centre": list(frame.centre), "axes": [list(row) for row in frame.axes]}
+
+
+def frame_from(data: Any, name: str) -> Frame:
+    """The frame that :func:`frame_dict` wrote.
+
+    Raises
+    ------
+    InputError
+        If numbers are missing or not finite, the scale is not positive or the axes are not a rotation.
+    """
+    try:
+        scale, centre = float(data["scale"]), [float(value) for value in data["centre"]]
+        axes = [[float(value) for value in row] for row in data["axes"]]
+        matrix = np.array(axes)
+        good = matrix.shape == (3, 3) and len(centre) == 3 and scale > 0
+        good = good and all(map(math.isfinite, [scale, *centre])) and np.isfinite(matrix).all()
+        good = good and np.allclose(matrix @ matrix.T, np.eye(3), atol=1e-6) and np.linalg.det(matrix) > 0
+    except (KeyError, TypeError, ValueError):
+        good = False
+    if not good:
+        raise InputError(f"{name}: the frame {str(data)[:120]} is no scale, centre and rotation", _CURE)
+    return Frame(scale, (centre[0], centre[1], centre[2]), tuple((a, b, c) for a, b, c in axes))
+
+
+def frame_comment(frame: Frame | None) -> str:
+    """The line that keeps a frame in program text; nothing where there is no frame."""
+    return "" if frame is None else f"# frame: {json.dumps(frame_dict(frame))}\n"
+
+
+def frame_in(text: str, name: str = "<program>") -> Frame | None:
+    """The frame kept in program text, or None.
+
+    Raises
+    ------
+    InputError
+        If there is such a comment and it cannot be read.
+    """
+    found = _HEADER.search(text)
+    if not found:
+        return None
+    try:
+        data = json.loads(found.group(1))
+    except json.JSONDecodeError as error:
+        raise InputError(f"{name}: the comment '# frame:' cannot be read: {error}", _CURE) from None
+    return frame_from(data, name)

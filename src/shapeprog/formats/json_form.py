@@ -1,0 +1,218 @@
+"""Programs and their tensors as JSON: versioned, with names, exact for every float32.
+
+{"format": "shapeprog", "version": 1, "program": [
+  {"statement": "translate", "parameters": {"count": 2, "by": [0, 0, 18]}, "body": [
+    {"statement": "leg", "parameters": {"at": [-12, -8, -10], "size": [16, 2, 2]}}]}]}
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any, NoReturn
+
+import torch
+
+from shapeprog.errors import InputError, ProgramError, ShapeProgError, did_you_mean
+from shapeprog.files import write_text
+from shapeprog.formats.frames import frame_dict, frame_from
+from shapeprog.formats.shape import read_text
+from shapeprog.language.program import Draw, Loop, Node, Program
+from shapeprog.language.statement import SLOTS, Statement, language
+from shapeprog.language.syntax import DEEPEST, proper_text
+from shapeprog.language.tensors import Code
+from shapeprog.language.values import checked, written
+from shapeprog.space import Frame
+
+FORMAT, CODE_FORMAT = "shapeprog", "shapeprog-code"
+VERSION = 1
+
+
+def read_json(path: Path) -> tuple[Program, Frame | None]:
+    """The program of a JSON file, and its frame where it keeps one."""
+    text = read_text(path)
+    program = program_from_json(text, str(path))
+    kept = json.loads(text.removeprefix("\ufeff")).get("frame")
+    return program, None if kept is None else frame_from(kept, str(path))
+
+
+def write_json(program: Program, path: Path, frame: Frame | None) -> None:
+    """Write the JSON form."""
+    write_text(path, result_json(program, frame))
+
+
+def result_json(program: Program, frame: Frame | None = None, **more: Any) -> str:
+    """The JSON form of a program with its frame and whatever else there is to say, such as scores."""
+    content = json.loads(program_to_json(program))
+    if frame is not None:
+        content["frame"] = frame_dict(frame)
+    return json.dumps({**content, **more}, indent=2, allow_nan=False) + "\n"
+
+
+def program_to_json(program: Program, indent: int | None = 2) -> str:
+    """A program as JSON text; numbers have the fewest digits that read back exactly.
+
+    Raises
+    ------
+    ShapeProgError
+        If a number is not finite, a statement is not declared, or loops nest too deeply to be read back.
+    """
+    body = [_node_to_json(node, 0) for node in program.body]
+    return json.dumps({"format": FORMAT, "version": VERSION, "program": body}, indent=indent) + "\n"
+
+
+def program_from_json(text: str, name: str = "<json>") -> Program:
+    """The program of a JSON text.
+
+    Raises
+    ------
+    ProgramError
+        If the text is not JSON, at its place.
+    InputError
+        If it is JSON of another kind, naming the entry.
+    """
+    body = _document(text, name, FORMAT).get("program")
+    return Program(_body(body, name, "program", 0))
+
+
+def code_to_json(code: Code) -> str:
+    """Program tensors as JSON text, exact for float32 and float64.
+
+    Raises
+    ------
+    ShapeProgError
+        If a parameter is not finite, which JSON cannot say.
+    """
+    if not bool(torch.isfinite(code.parameters).all()):
+        raise ShapeProgError(
+            "these program tensors hold numbers that are not finite", "JSON cannot say them; mend them"
+        )
+    content = {"ids": code.ids.tolist(), "parameters": code.parameters.detach().tolist()}
+    shape = {"dtype": str(code.parameters.dtype).removeprefix("torch."), "shape": list(code.ids.shape)}
+    return json.dumps({"format": CODE_FORMAT, "version": VERSION, **shape, **content}) + "\n"
+
+
+def code_from_json(text: str, name: str = "<json>") -> Code:
+    """The program tensors of a JSON text.
+
+    Raises
+    ------
+    ProgramError, InputError
+        As for :func:`program_from_json`.
+    """
+    content = _document(text, name, CODE_FORMAT)
+    dtype = {"float32": torch.float32, "float64": torch.float64}.get(str(content.get("dtype")))
+    try:
+        shape = [int(extent) for extent in content["shape"]]
+        ids = torch.tensor(content["ids"], dtype=torch.long).reshape(shape)
+        parameters = torch.tensor(content["parameters"], dtype=dtype).reshape(*shape, SLOTS)
+    except (KeyError, TypeError, ValueError, RuntimeError, OverflowError) as error:
+        raise InputError(
+            f"{name}: ids and parameters are no tensors of programs ({error})",
+            f"ids are (..., blocks, steps), parameters the same with {SLOTS} numbers each, shape that of the ids",
+        ) from None
+    if dtype is None or len(shape) < 2 or not bool(torch.isfinite(parameters).all()):
+        raise InputError(f"{name}: these program tensors are incomplete", "write them with code_to_json")
+    return Code(ids, parameters)
+
+
+def _node_to_json(node: Node, depth: int) -> dict[str, Any]:
+    known = language()
+    if node.name not in known:
+        raise ShapeProgError(f"no statement is called {node.name!r}", "load the module that declares it")
+    if depth > DEEPEST:
+        raise ShapeProgError(f"loops are nested more than {DEEPEST} deep", "put some of them side by side")
+    parameters = {}
+    for parameter in known[node.name].parameters:
+        numbers = [json.loads(written(parameter.quantity, value)) for value in node.values[parameter.slots]]
+        parameters[parameter.name] = numbers if parameter.quantity.width > 1 else numbers[0]
+    found: dict[str, Any] = {"statement": node.name, "parameters": parameters}
+    if isinstance(node, Loop):
+        found["body"] = [_node_to_json(inner, depth + 1) for inner in node.body]
+    return found
+
+
+def _document(text: str, name: str, wanted: str) -> dict[str, Any]:
+    def refuse(constant: str) -> NoReturn:
+        raise InputError(f"{name}: {constant} is not a number of a program", "write finite numbers")
+
+    def unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+        found = dict(pairs)
+        if len(found) != len(pairs):
+            words = [word for word, _ in pairs]
+            twice = next(word for word in words if words.count(word) > 1)
+            raise InputError(f"{name}: {twice!r} is given twice in one entry", "leave one of them out")
+        return found
+
+    text = proper_text(text, name)
+    try:
+        content = json.loads(text, parse_constant=refuse, object_pairs_hook=unique)
+    except json.JSONDecodeError as error:
+        lines = text.split("\n")
+        source = lines[min(error.lineno, len(lines)) - 1][:200]
+        raise ProgramError(
+            f"this is not JSON: {error.msg}", line=error.lineno, column=error.colno, source=source,
+            hint="was the file cut off?", name=name,
+        ) from None  # fmt: skip
+    except RecursionError:
+        raise InputError(f"{name}: this is nested too deeply to be a program", "loops nest at most 64 deep") from None
+    except ValueError as error:
+        raise InputError(f"{name}: {error}", "write shorter numbers") from None
+    if not isinstance(content, dict) or content.get("format") != wanted:
+        raise InputError(f"{name}: this JSON is not in the form {wanted!r}", f'it begins {{"format": "{wanted}", ...')
+    if content.get("version") != VERSION:
+        raise InputError(
+            f"{name}: version {content.get('version')!r} of the form {wanted!r} is not known",
+            f"this program reads version {VERSION}; a newer one may read it",
+        )
+    return content
+
+
+def _body(body: Any, name: str, place: str, depth: int) -> tuple[Node, ...]:
+    if not isinstance(body, list):
+        raise InputError(f"{name}: {place} is not a list of statements", "write [ ... ], empty if there are none")
+    if depth > DEEPEST:
+        raise InputError(f"{name}: loops are nested more than {DEEPEST} deep", "put some of them side by side")
+    return tuple(_node(entry, name, f"{place}[{index}]", depth) for index, entry in enumerate(body))
+
+
+def _node(entry: Any, name: str, place: str, depth: int) -> Node:
+    if not isinstance(entry, dict) or not isinstance(entry.get("statement"), str):
+        raise InputError(f"{name}: {place} is not a statement", 'write {"statement": name, "parameters": {...}}')
+    known, word = language(), entry["statement"]
+    if word not in known:
+        raise InputError(f"{name}: {place}: no statement is called {word!r}", did_you_mean(word, known.names))
+    declared = known[word]
+    allowed = {"statement", "parameters", "body"} if declared.is_loop else {"statement", "parameters"}
+    extra = sorted(set(entry) - allowed)
+    if extra:
+        raise InputError(f"{name}: {place}: {word} has no entry {extra[0]!r}", f"it has {', '.join(sorted(allowed))}")
+    values = _values(declared, entry.get("parameters"), name, place)
+    if not declared.is_loop:
+        return Draw(word, values)
+    return Loop(word, values, _body(entry.get("body"), name, f"{place}.body", depth + 1))
+
+
+def _values(declared: Statement, given: Any, name: str, place: str) -> tuple[float, ...]:
+    words = [parameter.name for parameter in declared.parameters]
+    if not isinstance(given, dict):
+        raise InputError(f"{name}: {place}: {declared.name} lacks its parameters", f"they are {', '.join(words)}")
+    for word in given:
+        if word not in words:
+            raise InputError(f"{name}: {place}: {declared.name} has no parameter {word!r}", did_you_mean(word, words))
+    values: list[float] = []
+    for parameter in declared.parameters:
+        if parameter.name not in given:
+            raise InputError(f"{name}: {place}: {declared.name} lacks {parameter.name}", f"it has {', '.join(words)}")
+        found = given[parameter.name]
+        numbers = found if isinstance(found, list) else [found]
+        if any(type(number) not in (int, float) for number in numbers):
+            raise InputError(
+                f"{name}: {place}: {parameter.name} of {declared.name} holds something that is not a number",
+                "write plain numbers such as 4 or -2.5",
+            )
+        try:
+            values += checked(declared, parameter, numbers)
+        except ShapeProgError as mistake:
+            raise InputError(f"{name}: {place}: {mistake.message}", mistake.hint) from None
+    return tuple(values)

@@ -1,0 +1,91 @@
+"""Meshes out: GLB, OBJ and PLY of coloured parts, STL of the one solid they make."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from shapeprog.files import write_bytes, write_text
+from shapeprog.formats.colours import colour
+from shapeprog.formats.parts import Faces, Part, Vertices, crease_normals, drawn_parts, solid
+from shapeprog.language.program import Program
+from shapeprog.space import Frame
+
+
+def write_glb(program: Program, path: Path, frame: Frame) -> None:
+    """One named node per part (``leg_1``, ``leg_2``...) and one material per statement.
+
+    The material is what a viewer shows; vertices are split along creases, so that boards look flat and bars round.
+    """
+    import trimesh
+    from trimesh.visual.material import PBRMaterial
+
+    make_material: Any = PBRMaterial
+    make_visual: Any = trimesh.visual.TextureVisuals
+    scene: Any = trimesh.Scene()
+    materials: dict[str, Any] = {}
+    for part in drawn_parts(program, frame):
+        if part.word not in materials:
+            materials[part.word] = make_material(
+                name=part.word, baseColorFactor=[*colour(part.statement), 255], metallicFactor=0.0, roughnessFactor=0.7
+            )
+        vertices, normals, faces = _split(part)
+        mesh = trimesh.Trimesh(vertices, faces, vertex_normals=normals, process=False)
+        mesh.visual = make_visual(uv=np.zeros((len(vertices), 2)), material=materials[part.word])
+        scene.add_geometry(mesh, node_name=part.name, geom_name=part.name)
+    content: Any = scene.export(file_type="glb", include_normals=True)
+    write_bytes(path, content)
+
+
+def write_obj(program: Program, path: Path, frame: Frame) -> None:
+    """One named object per part; its colours in an ``.mtl`` file of the same name beside it."""
+    each = drawn_parts(program, frame)
+    library = path.with_suffix(".mtl")
+    lines, first = [f"mtllib {library.name}"], 1
+    for part in each:
+        lines += [f"o {part.name}", f"usemtl {part.word}"]
+        lines += ["v {:.9g} {:.9g} {:.9g}".format(*vertex) for vertex in part.vertices]
+        lines += ["f {} {} {}".format(*face) for face in part.faces + first]
+        first += len(part.vertices)
+    materials = []
+    for word, statement in {part.word: part.statement for part in each}.items():
+        materials.append("newmtl {}\nKd {:.4f} {:.4f} {:.4f}\n".format(word, *(c / 255 for c in colour(statement))))
+    write_text(library, "\n".join(materials))
+    write_text(path, "\n".join([*lines, ""]))
+
+
+def write_ply(program: Program, path: Path, frame: Frame) -> None:
+    """All parts in one mesh with a colour at each vertex; parts overlap as they do in the program."""
+    import trimesh
+
+    each = drawn_parts(program, frame)
+    starts = np.cumsum([0, *(len(part.vertices) for part in each)])
+    colours = [np.tile([*colour(part.statement), 255], (len(part.vertices), 1)) for part in each]
+    mesh = trimesh.Trimesh(
+        np.concatenate([part.vertices for part in each]),
+        np.concatenate([part.faces + start for part, start in zip(each, starts, strict=False)]),
+        vertex_colors=np.concatenate(colours).astype(np.uint8),
+        process=False,
+    )
+    content: Any = mesh.export(file_type="ply")
+    write_bytes(path, content)
+
+
+def write_stl(program: Program, path: Path, frame: Frame) -> None:
+    """The union of all parts as one watertight solid, ready to print."""
+    import trimesh
+
+    vertices, faces = solid(program, frame)
+    content: Any = trimesh.Trimesh(vertices, faces, process=False).export(file_type="stl")
+    write_bytes(path, content)
+
+
+def _split(part: Part) -> tuple[Vertices, Vertices, Faces]:
+    """Vertices, normals and faces where corners share a vertex only if they share a normal."""
+    normals = crease_normals(part.vertices, part.faces).reshape(-1, 3)
+    corners = part.faces.reshape(-1)
+    key = np.concatenate([corners[:, None], np.rint(normals * 1e4)], 1)
+    _, first, index = np.unique(key, axis=0, return_index=True, return_inverse=True)
+    return part.vertices[corners[first]], normals[first], index.reshape(-1, 3)

@@ -1,0 +1,294 @@
+"""The notation of the paper, read and printed with nothing dropped.
+
+    for(i<2, 'Trans', u=(0, 0, 18))
+        draw('Leg', 'Cub', P=(-12, -8, -10)+i*u, G=(16, 2, 2))
+
+``P`` is the position (``P1`` and ``P2`` the ends of a line), ``G`` the lengths in declared order; everything else
+follows by its name: ``tilt``, ``turn``, ``step``.  Statements that the paper does not have go by their own name.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+from shapeprog.errors import ProgramError, ShapeProgError, did_you_mean
+from shapeprog.files import write_text
+from shapeprog.formats.frames import frame_comment, frame_in
+from shapeprog.formats.published import COUNT, Groups, is_published, restored
+from shapeprog.formats.shape import read_text
+from shapeprog.language.parameters import Parameter
+from shapeprog.language.program import Draw, Loop, Node, Program
+from shapeprog.language.statement import Statement, language
+from shapeprog.language.syntax import DEEPEST, proper_text
+from shapeprog.language.text import INDENT, variable
+from shapeprog.language.values import checked, written
+from shapeprog.space import Frame
+
+_NUMBER = r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?"
+_VALUE = rf"\(\s*{_NUMBER}(?:\s*,\s*{_NUMBER})*\s*,?\s*\)|{_NUMBER}\s*\N{{DEGREE SIGN}}?"
+_COPIES = r"(?:\s*\+\s*[a-z]\w*\s*\*\s*[a-z]\w*)*"
+_WORD = re.compile(r"\s*'([^'\n]*)'\s*(,|\)|$)")
+_GROUP = re.compile(rf"\s*([A-Za-z_]\w*)\s*=\s*({_VALUE}){_COPIES}\s*(,|\)|$)")
+_TURN = re.compile(r"\s*(?:theta\s*\*\s*[a-z]|axis)\s*(,|\)|$)")
+_DRAW = re.compile(r"draw\s*\(")
+_FOR = re.compile(rf"for\s*\(\s*[a-z]\w*\s*<\s*({_NUMBER})\s*(,|\))")
+_REST = re.compile(rf"{_COPIES}\s*:?\s*$")
+
+
+def read_notation(path: Path) -> tuple[Program, Frame | None]:
+    """The program of a file in the notation of the paper, and its frame where a comment keeps it.
+
+    What the published printer leaves out is filled in without a word; :func:`parse_notation` can tell.
+    """
+    text = read_text(path)
+    return parse_notation(text, str(path)), frame_in(text, str(path))
+
+
+def write_notation(program: Program, path: Path, frame: Frame | None) -> None:
+    """Write a program in the notation of the paper."""
+    write_text(path, frame_comment(frame) + format_notation(program))
+
+
+def format_notation(program: Program) -> str:
+    """A program in the notation of the paper; loops without a body draw nothing and are left out.
+
+    Raises
+    ------
+    ShapeProgError
+        If a number is not finite or a statement is not declared.
+    """
+    return "".join(f"{line}\n" for node in program.body for line in _lines(node, [], _nested(node)))
+
+
+def parse_notation(text: str, name: str = "<program>", notes: list[str] | None = None) -> Program:
+    """The program of a text in the notation of the paper.
+
+    Loops hold what is indented deeper, or, where the text says ``end``, everything up to there.  Text of the published
+    printer is read too.
+
+    Parameters
+    ----------
+    notes
+        Receives one sentence for each number that the published printer dropped and a default stands in for.
+
+    Raises
+    ------
+    ProgramError
+        At the first place that is not in the notation.
+    """
+    text = proper_text(text, name)
+    lines = [(number, line) for number, line in enumerate(text.splitlines(), 1) if line.split("#")[0].strip()]
+    reader = _Reader(lines, name, [] if notes is None else notes)
+    return Program(reader.body(-1, 0, inside=None))
+
+
+def groups(declared: Statement) -> dict[str, tuple[Parameter, ...]]:
+    """The groups of numbers that the notation writes for a statement and the parameters in each."""
+    rest = declared.parameters[declared.is_loop :]
+    found: dict[str, tuple[Parameter, ...]] = {}
+    if declared.is_loop:
+        for parameter in rest:
+            symbol = declared.paper[1] if declared.paper and not found else parameter.name
+            found[symbol] = (parameter,)
+        return found
+    positions = [parameter for parameter in rest if parameter.quantity.kind == "position"]
+    for number, parameter in enumerate(positions, 1):
+        found[f"P{number}" if len(positions) > 1 else "P"] = (parameter,)
+    lengths = tuple(parameter for parameter in rest if parameter.quantity.kind == "length")
+    if lengths:
+        found["G"] = lengths
+    found.update({p.name: (p,) for p in rest if p.quantity.kind not in ("position", "length")})
+    return found
+
+
+def _words(declared: Statement) -> list[str]:
+    words = list(declared.paper) if declared.paper else [declared.name]
+    return words[:1] if declared.is_loop else words
+
+
+def _quoted(words: list[str]) -> str:
+    return ", ".join(f"'{word}'" for word in words)
+
+
+def _moves(node: Node) -> bool:
+    """Whether a node is a loop that shifts, with a ``u`` in the notation."""
+    known = language()
+    shifts = node.name in known and any(p.quantity.kind == "shift" for p in known[node.name].parameters)
+    return isinstance(node, Loop) and shifts
+
+
+def _nested(node: Node, around: int = 0) -> bool:
+    """Whether shifting loops lie in each other, so that their ``u`` are numbered."""
+    around += _moves(node)
+    return around > 1 or (isinstance(node, Loop) and any(_nested(inner, around) for inner in node.body))
+
+
+def _lines(node: Node, loops: list[Loop], numbered: bool) -> Iterator[str]:
+    known = language()
+    if node.name not in known:
+        raise ShapeProgError(f"no statement is called {node.name!r}", "load the module that declares it")
+    declared = known[node.name]
+    shifts = [depth for depth, outer in enumerate(loops) if _moves(outer)]
+    names = [f"u{place + 1}" if numbered else "u" for place in range(len(shifts) + 1)]
+    moved = "".join(f"+{variable(depth)}*{u}" for depth, u in zip(shifts, names, strict=False))
+    words = [_quoted(_words(declared))]
+    for symbol, parameters in groups(declared).items():
+        numbers = [written(p.quantity, value) for p in parameters for value in node.values[p.slots]]
+        group = numbers[0] if len(numbers) == 1 else f"({', '.join(numbers)})"
+        at = moved if parameters[0].quantity.kind == "position" else ""
+        words.append(f"{names[-1] if symbol == 'u' else symbol}={group}{at}")
+    indent = INDENT * len(loops)
+    if isinstance(node, Draw):
+        yield f"{indent}draw({', '.join(words)})"
+        return
+    body = [line for inner in node.body for line in _lines(inner, [*loops, node], numbered)]
+    if body:
+        count = written(declared.parameters[0].quantity, node.values[0])
+        yield f"{indent}for({variable(len(loops))}<{count}, {', '.join(words)})"
+        yield from body
+
+
+class _Reader:
+    """Reads lines and knows the place of every mistake."""
+
+    def __init__(self, lines: list[tuple[int, str]], name: str, notes: list[str]) -> None:
+        self.lines = lines
+        self.name = name
+        self.notes = notes
+        self.next = 0
+        self.ends = any(_bare(line) == "end" for _, line in lines)
+
+    def body(self, outside: int, depth: int, inside: int | None) -> tuple[Node, ...]:
+        """The nodes indented deeper than ``outside``, or up to ``end``, for the loop of line ``inside``."""
+        nodes: list[Node] = []
+        level: int | None = None
+        while self.next < len(self.lines):
+            line = self.lines[self.next][1]
+            indent = len(line) - len(line.lstrip())
+            if self.ends:
+                if _bare(line) == "end":
+                    if inside is None:
+                        raise self._error("there is no loop to end here", "leave the end out")
+                    break
+            elif indent <= outside:
+                break
+            elif level is not None and indent != level:
+                raise self._error("this line is indented unlike the one before it", "indent with four spaces in a loop")
+            level = indent
+            nodes.append(self._node(indent, depth))
+        if inside is not None and self.ends:
+            if self.next == len(self.lines):
+                self.next = inside
+                raise self._error("this loop has no end", "write end after what it repeats")
+            self.next += 1
+        if inside is not None and not nodes:
+            self.next = inside
+            raise self._error("this loop repeats nothing", "indent what it repeats by four spaces")
+        return tuple(nodes)
+
+    def _node(self, indent: int, depth: int) -> Node:
+        row = self.next
+        text = _bare(self.lines[row][1])
+        found = _DRAW.match(text) or _FOR.match(text)
+        if not found:
+            raise self._error(
+                "a line is draw(...), for(...) or end", "write draw('Leg', 'Cub', P=(_, _, _), G=(_, _, _))"
+            )
+        is_loop = found.re is _FOR
+        start: Groups = {COUNT: [float(found[1])]} if is_loop else {}
+        words, groups = self._arguments(text, found, indent, start)
+        declared, values = self._declared(words, groups, is_loop)
+        self.next += 1
+        if not is_loop:
+            return Draw(declared.name, values)
+        if depth >= DEEPEST:
+            self.next = row
+            raise self._error(f"loops are nested more than {DEEPEST} deep", "put some of them side by side")
+        return Loop(declared.name, values, self.body(indent, depth + 1, row))
+
+    def _arguments(self, text: str, found: re.Match[str], indent: int, groups: Groups) -> tuple[list[str], Groups]:
+        """Quoted words and groups of numbers; the published printer forgets the last parenthesis of a rotation."""
+        words: list[str] = []
+        at = found.end()
+        last = found[0][-1] if found.re is _FOR else ","
+        while last == ",":
+            part = _WORD.match(text, at) or _GROUP.match(text, at) or _TURN.match(text, at)
+            if not part:
+                raise self._error(
+                    "this is neither a quoted word nor a group of numbers", "write 'Leg' or P=(0, 0, 0)", indent + at
+                )
+            if part.re is _WORD:
+                words.append(part[1])
+            elif part.re is _GROUP:
+                if part[1] in groups:
+                    raise self._error(f"{part[1]} is given twice", "leave one of them out", indent + at)
+                groups[part[1]] = [float(number) for number in re.findall(_NUMBER, part[2])]
+            at, last = part.end(), part[part.re.groups]
+        if not last and words != ["Rot"]:
+            raise self._error("the last parenthesis is missing", "write )", indent + at)
+        if not _REST.match(text, at):
+            raise self._error("this line goes on after its end", "leave the rest out", indent + at)
+        return words, groups
+
+    def _declared(self, words: list[str], found: Groups, is_loop: bool) -> tuple[Statement, tuple[float, ...]]:
+        known = [declared for declared in language() if declared.is_loop == is_loop]
+        fitting = next((declared for declared in known if _words(declared) == words), None)
+        try:
+            if is_published(words, found):
+                name, numbers, note = restored(words, found)
+                fitting = next((declared for declared in known if declared.name == name), None)
+                if fitting is not None:
+                    self.notes.append(f"{self.name}, line {self.lines[self.next][0]}: {note}")
+                    return fitting, _values(fitting, list(numbers))
+            if fitting is None:
+                spelled = [_quoted(_words(declared)) for declared in known]
+                what = "loop" if is_loop else "statement"
+                raise ShapeProgError(
+                    f"no {what} is called {_quoted(words) or 'nothing'}", did_you_mean(_quoted(words), spelled)
+                )
+            return fitting, self._sorted(fitting, found)
+        except ShapeProgError as mistake:
+            raise self._error(mistake.message, mistake.hint) from None
+
+    def _sorted(self, declared: Statement, found: Groups) -> tuple[float, ...]:
+        """Numbers in slot order."""
+        wanted = groups(declared)
+        given = {_symbol(symbol, wanted): numbers for symbol, numbers in found.items()}
+        for symbol in given:
+            if symbol not in wanted and symbol != COUNT:
+                raise ShapeProgError(f"{declared.name} has no group {symbol}", f"its groups are {', '.join(wanted)}")
+        slots = [0.0] * declared.size
+        if declared.is_loop:
+            slots[:1] = given[COUNT]
+        for symbol, parameters in wanted.items():
+            width = sum(parameter.quantity.width for parameter in parameters)
+            numbers = given.get(symbol)
+            if numbers is None or len(numbers) != width:
+                seen = "is missing" if numbers is None else f"has {len(numbers)} numbers"
+                raise ShapeProgError(f"{symbol} of {declared.name} {seen}", f"it takes {width} numbers")
+            for parameter in parameters:
+                slots[parameter.slots] = numbers[: parameter.quantity.width]
+                numbers = numbers[parameter.quantity.width :]
+        return _values(declared, slots)
+
+    def _error(self, message: str, hint: str, column: int | None = None) -> ProgramError:
+        number, line = self.lines[min(self.next, len(self.lines) - 1)]
+        start = len(line) - len(line.lstrip()) if column is None else column
+        source = line.replace("\t", " ")
+        return ProgramError(message, line=number, column=start + 1, source=source, hint=hint, name=self.name)
+
+
+def _symbol(symbol: str, wanted: dict[str, tuple[Parameter, ...]]) -> str:
+    """``u1`` and ``u2`` of nested loops both stand for ``u``."""
+    bare = symbol.rstrip("0123456789")
+    return bare if symbol not in wanted and bare in wanted else symbol
+
+
+def _values(declared: Statement, slots: list[float]) -> tuple[float, ...]:
+    return tuple(n for parameter in declared.parameters for n in checked(declared, parameter, slots[parameter.slots]))
+
+
+def _bare(line: str) -> str:
+    return line.split("#")[0].strip()

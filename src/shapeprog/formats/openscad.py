@@ -1,0 +1,131 @@
+"""OpenSCAD out: loops stay loops, and every number is a named variable at the top, ready for the customizer."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from shapeprog.files import write_text
+from shapeprog.formats.colours import colour
+from shapeprog.formats.plan import Heading, Plan, Repetition, Solid, Variable, plan
+from shapeprog.formats.symbolic import number
+from shapeprog.geometry.primitives.cylinder import SEGMENTS
+from shapeprog.language.program import Program
+from shapeprog.space import Frame
+
+_MODULES = """
+// A box from its low corner and its extents; its top is shifted by lean along y (a shear, not a turn).
+module cuboid(low, size, lean = 0) {
+  if (min(size) > 0) translate(low)
+    multmatrix([[1, 0, 0, 0], [lean / size[0], 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]) cube(size);
+}
+
+// A round bar between two points; as a prism of the same volume as the true cylinder.
+module cylinder_between(start, end, radius) {
+  along = end - start;
+  height = norm(along);
+  flat = norm([along[0], along[1]]);
+  if (height > 0 && radius > 0) translate(start)
+    rotate([0, acos(max(-1, min(1, along[2] / height))), flat > 0 ? atan2(along[1], along[0]) : 0])
+      cylinder(h = height, r = radius * sqrt(2 * PI / segments / sin(360 / segments)), $fn = segments);
+}
+
+// Any other solid: its mesh in a box of half extents 1, stretched and put at its centre.
+module shell(centre, half, mesh) {
+  if (min(half) > 0) translate(centre) scale(half) polyhedron(points = mesh[0], faces = mesh[1], convexity = 10);
+}
+
+// Local axes as columns of a rotation, about a point.
+module posed(centre, axes) {
+  multmatrix([for (r = [0:2]) [axes[r][0], axes[r][1], axes[r][2], centre[r]]]) children();
+}
+
+// Copy i of a translation loop.
+module move(i, by) { translate(i * by) children(); }
+
+// A turn about the vertical axis (x) through a point.
+module turn(degrees, about = [0, 0, 0]) {
+  translate([0, about[1], about[2]]) rotate([degrees, 0, 0]) translate([0, -about[1], -about[2]]) children();
+}
+"""
+
+
+def write_scad(program: Program, path: Path, frame: Frame) -> None:
+    """Write an OpenSCAD model; the world of the input is a last transformation around it."""
+    write_text(path, scad_text(program, frame))
+
+
+def scad_text(program: Program, frame: Frame) -> str:
+    """The OpenSCAD model of a program.
+
+    Inside the model x is up, y is depth (positive = rear) and z is left-right, in cells, as in the program.
+    """
+    made = plan(program)
+    lines = ["// Made by shapeprog. Change the numbers below, or use the customizer.", ""]
+    for heading in made.headings:
+        lines += [*_heading(heading), ""]
+    lines += ["/* [Quality and place] */", f"segments = {SEGMENTS}; // [12:4:128]"]
+    matrix = ", ".join(f"[{', '.join(number(value) for value in row)}]" for row in frame.matrix())
+    lines += ["// From cells to the world of the input.", f"world = [{matrix}];", "", "/* [Hidden] */", *_tables(made)]
+    lines += [_MODULES.strip(), "", "multmatrix(world) union() {"]
+    lines += [line for step in made.body for line in _step(step, 1)]
+    return "\n".join([*lines, "}", ""])
+
+
+def _heading(heading: Heading) -> Iterator[str]:
+    yield f"/* [{heading.name}] */"
+    yield f"// {heading.doc}"
+    for each in heading.variables:
+        yield f"{each.name} = {each.text}; // {_range(each)}"
+
+
+def _range(each: Variable) -> str:
+    if each.fixed:
+        return "not used below: another value here changes nothing"
+    step = 1 if each.quantity.discrete else 0.5
+    values = [float(word) for word in each.text.strip("[]").split(",")]
+    low, high = min(each.quantity.low, *values, 0), max(each.quantity.high, *values)
+    return f"[{number(np.floor(low))}:{number(step)}:{number(np.ceil(high))}]"
+
+
+def _tables(made: Plan) -> Iterator[str]:
+    for name, (vertices, faces) in made.shells.items():
+        points = ", ".join(f"[{', '.join(number(round(value, 9)) for value in vertex)}]" for vertex in vertices)
+        # OpenSCAD wants faces clockwise from outside.
+        triangles = ", ".join(f"[{a}, {c}, {b}]" for a, b, c in faces.tolist())
+        yield f"{name} = [[{points}], [{triangles}]];"
+    for name, table in made.tables.items():
+        rows = [number(row) if np.ndim(row) == 0 else f"[{', '.join(map(number, row))}]" for row in table]
+        yield f"{name} = [{', '.join(rows)}];"
+
+
+def _step(step: Solid | Repetition, depth: int) -> Iterator[str]:
+    indent = "  " * depth
+    if isinstance(step, Repetition):
+        words = [f"for ({step.letter} = [0 : 1 : {step.count} - 1])"]
+        words += [f"move({step.shift[0]}, {step.shift[1]})"] if step.shift else []
+        words += [f"turn({', '.join(step.turn)})"] if step.turn else []
+        yield f"{indent}{' '.join(words)} {{"
+        for inner in step.body:
+            yield from _step(inner, depth + 1)
+        yield f"{indent}}}"
+        return
+    shade = ", ".join(f"{channel / 255:.3f}" for channel in colour(step.statement))
+    yield f"{indent}color([{shade}]) {_call(step)}; // {step.name}"
+
+
+def _call(step: Solid) -> str:
+    arguments = list(step.arguments)
+    if step.kind == "cylinder":
+        return f"cylinder_between({', '.join(arguments)})"
+    around = ""
+    if step.axes is not None:
+        axes = ", ".join(f"[{', '.join(number(round(value, 12)) for value in row)}]" for row in step.axes)
+        around = f"posed({arguments[0]}, [{axes}]) "
+        lean = f" - [0, {arguments[2]} / 2, 0]" if len(arguments) > 2 else ""
+        arguments[0] = f"-{arguments[1]} / 2{lean}" if step.kind == "cuboid" else "[0, 0, 0]"
+    if step.kind == "cuboid":
+        return f"{around}cuboid({', '.join(arguments)})"
+    return f"{around}shell({', '.join(arguments)}, {step.shell})"

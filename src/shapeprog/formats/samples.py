@@ -1,0 +1,82 @@
+"""Samples of what a program draws: its cells as binvox and NPY, points as XYZ, arrays of everything as NPZ.
+
+Cells are those of the program snapped to the grid, as the measures of the project take them; points lie on the surface
+of the union of the program as it is.
+"""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import torch
+
+from shapeprog.files import atomic_path, write_bytes
+from shapeprog.formats.binvox import write_binvox
+from shapeprog.geometry.cells import voxels
+from shapeprog.geometry.surface import sample_surface
+from shapeprog.language.program import Program
+from shapeprog.language.tensors import encode
+from shapeprog.language.unroll import unroll
+from shapeprog.space import RESOLUTION, Frame
+
+POINTS = 5000
+"""Points on the surface that an NPZ holds, and an XYZ unless asked for others."""
+
+
+def cells(program: Program, resolution: int = RESOLUTION) -> npt.NDArray[np.bool_]:
+    """The cells (R, R, R) of a program snapped to the grid."""
+    return voxels(unroll(program.snap()), resolution).numpy().astype(np.bool_)
+
+
+def write_cells(program: Program, path: Path, frame: Frame) -> None:
+    """Write the cells as binvox, where the input lies."""
+    write_binvox(path, cells(program), frame)
+
+
+def write_grid(program: Program, path: Path, frame: Frame, resolution: int = RESOLUTION) -> None:
+    """Write the cells as a boolean array; it is in the grid, so the frame is not kept."""
+    content = io.BytesIO()  # numpy itself does not say so plainly when the disk is full
+    np.save(content, cells(program, resolution))
+    write_bytes(path, content.getvalue())
+
+
+def write_points(program: Program, path: Path, frame: Frame, points: int = POINTS, seed: int = 0) -> None:
+    """Write points on the surface with their normals, in the world of the frame."""
+    sample = sample_surface(unroll(program), points, torch.Generator().manual_seed(seed))
+    normals = sample.normals.numpy() @ np.asarray(frame.axes).T
+    rows = np.concatenate([frame.to_world(sample.points.detach().numpy()), normals], 1)
+    with atomic_path(path) as temporary:
+        np.savetxt(temporary, rows, fmt="%.7g")
+
+
+def write_arrays(program: Program, path: Path, frame: Frame) -> None:
+    """Write arrays: everything in the grid frame, and the frame.
+
+    ==========================  ===================  ==========================================================
+    array                       shape                meaning
+    ==========================  ===================  ==========================================================
+    ``voxels``                  (32, 32, 32) bool    cells of the program snapped to the grid
+    ``points``, ``normals``     (5000, 3) float32    on the surface of the union of the program as it is, in cells
+    ``ids``, ``parameters``     (K, J), (K, J, 7)    the program as tensors
+    ``scale, centre, axes``     (), (3,), (3, 3)     the way to the world: centre + axes @ (scale * point)
+    ==========================  ===================  ==========================================================
+    """
+    code = encode(program)
+    scene = unroll(code)
+    arrays: dict[str, Any] = {"voxels": cells(program), "ids": code.ids.numpy(), "parameters": code.parameters.numpy()}
+    if bool(scene.mask.any()):
+        surface = sample_surface(scene, POINTS, torch.Generator().manual_seed(0))
+        arrays |= {"points": surface.points.detach().numpy(), "normals": surface.normals.detach().numpy()}
+    else:
+        arrays |= {"points": np.zeros((0, 3), np.float32), "normals": np.zeros((0, 3), np.float32)}
+    place: dict[str, Any] = {
+        "scale": np.float64(frame.scale),
+        "centre": np.array(frame.centre),
+        "axes": np.array(frame.axes),
+    }
+    with atomic_path(path) as temporary, temporary.open("wb") as stream:
+        np.savez_compressed(stream, **arrays, **place)

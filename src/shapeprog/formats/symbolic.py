@@ -1,0 +1,265 @@
+"""Parameters kept as names: what a statement draws, as linear expressions in its parameters.
+
+Nothing here knows any statement.  A declaration is evaluated in float64 at its parameters and at points around them;
+a number that moves in proportion becomes an expression such as ``leg_1_at[1] + leg_1_size[1] / 2``.  A parameter on
+which something depends in another way is *fixed*: it enters as the number it is, and exports say so.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+import torch
+
+from shapeprog.geometry.batch import Solids
+from shapeprog.geometry.primitive import primitives
+from shapeprog.language.statement import SLOTS, Statement
+from shapeprog.space import FloatArray
+
+Measure = Callable[[torch.Tensor], "list[_Measured]"]
+
+STEP = 0.5
+"""How far in cells parameters are moved to see what they do."""
+
+TOLERANCE = 1e-7
+"""In cells: far below anything visible, far above rounding in float64."""
+
+
+@dataclass(frozen=True)
+class Affine:
+    """A number that is linear in named slots: ``constant + sum of coefficient * slot``."""
+
+    constant: float
+    terms: tuple[tuple[int, float], ...] = ()
+
+    def text(self, slots: Sequence[str]) -> str:
+        """The expression, valid in Python and OpenSCAD alike."""
+        words = []
+        for slot, coefficient in self.terms:
+            sign = "-" if coefficient < 0 else "+"
+            words += [sign, _scaled(slots[slot], abs(coefficient))]
+        if self.constant or not words:
+            words += ["-" if self.constant < 0 else "+", number(abs(self.constant))]
+        lead = "-" if words[0] == "-" else ""
+        return lead + " ".join(words[1:])
+
+
+@dataclass(frozen=True)
+class Piece:
+    """One solid that a statement draws.
+
+    Parameters
+    ----------
+    kind
+        ``cuboid``, ``cylinder`` or, for every other primitive, ``shell``.
+    groups
+        The vectors and numbers that place and shape it: for a cuboid its low corner, its extents and its lean; for a
+        cylinder both ends and its radius; for a shell its centre and the half extents of its local box.
+    axes
+        Its local axes as columns (3, 3), where they are not those of the grid and the groups do not tell them.  A
+        cuboid with axes has its centre in place of the corner.
+    vertices, faces
+        Of a shell: its mesh with the local box scaled to [-1, 1]^3.
+    """
+
+    kind: str
+    groups: tuple[tuple[Affine, ...], ...]
+    axes: FloatArray | None = None
+    vertices: FloatArray | None = None
+    faces: npt.NDArray[np.int64] | None = None
+
+
+def number(value: float) -> str:
+    """A number in short: 12 digits at most, no superfluous point."""
+    return f"{value + 0.0:.12g}"
+
+
+def pieces(declared: Statement, values: Sequence[float]) -> tuple[list[Piece], frozenset[int]]:
+    """The solids of a drawing statement as expressions in its slots, and the slots that are fixed."""
+    probe = _Probe(
+        declared, values, lambda rows: [_measured(s) for s in declared.solids(rows)], _continuous(declared), STEP
+    )
+    found = []
+    start = 0
+    for part in probe.base:
+        groups = []
+        for width in part.widths:
+            groups.append(tuple(probe.affine(start + place) for place in range(width)))
+            start += width
+        found.append(Piece(part.kind, tuple(groups), part.axes, part.vertices, part.faces))
+    return found, probe.fixed
+
+
+def point(declared: Statement, values: Sequence[float]) -> tuple[tuple[Affine, ...] | None, frozenset[int]]:
+    """The pivot of a statement as expressions in its slots, or None for the axis of the grid."""
+    pivot = declared.pivot
+    if pivot is None:
+        return None, frozenset()
+
+    def measure(rows: torch.Tensor) -> list[_Measured]:
+        place = pivot(**declared.split(rows)).numpy()
+        return [_Measured("point", (3,), place, np.zeros((len(place), 0)))]
+
+    probe = _Probe(declared, values, measure, _continuous(declared), STEP)
+    return tuple(probe.affine(axis) for axis in range(3)), probe.fixed
+
+
+@dataclass(frozen=True)
+class Repeat:
+    """How a loop moves copy i: by a turn of ``i * turn`` degrees, or evenly over the circle, and by ``i * shift``.
+
+    Where a loop follows no such rule, ``table`` holds its degrees and shift for every copy.
+    """
+
+    turn: Affine | None = None
+    even: bool = False
+    shift: tuple[Affine, ...] | None = None
+    table: FloatArray | None = None
+
+    @property
+    def turns(self) -> bool:
+        """Whether copies are turned at all."""
+        return self.even or self.turn is not None or (self.table is not None and bool(self.table[:, 0].any()))
+
+
+def repeat(declared: Statement, values: Sequence[float], quarter: bool) -> tuple[Repeat, frozenset[int]]:
+    """The motion of a loop as expressions in its slots, and the slots that are fixed (the count is never)."""
+
+    def moved(rows: torch.Tensor, copy: torch.Tensor) -> FloatArray:
+        assert declared.move is not None
+        flags = torch.full((len(rows),), quarter)
+        motion = declared.move(copy, flags, **declared.split(rows))
+        turn = torch.zeros(len(rows), dtype=rows.dtype) if motion.turn is None else motion.turn
+        shift = torch.zeros(len(rows), 3, dtype=rows.dtype) if motion.shift is None else motion.shift
+        return np.concatenate([360 * turn.numpy()[:, None], shift.numpy()], 1)
+
+    def measure(columns: slice) -> Measure:
+        def around(rows: torch.Tensor) -> list[_Measured]:
+            once, *others = (moved(rows, torch.full((len(rows),), float(c)).double())[:, columns] for c in (1, 2, 5))
+            still = np.concatenate([other - c * once for other, c in zip(others, (2, 5), strict=True)], 1)
+            return [_Measured("motion", (once.shape[1],), once, still)]
+
+        return around
+
+    slots = range(declared.size)
+    here = torch.zeros(8, SLOTS, dtype=torch.float64)
+    here[:, : len(values)] = torch.tensor(values, dtype=torch.float64)
+    here[:, 0] = torch.arange(1, 9)
+    copies = torch.tensor([0, 1, 1, 3, 4, 5, 2, 7], dtype=torch.float64)
+    even = bool(np.abs(moved(here, copies)[:, 0] - 360 * (copies / here[:, 0]).numpy()).max() < TOLERANCE)
+    turn = _Probe(declared, values, measure(slice(0, 0 if even else 1)), slots, 1.0)
+    shift = _Probe(declared, values, measure(slice(1, 4)), slots, 1.0)
+    if max(np.abs(probe.base[0].still[0]).max(initial=0) for probe in (turn, shift)) > TOLERANCE:
+        count = max(0, round(values[0]))
+        rows = here[:1].expand(count, SLOTS).clone()
+        rows[:, 0] = values[0]
+        return Repeat(table=moved(rows, torch.arange(count, dtype=torch.float64))), frozenset(slots) - {0}
+    angle = None if even else _unless_zero((turn.affine(0),))
+    by = _unless_zero(tuple(shift.affine(axis) for axis in range(3)))
+    found = Repeat(None if angle is None else angle[0], even, by)
+    return found, (turn.fixed & shift.fixed) - {0}
+
+
+def _unless_zero(each: tuple[Affine, ...]) -> tuple[Affine, ...] | None:
+    return each if any(one.terms or one.constant for one in each) else None
+
+
+@dataclass(frozen=True)
+class _Measured:
+    """A solid at every row of parameters: ``linear`` (B, m) may follow them, ``still`` (B, c) must not move."""
+
+    kind: str
+    widths: tuple[int, ...]
+    linear: FloatArray
+    still: FloatArray
+    axes: FloatArray | None = None
+    vertices: FloatArray | None = None
+    faces: npt.NDArray[np.int64] | None = None
+
+
+def _measured(solids: Solids) -> _Measured:
+    size, centre = solids.size.numpy(), solids.centre.numpy()
+    rows = len(size)
+    rotation = np.tile(np.eye(3), (rows, 1, 1)) if solids.rotation is None else solids.rotation.numpy()
+    turned = bool(np.abs(rotation - np.eye(3)).max() > 0)
+    name = primitives[solids.kind].name
+    if name == "cylinder":
+        reach = rotation[..., 0] * size[:, :1]
+        return _Measured(
+            name, (3, 3, 1), np.concatenate([centre - reach, centre + reach, size[:, 1:2]], 1), np.zeros((rows, 0))
+        )
+    axes, still = (rotation[0], rotation.reshape(rows, 9)) if turned else (None, np.zeros((rows, 0)))
+    if name == "cuboid":
+        low = centre - size[:, :3]
+        low[:, 1] -= size[:, 3] / 2
+        linear = np.concatenate([centre if turned else low, 2 * size[:, :3], size[:, 3:4]], 1)
+        return _Measured(name, (3, 3, 1), linear, still, axes)
+    declared = primitives[solids.kind]
+    bound = declared.bound(solids.size).numpy()
+    meshes = [declared.mesh(row.astype(np.float64)) for row in size]
+    units = [vertices / np.where(half > 0, half, 1) for (vertices, _), half in zip(meshes, bound, strict=True)]
+    same = all(unit.shape == units[0].shape for unit in units)
+    unit = np.stack(units) if same else np.arange(rows, dtype=np.float64)[:, None]
+    shape = np.concatenate([still, unit.reshape(rows, -1)], 1)
+    return _Measured("shell", (3, 3), np.concatenate([centre, bound], 1), shape, axes, units[0], meshes[0][1])
+
+
+class _Probe:
+    """A function of parameters, evaluated around them: which slots it is linear in, and with which coefficients."""
+
+    def __init__(
+        self, declared: Statement, values: Sequence[float], measure: Measure, slots: Sequence[int], step: float
+    ) -> None:
+        here = np.zeros(SLOTS)
+        here[: len(values)] = values
+        along = [far * np.eye(SLOTS)[slot] for slot in slots for far in (step, 2 * step)]
+        self.base, linear, still = _evaluate(measure, np.stack([here, *(here + move for move in along)]))
+        one, two = linear[1::2] - linear[0], linear[2::2] - linear[0]
+        bent = np.abs(two - 2 * one).max(1, initial=0) > TOLERANCE
+        moved = np.abs(still[1:] - still[0]).max(1, initial=0).reshape(-1, 2).max(1, initial=0) > TOLERANCE
+        live = [slot for slot, bad in zip(slots, bent | moved, strict=True) if not bad]
+        slope = np.zeros((SLOTS, linear.shape[1]))
+        slope[list(slots)] = one / step
+        # Linear in each slot alone is not linear in all: move the live ones together, and give up where that differs.
+        mixed = np.zeros((2, SLOTS))
+        mixed[:, live] = step * np.outer([1, 3], 1 + np.arange(len(live)) % 3)
+        _, together, pose = _evaluate(measure, np.concatenate([here[None], here + mixed]))
+        gap = np.abs(together[1:] - linear[0] - mixed @ slope).max(initial=0)
+        if max(gap, np.abs(pose[1:] - pose[0]).max(initial=0)) > TOLERANCE:
+            live = []
+        used = {slot for slot in live if np.abs(slope[slot]).max(initial=0) > TOLERANCE}
+        self.fixed = frozenset(range(declared.size)) - used
+        self._here, self._value, self._slope, self._live = here, linear[0], slope, live
+
+    def affine(self, column: int) -> Affine:
+        """One number as an expression."""
+        terms, constant = [], float(self._value[column])
+        for slot in self._live:
+            coefficient = round(float(self._slope[slot][column]), 9)
+            if coefficient:
+                terms.append((slot, coefficient))
+                constant -= coefficient * self._here[slot]
+        constant = round(constant, 9) if terms else constant
+        return Affine(constant if abs(constant) > 1e-9 else 0.0, tuple(terms))
+
+
+def _evaluate(measure: Measure, rows: FloatArray) -> tuple[list[_Measured], FloatArray, FloatArray]:
+    with torch.no_grad():
+        parts = measure(torch.from_numpy(rows))
+    linear = np.concatenate([part.linear for part in parts], 1)
+    return parts, linear, np.concatenate([part.still for part in parts], 1)
+
+
+def _continuous(declared: Statement) -> list[int]:
+    return [slot for slot, quantity in enumerate(declared.quantities) if not quantity.discrete]
+
+
+def _scaled(name: str, coefficient: float) -> str:
+    if coefficient == 1:
+        return name
+    if coefficient < 1 and abs(1 / coefficient - round(1 / coefficient)) < 1e-9:
+        return f"{name} / {round(1 / coefficient)}"
+    return f"{number(coefficient)} * {name}"

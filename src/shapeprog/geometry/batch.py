@@ -1,0 +1,110 @@
+"""Primitives as structures of arrays: of one kind as statements return them, and in padded slots as all is computed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, fields
+from typing import TypeVar
+
+import torch
+from jaxtyping import Bool, Float, Int
+from torch import Tensor
+
+from shapeprog.geometry.primitive import SIZES
+
+Some = TypeVar("Some", bound="Batch")
+
+
+@dataclass(frozen=True)
+class Solids:
+    """Primitives of one kind as a statement returns them: sizes and poses with any leading batch dimensions.
+
+    Parameters
+    ----------
+    kind
+        Number in the registry of primitives.
+    size
+        Sizes (..., 4) in cells, in the order the primitive declares.
+    centre
+        Centres (..., 3) in the grid frame.
+    rotation
+        Orientations (..., 3, 3) whose columns are the local axes, or ``None`` when aligned with the grid.
+    """
+
+    kind: int
+    size: Float[Tensor, "*batch 4"]
+    centre: Float[Tensor, "*batch 3"]
+    rotation: Float[Tensor, "*batch 3 3"] | None = None
+
+
+@dataclass(frozen=True)
+class Batch:
+    """``N`` slots of primitives for each element of a batch, padded with a mask.
+
+    A local point p of slot n lies at ``centre[n] + rotation[n] @ p``.
+
+    Parameters
+    ----------
+    kind
+        Which primitive (number in the registry).
+    size
+        Sizes in cells; zero in padding.
+    centre, rotation
+        Pose in the grid frame; zero and identity in padding.
+    mask
+        Which slots hold a primitive.
+    """
+
+    kind: Int[Tensor, "*batch N"]
+    size: Float[Tensor, "*batch N 4"]
+    centre: Float[Tensor, "*batch N 3"]
+    rotation: Float[Tensor, "*batch N 3 3"]
+    mask: Bool[Tensor, "*batch N"]
+
+    @property
+    def batch_shape(self) -> torch.Size:
+        """Leading dimensions: one union of primitives for each of them."""
+        return self.mask.shape[:-1]
+
+    @property
+    def device(self) -> torch.device:
+        """Where the tensors are."""
+        return self.mask.device
+
+    @property
+    def kinds(self) -> list[int]:
+        """Kinds of primitive in use."""
+        kinds: list[int] = torch.unique(self.kind[self.mask]).tolist()
+        return kinds
+
+    def __getitem__(self: Some, index: int | slice) -> Some:
+        """The element or elements at an index of the first batch dimension."""
+        return type(self)(**{field.name: getattr(self, field.name)[index] for field in fields(self)})
+
+    def __len__(self) -> int:
+        return self.mask.shape[0]
+
+    def __iter__(self: Some) -> Iterator[Some]:
+        return (self[index] for index in range(len(self)))
+
+    def flatten(self: Some) -> Some:
+        """The same with exactly one batch dimension."""
+        lead, count = len(self.batch_shape), self.batch_shape.numel()
+        tensors = {field.name: getattr(self, field.name) for field in fields(self)}
+        return type(self)(**{name: tensor.reshape(count, *tensor.shape[lead:]) for name, tensor in tensors.items()})
+
+    def detach(self: Some) -> Some:
+        """The same without gradient."""
+        return type(self)(**{field.name: getattr(self, field.name).detach() for field in fields(self)})
+
+    def local(self, points: Float[Tensor, "*batch P 3"]) -> Float[Tensor, "*batch P N 3"]:
+        """Positions of points (P, 3) in the local frame of every slot."""
+        offset = points[..., :, None, :] - self.centre[..., None, :, :]
+        return torch.einsum("...nij,...pni->...pnj", self.rotation, offset)
+
+    def at(self, slot: Int[Tensor, "B P"]) -> tuple[Int[Tensor, "B P"], Tensor, Tensor, Tensor]:
+        """Kind, size, centre and rotation of chosen slots of elements (B, N), with gradient to these."""
+        table = torch.cat([self.size, self.centre, self.rotation.flatten(-2)], -1)
+        rows = table.gather(1, slot[..., None].expand(*slot.shape, table.shape[-1]))
+        size, centre, rotation = rows.split([SIZES, 3, 9], -1)
+        return self.kind.gather(-1, slot), size, centre, rotation.unflatten(-1, (3, 3))

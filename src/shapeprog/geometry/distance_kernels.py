@@ -1,0 +1,174 @@
+"""Kernels that find the nearest primitive of a point, and take the gradient of the distance to it."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from shapeprog.geometry.dispatch import bound, distance, slopes
+from shapeprog.kernels.compile import helper, kernel
+from shapeprog.kernels.table import CENTRE, KIND, ROTATION, SIZE, local
+
+ROUNDING = 2e-6
+"""Error of a bound in single precision against the size of the coordinates, generously."""
+
+STRIDE = 2.0
+"""How far in cells from a point its list of possible nearest primitives is used."""
+
+FARTHEST = 1e18
+"""Coordinates in cells up to which bounds are taken in single precision, whose squares end at 3e38."""
+
+
+@helper
+def _boxes(table, first, many, kept, box):
+    """Fill the columns of ``box`` with the primitives that are there; returns how many, and how far they reach.
+
+    Of each: centre, local axes and half extents of the turned box around it.
+    """
+    used, extent = 0, 0.0
+    for slot in range(many):
+        row = first + slot
+        if table[row, KIND] < 0:
+            continue
+        for axis in range(3):
+            box[axis, used] = table[row, CENTRE + axis]
+            for other in range(3):
+                box[3 + 3 * axis + other, used] = table[row, ROTATION + 3 * other + axis]
+        box[12, used], box[13, used], box[14, used] = bound(table, row)
+        for entry in range(3):
+            reach = abs(box[entry, used]) + box[12 + entry, used]
+            extent = max(extent, reach if reach < FARTHEST else np.inf)
+        kept[used] = slot
+        used += 1
+    return used, extent
+
+
+@helper
+def _over(box, axis, count, x, y, z, over):
+    """How far a point is beyond the faces of each box along one of its axes."""
+    for n in range(count):
+        dx, dy, dz = x - box[0, n], y - box[1, n], z - box[2, n]
+        along = box[3 + 3 * axis, n] * dx + box[4 + 3 * axis, n] * dy + box[5 + 3 * axis, n] * dz
+        over[n] = abs(along) - box[12 + axis, n]
+
+
+@helper
+def _bounds(box, count, x, y, z, extent, up, depth, lower):
+    """Lower bounds of the signed distances of a point: those to the turned boxes around the primitives.
+
+    One short loop after another, because the compiler makes vectors of loops over few arrays only; in single
+    precision, lowered by more than its rounding.
+    """
+    slack, zero = np.float32(ROUNDING * (abs(x) + abs(y) + abs(z) + extent)), np.float32(0)
+    x, y, z = np.float32(x), np.float32(y), np.float32(z)
+    _over(box, 0, count, x, y, z, up)
+    _over(box, 1, count, x, y, z, depth)
+    _over(box, 2, count, x, y, z, lower)
+    for n in range(count):
+        u, v, w = up[n], depth[n], lower[n]
+        p, q, r = max(u, zero), max(v, zero), max(w, zero)
+        lower[n] = math.sqrt(p * p + q * q + r * r) + min(max(u, max(v, w)), zero) - slack
+
+
+@helper
+def _best(table, first, kept, lower, count, x, y, z):
+    """The best primitive by its exact distance, looking only at those whose bound is below the best so far."""
+    found, least = 0, lower[0]
+    for n in range(count):
+        value = lower[n]
+        if value < least:
+            least, found = value, n
+    best, start = np.inf, found
+    for turn in range(-1, count):
+        n = start if turn < 0 else turn
+        if (turn >= 0 and n == start) or lower[n] > best:
+            continue
+        a, b, c = local(table, first + kept[n], x, y, z)
+        closer = distance(table, first + kept[n], a, b, c)
+        if closer < best or (closer == best and n < found):
+            best, found = closer, n
+    return best, found
+
+
+@helper
+def _few(all_kept, all_box, lower, used, limit, kept, box):
+    """Keep the boxes whose bound is not above a limit, or no number; returns how many."""
+    number = 0
+    for n in range(used):
+        if not lower[n] > limit:
+            kept[number] = all_kept[n]
+            for entry in range(15):
+                box[entry, number] = all_box[entry, n]
+            number += 1
+    return number
+
+
+@kernel("void(f8[:, ::1], i8, f8[:, ::1], i8, i8[::1], f8[::1], i8, i8)")
+def nearest(table, many, points, count, slots, values, begin, end):
+    """Nearest primitive and signed distance of the union for the points ``begin`` to ``end`` of all scenes.
+
+    Each scene has ``many`` rows of the table and ``count`` points.  The turned box around a primitive bounds its
+    signed distance from below, inside too.  Distances change no faster than points move: a primitive whose bound at
+    one point exceeds the best there by more than twice ``STRIDE`` is not the nearest within ``STRIDE`` of it, so
+    points that come in order, such as cells, look at few primitives.  Where coordinates are too large for bounds, or
+    no numbers, every primitive is looked at.
+    """
+    all_kept, kept = np.empty(many, np.int64), np.empty(many, np.int64)
+    all_box, box = np.empty((15, many), np.float32), np.empty((15, many), np.float32)
+    up, depth, lower = np.empty(many, np.float32), np.empty(many, np.float32), np.empty(many, np.float32)
+    scene, used, number, extent, least = -1, 0, 0, 0.0, 0.0
+    px, py, pz = np.inf, np.inf, np.inf
+    for item in range(begin, end):
+        if item // count != scene:
+            scene, px = item // count, np.inf
+            used, extent = _boxes(table, scene * many, many, all_kept, all_box)
+        if used == 0:
+            slots[item], values[item] = 0, np.inf
+            continue
+        x, y, z = points[item, 0], points[item, 1], points[item, 2]
+        if not abs(x) + abs(y) + abs(z) + extent < FARTHEST:
+            for n in range(used):
+                lower[n] = -np.inf
+            values[item], found = _best(table, scene * many, all_kept, lower, used, x, y, z)
+            slots[item], px = all_kept[found], np.inf
+            continue
+        if (x - px) * (x - px) + (y - py) * (y - py) + (z - pz) * (z - pz) < STRIDE * STRIDE:
+            if number == 0:
+                number = _few(all_kept, all_box, lower, used, least + 2 * STRIDE + 1e-3, kept, box)
+            of, some, those = number, kept, box
+        else:
+            px, py, pz, number = x, y, z, 0
+            of, some, those = used, all_kept, all_box
+        _bounds(those, of, x, y, z, extent, up, depth, lower)
+        best, found = _best(table, scene * many, some, lower, of, x, y, z)
+        slots[item], values[item] = some[found], best
+        if number == 0:
+            least = best
+
+
+@kernel("void(f8[:, ::1], i8, f8[:, ::1], i8, i8[::1], f8[::1], f8[:, ::1], f8[:, ::1], i8, i8)")
+def pull(table, many, points, count, slots, slope, to_table, to_points, begin, end):
+    """Gradient of the distances to known primitives, given the gradient of a loss by each of them.
+
+    ``to_table`` has the rows of the table; the scenes are ``begin`` to ``end``.
+    """
+    part = np.empty(7)
+    for scene in range(begin, end):
+        for item in range(scene * count, (scene + 1) * count):
+            row, weight = scene * many + slots[item], slope[item]
+            if weight == 0:
+                continue
+            a, b, c = local(table, row, points[item, 0], points[item, 1], points[item, 2])
+            slopes(table, row, a, b, c, part)
+            for place in range(4):
+                if place == 3 or table[row, SIZE + place] >= 0:  # lengths below zero count as zero
+                    to_table[row, SIZE + place] += weight * part[3 + place]
+            for axis in range(3):
+                offset = points[item, axis] - table[row, CENTRE + axis]
+                moved = 0.0
+                for other in range(3):
+                    moved += table[row, ROTATION + 3 * axis + other] * part[other]
+                    to_table[row, ROTATION + 3 * axis + other] += weight * offset * part[other]
+                to_table[row, CENTRE + axis] -= weight * moved
+                to_points[item, axis] = weight * moved

@@ -1,0 +1,40 @@
+"""Rows of cells that kernels fill: planes of words (B, R, R * W), the W words of a row side by side.
+
+Positions are in cells from the low corner of the grid, so cell k covers [k, k + 1) and its centre is k + 0.5.
+"""
+
+from __future__ import annotations
+
+from shapeprog.kernels.bits import span
+from shapeprog.kernels.compile import helper
+
+REACH = 1.01
+"""A cell belongs to a cylinder when its centre is within this many radii of the axis, as in the published executor."""
+
+CAP = 1e-3
+"""Slack in cells along the axis of a cylinder, so that a cap through a cell centre takes that cell."""
+
+
+@helper
+def clip(value, high):
+    """A position as a cell boundary within the grid."""
+    return int(min(max(value, 0.0), float(high)))
+
+
+@helper
+def fill_row(planes, plane, i, j, first, last):
+    """Fill the cells ``first`` to ``last - 1`` of one row."""
+    start = j * (planes.shape[2] // planes.shape[1])
+    for word in range(first >> 5, (last + 31) >> 5):
+        planes[plane, i, start + word] |= span(first - 32 * word, last - 32 * word)
+
+
+@helper
+def fill_box(planes, plane, low, high):
+    """Fill the cells from ``low`` to ``high`` (excluded) along the three axes."""
+    words = planes.shape[2] // planes.shape[1]
+    for word in range(low[2] >> 5, (high[2] + 31) >> 5):
+        bits = span(low[2] - 32 * word, high[2] - 32 * word)
+        for i in range(low[0], high[0]):
+            for j in range(low[1], high[1]):
+                planes[plane, i, j * words + word] |= bits

@@ -1,0 +1,259 @@
+"""Every format: it agrees with unrolling where the input lies, is whole or not there, and errors say what to do."""
+
+from __future__ import annotations
+
+import errno
+import importlib
+import inspect
+import json
+import os
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+import shapeprog as sp
+from shapeprog.cli import main
+from shapeprog.data import load
+from shapeprog.data.loading import ARRAY_SUFFIXES
+from shapeprog.errors import InputError, OutputError, ProgramError
+from shapeprog.formats import FORMATS, Format, export, format_of, listed, load_with_frame, suffixes
+from shapeprog.formats.colours import colour
+from shapeprog.formats.frames import frame_comment, frame_in
+from shapeprog.formats.frames import upright as upright_in
+from shapeprog.formats.json_form import result_json
+from shapeprog.formats.parts import crease_normals, parts, solid
+from shapeprog.geometry.primitives.cylinder import mesh as cylinder_mesh
+from shapeprog.language.program import Program
+from shapeprog.language.text import format_program, parse
+from shapeprog.space import Frame, grid_axes
+
+TEXT = """
+top_rectangle(at=(10, 0, 0), thickness=2, half=(12, 9))
+for i in translate(2, by=(0, 0, 14)):
+    for j in translate(2, by=(0, 20, 0)):
+        leg(at=(-12, -11, -8), size=(22, 2, 2))
+line(start=(-6, -10, -8), end=(-6, 9, -8), radius=0.75)
+"""
+ROOT = Path(__file__).parents[1]
+PROGRAM = parse(TEXT)
+FRAME = Frame.around([1, 2, 3], [3, 4, 4.5], grid_axes("+y", "-z"))
+MESHES = [".glb", ".obj", ".ply", ".stl"]
+
+
+def upright(suffix: str) -> Frame:
+    chosen = format_of(f"a{suffix}")
+    assert chosen is not None
+    frame = upright_in(chosen)
+    assert frame is not None
+    return frame
+
+
+@pytest.mark.parametrize("suffix", MESHES)
+@pytest.mark.parametrize("frame", [FRAME, None])
+def test_meshes_agree_with_the_parts(tmp_path: Path, suffix: str, frame: Frame | None):
+    path = export(PROGRAM, tmp_path / f"table{suffix}", frame)
+    read = trimesh.load(path, force="mesh")
+    each = parts(PROGRAM, frame or upright(suffix))
+    stacked = np.concatenate([part.vertices for part in each])
+    np.testing.assert_allclose(read.bounds, [stacked.min(0), stacked.max(0)], atol=1e-5)
+    union = trimesh.Trimesh(*solid(PROGRAM, frame or upright(suffix)))
+    wanted = union.volume if suffix == ".stl" else sum(part.volume for part in each)
+    np.testing.assert_allclose(read.volume, wanted, rtol=1e-5)
+
+
+def test_stl_is_one_watertight_solid_without_inner_walls(tmp_path: Path):
+    read = trimesh.load(export(PROGRAM, tmp_path / "table.stl", FRAME))
+    assert read.is_watertight
+    assert read.body_count == 1
+    overlap = sum(part.volume for part in parts(PROGRAM, FRAME)) - read.volume
+    assert overlap > 0
+
+
+def test_glb_names_and_colours_every_part(tmp_path: Path):
+    scene = trimesh.load(export(PROGRAM, tmp_path / "table.glb", FRAME))
+    names = ["top_rectangle_1", "leg_1", "leg_2", "leg_3", "leg_4", "line_1"]
+    assert sorted(scene.graph.nodes_geometry) == sorted(names)
+    for name, part in zip(names, parts(PROGRAM), strict=True):
+        material = scene.geometry[name].visual.material
+        assert material.name == part.word
+        assert tuple(material.baseColorFactor[:3]) == colour(part.statement)
+
+
+def test_obj_names_parts_and_colours_them_beside(tmp_path: Path):
+    text = export(PROGRAM, tmp_path / "table.obj").read_text()
+    assert [line[2:] for line in text.splitlines() if line.startswith("o ")] == [part.name for part in parts(PROGRAM)]
+    assert "newmtl leg\nKd 0.2667 0.4667 0.6667" in (tmp_path / "table.mtl").read_text()
+
+
+def test_ply_colours_its_vertices(tmp_path: Path):
+    read = trimesh.load(export(PROGRAM, tmp_path / "table.ply"), process=False)
+    assert {tuple(row) for row in read.visual.vertex_colors[:, :3].tolist()} == {colour(1), colour(2), colour(17)}
+
+
+def test_a_program_without_a_frame_stands_upright_for_the_loader(tmp_path: Path):
+    for suffix in (*MESHES, ".binvox"):
+        shape = load(export(PROGRAM, tmp_path / f"table{suffix}"))
+        occupied = np.argwhere(shape.voxels)
+        assert (occupied.max(0) - occupied.min(0) + 1).tolist() == pytest.approx([24, 24, 18], abs=1), suffix
+        assert shape.voxels[26:28].mean() > 4 * shape.voxels[8:20].mean(), f"{suffix}: the top is not on top"
+
+
+def test_text_and_json_come_back_with_their_frame(tmp_path: Path):
+    for suffix in suffixes("program"):
+        assert load_with_frame(export(PROGRAM, tmp_path / f"a{suffix}", FRAME)) == (PROGRAM, FRAME)
+        assert load_with_frame(export(PROGRAM, tmp_path / f"b{suffix}")) == (PROGRAM, None)
+    assert (tmp_path / "b.shape").read_text() == format_program(PROGRAM)
+    assert json.loads(result_json(PROGRAM, FRAME, reason="done"))["reason"] == "done"
+
+
+def test_binvox_lies_where_the_input_lies(tmp_path: Path):
+    from shapeprog.formats.binvox import read_binvox
+
+    cells, corner, cell = read_binvox(export(PROGRAM, tmp_path / "table.binvox", FRAME))
+    low, high = np.argwhere(cells).min(0), np.argwhere(cells).max(0) + 1
+    wanted = np.concatenate([part.vertices for part in parts(PROGRAM.snap(), FRAME)])
+    np.testing.assert_allclose([corner + cell * low, corner + cell * high], [wanted.min(0), wanted.max(0)], atol=1e-5)
+
+
+def test_arrays_hold_everything_and_load_back(tmp_path: Path):
+    path = export(PROGRAM, tmp_path / "table.npz", FRAME)
+    with np.load(path, allow_pickle=False) as arrays:
+        assert arrays["points"].shape == (5000, 3)
+        assert arrays["ids"].tolist() == [[2, 0, 0], [19, 19, 1], [17, 0, 0]]
+        world = FRAME.to_world(arrays["points"])
+        np.testing.assert_allclose(
+            [world.min(0), world.max(0)], trimesh.Trimesh(*solid(PROGRAM, FRAME)).bounds, atol=0.05
+        )
+        voxels = arrays["voxels"]
+    assert (load(path).voxels == voxels).all()
+
+
+@pytest.mark.parametrize("suffix", [s for s in suffixes() if s not in (".step", ".stp")])
+def test_a_full_disk_leaves_the_old_file_and_no_litter(tmp_path: Path, suffix: str, monkeypatch: pytest.MonkeyPatch):
+    path = tmp_path / f"table{suffix}"
+    path.write_text("old")
+
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(os, "replace", full)
+    with pytest.raises(OutputError, match="the disk is full"):
+        export(PROGRAM, path)
+    assert path.read_text() == "old"
+    assert [each.name for each in tmp_path.iterdir()] == [path.name]
+
+
+def test_errors_say_what_to_do(tmp_path: Path):
+    with pytest.raises(OutputError, match=r"did you mean \.glb"):
+        export(PROGRAM, tmp_path / "table.gbl")
+    with pytest.raises(OutputError, match="no suffix"):
+        export(PROGRAM, tmp_path / "table")
+    with pytest.raises(OutputError, match="make the folder first"):
+        export(PROGRAM, tmp_path / "nowhere" / "table.glb")
+    with pytest.raises(OutputError, match="draws nothing"):
+        export(Program(), tmp_path / "table.glb")
+    with pytest.raises(OutputError, match="no solid"):
+        export(parse("leg(at=(0, 0, 0), size=(0, 2, 2))"), tmp_path / "table.stl")
+    with pytest.raises(InputError, match="frame"):
+        frame_in('# frame: {"scale": -1, "centre": [0, 0, 0], "axes": []}')
+    (tmp_path / "cut.json").write_text(result_json(PROGRAM)[:-30])
+    with pytest.raises(ProgramError, match="cut off"):
+        load_with_frame(tmp_path / "cut.json")
+    with pytest.raises(InputError, match=r"\.shape or \.json"):
+        load_with_frame(tmp_path / "table.glb")
+
+
+def test_every_program_file_reads_back_with_its_frame(tmp_path: Path):
+    for suffix in suffixes("program"):
+        path = tmp_path / f"table{suffix}"
+        for frame in (FRAME, None):
+            sp.save(PROGRAM, path, frame)
+            assert sp.load_with_frame(path) == (PROGRAM, frame)
+            assert sp.load(path) == PROGRAM
+    text = tmp_path / "table.txt"
+    text.write_text(TEXT)
+    assert sp.load(text) == PROGRAM
+
+
+def test_files_that_hold_no_program_are_refused_in_words(tmp_path: Path):
+    (tmp_path / "other.json").write_text('{"chair": 4}')
+    with pytest.raises(InputError, match="not in the form 'shapeprog'"):
+        sp.load(tmp_path / "other.json")
+    for name in ("chair.glb", "chair"):
+        with pytest.raises(InputError, match=r"holds no program.*\n.*\.shape or \.json or \.notation"):
+            sp.load(tmp_path / name)
+    with pytest.raises(InputError, match="there is no file"):
+        sp.load(tmp_path / "missing.json")
+    for name in ("chair.glb", "chair.txt", "chair"):
+        with pytest.raises(OutputError, match="could not be read back"):
+            sp.save(PROGRAM, tmp_path / name)
+    assert [each.name for each in tmp_path.iterdir()] == ["other.json"]
+
+
+def test_samples_take_their_options_and_other_formats_refuse_them(tmp_path: Path):
+    assert np.load(export(PROGRAM, tmp_path / "cells.npy", resolution=16)).shape == (16, 16, 16)
+    one, two = (export(PROGRAM, tmp_path / f"{seed}.xyz", FRAME, points=100, seed=seed) for seed in (1, 2))
+    assert np.loadtxt(one).shape == (100, 6)
+    assert (np.loadtxt(one) != np.loadtxt(two)).any()
+    with pytest.raises(OutputError, match=r"\.glb takes no points"):
+        export(PROGRAM, tmp_path / "table.glb", points=100)
+
+
+def test_each_suffix_has_one_declaration_and_every_readable_shape_states_its_axes():
+    every = [suffix for each in FORMATS for suffix in each.suffixes]
+    assert len(every) == len(set(every))
+    assert all(each.axes is None for each in FORMATS if each.kind == "program")
+    assert all(grid_axes(*each.axes).shape == (3, 3) for each in FORMATS if each.axes is not None)
+    stated = {suffix for each in FORMATS if each.axes for suffix in each.suffixes}
+    assert {*ARRAY_SUFFIXES, ".binvox", ".glb", ".gltf", ".obj", ".off", ".ply", ".stl"} <= stated
+
+
+@pytest.mark.parametrize("each", FORMATS, ids=lambda each: each.name)
+def test_the_functions_that_a_declaration_names_are_there_and_take_its_options(each: Format):
+    for place, first in ((each.reader, ["path"]), (each.writer, ["program", "path", "frame"])):
+        if place:
+            module, _, name = place.partition(":")
+            function = getattr(importlib.import_module(f"shapeprog.formats.{module}"), name)
+            options = each.options if place == each.writer else ()
+            assert list(inspect.signature(function).parameters) == [*first, *options]
+
+
+def test_help_readme_and_errors_list_the_declared_formats(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    helped = {}
+    for command in ("export", "render"):
+        with pytest.raises(SystemExit):
+            main([command, "--help"])
+        helped[command] = " ".join(capsys.readouterr().out.replace("│", " ").split())
+    assert " ".join(suffixes()) in helped["export"]
+    assert " ".join(suffixes("sample")) in helped["render"]
+    assert listed() in readme
+    assert listed().splitlines()[0] in str(sp.export.__doc__)
+    with pytest.raises(OutputError, match=re.escape(", ".join(suffixes()))):
+        export(PROGRAM, tmp_path / "table.unheard")
+
+
+def test_step_without_its_library_names_the_extra(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
+    with pytest.raises(OutputError, match=r"shapeprog\[step\]"):
+        export(PROGRAM, tmp_path / "table.step")
+
+
+def test_frames_survive_as_a_comment():
+    assert frame_in(frame_comment(FRAME) + TEXT) == FRAME
+    assert parse(frame_comment(FRAME) + TEXT) == PROGRAM
+    assert frame_in(TEXT) is None
+
+
+def test_creases_are_sharp_and_rounds_are_smooth():
+    vertices, faces = cylinder_mesh(np.array([2.0, 3.0, 0, 0]))
+    normals = crease_normals(vertices, faces)
+    np.testing.assert_allclose(np.linalg.norm(normals, axis=-1), 1, atol=1e-12)
+    corners = vertices[faces]
+    side = np.abs(normals[..., 0]) < 0.5
+    radial = corners[side][:, 1:] / np.linalg.norm(corners[side][:, 1:], axis=1, keepdims=True)
+    np.testing.assert_allclose(normals[side][:, 1:], radial, atol=0.03)
+    np.testing.assert_allclose(np.abs(normals[~side][:, 0]), 1, atol=1e-12)

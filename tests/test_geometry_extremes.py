@@ -1,0 +1,74 @@
+"""No number that fits into float32 makes a kernel read or write beside its arrays, and large ones are not too large."""
+
+import pytest
+import torch
+from geometry_helpers import NAMES, make_scene, random_scene, require, with_leaves
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+
+from shapeprog.errors import ShapeProgError
+from shapeprog.geometry.cells import rasterise
+from shapeprog.geometry.distance import each_distance, nearest_slot, signed_distance, union_distance
+from shapeprog.geometry.nearest import nearest, squared_distance
+from shapeprog.geometry.surface import sample_surface
+
+ANY = st.floats(width=32)
+ODD = [1e19, -1e19, 3e38, -3e38, 1e-38, 0.0, float("nan"), float("inf"), -float("inf")]
+
+
+def seeded(numbers):
+    """A scene and points of which some numbers are replaced by those given."""
+    scene = random_scene(0, lead=(2,), slots=6)
+    generator = torch.Generator().manual_seed(len(numbers))
+    points = torch.rand(2, 40, 3, generator=generator) * 20 - 10
+    size, centre, rotation = scene.size.clone(), scene.centre.clone(), scene.rotation.clone()
+    for number in numbers:
+        for tensor in (size, centre, rotation, points):
+            if torch.rand((), generator=generator) < 0.5:
+                place = int(torch.randint(tensor.numel(), (), generator=generator))
+                tensor.view(-1)[place] = number
+    return require(scene, size=size, centre=centre, rotation=rotation), points
+
+
+@settings(max_examples=40)
+@given(st.lists(ANY | st.sampled_from(ODD), min_size=1, max_size=12))
+@example([1e19] * 12)
+@example([float("nan")] * 12)
+@example(ODD)
+def test_every_kernel_takes_every_number(numbers):
+    scene, points = seeded(numbers)
+    scene, leaves = with_leaves(scene)
+    points.requires_grad_()
+    distance = signed_distance(scene, points)
+    assert distance.shape == (2, 40)
+    torch.autograd.grad(distance.nan_to_num(0, 0, 0).sum(), [*leaves, points])
+    slots = nearest_slot(scene, points)
+    assert ((slots >= 0) & (slots < 6)).all()
+    assert rasterise(scene).shape == (2, 32, 32)
+    assert rasterise(scene, 40).shape == (2, 40, 80)
+    try:
+        sample = sample_surface(scene, 20)
+        torch.autograd.grad(sample.points.sum() + sample.weights.sum(), leaves)
+    except ShapeProgError:  # such as a surface without end
+        pass
+    cloud = scene.centre
+    index = nearest(points, cloud)
+    assert ((index >= 0) & (index < 6)).all()
+    torch.autograd.grad(squared_distance(points, cloud).nan_to_num(0, 0, 0).sum(), [points])
+
+
+@pytest.mark.parametrize("far", [1e17, 1e19, 1e25, 1e30])
+def test_distances_far_away_are_those_of_all_pairs(far):
+    scene = random_scene(2, lead=(2,), slots=6, dtype=torch.float64)
+    points = torch.randn(2, 50, 3, dtype=torch.float64, generator=torch.Generator().manual_seed(0)) * far
+    points[:, ::2] /= far / 5
+    expected = each_distance(scene, points).min(-1).values
+    torch.testing.assert_close(union_distance(scene, points), expected, rtol=1e-6, atol=1e-9)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_solids_far_apart_find_the_nearer_one(name):
+    scene = make_scene([name] * 2, [[1e20, 1e20, 1e20]] * 2, [[0.0, 0, 0], [4e20, 0, 0]], dtype=torch.float64)
+    points = torch.tensor([[-3e20, 0, 0], [6e20, 0, 0], [1.5e20, 0, 0]], dtype=torch.float64)
+    assert nearest_slot(scene, points).tolist() == [0, 1, 0]
+    torch.testing.assert_close(union_distance(scene, points) / 1e20, torch.tensor([2.0, 1, 0.5], dtype=torch.float64))

@@ -141,12 +141,12 @@ def infer_command(
 def _prepare(picture: bool, talk: bool) -> None:
     """Make the kernels ready that all inference needs, and say so where that takes a while."""
     from shapeprog.kernels.compile import prepare
-    from shapeprog.kernels.modules import INFERENCE, PICTURES, READING
+    from shapeprog.kernels.modules import GEOMETRY, PICTURES, READING, SEARCH
 
     def tell(sentence: str) -> None:
         terminal.errors().print(f"{sentence.capitalize()}.", style="dim", markup=False)
 
-    prepare([*READING, *(PICTURES if picture else ()), *INFERENCE], tell if talk else None)
+    prepare([*SEARCH, *READING, *(PICTURES if picture else ()), *GEOMETRY], tell if talk else None)
 
 
 def _chosen(weights: str, proposals: int, no_search: bool) -> Inference:

@@ -23,8 +23,10 @@ import inspect
 import subprocess
 import sys
 import threading
+import time
+from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from hashlib import sha256
 from types import CodeType, FunctionType
 from typing import Any
@@ -33,12 +35,6 @@ Function = Callable[..., Any]
 
 OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 """Kernels run without the interpreter's lock, and divide as numpy does, without a check before each division."""
-
-APART = 3
-"""Kernels to compile from which a second process takes a share of them."""
-
-SECONDS_PER_BYTE = 5e-4
-"""About how long compiling takes for each byte of the instructions of a function."""
 
 _lock = threading.RLock()
 _helpers: dict[Function, dict[str, Any]] = {}
@@ -116,10 +112,6 @@ class Kernel:
                     self._compiled = dispatcher
             return self._compiled is not None
 
-    def weights(self) -> dict[CodeType, int]:
-        """Bytes of instructions of its function and of each helper it reaches; compiling takes about as long."""
-        return {code: len(code.co_code) for code, _ in _reached(self.function)}
-
     def _dispatcher(self) -> Any:
         numba: Any = importlib.import_module("numba")
         _declare_helpers()
@@ -137,7 +129,8 @@ class Kernel:
 def prepare(modules: Sequence[str], tell: Callable[[str], None] | None = None) -> None:
     """Make all kernels of some modules ready, so that nobody waits for them later.
 
-    What the cache lacks is compiled by two processes at once.
+    What the cache lacks is compiled by two processes at once: the other one takes kernels from the front, this one
+    from the back, so name first what is quickly imported and last what is not.
 
     Parameters
     ----------
@@ -146,48 +139,72 @@ def prepare(modules: Sequence[str], tell: Callable[[str], None] | None = None) -
     tell
         Called with a sentence before anything is compiled, which takes seconds.
     """
-    wanted = set(modules)
-    for name in modules:
-        importlib.import_module(name)
-    lacking = [each for each in list(_kernels.values()) if each.function.__module__ in wanted and not each.load()]
-    if not lacking:
-        return
-    shares, heaviest = _shares(lacking, 2 if len(lacking) >= APART else 1)
-    if tell:
-        seconds = max(1, round(heaviest * SECONDS_PER_BYTE))
-        tell(f"compiling {len(lacking)} kernels for this machine, which is done once and takes about {seconds} s")
-    process = None
-    if len(shares) > 1:
-        command = [sys.executable, "-m", "shapeprog.kernels.compile", *(each.name for each in shares[1])]
-        process = subprocess.Popen(
-            command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
-        )  # fmt: skip
+    lacking: list[Kernel] = []
+    second: _Second | None = None
     try:
-        for each in shares[0]:
-            each.compile()
-        if process is not None:
-            process.wait()
+        for name in modules:
+            importlib.import_module(name)
+            for each in list(_kernels.values()):
+                if each.function.__module__ == name and not each.load():
+                    if second is None:
+                        if tell:
+                            tell("compiling kernels for this machine, once; this may take half a minute")
+                        second = _Second()
+                    lacking.append(each)
+                    second.waiting.append(each.name)
+        while second and second.waiting:
+            with suppress(IndexError):  # the other process took the last one
+                _kernels[second.waiting.pop()].compile()
     finally:
-        if process is not None and process.poll() is None:
-            process.kill()
-            process.wait()
+        if second:
+            second.finish(wait=sys.exc_info()[0] is None)
     for each in lacking:  # from the cache now; compiled here should the other process have failed
         each.compile()
 
 
-def _shares(kernels: Sequence[Kernel], number: int) -> tuple[list[list[Kernel]], int]:
-    """Kernels in shares that take about as long, and the weight of the heaviest.
+class _Second:
+    """A second process that compiles kernels into the cache: it asks for one name after another."""
 
-    A helper is compiled once for all kernels of a share, so kernels with the same helpers tend to stay together.
-    """
-    shares: list[list[Kernel]] = [[] for _ in range(number)]
-    compiled: list[dict[CodeType, int]] = [{} for _ in range(number)]
-    for each in sorted(kernels, key=lambda one: -sum(one.weights().values())):
-        weights = each.weights()
-        least = min(range(number), key=lambda k: sum((compiled[k] | weights).values()))
-        shares[least].append(each)
-        compiled[least] |= weights
-    return shares, max(sum(each.values()) for each in compiled)
+    def __init__(self) -> None:
+        self.waiting: deque[str] = deque()
+        self._complete = False
+        command = [sys.executable, "-m", "shapeprog.kernels.compile"]
+        pipe, nothing = subprocess.PIPE, subprocess.DEVNULL
+        self._process = subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=nothing, text=True)
+        self._thread = threading.Thread(target=self._serve, daemon=True)
+        self._thread.start()
+
+    def _serve(self) -> None:
+        asked, answers = self._process.stdout, self._process.stdin
+        assert asked is not None
+        assert answers is not None
+        with suppress(OSError), asked, answers:  # should it fail, its kernels are compiled here
+            while asked.readline():
+                name = self._next()
+                if not name:
+                    break
+                answers.write(f"{name}\n")
+                answers.flush()
+
+    def _next(self) -> str:
+        """The next name, once there is one; none at the end."""
+        while True:
+            with suppress(IndexError):
+                return self.waiting.popleft()
+            if self._complete:
+                return ""
+            time.sleep(0.01)
+
+    def finish(self, wait: bool) -> None:
+        """Tell it that no more will come, and wait for what it is at, or end it."""
+        self._complete = True
+        try:
+            if wait:
+                self._process.wait()
+        finally:
+            self._process.kill()
+            self._process.wait()
+            self._thread.join()
 
 
 def _declare_helpers() -> None:
@@ -236,14 +253,18 @@ def _without_collector() -> Iterator[None]:
             gc.enable()
 
 
-def _main(names: Sequence[str]) -> None:
-    """The second process: compile some kernels into the cache."""
+def _main() -> None:
+    """The second process: ask for the names of kernels and compile them into the cache."""
     from shapeprog.kernels import compile as room  # not the copy of this module that runs as a script
 
-    for name in names:
+    while True:
+        print("next", flush=True)
+        name = sys.stdin.readline().strip()
+        if not name:
+            return
         importlib.import_module(name.partition(":")[0])
         room._kernels[name].compile()
 
 
 if __name__ == "__main__":
-    _main(sys.argv[1:])
+    _main()

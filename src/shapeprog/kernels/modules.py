@@ -5,26 +5,28 @@ They are named, not imported: kernels are the lowest room.
 
 from __future__ import annotations
 
-GEOMETRY = (
-    "shapeprog.geometry.distance_kernels",
-    "shapeprog.geometry.surface_kernels",
-    "shapeprog.geometry.cell_kernels",
-    "shapeprog.geometry.neighbour_kernels",
-)
-"""Distances, samples, cells and neighbours of scenes."""
-
-INFERENCE = (
-    *GEOMETRY,
-    "shapeprog.inference.chance_kernels",
-    "shapeprog.inference.raster_kernels",
-    "shapeprog.inference.descent_kernels",
-    "shapeprog.inference.form_kernels",
-    "shapeprog.inference.proposal_kernels",
-)
-"""Search and refinement of a program."""
-
 READING = ("shapeprog.data.voxelise_kernels",)
 """Meshes and points into cells."""
 
 PICTURES = ("shapeprog.view.raster_kernels",)
 """Pictures of shapes and programs."""
+
+SEARCH = (
+    "shapeprog.inference.proposal_kernels",
+    "shapeprog.inference.raster_kernels",
+    "shapeprog.inference.descent_kernels",
+    "shapeprog.inference.form_kernels",
+    "shapeprog.inference.chance_kernels",
+)
+"""Structure search."""
+
+GEOMETRY = (
+    "shapeprog.geometry.neighbour_kernels",
+    "shapeprog.geometry.distance_kernels",
+    "shapeprog.geometry.surface_kernels",
+    "shapeprog.geometry.cell_kernels",
+)
+"""Distances, samples, cells and neighbours of scenes; they import torch."""
+
+INFERENCE = (*SEARCH, *GEOMETRY)
+"""Search and refinement of a program."""

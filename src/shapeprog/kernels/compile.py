@@ -258,7 +258,8 @@ def _main() -> None:
     from shapeprog.kernels import compile as room  # not the copy of this module that runs as a script
 
     while True:
-        print("next", flush=True)
+        sys.stdout.write("next\n")
+        sys.stdout.flush()
         name = sys.stdin.readline().strip()
         if not name:
             return

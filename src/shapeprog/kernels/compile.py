@@ -13,6 +13,9 @@ A *kernel* is called from Python and has the one signature it declares, so nothi
 other types is an error.  A *helper* is a plain Python function that kernels call.  Neither needs numba to be imported:
 it is loaded when the first kernel is called.  Compiled kernels are kept in numba's cache; a kernel counts as changed
 when its own code, that of any helper it reaches, or a constant that these read has changed, in whatever file.
+
+What makes compiling slow: numba compiles a helper on its own and again within each kernel, and does so twice when both
+a kernel and a helper call it.  So share a large helper among few kernels, and call it from one level.
 """
 
 from __future__ import annotations
@@ -141,6 +144,7 @@ def prepare(modules: Sequence[str], tell: Callable[[str], None] | None = None) -
     """
     lacking: list[Kernel] = []
     second: _Second | None = None
+    done = False
     try:
         for name in modules:
             importlib.import_module(name)
@@ -155,9 +159,10 @@ def prepare(modules: Sequence[str], tell: Callable[[str], None] | None = None) -
         while second and second.waiting:
             with suppress(IndexError):  # the other process took the last one
                 _kernels[second.waiting.pop()].compile()
+        done = True
     finally:
         if second:
-            second.finish(wait=sys.exc_info()[0] is None)
+            second.finish(wait=done)
     for each in lacking:  # from the cache now; compiled here should the other process have failed
         each.compile()
 
@@ -237,7 +242,8 @@ def _digest(function: Function, compiler: str) -> str:
     found = sha256(compiler.encode())
     for code, values in _reached(function):
         read = sorted((name, repr(value)) for name, value in values.items() if isinstance(value, (int, float, str)))
-        found.update(repr((code.co_name, code.co_code, code.co_consts, code.co_names, read)).encode())
+        constants = [value.co_code if isinstance(value, CodeType) else value for value in code.co_consts]
+        found.update(repr((code.co_name, code.co_code, constants, code.co_names, read)).encode())
     return found.hexdigest()
 
 

@@ -25,8 +25,8 @@ from shapeprog.inference.block_layout import (
     WIDTH,
 )
 from shapeprog.inference.blocks import to_program
-from shapeprog.inference.descent_kernels import gains, layers
-from shapeprog.inference.raster_kernels import ROWS, draw_all, draw_block, iou_rows
+from shapeprog.inference.descent_kernels import layers
+from shapeprog.inference.drawing import cells_shared, draw_all, draw_each, places
 from shapeprog.language.unroll import unroll
 
 
@@ -46,8 +46,8 @@ def random_block(form, random):
     if form in (LINE, CROSS) and random.random() < 0.5:
         block[ROTATE] = random.integers(1, 7)
         return block
-    for count, shift in ((COUNT1, SHIFT1), (COUNT2, SHIFT2)):
-        block[count] = random.integers(1, 4)
+    for slot, shift in ((COUNT1, SHIFT1), (COUNT2, SHIFT2)):
+        block[slot] = random.integers(1, 4)
         block[shift : shift + 3] = random.integers(-7, 8, 3)
     return block
 
@@ -73,25 +73,20 @@ def test_names_change_no_cell():
         assert np.array_equal(draw_all(blocks), rows_of(to_program(blocks)))
 
 
-def test_gains_count_the_cells_that_a_block_covers():
+def test_the_cells_that_blocks_cover_are_counted_and_lie_within_their_layers():
     random = np.random.default_rng(1)
-    occupied, others = random.random((2, 32, 32, 32)) < 0.5
-    gained, wasted = words_of(pack(occupied & ~others)).reshape(-1), words_of(pack(~occupied & ~others)).reshape(-1)
-    scratch = random.integers(0, 2**32, ROWS, dtype=np.uint32)
-    for form in range(5):
-        block = random_block(form, random)
-        rows = np.zeros(ROWS, np.uint32)
-        draw_block(rows, block)
+    first, second = random.random((2, 32, 32, 32)) < 0.5
+    blocks = np.stack([random_block(form, random) for form in range(5)])
+    drawn = draw_each(blocks)
+    counts = cells_shared(drawn, words_of(pack(first)).reshape(-1), words_of(pack(second)).reshape(-1))
+    for rows, block, (one, other) in zip(drawn, blocks, counts, strict=True):
         cells = voxels(unroll(to_program(block[None]))).numpy().astype(bool)
-        first, last = layers(block)
-        assert not cells[:first].any()
-        assert not cells[last:].any()
-        assert gains(scratch, block, gained, wasted) == (
-            (cells & occupied & ~others).sum(), (cells & ~occupied & ~others).sum(),
-        )  # fmt: skip
-        assert (
-            iou_rows(rows, words_of(pack(occupied)).reshape(-1)) == (cells & occupied).sum() / (cells | occupied).sum()
-        )
+        low, high = layers(block)
+        assert not cells[:low].any()
+        assert not cells[high:].any()
+        assert (one, other) == ((cells & first).sum(), (cells & second).sum())
+        assert np.array_equal(places(rows), np.argwhere(cells) - 16)
+    assert np.array_equal(draw_all(blocks), np.bitwise_or.reduce(drawn))
 
 
 def box(low, size, *loops):

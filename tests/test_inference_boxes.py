@@ -8,13 +8,19 @@ import numpy as np
 import pytest
 
 from shapeprog.geometry.cells import voxels as voxels_of
-from shapeprog.inference.box_kernels import heaviest_box
+from shapeprog.inference.box_kernels import heaviest
 from shapeprog.inference.families import MIRROR, families
-from shapeprog.inference.fold_kernels import mirrors, search_family
+from shapeprog.inference.fold_kernels import VOLUMES, mirrors, search_family
 from shapeprog.inference.greedy import greedy_boxes
 from shapeprog.language.unroll import unroll
 
 ANY = 1 << 20
+
+
+def heaviest_box(weights, limit0, limit1, floor):
+    """The compiled search, its sum and its box."""
+    box = np.zeros(6, np.int64)
+    return heaviest(weights.reshape(-1), *weights.shape, limit0, limit1, floor, box), box
 
 
 def all_boxes(shape):
@@ -61,7 +67,9 @@ def test_folding_finds_what_searching_all_explicit_copies_finds():
     table = families(weights.shape, 2, 3)
     assert len(table) > 20
     for family in table:
-        best, found = search_family(weights, family, 0.0)
+        volumes, found = np.zeros((VOLUMES, weights.size), np.float32), np.zeros(12, np.int64)
+        volumes[0] = weights.reshape(-1)
+        best = search_family(volumes, *weights.shape, family, 0.0, found)
         assert best == repeated_by_hand(weights, family), family
         if best > 0:
             covered = np.zeros(weights.shape, np.int64)

@@ -18,10 +18,11 @@ from shapeprog.geometry.cells import pack, rasterise, words_of
 from shapeprog.inference import Schedule, Settings, infer, proposing, snapped_from
 from shapeprog.inference.blocks import to_program
 from shapeprog.inference.chance_kernels import start
+from shapeprog.inference.drawing import draw_all
 from shapeprog.inference.editing import Plan, recreate, value_of
 from shapeprog.inference.pool import Pool
 from shapeprog.inference.proposing import propose_program, ready_generator, single_pass
-from shapeprog.inference.raster_kernels import ROWS, draw_all
+from shapeprog.inference.raster_kernels import ROWS
 from shapeprog.inference.reading import from_program
 from shapeprog.inference.structure import Proposals, search_structure
 from shapeprog.language.parameters import Length, Position

@@ -9,9 +9,9 @@ from shapeprog.geometry.cells import pack, words_of
 from shapeprog.geometry.cells import voxels as voxels_of
 from shapeprog.inference import editing
 from shapeprog.inference.blocks import to_program
-from shapeprog.inference.descent_kernels import improve_block, moves, statements, valid
+from shapeprog.inference.descent_kernels import moves, statements, valid
+from shapeprog.inference.drawing import draw_all
 from shapeprog.inference.families import families
-from shapeprog.inference.raster_kernels import draw_all, iou_rows
 from shapeprog.inference.structure import MOST_COPIES, PLANES, Settings, search_structure
 from shapeprog.language.text import parse
 from shapeprog.language.unroll import unroll
@@ -117,9 +117,9 @@ def test_descent_polish_and_rounds_never_lower_the_objective(seed):
     aim = target(solid)
     blocks = noisy_blocks(solid, seed)
     others = draw_all(blocks[1:])
-    better, value = improve_block(blocks[0], aim.occupied, others, aim.price, 2)
-    before = iou_rows(others | draw_all(blocks[:1]), aim.occupied) - aim.price * statements(blocks[0])
-    after = iou_rows(others | draw_all(better[None]), aim.occupied) - aim.price * statements(better)
+    better, value = editing.improve_block(blocks[0], aim.occupied, others, aim.price, 2)
+    before = editing.iou(blocks, aim) - aim.price * statements(blocks[0])
+    after = editing.iou(np.concatenate([better[None], blocks[1:]]), aim) - aim.price * statements(better)
     assert value == pytest.approx(after, abs=1e-12)
     assert after >= before
     polished = editing.polish(blocks, aim, 1, 3)

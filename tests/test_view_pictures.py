@@ -49,7 +49,8 @@ def test_the_nearest_face_shows_as_in_a_slow_twin():
     generator = np.random.default_rng(0)
     points = generator.uniform([-4, -4, 0.1], [36, 28, 1], (60, 3))
     faces = generator.permutation(60).reshape(20, 3)
-    face, depth = kernels.nearest_faces(points, faces, 32, 24, 1e-6)
+    face, depth = np.full((24, 32), kernels.BACKGROUND, np.int32), np.zeros((24, 32))
+    kernels.nearest_faces(points, faces, 1e-6, face, depth)
     best, wanted = np.full((24, 32), -1), np.zeros((24, 32))
     centre = np.stack(np.meshgrid(np.arange(32) + 0.5, np.arange(24) + 0.5), -1)
     for number, (a, b, c) in enumerate(points[faces]):

@@ -71,8 +71,9 @@ def infer_command(
     from shapeprog.data import load_all
     from shapeprog.files import make_folder
 
-    terminal.load_modules(modules)
     terminal.check_axes(up, front)
+    _prepare(picture=not no_picture, talk=not (quiet or as_json))
+    terminal.load_modules(modules)
     infer_one = _baseline if baseline else _chosen(weights, proposals, no_search)
     folder = make_folder(out)
     failures: list[tuple[Path, ShapeProgError]] = []
@@ -135,6 +136,17 @@ def infer_command(
         raise typer.Exit(1 if written else terminal.MISTAKE)
     if not written:
         raise InputError("there was nothing to infer from", "name files or folders that hold shapes")
+
+
+def _prepare(picture: bool, talk: bool) -> None:
+    """Make the kernels ready that all inference needs, and say so where that takes a while."""
+    from shapeprog.kernels.compile import prepare
+    from shapeprog.kernels.modules import GEOMETRY, PICTURES, READING, SEARCH
+
+    def tell(sentence: str) -> None:
+        terminal.errors().print(f"{sentence.capitalize()}.", style="dim", markup=False)
+
+    prepare([*SEARCH, *READING, *(PICTURES if picture else ()), *GEOMETRY], tell if talk else None)
 
 
 def _chosen(weights: str, proposals: int, no_search: bool) -> Inference:

@@ -138,12 +138,12 @@ def _open(path: Path, up: str | None, front: str | None, points: int, seed: int)
             return _Held([name], lambda _: grid)
         if suffix in ARRAY_SUFFIXES:
             return _open_array(path, name, axes, points, seed)
-        if suffix not in readable_suffixes():
+        from shapeprog.data.meshes import COMMON, read_mesh
+
+        if suffix.removeprefix(".") not in COMMON and suffix not in readable_suffixes():
             known = ", ".join(sorted(readable_suffixes()))
             ending = f"that end in {suffix!r}" if suffix else "without a suffix"
             raise InputError(f"{path.name}: no shapes are read from files {ending}", f"known: {known}")
-        from shapeprog.data.meshes import read_mesh
-
         vertices, faces = read_mesh(path)
     except OSError as error:
         raise InputError(f"{path} cannot be read: {error.strerror or error}", "check its permissions") from error

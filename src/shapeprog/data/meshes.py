@@ -15,7 +15,9 @@ from shapeprog.space import Array
 
 _NO_MESH = {"bz2", "dict", "dict64", "dxf", "json", "msgpack", "stl_ascii", "svg", "tar.bz2", "tar.gz", "xyz", "zip"}
 _OFF_COUNTS = re.compile(rb"^\s*(?:C?N?OFF)?\s*(\d+)\s+(\d+)\s+\d+", re.MULTILINE)
-_COMMON = ("obj", "off", "ply", "stl", "glb", "gltf")
+COMMON = ("obj", "off", "ply", "stl", "glb", "gltf")
+"""Suffixes of mesh files that are read without asking trimesh whether it can, which takes it a while to say."""
+
 _TEXTS = ("obj", "off")
 _LAST_LINE = re.compile(rb"(?:^|\n)(v|f)[ \t]([^\n]*)$")
 
@@ -24,7 +26,7 @@ def mesh_formats() -> set[str]:
     """Suffixes, without the dot, of the mesh files that can be read: the common ones and what trimesh reads besides."""
     import trimesh
 
-    return (set(trimesh.available_formats()) | set(_COMMON)) - _NO_MESH
+    return (set(trimesh.available_formats()) | set(COMMON)) - _NO_MESH
 
 
 def read_mesh(path: Path) -> tuple[Array, Array]:

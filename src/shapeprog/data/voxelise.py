@@ -133,8 +133,10 @@ def _carve(barrier: BoolArray, hole: int, start: int, stride: int, cells: BoolAr
     """Mark the cells that none of the six views along the axes can see (Nooruddin & Turk 2003, ray stabbing)."""
     from shapeprog.data.voxelise_kernels import first_hits, mark_hidden
 
-    views = [first_hits(barrier, axis, reverse, hole) for axis in range(3) for reverse in (False, True)]
-    mark_hidden(np.stack(views), start, stride, cells)
+    views, scratch = np.empty((6, *barrier.shape[:2]), np.int64), np.empty(barrier.shape[:2], np.int64)
+    for side in range(6):
+        first_hits(barrier, side // 2, bool(side % 2), hole, scratch, views[side])
+    mark_hidden(views, start, stride, cells)
 
 
 def _mark_boundary_sheets(triangles: Array, cells: BoolArray) -> None:

@@ -1,23 +1,29 @@
-"""Compiled loops of :mod:`shapeprog.data.voxelise`: triangles into cells, and views from six sides.
-
-Each is compiled on its own: kernels that call each other are compiled again for every call.
+"""Kernels of :mod:`shapeprog.data.voxelise`: triangles into cells, and views from six sides.
 
 Coordinates are in cells with the origin at the corner of the grid, so cell ``k`` covers ``[k, k + 1]``.
 """
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-import numpy.typing as npt
-from numba import njit
 
-Array = npt.NDArray[Any]
+from shapeprog.kernels.compile import helper, kernel
 
 
-@njit(cache=True, nogil=True)
-def mark_triangles(triangles: Array, half: float, cells: Array) -> None:
+@helper
+def least_of(a, b, c):
+    """The least of three."""
+    return min(min(a, b), c)
+
+
+@helper
+def most_of(a, b, c):
+    """The largest of three."""
+    return max(max(a, b), c)
+
+
+@kernel("void(f8[:, :, ::1], f8, b1[:, :, ::1])")
+def mark_triangles(triangles, half, cells):
     """Mark every cell whose box of half side ``half`` about its centre meets a triangle.
 
     Separating axes (Akenine-Moller 2001): three box faces, the triangle's plane and nine edge products; the projections
@@ -26,11 +32,11 @@ def mark_triangles(triangles: Array, half: float, cells: Array) -> None:
     Parameters
     ----------
     triangles
-        Corners (F, 3 corners, 3), float64.
+        Corners (F, 3 corners, 3).
     half
         0.5 is the closed cell; a little less leaves out what merely touches its boundary.
     cells
-        Output (R, R, R) of booleans, only ever set.
+        Output (R, R, R), only ever set.
     """
     size = cells.shape[0]
     low = np.empty(3, np.int64)
@@ -43,8 +49,8 @@ def mark_triangles(triangles: Array, half: float, cells: Array) -> None:
         corner = triangles[face]
         empty = False
         for axis in range(3):
-            smallest = min(corner[0, axis], corner[1, axis], corner[2, axis])
-            largest = max(corner[0, axis], corner[1, axis], corner[2, axis])
+            smallest = least_of(corner[0, axis], corner[1, axis], corner[2, axis])
+            largest = most_of(corner[0, axis], corner[1, axis], corner[2, axis])
             low[axis] = max(int(np.ceil(smallest - half - 0.5)), 0)
             high[axis] = min(int(np.floor(largest + half - 0.5)), size - 1)
             empty |= low[axis] > high[axis]
@@ -68,8 +74,8 @@ def mark_triangles(triangles: Array, half: float, cells: Array) -> None:
                 b = edge[side, second] * corner[1, third] - edge[side, third] * corner[1, second]
                 c = edge[side, second] * corner[2, third] - edge[side, third] * corner[2, second]
                 radius = half * (abs(edge[side, second]) + abs(edge[side, third]))
-                least[3 * side + axis] = min(a, b, c) - radius
-                most[3 * side + axis] = max(a, b, c) + radius
+                least[3 * side + axis] = least_of(a, b, c) - radius
+                most[3 * side + axis] = most_of(a, b, c) + radius
         for i in range(low[0], high[0] + 1):
             x = i + 0.5
             for j in range(low[1], high[1] + 1):
@@ -97,9 +103,9 @@ def mark_triangles(triangles: Array, half: float, cells: Array) -> None:
                         cells[i, j, k] = True
 
 
-@njit(cache=True, nogil=True)
-def first_hits(barrier: Array, axis: int, reverse: bool, hole: int) -> Array:
-    """Depth (N, N) at which rays along ``axis`` first meet the barrier, with small holes closed.
+@kernel("void(b1[:, :, ::1], i8, b1, i8, i8[:, ::1], i8[:, ::1])")
+def first_hits(barrier, axis, reverse, hole, depth, closed):
+    """Depth at which rays along ``axis`` first meet the barrier, with small holes closed.
 
     A ray that passes where the rays around it, within ``hole`` lines on all four sides, are stopped earlier, is stopped
     as late as the latest of those four: a missing triangle lets nothing through, while a slot, open along one
@@ -113,11 +119,15 @@ def first_hits(barrier: Array, axis: int, reverse: bool, hole: int) -> Array:
         Direction of the rays; the other two axes index the result in rising order.
     hole
         Widest hole, in cells of the barrier, that is closed.
+    depth
+        Scratch (N, N).
+    closed
+        Output (N, N).
     """
     size = barrier.shape[0]
-    depth = np.full((size, size), size, np.int64)
     for i in range(size):
         for j in range(size):
+            depth[i, j] = size
             for step in range(size):
                 k = size - 1 - step if reverse else step
                 if axis == 0:
@@ -129,23 +139,22 @@ def first_hits(barrier: Array, axis: int, reverse: bool, hole: int) -> Array:
                 if stopped:
                     depth[i, j] = step
                     break
-    closed = depth.copy()
     for i in range(size):
         for j in range(size):
             latest = 0
-            for di, dj in ((-1, 0), (1, 0), (0, -1), (0, 1)):
+            for side in range(4):
+                along, across = (2 * side - 1, 0) if side < 2 else (0, 2 * side - 5)
                 nearest = size
                 for step in range(1, hole + 1):
-                    a, b = i + di * step, j + dj * step
+                    a, b = i + along * step, j + across * step
                     if 0 <= a < size and 0 <= b < size:
                         nearest = min(nearest, depth[a, b])
                 latest = max(latest, nearest)
             closed[i, j] = min(depth[i, j], latest)
-    return closed
 
 
-@njit(cache=True, nogil=True)
-def mark_hidden(depths: Array, start: int, stride: int, cells: Array) -> None:
+@kernel("void(i8[:, :, ::1], i8, i8, b1[:, :, ::1])")
+def mark_hidden(depths, start, stride, cells):
     """Mark the cells that no view sees: those behind the first hit of every one of six.
 
     Parameters
@@ -155,7 +164,7 @@ def mark_hidden(depths: Array, start: int, stride: int, cells: Array) -> None:
     start, stride
         Cell ``k`` of the output is cell ``start + stride * k`` of the lattice of the hits.
     cells
-        Output (R, R, R) of booleans, only ever set.
+        Output (R, R, R), only ever set.
     """
     size, last = cells.shape[0], depths.shape[1] - 1
     for i in range(size):

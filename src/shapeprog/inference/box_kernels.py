@@ -1,69 +1,80 @@
-"""Kernels that find the box of cells with the largest sum of weights, exactly."""
+"""Kernels that find the box of cells with the largest sum of weights, exactly.
+
+A volume (A, B, C) is a flat array with its three sizes, so that any scratch can hold one.  Cells are named by unsigned
+numbers, which spares the compiled loops a test for indices from the end.
+"""
 
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from shapeprog.kernels.compile import helper, kernel
 
 SLACK = 0.01
 """What a bound must fall short by before it prunes: more than the rounding of a sum in single precision."""
 
+SIDE = 32
+"""Most cells along a side of a volume."""
 
-@njit(cache=True, nogil=True, fastmath={"reassoc", "nsz", "nnan"})
-def positive_sum(values):  # type: ignore[no-untyped-def]
-    """Sum of the positive values of a row, in any order: a bound on the sum of any stretch of it."""
+
+@helper(fastmath={"reassoc", "nsz", "nnan"})
+def positive_sum(values, start, count):
+    """Sum of the positive values of a stretch, in any order: a bound on the sum of any part of it."""
     total = np.float32(0)
-    for k in range(len(values)):
-        total += values[k] if values[k] > 0 else np.float32(0)
+    first = np.uint64(start)
+    for k in range(count):
+        value = values[first + np.uint64(k)]
+        total += value if value > 0 else np.float32(0)
     return total
 
 
-@njit(cache=True, nogil=True)
-def heaviest_box(weights, limit0, limit1, floor):  # type: ignore[no-untyped-def]
-    """Largest sum over all boxes of a weight volume (A, B, C), and the box.
+@helper
+def add(total, values, start, count):
+    """Add a stretch of values to the first values of another array."""
+    first = np.uint64(start)
+    for k in range(count):
+        total[k] += values[first + np.uint64(k)]
 
-    Sides along the first two axes are at most ``limit0`` and ``limit1`` cells.  Only sums above ``floor`` count.
-    Slabs are accumulated over the first two axes and Kadane's scan runs along the third.  No box weighs more than the
-    positive weights that it holds, so planes, slabs and lines whose positive weights cannot beat the best are skipped.
 
-    Returns
-    -------
-    sum, box
-        ``floor`` and zeros when no box beats the floor; else the sum and (lo0, hi0, lo1, hi1, lo2, hi2), half-open.
+@helper
+def heaviest_box(weights, size0, size1, size2, limit0, limit1, floor, box):
+    """Largest sum over all boxes of a weight volume; the box (lo0, hi0, lo1, hi1, lo2, hi2), half-open, is written.
+
+    Sides along the first two axes are at most ``limit0`` and ``limit1`` cells.  Only sums above ``floor`` count; the
+    floor comes back, and no box is written, when none beats it.  Slabs are accumulated over the first two axes and
+    Kadane's scan runs along the third.  No box weighs more than the positive weights that it holds, so planes, slabs
+    and lines whose positive weights cannot beat the best are skipped.
     """
-    size0, size1, size2 = weights.shape
     best = floor
-    box = np.zeros(6, np.int64)
-    planes = np.zeros(size0 + 1, np.float32)
+    plane = size1 * size2
+    planes, positive = np.empty(SIDE + 1, np.float32), np.empty(SIDE + 1, np.float32)
+    slab, line = np.empty(SIDE * SIDE, np.float32), np.empty(SIDE, np.float32)
+    planes[size0] = positive[size1] = 0
     for i in range(size0 - 1, -1, -1):
-        planes[i] = planes[i + 1] + positive_sum(weights[i].reshape(size1 * size2))
-    slab = np.zeros((size1, size2), np.float32)
-    line = np.zeros(size2, np.float32)
-    positive = np.zeros(size1 + 1, np.float32)
+        planes[i] = planes[i + 1] + positive_sum(weights, i * plane, plane)
     for lo0 in range(size0):
         if planes[lo0] <= best - SLACK:
             break
-        slab[:] = 0
+        for k in range(plane):
+            slab[k] = 0
         for hi0 in range(lo0, min(size0, lo0 + limit0)):
-            for j in range(size1):
-                for k in range(size2):
-                    slab[j, k] += weights[hi0, j, k]
+            add(slab, weights, hi0 * plane, plane)
             if planes[lo0] - planes[hi0 + 1] <= best - SLACK:
                 continue
             for j in range(size1 - 1, -1, -1):
-                positive[j] = positive[j + 1] + positive_sum(slab[j])
+                positive[j] = positive[j + 1] + positive_sum(slab, j * size2, size2)
             for lo1 in range(size1):
                 if positive[lo1] <= best - SLACK:
                     break
-                line[:] = 0
+                for k in range(size2):
+                    line[k] = 0
                 for hi1 in range(lo1, min(size1, lo1 + limit1)):
+                    add(line, slab, hi1 * size2, size2)
                     if positive[hi1] == positive[hi1 + 1]:  # nothing positive here: no box ends here
-                        for k in range(size2):
-                            line[k] += slab[hi1, k]
                         continue
-                    for k in range(size2):
-                        line[k] += slab[hi1, k]
-                    if positive[lo1] - positive[hi1 + 1] <= best - SLACK or positive_sum(line) <= best - SLACK:
+                    if positive[lo1] - positive[hi1 + 1] <= best - SLACK:
+                        continue
+                    if positive_sum(line, 0, size2) <= best - SLACK:
                         continue
                     current = np.float32(0)
                     start = 0
@@ -76,4 +87,10 @@ def heaviest_box(weights, limit0, limit1, floor):  # type: ignore[no-untyped-def
                             best = current
                             box[0], box[1], box[2] = lo0, hi0 + 1, lo1
                             box[3], box[4], box[5] = hi1 + 1, start, k + 1
-    return best, box
+    return best
+
+
+@kernel("f8(f4[::1], i8, i8, i8, i8, i8, f8, i8[::1])")
+def heaviest(weights, size0, size1, size2, limit0, limit1, floor, box):
+    """``heaviest_box`` from Python."""
+    return heaviest_box(weights, size0, size1, size2, limit0, limit1, floor, box)

@@ -3,28 +3,37 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from shapeprog.kernels.compile import helper, kernel
 
 
-@njit(cache=True, nogil=True)
-def start(seed):  # type: ignore[no-untyped-def]
+@kernel("void(i8)")
+def start(seed):
     """Begin the sequence of a seed."""
     np.random.seed(seed)
 
 
-@njit(cache=True, nogil=True)
-def uniform():  # type: ignore[no-untyped-def]
+@kernel("f8()")
+def uniform():
     """A number in [0, 1)."""
     return np.random.random()
 
 
-@njit(cache=True, nogil=True)
-def below(count):  # type: ignore[no-untyped-def]
+@helper
+def one_of(count):
     """One of 0 to count - 1."""
     return np.random.randint(count)
 
 
-@njit(cache=True, nogil=True)
-def shuffled(count):  # type: ignore[no-untyped-def]
-    """The numbers 0 to count - 1 in random order."""
-    return np.random.permutation(count)
+@kernel("i8(i8)")
+def below(count):
+    """One of 0 to count - 1."""
+    return one_of(count)
+
+
+@kernel("void(i8[::1])")
+def shuffle(numbers):
+    """Put numbers in random order (Fisher and Yates, from the last to the first)."""
+    for last in range(len(numbers) - 1, 0, -1):
+        other = one_of(last + 1)
+        numbers[last], numbers[other] = numbers[other], numbers[last]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from shapeprog.inference.block_layout import (
     BACK,
@@ -19,10 +18,19 @@ from shapeprog.inference.block_layout import (
     ROTATE,
     TILT,
 )
-from shapeprog.inference.raster_kernels import ROWS, WORDS, draw_block, popcount
+from shapeprog.inference.raster_kernels import draw_block
+from shapeprog.kernels.bits import ones
+from shapeprog.kernels.compile import helper, kernel
+from shapeprog.kernels.rows import REACH
 
 MOST_MOVES = 200
 """At least the number of neighbours that any block has."""
+
+LOOP = COUNT2 - COUNT1
+"""Numbers of one translation loop."""
+
+LAYER = 16
+"""Words of 64 cells in one horizontal layer."""
 
 MOST_STEPS = 60
 """Most steps of one descent."""
@@ -34,19 +42,19 @@ GAIN = 1e-9
 """Least rise of the objective that counts, above the noise of rounding."""
 
 
-@njit(cache=True, nogil=True)
-def statements(block):  # type: ignore[no-untyped-def]
-    """Statements of a block: itself and its loops."""
+@helper
+def statements(block):
+    """Statements of a block: itself and its loops; from Python also those of the columns of many."""
     return 1 + (block[COUNT1] > 1) + (block[COUNT2] > 1) + (block[ROTATE] > 1)
 
 
-@njit(cache=True, nogil=True)
-def valid(block):  # type: ignore[no-untyped-def]
+@helper
+def valid(block):
     """Whether the lengths are positive and no two neighbouring copies of a loop are drawn over each other."""
     form = int(block[FORM])
     if block[COUNT1] < 1 or block[COUNT2] < 1 or block[COUNT1] * block[COUNT2] > MOST_COPIES:
         return False
-    for level in (COUNT1, COUNT2):
+    for level in range(COUNT1, ROTATE, LOOP):
         if block[level] > 1:
             apart = False
             for axis in range(3):
@@ -66,38 +74,22 @@ def valid(block):  # type: ignore[no-untyped-def]
     return block[EXTENT] >= 1 and block[RADIUS] >= 1
 
 
-@njit(cache=True, nogil=True)
-def layers(block):  # type: ignore[no-untyped-def]
+@helper
+def layers(block):
     """First layer of the grid that a block can touch, and the one after the last."""
     start, end = block[FIRST], block[FIRST] + block[EXTENT]
     if block[FORM] == LINE:
-        margin = 1.01 * block[TILT] + 2
+        margin = REACH * block[TILT] + 2
         start, end = min(block[FIRST], block[EXTENT]) - margin, max(block[FIRST], block[EXTENT]) + margin
-    for level in (COUNT1, COUNT2):
+    for level in range(COUNT1, ROTATE, LOOP):
         reach = (block[level] - 1) * block[level + 1]
         start += min(reach, 0.0)
         end += max(reach, 0.0)
     return max(int(np.floor(start)) + 16, 0), min(int(np.ceil(end)) + 16, 32)
 
 
-@njit(cache=True, nogil=True)
-def gains(rows, block, gained, wasted):  # type: ignore[no-untyped-def]
-    """How many cells of ``gained`` and of ``wasted`` a block covers; ``rows`` is scratch."""
-    first, last = layers(block)
-    words, good_words, bad_words = rows.view(np.uint64), gained.view(np.uint64), wasted.view(np.uint64)
-    for i in range(first * WORDS, last * WORDS):
-        words[i] = 0
-    draw_block(rows, block)
-    good = 0
-    bad = 0
-    for i in range(first * WORDS, last * WORDS):
-        good += popcount(words[i] & good_words[i])
-        bad += popcount(words[i] & bad_words[i])
-    return good, bad
-
-
-@njit(cache=True, nogil=True)
-def put(out, n, block, slot, by, slot2, by2):  # type: ignore[no-untyped-def]
+@helper
+def put(out, n, block, slot, by, slot2, by2):
     """Write the block with two of its numbers changed as neighbour n; returns the next n."""
     for i in range(len(block)):
         out[n, i] = block[i]
@@ -106,8 +98,8 @@ def put(out, n, block, slot, by, slot2, by2):  # type: ignore[no-untyped-def]
     return n + 1
 
 
-@njit(cache=True, nogil=True)
-def put_loop(out, n, block, slot, by, shift, share):  # type: ignore[no-untyped-def]
+@helper
+def put_loop(out, n, block, slot, by, shift, share):
     """Write the block with one number of a loop changed and its first copy moved; returns the next n.
 
     Along the axis of ``shift`` (or all three for -1) the copy moves back by ``share``.
@@ -122,8 +114,8 @@ def put_loop(out, n, block, slot, by, shift, share):  # type: ignore[no-untyped-
     return n
 
 
-@njit(cache=True, nogil=True)
-def moves(block, out, far):  # type: ignore[no-untyped-def]
+@helper
+def moves(block, out, far):
     """Neighbours of a block: faces, places, ends, spacings and counts moved by up to ``far``; their number."""
     n = 0
     form = int(block[FORM])
@@ -149,7 +141,7 @@ def moves(block, out, far):  # type: ignore[no-untyped-def]
                     n = put(out, n, block, FIRST + axis, delta, EXTENT + axis, delta)
             else:
                 n = put(out, n, block, FIRST, delta, EXTENT, -delta)
-        for level in (COUNT1, COUNT2):
+        for level in range(COUNT1, ROTATE, LOOP):
             if block[level] > 1:
                 for axis in range(3):
                     step = level + 1 + axis
@@ -166,34 +158,55 @@ def moves(block, out, far):  # type: ignore[no-untyped-def]
     return n
 
 
-@njit(cache=True, nogil=True)
-def improve_block(block, occupied, others, price, far):  # type: ignore[no-untyped-def]
-    """Best-improvement descent of one block; the block and its objective."""
-    gained, wasted = np.empty(ROWS, np.uint32), np.empty(ROWS, np.uint32)
-    inter = 0
-    union = 0
-    for i in range(ROWS):
-        gained[i] = occupied[i] & ~others[i]
-        wasted[i] = ~occupied[i] & ~others[i]
-        inter += popcount(occupied[i] & others[i])
-        union += popcount(occupied[i] | others[i])
-    rows = np.zeros(ROWS, np.uint32)
-    around = np.zeros((MOST_MOVES, len(block)))
-    good, bad = gains(rows, block, gained, wasted)
-    best = (inter + good) / max(union + bad, 1) - price * statements(block)
-    current = block.copy()
-    for _ in range(MOST_STEPS):
+@kernel("f8(f8[::1], i8, i8, u8[::1], u8[::1], f8, i8, u4[::1], u8[::1], f8[:, ::1])")
+def descend(block, inter, union, gained, wasted, price, far, rows, words, around):
+    """Best-improvement descent of one block in its place; its objective.
+
+    Parameters
+    ----------
+    block
+        The block, which is moved.
+    inter, union
+        Cells that the other blocks share with the solid, and cells of either.
+    gained, wasted
+        Cells of the solid, and empty cells, that no other block covers, as words (512).
+    price, far
+        IoU that one statement has to earn, and most cells that one move goes.
+    rows, words, around
+        Scratch: the same 1024 words of 32 cells as 512 of 64, and room for the block and its neighbours (M, 20).
+    """
+    best = -np.inf
+    for slot in range(len(block)):
+        around[0, slot] = block[slot]
+    number = 1  # first the block alone, then with its neighbours
+    for step in range(MOST_STEPS + 1):
         chosen = -1
-        for m in range(moves(current, around, far)):
-            if not valid(around[m]):
+        for m in range(number):
+            if step > 0 and not valid(around[m]):
                 continue
-            good, bad = gains(rows, around[m], gained, wasted)
-            value = (inter + good) / max(union + bad, 1) - price * statements(around[m])
+            first, last = layers(around[m])
+            for i in range(first * LAYER, last * LAYER):
+                words[i] = 0
+            draw_block(rows, around[m])
+            good = inter
+            bad = union
+            for i in range(first * LAYER, last * LAYER):
+                good += ones(words[i] & gained[i])
+                bad += ones(words[i] & wasted[i])
+            value = good / max(bad, 1) - price * statements(around[m])
             if value > best + GAIN:
                 best = value
                 chosen = m
         if chosen < 0:
             break
-        for i in range(len(current)):
-            current[i] = around[chosen, i]
-    return current, best
+        for slot in range(len(block)):
+            block[slot] = around[chosen, slot]
+        number = moves(block, around, far)
+    return best
+
+
+@kernel("void(f8[:, ::1], b1[::1])")
+def sound(blocks, out):
+    """Which blocks descent can start from."""
+    for k in range(len(blocks)):
+        out[k] = valid(blocks[k])

@@ -5,19 +5,17 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
-from shapeprog.inference.block_layout import COUNT1
-from shapeprog.inference.chance_kernels import below, shuffled, start, uniform
-from shapeprog.inference.descent_kernels import GAIN, gains, improve_block, statements, valid
-from shapeprog.inference.form_kernels import cells_of, guess, plain, repeat
+from shapeprog.inference.block_layout import COUNT1, ROTATE, SHIFT1, WIDTH
+from shapeprog.inference.chance_kernels import below, shuffle, start, uniform
+from shapeprog.inference.descent_kernels import GAIN, MOST_MOVES, descend, statements
+from shapeprog.inference.drawing import Rows, Whole, cells_shared, draw_all, draw_each, places
+from shapeprog.inference.fold_kernels import VOLUMES
+from shapeprog.inference.form_kernels import guess
 from shapeprog.inference.pool import Pool
 from shapeprog.inference.proposal_kernels import propose
-from shapeprog.inference.raster_kernels import ROWS, draw_all, draw_block, iou_rows
-from shapeprog.space import FloatArray
-
-Rows = npt.NDArray[np.uint32]
-Whole = npt.NDArray[np.int64]
+from shapeprog.inference.raster_kernels import ROWS
+from shapeprog.space import RESOLUTION, FloatArray
 
 GUESSES = 30
 """Rough blocks of a form from which one descent starts."""
@@ -54,8 +52,42 @@ class Target:
 
 def value_of(blocks: FloatArray, target: Target) -> float:
     """IoU minus price x statements."""
-    total = sum(statements(block) for block in blocks)
-    return float(iou_rows(draw_all(blocks), target.occupied) - target.price * total)
+    return iou(blocks, target) - target.price * int(statements(blocks.T).sum())
+
+
+def iou(blocks: FloatArray, target: Target) -> float:
+    """IoU of the cells that blocks draw with those of the target."""
+    return float(_ious(draw_all(blocks)[None], target)[0])
+
+
+def _ious(drawn: Rows, target: Target) -> FloatArray:
+    """IoU of each of several sets of rows (P, 1024) with the target."""
+    counts = cells_shared(drawn, target.occupied, ~target.occupied)
+    return counts[:, 0] / (target.cells + counts[:, 1])
+
+
+def improve_block(block: FloatArray, occupied: Rows, others: Rows, price: float, far: int) -> tuple[FloatArray, float]:
+    """A block after descent on IoU minus price x statements, the other blocks fixed, and the value it comes to.
+
+    Parameters
+    ----------
+    occupied, others
+        The solid, and what the other blocks cover, as rows (1024).
+    price
+        IoU that one statement has to earn.
+    far
+        Most cells that one move goes.
+    """
+    rows, better = np.empty((5, ROWS), np.uint32), block.copy()
+    np.bitwise_and(occupied, ~others, out=rows[0])
+    np.bitwise_and(~occupied, ~others, out=rows[1])
+    np.bitwise_and(occupied, others, out=rows[2])
+    np.bitwise_or(occupied, others, out=rows[3])
+    words = rows.view(np.uint64)
+    inter, union = np.bitwise_count(words[2:4]).sum(1).tolist()
+    around = np.empty((MOST_MOVES, WIDTH))
+    value = descend(better, inter, union, words[0], words[1], price, far, rows[4], words[4], around)
+    return better, value
 
 
 def polish(blocks: FloatArray, target: Target, far: int, sweeps: int) -> FloatArray:
@@ -69,9 +101,7 @@ def polish(blocks: FloatArray, target: Target, far: int, sweeps: int) -> FloatAr
         Most passes over all blocks.
     """
     blocks = blocks.copy()
-    drawn = np.zeros((len(blocks), ROWS), np.uint32)
-    for rows, block in zip(drawn, blocks, strict=True):
-        draw_block(rows, block)
+    drawn = draw_each(blocks)
     settled = np.zeros(len(blocks), np.bool_)
     for _ in range(sweeps):
         changed = False
@@ -85,15 +115,14 @@ def polish(blocks: FloatArray, target: Target, far: int, sweeps: int) -> FloatAr
                 settled[:] = False
                 settled[k] = True
                 blocks[k] = better
-                drawn[k] = 0
-                draw_block(drawn[k], better)
+                drawn[k] = draw_all(better[None])
         if not changed:
             break
     k = 0
     while k < len(blocks):
         others = _union(drawn, k)
-        with_it = iou_rows(others | drawn[k], target.occupied) - target.price * statements(blocks[k])
-        if iou_rows(others, target.occupied) >= with_it:
+        without, with_it = _ious(np.stack([others, others | drawn[k]]), target)
+        if without >= with_it - target.price * statements(blocks[k]):
             blocks, drawn = np.delete(blocks, k, 0), np.delete(drawn, k, 0)
         else:
             k += 1
@@ -120,26 +149,47 @@ def propose_form(form: int, covered: Rows, waste: float, box: FloatArray, target
     """
     price = target.price * target.cells
     gained, wasted = target.occupied & ~covered, ~target.occupied & ~covered
-    cells = cells_of(gained)
+    cells = places(gained)
     if len(cells) < FEWEST:
-        return 0.0, plain(form)
-    rows = np.zeros(ROWS, np.uint32)
-    first, rough = -np.inf, None
-    for _ in range(GUESSES):
-        block = guess(form, cells, box)
-        if not valid(block):
-            continue
-        good, bad = gains(rows, block, gained, wasted)
-        if good - waste * bad > first:
-            first, rough = good - waste * bad, block
-    if rough is None:
-        return 0.0, plain(form)
-    block, _value = improve_block(rough, target.occupied, covered, target.price, 2)
-    looped = repeat(block, gained, wasted, waste, price)
+        return 0.0, np.zeros(WIDTH)
+    rough = np.empty((GUESSES, WIDTH))
+    rough = rough[: guess(form, cells, box, rough)]
+    if not len(rough):
+        return 0.0, np.zeros(WIDTH)
+    best = rough[int(_nets(rough, gained, wasted, waste).argmax())]
+    block, _value = improve_block(best, target.occupied, covered, target.price, 2)
+    looped = _repeated(block, gained, wasted, waste, price)
     if looped[COUNT1] > block[COUNT1]:
         block, _value = improve_block(looped, target.occupied, covered, target.price, 1)
-    good, bad = gains(rows, block, gained, wasted)
-    return float(good - waste * bad - price * statements(block)), block
+    return float(_nets(block[None], gained, wasted, waste)[0] - price * statements(block)), block
+
+
+def _nets(blocks: FloatArray, gained: Rows, wasted: Rows, waste: float) -> FloatArray:
+    """Cells of ``gained`` that each block covers, minus ``waste`` times those of ``wasted``."""
+    counts = cells_shared(draw_each(blocks), gained, wasted)
+    return counts[:, 0] - waste * counts[:, 1]
+
+
+def _loops() -> FloatArray:
+    """The translation loops of two to four copies along one axis: rows of a count and a shift."""
+    return np.array([
+        (count, *(step * (axis == other) for other in range(3)))
+        for axis in range(3) for step in range(-23, 24) if step for count in range(2, 5)
+        if (count - 1) * abs(step) <= 24
+    ], np.float64)  # fmt: skip
+
+
+LOOPS = _loops()
+
+
+def _repeated(block: FloatArray, gained: Rows, wasted: Rows, waste: float, price: float) -> FloatArray:
+    """The block in its best translation loop of two to four copies along one axis, if that gains."""
+    if block[COUNT1] > 1 or block[ROTATE] > 0:
+        return block
+    trials = np.repeat(block[None], 1 + len(LOOPS), 0)
+    trials[1:, COUNT1 : SHIFT1 + 3] = LOOPS
+    values = _nets(trials, gained, wasted, waste) - price * statements(trials.T)
+    return trials[int(values.argmax())]
 
 
 CLUSTERS = 0.25
@@ -228,9 +278,7 @@ def ruin_cluster(blocks: FloatArray) -> tuple[FloatArray, int]:
 
 def _centre(block: FloatArray) -> FloatArray:
     """Mean position of the cells of a block."""
-    rows = np.zeros(ROWS, np.uint32)
-    draw_block(rows, block)
-    cells = cells_of(rows)
+    cells = places(draw_all(block[None]))
     return cells.mean(0) if len(cells) else np.zeros(3)
 
 
@@ -259,11 +307,27 @@ def recreate(blocks: FloatArray, wanted: int, target: Target, plan: Plan) -> Flo
 
 def _sought(covered: Rows, waste: float, target: Target, plan: Plan) -> tuple[float, FloatArray]:
     """The repeated box that gains most among families drawn at random, the single box always among them."""
-    picks = shuffled(len(target.table))[: plan.families]
+    picks = np.arange(len(target.table))
+    shuffle(picks)
     picks[0] = 0
-    gain, block = propose(
-        target.occupied, covered, waste, target.low, target.high, target.table, picks, target.price * target.cells
-    )
+    return best_box(covered, waste, picks[: plan.families], target)
+
+
+def best_box(covered: Rows, waste: float, picks: Whole, target: Target) -> tuple[float, FloatArray]:
+    """The repeated box that gains most on what is not covered, and its gain in cells; zero when none gains.
+
+    Parameters
+    ----------
+    waste
+        Weight of an empty cell against an occupied one.
+    picks
+        Numbers of the families to try.
+    """
+    block, volumes = np.zeros(WIDTH), np.empty((VOLUMES, RESOLUTION**3), np.float32)
+    gain = propose(
+        target.occupied, covered, waste, target.low, target.high, target.table, picks, target.price * target.cells,
+        volumes, block,
+    )  # fmt: skip
     return gain, block
 
 

@@ -1,4 +1,4 @@
-"""Kernels that find the best repeated box: fold the weights along the axes of a loop, then search one box.
+"""Helpers that find the best repeated box: fold the weights along the axes of a loop, then search one box.
 
 A loop along an axis that repeats a box n times at distance d covers the same weight as one box in the sum of n
 shifted volumes; a mirrored pair covers that of one box in the volume folded at the mirror plane.
@@ -7,17 +7,20 @@ shifted volumes; a mirrored pair covers that of one box in the volume folded at 
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from shapeprog.inference.box_kernels import heaviest_box
 from shapeprog.inference.families import MIRROR, PERIOD
+from shapeprog.kernels.compile import helper
 
 ANY = 1 << 20
 """More cells than any side has: no limit."""
 
+VOLUMES = 4
+"""Volumes that a search works on: the weights, folded once and twice, and with the axes in another order."""
 
-@njit(cache=True, nogil=True)
-def mirrors(plane):  # type: ignore[no-untyped-def]
+
+@helper
+def mirrors(plane):
     """The cells left and right of a mirror plane: between two cells for an even number, through a cell for an odd one.
 
     The plane is at ``plane`` / 2 cells, a cell farther when odd; the cell that it runs through belongs to no side.
@@ -26,72 +29,73 @@ def mirrors(plane):  # type: ignore[no-untyped-def]
     return left, left + 2 if plane % 2 else left + 1
 
 
-@njit(cache=True, nogil=True)
-def fold(volume, axis, kind, a, b):  # type: ignore[no-untyped-def]
-    """Fold an axis: mirrored at plane a, or summed over a copies at distance b."""
-    size0, size1, size2 = volume.shape
-    size = volume.shape[axis]
+@helper
+def fold(volume, out, outer, size, inner, kind, a, b):
+    """Fold the middle axis of a volume (outer, size, inner): mirrored at plane a, or a copies at distance b summed.
+
+    Returns its cells along that axis, none where the copies do not fit.
+    """
     left, right = mirrors(a)
     length = max(0, min(left + 1, size - right) if kind == MIRROR else size - (a - 1) * b)
-    new0, new1, new2 = length if axis == 0 else size0, length if axis == 1 else size1, length if axis == 2 else size2
-    out = np.zeros((new0, new1, new2), np.float32)
-    if axis == 2:
-        fold_rows(volume.reshape((size0 * size1, size2)), out.reshape((size0 * size1, length)), kind, left, right, a, b)
-        return out
-    outer, inner = (1, size1 * size2) if axis == 0 else (size0, size2)
-    source, folded = volume.reshape((outer, size, inner)), out.reshape((outer, length, inner))
     for o in range(outer):
         for i in range(length):
+            to = np.uint64((o * length + i) * inner)
             if kind == MIRROR:
-                near, far = np.uint64(left - i), np.uint64(right + i)  # unsigned: no test for indices from the end
+                near, far = np.uint64((o * size + left - i) * inner), np.uint64((o * size + right + i) * inner)
                 for k in range(inner):
-                    folded[o, i, k] = source[o, near, k] + source[o, far, k]
+                    step = np.uint64(k)
+                    out[to + step] = volume[near + step] + volume[far + step]
             else:
+                for k in range(inner):
+                    out[to + np.uint64(k)] = 0
                 for copy in range(a):
-                    near = np.uint64(i + copy * b)
+                    near = np.uint64((o * size + i + copy * b) * inner)
                     for k in range(inner):
-                        folded[o, i, k] += source[o, near, k]
-    return out
+                        step = np.uint64(k)
+                        out[to + step] += volume[near + step]
+    return length
 
 
-@njit(cache=True, nogil=True)
-def fold_rows(rows, out, kind, left, right, a, b):  # type: ignore[no-untyped-def]
-    """Fold the rows of a matrix, as ``fold`` does its last axis."""
-    length = out.shape[1]
-    for r in range(len(rows)):
+@helper
+def fold_rows(volume, out, rows, size, kind, a, b):
+    """Fold the last axis of a volume (rows, size), as ``fold`` does a middle one."""
+    left, right = mirrors(a)
+    length = max(0, min(left + 1, size - right) if kind == MIRROR else size - (a - 1) * b)
+    for r in range(rows):
+        to = np.uint64(r * length)
         if kind == MIRROR:
-            near, far = np.uint64(left), np.uint64(right)
+            near, far = np.uint64(r * size + left), np.uint64(r * size + right)
             for i in range(length):
                 step = np.uint64(i)
-                out[r, i] = rows[r, near - step] + rows[r, far + step]
+                out[to + step] = volume[near - step] + volume[far + step]
         else:
+            for i in range(length):
+                out[to + np.uint64(i)] = 0
             for copy in range(a):
-                near = np.uint64(copy * b)
+                near = np.uint64(r * size + copy * b)
                 for i in range(length):
-                    out[r, i] += rows[r, near + np.uint64(i)]
+                    step = np.uint64(i)
+                    out[to + step] += volume[near + step]
+    return length
 
 
-@njit(cache=True, nogil=True)
-def turn(volume, order):  # type: ignore[no-untyped-def]
-    """The volume with its axes in another order."""
-    if order[2] == 2:
-        return volume
-    steps = np.array([volume.shape[1] * volume.shape[2], volume.shape[2], 1])
+@helper
+def turn(volume, out, sizes, order):
+    """Write a volume with its axes in another order."""
+    at = np.uint64(0)
+    steps = np.array([sizes[1] * sizes[2], sizes[2], 1])
     step0, step1, step2 = steps[order[0]], steps[order[1]], np.uint64(steps[order[2]])
-    size0, size1, size2 = volume.shape[order[0]], volume.shape[order[1]], volume.shape[order[2]]
-    cells = volume.reshape(volume.size)
-    out = np.empty((size0, size1, size2), np.float32)
-    for i in range(size0):
-        for j in range(size1):
-            at = np.uint64(i * step0 + j * step1)  # unsigned: no test for indices from the end
-            for k in range(size2):
-                out[i, j, k] = cells[at]
-                at += step2
-    return out
+    for i in range(sizes[order[0]]):
+        for j in range(sizes[order[1]]):
+            cell = np.uint64(i * step0 + j * step1)
+            for _ in range(sizes[order[2]]):
+                out[at] = volume[cell]
+                cell += step2
+                at += np.uint64(1)
 
 
-@njit(cache=True, nogil=True)
-def unfold(kind, a, b, low, high):  # type: ignore[no-untyped-def]
+@helper
+def unfold(kind, a, b, low, high):
     """First low end, count and distance of the copies of a folded side [low, high)."""
     if kind == MIRROR:
         left, right = mirrors(a)
@@ -100,31 +104,53 @@ def unfold(kind, a, b, low, high):  # type: ignore[no-untyped-def]
     return low, a, b
 
 
-@njit(cache=True, nogil=True)
-def search_family(weights, family, floor):  # type: ignore[no-untyped-def]
-    """Best repeated box of one family: its sum, and (start, extent, count1, axis1, step1, count2, axis2, step2)."""
-    found = np.zeros(12, np.int64)
-    folded = weights
-    limits = np.full(3, ANY)
-    for part in (0, 4):
+@helper
+def search_family(volumes, size0, size1, size2, family, floor, found):
+    """Best repeated box of one family: its sum, or the floor when none beats it.
+
+    Parameters
+    ----------
+    volumes
+        The weights (size0, size1, size2) in the first of ``VOLUMES`` flat volumes; the others are scratch.
+    family
+        A row of ``families``.
+    found
+        The box is written here: (start, extent, count1, axis1, step1, count2, axis2, step2), twelve numbers.
+    """
+    sizes, limits, order = np.array([size0, size1, size2]), np.array([ANY, ANY, ANY]), np.array([0, 1, 2])
+    box = np.zeros(6, np.int64)
+    held = 0
+    for part in range(0, 8, 4):
         axis, kind, a, b = family[part], family[part + 1], family[part + 2], family[part + 3]
-        if axis >= 0:
-            folded = fold(folded, axis, kind, a, b)
-            if kind == PERIOD:
-                limits[axis] = b - 1
-    if folded.size == 0:
-        return floor, found
+        if axis < 0:
+            continue
+        volume, out = volumes[held], volumes[held + 1]
+        if axis == 2:
+            sizes[2] = fold_rows(volume, out, sizes[0] * sizes[1], sizes[2], kind, a, b)
+        elif axis == 1:
+            sizes[1] = fold(volume, out, sizes[0], sizes[1], sizes[2], kind, a, b)
+        else:
+            sizes[0] = fold(volume, out, 1, sizes[0], sizes[1] * sizes[2], kind, a, b)
+        held += 1
+        if kind == PERIOD:
+            limits[axis] = b - 1
+    if sizes[0] * sizes[1] * sizes[2] == 0:
+        return floor
     # The scan along the last axis is the fast one, so the longest goes there; it takes no limit of its length.
     last = 2
     for axis in range(3):
         free, taken = limits[axis] == ANY, limits[last] == ANY
-        if (free and not taken) or (free == taken and folded.shape[axis] > folded.shape[last]):
+        if (free and not taken) or (free == taken and sizes[axis] > sizes[last]):
             last = axis
-    first = 0 if last != 0 else 1
-    order = np.array([first, 3 - last - first, last])
-    best, box = heaviest_box(turn(folded, order), limits[order[0]], limits[order[1]], floor)
+    if last != 2:
+        order[0] = 0 if last != 0 else 1
+        order[1], order[2] = 3 - last - order[0], last
+        turn(volumes[held], volumes[held + 1], sizes, order)
+        held += 1
+    one, other = order[0], order[1]
+    best = heaviest_box(volumes[held], sizes[one], sizes[other], sizes[last], limits[one], limits[other], floor, box)
     if best <= floor:
-        return floor, found
+        return floor
     for place in range(3):
         found[order[place]] = box[2 * place]
         found[3 + order[place]] = box[2 * place + 1] - box[2 * place]
@@ -136,4 +162,4 @@ def search_family(weights, family, floor):  # type: ignore[no-untyped-def]
             kind, a, b = family[4 * part + 1], family[4 * part + 2], family[4 * part + 3]
             low = found[axis]
             found[axis], found[6 + 3 * part], found[8 + 3 * part] = unfold(kind, a, b, low, low + found[3 + axis])
-    return best, found
+    return best

@@ -16,12 +16,13 @@ def greedy_boxes(voxels: npt.NDArray[np.bool_], boxes: int = 10) -> Program:
 
     No learning, no loops, no search beyond the exact maximum-sum box: what a program must beat at equal size.
     """
-    from shapeprog.inference.box_kernels import heaviest_box
+    from shapeprog.inference.box_kernels import heaviest
 
     weights = np.where(voxels, np.float32(1), np.float32(-1))
     blocks = []
     for _ in range(boxes):
-        gain, box = heaviest_box(weights, RESOLUTION, RESOLUTION, 0.0)
+        box = np.zeros(6, np.int64)
+        gain = heaviest(weights.reshape(-1), *weights.shape, RESOLUTION, RESOLUTION, 0.0, box)
         if gain <= 0:
             break
         low, high = box[0::2], box[1::2]

@@ -26,7 +26,6 @@ from shapeprog.inference.structure import Settings, search_structure
 from shapeprog.inference.surface import points_of_cells
 from shapeprog.language.program import Program
 from shapeprog.language.unroll import unroll
-from shapeprog.space import RESOLUTION
 
 if TYPE_CHECKING:
     from shapeprog.models.generator import Generator
@@ -170,12 +169,12 @@ def infer(
 def prepare_kernels() -> None:
     """Compile, or load from the cache, all kernels that inference runs, so that no time budget pays for it.
 
-    The first call on a machine takes some tens of seconds, the first in a process well below one.
+    The first call on a machine takes some seconds, the first in a process a fraction of one.
     """
-    cells = np.zeros((RESOLUTION,) * 3, np.bool_)
-    cells[14:18, 14:18, 14:18] = True
-    found = search_structure(cells, Settings(blocks=2, rounds=2, forms=1.0, recall=1.0))
-    refine(to_program(found.blocks), torch.from_numpy(points_of_cells(cells)), schedule=Schedule(steps=1))
+    from shapeprog.kernels.compile import prepare
+    from shapeprog.kernels.modules import INFERENCE
+
+    prepare(INFERENCE)
 
 
 def _load(shape: Shape | str | Path) -> Shape:

@@ -9,8 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from shapeprog.inference.block_layout import WIDTH
-from shapeprog.inference.descent_kernels import statements, valid
-from shapeprog.inference.pool_kernels import draw_each, net_gains
+from shapeprog.inference.descent_kernels import sound, statements
+from shapeprog.inference.drawing import cells_shared, draw_each
 from shapeprog.space import FloatArray
 
 
@@ -36,9 +36,10 @@ class Pool:
     def of(cls, groups: Sequence[FloatArray], price: float) -> Pool:
         """The blocks of all groups that descent can start from; ``price`` in cells for one statement."""
         every = np.concatenate([np.zeros((0, WIDTH)), *groups])
-        sound = np.array([valid(block) for block in every], np.bool_)
-        blocks = np.unique(every[sound], axis=0)
-        return cls(blocks, draw_each(blocks), np.array([price * statements(block) for block in blocks], np.float64))
+        usable = np.empty(len(every), np.bool_)
+        sound(every, usable)
+        blocks = np.unique(every[usable], axis=0)
+        return cls(blocks, draw_each(blocks), price * statements(blocks.T))
 
     def best(
         self, occupied: npt.NDArray[np.uint32], covered: npt.NDArray[np.uint32], waste: float
@@ -64,5 +65,5 @@ class Pool:
 
     def _gains(self, occupied: npt.NDArray[np.uint32], covered: npt.NDArray[np.uint32], waste: float) -> FloatArray:
         """Cells that each block gains."""
-        gains: FloatArray = net_gains(self.drawn, occupied & ~covered, ~occupied & ~covered, waste) - self.prices
-        return gains
+        counts = cells_shared(self.drawn, occupied & ~covered, ~occupied & ~covered)
+        return counts[:, 0] - waste * counts[:, 1] - self.prices

@@ -3,53 +3,63 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
-from shapeprog.inference.block_layout import COUNT1, COUNT2, EXTENT, FIRST, SHIFT1, SHIFT2, WIDTH
+from shapeprog.inference.block_layout import COUNT1, COUNT2, EXTENT, FIRST, SHIFT1, SHIFT2
 from shapeprog.inference.fold_kernels import search_family
+from shapeprog.kernels.compile import helper, kernel
 
 
-@njit(cache=True, nogil=True)
-def weigh(occupied, covered, waste, low, high):  # type: ignore[no-untyped-def]
+@helper
+def weigh(occupied, covered, waste, low, high, out):
     """Weights of the cells in the box [low, high): +1 for occupied, -waste for empty, 0 once covered."""
-    out = np.zeros((high[0] - low[0], high[1] - low[1], high[2] - low[2]), np.float32)
+    n = 0
     for i in range(low[0], high[0]):
         for j in range(low[1], high[1]):
             full = occupied[i * 32 + j]
             done = covered[i * 32 + j]
             for k in range(low[2], high[2]):
                 bit = np.uint32(1) << np.uint32(k)
-                if done & bit == 0:
-                    out[i - low[0], j - low[1], k - low[2]] = 1.0 if full & bit else -waste
-    return out
+                out[n] = 0.0 if done & bit else (1.0 if full & bit else -waste)
+                n += 1
 
 
-@njit(cache=True, nogil=True)
-def propose(occupied, covered, waste, low, high, table, picks, price):  # type: ignore[no-untyped-def]
+@kernel("f8(u4[::1], u4[::1], f8, i8[::1], i8[::1], i8[:, ::1], i8[::1], f8, f4[:, ::1], f8[::1])")
+def propose(occupied, covered, waste, low, high, table, picks, price, volumes, block):
     """The repeated box that gains most on what is uncovered, among the families named by ``picks``.
 
     Parameters
     ----------
+    occupied, covered
+        The solid, and what is drawn, as rows (1024).
     waste
         Weight of an empty cell against an occupied one.
+    low, high
+        Box of cells outside which nothing is proposed.
+    table, picks
+        All families, and the numbers of those to try.
     price
         Cells that one statement has to gain.
+    volumes
+        Scratch for ``VOLUMES`` volumes of 32^3 cells.
+    block
+        The block (20) is written here; it comes with zeros.
 
     Returns
     -------
-    gain, block
+    gain
         Zero when nothing gains.
     """
-    weights = weigh(occupied, covered, waste, low, high)
-    block = np.zeros(WIDTH)
+    weigh(occupied, covered, waste, low, high, volumes[0])
+    size0, size1, size2 = high[0] - low[0], high[1] - low[1], high[2] - low[2]
+    found = np.zeros(12, np.int64)
     block[COUNT1], block[COUNT2] = 1, 1
     best = 0.0
     for s in picks:
         cost = price * (1 + (table[s, 0] >= 0) + (table[s, 4] >= 0))
-        value, found = search_family(weights, table[s], best + cost)
+        value = search_family(volumes, size0, size1, size2, table[s], best + cost, found)
         if value > best + cost:
             best = value - cost
-            for slot in range(WIDTH):
+            for slot in range(len(block)):
                 block[slot] = 0
             for axis in range(3):
                 block[FIRST + axis] = found[axis] + low[axis] - 16
@@ -59,4 +69,4 @@ def propose(occupied, covered, waste, low, high, table, picks, price):  # type: 
                 block[SHIFT1 + found[7]] = found[8]
             if found[9] > 1:
                 block[SHIFT2 + found[10]] = found[11]
-    return best, block
+    return best

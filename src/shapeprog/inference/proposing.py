@@ -18,9 +18,10 @@ import torch
 from shapeprog.errors import ShapeProgError
 from shapeprog.geometry.cells import cells_of, pack, words_of
 from shapeprog.inference.block_layout import WIDTH
-from shapeprog.inference.descent_kernels import improve_block
+from shapeprog.inference.drawing import draw_all
+from shapeprog.inference.editing import improve_block
 from shapeprog.inference.pool import Pool
-from shapeprog.inference.raster_kernels import ROWS, draw_block
+from shapeprog.inference.raster_kernels import ROWS
 from shapeprog.inference.reading import from_code
 from shapeprog.inference.refine import single_threaded
 from shapeprog.inference.structure import Proposals
@@ -90,7 +91,7 @@ def propose_program(
             if gain > 0:
                 fruitless = 0
                 program = np.concatenate([program, best[None]])
-                draw_block(covered, best)
+                covered = covered | draw_all(best[None])
     return Proposals((program,), np.concatenate([np.zeros((0, WIDTH)), *loose]))
 
 

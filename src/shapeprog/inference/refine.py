@@ -17,7 +17,6 @@ import numpy as np
 import numpy.typing as npt
 import torch
 from jaxtyping import Bool, Float, Int
-from scipy import ndimage
 from torch import Tensor
 
 from shapeprog.errors import InputError
@@ -208,6 +207,8 @@ def _gaps(scene: Scene, touching: Int[Tensor, "C 3"]) -> Float[Tensor, ""]:
 
 def _shell(voxels: npt.NDArray[np.bool_]) -> Float[Tensor, "S 4"]:
     """Centres of the cells on either side of the boundary of a solid of cells, and whether they are in it."""
+    from scipy import ndimage
+
     inner = ndimage.binary_erosion(voxels)
     outer = ndimage.binary_dilation(voxels)
     cells = np.argwhere(outer & ~inner)

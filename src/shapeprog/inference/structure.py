@@ -140,7 +140,6 @@ def search_structure(
     """
     from shapeprog.inference import editing
     from shapeprog.inference.pool import Pool
-    from shapeprog.inference.raster_kernels import draw_all, iou_rows
 
     cells = np.argwhere(voxels)
     low, high = cells.min(0), cells.max(0) + 1
@@ -178,23 +177,20 @@ def search_structure(
             progress("searching structure", done / settings.rounds)
     found = editing.polish(best, target, 3, 5)
     proposed = first < len(offered.programs)
-    return Structure(found, float(iou_rows(draw_all(found), target.occupied)), reason, proposed)
+    return Structure(found, editing.iou(found, target), reason, proposed)
 
 
 def greedy_starts(target: Target, most: int) -> list[FloatArray]:
     """For each weight of an empty cell, the repeated boxes that gain most, one after another."""
-    from shapeprog.inference.proposal_kernels import propose
-    from shapeprog.inference.raster_kernels import draw_all
+    from shapeprog.inference.drawing import draw_all
+    from shapeprog.inference.editing import best_box
 
     everything = np.arange(len(target.table))
     starts = []
     for waste in STARTS:
         blocks = np.zeros((0, WIDTH))
         while len(blocks) < most:
-            gain, block = propose(
-                target.occupied, draw_all(blocks), float(np.float32(waste)), target.low, target.high, target.table,
-                everything, target.price * target.cells,
-            )  # fmt: skip
+            gain, block = best_box(draw_all(blocks), float(np.float32(waste)), everything, target)
             if gain <= 0:
                 break
             blocks = np.concatenate([blocks, block[None]])

@@ -13,6 +13,9 @@ A *kernel* is called from Python and has the one signature it declares, so nothi
 other types is an error.  A *helper* is a plain Python function that kernels call.  Neither needs numba to be imported:
 it is loaded when the first kernel is called.  Compiled kernels are kept in numba's cache; a kernel counts as changed
 when its own code, that of any helper it reaches, or a constant that these read has changed, in whatever file.
+
+What makes compiling slow: numba compiles a helper on its own and again within each kernel, and does so twice when both
+a kernel and a helper call it.  So share a large helper among few kernels, and call it from one level.
 """
 
 from __future__ import annotations
@@ -23,8 +26,10 @@ import inspect
 import subprocess
 import sys
 import threading
+import time
+from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from hashlib import sha256
 from types import CodeType, FunctionType
 from typing import Any
@@ -33,9 +38,6 @@ Function = Callable[..., Any]
 
 OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 """Kernels run without the interpreter's lock, and divide as numpy does, without a check before each division."""
-
-APART = 2
-"""Kernels to compile from which a second process takes a share of them."""
 
 _lock = threading.RLock()
 _helpers: dict[Function, dict[str, Any]] = {}
@@ -113,11 +115,6 @@ class Kernel:
                     self._compiled = dispatcher
             return self._compiled is not None
 
-    @property
-    def weight(self) -> int:
-        """About how long it takes to compile: its instructions and those of all helpers it reaches."""
-        return sum(len(code.co_code) for code, _ in _reached(self.function))
-
     def _dispatcher(self) -> Any:
         numba: Any = importlib.import_module("numba")
         _declare_helpers()
@@ -135,7 +132,8 @@ class Kernel:
 def prepare(modules: Sequence[str], tell: Callable[[str], None] | None = None) -> None:
     """Make all kernels of some modules ready, so that nobody waits for them later.
 
-    What the cache lacks is compiled by two processes at once.
+    What the cache lacks is compiled by two processes at once: the other one takes kernels from the front, this one
+    from the back, so name first what is quickly imported and last what is not.
 
     Parameters
     ----------
@@ -144,42 +142,74 @@ def prepare(modules: Sequence[str], tell: Callable[[str], None] | None = None) -
     tell
         Called with a sentence before anything is compiled, which takes seconds.
     """
-    wanted = set(modules)
-    for name in modules:
-        importlib.import_module(name)
-    lacking = [each for each in list(_kernels.values()) if each.function.__module__ in wanted and not each.load()]
-    if not lacking:
-        return
-    if tell:
-        tell(f"compiling {len(lacking)} kernels for this machine, which is done once and takes about 20 seconds")
-    mine, other = _halves(lacking)
-    process = None
-    if len(lacking) >= APART:
-        names = [each.name for each in other]
-        command = [sys.executable, "-m", "shapeprog.kernels.compile", *names]
-        process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    lacking: list[Kernel] = []
+    second: _Second | None = None
+    done = False
     try:
-        for each in mine:
-            each.compile()
-        if process is not None:
-            process.wait()
+        for name in modules:
+            importlib.import_module(name)
+            for each in list(_kernels.values()):
+                if each.function.__module__ == name and not each.load():
+                    if second is None:
+                        if tell:
+                            tell("compiling kernels for this machine, once; this may take half a minute")
+                        second = _Second()
+                    lacking.append(each)
+                    second.waiting.append(each.name)
+        while second and second.waiting:
+            with suppress(IndexError):  # the other process took the last one
+                _kernels[second.waiting.pop()].compile()
+        done = True
     finally:
-        if process is not None and process.poll() is None:
-            process.kill()
-            process.wait()
-    for each in other:  # from the cache now; compiled here should the other process have failed
+        if second:
+            second.finish(wait=done)
+    for each in lacking:  # from the cache now; compiled here should the other process have failed
         each.compile()
 
 
-def _halves(kernels: Sequence[Kernel]) -> tuple[list[Kernel], list[Kernel]]:
-    """Two shares of about the same weight."""
-    shares: tuple[list[Kernel], list[Kernel]] = ([], [])
-    weights = [0, 0]
-    for each in sorted(kernels, key=lambda one: -one.weight):
-        least = 0 if weights[0] <= weights[1] else 1
-        shares[least].append(each)
-        weights[least] += each.weight
-    return shares
+class _Second:
+    """A second process that compiles kernels into the cache: it asks for one name after another."""
+
+    def __init__(self) -> None:
+        self.waiting: deque[str] = deque()
+        self._complete = False
+        command = [sys.executable, "-m", "shapeprog.kernels.compile"]
+        pipe, nothing = subprocess.PIPE, subprocess.DEVNULL
+        self._process = subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=nothing, text=True)
+        self._thread = threading.Thread(target=self._serve, daemon=True)
+        self._thread.start()
+
+    def _serve(self) -> None:
+        asked, answers = self._process.stdout, self._process.stdin
+        assert asked is not None
+        assert answers is not None
+        with suppress(OSError), asked, answers:  # should it fail, its kernels are compiled here
+            while asked.readline():
+                name = self._next()
+                if not name:
+                    break
+                answers.write(f"{name}\n")
+                answers.flush()
+
+    def _next(self) -> str:
+        """The next name, once there is one; none at the end."""
+        while True:
+            with suppress(IndexError):
+                return self.waiting.popleft()
+            if self._complete:
+                return ""
+            time.sleep(0.01)
+
+    def finish(self, wait: bool) -> None:
+        """Tell it that no more will come, and wait for what it is at, or end it."""
+        self._complete = True
+        try:
+            if wait:
+                self._process.wait()
+        finally:
+            self._process.kill()
+            self._process.wait()
+            self._thread.join()
 
 
 def _declare_helpers() -> None:
@@ -212,7 +242,8 @@ def _digest(function: Function, compiler: str) -> str:
     found = sha256(compiler.encode())
     for code, values in _reached(function):
         read = sorted((name, repr(value)) for name, value in values.items() if isinstance(value, (int, float, str)))
-        found.update(repr((code.co_name, code.co_code, code.co_consts, code.co_names, read)).encode())
+        constants = [value.co_code if isinstance(value, CodeType) else value for value in code.co_consts]
+        found.update(repr((code.co_name, code.co_code, constants, code.co_names, read)).encode())
     return found.hexdigest()
 
 
@@ -228,14 +259,19 @@ def _without_collector() -> Iterator[None]:
             gc.enable()
 
 
-def _main(names: Sequence[str]) -> None:
-    """The second process: compile some kernels into the cache."""
+def _main() -> None:
+    """The second process: ask for the names of kernels and compile them into the cache."""
     from shapeprog.kernels import compile as room  # not the copy of this module that runs as a script
 
-    for name in names:
+    while True:
+        sys.stdout.write("next\n")
+        sys.stdout.flush()
+        name = sys.stdin.readline().strip()
+        if not name:
+            return
         importlib.import_module(name.partition(":")[0])
         room._kernels[name].compile()
 
 
 if __name__ == "__main__":
-    _main(sys.argv[1:])
+    _main()

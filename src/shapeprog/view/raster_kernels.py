@@ -1,4 +1,4 @@
-"""Loops over triangles and pixels: nearest triangle per pixel, depth seen from lights, light that arrives.
+"""Kernels over triangles and pixels: nearest triangle per pixel, depth seen from lights, light that arrives.
 
 Serial and without the interpreter lock, so that two views can be drawn in two threads.
 """
@@ -8,69 +8,88 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
+
+from shapeprog.kernels.compile import helper, kernel
 
 BACKGROUND = -1
 """Face of a pixel that shows the ground."""
 
 
-@njit(cache=True, nogil=True, inline="always")
-def _span(wb, wc, step_b, step_c, first, last):  # type: ignore[no-untyped-def]
+@helper
+def first_pixel(a, b, c):
+    """First pixel whose middle three coordinates may enclose."""
+    return max(0, math.ceil(min(min(a, b), c) - 0.5))
+
+
+@helper
+def last_pixel(a, b, c, size):
+    """Last of ``size`` pixels whose middle three coordinates may enclose."""
+    return min(size - 1, math.floor(max(max(a, b), c) - 0.5))
+
+
+@helper
+def narrow(low, high, weight, step):
+    """The stretch of a row where a weight, given at pixel 0, is not negative as well."""
+    weight += 1e-9
+    if step > 1e-15:
+        low = max(low, -weight / step)
+    elif step < -1e-15:
+        high = min(high, -weight / step)
+    elif weight < 0:
+        high = -1.0  # nowhere
+    return low, high
+
+
+@helper
+def covered(wb, wc, step_b, step_c, first, last):
     """The pixels of a row, from ``first`` to ``last``, whose three weights are not negative; weights are given at 0."""
-    low, high = float(first), float(last)
-    for weight, step in ((wb, step_b), (wc, step_c), (1 - wb - wc, -step_b - step_c)):
-        weight += 1e-9
-        if step > 1e-15:
-            low = max(low, -weight / step)
-        elif step < -1e-15:
-            high = min(high, -weight / step)
-        elif weight < 0:
-            return 1, 0
+    low, high = narrow(float(first), float(last), wb, step_b)
+    low, high = narrow(low, high, wc, step_c)
+    low, high = narrow(low, high, 1 - wb - wc, -step_b - step_c)
     return math.ceil(low), math.floor(high)
 
 
-@njit(cache=True, nogil=True)
-def nearest_faces(points, faces, width, height, tolerance):  # type: ignore[no-untyped-def]
+@kernel("void(f8[:, ::1], i8[:, ::1], f8, i4[:, ::1], f8[:, ::1])")
+def nearest_faces(points, faces, tolerance, face, depth):
     """Face and inverse depth of every pixel; of faces in one place the first in the list shows.
 
-    ``points`` (V, 3) are pixel coordinates and inverse depth, which is linear across the screen.
+    ``points`` (V, 3) are pixel coordinates and inverse depth, which is linear across the screen.  ``face`` and
+    ``depth`` (H, W) come filled with ``BACKGROUND`` and 0.
     """
-    face = np.full((height, width), BACKGROUND, np.int32)
-    depth = np.zeros((height, width), np.float64)
+    height, width = face.shape
     for f in range(len(faces)):
         a, b, c = points[faces[f, 0]], points[faces[f, 1]], points[faces[f, 2]]
         area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
         if abs(area) < 1e-12:
             continue
-        left = max(0, math.ceil(min(a[0], b[0], c[0]) - 0.5))
-        right = min(width - 1, math.floor(max(a[0], b[0], c[0]) - 0.5))
-        low = max(0, math.ceil(min(a[1], b[1], c[1]) - 0.5))
-        high = min(height - 1, math.floor(max(a[1], b[1], c[1]) - 0.5))
+        left = first_pixel(a[0], b[0], c[0])
+        right = last_pixel(a[0], b[0], c[0], width)
+        low = first_pixel(a[1], b[1], c[1])
+        high = last_pixel(a[1], b[1], c[1], height)
         step_b, step_c = (c[1] - a[1]) / area, (a[1] - b[1]) / area
         slope = step_b * (b[2] - a[2]) + step_c * (c[2] - a[2])
         for y in range(low, high + 1):
             wb = ((0.5 - a[0]) * (c[1] - a[1]) - (y + 0.5 - a[1]) * (c[0] - a[0])) / area
             wc = ((b[0] - a[0]) * (y + 0.5 - a[1]) - (b[1] - a[1]) * (0.5 - a[0])) / area
-            first, last = _span(wb, wc, step_b, step_c, left, right)
+            first, last = covered(wb, wc, step_b, step_c, left, right)
             start = a[2] + wb * (b[2] - a[2]) + wc * (c[2] - a[2])
             for x in range(first, last + 1):
                 near = start + x * slope
                 if near > depth[y, x] * (1 + tolerance):
                     depth[y, x] = near
                     face[y, x] = f
-    return face, depth
 
 
-@njit(cache=True, nogil=True)
-def light_maps(vertices, faces, frames, size, radius):  # type: ignore[no-untyped-def]
-    """For each light the height of the highest surface below it, seen along its direction: (L, size, size).
+@kernel("void(f8[:, ::1], i8[:, ::1], f8[:, :, ::1], f8, f8[:, ::1], f4[:, :, ::1])")
+def light_maps(vertices, faces, frames, radius, placed, maps):
+    """For each light the height of the highest surface below it, seen along its direction.
 
     ``frames`` (L, 3, 3) hold two axes across the light and the direction towards it as rows; ``radius`` is half the
-    side of the square that a map covers.
+    side of the square that a map covers; ``placed`` (V, 3) is scratch; ``maps`` (L, size, size) come filled with
+    the lowest height.
     """
-    maps = np.full((len(frames), size, size), -1e9, np.float32)
+    size = maps.shape[1]
     scale = size / (2 * radius)
-    placed = np.empty((len(vertices), 3))
     for light in range(len(frames)):
         frame = frames[light]
         for v in range(len(vertices)):
@@ -86,31 +105,34 @@ def light_maps(vertices, faces, frames, size, radius):  # type: ignore[no-untype
             area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
             if abs(area) < 1e-12:
                 continue
-            left = max(0, math.ceil(min(a[0], b[0], c[0]) - 0.5))
-            right = min(size - 1, math.floor(max(a[0], b[0], c[0]) - 0.5))
-            low = max(0, math.ceil(min(a[1], b[1], c[1]) - 0.5))
-            high = min(size - 1, math.floor(max(a[1], b[1], c[1]) - 0.5))
+            left = first_pixel(a[0], b[0], c[0])
+            right = last_pixel(a[0], b[0], c[0], size)
+            low = first_pixel(a[1], b[1], c[1])
+            high = last_pixel(a[1], b[1], c[1], size)
             step_b, step_c = (c[1] - a[1]) / area, (a[1] - b[1]) / area
             slope = step_b * (b[2] - a[2]) + step_c * (c[2] - a[2])
             for y in range(low, high + 1):
                 wb = ((0.5 - a[0]) * (c[1] - a[1]) - (y + 0.5 - a[1]) * (c[0] - a[0])) / area
                 wc = ((b[0] - a[0]) * (y + 0.5 - a[1]) - (b[1] - a[1]) * (0.5 - a[0])) / area
-                first, last = _span(wb, wc, step_b, step_c, left, right)
+                first, last = covered(wb, wc, step_b, step_c, left, right)
                 start = a[2] + wb * (b[2] - a[2]) + wc * (c[2] - a[2])
                 for x in range(first, last + 1):
                     depth[y, x] = max(depth[y, x], start + x * slope)
-    return maps
 
 
-@njit(cache=True, nogil=True)
-def surface(face, depth, points, faces, normals, eye, corner, across, down, ground, everywhere):  # type: ignore[no-untyped-def]
+@kernel(
+    "void(i4[:, ::1], f8[:, ::1], f8[:, ::1], i8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8, b1,"
+    " f4[:, :, ::1], f4[:, :, ::1])"
+)
+def surface(face, depth, points, faces, normals, view, ground, everywhere, position, normal):
     """Position and normal towards the eye of every pixel; without a face, and if ``everywhere``, those of the ground.
 
-    The ray of pixel (x, y) is ``corner + x * across + y * down``; depth is inverse, along the axis of view.
+    ``view`` holds as rows the eye and the corner, across and down of its rays: that of pixel (x, y) is
+    ``corner + x * across + y * down``.  Depth is inverse, along the axis of view.  ``position`` and ``normal``
+    (H, W, 3) are written where somebody looks.
     """
     height, width = face.shape
-    position = np.empty((height, width, 3), np.float32)
-    normal = np.empty((height, width, 3), np.float32)  # left as it is where nobody looks
+    eye, corner, across, down = view[0], view[1], view[2], view[3]
     ray, here = np.empty(3), np.empty(3)
     for y in range(height):
         for x in range(width):
@@ -142,17 +164,16 @@ def surface(face, depth, points, faces, normals, eye, corner, across, down, grou
             scale = (-1.0 if facing > 0 else 1.0) / max(math.sqrt(length), 1e-12)
             for axis in range(3):
                 normal[y, x, axis] = here[axis] * scale
-    return position, normal
 
 
-@njit(cache=True, nogil=True)
-def irradiance(position, normal, skip, maps, frames, weights, radius, samples, bias):  # type: ignore[no-untyped-def]
+@kernel("void(f4[:, :, ::1], f4[:, :, ::1], i4[:, ::1], f4[:, :, ::1], f8[:, :, ::1], f8[::1], f8, i8, f8, f4[:, ::1])")
+def irradiance(position, normal, skip, maps, frames, weights, radius, samples, bias, lit):
     """Share of the light of the sky that arrives at every pixel that is not to be skipped.
 
-    Each of the ``samples`` x ``samples`` pixels that are averaged later asks another share of the lights.
+    Each of the ``samples`` x ``samples`` pixels that are averaged later asks another share of the lights.  ``lit``
+    (H, W) comes filled with 0.
     """
-    height, width, _ = position.shape
-    lit = np.zeros((height, width), np.float32)
+    height, width = lit.shape
     shares = samples * samples
     size = maps.shape[1]
     scale = size / (2 * radius)
@@ -177,14 +198,12 @@ def irradiance(position, normal, skip, maps, frames, weights, radius, samples, b
                         continue
                 arrived += weights[light] * slope
             lit[y, x] = arrived * shares
-    return lit
 
 
-@njit(cache=True, nogil=True)
-def edges(face, groups, position, normal, reach, gap):  # type: ignore[no-untyped-def]
+@kernel("void(i4[:, ::1], i8[::1], f4[:, :, ::1], f4[:, :, ::1], i8, f8, u1[:, ::1])")
+def edges(face, groups, position, normal, reach, gap, lines):
     """Lines to draw: 2 where another part or the ground begins or the surface jumps, 1 at creases, 0 elsewhere."""
     height, width = face.shape
-    out = np.zeros((height, width), np.uint8)
     for y in range(height):
         for x in range(width):
             mine, found = face[y, x], 0
@@ -209,15 +228,16 @@ def edges(face, groups, position, normal, reach, gap):  # type: ignore[no-untype
                         found = 2
                     elif cosine < 0.8:
                         found = max(found, 1)
-            out[y, x] = found
-    return out
+            lines[y, x] = found
 
 
-@njit(cache=True, nogil=True)
-def develop(face, colours, lit, lines, inks, ambient, ground, samples):  # type: ignore[no-untyped-def]
-    """Mean linear colour of every square of samples; ``ground`` is the brightness where no face is."""
+@kernel("void(i4[:, ::1], f4[:, ::1], f4[:, ::1], u1[:, ::1], f8[::1], f8, f4[:, ::1], i8, f4[:, :, ::1])")
+def develop(face, colours, lit, lines, inks, ambient, ground, samples, picture):
+    """Add up the linear colours of every square of samples; ``ground`` is the brightness where no face is.
+
+    ``picture`` (H, W, 3) comes filled with 0.
+    """
     height, width = ground.shape
-    out = np.zeros((height, width, 3), np.float32)
     for y in range(height * samples):
         for x in range(width * samples):
             f, line = face[y, x], lines[y, x]
@@ -225,9 +245,8 @@ def develop(face, colours, lit, lines, inks, ambient, ground, samples):  # type:
             if f < 0:
                 shade = ground[row, column] * (inks[3] if line == 2 else 1.0)
                 for channel in range(3):
-                    out[row, column, channel] += shade
+                    picture[row, column, channel] += shade
                 continue
             shade = (ambient + (1 - ambient) * lit[y, x]) * inks[line]
             for channel in range(3):
-                out[row, column, channel] += colours[f, channel] * shade
-    return out / (samples * samples)
+                picture[row, column, channel] += colours[f, channel] * shade

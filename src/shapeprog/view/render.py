@@ -152,43 +152,49 @@ def render(model: Model, camera: Camera, width: int, height: int, samples: int =
     faces = np.ascontiguousarray(model.faces, np.int64)
     shown = np.ascontiguousarray(model.normals, np.float64)
     points = camera.project(vertices, wide, tall)
-    face, depth = kernels.nearest_faces(points, faces, wide, tall, 1e-6)
+    face, depth = np.full((tall, wide), kernels.BACKGROUND, np.int32), np.zeros((tall, wide))
+    kernels.nearest_faces(points, faces, 1e-6, face, depth)
     scale = camera.focal * wide
     across, down = camera.right / scale, -camera.up / scale
     corner = camera.ahead + camera.right * camera.middle[0] + camera.up * camera.middle[1]
     corner = corner - across * wide / 2 - down * tall / 2
-    position, normal = kernels.surface(
-        face, depth, points, faces, shown, camera.eye, corner, across, down, camera.low, False
-    )
+    solid = (points, faces, shown)
+    position, normal = _surface(face, depth, solid, np.stack([camera.eye, corner, across, down]), camera.low, False)
     large = int(width >= LARGE)
     lights = samples**2 * max(1, min(LIGHTS[large], WORK // max(len(faces), 1)) // samples**2)
     frames, weights = _sky(lights)
-    maps = kernels.light_maps(vertices, faces, frames, MAP_SIZE[large], camera.radius)
-    sky = (maps, frames, weights, camera.radius)
+    maps = np.full((lights, MAP_SIZE[large], MAP_SIZE[large]), -1e9, np.float32)
+    kernels.light_maps(vertices, faces, frames, camera.radius, np.empty_like(vertices), maps)
     bias = 2.2 * camera.radius / MAP_SIZE[large]
-    lit = kernels.irradiance(position, normal, face, *sky, samples, bias)
+    sky = (maps, frames, weights, camera.radius)
+    lit = np.zeros((tall, wide), np.float32)
+    kernels.irradiance(position, normal, face, *sky, samples, bias, lit)
     # The ground is smooth: few places, all lights at each.
-    few = np.full((height // COARSE + 1, width // COARSE + 1), -1, np.int32)
+    few = np.full((height // COARSE + 1, width // COARSE + 1), kernels.BACKGROUND, np.int32)
     step = COARSE * samples
-    place, upward = kernels.surface(
-        few,
-        few.astype(np.float64),
-        points,
-        faces,
-        shown,
-        camera.eye,
-        corner,
-        across * step,
-        down * step,
-        camera.low,
-        True,
-    )
-    ground = 1 - SHADOW * (1 - _enlarged(kernels.irradiance(place, upward, -few, *sky, 1, bias), height, width))
-    lines = kernels.edges(face, np.asarray(model.group, np.int64), position, normal, max(1, samples // 2), 0.3)
-    colours = (np.asarray(model.colours, np.float32).reshape(-1, 3) / 255) ** GAMMA
-    linear = kernels.develop(face, colours, lit, lines, INKS, AMBIENT, ground, samples)
+    coarse = np.stack([camera.eye, corner, across * step, down * step])
+    place, upward = _surface(few, few.astype(np.float64), solid, coarse, camera.low, True)
+    sunlit = np.zeros(few.shape, np.float32)
+    kernels.irradiance(place, upward, -few, *sky, 1, bias, sunlit)
+    ground = (1 - SHADOW * (1 - _enlarged(sunlit, height, width))).astype(np.float32)
+    lines = np.zeros((tall, wide), np.uint8)
+    groups = np.asarray(model.group, np.int64)
+    kernels.edges(face, groups, position, normal, max(1, samples // 2), 0.3, lines)
+    colours = (np.ascontiguousarray(model.colours, np.float32).reshape(-1, 3) / 255) ** GAMMA
+    total = np.zeros((height, width, 3), np.float32)
+    kernels.develop(face, colours, lit, lines, INKS, AMBIENT, ground, samples, total)
+    linear = total / np.float64(samples * samples)
     image: Image = (np.clip(linear, 0, 1) ** (1 / GAMMA) * 255 + 0.5).astype(np.uint8)
     return image
+
+
+def _surface(face: Array, depth: Array, solid: Sequence[Array], view: Array, low: float, ground: bool) -> list[Array]:
+    """Position and normal (H, W, 3) of every pixel; without a face, and if ``ground``, those of the ground."""
+    from shapeprog.view.raster_kernels import surface
+
+    position, normal = (np.empty((*face.shape, 3), np.float32) for _ in range(2))
+    surface(face, depth, *solid, view, low, ground, position, normal)
+    return [position, normal]
 
 
 def _enlarged(coarse: Array, height: int, width: int) -> Array:

@@ -30,6 +30,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
+from functools import cache
 from hashlib import sha256
 from types import CodeType, FunctionType
 from typing import Any
@@ -41,7 +42,6 @@ OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "no_cfunc_wrap
 
 _lock = threading.RLock()
 _helpers: dict[Function, dict[str, Any]] = {}
-_known: set[Function] = set()
 _kernels: dict[str, Kernel] = {}
 
 
@@ -117,8 +117,7 @@ class Kernel:
 
     def _dispatcher(self) -> Any:
         numba: Any = importlib.import_module("numba")
-        _declare_helpers()
-        dispatcher = numba.njit(cache=True, **OPTIONS, **self._options)(self.function)
+        dispatcher = numba.njit(cache=True, **OPTIONS, **self._options)(_linked(self.function))
         # numba looks at the file of the kernel alone; what is compiled is the kernel with all helpers in it
         stamp = _digest(self.function, f"{numba.__version__}, bounds checked: {numba.config.BOUNDSCHECK}")
         dispatcher._cache._cache_file._source_stamp = stamp
@@ -212,14 +211,27 @@ class _Second:
             self._thread.join()
 
 
-def _declare_helpers() -> None:
-    """Let kernels call the helpers declared since the last time."""
-    from numba.extending import register_jitable
+def _linked(function: Function) -> FunctionType:
+    """A copy of a function whose helpers are compiled ones; the function itself stays as it is."""
+    found = {name: _compiled_helper(function.__globals__[name]) for name in _helpers_of(function)}
+    assert isinstance(function, FunctionType)
+    copy = FunctionType(function.__code__, {**function.__globals__, **found}, function.__name__, function.__defaults__)
+    copy.__qualname__, copy.__module__ = function.__qualname__, function.__module__
+    return copy
 
-    for function, options in _helpers.items():
-        if function not in _known:
-            _known.add(function)
-            register_jitable(no_cpython_wrapper=True, **OPTIONS, **options)(function)
+
+@cache
+def _compiled_helper(function: Function) -> Any:
+    """A helper as the compiler wants it: compiled with, and into, the kernels that reach it."""
+    numba: Any = importlib.import_module("numba")
+    return numba.njit(no_cpython_wrapper=True, **OPTIONS, **_helpers[function])(_linked(function))
+
+
+def _helpers_of(function: Function) -> list[str]:
+    """Names by which a function calls helpers."""
+    names = [name for name in function.__code__.co_names if name in function.__globals__]
+    values = {name: function.__globals__[name] for name in names}
+    return [name for name, value in values.items() if isinstance(value, FunctionType) and value in _helpers]
 
 
 def _reached(function: Function) -> Iterator[tuple[CodeType, dict[str, Any]]]:

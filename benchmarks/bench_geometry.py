@@ -25,6 +25,8 @@ from shapeprog.geometry.cells import iou, rasterise, voxels
 from shapeprog.geometry.distance import each_distance, signed_distance
 from shapeprog.geometry.losses import chamfer, coverage
 from shapeprog.geometry.occupancy import cell_centres, soft_occupancy
+from shapeprog.geometry.primitive import primitives
+from shapeprog.geometry.primitives import built_in_names
 from shapeprog.geometry.scene import Scene
 from shapeprog.geometry.surface import sample_surface
 from shapeprog.language import Code, Draw, Loop, Program, encode, unroll
@@ -105,16 +107,16 @@ def programs(count: int, seed: int = 0) -> Code:
     return encode([furniture(rng) for _ in range(count)])
 
 
-def turned_boxes(count: int, seed: int = 0) -> tuple[Scene, list[torch.Tensor]]:
-    """One scene of turned boxes, and its leaves."""
+def turned(name: str, count: int, seed: int = 0, batch: int = 1) -> tuple[Scene, list[torch.Tensor]]:
+    """Scenes of turned primitives of one name, and their leaves."""
     g = torch.Generator().manual_seed(seed)
-    size = torch.rand(1, count, 4, generator=g) * 3 + 0.3
+    size = torch.rand(batch, count, 4, generator=g) * 3 + 0.3
     size[..., 3] = 0
-    leaves = [size, torch.rand(1, count, 3, generator=g) * 24 - 12]
-    leaves.append(torch.linalg.qr(torch.randn(1, count, 3, 3, generator=g))[0])
+    leaves = [size, torch.rand(batch, count, 3, generator=g) * 24 - 12]
+    leaves.append(torch.linalg.qr(torch.randn(batch, count, 3, 3, generator=g))[0])
     leaves = [leaf.requires_grad_() for leaf in leaves]
-    kind = torch.zeros(1, count, dtype=torch.long)
-    return Scene(kind, *leaves, kind == 0, kind, kind, kind), leaves
+    none = torch.zeros(batch, count, dtype=torch.long)
+    return Scene(none + primitives.kind(name), *leaves, none == 0, none, none, none), leaves
 
 
 # ---------------------------------------------------------------- rows
@@ -148,12 +150,12 @@ def _slices(scene: Scene) -> np.ndarray:
     cells = np.zeros((len(scene), 32, 32, 32), np.uint8)
     ticks = np.arange(32) - 15.5
     kind, size, centre, mask = (t.numpy() for t in (scene.kind, scene.size, scene.centre, scene.mask))
-    turned = np.abs(scene.rotation.numpy())
+    box, turned = primitives.kind("cuboid"), np.abs(scene.rotation.numpy())
     for b, n in zip(*np.nonzero(mask), strict=True):
-        half = turned[b, n] @ (size[b, n, :3] if kind[b, n] == 0 else size[b, n, [0, 1, 1]])
+        half = turned[b, n] @ (size[b, n, :3] if kind[b, n] == box else size[b, n, [0, 1, 1]])
         low = np.clip(np.rint(centre[b, n] - half) + 16, 0, 32).astype(int)
         high = np.clip(np.rint(centre[b, n] + half) + 16, 0, 32).astype(int)
-        if kind[b, n] == 1:
+        if kind[b, n] != box:
             away = (ticks[:, None] - centre[b, n, 1]) ** 2 + (ticks[None] - centre[b, n, 2]) ** 2
             cells[b, low[0] : high[0], away <= (1.01 * size[b, n, 1]) ** 2] = 1
         elif size[b, n, 3] == 0:
@@ -223,7 +225,7 @@ def bench_chamfer(batch: int) -> None:
 
 
 def bench_distance() -> None:
-    scene, leaves = turned_boxes(64)
+    scene, leaves = turned("cuboid", 64)
     target = torch.rand(1, POINTS, 3, generator=torch.Generator().manual_seed(1)) * 24 - 12
     centres = cell_centres().reshape(1, -1, 3)
 
@@ -249,6 +251,30 @@ def bench_distance() -> None:
         report(f"{name}, forward + backward", took, 1e3, "ms", "eager over all pairs", eager)
 
 
+def bench_primitives(batch: int) -> None:
+    """What each built-in primitive costs beside the cuboid, in scenes of 20 turned ones."""
+    target = torch.rand(batch, POINTS, 3, generator=torch.Generator().manual_seed(1)) * 24 - 12
+    cuboid: dict[str, Time] = {}
+    for name in sorted(built_in_names(), key=lambda one: one != "cuboid"):
+        scene, leaves = turned(name, 20, batch=batch)
+
+        def surface(scene: Scene = scene) -> torch.Tensor:
+            sample = sample_surface(scene, POINTS, torch.Generator().manual_seed(0))
+            return ((sample.points**2).sum(-1) * sample.weights).mean()
+
+        rows = {
+            "distance of 5000 points, forward + backward": lambda s=scene: signed_distance(s, target).mean(),
+            "5000 surface points, forward + backward": surface,
+            "cells at 32^3": lambda s=scene: rasterise(s),
+            "cells at 128^3": lambda s=scene: rasterise(s, 128),
+        }
+        for what, work in rows.items():
+            grad = "backward" in what
+            took = clock(lambda work=work, of=leaves: torch.autograd.grad(work(), of) if grad else work())  # noqa: B023
+            cuboid.setdefault(what, took)
+            report(f"{name}, 20 of them: {what}", took, 1e3 / batch, "ms/scene", "as many cuboids", cuboid[what])
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--quick", action="store_true", help="smaller batches")
@@ -259,6 +285,7 @@ def main() -> None:
     bench_sampling(8 if options.quick else 32)
     bench_chamfer(4 if options.quick else 32)
     bench_distance()
+    bench_primitives(2 if options.quick else 16)
 
 
 if __name__ == "__main__":

@@ -27,8 +27,9 @@ THINNEST = 1e-6
 STEPS = 24
 """Newton steps to a foot; kernels stop once it no longer moves."""
 
-CLOSE = 1e-14
-"""How far from 1 the length of a place on the unit sphere may be that counts as on it."""
+CLOSE = 1e-9
+"""How far from 1 the squared length of a place may be that counts as on the unit sphere: errors of the distance, which
+is least at the foot, are squares of this."""
 
 TRIES = 40
 """Places drawn before one is taken as it comes; at least half of them are kept each time."""

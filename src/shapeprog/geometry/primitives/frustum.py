@@ -154,13 +154,13 @@ def bound_kernel(table: Array, row: int) -> tuple[float, float, float]:
 
 @helper
 def excess_kernel(table: Array, row: int, a: float, b: float, c: float) -> float:
-    """How far a point is beyond the caps, or its squared distance from the axis beyond that of the side there."""
-    half, bottom, top = table[row, SIZE], table[row, SIZE + 1], table[row, SIZE + 2]
+    """How far a point is beyond the caps, or beyond the side there, by squared distances from the axis, scaled."""
+    half = table[row, SIZE]
     over_cap = abs(a) - half
-    if over_cap > 0 or half <= 0:
-        return max(over_cap, 0.0)
-    radius = bottom + (top - bottom) * (a + half) / (2 * half)
-    return max(over_cap, b * b + c * c - radius * radius)
+    if over_cap > 0:
+        return over_cap
+    radius = table[row, SIZE + 1] * (half - a) + table[row, SIZE + 2] * (half + a)
+    return max(over_cap, 4 * half * half * (b * b + c * c) - radius * radius)
 
 
 @helper

@@ -120,6 +120,10 @@ CHOSEN = [
     "tests/test_inference_boxes.py::test_the_heaviest_box_is_that_of_brute_force",
     "tests/test_data_voxelise.py::test_touched_cells_equal_the_clipping_twin",
     "tests/test_view_pictures.py::test_the_nearest_face_shows_as_in_a_slow_twin",
+    "tests/test_geometry_extremes.py",
+    "tests/test_geometry_cells.py::test_any_pose_and_kind_fills_the_same_cells_by_kernel_and_by_declaration",
+    "tests/test_geometry_surface.py::test_gradient_of_placing_is_that_of_the_declarations",
+    "tests/test_data_synthetic.py::test_every_block_has_cells_of_its_own",
 ]
 """Tests that between them run kernels of every room."""
 

@@ -9,6 +9,9 @@ from shapeprog.kernels.compile import helper
 WORD = 32
 """Cells in a word."""
 
+GOLDEN, FIRST, SECOND = 0x9E3779B97F4A7C15, 0xBF58476D1CE4E5B9, 0x94D049BB133111EB
+"""The step and the two factors of SplitMix64 (Steele, Lea and Flood 2014), which makes random numbers of a counter."""
+
 
 @helper
 def span(first, last):
@@ -32,10 +35,10 @@ def ones(word):
 def uniform(seed, count):
     """Number ``count`` of the stream of a seed, uniform in [0, 1): a counter put through the mixer of SplitMix64.
 
-    Steele, Lea and Flood 2014.  Its twin in torch is :func:`shapeprog.geometry.surface.uniform`.
+    Its twin in torch is :func:`shapeprog.geometry.random.uniform`.
     """
-    word = np.uint64(seed) + np.uint64(count + 1) * np.uint64(0x9E3779B97F4A7C15)
-    word = (word ^ (word >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
-    word = (word ^ (word >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+    word = np.uint64(seed) + np.uint64(count + 1) * np.uint64(GOLDEN)
+    word = (word ^ (word >> np.uint64(30))) * np.uint64(FIRST)
+    word = (word ^ (word >> np.uint64(27))) * np.uint64(SECOND)
     word = word ^ (word >> np.uint64(31))
     return float(word >> np.uint64(11)) * (1.0 / 9007199254740992.0)

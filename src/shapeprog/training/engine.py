@@ -18,6 +18,7 @@ import torch
 from torch import Tensor, nn
 
 from shapeprog.errors import ShapeProgError
+from shapeprog.kernels.bits import FIRST, GOLDEN, SECOND
 
 AHEAD = 2
 """Batches that are made while a step is under way."""
@@ -148,9 +149,9 @@ def scrambled(*numbers: int) -> int:
     """One seed of 63 bits from several numbers; nearby ones give unrelated seeds (the mixing of splitmix64)."""
     state = 0
     for number in numbers:
-        state = (state + number + 0x9E3779B97F4A7C15) % 2**64
-        state = (state ^ state >> 30) * 0xBF58476D1CE4E5B9 % 2**64
-        state = (state ^ state >> 27) * 0x94D049BB133111EB % 2**64
+        state = (state + number + GOLDEN) % 2**64
+        state = (state ^ state >> 30) * FIRST % 2**64
+        state = (state ^ state >> 27) * SECOND % 2**64
         state ^= state >> 31
     return state >> 1
 

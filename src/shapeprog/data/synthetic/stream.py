@@ -12,6 +12,7 @@ from shapeprog.data.synthetic.mixture import Prior
 from shapeprog.errors import InputError
 from shapeprog.geometry.cells import unpack
 from shapeprog.geometry.surface import sample_surface
+from shapeprog.kernels.bits import FIRST, GOLDEN
 from shapeprog.language.tensors import Code
 from shapeprog.language.unroll import unroll
 
@@ -101,5 +102,5 @@ class Stream:
 
     def _random(self, number: int) -> torch.Generator:
         """Randomness of its own for each group of batches, and for the points of each batch."""
-        mixed = (self.seed * 0x9E3779B97F4A7C15 + number * 0xBF58476D1CE4E5B9 + 1) % 2**63
+        mixed = (self.seed * GOLDEN + number * FIRST + 1) % 2**63
         return torch.Generator(self.device).manual_seed(mixed)

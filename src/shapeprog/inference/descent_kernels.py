@@ -158,23 +158,29 @@ def moves(block, out, far):
     return n
 
 
-@kernel("f8(f8[::1], i8, i8, u8[::1], u8[::1], f8, i8, u4[::1], u8[::1], f8[:, ::1])")
-def descend(block, inter, union, gained, wasted, price, far, rows, words, around):
+@kernel("f8(f8[::1], u8[::1], u8[::1], f8, i8, u4[:, ::1], u8[:, ::1], f8[:, ::1])")
+def descend(block, occupied, others, price, far, scratch_rows, scratch_words, around):
     """Best-improvement descent of one block in its place; its objective.
 
     Parameters
     ----------
     block
         The block, which is moved.
-    inter, union
-        Cells that the other blocks share with the solid, and cells of either.
-    gained, wasted
-        Cells of the solid, and empty cells, that no other block covers, as words (512).
+    occupied, others
+        The solid, and what the other blocks cover, as words (512).
     price, far
         IoU that one statement has to earn, and most cells that one move goes.
-    rows, words, around
-        Scratch: the same 1024 words of 32 cells as 512 of 64, and room for the block and its neighbours (M, 20).
+    scratch_rows, scratch_words, around
+        Scratch: the same three times 1024 words of 32 cells as 512 of 64, and room for all neighbours (M, 20).
     """
+    rows, words, gained, wasted = scratch_rows[0], scratch_words[0], scratch_words[1], scratch_words[2]
+    inter = 0
+    union = 0
+    for i in range(len(occupied)):
+        gained[i] = occupied[i] & ~others[i]
+        wasted[i] = ~occupied[i] & ~others[i]
+        inter += ones(occupied[i] & others[i])
+        union += ones(occupied[i] | others[i])
     best = -np.inf
     for slot in range(len(block)):
         around[0, slot] = block[slot]

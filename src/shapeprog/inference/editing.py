@@ -57,13 +57,13 @@ def value_of(blocks: FloatArray, target: Target) -> float:
 
 def iou(blocks: FloatArray, target: Target) -> float:
     """IoU of the cells that blocks draw with those of the target."""
-    return float(_ious(draw_all(blocks)[None], target)[0])
+    return _iou(draw_all(blocks), target)
 
 
-def _ious(drawn: Rows, target: Target) -> FloatArray:
-    """IoU of each of several sets of rows (P, 1024) with the target."""
-    counts = cells_shared(drawn, target.occupied, ~target.occupied)
-    return counts[:, 0] / (target.cells + counts[:, 1])
+def _iou(drawn: Rows, target: Target) -> float:
+    """IoU of rows (1024) with the target."""
+    inter, beyond = cells_shared(drawn[None], target.occupied, ~target.occupied)[0].tolist()
+    return float(inter / (target.cells + beyond))
 
 
 def improve_block(block: FloatArray, occupied: Rows, others: Rows, price: float, far: int) -> tuple[FloatArray, float]:
@@ -78,15 +78,9 @@ def improve_block(block: FloatArray, occupied: Rows, others: Rows, price: float,
     far
         Most cells that one move goes.
     """
-    rows, better = np.empty((5, ROWS), np.uint32), block.copy()
-    np.bitwise_and(occupied, ~others, out=rows[0])
-    np.bitwise_and(~occupied, ~others, out=rows[1])
-    np.bitwise_and(occupied, others, out=rows[2])
-    np.bitwise_or(occupied, others, out=rows[3])
+    better, rows, around = block.copy(), np.empty((3, ROWS), np.uint32), np.empty((MOST_MOVES, WIDTH))
     words = rows.view(np.uint64)
-    inter, union = np.bitwise_count(words[2:4]).sum(1).tolist()
-    around = np.empty((MOST_MOVES, WIDTH))
-    value = descend(better, inter, union, words[0], words[1], price, far, rows[4], words[4], around)
+    value = descend(better, occupied.view(np.uint64), others.view(np.uint64), price, far, rows, words, around)
     return better, value
 
 
@@ -118,12 +112,11 @@ def polish(blocks: FloatArray, target: Target, far: int, sweeps: int) -> FloatAr
                 drawn[k] = draw_all(better[None])
         if not changed:
             break
-    k = 0
+    k, whole = 0, _iou(_union(drawn, len(drawn)), target)
     while k < len(blocks):
-        others = _union(drawn, k)
-        without, with_it = _ious(np.stack([others, others | drawn[k]]), target)
-        if without >= with_it - target.price * statements(blocks[k]):
-            blocks, drawn = np.delete(blocks, k, 0), np.delete(drawn, k, 0)
+        without = _iou(_union(drawn, k), target)
+        if without >= whole - target.price * statements(blocks[k]):
+            blocks, drawn, whole = np.delete(blocks, k, 0), np.delete(drawn, k, 0), without
         else:
             k += 1
     return blocks

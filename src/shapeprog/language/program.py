@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from shapeprog.language.statement import language
-
 PUBLISHED_DEPTH = 3
 """Steps of one block in the published generator."""
 
@@ -96,18 +94,6 @@ class Program:
     def snap(self) -> Program:
         """The program with every number rounded half to even to a whole one, as published executors do."""
         return Program(tuple(_snap(node) for node in self.body))
-
-    def outside_published(self) -> list[str]:
-        """Why the program leaves the published blocks [k], [19,k], [19,19,k], [20,10], [20,17]; empty if it stays."""
-        reasons = []
-        for number, chain in enumerate(self.chains, 1):
-            words = [node.name for node in chain]
-            ids = [language()[word].id for word in words]
-            loops = ids[:-1]
-            plain = 1 <= ids[-1] <= 18 and loops in ([], [19], [19, 19])
-            if not plain and ids not in ([20, 10], [20, 17]):
-                reasons.append(f"block {number} ({' > '.join(words)}) is none of the published blocks")
-        return reasons
 
 
 def nest(chain: Chain) -> Node:

@@ -21,7 +21,6 @@ from shapeprog.geometry.scene import Scene
 from shapeprog.language.program import Program
 from shapeprog.language.statement import EMPTY, END, Statement, language
 from shapeprog.language.tensors import Code, encode
-from shapeprog.space import RESOLUTION
 
 MOST_PRIMITIVES = 1 << 20
 """Most copies that one batch may unroll to; more is a mistake in a loop count."""
@@ -46,14 +45,6 @@ def draw_blocks(code: Code) -> Int[Tensor, "*batch K 32 32"]:
     """The packed cells of every block on its own, as an executor of whole numbers draws it: parameters are rounded."""
     scene = unroll(Code(code.ids, code.parameters.detach().round()))
     return rasterise_apart(scene, scene.block, code.ids.shape[-2])
-
-
-def stays_inside(code: Code) -> Bool[Tensor, "*batch K"]:
-    """Which blocks have the centre of every copy within the grid; what lies outside of it no canvas shows."""
-    lead, (steps, slots) = code.ids.shape[:-1], code.parameters.shape[-2:]
-    scene = unroll(Code(code.ids.reshape(-1, 1, steps), code.parameters.detach().reshape(-1, 1, steps, slots)))
-    within = (scene.centre.abs() <= RESOLUTION / 2).all(-1) | ~scene.mask
-    return within.all(-1).reshape(lead)
 
 
 @dataclass(frozen=True)

@@ -11,23 +11,14 @@ from shapeprog.space import HALF, RESOLUTION
 
 Kind = Literal["position", "length", "shift", "count", "turn"]
 
-DISCRETE: frozenset[str] = frozenset({"count", "turn"})
-"""Kinds that take whole numbers and receive no gradient."""
-
 
 @dataclass(frozen=True)
 class Quantity:
     """A group of numbers of one kind.
 
-    Parameters
-    ----------
-    kind
-        ``position`` and ``shift`` are coordinates in cells (a shift is relative), ``length`` an extent in cells,
-        ``count`` a number of copies, ``turn`` a number of quarter turns.
-    width
-        How many numbers, one tensor slot each.
-    low, high
-        Range that programs are sampled from and that errors name.
+    ``position`` and ``shift`` are coordinates in cells (a shift is relative), ``length`` is an extent in cells,
+    ``count`` a number of copies, ``turn`` a number of quarter turns.  The width is how many numbers there are, one
+    tensor slot each; programs are sampled from ``low`` to ``high``, which errors name.
     """
 
     kind: Kind
@@ -38,7 +29,7 @@ class Quantity:
     @property
     def discrete(self) -> bool:
         """Whether the numbers are whole and carry no gradient."""
-        return self.kind in DISCRETE
+        return self.kind in ("count", "turn")
 
 
 Position = Annotated[Tensor, Quantity("position", 3, -HALF, HALF)]
@@ -54,17 +45,7 @@ Turn = Annotated[Tensor, Quantity("turn", 1, -64, 64)]
 
 @dataclass(frozen=True)
 class Parameter:
-    """One named parameter of a statement and the tensor slots it takes.
-
-    Parameters
-    ----------
-    name
-        Keyword in program text.
-    quantity
-        Kind, width and range.
-    start
-        First of its slots.
-    """
+    """One named parameter of a statement and the first of the tensor slots it takes."""
 
     name: str
     quantity: Quantity

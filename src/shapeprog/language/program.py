@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -38,13 +39,7 @@ Chain = tuple[Draw | Loop, ...]
 
 @dataclass(frozen=True)
 class Program:
-    """A shape as a list of drawing statements and loops.
-
-    Parameters
-    ----------
-    body
-        The statements in the order they are written.
-    """
+    """A shape as a list of drawing statements and loops, in the order they are written."""
 
     body: tuple[Node, ...] = ()
 
@@ -54,7 +49,7 @@ class Program:
 
         A loop around several statements is the union of that loop around each, so nothing is lost.
         """
-        return [chain for node in self.body for chain in _chains(node, ())]
+        return [chain for node in self.body for chain in _chains(node)]
 
     @property
     def statements(self) -> int:
@@ -69,14 +64,7 @@ class Program:
     @property
     def size(self) -> int:
         """Number of drawn copies after unrolling."""
-        total = 0
-        for chain in self.chains:
-            copies = 1
-            for node in chain[:-1]:
-                assert isinstance(node, Loop)
-                copies *= node.count
-            total += copies
-        return total
+        return sum(math.prod(node.count for node in chain if isinstance(node, Loop)) for chain in self.chains)
 
     def walk(self) -> Iterator[Node]:
         """Every node in the order of the text."""
@@ -105,13 +93,12 @@ def nest(chain: Chain) -> Node:
     return node
 
 
-def _chains(node: Node, loops: tuple[Loop, ...]) -> Iterator[Chain]:
+def _chains(node: Node, *loops: Loop) -> Iterator[Chain]:
     if isinstance(node, Draw):
         yield (*loops, node)
     else:
-        bare = Loop(node.name, node.values, ())
         for inner in node.body:
-            yield from _chains(inner, (*loops, bare))
+            yield from _chains(inner, *loops, Loop(node.name, node.values, ()))
 
 
 def _snap(node: Node) -> Node:

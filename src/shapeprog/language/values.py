@@ -20,32 +20,19 @@ LARGEST_WHOLE = 1 << 24
 
 
 def to_float32(value: float) -> float:
-    """The float32 nearest to ``value``.
-
-    Raises
-    ------
-    ShapeProgError
-        If the value is not finite, or too large for float32.
-    """
+    """The float32 nearest to ``value``; a ``ShapeProgError`` if it is not finite, or too large for float32."""
     try:
         single: float = struct.unpack("f", struct.pack("f", value))[0]
     except OverflowError:
         single = math.inf
     if not math.isfinite(single):
-        raise ShapeProgError(
-            "this number is too large or no number at all", f"numbers go from -{LARGEST:.7e} to {LARGEST:.7e}"
-        )
+        limits = f"numbers go from -{LARGEST:.7e} to {LARGEST:.7e}"
+        raise ShapeProgError("this number is too large or no number at all", limits)
     return single
 
 
 def shortest(value: float) -> str:
-    """The shortest decimal that reads back as exactly this float32: ``16``, ``0.1``, ``-0.0``, ``1e-40``.
-
-    Raises
-    ------
-    ShapeProgError
-        If the value is not finite, or too large for float32.
-    """
+    """The shortest decimal that reads back as exactly this float32: ``16``, ``0.1``, ``-0.0``, ``1e-40``."""
     single = to_float32(value)
     decimal = float(str(np.float32(single)))
     if to_float32(decimal) != single:  # it was rounded twice on its way through float64
@@ -84,15 +71,15 @@ def checked(declared: Statement, parameter: Parameter, numbers: Sequence[float])
         wanted = "1 number" if quantity.width == 1 else f"{quantity.width} numbers"
         raise ShapeProgError(f"{place} takes {wanted}, not {len(numbers)}", f"write {blank(parameter)}")
     singles = [to_float32(number) for number in numbers]
+    if not quantity.discrete:
+        return singles
     for number in numbers:
-        if quantity.discrete and number != math.floor(number):
+        if number != math.floor(number):
             raise ShapeProgError(f"{place} is {number!r}, but must be whole", f"it takes {range_text(quantity)}")
-        if quantity.discrete and abs(number) > LARGEST_WHOLE:
-            raise ShapeProgError(
-                f"{place} is {int(number)}, beyond {LARGEST_WHOLE}, the end of exact whole numbers",
-                f"it takes {range_text(quantity)}",
-            )
-    return [single + 0.0 for single in singles] if quantity.discrete else singles
+        if abs(number) > LARGEST_WHOLE:
+            said = f"{place} is {int(number)}, beyond {LARGEST_WHOLE}, the end of exact whole numbers"
+            raise ShapeProgError(said, f"it takes {range_text(quantity)}")
+    return [single + 0.0 for single in singles]  # no minus zero
 
 
 def blank(parameter: Parameter) -> str:
@@ -105,6 +92,5 @@ def signature(declared: Statement) -> str:
     """How a statement is written, with a blank for each number; loops begin with ``for i in``."""
     words = [blank(parameter) for parameter in declared.parameters]
     if declared.is_loop:
-        words[0] = "_"
-        return f"for i in {declared.name}({', '.join(words)}):"
+        return f"for i in {declared.name}({', '.join(['_', *words[1:]])}):"
     return f"{declared.name}({', '.join(words)})"

@@ -73,11 +73,8 @@ class _Reader:
         except SyntaxError as error:
             row = min(max(error.lineno or 1, 1), len(self.lines))
             column = min(max(error.offset or 1, 1), len(self.lines[row - 1]) + 1)
-            reason, hint = (
-                (error.msg or "invalid syntax").split(";")[0],
-                "a line is name(parameter=number, ...) or a for loop",
-            )
-            raise self._at(row, column, f"this cannot be read: {reason}", hint) from None
+            said = f"this cannot be read: {(error.msg or 'invalid syntax').split(';')[0]}"
+            raise self._at(row, column, said, "a line is name(parameter=number, ...) or a for loop") from None
         except (RecursionError, MemoryError):
             raise self._at(1, 1, "this is nested too deeply to be a program", "write plain numbers") from None
 

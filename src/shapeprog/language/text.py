@@ -25,8 +25,7 @@ def format_program(program: Program) -> str:
     Raises
     ------
     ShapeProgError
-        If a number is not finite, a statement is not declared or has another number of values, or loops nest deeper than
-        text can.
+        If a number is not finite, a statement is not declared or has more or fewer, or loops nest deeper than text can.
     """
     return "".join(f"{line}\n" for node in program.body for line in _lines(node, 0))
 

@@ -172,9 +172,6 @@ class Language:
     def __iter__(self) -> Iterator[Statement]:
         return iter(sorted(self._by_id.values(), key=lambda declared: declared.id))
 
-    def __len__(self) -> int:
-        return len(self._by_id)
-
     @property
     def names(self) -> list[str]:
         """All names in order of id."""

@@ -117,9 +117,8 @@ class Plan:
         centre = torch.cat([values.new_zeros(0, 3), *(part.centre for part in parts)])
         identity, rotation = torch.eye(3, device=values.device, dtype=values.dtype), None
         if any(part.rotation is not None for part in parts):
-            rotation = torch.cat(
-                [identity.expand(len(p.size), 3, 3) if p.rotation is None else p.rotation for p in parts]
-            )
+            turns = [identity.expand(len(p.size), 3, 3) if p.rotation is None else p.rotation for p in parts]
+            rotation = torch.cat(turns)
         turn, shift = self._motion(values, layout.source)
         if turn is not None:
             centre = (turn @ centre[..., None])[..., 0]
@@ -131,10 +130,10 @@ class Plan:
         slots = table.reshape(*layout.mask.shape, table.shape[1])
         size, centre = slots[..., :SIZES], slots[..., SIZES : SIZES + 3]
         mask = layout.mask & ((size.detach() >= 0) | layout.signed).all(-1)
-        turns = identity.expand(*mask.shape, 3, 3)
+        pose = identity.expand(*mask.shape, 3, 3)
         if rotation is not None:
-            turns = torch.where(mask[..., None, None], slots[..., SIZES + 3 :].unflatten(-1, (3, 3)), turns)
-        return Scene(size=size, centre=centre, rotation=turns, mask=mask, **layout.fixed)
+            pose = torch.where(mask[..., None, None], slots[..., SIZES + 3 :].unflatten(-1, (3, 3)), pose)
+        return Scene(size=size, centre=centre, rotation=pose, mask=mask, **layout.fixed)
 
     def _layout(self, drawn: tuple[tuple[int, ...], ...]) -> _Layout:
         """The layout for the kinds of primitive that each statement returned; made once."""
@@ -155,14 +154,11 @@ class Plan:
         whole = torch.cat([self._whole[:, source], kind[None]])
         fixed = torch.cat([whole, whole.new_zeros(4, 1)], -1)[:, gather]
         extents = torch.tensor([known.extents for known in primitives], device=rank.device)[fixed[3]]
-        self._known = _Layout(
-            drawn,
-            None if all(len(kinds) == 1 for kinds in drawn) else source,
-            gather.flatten(),
-            gather < len(order),
-            torch.arange(SIZES, device=rank.device) >= extents[..., None],
-            dict(zip(("statement", "block", "copy", "kind"), fixed, strict=True)),
-        )
+        signed = torch.arange(SIZES, device=rank.device) >= extents[..., None]
+        single = all(len(kinds) == 1 for kinds in drawn)
+        fields = dict(zip(("statement", "block", "copy", "kind"), fixed, strict=True))
+        mask = gather < len(order)
+        self._known = _Layout(drawn, None if single else source, gather.flatten(), mask, signed, fields)
         return self._known
 
     def _motion(
@@ -172,8 +168,7 @@ class Plan:
         if not self._levels:
             return None, None
         shift = values.new_zeros(len(self._rank), 3)
-        turn: Tensor | None = None
-        axis: Tensor | None = None
+        turn = axis = None
         for level in self._levels:
             assert level.declared.move is not None
             named = level.declared.split(values.index_select(0, level.place))
@@ -220,10 +215,8 @@ def _copies(
     counts = torch.where((place < step) & legal, counts, 1)
     total = counts.double().prod(-1) * legal[:, 0]
     if float(total.sum()) > MOST_PRIMITIVES:
-        raise ShapeProgError(
-            f"the loops of this program make {float(total.sum()):.0f} copies",
-            f"lower the counts: at most {MOST_PRIMITIVES} primitives can be drawn at once",
-        )
+        hint = f"lower the counts: at most {MOST_PRIMITIVES} primitives can be drawn at once"
+        raise ShapeProgError(f"the loops of this program make {float(total.sum()):.0f} copies", hint)
     last = total.long().cumsum(0)
     many = torch.arange(int(total.sum()), device=ids.device)
     row = torch.searchsorted(last, many, right=True)  # repeat_interleave wakes threads for a handful of rows

@@ -92,6 +92,14 @@ class Statement:
         """Quantity of every slot in use, in order."""
         return tuple(p.quantity for p in self.parameters for _ in range(p.quantity.width))
 
+    @property
+    def signature(self) -> str:
+        """How it is written, with a blank for each number; loops begin with ``for i in``."""
+        words = [parameter.blank for parameter in self.parameters]
+        if self.is_loop:
+            return f"for i in {self.name}({', '.join(['_', *words[1:]])}):"
+        return f"{self.name}({', '.join(words)})"
+
     def split(self, values: Float[Tensor, "*batch 7"]) -> dict[str, Tensor]:
         """Parameter tensors by name: (...) for one slot, (..., width) for several; turns and counts are rounded."""
         named = {}

@@ -7,10 +7,9 @@ import re
 import warnings
 
 from shapeprog.errors import ProgramError, ShapeProgError, did_you_mean
-from shapeprog.language.parameters import Parameter
+from shapeprog.language.parameters import Parameter, to_float32
 from shapeprog.language.program import Draw, Loop, Node, Program
 from shapeprog.language.statement import Statement, language
-from shapeprog.language.values import blank, checked, signature, to_float32
 
 DEEPEST = 64
 """How deep loops may nest in text; Python itself ends at 100 levels of indentation."""
@@ -144,10 +143,10 @@ class _Reader:
     def _numbers(self, declared: Statement, parameter: Parameter, node: ast.expr) -> list[float]:
         place = f"{parameter.name} of {declared.name}"
         if isinstance(node, ast.Tuple) and parameter.quantity.width == 1:
-            raise self._error(node, f"{place} takes 1 number, not a group", f"write {blank(parameter)}")
+            raise self._error(node, f"{place} takes 1 number, not a group", f"write {parameter.blank}")
         numbers = [self._number(place, each) for each in (node.elts if isinstance(node, ast.Tuple) else [node])]
         try:
-            return checked(declared, parameter, numbers)
+            return parameter.checked(declared.name, numbers)
         except ShapeProgError as mistake:
             raise self._error(node, mistake.message, mistake.hint) from None
 
@@ -174,7 +173,7 @@ class _Reader:
         return text if len(text) <= _SHOWN else text[:_SHOWN] + "..."
 
     def _misused(self, node: ast.expr, message: str, declared: Statement) -> ProgramError:
-        return self._error(node, message, f"write {signature(declared)}")
+        return self._error(node, message, f"write {declared.signature}")
 
     def _error(self, node: ast.stmt | ast.expr | ast.keyword, message: str, hint: str) -> ProgramError:
         before = self.lines[node.lineno - 1].encode()[: node.col_offset]  # ast counts columns in bytes of UTF-8

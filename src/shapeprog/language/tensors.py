@@ -12,9 +12,9 @@ from jaxtyping import Float, Int
 from torch import Tensor
 
 from shapeprog.errors import ShapeProgError
+from shapeprog.language.parameters import LARGEST_WHOLE
 from shapeprog.language.program import PUBLISHED_DEPTH, Chain, Draw, Loop, Program, nest
 from shapeprog.language.statement import EMPTY, END, SLOTS, language
-from shapeprog.language.values import LARGEST_WHOLE
 from shapeprog.space import Array
 
 

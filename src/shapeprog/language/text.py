@@ -13,7 +13,6 @@ from shapeprog.language.program import Loop, Node, Program
 from shapeprog.language.statement import language
 from shapeprog.language.syntax import DEEPEST
 from shapeprog.language.syntax import parse as parse
-from shapeprog.language.values import written
 
 INDENT = "    "
 """One level of indentation."""
@@ -40,7 +39,7 @@ def _call(node: Node) -> str:
         raise ShapeProgError(said, "mend the program")
     words: list[str] = []
     for parameter in declared.parameters:
-        numbers = [written(parameter.quantity, value) for value in node.values[parameter.slots]]
+        numbers = [parameter.quantity.written(value) for value in node.values[parameter.slots]]
         group = numbers[0] if len(numbers) == 1 else f"({', '.join(numbers)})"
         words.append(group if declared.is_loop and not words else f"{parameter.name}={group}")
     return f"{node.name}({', '.join(words)})"

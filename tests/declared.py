@@ -6,10 +6,10 @@ from pathlib import Path
 
 from hypothesis import strategies as st
 
+from shapeprog.formats.plugins import load_statements
 from shapeprog.language import Draw, Language, Loop, Program, Statement, standard, using
 from shapeprog.language import builtin as builtin
-from shapeprog.language.plugins import load_statements
-from shapeprog.language.values import LARGEST_WHOLE
+from shapeprog.language.parameters import LARGEST_WHOLE
 
 EXAMPLES = Path(__file__).parents[1] / "examples" / "statements"
 MODULES = sorted(EXAMPLES.glob("*.py"))

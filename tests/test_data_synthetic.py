@@ -12,6 +12,7 @@ from typer.testing import CliRunner
 
 from shapeprog.cli.app import app
 from shapeprog.data import read_pack
+from shapeprog.data.random import outside_published
 from shapeprog.data.synthetic import PRIORS, Prior, Stream, prior, read_programs, write_programs
 from shapeprog.data.synthetic.hiding import with_own_cells, with_own_cells_by_torch
 from shapeprog.errors import InputError, OutputError, ShapeProgError
@@ -48,7 +49,7 @@ def test_every_sample_is_a_published_program_of_whole_numbers(each: Prior, seed:
     assert code.parameters.shape == (256, each.blocks, 3, 7)
     assert torch.equal(code.parameters, code.parameters.round())
     for program, blocks in zip(decode(code), statements(code).sum(-1).tolist(), strict=True):
-        assert program.outside_published() == []
+        assert outside_published(program) == []
         assert 1 <= program.blocks == blocks
 
 

@@ -7,6 +7,7 @@ from geometry_helpers import make_scene, random_scene, require
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from shapeprog.data.random import random_program
 from shapeprog.errors import ShapeProgError
 from shapeprog.geometry import cells as room
 from shapeprog.geometry.cells import (
@@ -27,7 +28,6 @@ from shapeprog.geometry.cells import (
 from shapeprog.geometry.primitive import primitives
 from shapeprog.geometry.scene import Scene
 from shapeprog.language import Code, encode, unroll
-from shapeprog.language.sampling import random_program
 from shapeprog.language.text import parse
 
 PARAMETERS = [0, 6, 6, 5, 5, 6, 5, 5, 5, 5, 6, 6, 6, 6, 6, 7, 6, 7, 6, 4, 2, 0]

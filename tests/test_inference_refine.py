@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import torch
 
+from shapeprog.data.random import outside_published
 from shapeprog.data.shape import Shape
 from shapeprog.errors import InputError
 from shapeprog.geometry.cells import voxels as voxels_of
@@ -81,7 +82,7 @@ def test_snapping_brings_a_perturbed_program_back():
 
 def check(result, blocks=10):
     assert snapped_from(result.program, result.snapped)
-    assert result.program.outside_published() == []
+    assert outside_published(result.program) == []
     assert result.scores["blocks"] == result.program.blocks <= blocks
     assert result.scores["statements"] == result.program.statements
     assert result.scores["primitives"] == result.program.size

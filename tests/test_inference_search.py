@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from shapeprog.data.random import outside_published
 from shapeprog.geometry.cells import pack, words_of
 from shapeprog.geometry.cells import voxels as voxels_of
 from shapeprog.inference import editing
@@ -66,7 +67,7 @@ def test_planted_programs_are_found_again(text, iou, blocks):
     assert len(found.blocks) <= blocks
     program = to_program(found.blocks)
     assert program.size == parse(text).size or found.iou < 1
-    assert program.outside_published() == []
+    assert outside_published(program) == []
     drawn = voxels_of(unroll(program)).numpy().astype(bool)
     assert (drawn & solid).sum() / (drawn | solid).sum() == pytest.approx(found.iou, abs=1e-12)
 

@@ -10,14 +10,14 @@ import pytest
 import torch
 from declared import MODULES
 
+from shapeprog.data.random import random_program
 from shapeprog.errors import DeclarationError, InputError, ShapeProgError
 from shapeprog.formats.notation import format_notation, parse_notation
+from shapeprog.formats.plugins import load_statements
 from shapeprog.geometry import Primitive, Solids, primitives
 from shapeprog.geometry.primitives import built_in_names
 from shapeprog.language import Language, decode, encode, loop, standard, statement, unroll, using
 from shapeprog.language.parameters import Count, Extent, Length, Position, Quantity, Shift3
-from shapeprog.language.plugins import load_statements
-from shapeprog.language.sampling import random_program
 from shapeprog.language.shapes import box
 from shapeprog.language.statement import Motion
 from shapeprog.language.text import format_program, parse

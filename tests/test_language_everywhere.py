@@ -10,12 +10,12 @@ from declared import MODULES, STATEMENTS, middle, name_of
 
 import shapeprog as sp
 from shapeprog.formats import suffixes
+from shapeprog.formats.plugins import load_statements
 from shapeprog.geometry.cells import voxels
 from shapeprog.geometry.distance import signed_distance
 from shapeprog.geometry.mesh import part_meshes, union_mesh
 from shapeprog.geometry.surface import sample_surface
 from shapeprog.language import Draw, Language, Program, Statement, standard, using
-from shapeprog.language.plugins import load_statements
 
 SEAT = """\
 arch(at=(-12, -8, -8), size=(12, 16, 16), thickness=3)

@@ -9,10 +9,10 @@ import pytest
 import torch
 from declared import LANGUAGE, STATEMENTS, middle, name_of
 
+from shapeprog.data.random import random_program
 from shapeprog.errors import ShapeProgError
 from shapeprog.geometry import Scene
 from shapeprog.language import Code, Draw, Loop, Program, Statement, encode, unroll, using
-from shapeprog.language.sampling import random_program
 from shapeprog.language.text import parse
 
 

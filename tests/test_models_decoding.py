@@ -8,13 +8,13 @@ import pytest
 import torch
 from torch import Tensor
 
+from shapeprog.data.random import outside_published, random_program
 from shapeprog.data.synthetic import Stream, prior
 from shapeprog.errors import ShapeProgError
 from shapeprog.geometry.cells import count, pack, preceding, unpack, widen
 from shapeprog.inference.snapping import snapped_from
 from shapeprog.language.parameters import Extent, Position
 from shapeprog.language.program import Program
-from shapeprog.language.sampling import random_program
 from shapeprog.language.shapes import box
 from shapeprog.language.statement import Language, language, statement, using
 from shapeprog.language.tensors import Code, encode
@@ -64,7 +64,7 @@ def test_only_legal_blocks_are_written(small: Callable[..., Generator], choose: 
     for seed in range(3):
         code = decode(small(seed), targets(8, seed), choose=choose, temperature=3.0, random=random).code  # type: ignore[arg-type]
         written = programs_of(code)
-        assert [program.outside_published() for program in written] == [[]] * 8
+        assert [outside_published(program) for program in written] == [[]] * 8
         drawing = (code.ids[:, :, 0] != 0).sum(-1)
         assert [program.blocks for program in written] == drawing.tolist()
 

@@ -7,9 +7,9 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor
 
+from shapeprog.data.random import random_program
 from shapeprog.geometry.cells import preceding, unpack
 from shapeprog.language import Code, encode, unroll
-from shapeprog.language.sampling import random_program
 from shapeprog.language.unroll import draw_blocks
 from shapeprog.models.decoding import decode
 from shapeprog.models.designs import build_generator

@@ -1,16 +1,16 @@
 from .data.loading import load_shape
+from .data.random import random_program
 from .data.shape import Shape
 from .errors import InputError, OutputError, ProgramError, ShapeProgError
 from .formats.files import export, load, load_with_frame, save
 from .formats.json_form import program_from_json, program_to_json
 from .formats.notation import format_notation, parse_notation
+from .formats.plugins import load_statements
 from .geometry.losses import chamfer
 from .geometry.scene import Scene
 from .inference.infer import infer
 from .inference.refine import refine
-from .language.plugins import load_statements
 from .language.program import Draw, Loop, Program
-from .language.sampling import random_program
 from .language.statement import loop, statement, using
 from .language.tensors import Code, decode, encode
 from .language.text import format_program, parse

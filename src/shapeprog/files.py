@@ -29,13 +29,8 @@ _CURES = {
 def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
     """A temporary path beside ``path`` that takes its place if the block succeeds and vanishes if it fails.
 
-    Readers see the old file or the whole new one, never a part.  The temporary name keeps the suffix, so that
-    writers which look at it behave alike.
-
-    Parameters
-    ----------
-    path
-        Where the file shall be; its folder must exist.
+    Readers see the old file or the whole new one, never a part.  The folder must exist.  The temporary name keeps the
+    suffix, so that writers which look at it behave alike.
 
     Raises
     ------
@@ -70,13 +65,7 @@ def write_text(path: str | os.PathLike[str], content: str) -> None:
 
 
 def make_folder(path: str | os.PathLike[str]) -> Path:
-    """The folder ``path``, made with its parents where missing.
-
-    Raises
-    ------
-    OutputError
-        If it cannot be made.
-    """
+    """The folder ``path``, made with its parents where missing; an ``OutputError`` if it cannot be."""
     folder = Path(path)
     try:
         folder.mkdir(parents=True, exist_ok=True)

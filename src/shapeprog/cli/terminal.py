@@ -118,7 +118,7 @@ def load_modules(modules: list[Path] | None) -> None:
     """Declare the statements of a user's modules."""
     if not modules:
         return
-    from shapeprog.language.plugins import load_statements
+    from shapeprog.formats.plugins import load_statements
 
     for module in modules:
         load_statements(module)

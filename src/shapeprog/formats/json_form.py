@@ -21,7 +21,6 @@ from shapeprog.language.program import Draw, Loop, Node, Program
 from shapeprog.language.statement import SLOTS, Statement, language
 from shapeprog.language.syntax import DEEPEST, proper_text
 from shapeprog.language.tensors import Code
-from shapeprog.language.values import checked, written
 from shapeprog.space import Frame
 
 FORMAT, CODE_FORMAT = "shapeprog", "shapeprog-code"
@@ -124,7 +123,7 @@ def _node_to_json(node: Node, depth: int) -> dict[str, Any]:
         raise ShapeProgError(f"loops are nested more than {DEEPEST} deep", "put some of them side by side")
     parameters = {}
     for parameter in known[node.name].parameters:
-        numbers = [json.loads(written(parameter.quantity, value)) for value in node.values[parameter.slots]]
+        numbers = [json.loads(parameter.quantity.written(value)) for value in node.values[parameter.slots]]
         parameters[parameter.name] = numbers if parameter.quantity.width > 1 else numbers[0]
     found: dict[str, Any] = {"statement": node.name, "parameters": parameters}
     if isinstance(node, Loop):
@@ -212,7 +211,7 @@ def _values(declared: Statement, given: Any, name: str, place: str) -> tuple[flo
                 "write plain numbers such as 4 or -2.5",
             )
         try:
-            values += checked(declared, parameter, numbers)
+            values += parameter.checked(declared.name, numbers)
         except ShapeProgError as mistake:
             raise InputError(f"{name}: {place}: {mistake.message}", mistake.hint) from None
     return tuple(values)

@@ -23,7 +23,6 @@ from shapeprog.language.program import Draw, Loop, Node, Program
 from shapeprog.language.statement import Statement, language
 from shapeprog.language.syntax import DEEPEST, proper_text
 from shapeprog.language.text import INDENT, variable
-from shapeprog.language.values import checked, written
 from shapeprog.space import Frame
 
 _NUMBER = r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?"
@@ -135,7 +134,7 @@ def _lines(node: Node, loops: list[Loop], numbered: bool) -> Iterator[str]:
     moved = "".join(f"+{variable(depth)}*{u}" for depth, u in zip(shifts, names, strict=False))
     words = [_quoted(_words(declared))]
     for symbol, parameters in groups(declared).items():
-        numbers = [written(p.quantity, value) for p in parameters for value in node.values[p.slots]]
+        numbers = [p.quantity.written(value) for p in parameters for value in node.values[p.slots]]
         group = numbers[0] if len(numbers) == 1 else f"({', '.join(numbers)})"
         at = moved if parameters[0].quantity.kind == "position" else ""
         words.append(f"{names[-1] if symbol == 'u' else symbol}={group}{at}")
@@ -145,7 +144,7 @@ def _lines(node: Node, loops: list[Loop], numbered: bool) -> Iterator[str]:
         return
     body = [line for inner in node.body for line in _lines(inner, [*loops, node], numbered)]
     if body:
-        count = written(declared.parameters[0].quantity, node.values[0])
+        count = declared.parameters[0].quantity.written(node.values[0])
         yield f"{indent}for({variable(len(loops))}<{count}, {', '.join(words)})"
         yield from body
 
@@ -287,7 +286,7 @@ def _symbol(symbol: str, wanted: dict[str, tuple[Parameter, ...]]) -> str:
 
 
 def _values(declared: Statement, slots: list[float]) -> tuple[float, ...]:
-    return tuple(n for parameter in declared.parameters for n in checked(declared, parameter, slots[parameter.slots]))
+    return tuple(n for p in declared.parameters for n in p.checked(declared.name, slots[p.slots]))
 
 
 def _bare(line: str) -> str:

@@ -15,7 +15,6 @@ from shapeprog.language.parameters import Quantity
 from shapeprog.language.program import Loop, Node, Program
 from shapeprog.language.statement import Statement, language
 from shapeprog.language.text import variable
-from shapeprog.language.values import written
 from shapeprog.space import FloatArray
 
 
@@ -146,7 +145,7 @@ def _named(node: Node, made: Plan, counter: Counter[str]) -> _Named:
 def _heading(declared: Statement, name: str, values: Sequence[float], fixed: frozenset[int]) -> Heading:
     variables = []
     for parameter in declared.parameters:
-        numbers = [written(parameter.quantity, value) for value in values[parameter.slots]]
+        numbers = [parameter.quantity.written(value) for value in values[parameter.slots]]
         text = numbers[0] if len(numbers) == 1 else f"[{', '.join(numbers)}]"
         still = set(range(parameter.slots.start, parameter.slots.stop)) <= fixed
         variables.append(Variable(f"{name}_{parameter.name}", text, parameter.quantity, still))

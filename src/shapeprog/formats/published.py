@@ -10,7 +10,7 @@ import math
 from collections.abc import Sequence
 
 from shapeprog.errors import ShapeProgError
-from shapeprog.language.values import shortest
+from shapeprog.language.parameters import shortest
 
 THICKNESS = 1.0
 """Thickness in cells of a cross arm whose thickness was dropped."""

@@ -106,7 +106,7 @@ def _begin(modules: list[Path]) -> None:
     """Make a worker ready: interruptions are for the process that asked, which then ends the others."""
     import torch
 
-    from shapeprog.language.plugins import load_statements
+    from shapeprog.formats.plugins import load_statements
 
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     torch.set_num_threads(1)

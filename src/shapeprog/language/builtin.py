@@ -17,34 +17,42 @@ ARM_HALF_WIDTH = 1.0
 """Half width in cells of one arm of a cross base, which is always two cells wide."""
 
 
-@statement("leg", id=1, paper=("Leg", "Cub"))
-def leg(at: Position, size: Extent) -> Solids:
-    """A leg: a post from its low corner and its full extents."""
+def _box(at: Position, size: Extent) -> Solids:
+    """from its low corner and its full extents."""
     return box(at, size)
 
 
-@statement("top_rectangle", id=2, paper=("Top", "Rec"))
-def top_rectangle(at: Position, thickness: Length, half: Half) -> Solids:
-    """A rectangular top or seat on the centre of its bottom face."""
+def _rectangle(at: Position, thickness: Length, half: Half) -> Solids:
+    """on the centre of its bottom face."""
     return slab(at, thickness, half[..., 0], half[..., 1])
 
 
-@statement("top_square", id=3, paper=("Top", "Square"))
-def top_square(at: Position, thickness: Length, half: Radius) -> Solids:
-    """A square top or seat on the centre of its bottom face."""
+def _square(at: Position, thickness: Length, half: Radius) -> Solids:
+    """on the centre of its bottom face."""
     return slab(at, thickness, half, half)
 
 
-@statement("top_circle", id=4, paper=("Top", "Circle"))
-def top_circle(at: Position, thickness: Length, radius: Radius) -> Solids:
-    """A round top or seat on the centre of its bottom face."""
+def _round(at: Position, thickness: Length, radius: Radius) -> Solids:
+    """on the centre of its bottom face."""
     return disc(at, thickness, radius)
 
 
-@statement("layer", id=5, paper=("Layer", "Rec"))
-def layer(at: Position, thickness: Length, half: Half) -> Solids:
-    """A rectangular shelf or layer on the centre of its bottom face."""
-    return slab(at, thickness, half[..., 0], half[..., 1])
+# statements that differ in their name alone; the function says where they stand
+for _id, _name, _paper, _draw, _what in (
+    (1, "leg", ("Leg", "Cub"), _box, "A leg: a post"),
+    (2, "top_rectangle", ("Top", "Rec"), _rectangle, "A rectangular top or seat"),
+    (3, "top_square", ("Top", "Square"), _square, "A square top or seat"),
+    (4, "top_circle", ("Top", "Circle"), _round, "A round top or seat"),
+    (5, "layer", ("Layer", "Rec"), _rectangle, "A rectangular shelf or layer"),
+    (8, "base_circle", ("Base", "Circle"), _round, "A round base plate"),
+    (9, "base_square", ("Base", "Square"), _square, "A square base plate"),
+    (12, "horizontal_bar", ("Hori_Bar", "Cub"), _box, "A horizontal bar"),
+    (13, "vertical_board", ("Vert_Board", "Cub"), _box, "A vertical board"),
+    (14, "locker", ("Locker", "Cub"), _box, "A locker, drawer or solid body"),
+    (16, "chair_beam", ("Chair_Beam", "Cub"), _box, "A beam of an arm rest or a back"),
+    (18, "back_support", ("Back_sup", "Cub"), _box, "A support that carries a back,"),
+):
+    statement(_name, id=_id, paper=_paper, doc=f"{_what} {_draw.__doc__}")(_draw)
 
 
 @statement("support_cylinder", id=6, paper=("Sup", "Cylinder"))
@@ -57,18 +65,6 @@ def support_cylinder(at: Position, height: Length, radius: Radius) -> Solids:
 def support_cuboid(at: Position, height: Length, half: Radius) -> Solids:
     """A square central support on the centre of its bottom face."""
     return slab(at, height, half, half)
-
-
-@statement("base_circle", id=8, paper=("Base", "Circle"))
-def base_circle(at: Position, thickness: Length, radius: Radius) -> Solids:
-    """A round base plate on the centre of its bottom face."""
-    return disc(at, thickness, radius)
-
-
-@statement("base_square", id=9, paper=("Base", "Square"))
-def base_square(at: Position, thickness: Length, half: Radius) -> Solids:
-    """A square base plate on the centre of its bottom face."""
-    return slab(at, thickness, half, half)
 
 
 @statement("base_cross", id=10, paper=("Base", "Line"), pivot=lambda at, **_: at, quarter=True)
@@ -90,24 +86,6 @@ def sideboard(at: Position, height: Length, half_depth: Length, width: Length) -
     return cuboid(centre, torch.stack([height / 2, half_depth, width / 2], -1))
 
 
-@statement("horizontal_bar", id=12, paper=("Hori_Bar", "Cub"))
-def horizontal_bar(at: Position, size: Extent) -> Solids:
-    """A horizontal bar from its low corner and its full extents."""
-    return box(at, size)
-
-
-@statement("vertical_board", id=13, paper=("Vert_Board", "Cub"))
-def vertical_board(at: Position, size: Extent) -> Solids:
-    """A vertical board from its low corner and its full extents."""
-    return box(at, size)
-
-
-@statement("locker", id=14, paper=("Locker", "Cub"))
-def locker(at: Position, size: Extent) -> Solids:
-    """A locker, drawer or solid body from its low corner and its full extents."""
-    return box(at, size)
-
-
 @statement("back", id=15, paper=("Back", "Cub"))
 def back(at: Position, size: Extent, tilt: Shift) -> Solids:
     """A back: a board whose top is shifted to the rear by ``tilt`` cells (a shear, not a rotation)."""
@@ -115,22 +93,10 @@ def back(at: Position, size: Extent, tilt: Shift) -> Solids:
     return cuboid(at + size / 2 + shift, size / 2, lean=tilt)
 
 
-@statement("chair_beam", id=16, paper=("Chair_Beam", "Cub"))
-def chair_beam(at: Position, size: Extent) -> Solids:
-    """A beam of an arm rest or a back from its low corner and its full extents."""
-    return box(at, size)
-
-
 @statement("line", id=17, paper=("Connect", "Line"), pivot=lambda start, **_: start + CELL_CENTRE)
 def line(start: Position, end: Position, radius: Radius) -> Solids:
     """A round bar between the centres of two cells, with flat caps."""
     return bar(start + CELL_CENTRE, end + CELL_CENTRE, radius)
-
-
-@statement("back_support", id=18, paper=("Back_sup", "Cub"))
-def back_support(at: Position, size: Extent) -> Solids:
-    """A support that carries a back, from its low corner and its full extents."""
-    return box(at, size)
 
 
 @loop("translate", id=19, paper=("Trans", "u"))

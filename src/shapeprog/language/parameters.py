@@ -1,33 +1,64 @@
-"""What the parameters of a statement mean: their kinds, widths and ranges, written as annotations."""
+"""What the parameters of a statement mean, written as annotations: kinds, widths, ranges, and their numbers as text.
+
+Numbers are exact in float32, written with the fewest digits, and checked against their declaration.
+"""
 
 from __future__ import annotations
 
+import math
+import struct
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
+import numpy as np
 from torch import Tensor
 
+from shapeprog.errors import ShapeProgError
 from shapeprog.space import HALF, RESOLUTION
 
 Kind = Literal["position", "length", "shift", "count", "turn"]
 
-DISCRETE: frozenset[str] = frozenset({"count", "turn"})
-"""Kinds that take whole numbers and receive no gradient."""
+LARGEST = 3.4028234663852886e38
+"""The largest finite float32."""
+
+LARGEST_WHOLE = 1 << 24
+"""Up to here float32 holds every whole number; counts and turns end here."""
+
+
+def to_float32(value: float) -> float:
+    """The float32 nearest to ``value``; a ``ShapeProgError`` if it is not finite, or too large for float32."""
+    try:
+        single: float = struct.unpack("f", struct.pack("f", value))[0]
+    except OverflowError:
+        single = math.inf
+    if not math.isfinite(single):
+        limits = f"numbers go from -{LARGEST:.7e} to {LARGEST:.7e}"
+        raise ShapeProgError("this number is too large or no number at all", limits)
+    return single
+
+
+def shortest(value: float) -> str:
+    """The shortest decimal that reads back as exactly this float32, such as ``0.1``, ``-0.0`` or ``1e-40``.
+
+    Raises what :func:`to_float32` raises.
+    """
+    single = to_float32(value)
+    decimal = float(str(np.float32(single)))
+    if to_float32(decimal) != single:  # it was rounded twice on its way through float64
+        decimal = single
+    if single == 0 and math.copysign(1, single) < 0:
+        return "-0.0"
+    return repr(decimal).removesuffix(".0")
 
 
 @dataclass(frozen=True)
 class Quantity:
     """A group of numbers of one kind.
 
-    Parameters
-    ----------
-    kind
-        ``position`` and ``shift`` are coordinates in cells (a shift is relative), ``length`` an extent in cells,
-        ``count`` a number of copies, ``turn`` a number of quarter turns.
-    width
-        How many numbers, one tensor slot each.
-    low, high
-        Range that programs are sampled from and that errors name.
+    ``position`` and ``shift`` are coordinates in cells (a shift is relative), ``length`` is an extent in cells,
+    ``count`` a number of copies, ``turn`` a number of quarter turns.  The width is how many numbers there are, one
+    tensor slot each; programs are sampled from ``low`` to ``high``, which errors name.
     """
 
     kind: Kind
@@ -38,7 +69,17 @@ class Quantity:
     @property
     def discrete(self) -> bool:
         """Whether the numbers are whole and carry no gradient."""
-        return self.kind in DISCRETE
+        return self.kind in ("count", "turn")
+
+    @property
+    def range_text(self) -> str:
+        """The declared range in words."""
+        whole = "whole numbers " if self.discrete else ""
+        return f"{whole}from {shortest(self.low)} to {shortest(self.high)}"
+
+    def written(self, value: float) -> str:
+        """A number as program text: whole for counts and turns, else the shortest decimal."""
+        return str(int(to_float32(value))) if self.discrete else shortest(value)
 
 
 Position = Annotated[Tensor, Quantity("position", 3, -HALF, HALF)]
@@ -54,17 +95,7 @@ Turn = Annotated[Tensor, Quantity("turn", 1, -64, 64)]
 
 @dataclass(frozen=True)
 class Parameter:
-    """One named parameter of a statement and the tensor slots it takes.
-
-    Parameters
-    ----------
-    name
-        Keyword in program text.
-    quantity
-        Kind, width and range.
-    start
-        First of its slots.
-    """
+    """One named parameter of a statement and the first of the tensor slots it takes."""
 
     name: str
     quantity: Quantity
@@ -74,3 +105,36 @@ class Parameter:
     def slots(self) -> slice:
         """Its slots among those of the statement."""
         return slice(self.start, self.start + self.quantity.width)
+
+    @property
+    def blank(self) -> str:
+        """How it is written, with a blank for each number: ``at=(_, _, _)``."""
+        width = self.quantity.width
+        return f"{self.name}=" + ("_" if width == 1 else f"({', '.join('_' * width)})")
+
+    def checked(self, owner: str, numbers: Sequence[float]) -> list[float]:
+        """Its numbers in a call of the statement ``owner``, rounded to float32.
+
+        Coordinates and lengths may be any finite number: the declared range is where programs are sampled from, and a
+        negative length draws nothing.  Counts and turns must be whole; beyond their range they stay legal as far as
+        float32 holds whole numbers, since a count of zero or less erases what is inside.
+
+        Raises
+        ------
+        ShapeProgError
+            If there are too many or too few, or one is not finite, or a count or turn is not whole or too large.
+        """
+        quantity, place = self.quantity, f"{self.name} of {owner}"
+        if len(numbers) != quantity.width:
+            wanted = "1 number" if quantity.width == 1 else f"{quantity.width} numbers"
+            raise ShapeProgError(f"{place} takes {wanted}, not {len(numbers)}", f"write {self.blank}")
+        singles = [to_float32(number) for number in numbers]
+        if not quantity.discrete:
+            return singles
+        for number in numbers:
+            if number != math.floor(number):
+                raise ShapeProgError(f"{place} is {number!r}, but must be whole", f"it takes {quantity.range_text}")
+            if abs(number) > LARGEST_WHOLE:
+                said = f"{place} is {int(number)}, beyond {LARGEST_WHOLE}, the end of exact whole numbers"
+                raise ShapeProgError(said, f"it takes {quantity.range_text}")
+        return [single + 0.0 for single in singles]  # no minus zero

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-
-from shapeprog.language.statement import language
 
 PUBLISHED_DEPTH = 3
 """Steps of one block in the published generator."""
@@ -40,13 +39,7 @@ Chain = tuple[Draw | Loop, ...]
 
 @dataclass(frozen=True)
 class Program:
-    """A shape as a list of drawing statements and loops.
-
-    Parameters
-    ----------
-    body
-        The statements in the order they are written.
-    """
+    """A shape as a list of drawing statements and loops, in the order they are written."""
 
     body: tuple[Node, ...] = ()
 
@@ -56,7 +49,7 @@ class Program:
 
         A loop around several statements is the union of that loop around each, so nothing is lost.
         """
-        return [chain for node in self.body for chain in _chains(node, ())]
+        return [chain for node in self.body for chain in _chains(node)]
 
     @property
     def statements(self) -> int:
@@ -71,14 +64,7 @@ class Program:
     @property
     def size(self) -> int:
         """Number of drawn copies after unrolling."""
-        total = 0
-        for chain in self.chains:
-            copies = 1
-            for node in chain[:-1]:
-                assert isinstance(node, Loop)
-                copies *= node.count
-            total += copies
-        return total
+        return sum(math.prod(node.count for node in chain if isinstance(node, Loop)) for chain in self.chains)
 
     def walk(self) -> Iterator[Node]:
         """Every node in the order of the text."""
@@ -97,18 +83,6 @@ class Program:
         """The program with every number rounded half to even to a whole one, as published executors do."""
         return Program(tuple(_snap(node) for node in self.body))
 
-    def outside_published(self) -> list[str]:
-        """Why the program leaves the published blocks [k], [19,k], [19,19,k], [20,10], [20,17]; empty if it stays."""
-        reasons = []
-        for number, chain in enumerate(self.chains, 1):
-            words = [node.name for node in chain]
-            ids = [language()[word].id for word in words]
-            loops = ids[:-1]
-            plain = 1 <= ids[-1] <= 18 and loops in ([], [19], [19, 19])
-            if not plain and ids not in ([20, 10], [20, 17]):
-                reasons.append(f"block {number} ({' > '.join(words)}) is none of the published blocks")
-        return reasons
-
 
 def nest(chain: Chain) -> Node:
     """The node that a chain of loops and a drawing statement stands for."""
@@ -119,13 +93,12 @@ def nest(chain: Chain) -> Node:
     return node
 
 
-def _chains(node: Node, loops: tuple[Loop, ...]) -> Iterator[Chain]:
+def _chains(node: Node, *loops: Loop) -> Iterator[Chain]:
     if isinstance(node, Draw):
         yield (*loops, node)
     else:
-        bare = Loop(node.name, node.values, ())
         for inner in node.body:
-            yield from _chains(inner, (*loops, bare))
+            yield from _chains(inner, *loops, Loop(node.name, node.values, ()))
 
 
 def _snap(node: Node) -> Node:

@@ -26,8 +26,7 @@ def solid(
 
 def cuboid(centre: Vector, half: Vector, lean: Scalar | None = None) -> Solids:
     """A cuboid from centre and half extents (..., 3); ``lean`` shifts its top against its bottom along depth."""
-    sizes = half.unbind(-1)
-    return solid(CUBOID, centre, *sizes) if lean is None else solid(CUBOID, centre, *sizes, lean)
+    return solid(CUBOID, centre, *half.unbind(-1), *([] if lean is None else [lean]))
 
 
 def box(corner: Vector, extent: Vector) -> Solids:
@@ -48,8 +47,7 @@ def disc(at: Vector, thickness: Scalar, radius: Scalar) -> Solids:
 def bar(start: Vector, end: Vector, radius: Scalar) -> Solids:
     """A cylinder between two points, with flat caps."""
     along = end - start
-    half = safe_norm((along**2).sum(-1)) / 2
-    return solid(CYLINDER, (start + end) / 2, half, radius, rotation=align(along))
+    return solid(CYLINDER, (start + end) / 2, safe_norm((along**2).sum(-1)) / 2, radius, rotation=align(along))
 
 
 def align(direction: Vector) -> Float[Tensor, "*batch 3 3"]:

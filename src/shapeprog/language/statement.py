@@ -24,7 +24,7 @@ from torch import Tensor
 
 from shapeprog.errors import DeclarationError
 from shapeprog.geometry.batch import Solids
-from shapeprog.geometry.primitive import primitives
+from shapeprog.geometry.primitive import SIZES, primitives
 from shapeprog.geometry.primitives import built_in_names
 from shapeprog.language.parameters import Parameter, Quantity
 
@@ -37,14 +37,9 @@ EMPTY, END = 0, 21
 
 @dataclass(frozen=True)
 class Motion:
-    """How a loop moves one copy: a turn about the vertical axis through the pivot, then a shift.
+    """How a loop moves one copy: a turn about the vertical axis through the pivot, then a shift in cells.
 
-    Parameters
-    ----------
-    turn
-        Fraction of a full circle (...), from depth towards left-right.
-    shift
-        Shift (..., 3) in cells.
+    The turn is a fraction of a full circle, from depth towards left-right.
     """
 
     turn: Float[Tensor, "*batch"] | None = None
@@ -57,12 +52,8 @@ class Statement:
 
     Parameters
     ----------
-    name, id
-        Word in program text and number in tensors.
-    doc
-        One line of manual.
-    parameters
-        Named parameters in slot order.
+    name, id, doc, parameters
+        Word in program text, number in tensors, one line of manual, and named parameters in slot order.
     draw
         For a drawing statement: parameter tensors by name to one or more :class:`Solids`; else ``None``.
     move
@@ -101,6 +92,14 @@ class Statement:
         """Quantity of every slot in use, in order."""
         return tuple(p.quantity for p in self.parameters for _ in range(p.quantity.width))
 
+    @property
+    def signature(self) -> str:
+        """How it is written, with a blank for each number; loops begin with ``for i in``."""
+        words = [parameter.blank for parameter in self.parameters]
+        if self.is_loop:
+            return f"for i in {self.name}({', '.join(['_', *words[1:]])}):"
+        return f"{self.name}({', '.join(words)})"
+
     def split(self, values: Float[Tensor, "*batch 7"]) -> dict[str, Tensor]:
         """Parameter tensors by name: (...) for one slot, (..., width) for several; turns and counts are rounded."""
         named = {}
@@ -134,25 +133,35 @@ class Language:
         DeclarationError
             If its name or id is taken or its parameters do not fit, in words.
         """
-        _check(declared)
-        if declared.name in self._by_name:
-            raise DeclarationError(f"statement {declared.name!r} is declared twice", "give one of them another name")
-        if declared.id in self._by_id or declared.id in (EMPTY, END):
-            owner = self._by_id[declared.id].name if declared.id in self._by_id else "the language itself"
-            raise DeclarationError(
-                f"statement {declared.name!r} wants id {declared.id}, which belongs to {owner}",
-                f"leave the id out; the next free one is {self.free_id()}",
-            )
-        twin = next((known for known in self if declared.paper and known.paper == declared.paper), None)
-        if twin is not None:
-            raise DeclarationError(
-                f"statement {declared.name!r} has the paper's name {declared.paper}, which belongs to {twin.name}",
-                "leave it out; the notation then uses the statement's own name",
-            )
+        for message, hint in self._faults(declared):
+            raise DeclarationError(message, hint)
         _try(declared)
         self._by_id[declared.id] = declared
         self._by_name[declared.name] = declared
         return declared
+
+    def _faults(self, declared: Statement) -> Iterator[tuple[str, str]]:
+        """What is wrong with a declaration before it is tried, and the cure."""
+        said = f"statement {declared.name!r}"
+        if not declared.name.isidentifier() or keyword.iskeyword(declared.name):
+            yield f"{declared.name!r} is not a word of Python", "use letters, digits and underscores"
+        if declared.is_loop and [p.quantity.kind for p in declared.parameters][:1] != ["count"]:
+            yield f"loop {declared.name!r} has no count", "annotate its first parameter with Count"
+        if declared.size > SLOTS:
+            numbers = f"{declared.size} numbers, but a statement has {SLOTS} slots"
+            yield f"{said} has {numbers}", "use fewer or narrower parameters"
+        if any(quantity.low > quantity.high for quantity in declared.quantities):
+            yield f"a range of {said} ends before it starts", "swap low and high"
+        if declared.name in self._by_name:
+            yield f"{said} is declared twice", "give one of them another name"
+        if declared.id in self._by_id or declared.id in (EMPTY, END):
+            owner = self._by_id[declared.id].name if declared.id in self._by_id else "the language itself"
+            free = f"leave the id out; the next free one is {self.free_id()}"
+            yield f"{said} wants id {declared.id}, which belongs to {owner}", free
+        for twin in self:
+            if declared.paper and twin.paper == declared.paper:
+                own = "leave it out; the notation then uses the statement's own name"
+                yield f"{said} has the paper's name {declared.paper}, which belongs to {twin.name}", own
 
     def forget(self, name: str) -> None:
         """Take a declaration out again, as when the module that made it fails."""
@@ -171,9 +180,6 @@ class Language:
     def __iter__(self) -> Iterator[Statement]:
         return iter(sorted(self._by_id.values(), key=lambda declared: declared.id))
 
-    def __len__(self) -> int:
-        return len(self._by_id)
-
     @property
     def names(self) -> list[str]:
         """All names in order of id."""
@@ -181,8 +187,9 @@ class Language:
 
 
 standard = Language()
-standard.primitives = primitives.names
 """The language of this process: the built-in statements and those that users register."""
+
+standard.primitives = primitives.names
 
 _active: ContextVar[Language] = ContextVar("language", default=standard)
 
@@ -207,47 +214,27 @@ def statement(
     name: str,
     *,
     id: int | None = None,
+    doc: str = "",
     paper: tuple[str, str] | None = None,
     pivot: Callable[..., Tensor] | None = None,
     quarter: bool = False,
 ) -> Callable[[Callable[..., Any]], Statement]:
-    """Declare a drawing statement from a function of annotated parameters that returns its solids."""
+    """Declare a drawing statement from a function of annotated parameters that returns its solids.
 
-    def register(draw: Callable[..., Any]) -> Statement:
-        known = language()
-        number = known.free_id() if id is None else id
-        parameters = _parameters(name, draw, skip=0)
-        return known.register(
-            Statement(name, number, _doc(name, draw), parameters, draw=draw, pivot=pivot, quarter=quarter, paper=paper)
-        )
-
-    return register
+    Without ``doc`` the manual shows the first paragraph of the function's docstring.
+    """
+    return lambda draw: _declare(name, id, doc, draw, 0, draw=draw, pivot=pivot, quarter=quarter, paper=paper)
 
 
 def loop(
     name: str, *, id: int | None = None, paper: tuple[str, str] | None = None
 ) -> Callable[[Callable[..., Motion]], Statement]:
     """Declare a loop from a function ``(copy, quarter, count, ...) -> Motion``; the first parameter is the count."""
-
-    def register(move: Callable[..., Motion]) -> Statement:
-        known = language()
-        number = known.free_id() if id is None else id
-        parameters = _parameters(name, move, skip=2)
-        if not parameters or parameters[0].quantity.kind != "count":
-            raise DeclarationError(f"loop {name!r} has no count", "annotate its first parameter with Count")
-        return known.register(Statement(name, number, _doc(name, move), parameters, move=move, paper=paper))
-
-    return register
+    return lambda move: _declare(name, id, "", move, 2, move=move, paper=paper)
 
 
-def _doc(name: str, function: Callable[..., Any]) -> str:
-    doc = inspect.getdoc(function)
-    if not doc:
-        raise DeclarationError(f"statement {name!r} has no docstring", "say in one line what it draws")
-    return " ".join(doc.split("\n\n")[0].split())
-
-
-def _parameters(name: str, function: Callable[..., Any], skip: int) -> tuple[Parameter, ...]:
+def _declare(name: str, id: int | None, doc: str, function: Callable[..., Any], skip: int, **fields: Any) -> Statement:
+    """Register what a function declares by its annotations, the first ``skip`` left out."""
     hints = get_type_hints(function, include_extras=True)
     parameters, start = [], 0
     for word in list(inspect.signature(function).parameters)[skip:]:
@@ -259,47 +246,33 @@ def _parameters(name: str, function: Callable[..., Any], skip: int) -> tuple[Par
             )
         parameters.append(Parameter(word, quantity, start))
         start += quantity.width
-    return tuple(parameters)
-
-
-def _check(declared: Statement) -> None:
-    if not declared.name.isidentifier() or keyword.iskeyword(declared.name):
-        raise DeclarationError(f"{declared.name!r} is not a word of Python", "use letters, digits and underscores")
-    if declared.size > SLOTS:
-        raise DeclarationError(
-            f"statement {declared.name!r} has {declared.size} numbers, but a statement has {SLOTS} slots",
-            "use fewer or narrower parameters",
-        )
-    if any(p.quantity.low > p.quantity.high for p in declared.parameters):
-        raise DeclarationError(f"a range of statement {declared.name!r} ends before it starts", "swap low and high")
+    doc = doc or inspect.getdoc(function) or ""
+    if not doc:
+        raise DeclarationError(f"statement {name!r} has no docstring", "say in one line what it draws")
+    known, line = language(), " ".join(doc.split("\n\n")[0].split())
+    return known.register(Statement(name, known.free_id() if id is None else id, line, tuple(parameters), **fields))
 
 
 def _try(declared: Statement) -> None:
     """Draw or move once with mid-range parameters, so that a wrong shape is refused now and not amid a run."""
-    what = "moved" if declared.is_loop else "drawn"
+    values = torch.zeros(2, SLOTS)
+    values[:, : declared.size] = torch.tensor([(quantity.low + quantity.high) / 2 for quantity in declared.quantities])
+    shapes: list[Any]
     try:
-        values = torch.zeros(2, SLOTS)
-        for slot, quantity in enumerate(declared.quantities):
-            values[:, slot] = (quantity.low + quantity.high) / 2
         if declared.move is not None:
             motion = declared.move(torch.arange(2.0), torch.zeros(2, dtype=torch.bool), **declared.split(values))
-            shapes = [(part if part is None else tuple(part.shape)) for part in (motion.turn, motion.shift)]
+            shapes = [part if part is None else tuple(part.shape) for part in (motion.turn, motion.shift)]
             fitting = shapes[0] in (None, (2,)) and shapes[1] in (None, (2, 3))
+            found, wanted = f"loop {declared.name!r} returns a motion", "a turn must be (...) and a shift (..., 3)"
         else:
-            drawn = [(tuple(solids.size.shape), tuple(solids.centre.shape)) for solids in declared.solids(values)]
-            fitting = bool(drawn) and all(pair == ((2, 4), (2, 3)) for pair in drawn)
+            shapes = [(tuple(solids.size.shape), tuple(solids.centre.shape)) for solids in declared.solids(values)]
+            fitting = bool(shapes) and all(pair == ((2, SIZES), (2, 3)) for pair in shapes)
+            found, wanted = f"statement {declared.name!r} returns solids", "sizes must be (..., 4) and centres (..., 3)"
     except Exception as cause:
         raise DeclarationError(
-            f"statement {declared.name!r} cannot be {what}: {cause}",
+            f"statement {declared.name!r} cannot be {'moved' if declared.is_loop else 'drawn'}: {cause}",
             "its function gets one tensor (...) or (..., width) per parameter, with any leading dimensions",
         ) from cause
-    if not fitting and declared.is_loop:
-        raise DeclarationError(
-            f"loop {declared.name!r} returns a motion of shapes {shapes}",
-            "a turn must be (...) and a shift (..., 3) with the leading dimensions of the parameters",
-        )
     if not fitting:
-        raise DeclarationError(
-            f"statement {declared.name!r} returns solids of shapes {drawn}",
-            "sizes must be (..., 4) and centres (..., 3) with the leading dimensions of the parameters",
-        )
+        leading = "with the leading dimensions of the parameters"
+        raise DeclarationError(f"{found} of shapes {shapes}", f"{wanted} {leading}")

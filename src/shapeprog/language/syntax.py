@@ -1,7 +1,4 @@
-"""From program text to programs: a strict subset of Python, read through ``ast``; nothing is ever executed.
-
-A program holds calls of drawing statements with literal numbers, and ``for`` loops over calls of loops.
-"""
+"""From program text to programs: a strict subset of Python, read through ``ast``; nothing is ever executed."""
 
 from __future__ import annotations
 
@@ -10,46 +7,48 @@ import re
 import warnings
 
 from shapeprog.errors import ProgramError, ShapeProgError, did_you_mean
-from shapeprog.language.parameters import Parameter
-from shapeprog.language.program import Draw, Loop, Node
+from shapeprog.language.parameters import Parameter, to_float32
+from shapeprog.language.program import Draw, Loop, Node, Program
 from shapeprog.language.statement import Statement, language
-from shapeprog.language.values import blank, checked, signature, to_float32
 
 DEEPEST = 64
 """How deep loops may nest in text; Python itself ends at 100 levels of indentation."""
 
+_FORBIDDEN = (
+    (r"^[^\S\t]*\t(?=.*\S)", "this line is indented with a tab", "indent with four spaces"),
+    (r"\0", "there is a null byte in this line", "is this a text file?"),
+)
 _SHOWN = 60
 _WIDEST = 200
 
 
-def read(text: str, name: str) -> tuple[Node, ...]:
-    """The nodes of a program text.
+def parse(text: str, name: str = "<program>") -> Program:
+    """The program of a text.
+
+    Parameters
+    ----------
+    text
+        Calls of drawing statements with literal numbers, and ``for`` loops over calls of loops.  Comments are allowed
+        and forgotten.  Numbers are rounded to float32.
+    name
+        What error messages call the text, a path for instance.
 
     Raises
     ------
     ProgramError
-        At the first place that is not in the language.
+        At the first mistake, with line, column, the nearest name or the legal range.
     """
     text = proper_text(text, name)
     reader = _Reader(re.split(r"\r\n|\r|\n", text), name)
-    return reader.body(reader.tree(text).body, 0)
+    return Program(reader.body(reader.tree(text).body, 0))
 
 
 def proper_text(text: str, name: str) -> str:
-    """The text without its byte order mark.
-
-    Raises
-    ------
-    ProgramError
-        If it holds half characters, which no file and no terminal can show.
-    """
-    try:
-        text.encode()
-    except UnicodeEncodeError as error:
-        line = text.count("\n", 0, error.start) + 1
-        raise ProgramError(
-            "this line holds half a character", line=line, hint="is this a text file in UTF-8?", name=name
-        ) from None
+    """The text without its byte order mark; a ``ProgramError`` if it holds half characters, which no file can show."""
+    half = re.search("[\ud800-\udfff]", text)
+    if half:
+        line, hint = text.count("\n", 0, half.start()) + 1, "is this a text file in UTF-8?"
+        raise ProgramError("this line holds half a character", line=line, hint=hint, name=name)
     return text.removeprefix("\ufeff")
 
 
@@ -62,15 +61,10 @@ class _Reader:
 
     def tree(self, text: str) -> ast.Module:
         for number, line in enumerate(self.lines, 1):
-            indent = line[: len(line) - len(line.lstrip())]
-            if "\t" in indent and line.strip():
-                raise self._at(
-                    number, indent.index("\t") + 1, "this line is indented with a tab", "indent with four spaces"
-                )
-            if "\0" in line:
-                raise self._at(
-                    number, line.index("\0") + 1, "there is a null byte in this line", "is this a text file?"
-                )
+            for pattern, message, hint in _FORBIDDEN:
+                found = re.search(pattern, line)
+                if found:
+                    raise self._at(number, found.end(), message, hint)
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")
@@ -78,10 +72,8 @@ class _Reader:
         except SyntaxError as error:
             row = min(max(error.lineno or 1, 1), len(self.lines))
             column = min(max(error.offset or 1, 1), len(self.lines[row - 1]) + 1)
-            reason = (error.msg or "invalid syntax").split(";")[0]
-            raise self._at(
-                row, column, f"this cannot be read: {reason}", "a line is name(parameter=number, ...) or a for loop"
-            ) from None
+            said = f"this cannot be read: {(error.msg or 'invalid syntax').split(';')[0]}"
+            raise self._at(row, column, said, "a line is name(parameter=number, ...) or a for loop") from None
         except (RecursionError, MemoryError):
             raise self._at(1, 1, "this is nested too deeply to be a program", "write plain numbers") from None
 
@@ -94,16 +86,11 @@ class _Reader:
         if isinstance(statement, ast.For):
             return self._loop(statement, depth)
         if not isinstance(statement, ast.Expr):
-            raise self._error(
-                statement,
-                "a program holds only drawing statements and for loops",
-                "write name(parameter=number, ...) or for i in loop(count, ...):",
-            )
+            hint = "write name(parameter=number, ...) or for i in loop(count, ...):"
+            raise self._error(statement, "a program holds only drawing statements and for loops", hint)
         declared, call = self._call(statement.value, "statement")
         if declared.is_loop:
-            raise self._error(
-                call, f"{declared.name} is a loop and draws nothing itself", f"write {signature(declared)}"
-            )
+            raise self._misused(call, f"{declared.name} is a loop and draws nothing itself", declared)
         return Draw(declared.name, self._values(declared, call))
 
     def _loop(self, statement: ast.For, depth: int) -> Loop:
@@ -115,7 +102,7 @@ class _Reader:
             raise self._error(statement.orelse[0], "a loop of the language has no else", "leave it out")
         declared, call = self._call(statement.iter, "loop")
         if not declared.is_loop:
-            raise self._error(call, f"{declared.name} draws and repeats nothing", f"write {signature(declared)}")
+            raise self._misused(call, f"{declared.name} draws and repeats nothing", declared)
         return Loop(declared.name, self._values(declared, call), self.body(statement.body, depth + 1))
 
     def _call(self, node: ast.expr, wanted: str) -> tuple[Statement, ast.Call]:
@@ -123,51 +110,43 @@ class _Reader:
         known = language()
         function = node.func if isinstance(node, ast.Call) else node
         if not isinstance(function, ast.Name):
-            raise self._error(
-                node, f"{self._shown(node)} is no {wanted}", f"write the name of a {wanted} and its parameters"
-            )
+            hint = f"write the name of a {wanted} and its parameters"
+            raise self._error(node, f"{self._shown(node)} is no {wanted}", hint)
         if function.id not in known:
             fitting = [declared.name for declared in known if declared.is_loop == (wanted == "loop")]
             raise self._error(function, f"no {wanted} is called {function.id!r}", did_you_mean(function.id, fitting))
         declared = known[function.id]
         if not isinstance(node, ast.Call):
-            raise self._error(node, f"{declared.name} lacks its parameters", f"write {signature(declared)}")
+            raise self._misused(node, f"{declared.name} lacks its parameters", declared)
         return declared, node
 
     def _values(self, declared: Statement, call: ast.Call) -> tuple[float, ...]:
         parameters = {parameter.name: parameter for parameter in declared.parameters}
         found: dict[str, list[float]] = {}
-        for place, argument in enumerate(call.args):
-            if not declared.is_loop or place > 0 or isinstance(argument, ast.Starred):
+        for argument in call.args:
+            if not declared.is_loop or found or isinstance(argument, ast.Starred):
                 allowed = "only its count" if declared.is_loop else "nothing"
-                raise self._error(
-                    argument, f"{declared.name} takes {allowed} without a name", f"write {signature(declared)}"
-                )
+                raise self._misused(argument, f"{declared.name} takes {allowed} without a name", declared)
             found[declared.parameters[0].name] = self._numbers(declared, declared.parameters[0], argument)
         for word in call.keywords:
             if word.arg is None or word.arg not in parameters:
                 what = f"parameter {word.arg!r}" if word.arg else "parameter **"
-                hint = did_you_mean(word.arg or "", list(parameters))
-                raise self._error(word, f"{declared.name} has no {what}", hint)
+                raise self._error(word, f"{declared.name} has no {what}", did_you_mean(word.arg or "", parameters))
             if word.arg in found:
                 raise self._error(word, f"{word.arg} of {declared.name} is given twice", "leave one of them out")
             found[word.arg] = self._numbers(declared, parameters[word.arg], word.value)
         for name in parameters:
             if name not in found:
-                raise self._error(call, f"{declared.name} lacks {name}", f"write {signature(declared)}")
+                raise self._misused(call, f"{declared.name} lacks {name}", declared)
         return tuple(number for name in parameters for number in found[name])
 
     def _numbers(self, declared: Statement, parameter: Parameter, node: ast.expr) -> list[float]:
         place = f"{parameter.name} of {declared.name}"
-        if isinstance(node, ast.Tuple):
-            if parameter.quantity.width == 1:
-                raise self._error(node, f"{place} takes 1 number, not a group", f"write {blank(parameter)}")
-            elements = node.elts
-        else:
-            elements = [node]
-        numbers = [self._number(place, element) for element in elements]
+        if isinstance(node, ast.Tuple) and parameter.quantity.width == 1:
+            raise self._error(node, f"{place} takes 1 number, not a group", f"write {parameter.blank}")
+        numbers = [self._number(place, each) for each in (node.elts if isinstance(node, ast.Tuple) else [node])]
         try:
-            return checked(declared, parameter, numbers)
+            return parameter.checked(declared.name, numbers)
         except ShapeProgError as mistake:
             raise self._error(node, mistake.message, mistake.hint) from None
 
@@ -176,18 +155,14 @@ class _Reader:
         if isinstance(node, ast.UnaryOp) and isinstance(node.op, (ast.USub, ast.UAdd)):
             sign, bare = (-1.0 if isinstance(node.op, ast.USub) else 1.0), node.operand
         if not isinstance(bare, ast.Constant) or type(bare.value) not in (int, float):
-            raise self._error(
-                node,
-                f"{place} holds {self._shown(node)}, which is not a number",
-                "write plain numbers such as 4 or -2.5",
-            )
+            said = f"{place} holds {self._shown(node)}, which is not a number"
+            raise self._error(node, said, "write plain numbers such as 4 or -2.5")
         try:
             number = sign * float(bare.value)  # type: ignore[arg-type]
             to_float32(number)
         except (OverflowError, ShapeProgError):
-            raise self._error(
-                node, f"{place} holds {self._shown(node)}, which is too large", "numbers end at 3.4028235e+38"
-            ) from None
+            said = f"{place} holds {self._shown(node)}, which is too large"
+            raise self._error(node, said, "numbers end at 3.4028235e+38") from None
         return number
 
     def _shown(self, node: ast.expr) -> str:
@@ -196,6 +171,9 @@ class _Reader:
         end = node.end_col_offset if node.end_lineno == node.lineno else None
         text = raw[node.col_offset : end].decode(errors="replace").strip()
         return text if len(text) <= _SHOWN else text[:_SHOWN] + "..."
+
+    def _misused(self, node: ast.expr, message: str, declared: Statement) -> ProgramError:
+        return self._error(node, message, f"write {declared.signature}")
 
     def _error(self, node: ast.stmt | ast.expr | ast.keyword, message: str, hint: str) -> ProgramError:
         before = self.lines[node.lineno - 1].encode()[: node.col_offset]  # ast counts columns in bytes of UTF-8

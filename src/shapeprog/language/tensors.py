@@ -12,22 +12,17 @@ from jaxtyping import Float, Int
 from torch import Tensor
 
 from shapeprog.errors import ShapeProgError
+from shapeprog.language.parameters import LARGEST_WHOLE
 from shapeprog.language.program import PUBLISHED_DEPTH, Chain, Draw, Loop, Program, nest
 from shapeprog.language.statement import EMPTY, END, SLOTS, language
-from shapeprog.language.values import LARGEST_WHOLE
 from shapeprog.space import Array
 
 
 @dataclass(frozen=True)
 class Code:
-    """A batch of programs as tensors.
+    """A batch of programs as tensors: the statement of each step of each block, and its parameters in slot order.
 
-    Parameters
-    ----------
-    ids
-        Statement of each step of each block; 0 is empty.
-    parameters
-        Parameters of each step in slot order; unused slots are ignored.
+    Id 0 is an empty step; unused slots are ignored.
     """
 
     ids: Int[Tensor, "*batch K J"]
@@ -65,10 +60,8 @@ def encode(
     rows = needed if blocks is None else blocks
     columns = max(depth, PUBLISHED_DEPTH) if steps is None else steps
     if needed > rows or depth > columns:
-        raise ShapeProgError(
-            f"a program of {needed} blocks and {depth} steps does not fit {rows} blocks of {columns} steps",
-            "allow more blocks or steps, or shorten the program",
-        )
+        said = f"a program of {needed} blocks and {depth} steps does not fit {rows} blocks of {columns} steps"
+        raise ShapeProgError(said, "allow more blocks or steps, or shorten the program")
     ids = np.zeros((len(batch), rows, columns), np.int64)
     parameters = np.zeros((len(batch), rows, columns, SLOTS), np.float64)
     known = language()
@@ -90,16 +83,14 @@ def decode(code: Code) -> list[Program]:
     programs = math.prod(code.ids.shape[:-2])
     ids = code.ids.detach().cpu().reshape(programs, *code.ids.shape[-2:]).numpy()
     values = code.parameters.detach().cpu().float().reshape(programs, *code.parameters.shape[-3:]).numpy()
-    found = []
-    for program_ids, program_values in zip(ids, values, strict=True):
-        chains = (_chain(row, numbers) for row, numbers in zip(program_ids, program_values, strict=True))
-        found.append(Program(tuple(nest(chain) for chain in chains if chain is not None)))
-    return found
+    blocks = (map(_chain, *program) for program in zip(ids, values, strict=True))
+    return [Program(tuple(nest(chain) for chain in chains if chain is not None)) for chains in blocks]
 
 
 def _chain(ids: Array, values: Array) -> Chain | None:
+    """The loops and the statement of one block; ``None`` where it is no such thing."""
     known = language()
-    chain: list[Draw | Loop] = []
+    chain: list[Loop] = []
     for place, number in enumerate(ids.tolist()):
         if number not in known:
             return None
@@ -114,7 +105,6 @@ def _chain(ids: Array, values: Array) -> Chain | None:
         if declared.is_loop:
             chain.append(Loop(declared.name, numbers, ()))
             continue
-        chain.append(Draw(declared.name, numbers))
         rest = set(ids[place + 1 :].tolist())
-        return tuple(chain) if rest <= {EMPTY, END} else None
+        return (*chain, Draw(declared.name, numbers)) if rest <= {EMPTY, END} else None
     return None

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 import torch
-from jaxtyping import Float, Int, UInt8
+from jaxtyping import Bool, Float, Int, UInt8
 from torch import Tensor
 
 from shapeprog.geometry.cells import count, iou, pack, unpack, widen
@@ -19,8 +19,9 @@ from shapeprog.language.program import Program
 from shapeprog.language.statement import EMPTY, SLOTS
 from shapeprog.language.tensors import Code
 from shapeprog.language.tensors import decode as programs_of
-from shapeprog.language.unroll import draw_blocks, stays_inside
+from shapeprog.language.unroll import draw_blocks, unroll
 from shapeprog.models.generator import Generator, Memory, Said
+from shapeprog.space import HALF
 
 Choice = Literal["drawn", "argmax", "sample", "ids"]
 
@@ -163,7 +164,7 @@ def _helping(
     """
     ids, values, chance = _blocks(generator, feature, width)
     candidates = Code(ids[:, :, None], values[:, :, None])
-    drawn, possible = draw_blocks(candidates)[:, :, 0], stays_inside(candidates)[..., 0] & chance.isfinite()
+    drawn, possible = draw_blocks(candidates)[:, :, 0], _stays_inside(candidates)[..., 0] & chance.isfinite()
     wanted, before = cells[:, None], canvas[:, None]
     new = drawn & ~before
     exact = 2 * count(new & wanted) - count(new)
@@ -173,6 +174,14 @@ def _helping(
     row = torch.arange(len(ids), device=ids.device)
     helps = (worth[row, best] > 0) & (ids[row, best, 0] != EMPTY)
     return ids[row, best] * helps[:, None], values[row, best] * helps[:, None, None], chance[row, best] * helps
+
+
+def _stays_inside(code: Code) -> Bool[Tensor, "*batch K"]:
+    """Which blocks have the centre of every copy within the grid; what lies outside of it no canvas shows."""
+    lead, (steps, slots) = code.ids.shape[:-1], code.parameters.shape[-2:]
+    scene = unroll(Code(code.ids.reshape(-1, 1, steps), code.parameters.detach().reshape(-1, 1, steps, slots)))
+    within = (scene.centre.abs() <= HALF).all(-1) | ~scene.mask
+    return within.all(-1).reshape(lead)
 
 
 def _block(

@@ -6,7 +6,6 @@ from shapeprog.errors import ShapeProgError, did_you_mean
 from shapeprog.formats.notation import groups
 from shapeprog.language.parameters import Parameter
 from shapeprog.language.statement import Statement, language
-from shapeprog.language.values import range_text, signature
 
 _UNITS = {"position": "cells", "length": "cells", "shift": "cells", "count": "copies", "turn": "quarter turns"}
 _AXES = {2: "(depth, left-right)", 3: "(up, depth, left-right)"}
@@ -33,7 +32,7 @@ def manual(name: str | None = None) -> str:
 def page(declared: Statement) -> str:
     """The page of one declaration: how it is written, what it means, its parameters with range and slots."""
     kind = "loop" if declared.is_loop else "statement"
-    lines = [signature(declared), "", f"  {_plain(declared.doc)}", ""]
+    lines = [declared.signature, "", f"  {_plain(declared.doc)}", ""]
     width = max((len(parameter.name) for parameter in declared.parameters), default=0)
     lines += [f"  {parameter.name:<{width}}  {_meaning(parameter)}" for parameter in declared.parameters]
     if declared.parameters:
@@ -56,7 +55,7 @@ def _meaning(parameter: Parameter) -> str:
     axes = f" {_AXES[quantity.width]}" if quantity.width in _AXES else ""
     first, last = parameter.start, parameter.start + quantity.width - 1
     slots = f"slot {first}" if first == last else f"slots {first} to {last}"
-    return f"{quantity.kind}{axes} in {_UNITS[quantity.kind]}, {range_text(quantity)}; {slots}"
+    return f"{quantity.kind}{axes} in {_UNITS[quantity.kind]}, {quantity.range_text}; {slots}"
 
 
 def _notation(declared: Statement) -> str:

@@ -43,9 +43,21 @@ def random_program(
         chain = [loops[_pick(generator, len(loops))] for _ in range(levels)] + chain
         steps = [_step(generator, declared, copies, whole) for declared in chain]
         candidate: Chain = tuple(steps)
-        if not published or not Program((nest(candidate),)).outside_published():
+        if not published or not outside_published(Program((nest(candidate),))):
             body.append(candidate)
     return Program(tuple(nest(chain) for chain in body))
+
+
+def outside_published(program: Program) -> list[str]:
+    """Why a program leaves the published blocks [k], [19,k], [19,19,k], [20,10], [20,17]; empty if it stays."""
+    reasons = []
+    for number, chain in enumerate(program.chains, 1):
+        words = [node.name for node in chain]
+        ids = [language()[word].id for word in words]
+        plain = 1 <= ids[-1] <= 18 and ids[:-1] in ([], [19], [19, 19])
+        if not plain and ids not in ([20, 10], [20, 17]):
+            reasons.append(f"block {number} ({' > '.join(words)}) is none of the published blocks")
+    return reasons
 
 
 def _pick(generator: torch.Generator, choices: int) -> int:

@@ -14,8 +14,7 @@ other types is an error.  A *helper* is a plain Python function that kernels cal
 it is loaded when the first kernel is called.  Compiled kernels are kept in numba's cache; a kernel counts as changed
 when its own code, that of any helper it reaches, or a constant that these read has changed, in whatever file.
 
-What makes compiling slow: numba compiles a helper on its own and again within each kernel, and does so twice when both
-a kernel and a helper call it.  So share a large helper among few kernels, and call it from one level.
+What makes compiling slow is the compiler's front end: a tenth of a second for each helper, and more for its lines.
 """
 
 from __future__ import annotations
@@ -23,6 +22,7 @@ from __future__ import annotations
 import gc
 import importlib
 import inspect
+import os
 import subprocess
 import sys
 import threading
@@ -39,6 +39,9 @@ Function = Callable[..., Any]
 
 OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 """Kernels run without the interpreter's lock, and divide as numpy does, without a check before each division."""
+
+MOST = 3
+"""Processes that compile beside this one, at most, where there are as many cores."""
 
 _lock = threading.RLock()
 _helpers: dict[Function, dict[str, Any]] = {}
@@ -131,8 +134,8 @@ class Kernel:
 def prepare(modules: Sequence[str], tell: Callable[[str], None] | None = None) -> None:
     """Make all kernels of some modules ready, so that nobody waits for them later.
 
-    What the cache lacks is compiled by two processes at once: the other one takes kernels from the front, this one
-    from the back, so name first what is quickly imported and last what is not.
+    What the cache lacks is compiled by several processes at once: the others take kernels from the front, this one from
+    the back, so name first what is quickly imported and last what is not.
 
     Parameters
     ----------
@@ -142,35 +145,36 @@ def prepare(modules: Sequence[str], tell: Callable[[str], None] | None = None) -
         Called with a sentence before anything is compiled, which takes seconds.
     """
     lacking: list[Kernel] = []
-    second: _Second | None = None
+    waiting: deque[str] = deque()
+    others: list[_Other] = []
     done = False
     try:
         for name in modules:
             importlib.import_module(name)
             for each in list(_kernels.values()):
                 if each.function.__module__ == name and not each.load():
-                    if second is None:
-                        if tell:
-                            tell("compiling kernels for this machine, once; this may take half a minute")
-                        second = _Second()
+                    if tell and not lacking:
+                        tell("compiling kernels for this machine, once; this may take half a minute")
                     lacking.append(each)
-                    second.waiting.append(each.name)
-        while second and second.waiting:
-            with suppress(IndexError):  # the other process took the last one
-                _kernels[second.waiting.pop()].compile()
+                    waiting.append(each.name)
+            if waiting and not others:
+                others = [_Other(waiting) for _ in range(min(max((os.cpu_count() or 2) - 1, 1), MOST))]
+        while waiting:
+            with suppress(IndexError):  # another process took the last one
+                _kernels[waiting.pop()].compile()
         done = True
     finally:
-        if second:
-            second.finish(wait=done)
-    for each in lacking:  # from the cache now; compiled here should the other process have failed
+        for other in others:
+            other.finish(wait=done)
+    for each in lacking:  # from the cache now; compiled here should another process have failed
         each.compile()
 
 
-class _Second:
-    """A second process that compiles kernels into the cache: it asks for one name after another."""
+class _Other:
+    """Another process that compiles kernels into the cache: it asks for one of the names waiting after another."""
 
-    def __init__(self) -> None:
-        self.waiting: deque[str] = deque()
+    def __init__(self, waiting: deque[str]) -> None:
+        self._waiting = waiting
         self._complete = False
         command = [sys.executable, "-m", "shapeprog.kernels.compile"]
         pipe, nothing = subprocess.PIPE, subprocess.DEVNULL
@@ -194,7 +198,7 @@ class _Second:
         """The next name, once there is one; none at the end."""
         while True:
             with suppress(IndexError):
-                return self.waiting.popleft()
+                return self._waiting.popleft()
             if self._complete:
                 return ""
             time.sleep(0.01)
@@ -222,9 +226,16 @@ def _linked(function: Function) -> FunctionType:
 
 @cache
 def _compiled_helper(function: Function) -> Any:
-    """A helper as the compiler wants it: compiled with, and into, the kernels that reach it."""
+    """A helper as the compiler wants it: compiled with, and into, the kernels that reach it.
+
+    Literal numbers count as any others, or the compiler would make a version of the helper for each of them.
+    """
     numba: Any = importlib.import_module("numba")
-    return numba.njit(no_cpython_wrapper=True, **OPTIONS, **_helpers[function])(_linked(function))
+    unliteral = importlib.import_module("numba.core.types").unliteral
+    dispatcher = numba.njit(no_cpython_wrapper=True, **OPTIONS, **_helpers[function])(_linked(function))
+    template = dispatcher.get_call_template
+    dispatcher.get_call_template = lambda args, kws: template(tuple(map(unliteral, args)), kws)
+    return dispatcher
 
 
 def _helpers_of(function: Function) -> list[str]:
@@ -272,7 +283,7 @@ def _without_collector() -> Iterator[None]:
 
 
 def _main() -> None:
-    """The second process: ask for the names of kernels and compile them into the cache."""
+    """What another process does: ask for the names of kernels and compile them into the cache."""
     from shapeprog.kernels import compile as room  # not the copy of this module that runs as a script
 
     while True:

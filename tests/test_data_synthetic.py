@@ -14,7 +14,7 @@ from shapeprog.cli.app import app
 from shapeprog.data import read_pack
 from shapeprog.data.random import outside_published
 from shapeprog.data.synthetic import PRIORS, Prior, Stream, prior, read_programs, write_programs
-from shapeprog.data.synthetic.hiding import with_own_cells, with_own_cells_by_torch
+from shapeprog.data.synthetic.hiding import with_own_cells
 from shapeprog.errors import InputError, OutputError, ShapeProgError
 from shapeprog.geometry.cells import preceding, voxels
 from shapeprog.language import Language, standard, using
@@ -81,7 +81,7 @@ def test_every_block_has_cells_of_its_own(each: Prior) -> None:
 
 def test_the_kernel_that_finds_hidden_blocks_agrees_with_its_twin() -> None:
     blocks = torch.randint(0, 2, (80, 6, 32, 32), dtype=torch.int32) * torch.randint(0, 2, (80, 6, 1, 1)).int()
-    for one, two in zip(with_own_cells(blocks), with_own_cells_by_torch(blocks), strict=True):
+    for one, two in zip(with_own_cells(blocks), with_own_cells.twin(blocks), strict=True):
         assert torch.equal(one, two)
 
 

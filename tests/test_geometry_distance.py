@@ -38,7 +38,7 @@ def test_the_way_without_kernels_is_the_same(user):
     torch.testing.assert_close(signed_distance(scene, points), expected.values, rtol=1e-5, atol=1e-5)
     torch.testing.assert_close(room.gathered_distance(scene, points), expected.values, rtol=1e-5, atol=1e-5)
     torch.testing.assert_close(union_distance(scene, points), expected.values, rtol=1e-5, atol=1e-5)
-    slot, value = room.nearest_of_pairs(scene, points)
+    slot, value = room.nearest(scene, points)
     assert (slot == expected.indices).all()
     torch.testing.assert_close(value, expected.values)
     assert (nearest_slot(scene, points) == expected.indices).double().mean() > 0.99

@@ -66,7 +66,7 @@ def test_the_way_without_a_kernel_finds_the_same(monkeypatch):
     one, two = clouds(0, 90, 80)
     expected = nearest(one, two)
     monkeypatch.setattr(room, "AT_ONCE", 1000)
-    assert (room._by_pairs(one[None], two[None])[0] == expected).all()
+    assert (room.neighbours(one[None], two[None])[0] == expected).all()
 
 
 def test_weights_shift_the_mean_and_carry_gradient():

@@ -33,7 +33,7 @@ def test_points_lie_on_their_own_surface_and_in_no_other_part(dtype, user):
 def test_the_kernel_draws_what_the_declarations_draw():
     scene = random_scene(2, lead=(3,), slots=6, dtype=torch.float64)
     shares = room.area_shares(room.face_areas(scene), scene)
-    fast, slow = room.choose_by_kernel(table_of(scene), shares, 300, 7), room.choose(scene, shares, 300, 7)
+    fast, slow = room.visible_by_kernel(table_of(scene), shares, 300, 7), room.visible(scene, shares, 300, 7)
     assert (fast.chosen == slow.chosen).all()
     assert (fast.found == slow.found).all()
     torch.testing.assert_close(fast.places, slow.places)
@@ -42,7 +42,7 @@ def test_the_kernel_draws_what_the_declarations_draw():
 def test_gradient_of_placing_is_that_of_the_declarations():
     scene, leaves = with_leaves(random_scene(3, lead=(2,), slots=5, dtype=torch.float64))
     table, areas = table_of(scene), room.face_areas(scene)
-    choice = room.choose_by_kernel(table, room.area_shares(areas.detach(), scene), 200, 5)
+    choice = room.visible_by_kernel(table, room.area_shares(areas.detach(), scene), 200, 5)
     slope = torch.randn(2, 200, 3, dtype=torch.float64, generator=seeded())
     weigh = torch.randn(2, 200, dtype=torch.float64, generator=seeded())
     fast = room._Placed.apply(*leaves, areas, table, choice)

@@ -50,13 +50,13 @@ def each_distance(batch: Batch, points: Float[Tensor, "*batch P 3"]) -> Float[Te
 def nearest_slot(batch: Batch, points: Float[Tensor, "*batch P 3"]) -> Int[Tensor, "*batch P"]:
     """The primitive with the smallest signed distance to each point; found without gradient."""
     flat, positions = _aligned(batch, points)
-    return _nearest(flat, positions)[0].reshape(*batch.batch_shape, points.shape[-2])
+    return _chosen(flat, positions)[0].reshape(*batch.batch_shape, points.shape[-2])
 
 
 def union_distance(batch: Batch, points: Float[Tensor, "*batch P 3"]) -> Float[Tensor, "*batch P"]:
     """The values of :func:`signed_distance` without gradient."""
     flat, positions = _aligned(batch, points)
-    return _nearest(flat, positions)[1].reshape(*batch.batch_shape, points.shape[-2])
+    return _chosen(flat, positions)[1].reshape(*batch.batch_shape, points.shape[-2])
 
 
 def signed_distance(batch: Batch, points: Float[Tensor, "*batch P 3"]) -> Float[Tensor, "*batch P"]:
@@ -81,7 +81,7 @@ def gathered_distance(flat: Batch, positions: Float[Tensor, "B P 3"]) -> Float[T
     found = torch.full_like(positions[..., 0], torch.inf)
     if not flat.mask.shape[-1]:
         return found
-    kind, size, centre, rotation = flat.at(_nearest(flat, positions)[0])
+    kind, size, centre, rotation = flat.at(_chosen(flat, positions)[0])
     local = ((positions - centre)[..., :, None] * rotation).sum(-2)
     there = flat.mask.any(-1, keepdim=True)
     for each in flat.kinds:
@@ -123,15 +123,15 @@ def _aligned(batch: Batch, points: Tensor) -> tuple[Batch, Float[Tensor, "B P 3"
 
 
 @torch.no_grad()
-def _nearest(flat: Batch, points: Float[Tensor, "B P 3"]) -> tuple[Int[Tensor, "B P"], Float[Tensor, "B P"]]:
+def _chosen(flat: Batch, points: Float[Tensor, "B P 3"]) -> tuple[Int[Tensor, "B P"], Float[Tensor, "B P"]]:
     """Slot and signed distance of the nearest primitive, by the kernel as far as there is one."""
     if not by_kernel(flat.mask):
-        return nearest_of_pairs(flat, points)
+        return nearest(flat, points)
     slot, value = nearest_by_kernel(flat, points)
     declared = declared_kinds(flat)
     if declared:
         rest = replace(flat, mask=flat.mask & torch.isin(flat.kind, torch.tensor(declared)))
-        other, closer = nearest_of_pairs(rest, points)
+        other, closer = nearest(rest, points)
         slot, value = torch.where(closer < value, other, slot), torch.minimum(closer, value)
     return slot, value
 
@@ -147,11 +147,11 @@ def nearest_by_kernel(
         slots, values,
     )  # fmt: skip
     over_threads(lambda first, last: kernels.nearest(*data, first, last), len(slots), least=2048)
-    nearest = torch.from_numpy(slots).reshape(scenes, count)
-    return nearest, torch.from_numpy(values).to(points.dtype).reshape(scenes, count)
+    found = torch.from_numpy(slots), torch.from_numpy(values).to(points.dtype)
+    return found[0].reshape(scenes, count), found[1].reshape(scenes, count)
 
 
-def nearest_of_pairs(flat: Batch, points: Float[Tensor, "B P 3"]) -> tuple[Int[Tensor, "B P"], Float[Tensor, "B P"]]:
+def nearest(flat: Batch, points: Float[Tensor, "B P 3"]) -> tuple[Int[Tensor, "B P"], Float[Tensor, "B P"]]:
     """The same over all pairs, in pieces that fit in memory; the twin of the kernel."""
     if not flat.mask.shape[-1]:
         nothing = torch.full_like(points[..., 0], torch.inf)

@@ -34,10 +34,10 @@ def nearest(queries: Cloud, points: Other) -> Int[Tensor, "*batch P"]:
     """
     many, few = _pair(queries.detach(), points.detach())
     if by_kernel(many):
-        rows, clouds = _neighbours(many, few)[0], np.arange(len(few))[:, None]
+        rows, clouds = neighbours_by_kernel(many, few)[0], np.arange(len(few))[:, None]
         index = torch.from_numpy(rows - clouds * few.shape[1])
     else:
-        index = _by_pairs(many, few)
+        index = neighbours(many, few)
     return index.reshape(queries.shape[:-1])
 
 
@@ -55,7 +55,7 @@ def squared_distance(queries: Cloud, points: Other) -> Float[Tensor, "*batch P"]
     if by_kernel(many):
         found: Tensor = _SquaredDistance.apply(many, few)  # type: ignore[no-untyped-call]
     else:
-        index = _by_pairs(many.detach(), few.detach())
+        index = neighbours(many.detach(), few.detach())
         found = ((many - few.gather(1, index[..., None].expand(-1, -1, 3))) ** 2).sum(-1)
     return found.reshape(queries.shape[:-1])
 
@@ -80,7 +80,7 @@ class _SquaredDistance(torch.autograd.Function):
 
     @staticmethod
     def forward(ctx: Any, queries: Tensor, points: Tensor) -> Tensor:
-        index, squared = _neighbours(queries, points)
+        index, squared = neighbours_by_kernel(queries, points)
         ctx.save_for_backward(queries, points)
         ctx.index = index
         return torch.from_numpy(squared).to(queries.dtype)
@@ -102,7 +102,7 @@ class _Chamfer(torch.autograd.Function):
 
     @staticmethod
     def forward(ctx: Any, one: Tensor, two: Tensor) -> tuple[Tensor, Tensor]:
-        there, back = _neighbours(one, two), _neighbours(two, one)
+        there, back = neighbours_by_kernel(one, two), neighbours_by_kernel(two, one)
         ctx.save_for_backward(one, two)
         ctx.index = there[0], back[0]
         return cast(there[1].mean(-1), one), cast(back[1].mean(-1), one)
@@ -131,7 +131,7 @@ def _pair(queries: Cloud, points: Other) -> tuple[Float[Tensor, "B P 3"], Float[
     return many, points.to(many).reshape(count, points.shape[-2], 3).contiguous()
 
 
-def _neighbours(queries: Tensor, points: Tensor) -> tuple[Array, Array]:
+def neighbours_by_kernel(queries: Tensor, points: Tensor) -> tuple[Array, Array]:
     """Rows of the nearest points among those of all clouds, and squared distances, (B, P) each."""
     (clouds, many), count = queries.shape[:2], points.shape[1]
     index, squared = np.empty(clouds * many, np.int64), np.empty(clouds * many)
@@ -148,7 +148,7 @@ def _pull(queries: Array, points: Array, index: Array, slope: Array, to_queries:
     over_threads(lambda first, last: kernels.pull(*data, first, last), len(index), least=8)
 
 
-def _by_pairs(queries: Float[Tensor, "B P 3"], points: Float[Tensor, "B Q 3"]) -> Int[Tensor, "B P"]:
+def neighbours(queries: Float[Tensor, "B P 3"], points: Float[Tensor, "B Q 3"]) -> Int[Tensor, "B P"]:
     """Differences are taken before they are squared, which keeps small distances exact."""
     step = max(1, AT_ONCE // max(1, points.shape[0] * points.shape[1]))
     found = []

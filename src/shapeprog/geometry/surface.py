@@ -105,14 +105,14 @@ def sample_surface(batch: Batch, n: int, generator: torch.Generator | None = Non
     seed = int(torch.randint(0, 2**62, (), generator=generator, device=device))
     if by_kernel(flat):
         table = table_of(flat)
-        choice = _whole(choose_by_kernel(table, shares, n, seed), n)
+        choice = _whole(visible_by_kernel(table, shares, n, seed), n)
         points, weights = _Placed.apply(  # type: ignore[no-untyped-call]
             flat.size, flat.centre, flat.rotation, areas, table, choice
         )
         normals = cast(choice.places[..., 6:].numpy(), flat.size)
     else:
         with torch.no_grad():
-            choice = _whole(choose(flat.detach(), shares, n, seed), n)
+            choice = _whole(visible(flat.detach(), shares, n, seed), n)
         points, weights = place(flat, areas, choice)
         normals = choice.places[..., 6:].to(points)
     found = SurfaceSample(points, weights, choice.slot, normals)
@@ -156,7 +156,7 @@ def area_shares(areas: Float[Tensor, "B N F"], batch: Batch) -> Float[Tensor, "B
     return total / whole
 
 
-def choose_by_kernel(table: Array, shares: Float[Tensor, "B C"], n: int, seed: int) -> Choice:
+def visible_by_kernel(table: Array, shares: Float[Tensor, "B C"], n: int, seed: int) -> Choice:
     """Visible points, from the table of primitives."""
     count = len(shares)
     chosen, places = np.empty((count * n, 2), np.int64), np.empty((count * n, 9))
@@ -170,7 +170,7 @@ def choose_by_kernel(table: Array, shares: Float[Tensor, "B C"], n: int, seed: i
     )))  # fmt: skip
 
 
-def choose(flat: Batch, shares: Float[Tensor, "B C"], n: int, seed: int) -> Choice:
+def visible(flat: Batch, shares: Float[Tensor, "B C"], n: int, seed: int) -> Choice:
     """The same from the declarations alone, for any kind of primitive on any device; the twin of the kernel."""
     per = shares.shape[-1] // flat.mask.shape[-1]
     pieces: list[tuple[Tensor, ...]] = []

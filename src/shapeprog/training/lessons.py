@@ -11,12 +11,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-import numpy as np
 import torch
 from jaxtyping import Bool, Int, UInt8
 from torch import Tensor
 
-from shapeprog.geometry.cells import count, preceding, unpack
+from shapeprog.geometry.cells import count, preceding
 from shapeprog.language.tensors import Code
 from shapeprog.language.unroll import draw_blocks
 from shapeprog.models.decoding import decode
@@ -145,12 +144,7 @@ def _best(
     drawn: Int[Tensor, "B K 32 32"], canvases: Int[Tensor, "B L 32 32"]
 ) -> tuple[Int[Tensor, "B L"], Bool[Tensor, "B L"]]:
     """On each canvas the block that newly covers the most cells, the lowest of equals; and whether it is enough."""
-    if drawn.device.type == "cpu":
-        fresh = drawn.numpy()[:, None] & ~canvases.numpy()[:, :, None]
-        new = torch.from_numpy(np.bitwise_count(fresh.view(np.uint32)).sum((-2, -1), dtype=np.int64))
-    else:
-        cells, covered = (unpack(each).flatten(2).float() for each in (drawn, canvases))
-        new = count(drawn)[:, None] - (covered @ cells.mT).round().long()
+    new = count(drawn[:, None] & ~canvases[:, :, None])
     words = drawn.flatten(2) != 0
     lowest = words.int().argmax(-1)
     worth = new * words.shape[-1] - lowest[:, None]

@@ -7,27 +7,24 @@ import torch
 from jaxtyping import Bool, Int
 from torch import Tensor
 
-from shapeprog.geometry.arrays import over_threads
+from shapeprog.data.synthetic import hiding_kernels as kernels
+from shapeprog.geometry.arrays import over_threads, twin_of
 from shapeprog.geometry.cells import Cells, cells_of, preceding, words_of
 
 
-def with_own_cells(blocks: Int[Tensor, "B K 32 32"]) -> tuple[Bool[Tensor, "B K"], Cells]:
-    """Which blocks to keep so that each has cells of its own and the shape stays the same, and that shape (B, 32, 32).
-
-    Of blocks that hide one another the earlier stay.
-    """
-    if blocks.device.type != "cpu":
-        return with_own_cells_by_torch(blocks)
-    from shapeprog.data.synthetic import hiding_kernels as kernels
-
+def _by_kernel(blocks: Int[Tensor, "B K 32 32"]) -> tuple[Bool[Tensor, "B K"], Cells]:
     words = words_of(blocks).reshape(*blocks.shape[:2], -1)
     keep, union = np.empty(words.shape[:2], np.bool_), np.zeros((len(words), words.shape[2]), np.uint32)
     over_threads(lambda first, last: kernels.unhide(words, keep, union, first, last), len(words), least=64)
     return torch.from_numpy(keep), cells_of(union).unflatten(-1, tuple(blocks.shape[2:]))
 
 
-def with_own_cells_by_torch(blocks: Int[Tensor, "B K 32 32"]) -> tuple[Bool[Tensor, "B K"], Cells]:
-    """The same on any device: the readable twin of the kernel."""
+@twin_of(_by_kernel)
+def with_own_cells(blocks: Int[Tensor, "B K 32 32"]) -> tuple[Bool[Tensor, "B K"], Cells]:
+    """Which blocks to keep so that each has cells of its own and the shape stays the same, and that shape (B, 32, 32).
+
+    Of blocks that hide one another the earlier stay.
+    """
     before, union = preceding(blocks), torch.zeros_like(blocks[:, 0])
     keep = torch.zeros_like(blocks[..., 0, 0], dtype=torch.bool)
     for k in reversed(range(blocks.shape[1])):

@@ -99,11 +99,6 @@ class Batch:
         """The same without gradient."""
         return type(self)(**{field.name: getattr(self, field.name).detach() for field in fields(self)})
 
-    def local(self, points: Float[Tensor, "*batch P 3"]) -> Float[Tensor, "*batch P N 3"]:
-        """Positions of points (P, 3) in the local frame of every slot."""
-        offset = points[..., :, None, :] - self.centre[..., None, :, :]
-        return torch.einsum("...nij,...pni->...pnj", self.rotation, offset)
-
     def at(self, slot: Int[Tensor, "B P"]) -> tuple[Int[Tensor, "B P"], Tensor, Tensor, Tensor]:
         """Kind, size, centre and rotation of chosen slots of elements (B, N), with gradient to these."""
         table = torch.cat([self.size, self.centre, self.rotation.flatten(-2)], -1)

@@ -17,23 +17,23 @@ SQUARE = 1e-6
 
 
 @helper
-def _excess(row, x, y, z):
+def _excess(table, row, x, y, z):
     """How far a place relative to the centre is outside of the primitive."""
     return excess(
-        row, 0,
-        row[0, ROTATION] * x + row[0, ROTATION + 3] * y + row[0, ROTATION + 6] * z,
-        row[0, ROTATION + 1] * x + row[0, ROTATION + 4] * y + row[0, ROTATION + 7] * z,
-        row[0, ROTATION + 2] * x + row[0, ROTATION + 5] * y + row[0, ROTATION + 8] * z,
+        table, row,
+        table[row, ROTATION] * x + table[row, ROTATION + 3] * y + table[row, ROTATION + 6] * z,
+        table[row, ROTATION + 1] * x + table[row, ROTATION + 4] * y + table[row, ROTATION + 7] * z,
+        table[row, ROTATION + 2] * x + table[row, ROTATION + 5] * y + table[row, ROTATION + 8] * z,
     )  # fmt: skip
 
 
 @helper
-def _stretch(row, half, x, y, reach):
+def _stretch(table, row, half, x, y, reach):
     """Where along left-right the row of cells through (x, y) can be inside the local box, relative to the centre."""
     near, far = -reach - 1e-6, reach + 1e-6
     for axis in range(3):
-        start = row[0, ROTATION + axis] * x + row[0, ROTATION + 3 + axis] * y
-        slope = row[0, ROTATION + 6 + axis]
+        start = table[row, ROTATION + axis] * x + table[row, ROTATION + 3 + axis] * y
+        slope = table[row, ROTATION + 6 + axis]
         if abs(slope) < 1e-12:
             if abs(start) > half[axis] + 1e-9:
                 return 1.0, -1.0
@@ -44,32 +44,32 @@ def _stretch(row, half, x, y, reach):
 
 
 @helper
-def _fill_turned(planes, plane, row, half, low, high):
+def _fill_turned(table, row, planes, plane, half, low, high):
     """Any primitive in any pose: cells whose centre is inside.
 
     Primitives are convex, so the cells of a row are a stretch: it is found for the box and its ends are tested.
     """
     resolution, reach = planes.shape[2], 0.0
-    half[0], half[1], half[2] = bound(row, 0)
+    half[0], half[1], half[2] = bound(table, row)
     for axis in range(3):
         reach = 0.0
         for other in range(3):
-            reach += abs(row[0, ROTATION + 3 * axis + other]) * half[other]
-        low[axis] = clip(np.floor(row[0, CENTRE + axis] - reach - 0.5), resolution)
-        high[axis] = clip(np.ceil(row[0, CENTRE + axis] + reach + 0.5), resolution)
-    side = row[0, CENTRE + 2]
+            reach += abs(table[row, ROTATION + 3 * axis + other]) * half[other]
+        low[axis] = clip(np.floor(table[row, CENTRE + axis] - reach - 0.5), resolution)
+        high[axis] = clip(np.ceil(table[row, CENTRE + axis] + reach + 0.5), resolution)
+    side = table[row, CENTRE + 2]
     for i in range(low[0], high[0]):
-        x = i + 0.5 - row[0, CENTRE]
+        x = i + 0.5 - table[row, CENTRE]
         for j in range(low[1], high[1]):
-            y = j + 0.5 - row[0, CENTRE + 1]
-            near, far = _stretch(row, half, x, y, reach)
+            y = j + 0.5 - table[row, CENTRE + 1]
+            near, far = _stretch(table, row, half, x, y, reach)
             if near > far:
                 continue
             first = max(clip(np.floor(near + side - 0.5), resolution), low[2])
             last = min(clip(np.ceil(far + side + 0.5), resolution), high[2])
-            while first < last and _excess(row, x, y, first + 0.5 - side) > 0:
+            while first < last and _excess(table, row, x, y, first + 0.5 - side) > 0:
                 first += 1
-            while first < last and _excess(row, x, y, last - 0.5 - side) > 0:
+            while first < last and _excess(table, row, x, y, last - 0.5 - side) > 0:
                 last -= 1
             fill_row(planes, plane, i, j, first, last)
 
@@ -78,29 +78,27 @@ def _fill_turned(planes, plane, row, half, low, high):
 def fill(table, owner, many, planes, begin, end):
     """Fill planes of words (P, W, R, R) with the cells of scenes ``begin`` to ``end``, of ``many`` rows each.
 
-    Each row of the table has its owner: the plane that its cells go to.
+    Each row of the table, which is scaled to cells and used up, has its owner: the plane that its cells go to.
     """
     resolution = planes.shape[2]
     scale, origin = resolution / 32, resolution / 2
-    row, half = np.empty((1, WIDTH)), np.empty(3)
-    low, high = np.empty(3, np.int64), np.empty(3, np.int64)
-    for item in range(begin * many, end * many):
-        if table[item, KIND] < 0:
+    half, low, high = np.empty(3), np.empty(3, np.int64), np.empty(3, np.int64)
+    for row in range(begin * many, end * many):
+        if table[row, KIND] < 0:
             continue
         total, square = 0.0, True
-        row[0, KIND] = table[item, KIND]
         for column in range(SIZE, CENTRE):
-            row[0, column] = table[item, column] * scale
-            total += row[0, column]
+            table[row, column] *= scale
+            total += table[row, column]
         for column in range(CENTRE, ROTATION):
-            row[0, column] = table[item, column] * scale + origin
-            total += row[0, column]
+            table[row, column] = table[row, column] * scale + origin
+            total += table[row, column]
         for column in range(ROTATION, WIDTH):
-            row[0, column] = value = table[item, column]
+            value = table[row, column]
             square = square and abs(value - np.rint(value)) <= SQUARE
             total += value
-        if math.isfinite(total) and not cells(row, 0, square, planes, owner[item], low, high):
-            _fill_turned(planes, owner[item], row, half, low, high)
+        if math.isfinite(total) and not cells(table, row, square, planes, owner[row], low, high):
+            _fill_turned(table, row, planes, owner[row], half, low, high)
 
 
 @kernel("void(u4[::1], u8[::1], u8[:, ::1], i8, i8)")

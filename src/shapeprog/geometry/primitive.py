@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -19,6 +19,8 @@ from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
 from shapeprog.errors import DeclarationError
+from shapeprog.kernels.compile import helper
+from shapeprog.space import Array
 
 SIZES = 4
 """Slots for the sizes of one primitive."""
@@ -30,6 +32,13 @@ Points = Float[Tensor, "*batch 3"]
 Sizes = Float[Tensor, "*batch 4"]
 Scalars = Float[Tensor, "*batch"]
 Helper = Callable[..., Any]
+Triple = tuple[float, float, float]
+
+
+@helper
+def tested(table: Array, row: int, square: bool, planes: Array, plane: int, low: Array, high: Array) -> bool:
+    """Cells of a primitive without a rule of its own: those whose centre is inside."""
+    return False
 
 
 @dataclass(frozen=True)
@@ -68,21 +77,13 @@ class Kernels:
     place: Helper
     normal: Helper
     pull: Helper
-    cells: Helper
+    cells: Helper = tested
 
 
-@dataclass(frozen=True)
-class Spans:
-    """Cells of M solids that fill rows from low to high in every layer, R layers each, by a rule of their own.
+class Spans(NamedTuple):
+    """Cells of M solids by a rule of their own: which of them it is for, and what these cover from low to high.
 
-    Parameters
-    ----------
-    known
-        Which of the solids the rule is for; the others are tested cell by cell.
-    layers
-        First layer and the one after the last, (M, 1) each.
-    depth, side
-        Along depth and left-right the first cell and the one after the last in every layer, (M, R) each.
+    That are layers, and in every layer of the grid cells along depth and left-right.
     """
 
     known: Bool[Tensor, " M"]

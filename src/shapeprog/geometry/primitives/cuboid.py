@@ -16,7 +16,7 @@ import torch
 from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
-from shapeprog.geometry.primitive import Kernels, Mesh, Points, Primitive, Scalars, Sizes, Spans, safe_norm
+from shapeprog.geometry.primitive import Kernels, Mesh, Points, Primitive, Scalars, Sizes, Spans, Triple, safe_norm
 from shapeprog.kernels.compile import helper
 from shapeprog.kernels.rows import clip, fill_box
 from shapeprog.kernels.table import CENTRE, ROTATION, SIZE
@@ -222,7 +222,7 @@ def slopes_kernel(table: Array, row: int, a: float, b: float, c: float, out: Arr
 
 
 @helper
-def bound_kernel(table: Array, row: int) -> tuple[float, float, float]:
+def bound_kernel(table: Array, row: int) -> Triple:
     """Twin of :func:`bound`."""
     depth = max(table[row, SIZE + 1], 0.0) + abs(table[row, SIZE + 3]) / 2
     return max(table[row, SIZE], 0.0), depth, max(table[row, SIZE + 2], 0.0)
@@ -240,9 +240,7 @@ def excess_kernel(table: Array, row: int, a: float, b: float, c: float) -> float
 
 
 @helper
-def sample_kernel(
-    table: Array, row: int, face: int, one: float, two: float, three: float
-) -> tuple[float, float, float]:
+def sample_kernel(table: Array, row: int, face: int, one: float, two: float, three: float) -> Triple:
     """Twin of :func:`sample`."""
     sign = 2.0 * (face % 2) - 1
     u, v, w = 2 * one - 1, 2 * two - 1, 2 * three - 1
@@ -254,14 +252,14 @@ def sample_kernel(
 
 
 @helper
-def place_kernel(table: Array, row: int, u: float, v: float, w: float) -> tuple[float, float, float]:
+def place_kernel(table: Array, row: int, u: float, v: float, w: float) -> Triple:
     """Twin of :func:`place`."""
     depth = table[row, SIZE + 1] * v + table[row, SIZE + 3] / 2 * u
     return table[row, SIZE] * u, depth, table[row, SIZE + 2] * w
 
 
 @helper
-def normal_kernel(table: Array, row: int, face: int, u: float, v: float, w: float) -> tuple[float, float, float]:
+def normal_kernel(table: Array, row: int, face: int, u: float, v: float, w: float) -> Triple:
     """Twin of :func:`normal`."""
     sign = 2.0 * (face % 2) - 1
     if face < 2:

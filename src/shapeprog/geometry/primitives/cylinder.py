@@ -13,7 +13,7 @@ import torch
 from jaxtyping import Float, Int
 from torch import Tensor
 
-from shapeprog.geometry.primitive import Kernels, Mesh, Points, Primitive, Scalars, Sizes, safe_norm
+from shapeprog.geometry.primitive import Kernels, Mesh, Points, Primitive, Scalars, Sizes, Triple, safe_norm
 from shapeprog.geometry.primitives.cuboid import corner
 from shapeprog.kernels.compile import helper
 from shapeprog.kernels.rows import CAP, REACH, clip, fill_row
@@ -128,7 +128,7 @@ def slopes_kernel(table: Array, row: int, a: float, b: float, c: float, out: Arr
 
 
 @helper
-def bound_kernel(table: Array, row: int) -> tuple[float, float, float]:
+def bound_kernel(table: Array, row: int) -> Triple:
     """Twin of :func:`bound`."""
     radius = max(table[row, SIZE + 1], 0.0)
     return max(table[row, SIZE], 0.0), radius, radius
@@ -142,9 +142,7 @@ def excess_kernel(table: Array, row: int, a: float, b: float, c: float) -> float
 
 
 @helper
-def sample_kernel(
-    table: Array, row: int, face: int, one: float, two: float, three: float
-) -> tuple[float, float, float]:
+def sample_kernel(table: Array, row: int, face: int, one: float, two: float, three: float) -> Triple:
     """Twin of :func:`sample`."""
     angle = 2 * math.pi * one
     if face == 2:
@@ -154,13 +152,13 @@ def sample_kernel(
 
 
 @helper
-def place_kernel(table: Array, row: int, u: float, v: float, w: float) -> tuple[float, float, float]:
+def place_kernel(table: Array, row: int, u: float, v: float, w: float) -> Triple:
     """Twin of :func:`place`."""
     return table[row, SIZE] * u, table[row, SIZE + 1] * v, table[row, SIZE + 1] * w
 
 
 @helper
-def normal_kernel(table: Array, row: int, face: int, u: float, v: float, w: float) -> tuple[float, float, float]:
+def normal_kernel(table: Array, row: int, face: int, u: float, v: float, w: float) -> Triple:
     """Twin of :func:`normal`."""
     return (0.0, v, w) if face == 2 else (u, 0.0, 0.0)
 

@@ -14,7 +14,7 @@ import torch
 from jaxtyping import Float, Int
 from torch import Tensor
 
-from shapeprog.geometry.primitive import Kernels, Mesh, Points, Primitive, Scalars, Sizes
+from shapeprog.geometry.primitive import Kernels, Mesh, Points, Primitive, Scalars, Sizes, Triple
 from shapeprog.geometry.random import uniform as uniform_at
 from shapeprog.kernels.bits import uniform
 from shapeprog.kernels.compile import helper
@@ -154,7 +154,7 @@ def volume(size: Sizes) -> Scalars:
 
 
 @helper
-def _foot(table: Array, row: int, x: float, y: float, z: float) -> tuple[float, float, float]:
+def _foot(table: Array, row: int, x: float, y: float, z: float) -> Triple:
     """Twin of :func:`foot`."""
     a, b, c = (
         max(table[row, SIZE], THINNEST), max(table[row, SIZE + 1], THINNEST), max(table[row, SIZE + 2], THINNEST)
@@ -194,7 +194,7 @@ def slopes_kernel(table: Array, row: int, a: float, b: float, c: float, out: Arr
 
 
 @helper
-def bound_kernel(table: Array, row: int) -> tuple[float, float, float]:
+def bound_kernel(table: Array, row: int) -> Triple:
     """The half axes."""
     return max(table[row, SIZE], 0.0), max(table[row, SIZE + 1], 0.0), max(table[row, SIZE + 2], 0.0)
 
@@ -210,9 +210,7 @@ def excess_kernel(table: Array, row: int, a: float, b: float, c: float) -> float
 
 
 @helper
-def sample_kernel(
-    table: Array, row: int, face: int, one: float, two: float, three: float
-) -> tuple[float, float, float]:
+def sample_kernel(table: Array, row: int, face: int, one: float, two: float, three: float) -> Triple:
     """Twin of :func:`sample`."""
     a, b, c = table[row, SIZE], table[row, SIZE + 1], table[row, SIZE + 2]
     most = max(max(b * c, a * c), a * b)
@@ -229,13 +227,13 @@ def sample_kernel(
 
 
 @helper
-def place_kernel(table: Array, row: int, u: float, v: float, w: float) -> tuple[float, float, float]:
+def place_kernel(table: Array, row: int, u: float, v: float, w: float) -> Triple:
     """Twin of :func:`place`."""
     return max(table[row, SIZE], 0.0) * u, max(table[row, SIZE + 1], 0.0) * v, max(table[row, SIZE + 2], 0.0) * w
 
 
 @helper
-def normal_kernel(table: Array, row: int, face: int, u: float, v: float, w: float) -> tuple[float, float, float]:
+def normal_kernel(table: Array, row: int, face: int, u: float, v: float, w: float) -> Triple:
     """Twin of :func:`normal`."""
     a, b, c = (
         max(table[row, SIZE], THINNEST), max(table[row, SIZE + 1], THINNEST), max(table[row, SIZE + 2], THINNEST)
@@ -256,17 +254,11 @@ def pull_kernel(
     out[row, SIZE + 2] += dc * w
 
 
-@helper
-def cells_kernel(table: Array, row: int, square: bool, planes: Array, plane: int, low: Array, high: Array) -> bool:
-    """A cell is filled when its centre is inside, so there is no rule of its own."""
-    return False
-
-
 PRIMITIVE = ELLIPSOID = Primitive(
     "ellipsoid", ("half_up", "half_depth", "half_side"), 3,
     distance, _axes, areas, sample, place, normal, mesh, volume,
     kernels=Kernels(
         distance_kernel, slopes_kernel, bound_kernel, excess_kernel, sample_kernel, place_kernel, normal_kernel,
-        pull_kernel, cells_kernel,
+        pull_kernel,
     ),
 )  # fmt: skip

@@ -10,7 +10,7 @@ import torch
 from jaxtyping import Float, Int
 from torch import Tensor
 
-from shapeprog.geometry.primitive import Kernels, Mesh, Points, Primitive, Scalars, Sizes, safe_norm
+from shapeprog.geometry.primitive import Kernels, Mesh, Points, Primitive, Scalars, Sizes, Triple, safe_norm
 from shapeprog.geometry.primitives.cylinder import SEGMENTS
 from shapeprog.kernels.compile import helper
 from shapeprog.kernels.table import SIZE
@@ -146,7 +146,7 @@ def slopes_kernel(table: Array, row: int, a: float, b: float, c: float, out: Arr
 
 
 @helper
-def bound_kernel(table: Array, row: int) -> tuple[float, float, float]:
+def bound_kernel(table: Array, row: int) -> Triple:
     """Twin of :func:`bound`."""
     widest = max(max(table[row, SIZE + 1], table[row, SIZE + 2]), 0.0)
     return max(table[row, SIZE], 0.0), widest, widest
@@ -164,9 +164,7 @@ def excess_kernel(table: Array, row: int, a: float, b: float, c: float) -> float
 
 
 @helper
-def sample_kernel(
-    table: Array, row: int, face: int, one: float, two: float, three: float
-) -> tuple[float, float, float]:
+def sample_kernel(table: Array, row: int, face: int, one: float, two: float, three: float) -> Triple:
     """Twin of :func:`sample`."""
     angle = 2 * math.pi * one
     if face == 2:
@@ -178,14 +176,14 @@ def sample_kernel(
 
 
 @helper
-def place_kernel(table: Array, row: int, u: float, v: float, w: float) -> tuple[float, float, float]:
+def place_kernel(table: Array, row: int, u: float, v: float, w: float) -> Triple:
     """Twin of :func:`place`."""
     radius = (table[row, SIZE + 1] * (1 - u) + table[row, SIZE + 2] * (1 + u)) / 2
     return table[row, SIZE] * u, radius * v, radius * w
 
 
 @helper
-def normal_kernel(table: Array, row: int, face: int, u: float, v: float, w: float) -> tuple[float, float, float]:
+def normal_kernel(table: Array, row: int, face: int, u: float, v: float, w: float) -> Triple:
     """Twin of :func:`normal`."""
     if face != 2:
         return u, 0.0, 0.0
@@ -205,16 +203,10 @@ def pull_kernel(
     out[row, SIZE + 2] += by_radius * (1 + u)
 
 
-@helper
-def cells_kernel(table: Array, row: int, square: bool, planes: Array, plane: int, low: Array, high: Array) -> bool:
-    """A cell is filled when its centre is inside, so there is no rule of its own."""
-    return False
-
-
 PRIMITIVE = FRUSTUM = Primitive(
     "frustum", ("half_height", "bottom", "top"), 3, distance, bound, areas, sample, place, normal, mesh, volume,
     kernels=Kernels(
         distance_kernel, slopes_kernel, bound_kernel, excess_kernel, sample_kernel, place_kernel, normal_kernel,
-        pull_kernel, cells_kernel,
+        pull_kernel,
     ),
 )  # fmt: skip

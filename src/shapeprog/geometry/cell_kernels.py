@@ -55,6 +55,8 @@ def _fill_turned(table, row, planes, plane, half, low, high):
         reach = 0.0
         for other in range(3):
             reach += abs(table[row, ROTATION + 3 * axis + other]) * half[other]
+        if not math.isfinite(reach):
+            return
         low[axis] = clip(np.floor(table[row, CENTRE + axis] - reach - 0.5), resolution)
         high[axis] = clip(np.ceil(table[row, CENTRE + axis] + reach + 0.5), resolution)
     side = table[row, CENTRE + 2]
@@ -94,9 +96,7 @@ def fill(table, owner, many, planes, begin, end):
             table[row, column] = table[row, column] * scale + origin
             total += table[row, column]
         for column in range(ROTATION, WIDTH):
-            value = table[row, column]
-            square = square and abs(value - np.rint(value)) <= SQUARE
-            total += value
+            square = square and abs(table[row, column] - np.rint(table[row, column])) <= SQUARE
         if math.isfinite(total) and not cells(table, row, square, planes, owner[row], low, high):
             _fill_turned(table, row, planes, owner[row], half, low, high)
 

@@ -39,8 +39,7 @@ _SPREAD: npt.NDArray[np.uint64] = (
 def rasterise(batch: Batch, resolution: int = RESOLUTION) -> Cells:
     """The packed cells that the primitives of each element occupy, clipped to the grid; see :func:`voxels`."""
     flat = batch.flatten()
-    plane = torch.arange(len(flat), device=batch.device)[:, None].expand(-1, batch.mask.shape[-1])
-    cells = _filled(flat, plane, len(flat), resolution)
+    cells = _filled(flat, None, 1, resolution)
     return cells.reshape(*batch.batch_shape, *cells.shape[1:])
 
 
@@ -53,8 +52,7 @@ def rasterise_apart(batch: Batch, part: Int[Tensor, "*batch N"], parts: int, res
         The group of every slot, from 0 to ``parts`` - 1.
     """
     flat = batch.flatten()
-    plane = torch.arange(len(flat), device=batch.device)[:, None] * parts + part.reshape(flat.mask.shape)
-    cells = _filled(flat, plane, len(flat) * parts, resolution)
+    cells = _filled(flat, part.reshape(flat.mask.shape), parts, resolution)
     return cells.reshape(*batch.batch_shape, parts, *cells.shape[1:])
 
 
@@ -182,21 +180,28 @@ def widen(cells: Cells) -> Cells:
     return wide.flatten(-3, -2)
 
 
-def _filled(flat: Batch, plane: Int[Tensor, "B N"], planes: int, resolution: int) -> Int[Tensor, "planes words R"]:
+def _filled(flat: Batch, part: Int[Tensor, "B N"] | None, parts: int, resolution: int) -> Int[Tensor, "planes words R"]:
+    """The cells of every part of every element on a plane of its own."""
     if resolution < 1:
         raise ShapeProgError(f"a grid of {resolution} cells a side holds nothing", "ask for a resolution of 1 or more")
-    cells = torch.zeros(planes, -(-resolution // WORD) * resolution, resolution, dtype=torch.int32, device=flat.device)
-    (fill_by_kernel if by_kernel(flat.mask) else fill)(flat, plane, cells)
+    rows = -(-resolution // WORD) * resolution
+    cells = torch.zeros(len(flat) * parts, rows, resolution, dtype=torch.int32, device=flat.device)
+    if by_kernel(flat.mask):
+        owner = np.repeat(np.arange(len(flat)) * parts, flat.mask.shape[-1])
+        fill_by_kernel(flat, owner if part is None else owner + array(part).reshape(-1), cells)
+    else:
+        plane = (torch.arange(len(flat), device=flat.device) * parts)[:, None].expand(flat.mask.shape)
+        fill(flat, plane if part is None else plane + part, cells)
     return cells
 
 
-def fill_by_kernel(flat: Batch, plane: Int[Tensor, "B N"], cells: Int[Tensor, "planes words R"]) -> None:
-    """Add the cells of all primitives to the planes that they name, by the kernel as far as it knows them."""
-    table, owner = table_of(flat), array(plane).reshape(-1)
-    words = words_of(cells.unflatten(-2, (-1, cells.shape[-1])))
+def fill_by_kernel(flat: Batch, owner: npt.NDArray[np.int64], cells: Int[Tensor, "planes words R"]) -> None:
+    """Add the cells of all slots (B * N) to the planes that own them, by the kernel as far as it knows them."""
+    table, words = table_of(flat), words_of(cells.unflatten(-2, (-1, cells.shape[-1])))
     many, scenes = flat.mask.shape[-1], len(flat)
     over_threads(lambda first, last: kernels.fill(table, owner, many, words, first, last), scenes, least=32)
-    _fill_kinds(flat, plane, cells, declared_kinds(flat))
+    if declared := declared_kinds(flat):
+        _fill_kinds(flat, torch.from_numpy(owner).reshape(flat.mask.shape), cells, declared)
 
 
 def fill(flat: Batch, plane: Int[Tensor, "B N"], cells: Int[Tensor, "planes words R"]) -> None:

@@ -44,7 +44,7 @@ def _boxes(table, first, many, kept, box):
     return used, extent
 
 
-@helper
+@helper(forceinline=True)
 def _over(box, axis, count, x, y, z, over):
     """How far a point is beyond the faces of each box along one of its axes."""
     for n in range(count):
@@ -53,7 +53,7 @@ def _over(box, axis, count, x, y, z, over):
         over[n] = abs(along) - box[12 + axis, n]
 
 
-@helper
+@helper(forceinline=True)
 def _bounds(box, count, x, y, z, extent, up, depth, lower):
     """Lower bounds of the signed distances of a point: those to the turned boxes around the primitives.
 
@@ -71,7 +71,7 @@ def _bounds(box, count, x, y, z, extent, up, depth, lower):
         lower[n] = math.sqrt(p * p + q * q + r * r) + min(max(u, max(v, w)), zero) - slack
 
 
-@helper
+@helper(forceinline=True)
 def _best(table, first, kept, lower, count, x, y, z):
     """The best primitive by its exact distance, looking only at those whose bound is below the best so far."""
     found, least = 0, lower[0]

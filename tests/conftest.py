@@ -32,6 +32,14 @@ def pytest_configure(config: pytest.Config) -> None:
     torch.set_num_threads(1)  # the suite runs one process per core
 
 
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    if config.getoption("--typecheck"):
+        refused = pytest.mark.skip(reason="the type checker refuses it first")
+        for item in items:
+            if item.get_closest_marker("wrong_types"):
+                item.add_marker(refused)
+
+
 @pytest.fixture(autouse=True)
 def same_random_state() -> None:
     """Every test begins alike, whichever ran before it in the same process."""

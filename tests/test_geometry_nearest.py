@@ -90,6 +90,7 @@ def test_points_that_are_no_numbers_do_no_harm():
     assert ((found >= 0) & (found < 20)).all()
 
 
+@pytest.mark.wrong_types
 def test_mistakes_are_named():
     with pytest.raises(ShapeProgError, match="no points"):
         nearest(torch.zeros(4, 3), torch.zeros(0, 3))

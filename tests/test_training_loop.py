@@ -245,6 +245,7 @@ def test_a_setting_that_a_run_did_not_know_was_as_by_default():
         constant.check(begun, constant.record(), "here")
 
 
+@pytest.mark.wrong_types
 @pytest.mark.parametrize(
     "wrong", [{"schedule": "linear"}, {"visits": 0}, {"rate": float("nan")}, {"precision": "fp16"}]
 )

@@ -60,6 +60,7 @@ def test_a_generator_learns_two_shapes_by_heart(tmp_path: Path, engine: Engine):
     assert off / slots < 0.5
 
 
+@pytest.mark.wrong_types
 def test_scores_of_a_prediction_that_is_right_are_perfect():
     made = Stream(prior("wide"), 4, seed=1)[0]
     assert torch.equal(code_iou(made.code, made.voxels), torch.ones(4, dtype=torch.float64))

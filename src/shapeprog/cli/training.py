@@ -35,7 +35,7 @@ Restart = Annotated[bool, typer.Option("--restart", help="Begin anew even if the
 TensorBoard = Annotated[bool, typer.Option("--tensorboard", help="Write curves for TensorBoard too.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Show no progress.")]
 
-Known = TypeVar("Known", bound="Settings")
+Known = TypeVar("Known", bound=Any)
 
 
 def pretrain_command(

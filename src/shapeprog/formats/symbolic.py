@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -72,7 +73,7 @@ class Piece:
     faces: npt.NDArray[np.int64] | None = None
 
 
-def number(value: float) -> str:
+def number(value: float | np.number[Any]) -> str:
     """A number in short: 12 digits at most, no superfluous point."""
     return f"{value + 0.0:.12g}"
 

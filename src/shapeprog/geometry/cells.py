@@ -43,7 +43,9 @@ def rasterise(batch: Batch, resolution: int = RESOLUTION) -> Cells:
     return cells.reshape(*batch.batch_shape, *cells.shape[1:])
 
 
-def rasterise_apart(batch: Batch, part: Int[Tensor, "*batch N"], parts: int, resolution: int = RESOLUTION) -> Cells:
+def rasterise_apart(
+    batch: Batch, part: Int[Tensor, "*batch N"], parts: int, resolution: int = RESOLUTION
+) -> Int[Tensor, "*batch parts words R"]:
     """The packed cells (..., parts, W * R, R) of groups of primitives, each on its own.
 
     Parameters
@@ -77,7 +79,7 @@ def words_of(cells: Cells) -> npt.NDArray[np.uint32]:
     return words
 
 
-def cells_of(words: npt.NDArray[np.uint32]) -> Cells:
+def cells_of(words: npt.NDArray[np.uint32]) -> Int[Tensor, ...]:
     """Unsigned words as cells; not copied."""
     return torch.from_numpy(words.view(np.int32))
 
@@ -132,7 +134,7 @@ def count(cells: Cells) -> Int[Tensor, "*batch"]:
     return unpack.twin(cells).flatten(-3).sum(-1, dtype=torch.int64)  # type: ignore[attr-defined]
 
 
-def _iou_by_kernel(one: Cells, two: Cells) -> Float[Tensor, "*batch"]:
+def _iou_by_kernel(one: Int[Tensor, "*one words R"], two: Int[Tensor, "*two words R"]) -> Float[Tensor, "*batch"]:
     first, second = torch.broadcast_tensors(one, two)
     lead = first.shape[:-2]
     counts = np.empty((lead.numel(), 2), np.int64)
@@ -142,7 +144,7 @@ def _iou_by_kernel(one: Cells, two: Cells) -> Float[Tensor, "*batch"]:
 
 
 @twin_of(_iou_by_kernel)
-def iou(one: Cells, two: Cells) -> Float[Tensor, "*batch"]:
+def iou(one: Int[Tensor, "*one words R"], two: Int[Tensor, "*two words R"]) -> Float[Tensor, "*batch"]:
     """Intersection over union of packed cells, with broadcasting; 1 when both are empty."""
     both, either = count(one & two).double(), count(one | two).double()
     return torch.where(either > 0, both / either.clamp(min=1), 1.0)
@@ -228,7 +230,7 @@ def _fill_kinds(flat: Batch, plane: Tensor, cells: Tensor, kinds: list[int]) -> 
         _fill_tested(cells, target, declared, size, centre, rotation)
 
 
-def _fill_rows(cells: Tensor, plane: Int[Tensor, " M"], *covers: Float[Tensor, "M R"]) -> None:
+def _fill_rows(cells: Tensor, plane: Int[Tensor, " M"], *covers: Float[Tensor, "M _"]) -> None:
     """Add solids to their planes: the first of each plane together, then the second, and so on."""
     resolution = cells.shape[-1]
     order = plane.argsort()

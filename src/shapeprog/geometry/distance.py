@@ -26,7 +26,7 @@ AT_ONCE = 1 << 22
 """Pairs of point and primitive that are looked at together where no kernel helps."""
 
 
-def each_distance(batch: Batch, points: Float[Tensor, "*batch P 3"]) -> Float[Tensor, "*batch P N"]:
+def each_distance(batch: Batch, points: Float[Tensor, "*shared P 3"]) -> Float[Tensor, "*batch P N"]:
     """Signed distance of every point to every primitive, negative inside, infinite for padding; exact.
 
     Parameters
@@ -47,19 +47,19 @@ def each_distance(batch: Batch, points: Float[Tensor, "*batch P 3"]) -> Float[Te
     return found.mT.reshape(*lead, points.shape[-2], flat.mask.shape[-1])
 
 
-def nearest_slot(batch: Batch, points: Float[Tensor, "*batch P 3"]) -> Int[Tensor, "*batch P"]:
+def nearest_slot(batch: Batch, points: Float[Tensor, "*shared P 3"]) -> Int[Tensor, "*batch P"]:
     """The primitive with the smallest signed distance to each point; found without gradient."""
     flat, positions = _aligned(batch, points)
     return _chosen(flat, positions)[0].reshape(*batch.batch_shape, points.shape[-2])
 
 
-def union_distance(batch: Batch, points: Float[Tensor, "*batch P 3"]) -> Float[Tensor, "*batch P"]:
+def union_distance(batch: Batch, points: Float[Tensor, "*shared P 3"]) -> Float[Tensor, "*batch P"]:
     """The values of :func:`signed_distance` without gradient."""
     flat, positions = _aligned(batch, points)
     return _chosen(flat, positions)[1].reshape(*batch.batch_shape, points.shape[-2])
 
 
-def signed_distance(batch: Batch, points: Float[Tensor, "*batch P 3"]) -> Float[Tensor, "*batch P"]:
+def signed_distance(batch: Batch, points: Float[Tensor, "*shared P 3"]) -> Float[Tensor, "*batch P"]:
     """Signed distance of points to the union of each element, with gradient to points, sizes and poses.
 
     The nearest primitive is selected without gradient, its numbers are gathered, and only its distance is

@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import torch
-from jaxtyping import Float
+from jaxtyping import Float, Shaped
 from torch import Tensor
 
 from shapeprog.geometry.batch import Batch
@@ -22,6 +22,7 @@ Target = Float[Tensor, "*batch Q 3"]
 TargetWeights = Float[Tensor, "*batch Q"]
 Values = Float[Tensor, "*batch"]
 Grid = Float[Tensor, "*batch R R R"]
+Marked = Shaped[Tensor, "*batch R R R"]
 Row = Float[Tensor, "*batch S"]
 Cells = Float[Tensor, "*cells"]
 
@@ -118,7 +119,7 @@ def cell_cross_entropy(logits: Cells, target: Cells, reduction: str = "none") ->
     return torch.nn.functional.binary_cross_entropy_with_logits(logits, target, reduction=reduction)
 
 
-def occupancy_cross_entropy(logits: Grid, target: Grid) -> Values:
+def occupancy_cross_entropy(logits: Grid, target: Marked) -> Values:
     """Cross-entropy of soft occupancy against target cells, as a mean over cells.
 
     Parameters
@@ -132,7 +133,7 @@ def occupancy_cross_entropy(logits: Grid, target: Grid) -> Values:
     return cell_cross_entropy(logits, target.to(logits)).flatten(-3).mean(-1)
 
 
-def soft_iou(occupancy: Grid, target: Grid) -> Values:
+def soft_iou(occupancy: Grid, target: Marked) -> Values:
     """Intersection over union of soft cells against target cells; 1 when both are empty, exact for hard cells."""
     return weighted_iou(occupancy.flatten(-3), target.to(occupancy).flatten(-3))
 

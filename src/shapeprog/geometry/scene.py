@@ -35,7 +35,7 @@ class Scene(Batch):
         """Points drawn uniformly by area from the visible surface, with gradient; see ``sample_surface``."""
         return sample_surface(self, n, generator).points
 
-    def distance(self, points: Float[Tensor, "*batch P 3"]) -> Float[Tensor, "*batch P"]:
+    def distance(self, points: Float[Tensor, "*shared P 3"]) -> Float[Tensor, "*batch P"]:
         """Signed distance of points to the union, with gradient; see ``signed_distance``."""
         return signed_distance(self, points)
 

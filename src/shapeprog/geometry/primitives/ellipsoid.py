@@ -85,9 +85,10 @@ def areas(size: Sizes) -> Float[Tensor, "*batch faces"]:
     height = torch.as_tensor((nodes + 1) / 2).to(size)[:, None].expand(24, 24)
     angle = torch.as_tensor((nodes + 1) * math.pi / 4).to(size)
     rim = (1 - height**2).sqrt()
-    unit = torch.stack([height, rim * angle.cos(), rim * angle.sin()], -1)
+    unit = torch.stack([height, rim * angle.cos(), rim * angle.sin()], -1).expand(*size.shape[:-1], 24, 24, 3)
     weight = torch.as_tensor(weights[:, None] * weights * math.pi).to(size)
-    return (_stretch(size[..., None, None, :], unit) * weight).sum((-1, -2))[..., None]
+    each = _stretch(size[..., None, None, :].expand(*unit.shape[:-1], 4), unit)
+    return (each * weight).sum((-1, -2))[..., None]
 
 
 def _sphere(one: Scalars, two: Scalars) -> Points:

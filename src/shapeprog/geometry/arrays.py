@@ -70,10 +70,8 @@ def table_of(batch: Batch) -> Array:
     their declaration knows.
     """
     count = batch.mask.numel()
-    known = {id(primitive): number for number, primitive in enumerate(BUILT_IN)}
-    number = np.array([known.get(id(primitive), -1) for primitive in primitives], np.float64)
     table: Array = np.empty((count, WIDTH))
-    table[:, KIND] = np.where(array(batch.mask).reshape(count), number[array(batch.kind).reshape(count)], -1)
+    table[:, KIND] = np.where(array(batch.mask).reshape(count), _numbers()[array(batch.kind).reshape(count)], -1)
     table[:, SIZE:CENTRE] = array(batch.size).reshape(count, CENTRE - SIZE)
     table[:, CENTRE:ROTATION] = array(batch.centre).reshape(count, 3)
     table[:, ROTATION:] = array(batch.rotation).reshape(count, 9)
@@ -90,7 +88,14 @@ def declared_kinds(batch: Batch) -> list[int]:
     """Kinds of primitive in use that only their declaration knows."""
     if len(primitives) == len(BUILT_IN):
         return []
-    return [kind for kind in batch.kinds if not any(primitives[kind] is known for known in BUILT_IN)]
+    known = _numbers()
+    return [kind for kind in batch.kinds if known[kind] < 0]
+
+
+def _numbers() -> Array:
+    """For every kind the number that kernels know it by, -1 for those that they do not."""
+    known = {id(primitive): number for number, primitive in enumerate(BUILT_IN)}
+    return np.array([known.get(id(primitive), -1) for primitive in primitives], np.float64)
 
 
 def over_threads(work: Callable[[int, int], None], count: int, *, least: int = 1) -> None:

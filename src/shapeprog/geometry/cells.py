@@ -20,10 +20,8 @@ from shapeprog.geometry import cell_kernels as kernels
 from shapeprog.geometry.arrays import array, by_kernel, declared_kinds, over_threads, table_of, twin_of
 from shapeprog.geometry.batch import Batch
 from shapeprog.geometry.primitive import Primitive, primitives
+from shapeprog.kernels.bits import WORD
 from shapeprog.space import RESOLUTION, Array
-
-WORD = 32
-"""Cells in a word."""
 
 AT_ONCE = 1 << 21
 """Cells, or words, that are worked on together."""

@@ -30,7 +30,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
-from functools import cache
+from functools import cache, cached_property
 from hashlib import sha256
 from types import CodeType, FunctionType
 from typing import Any
@@ -99,17 +99,15 @@ class Kernel:
         """Load it from the cache, or compile it and keep it there."""
         with _lock, _without_collector():
             if self._compiled is None:
-                dispatcher = self._dispatcher()
-                dispatcher.compile(self._types())
-                dispatcher.disable_compile()
-                self._compiled = dispatcher
+                self._dispatcher.compile(self._types())
+                self._dispatcher.disable_compile()
+                self._compiled = self._dispatcher
 
     def load(self) -> bool:
         """Load it from the cache; whether it was there."""
         with _lock, _without_collector():
             if self._compiled is None:
-                dispatcher = self._dispatcher()
-                types = self._types()
+                dispatcher, types = self._dispatcher, self._types()
                 kept = dispatcher._cache.load_overload(types, dispatcher.targetctx)
                 if kept is not None:
                     dispatcher.add_overload(kept)
@@ -118,6 +116,7 @@ class Kernel:
                     self._compiled = dispatcher
             return self._compiled is not None
 
+    @cached_property
     def _dispatcher(self) -> Any:
         numba: Any = importlib.import_module("numba")
         dispatcher = numba.njit(cache=True, **OPTIONS, **self._options)(_linked(self.function))
@@ -217,8 +216,8 @@ class _Other:
 
 def _linked(function: Function) -> FunctionType:
     """A copy of a function whose helpers are compiled ones; the function itself stays as it is."""
-    found = {name: _compiled_helper(function.__globals__[name]) for name in _helpers_of(function)}
     assert isinstance(function, FunctionType)
+    found = {name: _compiled_helper(value) for name, value in _read(function).items() if _is_helper(value)}
     copy = FunctionType(function.__code__, {**function.__globals__, **found}, function.__name__, function.__defaults__)
     copy.__qualname__, copy.__module__ = function.__qualname__, function.__module__
     return copy
@@ -238,11 +237,14 @@ def _compiled_helper(function: Function) -> Any:
     return dispatcher
 
 
-def _helpers_of(function: Function) -> list[str]:
-    """Names by which a function calls helpers."""
+def _read(function: FunctionType) -> dict[str, Any]:
+    """What a function reads of its module, by name."""
     names = [name for name in function.__code__.co_names if name in function.__globals__]
-    values = {name: function.__globals__[name] for name in names}
-    return [name for name, value in values.items() if isinstance(value, FunctionType) and value in _helpers]
+    return {name: function.__globals__[name] for name in names}
+
+
+def _is_helper(value: Any) -> bool:
+    return isinstance(value, FunctionType) and value in _helpers
 
 
 def _reached(function: Function) -> Iterator[tuple[CodeType, dict[str, Any]]]:
@@ -254,8 +256,7 @@ def _reached(function: Function) -> Iterator[tuple[CodeType, dict[str, Any]]]:
         if current in seen or not isinstance(current, FunctionType):
             continue
         seen.add(current)
-        names = [name for name in current.__code__.co_names if name in current.__globals__]
-        values = {name: current.__globals__[name] for name in names}
+        values = _read(current)
         yield current.__code__, values
         stack += [value for value in values.values() if isinstance(value, FunctionType)]
 

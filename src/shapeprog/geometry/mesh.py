@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -65,13 +65,28 @@ def union_mesh(scene: Batch) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.in
     ShapeProgError
         If the scene holds no solid part, or a batch is given.
     """
+    merged = _union(scene).to_mesh()
+    if not len(merged.tri_verts):
+        raise ShapeProgError("the union of the parts is empty", "a part may be too thin; give it some thickness")
+    return np.asarray(merged.vert_properties[:, :3], np.float64), np.asarray(merged.tri_verts, np.int64)
+
+
+def pieces(scene: Batch) -> int:
+    """How many connected solids the union of all primitives of one scene is; a cavity within one is no piece.
+
+    Raises
+    ------
+    ShapeProgError
+        As :func:`union_mesh`.
+    """
+    return sum(piece.volume() > 0 for piece in _union(scene).decompose())
+
+
+def _union(scene: Batch) -> Any:
     from manifold3d import Manifold, Mesh, OpType
 
     parts = part_meshes(scene)
     if not parts:
         raise ShapeProgError("the scene holds no solid part", "give the program a statement that draws something")
     solids = [Manifold(Mesh(part.vertices.astype(np.float32), part.faces.astype(np.uint32))) for part in parts]
-    merged = Manifold.batch_boolean(solids, OpType.Add).to_mesh()
-    if not len(merged.tri_verts):
-        raise ShapeProgError("the union of the parts is empty", "a part may be too thin; give it some thickness")
-    return np.asarray(merged.vert_properties[:, :3], np.float64), np.asarray(merged.tri_verts, np.int64)
+    return Manifold.batch_boolean(solids, OpType.Add)

@@ -13,6 +13,7 @@ set      what inference is given
 bench    the mesh
 cabinet  the mesh
 ikea     the union of the part meshes
+fused    that union filled at 256 cells along its longest side, as one smooth mesh by marching cubes (scikit-image)
 noisy    20,000 points of that union, each coordinate with normal noise of .5 % of the diagonal of its box
 open     20,000 points of that union without the fifth that lies farthest to one side
 =======  ==============================================================================================================
@@ -33,7 +34,7 @@ from typing import Any
 
 import numpy as np
 
-SETS = ("bench", "cabinet", "ikea", "noisy", "open")
+SETS = ("bench", "cabinet", "ikea", "fused", "noisy", "open")
 
 COLUMNS = (
     "f1_half_percent", "f1_percent", "normals", "silhouette", "one_piece", "slivers", "part_recall", "part_precision",
@@ -47,6 +48,9 @@ SCANNED = 20_000
 
 NOISE = 0.005
 """Standard deviation of the noise of a scan, as a share of the diagonal of the box of the object."""
+
+CELLS, MARGIN, SMOOTHING = 256, 4, 1.0
+"""Of a fused mesh: cells along the longest side, free cells around, standard deviation in cells of the smoothing."""
 
 MISSING = 0.2
 """Share of the points of a scan that its missing side held."""
@@ -101,7 +105,8 @@ def measure(task: Task) -> dict[str, Any]:
         cloud = scanned(sample_surface(vertices, faces, SCANNED, task.seed).astype(np.float64), task)
         shape = shape_from_points(cloud, name=task.name, axes=axes, seed=task.seed)
     else:
-        shape = shape_from_mesh(vertices, faces, name=task.name, axes=axes, seed=task.seed)
+        given = fused(vertices, faces) if task.set == "fused" else (vertices, faces)
+        shape = shape_from_mesh(*given, name=task.name, axes=axes, seed=task.seed)
     result = infer(shape, blocks=task.blocks, seed=task.seed, budget=60)
     seconds = time.perf_counter() - started
     target = replace(shape, points=None, vertices=shape.frame.to_grid(vertices), faces=faces)
@@ -120,6 +125,20 @@ def scanned(points: Any, task: Task) -> Any:
     angle = random.uniform(0, 2 * np.pi)
     side = points @ [np.cos(angle), 0, np.sin(angle)]
     return points[side <= np.quantile(side, 1 - MISSING)]
+
+
+def fused(vertices: Any, faces: Any) -> tuple[Any, Any]:
+    """One closed mesh without inner faces, as scanning and image-to-3D models give: parts have grown together."""
+    from scipy.ndimage import gaussian_filter
+    from skimage.measure import marching_cubes
+
+    from shapeprog.data.voxelise import voxelise_mesh
+
+    low, high = vertices.min(0), vertices.max(0)
+    scale, middle = CELLS / (high - low).max(), (low + high) / 2
+    cells = voxelise_mesh((vertices - middle) * scale, faces, resolution=CELLS + 2 * MARGIN)
+    corners, triangles, *_ = marching_cubes(gaussian_filter(cells.astype(np.float32), SMOOTHING), 0.5)
+    return (corners + 0.5 - CELLS / 2 - MARGIN) / scale + middle, triangles.astype(np.int64)
 
 
 def run(args: argparse.Namespace) -> None:

@@ -277,6 +277,23 @@ def test_evaluate_measures_programs_and_meshes_alike(run: Run, tmp_path: Path, p
     assert rows[0]["name"] == "table"
 
 
+def test_evaluate_tells_how_many_physical_parts_have_a_primitive_of_their_own(run: Run, tmp_path: Path, program: Path):
+    run("export", "table.json", "table.obj")
+    boxes = trimesh.load(tmp_path / "table.obj", force="mesh").split()
+    folder = tmp_path / "parts" / "kitchen" / "table"
+    folder.mkdir(parents=True)
+    for number, box in enumerate(boxes):
+        box.export(folder / f"{number}.ply")
+    (tmp_path / "table.obj").rename(tmp_path / "kitchen_table.obj")
+    ended = run("evaluate", "table.json", "kitchen_table.obj", "--parts", "parts", "--json")
+    assert ended.code == 0, ended.err
+    row = json.loads(ended.out)["rows"][0]
+    assert (row["part_recall"], row["part_precision"]) == (1, 1)
+    (folder / "0.ply").write_text("ply")
+    ended = run("evaluate", "table.json", "kitchen_table.obj", "--parts", "parts")
+    assert (ended.code, "parts of table: 0.ply" in ended.err) == (1, True)
+
+
 def test_evaluate_tells_what_has_no_partner(run: Run, tmp_path: Path, program: Path):
     for name in ("one", "two"):
         (tmp_path / "programs").mkdir(exist_ok=True)

@@ -20,10 +20,11 @@ if TYPE_CHECKING:
     from shapeprog.evaluation.metrics import Metrics, Summary
 
 _LABELS = {
-    "f1_half_percent": "F1@.5%", "f1_half_percent_floor": "  floor", "f1_percent": "F1@1%",
-    "f1_percent_floor": "  floor", "normals": "normals", "normals_floor": "  floor", "silhouette": "silhouette",
-    "one_piece": "one piece", "slivers": "slivers", "part_recall": "part recall", "part_precision": "part precision",
-    "iou": "IoU@32", "cd": "CD", "noise_floor": "  floor", "f1": "F1@1cell",
+    "f1_half_percent": "F1@.5%", "f1_half_percent_floor": "F1@.5% floor", "f1_percent": "F1@1%",
+    "f1_percent_floor": "F1@1% floor", "normals": "normals", "normals_floor": "normals floor",
+    "silhouette": "silhouette", "one_piece": "one piece", "slivers": "slivers",
+    "part_recall": "part recall", "part_precision": "part precision",
+    "iou": "IoU@32", "cd": "CD", "noise_floor": "CD noise floor", "f1": "F1@1cell",
     "blocks": "blocks", "statements": "statements", "primitives": "primitives", "numbers": "numbers",
 }  # fmt: skip
 _FEW = 5
@@ -185,10 +186,11 @@ def _table(rows: Sequence[Metrics], summary: dict[str, Summary], each: bool, see
     names = [name for name in _LABELS if name in summary and summary[name].count]
     if each:
         table = Table("shape", box=box.SIMPLE_HEAD)
-        for name in names:
+        shown = [name for name in names if not name.endswith("floor")]
+        for name in shown:
             table.add_column(_LABELS[name], justify="right")
         for row in rows:
-            table.add_row(row.name, *(_number(name, getattr(row, name)) for name in names))
+            table.add_row(row.name, *(_number(name, getattr(row, name)) for name in shown))
         console.print(table)
     table = Table(f"{len(rows)} shapes, seed {seed}", box=box.SIMPLE_HEAD)
     for heading in ("mean", "standard error", "median"):

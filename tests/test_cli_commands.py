@@ -61,7 +61,7 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
 
     def infer(shape, *, blocks, budget, seed, progress, **generator):
         progress("searching", 0.5)
-        return inference.Result(PROGRAM, PROGRAM.snap(), {"seconds": 0.1, "odd": float("nan")}, "Stopped at once.")
+        return inference.Result(PROGRAM, PROGRAM.snap(), {"odd": float("nan")}, "Stopped at once.", (), seconds=0.1)
 
     monkeypatch.setattr(inference, "infer", infer)
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import numpy.typing as npt
 import torch
 from jaxtyping import Float, Int
 from torch import Tensor
@@ -19,7 +18,7 @@ from shapeprog.geometry.random import uniform as uniform_at
 from shapeprog.kernels.bits import uniform
 from shapeprog.kernels.compile import helper
 from shapeprog.kernels.table import SIZE
-from shapeprog.space import Array
+from shapeprog.space import Array, FloatArray
 
 THINNEST = 1e-6
 """Half axes in cells below this count as this where they divide."""
@@ -132,7 +131,7 @@ def normal(size: Sizes, unit: Points, face: Int[Tensor, "*batch"]) -> Points:
     return _outward(size, unit)
 
 
-def mesh(size: npt.NDArray[np.float64], rings: int = 16, sides: int = 32) -> Mesh:
+def mesh(size: FloatArray, rings: int = 16, sides: int = 32) -> Mesh:
     """Rings between two poles, grown a little so that the volume is that of the ellipsoid."""
     height = np.cos(np.pi * np.arange(1, rings) / rings)[:, None]
     angle = 2 * np.pi * np.arange(sides) / sides

@@ -20,10 +20,7 @@ from shapeprog.space import Array
 
 @dataclass(frozen=True)
 class Code:
-    """A batch of programs as tensors: the statement of each step of each block, and its parameters in slot order.
-
-    Id 0 is an empty step; unused slots are ignored.
-    """
+    """Programs as tensors: the statement of each step of each block, 0 for none, and its parameters in slot order."""
 
     ids: Int[Tensor, "*batch K J"]
     parameters: Float[Tensor, "*batch K J 7"]
@@ -43,15 +40,8 @@ def encode(
 ) -> Code:
     """Tensors of programs: (B, K, J) for a sequence, (K, J) for one program.
 
-    Parameters
-    ----------
-    blocks, steps
-        K and J; by default the longest program and at least the published three steps.
-
-    Raises
-    ------
-    ShapeProgError
-        If a program has more blocks, or loops nested deeper, than asked for.
+    There are as many blocks K and steps J as the longest program has, and at least the published three steps, unless
+    they are given; a ``ShapeProgError`` if a program has more.
     """
     batch = [programs] if isinstance(programs, Program) else list(programs)
     chains = [program.chains for program in batch]

@@ -103,8 +103,8 @@ def over_threads(work: Callable[[int, int], None], count: int, *, least: int = 1
         work(0, count)
         return
     cuts = [count * part // threads for part in range(threads + 1)]
-    jobs = [_threads().submit(work, cuts[part], cuts[part + 1]) for part in range(1, threads)]
-    work(cuts[0], cuts[1])
+    jobs = [_threads().submit(work, *cuts[part : part + 2]) for part in range(1, threads)]
+    work(0, cuts[1])
     for job in jobs:
         job.result()
 

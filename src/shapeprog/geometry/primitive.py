@@ -147,18 +147,14 @@ class Primitives:
     def register(self, primitive: Primitive) -> Primitive:
         """Add a primitive and return it.
 
-        Raises
-        ------
-        DeclarationError
-            If the name is taken, the sizes do not fit the four slots, or a function fails or returns a wrong shape.
+        A ``DeclarationError`` if its name is taken, or its sizes or what its functions return do not fit.
         """
+        said = f"primitive {primitive.name!r}"
         if primitive.name in self.names:
-            raise DeclarationError(f"primitive {primitive.name!r} is declared twice", "give one of them another name")
+            raise DeclarationError(f"{said} is declared twice", "give one of them another name")
         if not 1 <= len(primitive.sizes) <= SIZES or not 0 <= primitive.extents <= len(primitive.sizes):
-            raise DeclarationError(
-                f"primitive {primitive.name!r} has {len(primitive.sizes)} sizes, {primitive.extents} of them lengths",
-                f"a primitive has 1 to {SIZES} sizes",
-            )
+            said += f" has {len(primitive.sizes)} sizes, {primitive.extents} of them lengths"
+            raise DeclarationError(said, f"a primitive has 1 to {SIZES} sizes")
         _try(primitive)
         self._kinds.append(primitive)
         self.names[primitive.name] = len(self._kinds) - 1
@@ -179,13 +175,7 @@ class Primitives:
             self._names.reset(token)
 
     def kind(self, name: str) -> int:
-        """Number of the primitive called ``name``.
-
-        Raises
-        ------
-        DeclarationError
-            If there is none.
-        """
+        """Number of the primitive called ``name``; a ``DeclarationError`` if there is none."""
         if name not in self.names:
             raise DeclarationError(f"no primitive is called {name!r}", f"known are {', '.join(self.names)}")
         return self.names[name]

@@ -194,8 +194,8 @@ def _compiled_helper(function: Function) -> Any:
 
 def _read(function: FunctionType) -> dict[str, Any]:
     """What a function reads of its module, by name."""
-    names = [name for name in function.__code__.co_names if name in function.__globals__]
-    return {name: function.__globals__[name] for name in names}
+    known = function.__globals__
+    return {name: known[name] for name in function.__code__.co_names if name in known}
 
 
 def _is_helper(value: Any) -> bool:

@@ -23,20 +23,10 @@ _WIDEST = 200
 
 
 def parse(text: str, name: str = "<program>") -> Program:
-    """The program of a text.
+    """The program of a text: calls of drawing statements with literal numbers, and ``for`` loops over calls of loops.
 
-    Parameters
-    ----------
-    text
-        Calls of drawing statements with literal numbers, and ``for`` loops over calls of loops.  Comments are allowed
-        and forgotten.  Numbers are rounded to float32.
-    name
-        What error messages call the text, a path for instance.
-
-    Raises
-    ------
-    ProgramError
-        At the first mistake, with line, column, the nearest name or the legal range.
+    Comments are allowed and forgotten; numbers are rounded to float32.  A ``ProgramError`` says where in ``name``, such
+    as a path, the first mistake is, and the nearest name or the legal range.
     """
     text = proper_text(text, name)
     reader = _Reader(re.split(r"\r\n|\r|\n", text), name)

@@ -31,36 +31,30 @@ class Code:
 
 
 def encode(
-    programs: Program | Sequence[Program],
-    *,
-    blocks: int | None = None,
-    steps: int | None = None,
-    dtype: torch.dtype = torch.float32,
-    device: torch.device | str = "cpu",
+    programs: Program | Sequence[Program], *, blocks: int | None = None, dtype: torch.dtype = torch.float32
 ) -> Code:
     """Tensors of programs: (B, K, J) for a sequence, (K, J) for one program.
 
-    There are as many blocks K and steps J as the longest program has, and at least the published three steps, unless
-    they are given; a ``ShapeProgError`` if a program has more.
+    There are as many steps J as the longest block has, at least the published three, and as many blocks K as the
+    longest program has, or as are asked for; a ``ShapeProgError`` if a program has more.
     """
     batch = [programs] if isinstance(programs, Program) else list(programs)
     chains = [program.chains for program in batch]
-    needed = max((len(each) for each in chains), default=0)
-    depth = max((len(chain) for each in chains for chain in each), default=0)
+    needed = max([0, *map(len, chains)])
+    steps = max([PUBLISHED_DEPTH, *(len(chain) for each in chains for chain in each)])
     rows = needed if blocks is None else blocks
-    columns = max(depth, PUBLISHED_DEPTH) if steps is None else steps
-    if needed > rows or depth > columns:
-        said = f"a program of {needed} blocks and {depth} steps does not fit {rows} blocks of {columns} steps"
-        raise ShapeProgError(said, "allow more blocks or steps, or shorten the program")
-    ids = np.zeros((len(batch), rows, columns), np.int64)
-    parameters = np.zeros((len(batch), rows, columns, SLOTS), np.float64)
+    if needed > rows:
+        said = f"a program of {needed} blocks does not fit {rows} blocks"
+        raise ShapeProgError(said, "allow more blocks, or shorten the program")
+    ids = np.zeros((len(batch), rows, steps), np.int64)
+    parameters = np.zeros((len(batch), rows, steps, SLOTS), np.float64)
     known = language()
     for b, each in enumerate(chains):
         for k, chain in enumerate(each):
             for j, node in enumerate(chain):
                 ids[b, k, j] = known[node.name].id
                 parameters[b, k, j, : len(node.values)] = node.values
-    code = Code(torch.from_numpy(ids).to(device), torch.from_numpy(parameters).to(device, dtype))
+    code = Code(torch.from_numpy(ids), torch.from_numpy(parameters).to(dtype))
     return code[0] if isinstance(programs, Program) else code
 
 

@@ -8,6 +8,7 @@ On the CPU kernels do the work, elsewhere their twins in torch.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 
 import numpy as np
 import numpy.typing as npt
@@ -93,7 +94,7 @@ def _unpack_by_kernel(cells: Cells) -> UInt8[Tensor, "*batch R R R"]:
     rows = _rows(cells)
     words = words_of(rows).reshape(-1)
     eights = np.empty((len(words), 4), np.uint64)
-    over_threads(lambda first, last: kernels.unpack(words, _SPREAD, eights, first, last), len(words), least=1 << 15)
+    over_threads(partial(kernels.unpack, words, _SPREAD, eights), len(words), least=1 << 15)
     voxels = torch.from_numpy(eights.view(np.uint8)).reshape(*rows.shape[:-1], -1)
     return voxels[..., : cells.shape[-1]].contiguous()
 
@@ -168,18 +169,16 @@ def widen(cells: Cells) -> Cells:
     return wide.flatten(-3, -2)
 
 
-def fill_by_kernel(flat: Batch, plane: Int[Tensor, "B N"], cells: Int[Tensor, "planes words R"]) -> None:
+def fill_by_kernel(flat: Batch, plane: Int[Tensor, "B N"], cells: Cells) -> None:
     """Add the cells of every slot to its plane, by the kernel as far as it knows the primitive."""
-    table, owner, words = table_of(flat), array(plane).reshape(-1), words_of(cells.unflatten(-2, (-1, cells.shape[-1])))
-    many, scenes = flat.mask.shape[-1], len(flat)
-    over_threads(lambda first, last: kernels.fill(table, owner, many, words, first, last), scenes, least=32)
+    words = words_of(cells.unflatten(-2, (-1, cells.shape[-1])))
+    data = table_of(flat), array(plane).reshape(-1), flat.mask.shape[-1], words
+    over_threads(partial(kernels.fill, *data), len(flat), least=32)
     if declared := declared_kinds(flat):
         fill(flat, plane, cells, declared)
 
 
-def fill(
-    flat: Batch, plane: Int[Tensor, "B N"], cells: Int[Tensor, "planes words R"], kinds: list[int] | None = None
-) -> None:
+def fill(flat: Batch, plane: Int[Tensor, "B N"], cells: Cells, kinds: list[int] | None = None) -> None:
     """The same from the declarations, for some or all kinds of primitive on any device; the twin of the kernel.
 
     Primitives whose rule is to fill rows are filled row by row, the others tested cell by cell.
@@ -191,12 +190,12 @@ def fill(
         size, centre, rotation = (each.detach()[here].double() for each in (flat.size, flat.centre, flat.rotation))
         size, centre = declared.cell_size(size * scale), centre * scale + origin
         finite = torch.cat([size, centre, rotation.flatten(1)], -1).isfinite().all(-1)
-        size, centre, rotation, target = size[finite], centre[finite], rotation[finite], plane[here][finite]
+        size, centre, rotation, target = (each[finite] for each in (size, centre, rotation, plane[here]))
         square = ((rotation - rotation.round()).abs() <= kernels.SQUARE).all(-1).all(-1)
         if declared.spans is not None:
             spans = declared.spans(size, centre, rotation, square, resolution)
-            covers = [*spans.layers, *spans.depth, *spans.side]
-            _fill_rows(cells, target[spans.known], *(each[spans.known] for each in covers))
+            covers = target, *spans.layers, *spans.depth, *spans.side
+            _fill_rows(cells, *(each[spans.known] for each in covers))
             size, centre, rotation, target = (each[~spans.known] for each in (size, centre, rotation, target))
         _fill_tested(cells, target, declared, size, centre, rotation)
 

@@ -23,6 +23,9 @@ from shapeprog.geometry.primitive import SIZES, primitives
 from shapeprog.kernels.table import WIDTH
 from shapeprog.space import Array
 
+Nearest = tuple[Int[Tensor, "*batch P"], Float[Tensor, "*batch P"]]
+"""Slot of the nearest primitive of each point, and the signed distance to it."""
+
 AT_ONCE = 1 << 22
 """Pairs of point and primitive that are looked at together where no kernel helps."""
 
@@ -40,12 +43,20 @@ def each_distance(batch: Batch, points: Float[Tensor, "*shared P 3"]) -> Float[T
     return found.mT.reshape(*batch.batch_shape, points.shape[-2], flat.mask.shape[-1])
 
 
-def nearest_primitive(
-    batch: Batch, points: Float[Tensor, "*shared P 3"]
-) -> tuple[Int[Tensor, "*batch P"], Float[Tensor, "*batch P"]]:
+@torch.no_grad()
+def nearest_primitive(batch: Batch, points: Float[Tensor, "*shared P 3"]) -> Nearest:
     """The slot with the smallest signed distance to each point, and that distance; without gradient."""
-    found = _chosen(*_aligned(batch, points))
-    return found[0].reshape(*batch.batch_shape, -1), found[1].reshape(*batch.batch_shape, -1)
+    flat, positions = _aligned(batch, points)
+    if by_kernel(flat.mask):
+        slot, value = nearest_by_kernel(flat, positions, table_of(flat))
+        if declared := declared_kinds(flat):
+            rest = replace(flat, mask=flat.mask & torch.isin(flat.kind, torch.tensor(declared)))
+            other, closer = nearest(rest, positions)
+            slot, value = torch.where(closer < value, other, slot), torch.minimum(closer, value)
+    else:
+        slot, value = nearest(flat, positions)
+    shape = *batch.batch_shape, points.shape[-2]
+    return slot.reshape(shape), value.reshape(shape)
 
 
 def signed_distance(batch: Batch, points: Float[Tensor, "*shared P 3"]) -> Float[Tensor, "*batch P"]:
@@ -68,7 +79,7 @@ def gathered_distance(flat: Batch, positions: Float[Tensor, "B P 3"]) -> Float[T
     found = torch.full_like(positions[..., 0], torch.inf)
     if not flat.mask.shape[-1]:
         return found
-    kind, size, centre, rotation = flat.at(_chosen(flat, positions)[0])
+    kind, size, centre, rotation = flat.at(nearest_primitive(flat, positions)[0])
     local = ((positions - centre)[..., :, None] * rotation).sum(-2)
     there = flat.mask.any(-1, keepdim=True)
     for each in flat.kinds:
@@ -109,22 +120,7 @@ def _aligned(batch: Batch, points: Tensor) -> tuple[Batch, Float[Tensor, "B P 3"
     return batch.flatten(), points.expand(*batch.batch_shape, *shape).reshape(-1, *shape)
 
 
-@torch.no_grad()
-def _chosen(flat: Batch, points: Float[Tensor, "B P 3"]) -> tuple[Int[Tensor, "B P"], Float[Tensor, "B P"]]:
-    """Slot and signed distance of the nearest primitive, by the kernel as far as there is one."""
-    if not by_kernel(flat.mask):
-        return nearest(flat, points)
-    slot, value = nearest_by_kernel(flat, points, table_of(flat))
-    if declared := declared_kinds(flat):
-        rest = replace(flat, mask=flat.mask & torch.isin(flat.kind, torch.tensor(declared)))
-        other, closer = nearest(rest, points)
-        slot, value = torch.where(closer < value, other, slot), torch.minimum(closer, value)
-    return slot, value
-
-
-def nearest_by_kernel(
-    flat: Batch, points: Float[Tensor, "B P 3"], table: Array
-) -> tuple[Int[Tensor, "B P"], Float[Tensor, "B P"]]:
+def nearest_by_kernel(flat: Batch, points: Float[Tensor, "B P 3"], table: Array) -> Nearest:
     """The nearest of the primitives that kernels know, which are rows of the table."""
     scenes, count = points.shape[:-1]
     slots, values = np.empty(scenes * count, np.int64), np.empty(scenes * count)
@@ -134,7 +130,7 @@ def nearest_by_kernel(
     return found[0].reshape(scenes, count), found[1].reshape(scenes, count)
 
 
-def nearest(flat: Batch, points: Float[Tensor, "B P 3"]) -> tuple[Int[Tensor, "B P"], Float[Tensor, "B P"]]:
+def nearest(flat: Batch, points: Float[Tensor, "B P 3"]) -> Nearest:
     """The same over all pairs, in pieces that fit in memory; the twin of the kernel."""
     if not flat.mask.shape[-1]:
         nothing = torch.full_like(points[..., 0], torch.inf)

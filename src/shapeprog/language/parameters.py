@@ -19,11 +19,7 @@ from shapeprog.space import HALF, RESOLUTION
 
 Kind = Literal["position", "length", "shift", "count", "turn"]
 
-LARGEST = 3.4028234663852886e38
-"""The largest finite float32."""
-
-LARGEST_WHOLE = 1 << 24
-"""Up to here float32 holds every whole number; counts and turns end here."""
+LARGEST_WHOLE = 1 << 24  # up to here float32 holds every whole number; counts and turns end here
 
 
 def to_float32(value: float) -> float:
@@ -33,7 +29,8 @@ def to_float32(value: float) -> float:
     except OverflowError:
         single = math.inf
     if not math.isfinite(single):
-        limits = f"numbers go from -{LARGEST:.7e} to {LARGEST:.7e}"
+        largest = np.finfo(np.float32).max
+        limits = f"numbers go from -{largest:.7e} to {largest:.7e}"
         raise ShapeProgError("this number is too large or no number at all", limits)
     return single
 

@@ -28,11 +28,8 @@ from shapeprog.geometry.primitive import SIZES, primitives
 from shapeprog.geometry.primitives import built_in_names
 from shapeprog.language.parameters import Parameter, Quantity
 
-SLOTS = 7
-"""Tensor slots for the parameters of one statement."""
-
-EMPTY, END = 0, 21
-"""Ids without a statement: nothing, and the end of a loop in flat listings."""
+SLOTS = 7  # in tensors for the parameters of one statement
+EMPTY, END = 0, 21  # ids without a statement: nothing, and the end of a loop in flat listings
 
 
 @dataclass(frozen=True)

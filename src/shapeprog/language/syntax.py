@@ -11,8 +11,7 @@ from shapeprog.language.parameters import Parameter, to_float32
 from shapeprog.language.program import Draw, Loop, Node, Program
 from shapeprog.language.statement import Statement, language
 
-DEEPEST = 64
-"""How deep loops may nest in text; Python itself ends at 100 levels of indentation."""
+DEEPEST = 64  # levels of loops in text; Python itself ends at 100 levels of indentation
 
 _FORBIDDEN = (
     (r"^[^\S\t]*\t(?=.*\S)", "this line is indented with a tab", "indent with four spaces"),

@@ -20,21 +20,11 @@ from shapeprog.kernels.compile import helper
 from shapeprog.kernels.table import SIZE
 from shapeprog.space import Array, FloatArray
 
-THINNEST = 1e-6
-"""Half axes in cells below this count as this where they divide."""
-
-STEPS = 24
-"""Newton steps to a foot; kernels stop once it no longer moves."""
-
-CLOSE = 1e-9
-"""How far from 1 the squared length of a place may be that counts as on the unit sphere: errors of the distance, which
-is least at the foot, are squares of this."""
-
-NODES = 12
-"""Places along each axis of the quadrature for the area."""
-
-TRIES = 40
-"""Places drawn before one is taken as it comes; at least half of them are kept each time."""
+THINNEST = 1e-6  # half axes in cells below this count as this where they divide
+STEPS = 24  # Newton steps to a foot; kernels stop once it no longer moves
+CLOSE = 1e-9  # of the squared length of a place to 1, for kernels; the distance, least at the foot, errs by its square
+NODES = 12  # places along each axis of the quadrature for the area
+TRIES = 40  # places drawn before one is taken as it comes; at least half of them are kept each time
 
 
 def _axes(size: Sizes) -> Points:

@@ -26,11 +26,23 @@ AT_ONCE = 1 << 26
 """Pairs of points that are compared together on a device without the kernel."""
 
 
-def squared_distance(queries: Cloud, points: Other) -> Float[Tensor, "*batch P"]:
-    """Squared distance of each query to the nearest of the points, exact, with gradient to both.
+def nearest(queries: Cloud, points: Other) -> Int[Tensor, "*batch P"]:
+    """Index of the nearest of the points to each query, exact, without gradient.
 
-    The gradient of the distance to the neighbours, which are found without, is that of the minimum.  A
-    ``ShapeProgError`` if there are no points, or the leading dimensions differ.
+    A ``ShapeProgError`` if there are no points, or the leading dimensions differ.
+    """
+    many, few = _pair(queries.detach(), points.detach())
+    if by_kernel(many):
+        index = torch.from_numpy(neighbours_by_kernel(many, few)[0] - np.arange(len(few))[:, None] * few.shape[1])
+    else:
+        index = neighbours(many, few)
+    return index.reshape(queries.shape[:-1])
+
+
+def squared_distance(queries: Cloud, points: Other) -> Float[Tensor, "*batch P"]:
+    """Squared distance of each query to its nearest point, with gradient to both; raises what :func:`nearest` does.
+
+    Neighbours are found without gradient; the gradient of the distance to them is that of the minimum.
     """
     many, few = _pair(queries, points)
     if by_kernel(many):

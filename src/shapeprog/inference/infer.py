@@ -19,7 +19,7 @@ from torch import Tensor
 
 from shapeprog.data.shape import Shape
 from shapeprog.geometry.cells import iou, pack, rasterise
-from shapeprog.geometry.distance import union_distance
+from shapeprog.geometry.distance import nearest_primitive
 from shapeprog.inference.blocks import to_program
 from shapeprog.inference.budget import BUDGET, Deadline
 from shapeprog.inference.refine import REACH, Schedule, refine
@@ -207,7 +207,7 @@ def outer_points(target: Shape, snapped: Program, seed: int) -> Float[Tensor, "P
     if target.points is None:
         return torch.from_numpy(points_of_cells(target.voxels, seed=seed))
     points = torch.from_numpy(np.asarray(target.points, np.float32))
-    outer = points[union_distance(unroll(snapped), points) > -DEEP] if snapped.size else points
+    outer = points[nearest_primitive(unroll(snapped), points)[1] > -DEEP] if snapped.size else points
     return outer if len(outer) else points
 
 

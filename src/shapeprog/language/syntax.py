@@ -11,8 +11,7 @@ from shapeprog.language.parameters import Parameter, to_float32
 from shapeprog.language.program import Draw, Loop, Node, Program
 from shapeprog.language.statement import Statement, language
 
-DEEPEST = 64
-"""How deep loops may nest in text; Python itself ends at 100 levels of indentation."""
+DEEPEST = 64  # levels of loops in text; Python itself ends at 100 levels of indentation
 
 _FORBIDDEN = (
     (r"^[^\S\t]*\t(?=.*\S)", "this line is indented with a tab", "indent with four spaces"),
@@ -23,20 +22,10 @@ _WIDEST = 200
 
 
 def parse(text: str, name: str = "<program>") -> Program:
-    """The program of a text.
+    """The program of a text: calls of drawing statements with literal numbers, and ``for`` loops over calls of loops.
 
-    Parameters
-    ----------
-    text
-        Calls of drawing statements with literal numbers, and ``for`` loops over calls of loops.  Comments are allowed
-        and forgotten.  Numbers are rounded to float32.
-    name
-        What error messages call the text, a path for instance.
-
-    Raises
-    ------
-    ProgramError
-        At the first mistake, with line, column, the nearest name or the legal range.
+    Comments are allowed and forgotten; numbers are rounded to float32.  A ``ProgramError`` says where in ``name``, such
+    as a path, the first mistake is, and the nearest name or the legal range.
     """
     text = proper_text(text, name)
     reader = _Reader(re.split(r"\r\n|\r|\n", text), name)

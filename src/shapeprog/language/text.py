@@ -21,10 +21,7 @@ INDENT = "    "
 def format_program(program: Program) -> str:
     """The canonical text of a program: parameters by name in declared order, the fewest digits, loops i, j, k...
 
-    Raises
-    ------
-    ShapeProgError
-        If a number is not finite, a statement is not declared or has more or fewer, or loops nest deeper than text can.
+    A ``ShapeProgError`` if a number is not finite, a statement is not declared, or loops nest deeper than text can.
     """
     return "".join(f"{line}\n" for node in program.body for line in _lines(node, 0))
 
@@ -37,12 +34,7 @@ def _call(node: Node) -> str:
     if len(node.values) != declared.size:
         said = f"{node.name} has {len(node.values)} numbers instead of {declared.size}"
         raise ShapeProgError(said, "mend the program")
-    words: list[str] = []
-    for parameter in declared.parameters:
-        numbers = [parameter.quantity.written(value) for value in node.values[parameter.slots]]
-        group = numbers[0] if len(numbers) == 1 else f"({', '.join(numbers)})"
-        words.append(group if declared.is_loop and not words else f"{parameter.name}={group}")
-    return f"{node.name}({', '.join(words)})"
+    return declared.call([each.written(value) for each, value in zip(declared.quantities, node.values, strict=True)])
 
 
 def _lines(node: Node, depth: int) -> Iterator[str]:

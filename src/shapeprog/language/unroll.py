@@ -30,12 +30,7 @@ def unroll(program: Program | Sequence[Program] | Code) -> Scene:
     """The scene of a program, or scenes (B, N) of a batch; N is the largest number of primitives in it.
 
     Blocks that are not loops followed by one drawing statement draw nothing, nor do loops without copies, nor
-    primitives with a negative extent.
-
-    Raises
-    ------
-    ShapeProgError
-        If the loop counts multiply to more primitives than ``MOST_PRIMITIVES``.
+    primitives with a negative extent.  A ``ShapeProgError`` if there are more than ``MOST_PRIMITIVES``.
     """
     code = program if isinstance(program, Code) else encode(program)
     return Plan(code).scene(code.parameters)

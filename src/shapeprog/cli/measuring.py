@@ -145,8 +145,8 @@ def evaluate_command(
             try:
                 of_target = files.get(target.name)
                 rows.append(scoring.with_parts(row, prediction, target, of_target, seed) if of_target else row)
-            except InputError as error:
-                failures.append(ShapeProgError(f"parts of {name}: {error.message}", error.hint))
+            except InputError as mistake:
+                failures.append(ShapeProgError(f"parts of {name}: {mistake.message}", mistake.hint))
                 rows.append(row)
     used = {row.name for row in rows}
     missing_names = [name for name in shapes if name not in used]

@@ -219,8 +219,11 @@ def with_likeness(row: Metrics, predicted: Triangles | None, target: Target, see
         outlines = likeness.silhouette(predicted, mesh) if mesh is not None else math.nan
     if mesh is None:
         outlines, found = math.nan, found._replace(normals=math.nan)
-    floors = dict(zip(("f1_half_percent_floor", "f1_percent_floor", "normals_floor"), floor, strict=True))
-    return replace(row, silhouette=outlines, **found._asdict(), **floors)
+    return replace(
+        row, f1_half_percent=found.f1_half_percent, f1_percent=found.f1_percent, normals=found.normals,
+        silhouette=outlines, f1_half_percent_floor=floor.f1_half_percent, f1_percent_floor=floor.f1_percent,
+        normals_floor=floor.normals,
+    )  # fmt: skip
 
 
 def summarise(rows: Sequence[Metrics]) -> dict[str, Summary]:

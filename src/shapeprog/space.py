@@ -22,6 +22,7 @@ import numpy.typing as npt
 RESOLUTION = 32  # cells along each side of the grid
 HALF = RESOLUTION // 2  # distance in cells from the centre of the grid to its sides
 SPAN = 24  # cells along the longest side of a shape that is in the grid frame
+LEAST_SIDE, MOST_SIDE = 1e-30, 1e30  # longest sides of shapes, in world units, that all exports can hold
 UP, DEPTH, SIDE = 0, 1, 2  # grid axes
 
 Array = npt.NDArray[Any]

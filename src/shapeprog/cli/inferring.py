@@ -114,10 +114,7 @@ def infer_command(
                     failures.append((path, error))
                     continue
                 except Exception as error:
-                    if terminal.debugging:
-                        raise
-                    cause = f"{type(error).__name__}: {error}"
-                    failures.append((path, ShapeProgError(f"inference failed: {cause}", "run it again with --debug")))
+                    failures.append((path, terminal.fault("no program could be inferred", error)))
                     continue
                 written += 1
                 if as_json:
@@ -131,7 +128,7 @@ def infer_command(
         if as_json:
             told = {"name": path.name, "source": str(path), "error": problem.message, "hint": problem.hint}
             terminal.print_json(told)
-        terminal.complain(_at(path, problem))
+        terminal.complain(terminal.at(path, problem))
     if len(failures) + written > 1 and failures and not quiet:
         terminal.errors().print(f"{len(failures)} of {len(failures) + written} inputs failed.", markup=False)
     if stopped:
@@ -278,8 +275,3 @@ def _report(console: Any, found: Found, shape: Shape, folder: Path, names: list[
     console.print(found.reason, style="dim")
     console.print(f"Wrote {', '.join(names)} in {folder}; the files keep every digit.", style="dim")
     console.print()
-
-
-def _at(path: Path, error: ShapeProgError) -> ShapeProgError:
-    named = str(path) in error.message or path.name in error.message
-    return error if named else ShapeProgError(f"{path}: {error.message}", error.hint)

@@ -58,7 +58,7 @@ def prepare_command(
             raise terminal.Interrupted(f"categories that were finished are kept in {output}") from None
     assert last is not None
     for path, error in last.failures:
-        terminal.complain(ShapeProgError(f"{path}: {error.message}", error.hint))
+        terminal.complain(terminal.at(path, error))
     if not quiet:
         for path, count in last.packs:
             terminal.output().print(f"wrote {path}: {count} shapes")
@@ -141,7 +141,14 @@ def evaluate_command(
         elif target is None:
             failures.append(ShapeProgError(f"prediction {name} has no target of that name", "rename one of them"))
         else:
-            row = scoring.measure(prediction, target, points, seed, finite=generates)
+            try:
+                row = scoring.measure(prediction, target, points, seed, finite=generates)
+            except ShapeProgError as refused:
+                failures.append(ShapeProgError(f"prediction {name}: {refused.message}", refused.hint))
+                continue
+            except Exception as fault:
+                failures.append(terminal.fault(f"prediction {name} could not be measured", fault))
+                continue
             try:
                 of_target = files.get(target.name)
                 rows.append(scoring.with_parts(row, prediction, target, of_target, seed) if of_target else row)

@@ -13,6 +13,7 @@ import numpy as np
 from shapeprog.cli.terminal import read_program_file
 from shapeprog.cli.writing import program_files
 from shapeprog.data import load_all
+from shapeprog.data.reading import in_words
 from shapeprog.data.shape import Shape
 from shapeprog.data.voxelise import voxelise_mesh, voxelise_points
 from shapeprog.errors import ShapeProgError
@@ -45,9 +46,12 @@ def predictions(path: Path) -> Iterator[tuple[str, Prediction | ShapeProgError]]
         files = program_files(path)
     for file in files:
         try:
-            yield file.stem, _program(file)
+            with in_words(file, "a program"):
+                found = _program(file)
         except ShapeProgError as error:
             yield file.stem, error
+        else:
+            yield file.stem, found
     if not files:
         for file, shape in load_all([path]):
             yield (file.stem if isinstance(shape, ShapeProgError) else shape.name), shape

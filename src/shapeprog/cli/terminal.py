@@ -101,6 +101,25 @@ def complain(error: ShapeProgError) -> None:
         console.print(f"hint: {error.hint}", markup=False)
 
 
+def at(path: Path, error: ShapeProgError) -> ShapeProgError:
+    """The error with the file that it is about in front, unless it names it already."""
+    named = str(path) in error.message or path.name in error.message
+    return error if named else ShapeProgError(f"{path}: {error.message}", error.hint)
+
+
+def fault(what: str, error: Exception) -> ShapeProgError:
+    """The error for what the user cannot mend, so that a command goes on with the next file; --debug stops at it.
+
+    Raises
+    ------
+    Exception
+        ``error`` itself, where errors are to show their traceback.
+    """
+    if debugging:
+        raise error
+    return ShapeProgError(f"{what}: a fault of shapeprog, not of the file", "run it again with --debug and report it")
+
+
 def check_axes(up: str | None, front: str | None) -> None:
     """Refuse axes that are none before the first file is read.
 

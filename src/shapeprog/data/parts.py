@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from shapeprog.data.folders import Skipped, files_below
 from shapeprog.data.meshes import COMMON, read_mesh
+from shapeprog.data.reading import in_words
 from shapeprog.errors import InputError
 from shapeprog.space import Array
 
@@ -20,13 +22,15 @@ def part_files(root: Path) -> dict[str, list[Path]]:
     Raises
     ------
     InputError
-        If there is no mesh file below it.
+        If there is no mesh file below it, or a folder below it may not be read.
     """
     found: dict[str, list[Path]] = {}
-    for file in sorted(root.rglob("*")):
-        if file.suffix.lower().lstrip(".") in COMMON and file.is_file():
-            name = "_".join(file.parent.relative_to(root).parts) or root.name
-            found.setdefault(name, []).append(file)
+    skipped: Skipped = []
+    for file in files_below(root, {f".{suffix}" for suffix in COMMON}, skipped):
+        name = "_".join(file.parent.relative_to(root).parts) or root.name
+        found.setdefault(name, []).append(file)
+    if skipped:  # parts that are left out would be missed as if the object lacked them
+        raise skipped[0][1]
     if not found:
         raise InputError(f"{root} holds no parts", "name a folder with a folder of part meshes for each object")
     return found
@@ -40,4 +44,10 @@ def read_parts(files: list[Path]) -> list[Part]:
     InputError
         If one cannot be read.
     """
-    return [(vertices, faces) for vertices, faces in map(read_mesh, files) if len(faces)]
+    found = []
+    for file in files:
+        with in_words(file):
+            vertices, faces = read_mesh(file)
+        if len(faces):
+            found.append((vertices, faces))
+    return found

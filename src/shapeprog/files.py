@@ -60,8 +60,11 @@ def write_bytes(path: str | os.PathLike[str], content: bytes) -> None:
 
 
 def write_text(path: str | os.PathLike[str], content: str) -> None:
-    """Write ``content`` to ``path`` as UTF-8 with plain newlines, whole or not at all."""
-    write_bytes(path, content.encode("utf-8"))
+    """Write ``content`` to ``path`` as UTF-8 with plain newlines, whole or not at all.
+
+    Names of files that are no text, as any is where the locale knows ASCII alone, are written byte for byte.
+    """
+    write_bytes(path, content.encode("utf-8", "surrogateescape"))
 
 
 def make_folder(path: str | os.PathLike[str]) -> Path:

@@ -75,6 +75,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
     With the arguments of the process it is the whole of the process, which then ends at once.
     """
+    terminal.write_anything()
     words = list(sys.argv[1:] if arguments is None else arguments)
     terminal.debugging = "--debug" in words  # wherever it stands
     run = partial(app, args=[word for word in words if word != "--debug"], prog_name="shapeprog")

@@ -86,7 +86,12 @@ def infer_command(
     written, taken = 0, set[str]()
     talk = not (quiet or as_json)
     console = terminal.output()
-    columns = (SpinnerColumn(), TextColumn("{task.description}", markup=False), BarColumn(24), TimeElapsedColumn())
+    columns = (
+        SpinnerColumn("line"),
+        TextColumn("{task.description}", markup=False),
+        BarColumn(24),
+        TimeElapsedColumn(),
+    )
     bar = Progress(*columns, console=terminal.errors(), transient=True) if talk else None
     with bar or nullcontext():
         task = bar.add_task("reading", total=1.0) if bar else None
@@ -239,14 +244,15 @@ def _free_stem(shape: Shape, taken: set[str], folder: Path) -> str:
 
 def _replaceable(shape: Shape, folder: Path, stem: str) -> bool:
     """Whether nothing of that name is there, or only what was inferred from the same shape before."""
+    from shapeprog.formats.json_form import read_result
+
     if shape.source is not None and shape.source.resolve() == (folder / f"{stem}{shape.source.suffix}").resolve():
         return False
     if not any((folder / f"{stem}{suffix}").exists() for suffix in _SUFFIXES):
         return True
     try:
-        kept = json.loads((folder / f"{stem}.json").read_text(encoding="utf-8-sig"))
-        return bool(kept["source"] == _source(shape))
-    except (OSError, ValueError, KeyError, TypeError):
+        return read_result(folder / f"{stem}.json").source == _source(shape)
+    except ShapeProgError:
         return False
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -105,15 +104,12 @@ def with_parts(row: Metrics, prediction: Prediction, target: Shape, files: list[
 
 
 def _program(path: Path) -> tuple[Program, Program | None]:
-    from shapeprog.formats.json_form import FORMAT, VERSION, program_from_json
+    from shapeprog.formats.json_form import read_result
 
-    program, _ = read_program_file(path)
     if path.suffix.lower() != ".json":
-        return program, None
-    body = json.loads(path.read_text(encoding="utf-8-sig")).get("snapped")
-    if body is None:
-        return program, None
-    return program, program_from_json(json.dumps({"format": FORMAT, "version": VERSION, "program": body}), str(path))
+        return read_program_file(path)[0], None
+    result = read_result(path)
+    return result.program, result.snapped
 
 
 def _measure_shape(prediction: Shape, target: Shape, points: int, seed: int) -> Metrics:

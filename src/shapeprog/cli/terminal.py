@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import io
 import json
 import os
 import sys
@@ -73,6 +74,13 @@ def guarded(command: Command) -> Command:
             raise typer.Exit(MISTAKE) from None
 
     return run  # type: ignore[return-value]
+
+
+def write_anything() -> None:
+    """Let both outputs show letters that the terminal does not know as escapes, such as ``\\xb7``, not as an error."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
 
 
 def output() -> Console:

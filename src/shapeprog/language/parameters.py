@@ -19,6 +19,7 @@ from shapeprog.space import HALF, RESOLUTION
 
 Kind = Literal["position", "length", "shift", "count", "turn"]
 
+LARGEST = float(np.finfo(np.float32).max)
 LARGEST_WHOLE = 1 << 24  # up to here float32 holds every whole number; counts and turns end here
 
 
@@ -26,11 +27,10 @@ def to_float32(value: float) -> float:
     """The float32 nearest to ``value``; a ``ShapeProgError`` if it is not finite, or too large for float32."""
     try:
         single: float = struct.unpack("f", struct.pack("f", value))[0]
-    except OverflowError:
+    except (OverflowError, struct.error):  # the latter for a whole number beyond float64
         single = math.inf
     if not math.isfinite(single):
-        largest = np.finfo(np.float32).max
-        limits = f"numbers go from -{largest:.7e} to {largest:.7e}"
+        limits = f"numbers go from -{LARGEST:.7e} to {LARGEST:.7e}"
         raise ShapeProgError("this number is too large or no number at all", limits)
     return single
 

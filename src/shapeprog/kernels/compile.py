@@ -23,8 +23,6 @@ import gc
 import importlib
 import inspect
 import os
-import subprocess
-import sys
 import threading
 import time
 from collections import deque
@@ -34,6 +32,9 @@ from functools import cache, cached_property
 from hashlib import sha256
 from types import CodeType, FunctionType
 from typing import Any
+
+from shapeprog.errors import ShapeProgError
+from shapeprog.processes import Worker, serve
 
 Function = Callable[..., Any]
 
@@ -157,7 +158,9 @@ def prepare(modules: Sequence[str], tell: Callable[[str], None] | None = None) -
                     lacking.append(each)
                     waiting.append(each.name)
             if waiting and not others:
-                others = [_Other(waiting) for _ in range(min(max((os.cpu_count() or 2) - 1, 1), MOST))]
+                with suppress(ShapeProgError):  # no process can be started now: all is compiled here
+                    for _ in range(min(max((os.cpu_count() or 2) - 1, 1), MOST)):
+                        others.append(_Other(waiting))
         while waiting:
             with suppress(IndexError):  # another process took the last one
                 _kernels[waiting.pop()].compile()
@@ -170,28 +173,19 @@ def prepare(modules: Sequence[str], tell: Callable[[str], None] | None = None) -
 
 
 class _Other:
-    """Another process that compiles kernels into the cache: it asks for one of the names waiting after another."""
+    """Another process that compiles kernels into the cache, one of the names waiting after another."""
 
     def __init__(self, waiting: deque[str]) -> None:
         self._waiting = waiting
         self._complete = False
-        command = [sys.executable, "-m", "shapeprog.kernels.compile"]
-        pipe, nothing = subprocess.PIPE, subprocess.DEVNULL
-        self._process = subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=nothing, text=True)
+        self._worker = Worker("shapeprog.kernels.compile", quiet=True)
         self._thread = threading.Thread(target=self._serve, daemon=True)
         self._thread.start()
 
     def _serve(self) -> None:
-        asked, answers = self._process.stdout, self._process.stdin
-        assert asked is not None
-        assert answers is not None
-        with suppress(OSError), asked, answers:  # should it fail, its kernels are compiled here
-            while asked.readline():
-                name = self._next()
-                if not name:
-                    break
-                answers.write(f"{name}\n")
-                answers.flush()
+        with suppress(ShapeProgError):  # should it fail, its kernels are compiled here
+            while name := self._next():
+                self._worker.ask(name)
 
     def _next(self) -> str:
         """The next name, once there is one; none at the end."""
@@ -207,11 +201,11 @@ class _Other:
         self._complete = True
         try:
             if wait:
-                self._process.wait()
+                self._thread.join()
         finally:
-            self._process.kill()
-            self._process.wait()
+            self._worker.kill()
             self._thread.join()
+            self._worker.close()
 
 
 def _linked(function: Function) -> FunctionType:
@@ -283,19 +277,14 @@ def _without_collector() -> Iterator[None]:
             gc.enable()
 
 
-def _main() -> None:
-    """What another process does: ask for the names of kernels and compile them into the cache."""
+def _compile(name: str) -> str:
+    """What another process does: compile a kernel into the cache, given its name."""
     from shapeprog.kernels import compile as room  # not the copy of this module that runs as a script
 
-    while True:
-        sys.stdout.write("next\n")
-        sys.stdout.flush()
-        name = sys.stdin.readline().strip()
-        if not name:
-            return
-        importlib.import_module(name.partition(":")[0])
-        room._kernels[name].compile()
+    importlib.import_module(name.partition(":")[0])
+    room._kernels[name].compile()
+    return name
 
 
 if __name__ == "__main__":
-    _main()
+    serve(_compile)

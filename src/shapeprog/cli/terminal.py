@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 
+from shapeprog.cli import interruption
 from shapeprog.errors import InputError, ShapeProgError
 from shapeprog.files import output_error
 
@@ -27,7 +28,6 @@ debugging = False
 WIDTH = 120
 """Columns of a table where the output is no terminal."""
 
-INTERRUPTED = 130
 MISTAKE = 2
 
 Command = TypeVar("Command", bound=Callable[..., None])
@@ -52,8 +52,9 @@ def guarded(command: Command) -> Command:
     @functools.wraps(command)
     def run(*args: Any, **kwargs: Any) -> None:
         try:
-            command(*args, **kwargs)
-            sys.stdout.flush()
+            with interruption.tidied():
+                command(*args, **kwargs)
+                sys.stdout.flush()
         except ShapeProgError as error:
             if debugging:
                 raise
@@ -62,7 +63,7 @@ def guarded(command: Command) -> Command:
         except KeyboardInterrupt as stop:
             kept = str(stop) if isinstance(stop, Interrupted) else "nothing was left half written"
             errors().print(f"Interrupted; {kept}.", style="yellow", markup=False, highlight=False)
-            raise typer.Exit(INTERRUPTED) from None
+            raise typer.Exit(interruption.INTERRUPTED) from None
         except BrokenPipeError:
             # The reader of a pipe has gone; keep Python from complaining about it at exit.
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -18,7 +18,7 @@ from shapeprog.errors import ShapeProgError
 from shapeprog.geometry.cells import cells_of, pack, words_of
 from shapeprog.inference.block_layout import WIDTH
 from shapeprog.inference.budget import NEVER, Deadline
-from shapeprog.inference.drawing import draw_all
+from shapeprog.inference.drawing import Rows, draw_all
 from shapeprog.inference.editing import improve_block
 from shapeprog.inference.pool import Pool
 from shapeprog.inference.raster_kernels import ROWS
@@ -74,7 +74,8 @@ def propose_program(
     device = next(generator.parameters()).device
     target = torch.from_numpy(voxels.astype(np.uint8))[None].to(device)
     random = torch.Generator(device).manual_seed(seed)
-    covered, program = np.zeros(ROWS, np.uint32), np.zeros((0, WIDTH))
+    covered: Rows = np.zeros(ROWS, np.uint32)
+    program: FloatArray = np.zeros((0, WIDTH))
     loose: list[FloatArray] = []
     memory, fruitless = None, 0
     with single_threaded():

@@ -188,7 +188,7 @@ def greedy_starts(target: Target, most: int) -> list[FloatArray]:
     everything = np.arange(len(target.table))
     starts = []
     for waste in STARTS:
-        blocks = np.zeros((0, WIDTH))
+        blocks: FloatArray = np.zeros((0, WIDTH))
         while len(blocks) < most:
             gain, block = best_box(draw_all(blocks), float(np.float32(waste)), everything, target)
             if gain <= 0:

@@ -23,8 +23,6 @@ import gc
 import importlib
 import inspect
 import os
-import subprocess
-import sys
 import threading
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
@@ -33,6 +31,9 @@ from functools import cache, cached_property
 from hashlib import sha256
 from types import CodeType, FunctionType
 from typing import Any
+
+from shapeprog.errors import ShapeProgError
+from shapeprog.processes import Worker, serve
 
 Function = Callable[..., Any]
 
@@ -146,18 +147,14 @@ def prepare(modules: Sequence[str], tell: Callable[[str], None] | None = None) -
 
 
 def _serve(waiting: deque[str], complete: threading.Event) -> None:
-    """Have another process compile kernels into the cache: it asks for one of the names waiting after another."""
-    command, pipe = [sys.executable, "-m", "shapeprog.kernels.compile"], subprocess.PIPE
-    with (
-        suppress(OSError),  # should it fail, its kernels are compiled here
-        subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=subprocess.DEVNULL, text=True) as process,
-    ):
-        asked, answers = process.stdout, process.stdin
-        assert asked is not None
-        assert answers is not None
-        while asked.readline() and (name := _next(waiting, complete)):
-            answers.write(f"{name}\n")
-            answers.flush()
+    """Have another process compile kernels into the cache, one of the names waiting after another."""
+    with suppress(ShapeProgError):  # should it fail, its kernels are compiled here
+        worker = Worker("shapeprog.kernels.compile", quiet=True)
+        try:
+            while name := _next(waiting, complete):
+                worker.ask(name)
+        finally:
+            worker.close()
 
 
 def _next(waiting: deque[str], complete: threading.Event) -> str:
@@ -230,19 +227,14 @@ def _without_collector() -> Iterator[None]:
             gc.enable()
 
 
-def _main() -> None:
-    """What another process does: ask for the names of kernels and compile them into the cache."""
+def _compile(name: str) -> str:
+    """What another process does: compile a kernel into the cache, given its name."""
     from shapeprog.kernels import compile as room  # not the copy of this module that runs as a script
 
-    while True:
-        sys.stdout.write("next\n")
-        sys.stdout.flush()
-        name = sys.stdin.readline().strip()
-        if not name:
-            return
-        importlib.import_module(name.partition(":")[0])
-        room._kernels[name].compile()
+    importlib.import_module(name.partition(":")[0])
+    room._kernels[name].compile()
+    return name
 
 
 if __name__ == "__main__":
-    _main()
+    serve(_compile)

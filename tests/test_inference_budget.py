@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
 from itertools import accumulate, chain, repeat
 from pathlib import Path
 
@@ -104,12 +103,8 @@ def test_labels_stand_in_the_order_of_the_pack_and_those_cut_short_are_counted(
     names = [f"s{number}" for number in range(4)]
     write_pack(tmp_path / "few.npz", [Shape(name, SHAPE.voxels) for name in names])
 
-    def labelled(place: int, *_: object) -> dict[str, object]:
-        time.sleep(0.1 * (place == 1))
-        return {"name": names[place], "program": "", "cut": ["the search"] * (place == 2)}
-
-    monkeypatch.setattr(labelling, "_labelled", labelled)
-    monkeypatch.setattr("concurrent.futures.ProcessPoolExecutor", lambda workers, *_: ThreadPoolExecutor(workers))
+    rows = [{"name": name, "program": "", "cut": ["the search"] * (name == "s2")} for name in names[1:]]
+    monkeypatch.setattr(labelling, "answers", lambda *_: (json.dumps(row) for row in rows))
     out = tmp_path / "labels.jsonl"
     out.write_text('{"name": "s0", "program": "", "cut": ["the refinement"]}\n')
     with pytest.raises(SystemExit) as end:

@@ -44,10 +44,12 @@ def _leave(stop: SystemExit) -> None:
     """End the process without taking torch apart, which takes longer than many a command.
 
     What is registered to be done at the end is done; only the modules are not torn down.  Someone who watches the
-    process, such as a profiler, gets the usual end.
+    process, such as a profiler, gets the usual end.  An interruption that came amid an ``exec`` is not forgotten by
+    Python, which would end itself by a signal in the place of the exit code.
     """
     watched = sys.gettrace() or sys.getprofile()
-    if "torch" not in sys.modules or watched or not isinstance(stop.code, int | None):
+    quick = "torch" in sys.modules or stop.code == interruption.INTERRUPTED
+    if not quick or watched or not isinstance(stop.code, int | None):
         return
     try:
         sys.stdout.flush()

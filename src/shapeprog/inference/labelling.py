@@ -93,8 +93,8 @@ def label(
             error = _error_of(answer)
             if isinstance(answer, str) and error is None:
                 append_line(out, answer)
-                done += 1
-                cut += bool(json.loads(answer)["cut"])
+                row = _label_in(answer)
+                done, cut = done + 1, cut + (row is not None and row[1])
             yield Labelled(done, len(names), cut, names[place], error)
 
 

@@ -11,7 +11,7 @@ import warnings
 import zipfile
 from collections.abc import Collection
 from pathlib import Path
-from typing import IO
+from typing import IO, Any
 
 import numpy as np
 
@@ -24,7 +24,8 @@ Stream = IO[bytes] | io.BufferedIOBase
 
 SHAPES_OF_ARRAYS = "give points as (P, 3), voxels as (R, R, R), or many voxel grids as (N, R, R, R)"
 
-_HEADS = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}
+_npy: Any = np.lib.format  # older versions of numpy do not annotate it
+_HEADS = {(1, 0): _npy.read_array_header_1_0, (2, 0): _npy.read_array_header_2_0}
 _AGAIN = "the file is cut short or damaged; write it again"
 _AT_ONCE = 1 << 22
 """Cells compared at once."""
@@ -57,7 +58,7 @@ def checked(array: Array, name: str) -> Array:
     return array[None] if array.ndim == 3 else array
 
 
-def check_shape(name: str, dtype: np.dtype, shape: tuple[int, ...]) -> None:
+def check_shape(name: str, dtype: np.dtype[Any], shape: tuple[int, ...]) -> None:
     """Refuse what is neither points nor voxels, or more of them than can be read, by its head alone."""
     if dtype.kind not in "biuf":
         raise InputError(f"{name} holds {few([dtype])} where numbers are needed", SHAPES_OF_ARRAYS)
@@ -152,7 +153,7 @@ def _member(archive: zipfile.ZipFile, name: str, file: str) -> Array:
         return _read_npy(stream, f"{file}: {name}", entry.file_size)
 
 
-def read_head(stream: Stream) -> tuple[tuple[int, ...], np.dtype]:
+def read_head(stream: Stream) -> tuple[tuple[int, ...], np.dtype[Any]]:
     """The shape and the type that an NPY stream announces.
 
     Raises
@@ -160,7 +161,7 @@ def read_head(stream: Stream) -> tuple[tuple[int, ...], np.dtype]:
     ValueError
         If it is no NPY stream, or of a version that holds no plain numbers.
     """
-    version = np.lib.format.read_magic(stream)
+    version = _npy.read_magic(stream)
     if version not in _HEADS:
         raise ValueError(f"NPY {version} is not read")
     with warnings.catch_warnings():
@@ -182,7 +183,7 @@ def _read_npy(stream: Stream, name: str, size: int) -> Array:
         raise InputError(f"{name} announces an array of shape {shape} and holds less", _AGAIN)
     check_count(name, "bytes", announced, BYTES)
     stream.seek(0)
-    array: Array = np.lib.format.read_array(stream, allow_pickle=False)
+    array: Array = _npy.read_array(stream, allow_pickle=False)
     return array
 
 

@@ -51,7 +51,7 @@ def _triangles(name: str, content: bytes, count: int) -> Array:
     corners = numbers(name, _TEXTURE.sub(b"", text) if b"/" in text else text, np.int64)
     if len(corners) != widths.sum():
         raise InputError(f"{name} has a corner of a face that names no vertex", _CURE)
-    known = np.full(len(corners), count)
+    known: Array = np.full(len(corners), count)
     if (corners < 0).any():  # counted back from the vertices above the face
         kinds = np.array(_KIND.findall(content))
         known = np.repeat(np.cumsum(kinds == b"v")[kinds == b"f"], widths)

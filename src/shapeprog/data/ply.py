@@ -6,6 +6,7 @@ A text is read as the binary file whose numbers are all float64, so that one rea
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -29,7 +30,7 @@ class _Element:
 
     name: str
     count: int
-    properties: list[tuple[str, np.dtype, np.dtype | None]] = field(default_factory=list)
+    properties: list[tuple[str, np.dtype[Any], np.dtype[Any] | None]] = field(default_factory=list)
 
 
 def read_ply(name: str, content: bytes) -> tuple[Array, Array]:
@@ -41,7 +42,9 @@ def read_ply(name: str, content: bytes) -> tuple[Array, Array]:
         If the file holds fewer or more numbers than its head announces, or has no positions.
     """
     elements, body = _head(name, content)
-    vertices, faces, at = np.zeros((0, 3)), np.zeros((0, 3), np.int64), 0
+    vertices: Array = np.zeros((0, 3))
+    faces: Array = np.zeros((0, 3), np.int64)
+    at = 0
     for element in elements:
         columns, at = _rows(name, element, body, at)
         if element.name == "vertex" and element.count:
@@ -82,7 +85,7 @@ def _head(name: str, content: bytes) -> tuple[list[_Element], bytes]:
     return elements, body
 
 
-def _type(name: str, word: str, form: str) -> np.dtype:
+def _type(name: str, word: str, form: str) -> np.dtype[Any]:
     if word not in _TYPES:
         raise InputError(f"{name} has numbers of the type {word[:40]!r}, which PLY does not know", _AGAIN)
     if form == "ascii":
@@ -95,7 +98,7 @@ def _rows(name: str, element: _Element, body: bytes, at: int) -> tuple[dict[str,
     check_count(name, f"{element.name} rows", element.count, 3 * POINTS)
     lists = [each for each in element.properties if each[2] is not None]
     widths = {} if element.count == 0 else _first_widths(name, element, body, at)
-    fields = list[tuple[str, np.dtype] | tuple[str, np.dtype, tuple[int]]]()
+    fields = list[tuple[str, np.dtype[Any]] | tuple[str, np.dtype[Any], tuple[int]]]()
     for label, kind, length in element.properties:
         if length is not None:
             fields += [(f"{label} length", length), (label, kind, (max(widths.get(label, 0), 0),))]
@@ -139,7 +142,7 @@ def _first_widths(name: str, element: _Element, body: bytes, at: int) -> dict[st
     return widths
 
 
-def _at(name: str, element: _Element, body: bytes, at: int, kind: np.dtype, count: int) -> Array:
+def _at(name: str, element: _Element, body: bytes, at: int, kind: np.dtype[Any], count: int) -> Array:
     if count < 0 or at + kind.itemsize * count > len(body):
         raise _short(name, element)
     return np.frombuffer(body, kind, count, at)

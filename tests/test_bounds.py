@@ -1,6 +1,7 @@
 """No kernel reads or writes beside its arrays: tests that between them run all kernels, with every index checked.
 
-It is the slowest test of the suite, since all is compiled again; its file comes first so that nothing waits for it.
+It is the slowest test of the suite the first time, since all is compiled again; its file comes first so that nothing
+waits for it.
 """
 
 from __future__ import annotations
@@ -9,6 +10,8 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+
+import pytest
 
 ROOT = Path(__file__).parents[1]
 
@@ -26,9 +29,11 @@ CHOSEN = [
 """Tests that between them run kernels of every room."""
 
 
-def test_kernels_stay_within_the_bounds_of_their_arrays(tmp_path):
-    """Once with every index checked; the cache is one of its own, since the code is another."""
-    environment = {**os.environ, "NUMBA_BOUNDSCHECK": "1", "NUMBA_OPT": "1", "NUMBA_CACHE_DIR": str(tmp_path)}
+def test_kernels_stay_within_the_bounds_of_their_arrays(pytestconfig: pytest.Config):
+    """Once with every index checked; the cache is its own, since the code is another, and kept for the next run."""
+    assert pytestconfig.cache is not None
+    kept = str(pytestconfig.cache.mkdir("bounds"))
+    environment = {**os.environ, "NUMBA_BOUNDSCHECK": "1", "NUMBA_OPT": "1", "NUMBA_CACHE_DIR": kept}
     command = [sys.executable, "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", *CHOSEN]
     done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout[-4000:]

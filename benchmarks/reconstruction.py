@@ -9,13 +9,15 @@ Packs with points give the methods ``search`` (mesh points given) and ``search, 
 ``search``.  ``greedy boxes`` and ``greedy boxes, refined`` are the baselines of the measuring protocol.  ``search`` is
 the search without a generator and without a memory, ``search, recalling`` the one with a memory alone, ``generator`` a
 single pass of the weights, and ``generator + search`` what ``shapeprog infer`` does with them, at about the time of
-``search`` or after 60 rounds.  What has no weights or no points to work with is left out.
+``search`` or after 60 rounds.  What has no weights or no points to work with is left out.  There is no time budget:
+the seed alone decides.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import math
 import multiprocessing
 import time
 from collections.abc import Iterator
@@ -26,8 +28,8 @@ from typing import Any
 import numpy as np
 import torch
 
-Task = tuple[str, int, int, tuple[str, ...], int, float, str]
-"""Pack, index, most blocks, methods, seed, seconds, weights."""
+Task = tuple[str, int, int, tuple[str, ...], int, str]
+"""Pack, index, most blocks, methods, seed, weights."""
 
 GREEDY, REFINED, SEARCH, ALONE = "greedy boxes", "greedy boxes, refined", "search", "search, voxels alone"
 RECALLING, SINGLE = "search, recalling", "generator"
@@ -51,7 +53,7 @@ def measure(task: Task) -> list[dict[str, Any]]:
 
     torch.set_num_threads(1)
     prepare_kernels()
-    pack, index, blocks, methods, seed, budget, weights = task
+    pack, index, blocks, methods, seed, weights = task
     writer, _ = ready_generator(weights)
     shape = read_pack(Path(pack))[index]
     cloud = None if shape.points is None else torch.from_numpy(np.asarray(shape.points, np.float32))
@@ -82,14 +84,14 @@ def measure(task: Task) -> list[dict[str, Any]]:
             continue
         before = time.thread_time()
         result = infer(
-            shape, blocks=blocks, seed=seed, budget=budget, settings=settings, generator=generator,
+            shape, blocks=blocks, seed=seed, budget=math.inf, settings=settings, generator=generator,
             search=method != SINGLE,
         )  # fmt: skip
-        keep(method, result.program, result.snapped, result.scores["seconds"], time.thread_time() - before)
+        keep(method, result.program, result.snapped, result.seconds, time.thread_time() - before)
         if method == SEARCH and ALONE in methods and cloud is not None:  # the same structure: it is found on cells
             guessed = torch.from_numpy(points_of_cells(shape.voxels, seed=seed))
             alone = refine(result.snapped, guessed, voxels=shape.voxels, reach=REACH, seed=seed)
-            keep(ALONE, alone, result.snapped, result.scores["seconds"])
+            keep(ALONE, alone, result.snapped, result.seconds)
     return rows
 
 
@@ -103,7 +105,7 @@ def tasks(args: argparse.Namespace, done: set[tuple[str, str, int]]) -> Iterator
         for index in chosen[: args.shapes]:
             for blocks in args.blocks:
                 if (Path(pack).stem, str(shapes.ids[index]), blocks) not in done:
-                    yield pack, index, blocks, tuple(args.methods), args.seed, args.budget, args.weights
+                    yield pack, index, blocks, tuple(args.methods), args.seed, args.weights
 
 
 def run(args: argparse.Namespace) -> None:
@@ -157,7 +159,6 @@ def main() -> None:
     parser.add_argument("--weights", default="default", help="generator: weights that ship, or a file")
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--budget", type=float, default=60.0, help="seconds; ample, so that the seed alone decides")
     parser.add_argument("--out", default="reconstruction.jsonl", help="rows, one line of JSON each; appended to")
     parser.add_argument("--table", nargs="*", default=None, help="print the table of these rows and do nothing else")
     args = parser.parse_args()

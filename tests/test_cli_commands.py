@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+import re
 import subprocess
 import sys
 from collections.abc import Callable
@@ -14,6 +15,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
+from bad_files import BAD
 
 from shapeprog import inference
 from shapeprog.cli import main, terminal
@@ -61,7 +63,7 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
 
     def infer(shape, *, blocks, budget, seed, progress, **generator):
         progress("searching", 0.5)
-        return inference.Result(PROGRAM, PROGRAM.snap(), {"seconds": 0.1, "odd": float("nan")}, "Stopped at once.")
+        return inference.Result(PROGRAM, PROGRAM.snap(), {"odd": float("nan")}, "Stopped at once.", (), seconds=0.1)
 
     monkeypatch.setattr(inference, "infer", infer)
 
@@ -174,6 +176,51 @@ def test_an_interruption_says_what_was_kept(run: Run, tmp_path: Path, monkeypatc
     assert "what was finished is kept: 0 programs in res" in ended.err
 
 
+@pytest.mark.usefixtures("quick")
+@pytest.mark.parametrize("kind", ["npz_encrypted", "glb_accessor_without_a_view", "ply_text_cut_between_faces", "fifo"])
+def test_a_bad_file_between_two_good_ones_is_told_at_the_end_by_every_command(run: Run, tmp_path: Path, kind: str):
+    folder = tmp_path / "in" / "tables"
+    folder.mkdir(parents=True)
+    for name in ("a", "z"):
+        table(folder / f"{name}.obj")
+    bad = BAD[kind](folder)
+    ended = run("infer", "in", "--out", "res", "--no-picture")
+    assert ended.code == 1
+    assert sorted(path.name for path in (tmp_path / "res").glob("*.json")) == ["a.json", "z.json"]
+    assert bad.name in ended.err
+    ended = run("prepare", "in", "packs")
+    assert ended.code == 1
+    assert bad.name in ended.err
+    assert sum(int(count) for count in re.findall(r": (\d) shapes", ended.out)) == 2
+    ended = run("evaluate", "res", "in", "--each", "--json")
+    assert ended.code == 1
+    assert bad.name in ended.err
+    assert [row["name"] for row in json.loads(ended.out)["rows"]] == ["a", "z"]
+    ended = run("evaluate", "in", "in", "--json")
+    assert ended.code == 1
+    assert [row["name"] for row in json.loads(ended.out)["rows"]] == ["a", "z"]
+
+
+def test_a_fault_of_ours_in_measuring_one_shape_stops_nothing(run: Run, tmp_path: Path, monkeypatch):
+    from shapeprog.cli import scoring
+
+    (tmp_path / "in").mkdir()
+    for name in ("a", "b"):
+        table(tmp_path / "in" / f"{name}.obj")
+    measure = scoring.measure
+
+    def fails_once(prediction, target, *others, **options):
+        if target.name == "a":
+            raise ZeroDivisionError("division by zero")
+        return measure(prediction, target, *others, **options)
+
+    monkeypatch.setattr(scoring, "measure", fails_once)
+    ended = run("evaluate", "in", "in", "--json")
+    assert ended.code == 1
+    assert "prediction a could not be measured: a fault of shapeprog" in ended.err
+    assert [row["name"] for row in json.loads(ended.out)["rows"]] == ["b"]
+
+
 def test_a_fault_of_ours_in_one_shape_stops_nothing(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     def infer(shape, **_):
         raise RuntimeError("a bug")
@@ -181,7 +228,8 @@ def test_a_fault_of_ours_in_one_shape_stops_nothing(run: Run, tmp_path: Path, mo
     monkeypatch.setattr(inference, "infer", infer)
     ended = run("infer", table(tmp_path / "table.obj"))
     assert ended.code == 2
-    assert "RuntimeError: a bug" in ended.err
+    assert "a fault of shapeprog" in ended.err
+    assert "RuntimeError" not in ended.err, "what Python says is for --debug"
     assert "--debug" in ended.err
     with pytest.raises(RuntimeError, match="a bug"):
         main(["infer", str(tmp_path / "table.obj"), "--debug"])
@@ -275,6 +323,23 @@ def test_evaluate_measures_programs_and_meshes_alike(run: Run, tmp_path: Path, p
     assert "noise floor" in shown.out
     rows = list(csv.DictReader(io.StringIO(run("evaluate", "programs", "targets", "--csv").out)))
     assert rows[0]["name"] == "table"
+
+
+def test_evaluate_tells_how_many_physical_parts_have_a_primitive_of_their_own(run: Run, tmp_path: Path, program: Path):
+    run("export", "table.json", "table.obj")
+    boxes = trimesh.load(tmp_path / "table.obj", force="mesh").split()
+    folder = tmp_path / "parts" / "kitchen" / "table"
+    folder.mkdir(parents=True)
+    for number, box in enumerate(boxes):
+        box.export(folder / f"{number}.ply")
+    (tmp_path / "table.obj").rename(tmp_path / "kitchen_table.obj")
+    ended = run("evaluate", "table.json", "kitchen_table.obj", "--parts", "parts", "--json")
+    assert ended.code == 0, ended.err
+    row = json.loads(ended.out)["rows"][0]
+    assert (row["part_recall"], row["part_precision"]) == (1, 1)
+    (folder / "0.ply").write_text("ply")
+    ended = run("evaluate", "table.json", "kitchen_table.obj", "--parts", "parts")
+    assert (ended.code, "parts of table: 0.ply" in ended.err) == (1, True)
 
 
 def test_evaluate_tells_what_has_no_partner(run: Run, tmp_path: Path, program: Path):

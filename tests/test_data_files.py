@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import errno
+import os
+import subprocess
+import sys
+from pathlib import Path
 
 import pytest
 
 from shapeprog.errors import OutputError
-from shapeprog.files import atomic_path, make_folder, write_bytes, write_text
+from shapeprog.files import append_line, atomic_path, make_folder, write_bytes, write_text
 
 
 def fail_halfway(path, error):
@@ -64,3 +68,47 @@ def test_missing_folders_and_folders_in_the_way(tmp_path):
     with pytest.raises(OutputError, match="a file of that name"):
         make_folder(tmp_path / "file")
     assert make_folder(tmp_path / "x" / "y").is_dir()
+
+
+def test_what_is_written_is_on_the_disk_before_it_has_its_name(tmp_path, monkeypatch):
+    calls = []
+
+    def sync(file):
+        calls.append(("sync", os.fstat(file).st_ino))
+
+    def move(source, target, replace=os.replace):
+        calls.append(("move", source.stat().st_ino))
+        replace(source, target)
+
+    monkeypatch.setattr(os, "fsync", sync)
+    monkeypatch.setattr(os, "replace", move)
+    write_text(tmp_path / "a.txt", "x")
+    file, folder = (tmp_path / "a.txt").stat().st_ino, tmp_path.stat().st_ino
+    assert calls == [("sync", file), ("move", file), ("sync", folder)]
+
+
+def test_what_a_killed_writer_left_is_removed_when_the_folder_is_used_again(tmp_path):
+    code = (
+        "import os, pathlib, sys\nfrom shapeprog.files import atomic_path\n"
+        "with atomic_path(pathlib.Path(sys.argv[1])) as path:\n    path.write_text('half')\n    os.kill(os.getpid(), 9)"
+    )
+    subprocess.run([sys.executable, "-c", code, tmp_path / "a.txt"], check=False)
+    left = list(tmp_path.iterdir())
+    assert [path.read_text() for path in left] == ["half"]
+    with atomic_path(tmp_path / "b.txt") as temporary:
+        temporary.write_text("of somebody who lives")
+        make_folder(tmp_path)
+        assert list(tmp_path.iterdir()) == [temporary]
+    assert [path.name for path in tmp_path.iterdir()] == ["b.txt"]
+
+
+def test_lines_are_added_whole(tmp_path):
+    for line in ("eins", "zwölf"):
+        append_line(tmp_path / "a.txt", line)
+    assert (tmp_path / "a.txt").read_bytes() == "eins\nzwölf\n".encode()
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no full device")
+def test_a_disk_that_is_full_is_blamed_by_the_name_of_the_file():
+    with pytest.raises(OutputError, match="cannot write /dev/full: the disk is full"):
+        append_line("/dev/full", "x")

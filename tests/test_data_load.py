@@ -197,6 +197,13 @@ def test_binvox_agrees_with_the_mesh_library(tmp_path):
     np.testing.assert_array_equal(theirs, read_binvox(tmp_path / "a.binvox")[0])
 
 
+def test_a_binvox_of_many_short_runs_is_read_cell_for_cell(tmp_path):
+    cells = np.random.default_rng(0).random((64,) * 3) < 0.5
+    write_binvox(tmp_path / "a.binvox", cells)
+    found = read_binvox(tmp_path / "a.binvox")[0]
+    np.testing.assert_array_equal(found, cells)
+
+
 def test_published_hdf5(tmp_path):
     h5py = pytest.importorskip("h5py")
     cells = np.stack([steps_in_grid(), steps_in_grid()[:, :, ::-1]])

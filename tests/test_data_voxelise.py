@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from shapeprog.data.sampling import sample_surface
-from shapeprog.data.voxelise import SHRINK, resample_voxels, voxelise_mesh, voxelise_points
+from shapeprog.data.voxelise import SHRINK, occupied_bounds, resample_voxels, voxelise_mesh, voxelise_points
 
 CORNERS = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], float)
 QUADS = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
@@ -211,6 +211,37 @@ def test_a_grid_of_another_size_is_resampled_without_holes(factor):
     size = round(24 / factor)
     cells = resample_voxels(np.ones((size,) * 3, bool), np.full(3, -12.0), factor)
     np.testing.assert_array_equal(cells, cells_of((-12, -12, -12), (12, 12, 12)))
+
+
+def resampled_slowly(voxels, low, scale, size=32):
+    """Twin of resampling: every cell of the grid that each occupied cell reaches, one occupied cell after another."""
+    cells = np.zeros((size,) * 3, bool)
+    margin = scale / 2 if scale < 1 else SHRINK
+    for place in np.argwhere(voxels):
+        start = np.asarray(low) + size / 2 + place * scale
+        first = np.floor(start + margin).astype(int)
+        last = np.maximum(np.ceil(start + scale - margin).astype(int) - 1, first)
+        cells[tuple(slice(max(low, 0), max(high + 1, 0)) for low, high in zip(first, last, strict=True))] = True
+    return cells
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_resampling_equals_its_twin(seed):
+    rng = np.random.default_rng(seed)
+    voxels = rng.random(rng.integers(1, 20, 3)) < rng.choice([0.02, 0.3, 1])
+    scale = float(rng.choice([0.1, 0.5, 0.77, 1, 1.5, 4, 7.3]))
+    low = rng.uniform(-20, 4, 3) if seed % 2 else rng.integers(-20, 4, 3) * 1.0
+    np.testing.assert_array_equal(resample_voxels(voxels, low, scale), resampled_slowly(voxels, low, scale))
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_bounds_are_those_of_the_occupied_cells(seed):
+    rng = np.random.default_rng(seed)
+    voxels = np.zeros((9, 7, 8), bool)
+    voxels[tuple(rng.integers(0, (9, 7, 8), (3, 3)).T)] = True
+    low, high = occupied_bounds(voxels.transpose(2, 0, 1)[::-1])
+    places = np.argwhere(voxels.transpose(2, 0, 1)[::-1])
+    np.testing.assert_array_equal((low, high), (places.min(0), places.max(0) + 1))
 
 
 def test_samples_lie_on_the_surface_by_area_and_repeat_with_the_seed():

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from shapeprog.geometry import distance as room
-from shapeprog.geometry.distance import each_distance, nearest_slot, signed_distance, union_distance
+from shapeprog.geometry.distance import each_distance, nearest_primitive, signed_distance
 from shapeprog.geometry.primitive import primitives
 
 
@@ -37,11 +37,12 @@ def test_the_way_without_kernels_is_the_same(user):
     expected = each_distance(scene, points).min(-1)
     torch.testing.assert_close(signed_distance(scene, points), expected.values, rtol=1e-5, atol=1e-5)
     torch.testing.assert_close(room.gathered_distance(scene, points), expected.values, rtol=1e-5, atol=1e-5)
-    torch.testing.assert_close(union_distance(scene, points), expected.values, rtol=1e-5, atol=1e-5)
+    slot, value = nearest_primitive(scene, points)
+    torch.testing.assert_close(value, expected.values, rtol=1e-5, atol=1e-5)
+    assert (slot == expected.indices).double().mean() > 0.99
     slot, value = room.nearest(scene, points)
     assert (slot == expected.indices).all()
     torch.testing.assert_close(value, expected.values)
-    assert (nearest_slot(scene, points) == expected.indices).double().mean() > 0.99
 
 
 def test_known_distances_of_a_box_a_cylinder_and_a_sheared_board():

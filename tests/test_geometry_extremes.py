@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from shapeprog.errors import ShapeProgError
 from shapeprog.geometry.cells import rasterise
-from shapeprog.geometry.distance import each_distance, nearest_slot, signed_distance, union_distance
+from shapeprog.geometry.distance import each_distance, nearest_primitive, signed_distance
 from shapeprog.geometry.nearest import nearest, squared_distance
 from shapeprog.geometry.surface import sample_surface
 
@@ -42,7 +42,7 @@ def test_every_kernel_takes_every_number(numbers):
     distance = signed_distance(scene, points)
     assert distance.shape == (2, 40)
     torch.autograd.grad(distance.nan_to_num(0, 0, 0).sum(), [*leaves, points])
-    slots = nearest_slot(scene, points)
+    slots = nearest_primitive(scene, points)[0]
     assert ((slots >= 0) & (slots < 6)).all()
     assert rasterise(scene).shape == (2, 32, 32)
     assert rasterise(scene, 40).shape == (2, 80, 40)
@@ -63,12 +63,13 @@ def test_distances_far_away_are_those_of_all_pairs(far):
     points = torch.randn(2, 50, 3, dtype=torch.float64, generator=torch.Generator().manual_seed(0)) * far
     points[:, ::2] /= far / 5
     expected = each_distance(scene, points).min(-1).values
-    torch.testing.assert_close(union_distance(scene, points), expected, rtol=1e-6, atol=1e-9)
+    torch.testing.assert_close(nearest_primitive(scene, points)[1], expected, rtol=1e-6, atol=1e-9)
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_solids_far_apart_find_the_nearer_one(name):
     scene = make_scene([name] * 2, [[1e20, 1e20, 1e20]] * 2, [[0.0, 0, 0], [4e20, 0, 0]], dtype=torch.float64)
     points = torch.tensor([[-3e20, 0, 0], [6e20, 0, 0], [1.5e20, 0, 0]], dtype=torch.float64)
-    assert nearest_slot(scene, points).tolist() == [0, 1, 0]
-    torch.testing.assert_close(union_distance(scene, points) / 1e20, torch.tensor([2.0, 1, 0.5], dtype=torch.float64))
+    slots, distances = nearest_primitive(scene, points)
+    assert slots.tolist() == [0, 1, 0]
+    torch.testing.assert_close(distances / 1e20, torch.tensor([2.0, 1, 0.5], dtype=torch.float64))

@@ -10,6 +10,7 @@ from shapeprog.geometry.cells import pack, words_of
 from shapeprog.geometry.cells import voxels as voxels_of
 from shapeprog.inference import editing
 from shapeprog.inference.blocks import to_program
+from shapeprog.inference.budget import Deadline
 from shapeprog.inference.descent_kernels import moves, statements, valid
 from shapeprog.inference.drawing import draw_all
 from shapeprog.inference.families import families
@@ -92,7 +93,7 @@ def test_no_more_blocks_than_allowed_and_more_are_no_worse(most):
 
 
 def test_a_passed_deadline_still_gives_a_structure_and_says_so():
-    found = search_structure(cells(TABLE), Settings(), deadline=0.0)
+    found = search_structure(cells(TABLE), Settings(), deadline=Deadline(0.0))
     assert len(found.blocks)
     assert "time budget ran out after 0 of" in found.reason
     told = []

@@ -11,7 +11,7 @@ from declared import LANGUAGE, STATEMENTS, middle, name_of
 
 from shapeprog.data.random import random_program
 from shapeprog.errors import ShapeProgError
-from shapeprog.geometry import Scene
+from shapeprog.geometry.scene import Scene
 from shapeprog.language import Code, Draw, Loop, Program, Statement, encode, unroll, using
 from shapeprog.language.text import parse
 

@@ -136,16 +136,92 @@ def test_a_run_begun_anew_never_goes_back_to_the_old_one(tmp_path: Path, engine:
     going.close()
 
 
-def test_another_network_or_a_damaged_state_is_refused(tmp_path: Path, engine: Engine):
+def test_another_network_is_refused(tmp_path: Path, engine: Engine):
     train(tmp_path, engine)
     other = Toy()
     other.module = torch.nn.Sequential(torch.nn.Flatten(), torch.nn.Linear(64, 3))
     with pytest.raises(InputError, match="another network"):
         train(tmp_path, engine, toy=other)
-    path = tmp_path / folders.STATE
-    path.write_bytes(path.read_bytes()[:-10])
-    with pytest.raises(InputError, match="damaged"):
+
+
+DAMAGES = {
+    "emptied": lambda content: b"",
+    "cut": lambda content: content[:-10],
+    "lengthened": lambda content: content + b"\0",
+    "with one bit of a weight turned": lambda content: content[:-1] + bytes([content[-1] ^ 1]),
+    "with another step": lambda content: content.replace(b'\\"step\\": 20', b'\\"step\\": 10'),
+    "with an endless header": lambda content: b"\xff" * 8 + content[8:],
+    "with a header that is no table": lambda content: (2).to_bytes(8, "little") + b"[]",
+    "with a deep header": lambda content: (9999).to_bytes(8, "little") + b"[" * 9999,
+    "of something else": lambda content: b"weights" * 99,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("damage", DAMAGES)
+def test_a_damaged_state_is_left_alone_and_the_last_good_one_named(tmp_path: Path, engine: Engine, damage: str):
+    train(tmp_path, engine, save_seconds=0)
+    state, previous = tmp_path / folders.STATE, tmp_path / folders.PREVIOUS
+    whole, log = state.read_bytes(), (tmp_path / folders.LOG).read_text()
+    damaged = DAMAGES[damage](whole)
+    assert damaged != whole
+    state.write_bytes(damaged)
+    with pytest.raises(InputError, match=r"is (empty|damaged).*the last good state is .*previous.* of step 19") as told:
         train(tmp_path, engine)
+    assert "rename it to state.safetensors" in told.value.hint
+    assert (state.read_bytes(), (tmp_path / folders.LOG).read_text()) == (damaged, log)
+    previous.rename(state)
+    assert [record["step"] for record in train(tmp_path, engine)[1]] == [20]
+    assert state.read_bytes() == whole, "nothing was lost"
+
+
+def test_a_run_without_its_state_is_not_begun_anew_unasked(tmp_path: Path, engine: Engine):
+    train(tmp_path, engine)
+    for name in (folders.STATE, folders.PREVIOUS):
+        (tmp_path / name).unlink()
+        with pytest.raises(InputError, match=r"holds the log of a run but no state\.safetensors"):
+            train(tmp_path, engine)
+    assert len(train(tmp_path, engine, restart=True)[1]) == 20
+
+
+LOGS = {
+    "a line that is no JSON": lambda lines: [*lines[:5], "{", *lines[6:]],
+    "a record that is none": lambda lines: [*lines[:5], "[6]", *lines[6:]],
+    "a record without numbers": lambda lines: [*lines[:5], '{"step": 6, "loss": "low"}', *lines[6:]],
+    "a line without end": lambda lines: [*lines[:5], "[" * 9999, *lines[6:]],
+    "a line that is no text": lambda lines: [*lines[:5], "\udcff", *lines[6:]],
+    "records that are missing": lambda lines: [*lines[:5], *lines[7:]],
+    "an end that is missing": lambda lines: lines[:5],
+}
+
+
+@pytest.mark.parametrize("damage", LOGS)
+def test_a_damaged_log_is_left_alone_and_its_last_good_record_named(tmp_path: Path, engine: Engine, damage: str):
+    train(tmp_path, engine, replace(SETTINGS, visits=40))
+    path = tmp_path / folders.LOG
+    lines = path.read_text().splitlines()
+    damaged = "".join(f"{line}\n" for line in LOGS[damage](lines)).encode(errors="surrogateescape")
+    path.write_bytes(damaged)
+    with pytest.raises(InputError, match=r"the log .* is damaged: .*the last good record is that of step 5"):
+        train(tmp_path, engine)
+    assert path.read_bytes() == damaged
+    path.rename(tmp_path / "old.jsonl")
+    assert [record["step"] for record in train(tmp_path, engine)[1]] == list(range(11, 21))
+    assert [record["step"] for record in read_log(tmp_path)] == list(range(11, 21))
+    path.write_bytes(damaged)
+    assert len(train(tmp_path, engine, restart=True)[1]) == 20
+
+
+def test_an_emptied_log_is_no_new_one(tmp_path: Path, engine: Engine):
+    train(tmp_path, engine, replace(SETTINGS, visits=40))
+    (tmp_path / folders.LOG).write_text("")
+    with pytest.raises(InputError, match="there is no good record"):
+        train(tmp_path, engine)
+
+
+def test_what_a_killed_run_was_writing_is_removed_at_the_next_start(tmp_path: Path, engine: Engine):
+    (tmp_path / f".01234567~{folders.STATE}").write_bytes(b"half")
+    next(run(Toy(), SETTINGS, tmp_path, engine))
+    assert not [path.name for path in tmp_path.iterdir() if "~" in path.name]
 
 
 def test_only_one_process_trains_into_a_folder(tmp_path: Path, engine: Engine):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,7 @@ import pytest
 import torch
 
 from shapeprog.cli import main
+from shapeprog.cli.training import stopping
 from shapeprog.data.packs import write_pack
 from shapeprog.data.shape import Shape
 from shapeprog.data.synthetic import Stream, prior
@@ -212,16 +214,31 @@ def test_the_command_goes_on_with_the_run_of_its_folder(tmp_path: Path, capsys: 
 def test_the_first_interruption_saves_and_says_how_to_go_on(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ):
-    import signal
-
     def interrupted(self: Any, batch: Any, progress: float, random: Any) -> dict[str, torch.Tensor]:
         signal.raise_signal(signal.SIGINT)
         return {"fit": next(self.module.parameters()).square().mean()}
 
     monkeypatch.setattr(ExecutorTraining, "loss", interrupted)
     words = ["train-executor", tmp_path, "--visits", 64, "--batch", 2, "--prior", "wide", "--device", "cpu"]
-    assert run_command(*words) == 130
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored where the suite runs in the background
+    try:
+        assert run_command(*words) == 130
+        assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    finally:
+        signal.signal(signal.SIGINT, before)
     told = " ".join(capsys.readouterr().err.split())
     assert "the same command goes on with it" in told
     assert [record["step"] for record in read_log(tmp_path)] == [1]
-    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def test_what_was_ignored_when_a_run_began_does_not_stop_it():
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        with stopping() as stop:
+            signal.raise_signal(signal.SIGINT)
+            assert not stop.is_set()
+            signal.raise_signal(signal.SIGTERM)
+            assert stop.is_set()
+        assert signal.getsignal(signal.SIGINT) is signal.SIG_IGN
+    finally:
+        signal.signal(signal.SIGINT, before)

@@ -10,6 +10,7 @@ from __future__ import annotations
 import argparse
 import hashlib
 import json
+import math
 import multiprocessing
 import time
 from collections.abc import Callable, Iterator
@@ -111,7 +112,7 @@ def measure_baselines(experiment: Experiment, workers: int = 2) -> None:
         argparse.Namespace(
             packs=[str(experiment.pack(category, "test")) for category in CATEGORIES], split="test",
             shapes=experiment.shapes, blocks=[BLOCKS], methods=[GREEDY, REFINED, SEARCH], workers=workers,
-            seed=0, budget=60.0, weights=experiment.start, out=str(baselines_file(experiment)),
+            seed=0, weights=experiment.start, out=str(baselines_file(experiment)),
         )
     )  # fmt: skip
 
@@ -200,7 +201,7 @@ def searched(job: Job) -> Row:
 
     shape, weights, told = _prepared(job)
     started = time.process_time()
-    result = infer(shape, blocks=BLOCKS, budget=60.0, generator=weights)
+    result = infer(shape, blocks=BLOCKS, budget=math.inf, generator=weights)
     told["cpu_seconds"] = time.process_time() - started
     return _row(Written(result.program, result.snapped), result.snapped, shape) | told | AS_DRAWN_UNKNOWN
 

@@ -3,7 +3,14 @@
 from __future__ import annotations
 
 import difflib
+import re
 from collections.abc import Iterable
+
+_WIDEST = 200
+"""Letters of a line that are shown."""
+
+_LONGEST = 200
+"""Letters of a word that are compared with known ones, which takes as long as the word has letters."""
 
 
 class ShapeProgError(Exception):
@@ -32,14 +39,16 @@ class OutputError(ShapeProgError):
 class ProgramError(ShapeProgError):
     """A program text that is not in the language; points at the place.
 
-    ``line`` and ``column`` count from 1; ``source`` is the line of text; ``name`` is what the text is called.
+    ``line`` and ``column`` count from 1; ``source`` is the line of text, of which no more is shown than a terminal
+    can; ``name`` is what the text is called.
     """
 
     def __init__(
         self, message: str, *, line: int = 1, column: int = 1, source: str = "", hint: str = "", name: str = "<program>"
     ) -> None:
         super().__init__(message, hint)
-        self.line, self.column, self.source, self.name = line, column, source, name
+        self.line, self.column, self.name = line, column, name
+        self.source = re.sub(r"[\0-\x1f\x7f-\x9f]", " ", source[:_WIDEST]) if column <= _WIDEST else ""
 
     def __str__(self) -> str:
         shown = f"\n  {self.source}\n  {' ' * (self.column - 1)}^" if self.source else ""
@@ -53,7 +62,7 @@ def did_you_mean(word: str, known: Iterable[str], otherwise: str = "", *, quoted
     Where none is near, the hint is ``otherwise``; by default it lists all that are known.
     """
     words = {each.lower(): each for each in known}
-    near = difflib.get_close_matches(word.lower(), words, 1)
+    near = difflib.get_close_matches(word[:_LONGEST].lower(), words, 1)
     if near:
         return f"did you mean {repr(words[near[0]]) if quoted else words[near[0]]}?"
     return otherwise or (f"known are {', '.join(words.values())}" if words else "nothing is declared")

@@ -1,4 +1,7 @@
-"""Files that are either whole or not there: every output is written beside its place and moved in."""
+"""Files that are either whole or not there: every output is written beside its place and moved in.
+
+This holds when the machine stops too: what is written reaches the disk before it takes its place.
+"""
 
 from __future__ import annotations
 
@@ -6,10 +9,18 @@ import contextlib
 import errno
 import os
 import secrets
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
 from shapeprog.errors import OutputError
+
+if sys.platform == "win32":
+    import msvcrt
+else:
+    import fcntl
+
+_WINDOWS = sys.platform == "win32"
 
 _CURES = {
     errno.ENOSPC: ("the disk is full", "free some space or write to another disk"),
@@ -25,12 +36,17 @@ _CURES = {
 }
 
 
+_UNFINISHED = ".????????~*"
+"""What names of files that are being written look like."""
+
+
 @contextlib.contextmanager
 def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
-    """A temporary path beside ``path`` that takes its place if the block succeeds and vanishes if it fails.
+    """A temporary file beside ``path`` that takes its place if the block succeeds and vanishes if it fails.
 
     Readers see the old file or the whole new one, never a part.  The folder must exist.  The temporary name keeps the
-    suffix, so that writers which look at it behave alike.
+    suffix, so that writers which look at it behave alike.  The file is locked while it is written: one that is not is
+    of a process that was killed, and :func:`make_folder` removes it.
 
     Raises
     ------
@@ -44,8 +60,15 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
             raise IsADirectoryError(errno.EISDIR, "is a folder", str(target))
         if not target.parent.is_dir():
             raise FileNotFoundError(errno.ENOENT, "no such folder", str(target.parent))
-        yield temporary
-        os.replace(temporary, target)
+        with temporary.open("xb") as stream:
+            if not _WINDOWS:  # there a lock would keep the writer out
+                lock(stream.fileno())
+            yield temporary
+            os.fsync(stream.fileno())
+            if _WINDOWS:  # there a file that is open can be neither moved nor removed
+                stream.close()
+            os.replace(temporary, target)
+        sync(target.parent)
     except OSError as error:
         raise output_error(target, error) from error
     finally:
@@ -60,12 +83,38 @@ def write_bytes(path: str | os.PathLike[str], content: bytes) -> None:
 
 
 def write_text(path: str | os.PathLike[str], content: str) -> None:
-    """Write ``content`` to ``path`` as UTF-8 with plain newlines, whole or not at all."""
-    write_bytes(path, content.encode("utf-8"))
+    """Write ``content`` to ``path`` as UTF-8 with plain newlines, whole or not at all.
+
+    Names of files that are no text, as any is where the locale knows ASCII alone, are written byte for byte.
+    """
+    write_bytes(path, content.encode("utf-8", "surrogateescape"))
+
+
+def append_line(path: str | os.PathLike[str], line: str) -> None:
+    """Add a line to a file; one that was added in part, because the disk became full, has no end.
+
+    Raises
+    ------
+    OutputError
+        If the disk does not take it.
+    """
+    left = f"{line}\n".encode()
+    try:
+        with Path(path).open("ab", buffering=0) as stream:  # no buffer whose rest would fail again when it is closed
+            while left:
+                left = left[stream.write(left) :]
+    except OSError as error:
+        raise output_error(Path(path), error) from error
 
 
 def make_folder(path: str | os.PathLike[str]) -> Path:
-    """The folder ``path``, made with its parents where missing; an ``OutputError`` if it cannot be."""
+    """The folder ``path``, made with its parents where missing, without what killed processes left unfinished in it.
+
+    Raises
+    ------
+    OutputError
+        If it cannot be made.
+    """
     folder = Path(path)
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -73,7 +122,42 @@ def make_folder(path: str | os.PathLike[str]) -> Path:
         raise OutputError(f"cannot make the folder {folder}: there is a file of that name", "choose another") from error
     except OSError as error:
         raise output_error(folder, error) from error
+    remove_unfinished(folder)
     return folder
+
+
+def remove_unfinished(folder: Path) -> None:
+    """Remove the files that processes were writing into a folder when they were killed."""
+    for path in folder.glob(_UNFINISHED):
+        with contextlib.suppress(OSError):
+            if _WINDOWS:
+                path.unlink()
+                continue
+            with path.open("r+b") as stream:
+                if lock(stream.fileno()):
+                    path.unlink()
+
+
+def lock(file: int) -> bool:
+    """Lock an open file for this process, if no other has; the lock falls when it is closed or the process ends."""
+    try:
+        if sys.platform == "win32":
+            msvcrt.locking(file, msvcrt.LK_NBLCK, 1)
+        else:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        return False
+    return True
+
+
+def sync(path: Path) -> None:
+    """See to it that a file, or the names in a folder, are on the disk, where the system can tell."""
+    with contextlib.suppress(OSError):
+        file = os.open(path, os.O_RDONLY)
+        try:
+            os.fsync(file)
+        finally:
+            os.close(file)
 
 
 def output_error(path: Path, error: OSError) -> OutputError:

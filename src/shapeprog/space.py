@@ -19,35 +19,21 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-RESOLUTION = 32
-"""Cells along each side of the grid."""
-
-HALF = RESOLUTION // 2
-"""Distance in cells from the centre of the grid to its sides."""
-
-SPAN = 24
-"""Cells along the longest side of a shape that is in the grid frame."""
-
-UP, DEPTH, SIDE = 0, 1, 2
-"""Grid axes: up, depth (positive = rear), left-right."""
+RESOLUTION = 32  # cells along each side of the grid
+HALF = RESOLUTION // 2  # distance in cells from the centre of the grid to its sides
+SPAN = 24  # cells along the longest side of a shape that is in the grid frame
+LEAST_SIDE, MOST_SIDE = 1e-30, 1e30  # longest sides of shapes, in world units, that all exports can hold
+UP, DEPTH, SIDE = 0, 1, 2  # grid axes
 
 Array = npt.NDArray[Any]
-"""An array of any numbers."""
-
 FloatArray = npt.NDArray[np.float64]
-"""An array of float64."""
 
 
 def grid_axes(up: str, front: str) -> FloatArray:
     """World directions of the three grid axes, as the columns of a proper rotation (3, 3).
 
     ``up`` and ``front`` are signed axis names such as ``"+y"``, ``"-z"`` or ``"x"``.  Depth points away from ``front``;
-    left-right completes a right-handed frame, so nothing is mirrored.
-
-    Raises
-    ------
-    ValueError
-        If a name is not an axis or the two lie on one line.
+    left-right completes a right-handed frame, so nothing is mirrored.  A ``ValueError`` if they are no two axes.
     """
     rise, rear = _axis(up), -_axis(front)
     if abs(rise @ rear) > 0:
@@ -100,5 +86,4 @@ class Frame:
 
 
 def _triple(values: FloatArray) -> tuple[float, float, float]:
-    first, second, third = (float(value) for value in values)
-    return (first, second, third)
+    return (float(values[0]), float(values[1]), float(values[2]))

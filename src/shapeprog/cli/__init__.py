@@ -1,5 +1,5 @@
 """The commands of ``shapeprog``."""
 
-from shapeprog.cli.app import main
+from shapeprog.cli.entry import main
 
 __all__ = ["main"]

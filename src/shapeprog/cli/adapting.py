@@ -3,20 +3,25 @@
 from __future__ import annotations
 
 import os
+from contextlib import closing
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from shapeprog.cli import terminal, training
-from shapeprog.errors import InputError
+from shapeprog.errors import InputError, ShapeProgError
+from shapeprog.inference.budget import BUDGET
+
+if TYPE_CHECKING:
+    from shapeprog.inference.labelling import Labelled
 
 
 def label_command(
     pack: Annotated[Path, typer.Argument(help="A pack of shapes.")],
     out: Annotated[Path, typer.Option("--out", "-o", help="File of labels; goes on with those that it holds.")],
     blocks: Annotated[int, typer.Option(help="Most blocks of a program.", min=1)] = 10,
-    budget: Annotated[float, typer.Option(help="Most seconds for each shape.", min=0.1)] = 60.0,
+    budget: Annotated[float, typer.Option(help="Most seconds for each shape; a safety net.", min=0.1)] = BUDGET,
     processes: Annotated[int | None, typer.Option(help="Shapes at a time; by default one per core.", min=1)] = None,
     seed: terminal.Seed = 0,
     modules: terminal.With = None,
@@ -24,7 +29,8 @@ def label_command(
 ) -> None:
     """Find programs for all shapes of a pack by search, as labels to learn from: shapeprog adapt --labels FILE.
 
-    Each line of the file is a JSON object: name, program, snapped, scores. Interrupted, the same command goes on.
+    Each line of the file is a JSON object: name, program, snapped, scores, and what --budget cut short. Interrupted,
+    the same command goes on. The same --seed writes the same file.
     """
     from rich.progress import track
 
@@ -32,16 +38,32 @@ def label_command(
 
     os.environ.setdefault("OMP_NUM_THREADS", "1")  # the processes share the cores
     terminal.load_modules(modules)
-    counts = label(pack, out, blocks=blocks, budget=budget, seed=seed, processes=processes, modules=modules or ())
-    done, total = next(counts)
+    records = label(pack, out, blocks=blocks, budget=budget, seed=seed, processes=processes, modules=modules or ())
+    last = next(records)
+    console, left = terminal.errors(), last.total - last.done
+    failures: list[Labelled] = []
     try:
-        left = track(counts, "labelling", total=total - done, console=terminal.errors(), transient=True, disable=quiet)
-        for done, _ in left:  # noqa: B007
-            pass
+        with closing(records):
+            for last in track(records, "labelling", total=left, console=console, transient=True, disable=quiet):
+                if last.error is not None:
+                    failures.append(last)
     except KeyboardInterrupt:
-        raise terminal.Interrupted(f"{out} holds {done} of {total} labels; the same command goes on") from None
+        kept = f"{out} holds {last.done} of {last.total} labels; the same command goes on"
+        raise terminal.Interrupted(kept) from None
+    for each in failures:
+        assert each.error is not None
+        terminal.complain(ShapeProgError(f"{each.name}: {each.error.message}", each.error.hint))
     if not quiet:
-        terminal.output().print(f"{out} holds labels of all {total} shapes")
+        which = f"all {last.total} shapes" if not failures else f"{last.done} of {last.total} shapes"
+        terminal.output().print(f"{out} holds labels of {which}")
+    if last.cut and not quiet:
+        terminal.errors().print(
+            f"The time budget cut short {last.cut} of them, which may come out otherwise in another run; to have them "
+            "decided by the seed alone, take out their lines (those that name a cut) and give a larger --budget.",
+            style="yellow", markup=False,
+        )  # fmt: skip
+    if failures:
+        raise typer.Exit(1)
 
 
 def adapt_command(

@@ -1,16 +1,11 @@
-"""The command ``shapeprog``: what it is called, and where its parts are.
+"""The commands of ``shapeprog``: what they are called, and where they are.
 
 Nothing heavy is imported here or by the modules of this room: commands import what they need when they run.
 """
 
 from __future__ import annotations
 
-import atexit
-import gc
 import os
-import sys
-from collections.abc import Sequence
-from functools import partial
 from typing import Annotated
 
 import typer
@@ -68,40 +63,3 @@ def _options(
 
     Exit codes: 0 all is well, 1 some of several inputs failed, 2 a mistake that can be mended, 130 interrupted.
     """
-
-
-def main(arguments: Sequence[str] | None = None) -> None:
-    """Run the command with the arguments of the process, or with those given; ends in ``SystemExit``.
-
-    With the arguments of the process it is the whole of the process, which then ends at once.
-    """
-    words = list(sys.argv[1:] if arguments is None else arguments)
-    terminal.debugging = "--debug" in words  # wherever it stands
-    run = partial(app, args=[word for word in words if word != "--debug"], prog_name="shapeprog")
-    if arguments is not None:
-        run()
-        return
-    gc.set_threshold(100_000, 50, 50)  # importing makes many objects that stay, which the collector would count often
-    try:
-        run()
-    except SystemExit as stop:
-        _leave(stop)
-        raise
-
-
-def _leave(stop: SystemExit) -> None:
-    """End the process without taking torch apart, which takes longer than many a command.
-
-    What is registered to be done at the end is done; only the modules are not torn down.  Someone who watches the
-    process, such as a profiler, gets the usual end.
-    """
-    watched = sys.gettrace() or sys.getprofile()
-    if "torch" not in sys.modules or watched or not isinstance(stop.code, int | None):
-        return
-    try:
-        sys.stdout.flush()
-        sys.stderr.flush()
-    except OSError:
-        return  # the interpreter knows what to say
-    atexit._run_exitfuncs()
-    os._exit(stop.code or 0)

@@ -14,6 +14,7 @@ import typer
 
 from shapeprog.cli import terminal
 from shapeprog.errors import InputError, OutputError, ShapeProgError
+from shapeprog.inference.budget import BUDGET
 
 if TYPE_CHECKING:
     from shapeprog.data.shape import Shape
@@ -29,12 +30,13 @@ Progress = Callable[[str, float], None]
 
 @dataclass(frozen=True)
 class Found:
-    """A program for one shape."""
+    """A program for one shape.  Its files leave the seconds out: the same seed writes the same bytes."""
 
     program: Program
     snapped: Program
     scores: dict[str, float]
     reason: str
+    seconds: float
 
 
 Inference = Callable[["Shape", int, float, int, Progress], Found]
@@ -44,7 +46,8 @@ def infer_command(
     inputs: Annotated[list[Path], typer.Argument(help="Meshes, point clouds, voxels, packs, or folders of them.")],
     out: Annotated[Path, typer.Option("--out", "-o", help="Folder for the results; made if missing.")] = FOLDER,
     blocks: Annotated[int, typer.Option(help="Most blocks of a program.", min=1)] = 10,
-    budget: Annotated[float, typer.Option(help="Seconds of search for each shape.", min=0.1)] = 4.0,
+    rounds: Annotated[int | None, typer.Option(help="Most rounds of search; the default suits most.", min=0)] = None,
+    budget: Annotated[float, typer.Option(help="Most seconds for each shape; a safety net.", min=0.1)] = BUDGET,
     seed: terminal.Seed = 0,
     up: terminal.Up = None,
     front: terminal.Front = None,
@@ -63,6 +66,8 @@ def infer_command(
 ) -> None:
     """Infer a program from each shape and write NAME.shape, NAME.json, NAME.glb and NAME.png.
 
+    The same --seed writes the same files, byte for byte, on a busy machine too; where --budget cuts in, the result
+    says so. To spend less on each shape, give fewer --rounds.
     The .json and .shape files keep the place of the input, so what is exported from them later lies on it.
     A file that cannot be read is told at the end and stops nothing.
     """
@@ -74,14 +79,19 @@ def infer_command(
     terminal.check_axes(up, front)
     _prepare(picture=not no_picture, talk=not (quiet or as_json))
     terminal.load_modules(modules)
-    infer_one = _baseline if baseline else _chosen(weights, proposals, no_search)
+    infer_one = _baseline if baseline else _chosen(weights, proposals, rounds, no_search)
     folder = make_folder(out)
     failures: list[tuple[Path, ShapeProgError]] = []
     stopped: OutputError | None = None
     written, taken = 0, set[str]()
     talk = not (quiet or as_json)
     console = terminal.output()
-    columns = (SpinnerColumn(), TextColumn("{task.description}", markup=False), BarColumn(24), TimeElapsedColumn())
+    columns = (
+        SpinnerColumn("line"),
+        TextColumn("{task.description}", markup=False),
+        BarColumn(24),
+        TimeElapsedColumn(),
+    )
     bar = Progress(*columns, console=terminal.errors(), transient=True) if talk else None
     with bar or nullcontext():
         task = bar.add_task("reading", total=1.0) if bar else None
@@ -109,16 +119,12 @@ def infer_command(
                     failures.append((path, error))
                     continue
                 except Exception as error:
-                    if terminal.debugging:
-                        raise
-                    cause = f"{type(error).__name__}: {error}"
-                    failures.append((path, ShapeProgError(f"inference failed: {cause}", "run it again with --debug")))
+                    failures.append((path, terminal.fault("no program could be inferred", error)))
                     continue
                 written += 1
                 if as_json:
-                    terminal.print_json(
-                        {"name": shape.name, "folder": str(folder)} | json.loads(_document(found, shape))
-                    )
+                    told = {"name": shape.name, "folder": str(folder), "seconds": found.seconds}
+                    terminal.print_json(told | json.loads(_document(found, shape)))
                 elif talk:
                     _report(console, found, shape, folder, names)
         except KeyboardInterrupt:
@@ -127,7 +133,7 @@ def infer_command(
         if as_json:
             told = {"name": path.name, "source": str(path), "error": problem.message, "hint": problem.hint}
             terminal.print_json(told)
-        terminal.complain(_at(path, problem))
+        terminal.complain(terminal.at(path, problem))
     if len(failures) + written > 1 and failures and not quiet:
         terminal.errors().print(f"{len(failures)} of {len(failures) + written} inputs failed.", markup=False)
     if stopped:
@@ -149,21 +155,22 @@ def _prepare(picture: bool, talk: bool) -> None:
     prepare([*SEARCH, *READING, *(PICTURES if picture else ()), *GEOMETRY], tell if talk else None)
 
 
-def _chosen(weights: str, proposals: int, no_search: bool) -> Inference:
+def _chosen(weights: str, proposals: int, rounds: int | None, no_search: bool) -> Inference:
     """Inference with what was asked for, which is looked at before any shape is."""
-    from shapeprog.inference import infer
+    from shapeprog.inference import Settings, infer
     from shapeprog.inference.proposing import ready_generator
 
+    settings = None if rounds is None else Settings(rounds=rounds)
     asked = None if weights == "none" else weights
     ready_generator(asked, needed=no_search)
 
     def one(shape: Shape, blocks: int, budget: float, seed: int, progress: Progress) -> Found:
         result = infer(
-            shape, blocks=blocks, budget=budget, seed=seed, generator=asked, proposals=proposals,
+            shape, blocks=blocks, budget=budget, seed=seed, settings=settings, generator=asked, proposals=proposals,
             search=not no_search, progress=progress,
         )  # fmt: skip
         scores = _scores(result.program, result.snapped, shape, result.scores, seed)
-        return Found(result.program, result.snapped, scores, result.reason)
+        return Found(result.program, result.snapped, scores, result.reason, result.seconds)
 
     return one
 
@@ -175,9 +182,9 @@ def _baseline(shape: Shape, blocks: int, budget: float, seed: int, progress: Pro
 
     started = time.monotonic()
     program: Program = greedy_boxes(shape.voxels, blocks)
-    seconds = {"seconds": time.monotonic() - started}
+    seconds = time.monotonic() - started
     reason = "Stopped because greedy boxes place one box per block and never go back."
-    return Found(program, program.snap(), _scores(program, program.snap(), shape, seconds, seed), reason)
+    return Found(program, program.snap(), _scores(program, program.snap(), shape, {}, seed), reason, seconds)
 
 
 def _scores(program: Program, snapped: Program, shape: Shape, known: dict[str, float], seed: int) -> dict[str, float]:
@@ -237,14 +244,15 @@ def _free_stem(shape: Shape, taken: set[str], folder: Path) -> str:
 
 def _replaceable(shape: Shape, folder: Path, stem: str) -> bool:
     """Whether nothing of that name is there, or only what was inferred from the same shape before."""
+    from shapeprog.formats.json_form import read_result
+
     if shape.source is not None and shape.source.resolve() == (folder / f"{stem}{shape.source.suffix}").resolve():
         return False
     if not any((folder / f"{stem}{suffix}").exists() for suffix in _SUFFIXES):
         return True
     try:
-        kept = json.loads((folder / f"{stem}.json").read_text(encoding="utf-8-sig"))
-        return bool(kept["source"] == _source(shape))
-    except (OSError, ValueError, KeyError, TypeError):
+        return read_result(folder / f"{stem}.json").source == _source(shape)
+    except ShapeProgError:
         return False
 
 
@@ -268,13 +276,8 @@ def _report(console: Any, found: Found, shape: Shape, folder: Path, names: list[
         held = f"a cloud of {len(shape.points)} points" if shape.points is not None else "voxels"
         console.print(f"Read as {held}.", style="dim")
     terminal.print_program(console, found.program)
-    for line in scores_text(found.scores, found.program):
+    for line in scores_text(found.scores | {"seconds": found.seconds}, found.program):
         console.print(line, style="dim")
     console.print(found.reason, style="dim")
     console.print(f"Wrote {', '.join(names)} in {folder}; the files keep every digit.", style="dim")
     console.print()
-
-
-def _at(path: Path, error: ShapeProgError) -> ShapeProgError:
-    named = str(path) in error.message or path.name in error.message
-    return error if named else ShapeProgError(f"{path}: {error.message}", error.hint)

@@ -20,11 +20,15 @@ if TYPE_CHECKING:
     from shapeprog.evaluation.metrics import Metrics, Summary
 
 _LABELS = {
+    "f1_half_percent": "F1@.5%", "f1_half_percent_floor": "F1@.5% floor", "f1_percent": "F1@1%",
+    "f1_percent_floor": "F1@1% floor", "normals": "normals", "normals_floor": "normals floor",
+    "silhouette": "silhouette", "one_piece": "one piece", "slivers": "slivers",
+    "part_recall": "part recall", "part_precision": "part precision",
     "iou": "IoU@32", "cd": "CD", "noise_floor": "CD noise floor", "f1": "F1@1cell",
-    "blocks": "blocks", "statements": "statements", "primitives": "primitives",
+    "blocks": "blocks", "statements": "statements", "primitives": "primitives", "numbers": "numbers",
 }  # fmt: skip
 _FEW = 5
-_SIZES = ("blocks", "statements", "primitives")
+_SIZES = ("blocks", "statements", "primitives", "numbers")
 
 
 def prepare_command(
@@ -54,7 +58,7 @@ def prepare_command(
             raise terminal.Interrupted(f"categories that were finished are kept in {output}") from None
     assert last is not None
     for path, error in last.failures:
-        terminal.complain(ShapeProgError(f"{path}: {error.message}", error.hint))
+        terminal.complain(terminal.at(path, error))
     if not quiet:
         for path, count in last.packs:
             terminal.output().print(f"wrote {path}: {count} shapes")
@@ -69,7 +73,10 @@ def evaluate_command(
         str | None, typer.Option(help="A generator instead of predictions, which rebuilds all targets in one pass.")
     ] = None,
     choose: Annotated[str, typer.Option(help="How it chooses blocks: drawn or argmax.")] = "drawn",
-    points: Annotated[int, typer.Option(help="Points on each surface.", min=2)] = 5000,
+    parts: Annotated[
+        Path | None, typer.Option(help="A folder with a folder of part meshes for each target, named as it is.")
+    ] = None,
+    points: Annotated[int, typer.Option(help="Points on each surface, for CD.", min=2)] = 5000,
     seed: terminal.Seed = 0,
     up: terminal.Up = None,
     front: terminal.Front = None,
@@ -79,7 +86,13 @@ def evaluate_command(
     modules: terminal.With = None,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Show no progress.")] = False,
 ) -> None:
-    """Measure predictions against targets of the same name: IoU at 32^3, CD, F1 at one cell, and size.
+    """Measure predictions against targets of the same name: what a person sees, IoU at 32^3, CD, and size.
+
+    F1@.5% and F1@1% are of 20,000 points on each surface, at those shares of the diagonal of the target's box; normals
+    the mean absolute cosine at nearest points; silhouette the mean IoU of 12 outlines; one piece the share of programs
+    whose union is one solid; slivers that of primitives thinner than .4% of the longest side. Floors are those of the
+    target sampled twice. With --parts DIR, where DIR/Chair/bekvam holds the part meshes of the target Chair_bekvam in
+    its world, part recall and precision tell how many parts have a primitive of their own (IoU >= .5).
 
     IoU is of the program snapped to the grid (the 'snapped' form of a .json result, else rounded); CD and F1 of the
     program as it is, 5,000 points each, bounding box of the target scaled to diagonal 1, squared distances, both
@@ -93,6 +106,7 @@ def evaluate_command(
 
     from shapeprog.cli import scoring
     from shapeprog.data import load_all
+    from shapeprog.data.parts import part_files
     from shapeprog.evaluation.metrics import summarise
 
     terminal.load_modules(modules)
@@ -105,6 +119,7 @@ def evaluate_command(
         raise InputError("there are no targets", "name them after the predictions, or give --weights")
     if choose not in ("drawn", "argmax"):
         raise InputError(f"blocks cannot be chosen by {choose!r}", "give --choose drawn or --choose argmax")
+    files = part_files(parts) if parts else {}
     failures: list[ShapeProgError] = []
     shapes: dict[str, Shape] = {}
     for path, shape in load_all(wanted, up=up, front=front, points=2 * points, seed=seed):
@@ -126,7 +141,20 @@ def evaluate_command(
         elif target is None:
             failures.append(ShapeProgError(f"prediction {name} has no target of that name", "rename one of them"))
         else:
-            rows.append(scoring.measure(prediction, target, points, seed, finite=generates))
+            try:
+                row = scoring.measure(prediction, target, points, seed, finite=generates)
+            except ShapeProgError as refused:
+                failures.append(ShapeProgError(f"prediction {name}: {refused.message}", refused.hint))
+                continue
+            except Exception as fault:
+                failures.append(terminal.fault(f"prediction {name} could not be measured", fault))
+                continue
+            try:
+                of_target = files.get(target.name)
+                rows.append(scoring.with_parts(row, prediction, target, of_target, seed) if of_target else row)
+            except InputError as mistake:
+                failures.append(ShapeProgError(f"parts of {name}: {mistake.message}", mistake.hint))
+                rows.append(row)
     used = {row.name for row in rows}
     missing_names = [name for name in shapes if name not in used]
     if not rows:
@@ -165,10 +193,11 @@ def _table(rows: Sequence[Metrics], summary: dict[str, Summary], each: bool, see
     names = [name for name in _LABELS if name in summary and summary[name].count]
     if each:
         table = Table("shape", box=box.SIMPLE_HEAD)
-        for name in names:
+        shown = [name for name in names if not name.endswith("floor")]
+        for name in shown:
             table.add_column(_LABELS[name], justify="right")
         for row in rows:
-            table.add_row(row.name, *(_number(name, getattr(row, name)) for name in names))
+            table.add_row(row.name, *(_number(name, getattr(row, name)) for name in shown))
         console.print(table)
     table = Table(f"{len(rows)} shapes, seed {seed}", box=box.SIMPLE_HEAD)
     for heading in ("mean", "standard error", "median"):
@@ -182,6 +211,4 @@ def _table(rows: Sequence[Metrics], summary: dict[str, Summary], each: bool, see
 def _number(name: str, value: Any) -> str:
     if value != value:
         return "-"
-    return (
-        f"{value:.5f}" if name in ("cd", "noise_floor") else f"{value:.3f}" if name in ("iou", "f1") else f"{value:.4g}"
-    )
+    return f"{value:.5f}" if name in ("cd", "noise_floor") else f"{value:.4g}" if name in _SIZES else f"{value:.3f}"

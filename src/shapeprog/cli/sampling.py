@@ -98,6 +98,6 @@ def _shapes(names: list[str], programs: list[Program], points: int, seed: int) -
     scene = unroll(programs)
     cells = voxels(scene).numpy().astype(np.bool_)
     if not points:
-        return [Shape(name, grid) for name, grid in zip(names, cells, strict=True)]
+        return [Shape(name, cells[number]) for number, name in enumerate(names)]
     places = sample_surface(scene, points, torch.Generator().manual_seed(seed)).points.numpy().astype(np.float32)
-    return [Shape(name, grid, on) for name, grid, on in zip(names, cells, places, strict=True)]
+    return [Shape(name, cells[number], places[number]) for number, name in enumerate(names)]

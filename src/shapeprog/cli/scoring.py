@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
@@ -12,10 +12,19 @@ import numpy as np
 from shapeprog.cli.terminal import read_program_file
 from shapeprog.cli.writing import program_files
 from shapeprog.data import load_all
+from shapeprog.data.reading import in_words
 from shapeprog.data.shape import Shape
 from shapeprog.data.voxelise import voxelise_mesh, voxelise_points
 from shapeprog.errors import ShapeProgError
-from shapeprog.evaluation.metrics import CELL, Metrics, evaluate_program, target_samples, world_scale
+from shapeprog.evaluation.likeness import Triangles
+from shapeprog.evaluation.metrics import (
+    CELL,
+    Metrics,
+    evaluate_program,
+    target_samples,
+    with_likeness,
+    world_scale,
+)
 from shapeprog.formats.format import suffixes
 from shapeprog.geometry.nearest import squared_distance
 from shapeprog.language.program import Program
@@ -36,9 +45,12 @@ def predictions(path: Path) -> Iterator[tuple[str, Prediction | ShapeProgError]]
         files = program_files(path)
     for file in files:
         try:
-            yield file.stem, _program(file)
+            with in_words(file, "a program"):
+                found = _program(file)
         except ShapeProgError as error:
             yield file.stem, error
+        else:
+            yield file.stem, found
     if not files:
         for file, shape in load_all([path]):
             yield (file.stem if isinstance(shape, ShapeProgError) else shape.name), shape
@@ -68,40 +80,58 @@ def measure(prediction: Prediction, target: Shape, points: int, seed: int, *, fi
         from shapeprog.evaluation.generated import Written, measured
 
         program, whole = prediction
-        return measured(Written(program, program.snap() if whole is None else whole), target, points, seed)
-    return evaluate_program(prediction[0], target, prediction[1], points, seed)
+        written = Written(program, program.snap() if whole is None else whole)
+        return measured(written, target, points, seed, looks=True)
+    return evaluate_program(prediction[0], target, prediction[1], points, seed, looks=True)
+
+
+def with_parts(row: Metrics, prediction: Prediction, target: Shape, files: list[Path], seed: int) -> Metrics:
+    """The measures with recall and precision of the physical parts in ``files``; a shape has no parts to find.
+
+    Raises
+    ------
+    InputError
+        If a part cannot be read.
+    """
+    from shapeprog.data.parts import read_parts
+    from shapeprog.evaluation.parts import part_scores
+    from shapeprog.language.unroll import unroll
+
+    if isinstance(prediction, Shape):
+        return row
+    parts = [Triangles(target.frame.to_grid(vertices), faces) for vertices, faces in read_parts(files)]
+    return replace(row, **part_scores(parts, unroll(prediction[0]), seed)._asdict())
 
 
 def _program(path: Path) -> tuple[Program, Program | None]:
-    from shapeprog.formats.json_form import FORMAT, VERSION, program_from_json
+    from shapeprog.formats.json_form import read_result
 
-    program, _ = read_program_file(path)
     if path.suffix.lower() != ".json":
-        return program, None
-    body = json.loads(path.read_text(encoding="utf-8-sig")).get("snapped")
-    if body is None:
-        return program, None
-    return program, program_from_json(json.dumps({"format": FORMAT, "version": VERSION, "program": body}), str(path))
+        return read_program_file(path)[0], None
+    result = read_result(path)
+    return result.program, result.snapped
 
 
 def _measure_shape(prediction: Shape, target: Shape, points: int, seed: int) -> Metrics:
     """A predicted mesh or cloud lies where its file says, in the world of the target; cells lie in the grid."""
     import torch
 
-    cells = prediction.voxels
+    cells, mesh = prediction.voxels, None
     drawn = None if prediction.points is None else torch.from_numpy(prediction.points.astype(np.float64))
     if prediction.vertices is not None and prediction.faces is not None:
         from shapeprog.data.sampling import sample_surface
 
         placed = target.frame.to_grid(prediction.frame.to_world(prediction.vertices))
-        cells = voxelise_mesh(placed, prediction.faces)
+        cells, mesh = voxelise_mesh(placed, prediction.faces), Triangles(placed, prediction.faces)
         drawn = torch.from_numpy(np.asarray(sample_surface(placed, prediction.faces, points, seed), np.float64))
     elif prediction.kind == "points" and prediction.points is not None:
         placed = target.frame.to_grid(prediction.frame.to_world(prediction.points))
         cells, drawn = voxelise_points(placed), torch.from_numpy(placed)
     union = int((cells | target.voxels).sum())
     iou = float((cells & target.voxels).sum() / union) if union else 1.0
-    return Metrics(target.name, *_distances(drawn, target, points, seed), iou=iou, blocks=0, statements=0, primitives=0)
+    distances = _distances(drawn, target, points, seed)
+    row = Metrics(target.name, *distances, iou=iou, blocks=0, statements=0, primitives=0)
+    return row if mesh is None else with_likeness(row, mesh, target, seed)
 
 
 def _distances(drawn: Tensor | None, target: Shape, points: int, seed: int) -> tuple[float, float, float, float, float]:

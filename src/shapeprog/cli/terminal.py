@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import io
 import json
 import os
 import sys
@@ -12,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 
+from shapeprog.cli import interruption
 from shapeprog.errors import InputError, ShapeProgError
 from shapeprog.files import output_error
 
@@ -26,7 +28,6 @@ debugging = False
 WIDTH = 120
 """Columns of a table where the output is no terminal."""
 
-INTERRUPTED = 130
 MISTAKE = 2
 
 Command = TypeVar("Command", bound=Callable[..., None])
@@ -51,8 +52,9 @@ def guarded(command: Command) -> Command:
     @functools.wraps(command)
     def run(*args: Any, **kwargs: Any) -> None:
         try:
-            command(*args, **kwargs)
-            sys.stdout.flush()
+            with interruption.tidied():
+                command(*args, **kwargs)
+                sys.stdout.flush()
         except ShapeProgError as error:
             if debugging:
                 raise
@@ -61,7 +63,7 @@ def guarded(command: Command) -> Command:
         except KeyboardInterrupt as stop:
             kept = str(stop) if isinstance(stop, Interrupted) else "nothing was left half written"
             errors().print(f"Interrupted; {kept}.", style="yellow", markup=False, highlight=False)
-            raise typer.Exit(INTERRUPTED) from None
+            raise typer.Exit(interruption.INTERRUPTED) from None
         except BrokenPipeError:
             # The reader of a pipe has gone; keep Python from complaining about it at exit.
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -73,6 +75,13 @@ def guarded(command: Command) -> Command:
             raise typer.Exit(MISTAKE) from None
 
     return run  # type: ignore[return-value]
+
+
+def write_anything() -> None:
+    """Let both outputs show letters that the terminal does not know as escapes, such as ``\\xb7``, not as an error."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
 
 
 def output() -> Console:
@@ -99,6 +108,25 @@ def complain(error: ShapeProgError) -> None:
     console.print(text, style="red", markup=False)
     if error.hint:
         console.print(f"hint: {error.hint}", markup=False)
+
+
+def at(path: Path, error: ShapeProgError) -> ShapeProgError:
+    """The error with the file that it is about in front, unless it names it already."""
+    named = str(path) in error.message or path.name in error.message
+    return error if named else ShapeProgError(f"{path}: {error.message}", error.hint)
+
+
+def fault(what: str, error: Exception) -> ShapeProgError:
+    """The error for what the user cannot mend, so that a command goes on with the next file; --debug stops at it.
+
+    Raises
+    ------
+    Exception
+        ``error`` itself, where errors are to show their traceback.
+    """
+    if debugging:
+        raise error
+    return ShapeProgError(f"{what}: a fault of shapeprog, not of the file", "run it again with --debug and report it")
 
 
 def check_axes(up: str | None, front: str | None) -> None:

@@ -138,6 +138,8 @@ def command_line() -> str:
 def stopping() -> Iterator[threading.Event]:
     """An event that the first Ctrl-C, or a request to terminate, sets; a second one interrupts at once.
 
+    One that is ignored, as Ctrl-C is in the background of a script, stays so.
+
     Memory is kept between steps, which these commands alone want, and which must be said before any is used.
     """
     from shapeprog.training.engine import tune_allocator
@@ -150,7 +152,10 @@ def stopping() -> Iterator[threading.Event]:
             raise KeyboardInterrupt
         stop.set()
 
-    before = {each: signal.signal(each, ask) for each in (signal.SIGINT, signal.SIGTERM)}
+    before = {each: signal.getsignal(each) for each in (signal.SIGINT, signal.SIGTERM)}
+    before = {each: handler for each, handler in before.items() if handler != signal.SIG_IGN}
+    for each in before:
+        signal.signal(each, ask)
     try:
         yield stop
     finally:

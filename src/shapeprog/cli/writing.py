@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -14,6 +13,7 @@ from shapeprog.formats.format import format_of, program_suffixes, suffixes
 
 if TYPE_CHECKING:
     from shapeprog.data.shape import Shape
+    from shapeprog.formats.json_form import Result
 
 _SAMPLES = " ".join(suffixes("sample"))
 
@@ -22,7 +22,8 @@ Outputs = Annotated[
     list[Path], typer.Argument(help=f"Files to write; the suffix of each names its format: {' '.join(suffixes())}.")
 ]
 Input = Annotated[
-    Path | None, typer.Option("--shape", help="The input to show beside it; by default the one a .json file names.")
+    Path | None,
+    typer.Option("--shape", help="The input to show beside it; by default what a .json file names in its own folder."),
 ]
 
 
@@ -70,9 +71,10 @@ def render_command(
     found, frame = terminal.read_program_file(program)
     suffix, chosen = output.suffix.lower(), format_of(output)
     if suffix in SUFFIXES:
-        scores = _kept(program).get("scores")
-        beside = _input_of(program, shape)
-        picture(beside, found, output, title=program.stem, scores=scores if isinstance(scores, dict) else None)
+        result = _result(program)
+        beside = _input_of(result, shape)
+        _tell_hidden([result], [beside], quiet)
+        picture(beside, found, output, title=program.stem, scores=result.scores)
     elif chosen is not None and chosen.kind == "sample":
         given = {"resolution": resolution, "points": points, "seed": seed}
         export(found, output, frame, **{name: given[name] for name in chosen.options})
@@ -99,7 +101,10 @@ def show_command(
     page = output or Path(f"{program.stem}.html")
     if page.suffix.lower() not in (".html", ".htm"):
         raise OutputError(f"{page} is no page", "pages end in .html; pictures are made by 'shapeprog render'")
-    viewer(found, page, shape=_input_of(program, shape), title=program.stem, scores=_kept(program).get("scores"))
+    result = _result(program)
+    beside = _input_of(result, shape)
+    _tell_hidden([result], [beside], quiet)
+    viewer(found, page, shape=beside, title=program.stem, scores=result.scores)
     if not quiet:
         terminal.output().print(f"wrote {page}")
     if browse:
@@ -114,15 +119,22 @@ def sheet_command(
     columns: Annotated[int, typer.Option(help="Pairs in a row.", min=1)] = 4,
     most: Annotated[int, typer.Option("--most", help="Most programs to show.", min=1)] = 96,
     title: Annotated[str, typer.Option(help="Stands above it.")] = "",
+    shape: Annotated[
+        Path | None, typer.Option("--shape", help="The folder of the inputs; by default that of the programs.")
+    ] = None,
     modules: terminal.With = None,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
 ) -> None:
-    """Draw a contact sheet of a folder of programs, each beside the input that its .json file names."""
+    """Draw a contact sheet of a folder of programs, each beside the input that its .json file names.
+
+    Inputs are looked for in the folder of the programs, or in the one that is given and deeper; nothing else is opened.
+    """
     from shapeprog.view import Item, contact_sheet
     from shapeprog.view.page import scores_text
 
     terminal.load_modules(modules)
     items: list[Item] = []
+    results: list[Result] = []
     failures: list[ShapeProgError] = []
     for path in program_files(folder):
         if len(items) == most:
@@ -132,9 +144,10 @@ def sheet_command(
         except ShapeProgError as error:
             failures.append(error)
             continue
-        scores = _kept(path).get("scores")
-        note = scores_text(scores if isinstance(scores, dict) else None, found)[0]
-        items.append(Item(path.stem, _input_of(path, None), found, note))
+        results.append(_result(path))
+        note = scores_text(results[-1].scores, found)[0]
+        items.append(Item(path.stem, _input_of(results[-1], shape), found, note))
+    _tell_hidden(results, [item.shape for item in items], quiet)
     contact_sheet(items, output, columns=columns, title=title)
     if not quiet:
         terminal.output().print(f"wrote {output}: {len(items)} programs")
@@ -173,32 +186,49 @@ def program_files(folder: Path) -> list[Path]:
     return [found[key] for key in sorted(found)]
 
 
-def _kept(path: Path) -> dict[str, Any]:
-    """Everything a .json result keeps beside the program."""
-    if path.suffix.lower() != ".json":
-        return {}
-    content = json.loads(path.read_text(encoding="utf-8-sig"))
-    return content if isinstance(content, dict) else {}
+def _result(path: Path) -> Result:
+    """What a .json file says beside its program; other programs say nothing."""
+    from shapeprog.formats.json_form import Result, read_result
+
+    return read_result(path) if path.suffix.lower() == ".json" else Result(str(path), {})
 
 
-def _input_of(program: Path, shape: Path | None) -> Shape | None:
-    """The shape a program was inferred from: the one given, or the one its file names if it is still there."""
+def _input_of(result: Result, named: Path | None) -> Shape | None:
+    """The shape that a program was inferred from: the file that the user names, or the one that its own file names.
+
+    The latter is opened only beside the program, or in the folder that the user names and deeper: a program from
+    elsewhere may name any file.
+    """
     from dataclasses import replace
 
     from shapeprog.data import load
 
-    if shape is not None:
-        return load(shape)
-    content = _kept(program)
-    source = content.get("source")
-    if not isinstance(source, str) or not Path(source.split("#")[0]).exists():
+    if named is not None and not named.is_dir():
+        return load(named)
+    if result.source is None:
         return None
+    place, mark, member = result.source.partition("#")
     try:
-        found = load(source)
+        home = (Path(result.name).parent if named is None else named).resolve()
+        source = (home / place).resolve()
+        inside = source.parent == home or (named is not None and source.is_relative_to(home))
+        if not inside or not source.exists():
+            return None
+    except (OSError, ValueError, RuntimeError):
+        return None  # no file can have such a name
+    try:
+        found = load(f"{source}{mark}{member}")
     except ShapeProgError:
         return None  # a picture without the input is better than none
-    frame = terminal.read_program_file(program)[1]
-    if frame is None or found.vertices is None or frame.axes == found.frame.axes:
+    if result.frame is None or found.vertices is None or result.frame.axes == found.frame.axes:
         return found
     # It was inferred with --up or --front: show it as it was seen then.
-    return replace(found, vertices=frame.to_grid(found.frame.to_world(found.vertices)))
+    seen = result.frame.to_grid(found.frame.to_world(found.vertices))
+    return replace(found, vertices=seen.astype(found.vertices.dtype))
+
+
+def _tell_hidden(results: list[Result], shapes: list[Shape | None], quiet: bool) -> None:
+    """Say that inputs are not shown, where programs name some and none was found."""
+    if any(result.source for result in results) and not any(shapes) and not quiet:
+        said = "Inputs are not shown: none lies beside its program, or can be read; name them with --shape."
+        terminal.errors().print(said, style="dim", markup=False)

@@ -1,155 +1,199 @@
-"""Points and voxels out of array files: XYZ text, NPY, NPZ and the published HDF5.  Pickles are never opened."""
+"""Points and voxels out of array files: XYZ text, NPY and NPZ.  Pickles are never opened.
+
+The head of every array is looked at before memory is taken for it, and of an archive only what is wanted is unpacked.
+"""
 
 from __future__ import annotations
 
+import io
+import math
 import warnings
 import zipfile
-import zlib
-from collections.abc import Callable
+from collections.abc import Collection
 from pathlib import Path
-from typing import Any
+from typing import IO
 
 import numpy as np
 
+from shapeprog.data.reading import BYTES, CELLS, POINTS, SHAPES, check_count, check_file, few, in_words, read_whole
 from shapeprog.errors import InputError
 from shapeprog.space import Array
 
-_SHAPES = "give points as (P, 3), voxels as (R, R, R), or many voxel grids as (N, R, R, R)"
+Stream = IO[bytes] | io.BufferedIOBase
+"""An open file, or a member of an archive."""
+
+SHAPES_OF_ARRAYS = "give points as (P, 3), voxels as (R, R, R), or many voxel grids as (N, R, R, R)"
+
+_HEADS = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}
+_AGAIN = "the file is cut short or damaged; write it again"
+_AT_ONCE = 1 << 22
+"""Cells compared at once."""
 
 
 def read_array(path: Path) -> Array:
-    """The array of an XYZ, NPY or NPZ file: points (P, 3), or voxel grids (N, R, R, R) of booleans.
+    """The array of an XYZ, NPY or NPZ file: points (P, 3), or voxel grids (N, R, R, R) of 0 and 1.
 
     An NPZ may hold ``points`` or ``voxels`` or a single array of any name.
 
     Raises
     ------
     InputError
-        If the file cannot be read, holds objects, or an array of another shape or with other values.
+        If the file cannot be read, holds objects, or an array of another shape.
     """
     return checked(_read_text(path) if path.suffix.lower() == ".xyz" else _chosen(path), path.name)
 
 
 def checked(array: Array, name: str) -> Array:
-    """``array`` as points (P, 3) or as boolean voxel grids (N, R, R, R).
+    """``array`` as points (P, 3) in float64, or as voxel grids (N, R, R, R) whose values are not looked at yet.
 
     Raises
     ------
     InputError
         If it is neither.
     """
-    if array.dtype.kind not in "biuf":
-        raise InputError(f"{name} holds {array.dtype} where numbers are needed", _SHAPES)
-    if array.ndim == 2 and array.shape[1] == 3:
+    check_shape(name, array.dtype, array.shape)
+    if array.ndim == 2:
         return array.astype(np.float64)
-    grids = array[None] if array.ndim == 3 else array
-    if grids.ndim != 4 or len(set(grids.shape[1:])) != 1 or 0 in grids.shape:
-        raise InputError(f"{name} holds an array of shape {array.shape}", _SHAPES)
-    if grids.dtype != np.bool_:
-        odd = (grids != 0) & (grids != 1)
+    return array[None] if array.ndim == 3 else array
+
+
+def check_shape(name: str, dtype: np.dtype, shape: tuple[int, ...]) -> None:
+    """Refuse what is neither points nor voxels, or more of them than can be read, by its head alone."""
+    if dtype.kind not in "biuf":
+        raise InputError(f"{name} holds {few([dtype])} where numbers are needed", SHAPES_OF_ARRAYS)
+    if len(shape) == 2 and shape[1] == 3:
+        check_count(name, "points", shape[0], POINTS)
+        return
+    sides = shape[-3:]
+    if len(shape) not in (3, 4) or len(set(sides)) != 1 or 0 in shape:
+        raise InputError(f"{name} holds an array of shape {shape}", SHAPES_OF_ARRAYS)
+    check_count(name, "cells in a grid", math.prod(sides), CELLS)
+    check_count(name, "shapes", math.prod(shape[:-3]), SHAPES)
+
+
+def occupied(grid: Array, name: str) -> Array:
+    """The cells (R, R, R) of a voxel grid as booleans, without a copy where each is a byte already.
+
+    Raises
+    ------
+    InputError
+        If it holds anything but 0 and 1.
+    """
+    bits = grid.view(np.uint8) if grid.dtype == np.bool_ else grid  # a damaged file may hold other bytes
+    step = max(1, _AT_ONCE // max(1, math.prod(grid.shape[1:])))
+    for start in range(0, len(bits), step):
+        some = bits[start : start + step]
+        odd = (some != 0) & (some != 1)
         if odd.any():
             raise InputError(
-                f"{name} holds voxels with the value {grids[odd].flat[0]}; only 0 and 1 have a meaning",
+                f"{name} holds voxels with the value {some[odd].flat[0]}; only 0 and 1 have a meaning",
                 "compare with a threshold first, as in voxels > 0.5",
             )
-    return grids.astype(np.bool_)
+    return bits.view(np.bool_) if bits.dtype.itemsize == 1 else bits.astype(np.bool_)
 
 
 def _read_text(path: Path) -> Array:
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # that there are no points is told below, as an error
-            rows = np.loadtxt(path, dtype=np.float64, comments=("#", "//"), ndmin=2, encoding="utf-8")
-    except (ValueError, UnicodeDecodeError) as error:
-        raise InputError(
-            f"{path.name} cannot be read as points: {' '.join(str(error).split())[:160]}",
-            "write one point a line: x y z, and whatever else behind, parted by blanks",
-        ) from None
-    if rows.shape[0] and rows.shape[1] < 3:
-        raise InputError(f"{path.name} has {rows.shape[1]} numbers a line", "write one point a line: x y z")
-    return rows[:, :3] if rows.size else np.zeros((0, 3))
+    content = read_whole(path)
+    check_count(path.name, "lines", content.count(b"\n"), POINTS)
+    text = content.decode("utf-8-sig", "replace")  # comments may be in any encoding
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # that there are no points is told later, as an error
+        try:
+            rows = np.loadtxt(io.StringIO(text), np.float64, comments=("#", "//"), ndmin=2, usecols=(0, 1, 2))
+        except ValueError as error:
+            raise InputError(
+                f"{path.name} cannot be read as points: {_bad_line(text)}",
+                "write one point a line: x y z, and whatever else behind, parted by blanks",
+            ) from error
+    return rows.reshape(-1, 3)
 
 
-def read_numpy(path: Path) -> dict[str, Array]:
-    """Every array of an NPY (named ``""``) or NPZ file.
+def _bad_line(text: str) -> str:
+    for number, line in enumerate(text.splitlines(), 1):
+        words = line.partition("#")[0].partition("//")[0].split()
+        try:
+            count = len([float(word) for word in words[:3]])
+        except ValueError:
+            return f"line {number} holds a word where a number is needed"
+        if 0 < count < 3:
+            return f"line {number} has {count} numbers, not three"
+    return "its lines hold no numbers"
+
+
+def read_numpy(path: Path, wanted: Collection[str]) -> dict[str, Array]:
+    """The array of an NPY file (named ``""``), or those of an NPZ file that are wanted and there.
 
     Raises
     ------
     InputError
-        If the file is damaged or holds Python objects.
+        If the file is damaged, or what is wanted of it holds Python objects or is too large.
     """
-    try:
-        with path.open("rb") as stream:
-            loaded = np.load(stream, allow_pickle=False)
-            if isinstance(loaded, np.ndarray):
-                return {"": loaded}
-            with loaded:
-                return {name: loaded[name] for name in loaded.files}
-    except (ValueError, EOFError, OSError, KeyError, zipfile.BadZipFile, zlib.error) as error:
-        if isinstance(error, OSError) and error.errno:
-            raise
-        text = " ".join(str(error).split())
-        if "pickle" in text.lower():
-            raise InputError(
-                f"{path.name} holds Python objects (a pickle), which are never opened, or is damaged",
-                "save plain numbers: numpy.save(path, array.astype('float32'))",
-            ) from None
+    check_file(path)
+    with in_words(path), path.open("rb") as stream:
+        if not zipfile.is_zipfile(stream):
+            stream.seek(0)
+            return {"": _read_npy(stream, path.name, path.stat().st_size)}
+        with zipfile.ZipFile(stream) as archive:
+            found = {name: _member(archive, name, path.name) for name in members(archive) if name in wanted}
+    return found
+
+
+def members(archive: zipfile.ZipFile) -> list[str]:
+    """The arrays of an NPZ file."""
+    return [name.removesuffix(".npy") for name in archive.namelist()]
+
+
+def _member(archive: zipfile.ZipFile, name: str, file: str) -> Array:
+    place = f"{name}.npy" if f"{name}.npy" in archive.NameToInfo else name
+    entry = archive.getinfo(place)
+    if entry.flag_bits & 1:
+        raise InputError(f"{file}: {name} is encrypted", "save it without a password")
+    with archive.open(entry) as stream:
+        return _read_npy(stream, f"{file}: {name}", entry.file_size)
+
+
+def read_head(stream: Stream) -> tuple[tuple[int, ...], np.dtype]:
+    """The shape and the type that an NPY stream announces.
+
+    Raises
+    ------
+    ValueError
+        If it is no NPY stream, or of a version that holds no plain numbers.
+    """
+    version = np.lib.format.read_magic(stream)
+    if version not in _HEADS:
+        raise ValueError(f"NPY {version} is not read")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # about heads that an old Python wrote
+        shape, _, dtype = _HEADS[version](stream)
+    return shape, dtype
+
+
+def _read_npy(stream: Stream, name: str, size: int) -> Array:
+    """The array of a stream of ``size`` bytes."""
+    shape, dtype = read_head(stream)
+    if dtype.hasobject:
         raise InputError(
-            f"{path.name} cannot be read as {path.suffix[1:].upper()}: {text[:160] or type(error).__name__}",
-            "the file is cut short or damaged; write it again",
-        ) from None
+            f"{name} holds Python objects (a pickle), which are never opened",
+            "save plain numbers: numpy.save(path, array.astype('float32'))",
+        )
+    announced = math.prod(shape) * dtype.itemsize
+    if min(shape, default=0) < 0 or announced > size - stream.tell():
+        raise InputError(f"{name} announces an array of shape {shape} and holds less", _AGAIN)
+    check_count(name, "bytes", announced, BYTES)
+    stream.seek(0)
+    array: Array = np.lib.format.read_array(stream, allow_pickle=False)
+    return array
 
 
 def _chosen(path: Path) -> Array:
-    arrays = read_numpy(path)
-    for name in ("voxels", "points"):
-        if name in arrays:
-            return arrays[name]
-    if len(arrays) != 1:
-        held = ", ".join(arrays) or "nothing"
-        raise InputError(f"{path.name} holds {held}", "name the array to be read 'points' or 'voxels'")
-    return next(iter(arrays.values()))
-
-
-class Hdf5Grids:
-    """The voxel grids of an HDF5 file, each read when asked for: the published file unpacks to gigabytes.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read, or holds no ``data`` of shape (N, R, R, R).
-    """
-
-    def __init__(self, path: Path) -> None:
-        self.path = path
-        self._shape = self._read(lambda data: tuple(data.shape))
-        if len(self._shape) not in (3, 4) or len(set(self._shape[-3:])) != 1 or 0 in self._shape:
-            raise InputError(f"{path.name} holds an array of shape {self._shape}", _SHAPES)
-
-    def __len__(self) -> int:
-        return int(self._shape[0]) if len(self._shape) == 4 else 1
-
-    def __getitem__(self, number: int) -> Array:
-        """The grid (R, R, R) numbered ``number``."""
-        array = self._read(lambda data: np.asarray(data[number] if len(self._shape) == 4 else data))
-        grid: Array = checked(array, f"{self.path.name}#{number}")[0]
-        return grid
-
-    def _read(self, part: Callable[[Any], Any]) -> Any:
-        try:
-            import h5py
-        except ImportError:
-            raise InputError(
-                f"{self.path.name} needs the library h5py, which is not installed", "pip install 'shapeprog[hdf5]'"
-            ) from None
-        try:
-            with h5py.File(self.path, "r") as file:
-                if not isinstance(file.get("data"), h5py.Dataset):
-                    held = ", ".join(file) or "nothing"
-                    raise InputError(f"{self.path.name} holds {held}", "its voxels must be named 'data'")
-                return part(file["data"])
-        except (OSError, KeyError, RuntimeError) as error:
-            raise InputError(
-                f"{self.path.name} cannot be read as HDF5: {' '.join(str(error).split())[:160]}",
-                "the file is cut short or damaged; write it again",
-            ) from None
+    check_file(path)
+    with in_words(path):
+        if not zipfile.is_zipfile(path):
+            return read_numpy(path, ())[""]
+        with zipfile.ZipFile(path) as archive:
+            held = members(archive)
+    name = next((each for each in ("voxels", "points") if each in held), held[0] if len(held) == 1 else None)
+    if name is None:
+        raise InputError(f"{path.name} holds {few(held)}", "name the array to be read 'points' or 'voxels'")
+    return read_numpy(path, (name,))[name]

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
-from typing import Any
 
+from shapeprog.data.folders import Skipped, files_below
+from shapeprog.data.meshes import COMMON, mesh_formats, read_mesh
 from shapeprog.data.orientation import axes_of, in_shapenet_layout
 from shapeprog.data.placement import shape_from_mesh, shape_from_points, shape_from_voxels
+from shapeprog.data.reading import BYTES, POINTS, check_count, check_file, in_words
 from shapeprog.data.shape import Shape
 from shapeprog.errors import InputError, ShapeProgError
 from shapeprog.space import Array
@@ -83,7 +85,7 @@ def load_all(
     for path in paths:
         try:
             file, index = _split_index(path)
-            files = _files_in(file) if os.path.isdir(file) else [file]
+            files, skipped = _files_in(file) if os.path.isdir(file) else ([file], [])
         except ShapeProgError as error:
             yield Path(path), error
             continue
@@ -96,77 +98,88 @@ def load_all(
                 continue
             for number in chosen:
                 label = each if len(held) == 1 else Path(f"{each}#{number}")
-                try:
-                    yield label, held[number]
-                except ShapeProgError as error:
-                    yield label, error
+                yield label, _made(held, number)
+        yield from skipped
+
+
+def _made(held: _Held, number: int) -> Shape | ShapeProgError:
+    try:
+        return held[number]
+    except ShapeProgError as error:
+        return error
 
 
 def readable_suffixes() -> set[str]:
     """Every suffix, with its dot and in lower case, that :func:`load` understands."""
-    from shapeprog.data.meshes import mesh_formats
-
     return {f".{name}" for name in mesh_formats()} | ARRAY_SUFFIXES | {".binvox"}
 
 
 class _Held:
-    """The shapes of one file, each made when asked for."""
+    """The shapes of one file, each made when asked for; whatever its reader raises comes in words."""
 
-    def __init__(self, names: list[str], make: Any) -> None:
-        self.names, self._make = names, make
+    def __init__(self, path: Path, names: list[str], make: Callable[[int], Shape]) -> None:
+        self.path, self.names, self._make = path, names, make
 
     def __len__(self) -> int:
         return len(self.names)
 
     def __getitem__(self, number: int) -> Shape:
-        shape: Shape = self._make(number)
-        return shape
+        with in_words(self.path):
+            return self._make(number)
 
 
 def _open(path: Path, up: str | None, front: str | None, points: int, seed: int) -> _Held:
-    if os.path.isdir(path):
-        raise InputError(f"{path} is a folder", "name a file in it, or read the whole folder with load_all")
-    if not os.path.exists(path):  # unlike Path.exists, never raises
-        raise InputError(f"there is no file {path}", "check the path")
-    suffix, axes, name = path.suffix.lower(), axes_of(path, up, front), _name(path)
-    try:
-        if suffix == ".binvox":
-            from shapeprog.formats.binvox import read_binvox
-
-            cells, corner, cell = read_binvox(path)
-            grid = shape_from_voxels(cells, name=name, axes=axes, corner=corner, cell=cell, source=path)
-            return _Held([name], lambda _: grid)
-        if suffix in ARRAY_SUFFIXES:
-            return _open_array(path, name, axes, points, seed)
-        from shapeprog.data.meshes import COMMON, read_mesh
-
+    suffix = path.suffix.lower()
+    with in_words(path):
+        check_file(path)
         if suffix.removeprefix(".") not in COMMON and suffix not in readable_suffixes():
             known = ", ".join(sorted(readable_suffixes()))
             ending = f"that end in {suffix!r}" if suffix else "without a suffix"
             raise InputError(f"{path.name}: no shapes are read from files {ending}", f"known: {known}")
-        vertices, faces = read_mesh(path)
-    except OSError as error:
-        raise InputError(f"{path} cannot be read: {error.strerror or error}", "check its permissions") from error
+        axes, name = axes_of(path, up, front), _name(path)
+        if suffix in ARRAY_SUFFIXES:
+            return _open_array(path, name, axes, points, seed)
+        if suffix == ".binvox":
+            shape = _read_binvox(path, name, axes)
+        else:
+            shape = _shape_of(*read_mesh(path), path, name, axes, points, seed)
+    return _Held(path, [name], lambda _: shape)
+
+
+def _read_binvox(path: Path, name: str, axes: Array) -> Shape:
+    from shapeprog.formats.binvox import read_binvox
+
+    check_count(path.name, "bytes", path.stat().st_size, BYTES)
+    cells, corner, cell = read_binvox(path)
+    return shape_from_voxels(cells, name=name, axes=axes, corner=corner, cell=cell, source=path)
+
+
+def _shape_of(vertices: Array, faces: Array, path: Path, name: str, axes: Array, points: int, seed: int) -> Shape:
     if len(faces):
-        mesh = shape_from_mesh(vertices, faces, name=name, axes=axes, points=points, seed=seed, source=path)
-    else:
-        mesh = shape_from_points(vertices, name=name, axes=axes, points=points, seed=seed, source=path)
-    return _Held([name], lambda _: mesh)
+        return shape_from_mesh(vertices, faces, name=name, axes=axes, points=points, seed=seed, source=path)
+    check_count(path.name, "points", len(vertices), POINTS)
+    return shape_from_points(vertices, name=name, axes=axes, points=points, seed=seed, source=path)
 
 
 def _open_array(path: Path, name: str, axes: Array, points: int, seed: int) -> _Held:
-    from shapeprog.data.arrays import Hdf5Grids, read_array
+    from shapeprog.data.arrays import occupied, read_array
+    from shapeprog.data.hdf5 import Hdf5Grids
     from shapeprog.data.packs import is_pack, read_pack
 
     if is_pack(path):
-        pack = read_pack(path)
-        return _Held([str(each) for each in pack.ids], pack.__getitem__)
+        pack = read_pack(path, whole=False)
+        return _Held(path, pack.ids.tolist(), pack.__getitem__)
     array = Hdf5Grids(path) if path.suffix.lower() in (".h5", ".hdf5") else read_array(path)
     if not isinstance(array, Hdf5Grids) and array.ndim == 2:
         cloud = shape_from_points(array, name=name, axes=axes, points=points, seed=seed, source=path)
-        return _Held([name], lambda _: cloud)
+        return _Held(path, [name], lambda _: cloud)
     names = [name] if len(array) == 1 else [f"{name}#{number}" for number in range(len(array))]
-    return _Held(names, lambda n: shape_from_voxels(array[n], name=names[n], axes=axes, source=path))
+
+    def make(number: int) -> Shape:
+        cells = occupied(array[number], names[number])
+        return shape_from_voxels(cells, name=names[number], axes=axes, source=path)
+
+    return _Held(path, names, make)
 
 
 def _split_index(path: str | os.PathLike[str]) -> tuple[Path, str | None]:
@@ -189,15 +202,16 @@ def _number(path: Path, index: str, held: _Held) -> int:
     )
 
 
-def _files_in(folder: Path) -> list[Path]:
-    suffixes = readable_suffixes()
-    found = sorted(path for path in folder.rglob("*") if path.suffix.lower() in suffixes and path.is_file())
+def _files_in(folder: Path) -> tuple[list[Path], Skipped]:
+    """The files to read in a folder and below, and what of it cannot be looked into."""
+    skipped: Skipped = []
+    found = files_below(folder, readable_suffixes(), skipped)
     # ShapeNet lays the voxels of each object beside its mesh: one shape, read from the mesh.
     meshes = {path.parent for path in found if path.suffix.lower() != ".binvox" and in_shapenet_layout(path)}
     found = [path for path in found if not (path.suffix.lower() == ".binvox" and path.parent in meshes)]
-    if not found:
+    if not found and not skipped:
         raise InputError(f"the folder {folder} holds no file that can be read as a shape", "name another folder")
-    return found
+    return found, skipped
 
 
 def _name(path: Path) -> str:

@@ -19,19 +19,22 @@ import os
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import overload
+from typing import Any, overload
 
 import numpy as np
 import numpy.typing as npt
 
-from shapeprog.data.arrays import read_numpy
+from shapeprog.data.arrays import members, read_head, read_numpy
+from shapeprog.data.reading import POINTS, check_count, few, in_words
 from shapeprog.data.shape import Shape
 from shapeprog.errors import InputError
 from shapeprog.files import atomic_path
-from shapeprog.space import RESOLUTION, SPAN, Array, Frame
+from shapeprog.space import LEAST_SIDE, MOST_SIDE, RESOLUTION, SPAN, Array, Frame
 
 _BYTES = RESOLUTION**3 // 8
 _LEVELS = 65535
+_ARRAYS = ("ids", "voxels", "points", "longest_side", "split")
+_CURE = "make packs with 'shapeprog prepare'; the manual of shapeprog.data.packs says what they hold"
 
 
 @dataclass(frozen=True)
@@ -67,16 +70,23 @@ class Pack(Sequence[Shape]):
             raise IndexError(
                 f"{self.source.name} holds {len(self)} shapes, numbered from 0; {index} is not one of them"
             )
+        name, side = str(self.ids[index]), SPAN if self.longest_side is None else float(self.longest_side[index])
+        if not self.voxels[index].any():
+            raise InputError(f"{self.source.name}: {name} has no occupied cell", _CURE)
+        if not _usable(side):
+            raise InputError(
+                f"{self.source.name}: the longest side of {name} is {side:g}, not between {LEAST_SIDE:g} and "
+                f"{MOST_SIDE:g}", _CURE
+            )  # fmt: skip
         cells = np.unpackbits(self.voxels[index]).reshape((RESOLUTION,) * 3).astype(np.bool_)
         points = None
         if self.points is not None:
             points = ((self.points[index].astype(np.float64) / _LEVELS - 0.5) * SPAN).astype(np.float32)
-        scale = 1.0 if self.longest_side is None else float(self.longest_side[index]) / SPAN
         return Shape(
-            name=str(self.ids[index]),
+            name=name,
             voxels=cells,
             points=points,
-            frame=Frame(scale=scale),
+            frame=Frame(scale=side / SPAN),
             source=self.source,
             kind="voxels" if points is None else "mesh",
             split="" if self.split is None else str(self.split[index]),
@@ -115,19 +125,17 @@ def is_pack(path: Path) -> bool:
     if path.suffix.lower() != ".npz" or not zipfile.is_zipfile(path):
         return False
     with zipfile.ZipFile(path) as archive:
-        if not {"ids.npy", "voxels.npy"} <= set(archive.namelist()):
+        if not {"ids", "voxels"} <= set(members(archive)):
             return False
         try:
             with archive.open("voxels.npy") as stream:
-                version = np.lib.format.read_magic(stream)
-                head = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}
-                shape, _, dtype = head[version](stream)
-        except (ValueError, KeyError, EOFError, OSError, zipfile.BadZipFile):
+                shape, dtype = read_head(stream)
+        except Exception:
             return True  # a damaged pack: reading it says so
         return len(shape) == 2 and shape[1] == _BYTES and dtype == np.uint8
 
 
-def read_pack(path: str | os.PathLike[str], split: str | None = None) -> Pack:
+def read_pack(path: str | os.PathLike[str], split: str | None = None, *, whole: bool = True) -> Pack:
     """The shapes of a pack, in the order of the file.
 
     Parameters
@@ -136,6 +144,8 @@ def read_pack(path: str | os.PathLike[str], split: str | None = None) -> Pack:
         An NPZ file with the arrays listed at the head of this module.
     split
         Only the shapes of this split: train, val or test.
+    whole
+        Whether a single shape without cells or of no usable size spoils the pack; else it is refused when asked for.
 
     Raises
     ------
@@ -143,29 +153,47 @@ def read_pack(path: str | os.PathLike[str], split: str | None = None) -> Pack:
         If the file cannot be read, is no pack, or its arrays do not fit together.
     """
     source = Path(path)
-    cure = "make packs with 'shapeprog prepare'; the manual of shapeprog.data.packs says what they hold"
-    if not source.is_file():
-        raise InputError(f"there is no file {source}", "check the path")
-    arrays = read_numpy(source)
+    arrays = read_numpy(source, _ARRAYS)
     missing = {"ids", "voxels"} - set(arrays)
     if missing:
-        raise InputError(f"{source.name} is no pack: it has no {' and no '.join(sorted(missing))}", cure)
-    voxels, count = arrays["voxels"], len(arrays["ids"])
-    if voxels.dtype != np.uint8 or voxels.shape != (count, _BYTES):
-        raise InputError(
-            f"{source.name}: voxels are {voxels.dtype} {voxels.shape}, not uint8 ({count}, {_BYTES})", cure
-        )
-    points = arrays.get("points")
-    if points is not None and (points.dtype != np.uint16 or points.ndim != 3 or points.shape[::2] != (count, 3)):
-        raise InputError(f"{source.name}: points are {points.dtype} {points.shape}, not uint16 ({count}, P, 3)", cure)
-    longest = arrays.get("longest_side")
-    if longest is not None and (longest.shape != (count,) or not (np.isfinite(longest) & (longest > 0)).all()):
-        raise InputError(f"{source.name}: longest_side must be {count} positive numbers", cure)
-    splits = arrays.get("split")
-    if splits is not None and splits.shape != (count,):
-        raise InputError(f"{source.name}: split has {splits.shape[:1]} entries for {count} shapes", cure)
-    pack = Pack(source, arrays["ids"], voxels, points, longest, splits)
+        raise InputError(f"{source.name} is no pack: it has no {' and no '.join(sorted(missing))}", _CURE)
+    with in_words(source, "a pack"):
+        _check(source.name, arrays)
+    pack = Pack(source, *(arrays.get(name) for name in _ARRAYS))  # type: ignore[arg-type]
+    if whole:
+        good = pack.voxels.any(1) & (True if pack.longest_side is None else _usable(pack.longest_side))
+        for index in np.flatnonzero(~good)[:1]:
+            pack[int(index)]  # which says what is wrong with it
     return pack if split is None else pack.only(split)
+
+
+def _check(name: str, arrays: dict[str, Array]) -> None:
+    """Refuse arrays that do not fit together."""
+    ids, voxels = arrays["ids"], arrays["voxels"]
+    if ids.ndim != 1 or ids.dtype.kind != "U":
+        raise InputError(f"{name}: ids are {few([ids.dtype])} {ids.shape}, not the text of N names", _CURE)
+    "".join(ids.tolist()).encode()  # names that are no text end here
+    count = len(ids)
+    if voxels.dtype != np.uint8 or voxels.shape != (count, _BYTES):
+        raise InputError(f"{name}: voxels are {voxels.dtype} {voxels.shape}, not uint8 ({count}, {_BYTES})", _CURE)
+    points = arrays.get("points")
+    if points is not None and (
+        points.dtype != np.uint16 or points.ndim != 3 or points.shape[::2] != (count, 3) or 0 in points.shape[1:]
+    ):
+        raise InputError(f"{name}: points are {points.dtype} {points.shape}, not uint16 ({count}, P, 3)", _CURE)
+    if points is not None:
+        check_count(name, "points a shape", points.shape[1], POINTS)
+    longest = arrays.get("longest_side")
+    if longest is not None and (longest.dtype.kind not in "iuf" or longest.shape != (count,)):
+        raise InputError(f"{name}: longest_side is {longest.dtype} {longest.shape}, not {count} numbers", _CURE)
+    splits = arrays.get("split")
+    if splits is not None and (splits.shape != (count,) or splits.dtype.kind != "U"):
+        raise InputError(f"{name}: split is {few([splits.dtype])} {splits.shape}, not {count} names of splits", _CURE)
+
+
+def _usable(side: Array | float) -> Any:
+    """Whether longest sides can be those of shapes; what is no number is not."""
+    return (side > LEAST_SIDE) & (side < MOST_SIDE)
 
 
 def write_pack(path: str | os.PathLike[str], shapes: Iterable[Shape]) -> int:

@@ -8,7 +8,10 @@ import numpy as np
 
 from shapeprog.data.shape import Shape
 from shapeprog.errors import InputError
-from shapeprog.space import HALF, RESOLUTION, SPAN, Array, Frame
+from shapeprog.space import HALF, LEAST_SIDE, MOST_SIDE, RESOLUTION, SPAN, Array, Frame
+
+_NEAREST = 1e-12
+"""Least longest side of a shape as a part of its distance from the origin: below, float64 tells no cells apart."""
 
 
 def shape_from_mesh(
@@ -103,16 +106,15 @@ def shape_from_voxels(
     backward = tuple(axis for axis in range(3) if turn[order[axis], axis] < 0)
     turned = np.flip(np.asarray(voxels, np.bool_).transpose(order), backward)
     start, size = np.zeros(3) if corner is None else np.asarray(corner, np.float64), len(turned)
-    low, high = occupied_bounds(turned)
+    first, last = occupied_bounds(voxels)
+    frame = _around(start + cell * first, start + cell * last, name, turn)
+    low, high = first[order], last[order]
+    low, high = np.where(np.isin(range(3), backward), (size - high, size - low), (low, high))
     middle, longest = (low + high) / 2 - HALF, (high - low).max()
     if size == RESOLUTION and abs(longest - SPAN) <= 2 and np.abs(middle).max() <= 1.5:
-        triple = start + cell * HALF
-        frame = Frame(
-            cell, (float(triple[0]), float(triple[1]), float(triple[2])), Frame.around(start, start + 1, turn).axes
-        )
-        return Shape(name, np.ascontiguousarray(turned), frame=frame, source=source)
-    first, last = occupied_bounds(voxels)
-    frame = Frame.around(start + cell * first, start + cell * last, turn)
+        centre = start + cell * HALF
+        kept = Frame(cell, (float(centre[0]), float(centre[1]), float(centre[2])), frame.axes)
+        return Shape(name, np.ascontiguousarray(turned), frame=kept, source=source)
     ends = frame.to_grid([start, start + cell * size])
     return Shape(name, resample_voxels(turned, ends.min(0), cell / frame.scale), frame=frame, source=source)
 
@@ -125,9 +127,20 @@ def _frame(positions: Array, name: str, axes: Array | None) -> Frame:
     if not np.isfinite(positions).all():
         count = int((~np.isfinite(positions)).any(1).sum())
         raise InputError(f"{name}: {count} of {len(positions)} positions are not finite numbers", "remove or mend them")
-    low, high = positions.min(0), positions.max(0)
-    if not 1e-30 < (high - low).max() < 1e30:
+    return _around(positions.min(0), positions.max(0), name, axes)
+
+
+def _around(low: Array, high: Array, name: str, axes: Array | None) -> Frame:
+    """The frame around a box of the world, if numbers can tell its sides apart."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        longest, farthest = float((high - low).max()), float(np.maximum(np.abs(low), np.abs(high)).max())
+    if not LEAST_SIDE < longest < MOST_SIDE:
         raise InputError(
             f"{name} has no usable extent: its box spans {low.tolist()} to {high.tolist()}", "check its scale"
+        )
+    if longest < _NEAREST * farthest:
+        raise InputError(
+            f"{name} lies too far from the origin for its size: its box spans {low.tolist()} to {high.tolist()}",
+            "move it to the origin",
         )
     return Frame.around(low, high, axes)

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
+from shapeprog.data.folders import Skipped, entries, files_below, is_folder
 from shapeprog.data.loading import load, readable_suffixes
 from shapeprog.data.packs import write_pack
 from shapeprog.data.shape import Shape
@@ -53,7 +54,7 @@ class Prepared:
     packs
         In the last record the packs written, with their number of shapes.
     failures
-        In the last record every model that could not be read, with its error.
+        In the last record every model or folder that could not be read, with its error.
     """
 
     done: int
@@ -105,9 +106,9 @@ def prepare(
     """
     if len(shares) != 3 or min(shares) < 0 or not abs(sum(shares) - 1) < 1e-6:
         raise InputError(f"shares {shares} are not three parts of a whole", "give three numbers that sum to 1")
-    models = find_models(Path(directory))
+    failures: Skipped = []
+    models = find_models(Path(directory), failures)
     folder = make_folder(output)
-    failures: list[tuple[Path, ShapeProgError]] = []
     packs: list[tuple[Path, int]] = []
     done = 0
     # A category is written as soon as it is read: what is in memory stays small, and a stop loses one category at most.
@@ -133,8 +134,10 @@ def prepare(
     yield Prepared(done, len(models), folder, packs=tuple(packs), failures=tuple(failures))
 
 
-def find_models(directory: Path) -> list[tuple[str, str, Path]]:
+def find_models(directory: Path, skipped: Skipped) -> list[tuple[str, str, Path]]:
     """Every model of a directory as (category, name, file), in the order of the names.
+
+    Folders that may not be read are left out and added to ``skipped``.
 
     Raises
     ------
@@ -144,18 +147,22 @@ def find_models(directory: Path) -> list[tuple[str, str, Path]]:
     if not directory.is_dir():
         raise InputError(f"there is no folder {directory}", "give the folder that holds one folder per category")
     suffixes, found = readable_suffixes(), []
-    for branch in sorted(path for path in directory.iterdir() if path.is_dir()):
+    for branch in (path for path in entries(directory, skipped) if is_folder(path, skipped)):
         category = SYNSETS.get(branch.name, re.sub(r"[^\w-]+", "_", branch.name))
-        layout = sorted(path for path in branch.iterdir() if (path / "models").is_dir())
+        closed: Skipped = []
+        layout = [path for path in entries(branch, skipped) if is_folder(path / "models", closed)]
         for place in layout:
-            files = [path for path in (place / "models").iterdir() if path.suffix.lower() in suffixes]
+            files = [path for path in entries(place / "models", skipped) if path.suffix.lower() in suffixes]
             if files:
                 found.append((category, place.name, min(files, key=_preference)))
-        if not layout:
-            for path in sorted(branch.rglob("*")):
-                if path.suffix.lower() in suffixes and path.is_file():
-                    found.append((category, path.relative_to(branch).with_suffix("").as_posix(), path))
+        if layout:
+            skipped += closed
+        else:
+            for path in files_below(branch, suffixes, skipped):
+                found.append((category, path.relative_to(branch).with_suffix("").as_posix(), path))
     if not found:
+        if skipped:
+            raise skipped[0][1]
         raise InputError(
             f"the folder {directory} holds no models",
             "it needs a folder per category: <category>/... or <synset>/<id>/models",

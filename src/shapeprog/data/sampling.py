@@ -12,7 +12,14 @@ _AT_ONCE = 1 << 17
 
 
 def sample_surface(vertices: Array, faces: Array, count: int, seed: int = 0) -> npt.NDArray[np.float32]:
-    """Points (count, 3) drawn uniformly by area from the triangles.
+    """Points (count, 3) drawn uniformly by area from the triangles; see :func:`sample_with_faces`."""
+    return sample_with_faces(vertices, faces, count, seed)[0]
+
+
+def sample_with_faces(
+    vertices: Array, faces: Array, count: int, seed: int = 0
+) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.int64]]:
+    """Points (count, 3) drawn uniformly by area from the triangles, and the triangle (count,) that each lies on.
 
     Faces without area get none; a mesh that has no area at all is drawn from uniformly by face.
 
@@ -38,8 +45,7 @@ def sample_surface(vertices: Array, faces: Array, count: int, seed: int = 0) -> 
     # The square root keeps the density even from the first corner to the opposite edge.
     root, share = np.sqrt(drawn[:, 1:2]), drawn[:, 2:3]
     points: Array = first + root * ((1 - share) * along + share * across)
-    single: npt.NDArray[np.float32] = points.astype(np.float32)
-    return single
+    return points.astype(np.float32), face
 
 
 def _starts(count: int) -> range:

@@ -101,18 +101,18 @@ def resample_voxels(voxels: Array, low: Array, scale: float, resolution: int = R
     scale
         Side of one of its cells in cells of the grid.
     """
-    occupied = np.argwhere(voxels)
-    start = np.asarray(low, np.float64) + resolution / 2 + occupied * scale
-    margin = scale / 2 if scale < 1 else SHRINK  # all of a finer cell is drawn together into its centre
-    first = np.floor(start + margin).astype(np.int64)
-    last = np.maximum(np.ceil(start + scale - margin).astype(np.int64) - 1, first)
-    cells = np.zeros((resolution,) * 3, np.bool_)
-    reach = int((last - first).max()) + 1 if len(first) else 0
-    for step in np.ndindex(reach, reach, reach):
-        place = np.minimum(first + step, last)
-        place = place[((place >= 0) & (place < resolution)).all(1)]
-        cells[tuple(place.T)] = True
-    return cells
+    reduced = np.asarray(voxels, np.bool_)
+    for axis, corner in enumerate(np.asarray(low, np.float64) + resolution / 2):
+        start = corner + np.arange(reduced.shape[axis]) * scale
+        margin = scale / 2 if scale < 1 else SHRINK  # all of a finer cell is drawn together into its centre
+        first = np.floor(start + margin)
+        last = np.maximum(np.ceil(start + scale - margin) - 1, first)
+        # The cells that reach cell k lie side by side, and which they are does not depend on the other axes.
+        numbers = np.arange(resolution)
+        spans = zip(np.searchsorted(last, numbers), np.searchsorted(first, numbers, side="right"), strict=True)
+        layers = np.moveaxis(reduced, axis, 0)
+        reduced = np.moveaxis(np.stack([layers[begin:end].any(0) for begin, end in spans]), 0, axis)
+    return np.ascontiguousarray(reduced)
 
 
 def occupied_bounds(voxels: Array) -> tuple[Array, Array]:
@@ -123,10 +123,11 @@ def occupied_bounds(voxels: Array) -> tuple[Array, Array]:
     InputError
         If no cell is occupied.
     """
-    places = np.argwhere(voxels)
-    if len(places) == 0:
+    layer: Array = np.any(voxels, 0)  # then only a layer is left to look at, however large the grid
+    sides = [np.flatnonzero(each) for each in (np.any(voxels, (1, 2)), layer.any(1), layer.any(0))]
+    if len(sides[0]) == 0:
         raise InputError("the voxel grid is empty", "give a grid in which at least one cell is occupied")
-    return places.min(0), places.max(0) + 1
+    return np.array([side[0] for side in sides]), np.array([side[-1] + 1 for side in sides])
 
 
 def _carve(barrier: BoolArray, hole: int, start: int, stride: int, cells: BoolArray) -> None:

@@ -80,7 +80,13 @@ def mark_triangles(triangles, half, cells):
             x = i + 0.5
             for j in range(low[1], high[1] + 1):
                 y = j + 0.5
-                for k in range(low[2], high[2] + 1):
+                start, stop = low[2], high[2] + 1
+                if stop - start > 4 and abs(normal[2]) > 1e-6 * reach:  # a large box is mostly far from the plane
+                    middle = (offset - normal[0] * x - normal[1] * y) / normal[2] - 0.5
+                    room = abs(reach / normal[2]) + 1
+                    start = max(start, int(np.floor(max(middle - room, start))))
+                    stop = min(stop, int(np.ceil(min(middle + room, stop))) + 1)
+                for k in range(start, stop):
                     if cells[i, j, k]:
                         continue
                     z = k + 0.5

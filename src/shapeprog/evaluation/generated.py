@@ -94,15 +94,24 @@ def scores_on_packs(generator: Generator, packs: Mapping[str, Sequence[Target]],
     return scores
 
 
-def measured(written: Written, target: Target, points: int = 5000, seed: int = 0, snapping: bool = False) -> Metrics:
+def measured(
+    written: Written,
+    target: Target,
+    points: int = 5000,
+    seed: int = 0,
+    snapping: bool = False,
+    *,
+    looks: bool = False,
+) -> Metrics:
     """The measures of a program; one that draws nothing counts as a single point in the centre of the grid.
 
-    An infinite distance would make every mean infinite for the sake of one shape.
+    An infinite distance would make every mean infinite for the sake of one shape.  The arguments are those of
+    :func:`evaluate_generator` and :func:`shapeprog.evaluation.metrics.evaluate_program`.
     """
     from shapeprog.inference.snapping import snap
 
     snapped = snap(written.program, target.voxels) if snapping else written.whole
-    row = evaluate_program(written.program, target, snapped, points, seed)
+    row = evaluate_program(written.program, target, snapped, points, seed, looks=looks)
     samples = None if np.isfinite(row.cd) else target_samples(target, points, seed)
     if samples is None:
         return row

@@ -9,16 +9,22 @@ F1
     F-score of the same points at a distance of one grid cell.
 IoU
     Cells of the program snapped to whole numbers against the touched cells of the target, at 32^3.
-Noise floor
-    The CD between two independent samplings of the target itself.
+Likeness
+    F1@.5 %, F1@1 %, normals and silhouette: see :mod:`shapeprog.evaluation.likeness`.  Normals and silhouette need a
+    mesh as target; F1 needs points at least.
+Floors
+    CD and likeness between two independent samplings of the target itself.
+Structure
+    Whether the union is one piece, slivers, continuous numbers: see :mod:`shapeprog.evaluation.structure`.
 Size
     Blocks, statements (loops count one each) and primitives after unrolling.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
@@ -29,7 +35,10 @@ from torch import Tensor
 
 from shapeprog.data.sampling import sample_surface as sample_triangles
 from shapeprog.errors import ShapeProgError
+from shapeprog.evaluation import likeness, structure
+from shapeprog.evaluation.likeness import Samples, Triangles
 from shapeprog.geometry import cells
+from shapeprog.geometry.mesh import union_mesh
 from shapeprog.geometry.nearest import squared_distance
 from shapeprog.geometry.scene import Scene
 from shapeprog.geometry.surface import sample_surface
@@ -89,6 +98,18 @@ class Metrics:
         Share between 0 and 1, of the snapped program.
     blocks, statements, primitives
         Size of the program.
+    numbers
+        How many continuous numbers are written.
+    f1_half_percent, f1_percent, normals, silhouette
+        Likeness, between 0 and 1; these and all that follow are not a number where they were not measured.
+    one_piece
+        1 where the union is one connected solid, else 0.
+    slivers
+        Share of the primitives that are too thin to be a part.
+    f1_half_percent_floor, f1_percent_floor, normals_floor
+        What the target reads against itself, sampled twice.
+    part_recall, part_precision
+        Parts with a primitive of their own, over parts and over primitives: see :mod:`shapeprog.evaluation.parts`.
     """
 
     name: str
@@ -101,6 +122,18 @@ class Metrics:
     blocks: int
     statements: int
     primitives: int
+    numbers: int = 0
+    f1_half_percent: float = math.nan
+    f1_percent: float = math.nan
+    normals: float = math.nan
+    silhouette: float = math.nan
+    one_piece: float = math.nan
+    slivers: float = math.nan
+    f1_half_percent_floor: float = math.nan
+    f1_percent_floor: float = math.nan
+    normals_floor: float = math.nan
+    part_recall: float = math.nan
+    part_precision: float = math.nan
 
 
 @dataclass(frozen=True)
@@ -121,6 +154,7 @@ def evaluate_program(
     seed: int = 0,
     *,
     iou: float | None = None,
+    looks: bool = False,
 ) -> Metrics:
     """Measure a program against a target.
 
@@ -138,16 +172,57 @@ def evaluate_program(
         Seed of all samplings; the same seed gives the same figures.
     iou
         The IoU where it has been measured already, as inference has.
+    looks
+        Whether to measure what a person sees, too: likeness and structure, which take a good part of a second.
     """
     scene = unroll(program)
     if iou is None:
         drawn = cells.rasterise(unroll(program.snap() if snapped is None else snapped))
         iou = float(cells.iou(drawn, cells.pack(target.voxels)))
     to_target, from_target, f1, floor = _distances(scene, target, points, seed)
-    return Metrics(
+    row = Metrics(
         name=target.name, cd=to_target + from_target, to_target=to_target, from_target=from_target,
-        noise_floor=floor, f1=f1, iou=iou,
-        blocks=program.blocks, statements=program.statements, primitives=int(scene.mask.sum()),
+        noise_floor=floor, f1=f1, iou=iou, blocks=program.blocks, statements=program.statements,
+        primitives=int(scene.mask.sum()), numbers=structure.numbers(program),
+    )  # fmt: skip
+    if not looks:
+        return row
+    try:
+        mesh = Triangles(*union_mesh(scene))
+    except ShapeProgError:  # nothing in it has a volume
+        mesh = None
+    return replace(
+        with_likeness(row, mesh, target, seed), one_piece=structure.one_piece(scene), slivers=structure.slivers(scene)
+    )
+
+
+def with_likeness(row: Metrics, predicted: Triangles | None, target: Target, seed: int = 0) -> Metrics:
+    """The measures with the likeness of a predicted mesh, ``None`` where it has no surface, to the target."""
+    count = likeness.POINTS
+    if target.vertices is not None and target.faces is not None and len(target.faces):
+        mesh = Triangles(target.vertices, target.faces)
+        diagonal = likeness.box(np.asarray(mesh.vertices, np.float64)[np.unique(mesh.faces)])[1]
+        seeds = np.random.SeedSequence((seed, 1)).generate_state(3).tolist()
+        one, two = (likeness.sampled(mesh, each, count) for each in seeds[:2])
+    elif target.points is not None and len(target.points) > 1:
+        mixed = np.asarray(target.points, np.float64)[np.random.default_rng(seed).permutation(len(target.points))]
+        mesh, diagonal, seeds = None, likeness.box(mixed)[1], [0, 0, seed]
+        one, two = Samples(mixed[: len(mixed) // 2]), Samples(mixed[len(mixed) // 2 :])
+    else:
+        return row
+    floor = likeness.likeness(one, two, diagonal)
+    if predicted is None:
+        found, outlines = likeness.NOTHING, 0.0
+    else:
+        surface = one if mesh is not None else Samples(np.concatenate([one.points, two.points]))
+        found = likeness.likeness(likeness.sampled(predicted, seeds[2], count), surface, diagonal)
+        outlines = likeness.silhouette(predicted, mesh) if mesh is not None else math.nan
+    if mesh is None:
+        outlines, found = math.nan, found._replace(normals=math.nan)
+    return replace(
+        row, f1_half_percent=found.f1_half_percent, f1_percent=found.f1_percent, normals=found.normals,
+        silhouette=outlines, f1_half_percent_floor=floor.f1_half_percent, f1_percent_floor=floor.f1_percent,
+        normals_floor=floor.normals,
     )  # fmt: skip
 
 

@@ -6,6 +6,7 @@ The format is Patrick Min's; its cubes are anchored at a corner: cell ``(i, j, k
 
 from __future__ import annotations
 
+import math
 import os
 from pathlib import Path
 
@@ -14,6 +15,12 @@ import numpy as np
 from shapeprog.errors import InputError
 from shapeprog.files import write_bytes
 from shapeprog.space import HALF, Array, Frame
+
+_HEAD = 4096
+"""Most bytes of a head."""
+
+_AT_ONCE = 1 << 16
+"""Runs unpacked at once: numpy takes eight bytes for the length of each."""
 
 _CURE = "write the file again; binvox files start with '#binvox 1' and hold runs of 0 and 1"
 
@@ -28,7 +35,7 @@ def read_binvox(path: str | os.PathLike[str]) -> tuple[Array, Array, float]:
     """
     name = Path(path).name
     content = Path(path).read_bytes()
-    head, mark, body = content.partition(b"data\n")
+    head, mark, _ = content[:_HEAD].partition(b"data\n")
     lines = {line.split()[0]: line.split()[1:] for line in head.decode("latin-1").splitlines() if line.strip()}
     if not mark or "#binvox" not in lines:
         raise InputError(f"{name} is not a binvox file", _CURE)
@@ -41,15 +48,19 @@ def read_binvox(path: str | os.PathLike[str]) -> tuple[Array, Array, float]:
     good_shape = len(shape) == 3 and shape[0] == shape[1] == shape[2] and 0 < shape[0] <= 1024
     if not good_shape or corner.shape != (3,) or not np.isfinite([*corner, scale]).all() or scale <= 0:
         raise InputError(f"{name}: dim {shape}, translate {corner}, scale {scale} is no cube of cells", _CURE)
-    runs = np.frombuffer(body, np.uint8)
-    values, lengths = runs[: len(runs) // 2 * 2 : 2], runs[1::2].astype(np.int64)
-    total = int(np.prod(shape))
-    if len(runs) % 2 or lengths.sum() != total:
-        raise InputError(f"{name} holds {lengths.sum()} cells where its head says {total}: it is cut short", _CURE)
+    runs = np.frombuffer(content, np.uint8, offset=len(head) + len(mark))
+    values, lengths = runs[: len(runs) // 2 * 2 : 2], runs[1::2]
+    total, held = math.prod(shape), int(lengths.sum(dtype=np.int64))
+    if len(runs) % 2 or held != total:
+        raise InputError(f"{name} holds {held} cells where its head says {total}: it is cut short or damaged", _CURE)
     if (values > 1).any():
         raise InputError(f"{name} holds cells with the value {values.max()}; only 0 and 1 have a meaning", _CURE)
-    cells = np.repeat(values.astype(np.bool_), lengths).reshape(shape)
-    return cells.transpose(0, 2, 1), corner, scale / shape[0]
+    cells, at = np.empty(total, np.bool_), 0
+    for start in range(0, len(lengths), _AT_ONCE):
+        some = np.repeat(values[start : start + _AT_ONCE].view(np.bool_), lengths[start : start + _AT_ONCE])
+        cells[at : at + len(some)] = some
+        at += len(some)
+    return cells.reshape(shape).transpose(0, 2, 1), corner, scale / shape[0]
 
 
 def write_binvox(path: str | os.PathLike[str], voxels: Array, frame: Frame | None = None) -> None:

@@ -13,6 +13,7 @@ from __future__ import annotations
 import json
 import math
 import re
+from reprlib import repr as shortened
 from typing import Any
 
 import numpy as np
@@ -21,7 +22,7 @@ from shapeprog.errors import InputError
 from shapeprog.formats.format import Format
 from shapeprog.space import Frame, grid_axes
 
-_HEADER = re.compile(r"^#\s*frame:(.*)$", re.MULTILINE)
+_HEADER = re.compile(r"^#[ \t]*frame:(.*)$", re.MULTILINE)
 _CURE = (
     'write it as # frame: {"scale": 1, "centre": [0, 0, 0], "axes": [[1, 0, 0], [0, 1, 0], [0, 0, 1]]}, or remove it'
 )
@@ -55,12 +56,12 @@ def frame_from(data: Any, name: str) -> Frame:
         axes = [[float(value) for value in row] for row in data["axes"]]
         matrix = np.array(axes)
         good = matrix.shape == (3, 3) and len(centre) == 3 and scale > 0
-        good = good and all(map(math.isfinite, [scale, *centre])) and np.isfinite(matrix).all()
+        good = good and all(map(math.isfinite, [scale, *centre])) and (np.abs(matrix) < 2).all()
         good = good and np.allclose(matrix @ matrix.T, np.eye(3), atol=1e-6) and np.linalg.det(matrix) > 0
-    except (KeyError, TypeError, ValueError):
+    except (KeyError, TypeError, ValueError, OverflowError):
         good = False
     if not good:
-        raise InputError(f"{name}: the frame {str(data)[:120]} is no scale, centre and rotation", _CURE)
+        raise InputError(f"{name}: the frame {shortened(data)} is no scale, centre and rotation", _CURE)
     return Frame(scale, (centre[0], centre[1], centre[2]), tuple((a, b, c) for a, b, c in axes))
 
 
@@ -82,6 +83,6 @@ def frame_in(text: str, name: str = "<program>") -> Frame | None:
         return None
     try:
         data = json.loads(found.group(1))
-    except json.JSONDecodeError as error:
-        raise InputError(f"{name}: the comment '# frame:' cannot be read: {error}", _CURE) from None
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"{name}: the comment '# frame:' holds no JSON", _CURE) from error
     return frame_from(data, name)

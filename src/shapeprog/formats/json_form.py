@@ -8,7 +8,10 @@
 from __future__ import annotations
 
 import json
+from collections import Counter
+from dataclasses import dataclass
 from pathlib import Path
+from reprlib import repr as shortened
 from typing import Any, NoReturn
 
 import torch
@@ -16,7 +19,8 @@ import torch
 from shapeprog.errors import InputError, ProgramError, ShapeProgError, did_you_mean
 from shapeprog.files import write_text
 from shapeprog.formats.frames import frame_dict, frame_from
-from shapeprog.formats.shape import read_text
+from shapeprog.formats.shape import LARGEST_FILE, read_text
+from shapeprog.language.parameters import LARGEST
 from shapeprog.language.program import Draw, Loop, Node, Program
 from shapeprog.language.statement import SLOTS, Statement, language
 from shapeprog.language.syntax import DEEPEST, proper_text
@@ -27,12 +31,67 @@ FORMAT, CODE_FORMAT = "shapeprog", "shapeprog-code"
 VERSION = 1
 
 
+@dataclass(frozen=True)
+class Result:
+    """A JSON file: a program, and what else there was to say about it.
+
+    Parameters
+    ----------
+    name
+        What the file is called in errors.
+    content
+        Its entries, of which only the form and its version have been looked at.
+    """
+
+    name: str
+    content: dict[str, Any]
+
+    @property
+    def program(self) -> Program:
+        """The program; an ``InputError`` if it is none."""
+        return Program(_body(self.content.get("program"), self.name, "program", 0))
+
+    @property
+    def snapped(self) -> Program | None:
+        """Its whole-numbered form where the file holds one; an ``InputError`` if that is no program."""
+        body = self.content.get("snapped")
+        return None if body is None else Program(_body(body, self.name, "snapped", 0))
+
+    @property
+    def frame(self) -> Frame | None:
+        """The way to the world of the input where the file keeps it; an ``InputError`` if it is none."""
+        kept = self.content.get("frame")
+        return None if kept is None else frame_from(kept, self.name)
+
+    @property
+    def scores(self) -> dict[str, float]:
+        """The measures that are finite numbers; whatever else a foreign file calls its scores is left out."""
+        kept = self.content.get("scores")
+        named = kept.items() if isinstance(kept, dict) else ()
+        return {name: value for name, value in named if type(value) in (int, float) and abs(value) <= LARGEST}
+
+    @property
+    def source(self) -> str | None:
+        """The file that the program was inferred from, as the file says."""
+        source = self.content.get("source")
+        return source if isinstance(source, str) else None
+
+
+def read_result(path: Path) -> Result:
+    """All that a JSON file holds.
+
+    Raises
+    ------
+    ProgramError, InputError
+        As for :func:`program_from_json`.
+    """
+    return Result(str(path), _document(read_text(path, LARGEST_FILE), str(path), FORMAT))
+
+
 def read_json(path: Path) -> tuple[Program, Frame | None]:
     """The program of a JSON file, and its frame where it keeps one."""
-    text = read_text(path)
-    program = program_from_json(text, str(path))
-    kept = json.loads(text.removeprefix("\ufeff")).get("frame")
-    return program, None if kept is None else frame_from(kept, str(path))
+    result = read_result(path)
+    return result.program, result.frame
 
 
 def write_json(program: Program, path: Path, frame: Frame | None) -> None:
@@ -70,8 +129,7 @@ def program_from_json(text: str, name: str = "<json>") -> Program:
     InputError
         If it is JSON of another kind, naming the entry.
     """
-    body = _document(text, name, FORMAT).get("program")
-    return Program(_body(body, name, "program", 0))
+    return Result(name, _document(text, name, FORMAT)).program
 
 
 def code_to_json(code: Code) -> str:
@@ -107,9 +165,9 @@ def code_from_json(text: str, name: str = "<json>") -> Code:
         parameters = torch.tensor(content["parameters"], dtype=dtype).reshape(*shape, SLOTS)
     except (KeyError, TypeError, ValueError, RuntimeError, OverflowError) as error:
         raise InputError(
-            f"{name}: ids and parameters are no tensors of programs ({error})",
+            f"{name}: ids and parameters are no tensors of programs",
             f"ids are (..., blocks, steps), parameters the same with {SLOTS} numbers each, shape that of the ids",
-        ) from None
+        ) from error
     if dtype is None or len(shape) < 2 or not bool(torch.isfinite(parameters).all()):
         raise InputError(f"{name}: these program tensors are incomplete", "write them with code_to_json")
     return Code(ids, parameters)
@@ -138,9 +196,8 @@ def _document(text: str, name: str, wanted: str) -> dict[str, Any]:
     def unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
         found = dict(pairs)
         if len(found) != len(pairs):
-            words = [word for word, _ in pairs]
-            twice = next(word for word in words if words.count(word) > 1)
-            raise InputError(f"{name}: {twice!r} is given twice in one entry", "leave one of them out")
+            twice, _ = Counter(word for word, _ in pairs).most_common(1)[0]
+            raise InputError(f"{name}: {shortened(twice)} is given twice in one entry", "leave one of them out")
         return found
 
     text = proper_text(text, name)
@@ -148,20 +205,20 @@ def _document(text: str, name: str, wanted: str) -> dict[str, Any]:
         content = json.loads(text, parse_constant=refuse, object_pairs_hook=unique)
     except json.JSONDecodeError as error:
         lines = text.split("\n")
-        source = lines[min(error.lineno, len(lines)) - 1][:200]
+        source = lines[min(error.lineno, len(lines)) - 1]
         raise ProgramError(
             f"this is not JSON: {error.msg}", line=error.lineno, column=error.colno, source=source,
             hint="was the file cut off?", name=name,
         ) from None  # fmt: skip
     except RecursionError:
         raise InputError(f"{name}: this is nested too deeply to be a program", "loops nest at most 64 deep") from None
-    except ValueError as error:
-        raise InputError(f"{name}: {error}", "write shorter numbers") from None
+    except ValueError as error:  # what Python says of a whole number of thousands of digits
+        raise InputError(f"{name}: a number has too many digits to be read", "write shorter numbers") from error
     if not isinstance(content, dict) or content.get("format") != wanted:
         raise InputError(f"{name}: this JSON is not in the form {wanted!r}", f'it begins {{"format": "{wanted}", ...')
     if content.get("version") != VERSION:
         raise InputError(
-            f"{name}: version {content.get('version')!r} of the form {wanted!r} is not known",
+            f"{name}: version {shortened(content.get('version'))} of the form {wanted!r} is not known",
             f"this program reads version {VERSION}; a newer one may read it",
         )
     return content
@@ -180,12 +237,14 @@ def _node(entry: Any, name: str, place: str, depth: int) -> Node:
         raise InputError(f"{name}: {place} is not a statement", 'write {"statement": name, "parameters": {...}}')
     known, word = language(), entry["statement"]
     if word not in known:
-        raise InputError(f"{name}: {place}: no statement is called {word!r}", did_you_mean(word, known.names))
+        raise InputError(f"{name}: {place}: no statement is called {shortened(word)}", did_you_mean(word, known.names))
     declared = known[word]
     allowed = {"statement", "parameters", "body"} if declared.is_loop else {"statement", "parameters"}
     extra = sorted(set(entry) - allowed)
     if extra:
-        raise InputError(f"{name}: {place}: {word} has no entry {extra[0]!r}", f"it has {', '.join(sorted(allowed))}")
+        raise InputError(
+            f"{name}: {place}: {word} has no entry {shortened(extra[0])}", f"it has {', '.join(sorted(allowed))}"
+        )
     values = _values(declared, entry.get("parameters"), name, place)
     if not declared.is_loop:
         return Draw(word, values)
@@ -198,7 +257,9 @@ def _values(declared: Statement, given: Any, name: str, place: str) -> tuple[flo
         raise InputError(f"{name}: {place}: {declared.name} lacks its parameters", f"they are {', '.join(words)}")
     for word in given:
         if word not in words:
-            raise InputError(f"{name}: {place}: {declared.name} has no parameter {word!r}", did_you_mean(word, words))
+            raise InputError(
+                f"{name}: {place}: {declared.name} has no parameter {shortened(word)}", did_you_mean(word, words)
+            )
     values: list[float] = []
     for parameter in declared.parameters:
         if parameter.name not in given:

@@ -17,7 +17,7 @@ from shapeprog.errors import ProgramError, ShapeProgError, did_you_mean
 from shapeprog.files import write_text
 from shapeprog.formats.frames import frame_comment, frame_in
 from shapeprog.formats.published import COUNT, Groups, is_published, restored
-from shapeprog.formats.shape import read_text
+from shapeprog.formats.shape import LARGEST_FILE, read_text
 from shapeprog.language.parameters import Parameter
 from shapeprog.language.program import Draw, Loop, Node, Program
 from shapeprog.language.statement import Statement, language
@@ -26,14 +26,16 @@ from shapeprog.language.text import INDENT, variable
 from shapeprog.space import Frame
 
 _NUMBER = r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?"
-_VALUE = rf"\(\s*{_NUMBER}(?:\s*,\s*{_NUMBER})*\s*,?\s*\)|{_NUMBER}\s*\N{{DEGREE SIGN}}?"
+# No pattern begins with blanks where one before it may end with them: each run of blanks is passed over once.
+_VALUE = rf"\(\s*{_NUMBER}(?:\s*,\s*{_NUMBER})*\s*(?:,\s*)?\)|{_NUMBER}(?:\s*\N{{DEGREE SIGN}})?"
 _COPIES = r"(?:\s*\+\s*[a-z]\w*\s*\*\s*[a-z]\w*)*"
 _WORD = re.compile(r"\s*'([^'\n]*)'\s*(,|\)|$)")
 _GROUP = re.compile(rf"\s*([A-Za-z_]\w*)\s*=\s*({_VALUE}){_COPIES}\s*(,|\)|$)")
 _TURN = re.compile(r"\s*(?:theta\s*\*\s*[a-z]|axis)\s*(,|\)|$)")
 _DRAW = re.compile(r"draw\s*\(")
 _FOR = re.compile(rf"for\s*\(\s*[a-z]\w*\s*<\s*({_NUMBER})\s*(,|\))")
-_REST = re.compile(rf"{_COPIES}\s*:?\s*$")
+_REST = re.compile(rf"{_COPIES}\s*(?::\s*)?$")
+_SHOWN = 60
 
 
 def read_notation(path: Path) -> tuple[Program, Frame | None]:
@@ -41,7 +43,7 @@ def read_notation(path: Path) -> tuple[Program, Frame | None]:
 
     What the published printer leaves out is filled in without a word; :func:`parse_notation` can tell.
     """
-    text = read_text(path)
+    text = read_text(path, LARGEST_FILE)
     return parse_notation(text, str(path)), frame_in(text, str(path))
 
 
@@ -78,7 +80,7 @@ def parse_notation(text: str, name: str = "<program>", notes: list[str] | None =
         At the first place that is not in the notation.
     """
     text = proper_text(text, name)
-    lines = [(number, line) for number, line in enumerate(text.splitlines(), 1) if line.split("#")[0].strip()]
+    lines = [(number, line) for number, line in enumerate(text.splitlines(), 1) if _bare(line)]
     reader = _Reader(lines, name, [] if notes is None else notes)
     return Program(reader.body(-1, 0, inside=None))
 
@@ -222,7 +224,7 @@ class _Reader:
                 words.append(part[1])
             elif part.re is _GROUP:
                 if part[1] in groups:
-                    raise self._error(f"{part[1]} is given twice", "leave one of them out", indent + at)
+                    raise self._error(f"{part[1][:_SHOWN]} is given twice", "leave one of them out", indent + at)
                 groups[part[1]] = [float(number) for number in re.findall(_NUMBER, part[2])]
             at, last = part.end(), part[part.re.groups]
         if not last and words != ["Rot"]:
@@ -245,7 +247,7 @@ class _Reader:
                 spelled = [_quoted(_words(declared)) for declared in known]
                 what = "loop" if is_loop else "statement"
                 raise ShapeProgError(
-                    f"no {what} is called {_quoted(words) or 'nothing'}", did_you_mean(_quoted(words), spelled)
+                    f"no {what} is called {_quoted(words)[:_SHOWN] or 'nothing'}", did_you_mean(_quoted(words), spelled)
                 )
             return fitting, self._sorted(fitting, found)
         except ShapeProgError as mistake:
@@ -257,7 +259,9 @@ class _Reader:
         given = {_symbol(symbol, wanted): numbers for symbol, numbers in found.items()}
         for symbol in given:
             if symbol not in wanted and symbol != COUNT:
-                raise ShapeProgError(f"{declared.name} has no group {symbol}", f"its groups are {', '.join(wanted)}")
+                raise ShapeProgError(
+                    f"{declared.name} has no group {symbol[:_SHOWN]}", f"its groups are {', '.join(wanted)}"
+                )
         slots = [0.0] * declared.size
         if declared.is_loop:
             slots[:1] = given[COUNT]
@@ -275,8 +279,7 @@ class _Reader:
     def _error(self, message: str, hint: str, column: int | None = None) -> ProgramError:
         number, line = self.lines[min(self.next, len(self.lines) - 1)]
         start = len(line) - len(line.lstrip()) if column is None else column
-        source = line.replace("\t", " ")
-        return ProgramError(message, line=number, column=start + 1, source=source, hint=hint, name=self.name)
+        return ProgramError(message, line=number, column=start + 1, source=line, hint=hint, name=self.name)
 
 
 def _symbol(symbol: str, wanted: dict[str, tuple[Parameter, ...]]) -> str:
@@ -290,4 +293,4 @@ def _values(declared: Statement, slots: list[float]) -> tuple[float, ...]:
 
 
 def _bare(line: str) -> str:
-    return line.split("#")[0].strip()
+    return line.partition("#")[0].strip()

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from shapeprog.errors import OutputError, ShapeProgError
+from shapeprog.language.parameters import LARGEST
 from shapeprog.language.program import Program
 from shapeprog.space import Frame
 
@@ -55,6 +56,11 @@ def parts(program: Program, frame: Frame | None = None) -> list[Part]:
     """The parts of a program in the order they are drawn, in the world of ``frame`` (the grid by default).
 
     Parts without volume, such as boards of zero thickness, are left out.
+
+    Raises
+    ------
+    OutputError
+        If they reach further than files and pictures can say.
     """
     import torch
 
@@ -70,9 +76,25 @@ def parts(program: Program, frame: Frame | None = None) -> list[Part]:
         statement = int(scene.statement[slot])
         word = language()[statement].name
         numbers[word] += 1
-        placed = np.asarray(vertices, np.float64)
-        placed = placed if frame is None else frame.to_world(placed)
-        found.append(Part(f"{word}_{numbers[word]}", statement, word, int(scene.block[slot]), placed, faces))
+        name, where = f"{word}_{numbers[word]}", placed(vertices, frame)
+        found.append(Part(name, statement, word, int(scene.block[slot]), where, faces))
+    return found
+
+
+def placed(points: npt.NDArray[Any], frame: Frame | None = None) -> Vertices:
+    """Points of the grid in the world of ``frame``, or as they are.
+
+    Raises
+    ------
+    OutputError
+        If one has a coordinate that float32 cannot hold, which is what most files keep.
+    """
+    found = np.asarray(points, np.float64)
+    with np.errstate(over="ignore", invalid="ignore"):
+        found = found if frame is None else frame.to_world(found)
+    if not (np.abs(found) <= LARGEST).all():
+        said = "a part of this program, or its frame, is too large or too far away to be drawn"
+        raise OutputError(said, f"coordinates go from -{LARGEST:.7e} to {LARGEST:.7e}")
     return found
 
 
@@ -96,7 +118,7 @@ def solid(program: Program, frame: Frame | None = None) -> tuple[Vertices, Faces
     Raises
     ------
     OutputError
-        If nothing in the program has a volume.
+        If nothing in the program has a volume, or it reaches further than files can say.
     """
     import torch
 
@@ -107,8 +129,8 @@ def solid(program: Program, frame: Frame | None = None) -> tuple[Vertices, Faces
     try:
         vertices, faces = union_mesh(unroll(encode(program, dtype=torch.float64)))
     except ShapeProgError as error:
-        raise OutputError("nothing in this program has a volume, so it makes no solid", "thicken its parts") from error
-    return (vertices if frame is None else frame.to_world(vertices)), faces
+        raise OutputError(f"this program makes no solid: {error.message}", error.hint) from error
+    return placed(vertices, frame), faces
 
 
 def crease_normals(vertices: npt.NDArray[Any], faces: npt.NDArray[Any], angle: float = 40.0) -> Vertices:
@@ -121,8 +143,8 @@ def crease_normals(vertices: npt.NDArray[Any], faces: npt.NDArray[Any], angle: f
     area = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     length = np.linalg.norm(area, axis=1, keepdims=True)
     flat = area / np.where(length > 0, length, 1)
-    extent = float(np.ptp(vertices, axis=0).max()) if len(vertices) else 1.0
-    keys = np.rint(np.asarray(vertices, np.float64) / max(extent, 1e-30) * 1e6).astype(np.int64)
+    inside = vertices - vertices.min(0) if len(vertices) else np.zeros((0, 3))
+    keys = np.rint(inside / max(inside.max(initial=0), 1e-30) * 1e6).astype(np.int64)
     place = np.unique(keys, axis=0, return_inverse=True)[1].reshape(-1)[faces].reshape(-1)
     order = np.argsort(place, kind="stable")
     starts = np.flatnonzero(np.diff(place[order], prepend=-1))

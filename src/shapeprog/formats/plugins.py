@@ -45,7 +45,8 @@ def load_statements(path: str | os.PathLike[str]) -> tuple[Statement, ...]:
     except BaseException as cause:
         for name in set(language().names) - before:
             language().forget(name)
-        primitives.restore(solids)
+        for name in primitives.names.keys() - solids:
+            del primitives.names[name]
         sys.modules.pop(module_name, None)
         if isinstance(cause, (Exception, SystemExit)):
             raise _in_words(path, file, cause) from cause

@@ -10,7 +10,7 @@ import math
 from collections.abc import Sequence
 
 from shapeprog.errors import ShapeProgError
-from shapeprog.language.parameters import shortest
+from shapeprog.language.parameters import shortest, to_float32
 
 THICKNESS = 1.0
 """Thickness in cells of a cross arm whose thickness was dropped."""
@@ -42,8 +42,10 @@ def restored(words: Sequence[str], groups: Groups) -> tuple[str, tuple[float, ..
     Raises
     ------
     ShapeProgError
-        If the text is not what the published printer writes.
+        If the text is not what the published printer writes, or a number is too large.
     """
+    for number in (number for numbers in groups.values() for number in numbers):
+        to_float32(number)
     if words == ["Rot"]:
         count = groups[COUNT]
         if set(groups) - {COUNT, "theta", "axis"}:

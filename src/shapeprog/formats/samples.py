@@ -16,6 +16,7 @@ import torch
 
 from shapeprog.files import atomic_path, write_bytes
 from shapeprog.formats.binvox import write_binvox
+from shapeprog.formats.parts import placed
 from shapeprog.geometry.cells import voxels
 from shapeprog.geometry.surface import sample_surface
 from shapeprog.language.program import Program
@@ -34,6 +35,7 @@ def cells(program: Program, resolution: int = RESOLUTION) -> npt.NDArray[np.bool
 
 def write_cells(program: Program, path: Path, frame: Frame) -> None:
     """Write the cells as binvox, where the input lies."""
+    placed(np.array([[-RESOLUTION] * 3, [RESOLUTION] * 3]), frame)  # the file has words for numbers alone
     write_binvox(path, cells(program), frame)
 
 
@@ -48,7 +50,7 @@ def write_points(program: Program, path: Path, frame: Frame, points: int = POINT
     """Write points on the surface with their normals, in the world of the frame."""
     sample = sample_surface(unroll(program), points, torch.Generator().manual_seed(seed))
     normals = sample.normals.numpy() @ np.asarray(frame.axes).T
-    rows = np.concatenate([frame.to_world(sample.points.detach().numpy()), normals], 1)
+    rows = np.concatenate([placed(sample.points.detach().numpy(), frame), normals], 1)
     with atomic_path(path) as temporary:
         np.savetxt(temporary, rows, fmt="%.7g")
 
@@ -70,6 +72,7 @@ def write_arrays(program: Program, path: Path, frame: Frame) -> None:
     arrays: dict[str, Any] = {"voxels": cells(program), "ids": code.ids.numpy(), "parameters": code.parameters.numpy()}
     if bool(scene.mask.any()):
         surface = sample_surface(scene, POINTS, torch.Generator().manual_seed(0))
+        placed(surface.points.detach().numpy())
         arrays |= {"points": surface.points.detach().numpy(), "normals": surface.normals.detach().numpy()}
     else:
         arrays |= {"points": np.zeros((0, 3), np.float32), "normals": np.zeros((0, 3), np.float32)}

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import os
+import stat
 from pathlib import Path
 
 from shapeprog.errors import InputError
@@ -12,10 +14,13 @@ from shapeprog.language.program import Program
 from shapeprog.language.text import format_program, parse
 from shapeprog.space import Frame
 
+LARGEST_FILE = 16_000_000
+"""Bytes of the largest program file."""
+
 
 def read_shape(path: Path) -> tuple[Program, Frame | None]:
     """The program of a text file, and its frame where it keeps one."""
-    text = read_text(path)
+    text = read_text(path, LARGEST_FILE)
     return parse(text, str(path)), frame_in(text, str(path))
 
 
@@ -24,23 +29,30 @@ def write_shape(program: Program, path: Path, frame: Frame | None) -> None:
     write_text(path, frame_comment(frame) + format_program(program))
 
 
-def read_text(path: str | os.PathLike[str]) -> str:
-    """The text of a UTF-8 file, with or without a byte order mark.
+def read_text(path: str | os.PathLike[str], largest: float = math.inf) -> str:
+    """The text of a UTF-8 file of at most so many bytes, with or without a byte order mark.
 
     Raises
     ------
     InputError
-        If the file cannot be read or is not UTF-8.
+        If the file cannot be read, is no regular file, is larger, or is not UTF-8.
     """
     try:
+        kept = os.stat(path)
+        if stat.S_ISDIR(kept.st_mode):
+            raise InputError(f"{path} is a folder, not a file", "name a file in it")
+        if not stat.S_ISREG(kept.st_mode):
+            raise InputError(f"{path} is no regular file", "name a file on a disk")
+        if kept.st_size > largest:
+            raise InputError(f"{path} is larger than {largest / 1e6:.0f} MB", "check that it is a program")
         return Path(path).read_bytes().decode("utf-8-sig")
     except FileNotFoundError as error:
         raise InputError(f"there is no file {path}", "check the path") from error
-    except IsADirectoryError as error:
-        raise InputError(f"{path} is a folder, not a file", "name a file in it") from error
     except UnicodeDecodeError as error:
         raise InputError(
             f"{path} is not text: byte {error.start} is not UTF-8", "save it as UTF-8, or check that it is a program"
         ) from error
-    except (OSError, ValueError) as error:
-        raise InputError(f"cannot read {path}: {error}", "check the path and its permissions") from error
+    except OSError as error:
+        raise InputError(f"cannot read {path}: {error.strerror}", "check the path and its permissions") from error
+    except ValueError as error:
+        raise InputError(f"{str(path)!r} can be the name of no file", "check the path") from error

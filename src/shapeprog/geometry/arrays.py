@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from functools import wraps
+from functools import cache, wraps
 from typing import Any, TypeVar
 
 import numpy as np
@@ -19,8 +19,6 @@ from shapeprog.kernels.table import CENTRE, KIND, ROTATION, SIZE, WIDTH
 from shapeprog.space import Array
 
 Function = TypeVar("Function", bound=Callable[..., Any])
-
-_pool: ThreadPoolExecutor | None = None
 
 
 def by_kernel(of: Tensor | Batch) -> bool:
@@ -47,14 +45,12 @@ def twin_of(kernel: Callable[..., Any]) -> Callable[[Function], Function]:
 
 def array(tensor: Tensor) -> Array:
     """The values of a tensor as a contiguous array, without copying where that is possible."""
-    values: Array = tensor.detach().cpu().contiguous().numpy()
-    return values
+    return tensor.detach().cpu().contiguous().numpy()
 
 
 def numbers(tensor: Tensor) -> Array:
     """The values of a tensor as a contiguous array of float64, which is all that kernels take."""
-    values: Array = array(tensor).astype(np.float64, copy=False)
-    return values
+    return array(tensor).astype(np.float64, copy=False)
 
 
 def cast(values: Array, like: Tensor) -> Tensor:
@@ -64,10 +60,9 @@ def cast(values: Array, like: Tensor) -> Tensor:
 
 
 def table_of(batch: Batch) -> Array:
-    """All primitives as rows of the table (B * N, WIDTH) of float64 for kernels, see ``kernels.table``.
+    """All primitives as rows of the table (B * N, WIDTH) for kernels, see ``kernels.table``.
 
-    Kernels know a primitive by its number among the built-in ones.  It is negative for padding and for kinds that only
-    their declaration knows.
+    Its kinds are numbers among the built-in primitives, negative for padding and for what kernels do not know.
     """
     count = batch.mask.numel()
     table: Array = np.empty((count, WIDTH))
@@ -108,23 +103,16 @@ def over_threads(work: Callable[[int, int], None], count: int, *, least: int = 1
         work(0, count)
         return
     cuts = [count * part // threads for part in range(threads + 1)]
-    jobs = [_threads().submit(work, cuts[part], cuts[part + 1]) for part in range(1, threads)]
-    work(cuts[0], cuts[1])
+    jobs = [_threads().submit(work, *cuts[part : part + 2]) for part in range(1, threads)]
+    work(0, cuts[1])
     for job in jobs:
         job.result()
 
 
+@cache
 def _threads() -> ThreadPoolExecutor:
-    global _pool
-    if _pool is None:
-        _pool = ThreadPoolExecutor(max(1, (os.cpu_count() or 2) - 1), thread_name_prefix="shapeprog")
-    return _pool
+    return ThreadPoolExecutor(max(1, (os.cpu_count() or 2) - 1), thread_name_prefix="shapeprog")
 
 
-def _forget_threads() -> None:
-    global _pool
-    _pool = None
-
-
-if hasattr(os, "register_at_fork"):
-    os.register_at_fork(after_in_child=_forget_threads)
+if hasattr(os, "register_at_fork"):  # threads do not survive a fork
+    os.register_at_fork(after_in_child=_threads.cache_clear)

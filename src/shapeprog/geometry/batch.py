@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, fields
 from typing import TypeVar
 
@@ -17,18 +17,10 @@ Some = TypeVar("Some", bound="Batch")
 
 @dataclass(frozen=True)
 class Solids:
-    """Primitives of one kind as a statement returns them: sizes and poses with any leading batch dimensions.
+    """Primitives of one kind as a statement returns them, in cells of the grid frame, with any leading dimensions.
 
-    Parameters
-    ----------
-    kind
-        Number in the registry of primitives.
-    size
-        Sizes (..., 4) in cells, in the order the primitive declares.
-    centre
-        Centres (..., 3) in the grid frame.
-    rotation
-        Orientations (..., 3, 3) whose columns are the local axes, or ``None`` when aligned with the grid.
+    ``kind`` is the number in the registry; sizes are in the order that the primitive declares; the columns of
+    ``rotation`` are the local axes, ``None`` when they are those of the grid.
     """
 
     kind: int
@@ -39,20 +31,9 @@ class Solids:
 
 @dataclass(frozen=True)
 class Batch:
-    """``N`` slots of primitives for each element of a batch, padded with a mask.
+    """``N`` slots of primitives for each element of a batch; ``mask`` says which slots hold one.
 
-    A local point p of slot n lies at ``centre[n] + rotation[n] @ p``.
-
-    Parameters
-    ----------
-    kind
-        Which primitive (number in the registry).
-    size
-        Sizes in cells; zero in padding.
-    centre, rotation
-        Pose in the grid frame; zero and identity in padding.
-    mask
-        Which slots hold a primitive.
+    A local point p of slot n lies at ``centre[n] + rotation[n] @ p``.  Padding has size and centre zero, no rotation.
     """
 
     kind: Int[Tensor, "*batch N"]
@@ -77,27 +58,27 @@ class Batch:
         kinds: list[int] = torch.unique(self.kind[self.mask]).tolist()
         return kinds
 
-    def __getitem__(self: Some, index: int | slice) -> Some:
-        """The element or elements at an index of the first batch dimension."""
-        return type(self)(**{field.name: getattr(self, field.name)[index] for field in fields(self)})
-
     def __len__(self) -> int:
         return self.mask.shape[0]
 
     def __iter__(self: Some) -> Iterator[Some]:
         return (self[index] for index in range(len(self)))
 
+    def __getitem__(self: Some, index: int | slice) -> Some:
+        """The element or elements at an index of the first batch dimension."""
+        return self._map(lambda tensor: tensor[index])
+
     def flatten(self: Some) -> Some:
         """The same with exactly one batch dimension."""
         lead, count = len(self.batch_shape), self.batch_shape.numel()
-        if lead == 1:
-            return self
-        tensors = {field.name: getattr(self, field.name) for field in fields(self)}
-        return type(self)(**{name: tensor.reshape(count, *tensor.shape[lead:]) for name, tensor in tensors.items()})
+        return self if lead == 1 else self._map(lambda tensor: tensor.reshape(count, *tensor.shape[lead:]))
 
     def detach(self: Some) -> Some:
         """The same without gradient."""
-        return type(self)(**{field.name: getattr(self, field.name).detach() for field in fields(self)})
+        return self._map(Tensor.detach)
+
+    def _map(self: Some, change: Callable[[Tensor], Tensor]) -> Some:
+        return type(self)(*(change(getattr(self, field.name)) for field in fields(self)))
 
     def at(self, slot: Int[Tensor, "B P"]) -> tuple[Int[Tensor, "B P"], Tensor, Tensor, Tensor]:
         """Kind, size, centre and rotation of chosen slots of elements (B, N), with gradient to these."""

@@ -8,6 +8,7 @@ On the CPU kernels do the work, elsewhere their twins in torch.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 
 import numpy as np
 import numpy.typing as npt
@@ -29,52 +30,40 @@ AT_ONCE = 1 << 21
 Cells = Int[Tensor, "*batch words R"]
 """Packed cells."""
 
-_SPREAD: npt.NDArray[np.uint64] = (
-    np.unpackbits(np.arange(256, dtype=np.uint8)[:, None], axis=1, bitorder="little").copy().view(np.uint64)[:, 0]
-)
+_SPREAD = np.unpackbits(np.arange(256, dtype=np.uint8), bitorder="little").view(np.uint64)
 
 
 def rasterise(batch: Batch, resolution: int = RESOLUTION) -> Cells:
     """The packed cells that the primitives of each element occupy, clipped to the grid; see :func:`voxels`."""
-    flat = batch.flatten()
-    cells = _filled(flat, None, 1, resolution)
-    return cells.reshape(*batch.batch_shape, *cells.shape[1:])
+    return rasterise_apart(batch, torch.zeros_like(batch.kind), 1, resolution)[..., 0, :, :]
 
 
 def rasterise_apart(
     batch: Batch, part: Int[Tensor, "*batch N"], parts: int, resolution: int = RESOLUTION
 ) -> Int[Tensor, "*batch parts words R"]:
-    """The packed cells (..., parts, W * R, R) of groups of primitives, each on its own.
-
-    Parameters
-    ----------
-    part
-        The group of every slot, from 0 to ``parts`` - 1.
-    """
-    flat = batch.flatten()
-    cells = _filled(flat, part.reshape(flat.mask.shape), parts, resolution)
-    return cells.reshape(*batch.batch_shape, parts, *cells.shape[1:])
+    """The same of groups of primitives, each on its own; ``part`` is the group of a slot, from 0 to ``parts`` - 1."""
+    if resolution < 1:
+        raise ShapeProgError(f"a grid of {resolution} cells a side holds nothing", "ask for a resolution of 1 or more")
+    flat, rows = batch.flatten(), -(-resolution // WORD) * resolution
+    cells = torch.zeros(len(flat) * parts, rows, resolution, dtype=torch.int32, device=flat.device)
+    plane = torch.arange(len(flat), device=flat.device)[:, None] * parts + part.reshape(flat.mask.shape)
+    (fill_by_kernel if by_kernel(flat.mask) else fill)(flat, plane, cells)
+    return cells.reshape(*batch.batch_shape, parts, rows, resolution)
 
 
 def voxels(batch: Batch, resolution: int = RESOLUTION) -> UInt8[Tensor, "*batch R R R"]:
-    """The cells that the primitives of each element occupy, 1 or 0, clipped to the grid.
+    """The cells that the primitives of each element occupy, 1 or 0, clipped to the grid, to which they are scaled.
 
     A cuboid at right angles covers [rint(low), rint(high)) along each axis, and if sheared each layer is moved by
     whole cells; a cylinder covers the cells whose centre is within 1.01 radii of its axis; a turned cuboid, and any
     other primitive, those whose centre it contains.  On whole-numbered programs this is the published executor.
-
-    Parameters
-    ----------
-    resolution
-        Cells along each side R; the primitives are scaled with it.
     """
     return unpack(rasterise(batch, resolution))
 
 
 def words_of(cells: Cells) -> npt.NDArray[np.uint32]:
     """The words of cells on the CPU as unsigned numbers, which is how kernels take them; not copied."""
-    words: npt.NDArray[np.uint32] = array(cells).view(np.uint32)
-    return words
+    return array(cells).view(np.uint32)
 
 
 def cells_of(words: npt.NDArray[np.uint32]) -> Int[Tensor, ...]:
@@ -105,7 +94,7 @@ def _unpack_by_kernel(cells: Cells) -> UInt8[Tensor, "*batch R R R"]:
     rows = _rows(cells)
     words = words_of(rows).reshape(-1)
     eights = np.empty((len(words), 4), np.uint64)
-    over_threads(lambda first, last: kernels.unpack(words, _SPREAD, eights, first, last), len(words), least=1 << 15)
+    over_threads(partial(kernels.unpack, words, _SPREAD, eights), len(words), least=1 << 15)
     voxels = torch.from_numpy(eights.view(np.uint8)).reshape(*rows.shape[:-1], -1)
     return voxels[..., : cells.shape[-1]].contiguous()
 
@@ -180,50 +169,33 @@ def widen(cells: Cells) -> Cells:
     return wide.flatten(-3, -2)
 
 
-def _filled(flat: Batch, part: Int[Tensor, "B N"] | None, parts: int, resolution: int) -> Int[Tensor, "planes words R"]:
-    """The cells of every part of every element on a plane of its own."""
-    if resolution < 1:
-        raise ShapeProgError(f"a grid of {resolution} cells a side holds nothing", "ask for a resolution of 1 or more")
-    rows = -(-resolution // WORD) * resolution
-    cells = torch.zeros(len(flat) * parts, rows, resolution, dtype=torch.int32, device=flat.device)
-    if by_kernel(flat.mask):
-        owner = np.repeat(np.arange(len(flat)) * parts, flat.mask.shape[-1])
-        fill_by_kernel(flat, owner if part is None else owner + array(part).reshape(-1), cells)
-    else:
-        plane = (torch.arange(len(flat), device=flat.device) * parts)[:, None].expand(flat.mask.shape)
-        fill(flat, plane if part is None else plane + part, cells)
-    return cells
-
-
-def fill_by_kernel(flat: Batch, owner: npt.NDArray[np.int64], cells: Int[Tensor, "planes words R"]) -> None:
-    """Add the cells of all slots (B * N) to the planes that own them, by the kernel as far as it knows them."""
-    table, words = table_of(flat), words_of(cells.unflatten(-2, (-1, cells.shape[-1])))
-    many, scenes = flat.mask.shape[-1], len(flat)
-    over_threads(lambda first, last: kernels.fill(table, owner, many, words, first, last), scenes, least=32)
+def fill_by_kernel(flat: Batch, plane: Int[Tensor, "B N"], cells: Cells) -> None:
+    """Add the cells of every slot to its plane, by the kernel as far as it knows the primitive."""
+    words = words_of(cells.unflatten(-2, (-1, cells.shape[-1])))
+    data = table_of(flat), array(plane).reshape(-1), flat.mask.shape[-1], words
+    over_threads(partial(kernels.fill, *data), len(flat), least=32)
     if declared := declared_kinds(flat):
-        _fill_kinds(flat, torch.from_numpy(owner).reshape(flat.mask.shape), cells, declared)
+        fill(flat, plane, cells, declared)
 
 
-def fill(flat: Batch, plane: Int[Tensor, "B N"], cells: Int[Tensor, "planes words R"]) -> None:
-    """The same from the declarations, for any kind of primitive on any device; the twin of the kernel."""
-    _fill_kinds(flat, plane, cells, flat.kinds)
+def fill(flat: Batch, plane: Int[Tensor, "B N"], cells: Cells, kinds: list[int] | None = None) -> None:
+    """The same from the declarations, for some or all kinds of primitive on any device; the twin of the kernel.
 
-
-def _fill_kinds(flat: Batch, plane: Tensor, cells: Tensor, kinds: list[int]) -> None:
-    """Primitives whose rule is to fill rows are filled row by row, the others tested cell by cell."""
+    Primitives whose rule is to fill rows are filled row by row, the others tested cell by cell.
+    """
     resolution = cells.shape[-1]
     scale, origin = resolution / RESOLUTION, resolution / 2
-    for kind in kinds:
+    for kind in flat.kinds if kinds is None else kinds:
         declared, here = primitives[kind], flat.mask & (flat.kind == kind)
         size, centre, rotation = (each.detach()[here].double() for each in (flat.size, flat.centre, flat.rotation))
         size, centre = declared.cell_size(size * scale), centre * scale + origin
         finite = torch.cat([size, centre, rotation.flatten(1)], -1).isfinite().all(-1)
-        size, centre, rotation, target = size[finite], centre[finite], rotation[finite], plane[here][finite]
+        size, centre, rotation, target = (each[finite] for each in (size, centre, rotation, plane[here]))
         square = ((rotation - rotation.round()).abs() <= kernels.SQUARE).all(-1).all(-1)
         if declared.spans is not None:
             spans = declared.spans(size, centre, rotation, square, resolution)
-            covers = [*spans.layers, *spans.depth, *spans.side]
-            _fill_rows(cells, target[spans.known], *(each[spans.known] for each in covers))
+            covers = target, *spans.layers, *spans.depth, *spans.side
+            _fill_rows(cells, *(each[spans.known] for each in covers))
             size, centre, rotation, target = (each[~spans.known] for each in (size, centre, rotation, target))
         _fill_tested(cells, target, declared, size, centre, rotation)
 
@@ -261,9 +233,8 @@ def _fill_tested(
         inside = declared.distance((rotation[owner].mT @ offset[..., None])[..., 0], size[owner]) <= 0
         up, depth, side = index[inside].unbind(-1)
         row = plane[owner[inside]] * cells.shape[-2] + side // WORD * resolution + up
-        bit = torch.unique(
-            (row * resolution + depth) * WORD + side % WORD
-        )  # each bit once, so that adding bits is joining them
+        # each bit once, so that adding bits is joining them
+        bit = torch.unique((row * resolution + depth) * WORD + side % WORD)
         added = torch.zeros_like(cells).flatten().index_add(0, bit // WORD, (1 << bit % WORD).to(torch.int32))
         cells |= added.view_as(cells)
 

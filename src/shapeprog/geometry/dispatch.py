@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from inspect import signature
 from typing import Any
 
 from shapeprog.geometry.primitives import BUILT_IN
@@ -10,28 +11,22 @@ from shapeprog.kernels.compile import helper
 from shapeprog.kernels.table import KIND
 
 
-def _by_kind(question: str, arguments: str) -> Callable[..., Any]:
-    """The helper for one of the functions of ``Kernels``.
+def _by_kind(question: str) -> Callable[..., Any]:
+    """The helper for one of the functions of ``Kernels``, with a branch for each primitive.
 
-    It is written out as text, a branch for each primitive: the compiler puts all of them in place, which it cannot do
-    with a table of functions.
+    It is written out as text: the compiler puts all of them in place, which it cannot do with a table of functions.
     """
     answers = {primitive.name: getattr(primitive.kernels, question) for primitive in BUILT_IN}
-    lines = [f"def {question}(table, row{arguments}):"]
+    arguments = ", ".join(signature(answers[BUILT_IN[0].name]).parameters)
+    lines = [f"def {question}({arguments}):"]
     for number, name in enumerate(answers):
         condition = f"if table[row, {KIND}] == {number}: " if number < len(answers) - 1 else ""
-        lines.append(f"    {condition}return {name}(table, row{arguments})")
+        lines.append(f"    {condition}return {name}({arguments})")
     made: dict[str, Any] = {"__name__": __name__, **answers}
     exec("\n".join(lines), made)
     return helper(made[question], forceinline=True)
 
 
-distance = _by_kind("distance", ", a, b, c")
-slopes = _by_kind("slopes", ", a, b, c, out")
-bound = _by_kind("bound", "")
-excess = _by_kind("excess", ", a, b, c")
-sample = _by_kind("sample", ", face, one, two, three")
-place = _by_kind("place", ", u, v, w")
-normal = _by_kind("normal", ", face, u, v, w")
-pull = _by_kind("pull", ", u, v, w, da, db, dc, out")
-cells = _by_kind("cells", ", square, planes, plane, low, high")
+distance, slopes, bound, excess = map(_by_kind, ("distance", "slopes", "bound", "excess"))
+sample, place, normal, pull = map(_by_kind, ("sample", "place", "normal", "pull"))
+cells = _by_kind("cells")

@@ -7,6 +7,7 @@ overlap, it is only a bound: the true depth below the common surface can be grea
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -22,55 +23,52 @@ from shapeprog.geometry.primitive import SIZES, primitives
 from shapeprog.kernels.table import WIDTH
 from shapeprog.space import Array
 
+Nearest = tuple[Int[Tensor, "*batch P"], Float[Tensor, "*batch P"]]
+"""Slot of the nearest primitive of each point, and the signed distance to it."""
+
 AT_ONCE = 1 << 22
 """Pairs of point and primitive that are looked at together where no kernel helps."""
 
 
 def each_distance(batch: Batch, points: Float[Tensor, "*shared P 3"]) -> Float[Tensor, "*batch P N"]:
-    """Signed distance of every point to every primitive, negative inside, infinite for padding; exact.
-
-    Parameters
-    ----------
-    points
-        Grid positions; leading dimensions as those of the batch.
-    """
-    flat, lead = batch.flatten(), batch.batch_shape
-    points = points.expand(*lead, *points.shape[-2:])
-    found = torch.full((*flat.mask.shape, points.shape[-2]), torch.inf, dtype=points.dtype, device=points.device)
-    positions = points.reshape(-1, *points.shape[-2:])
+    """Signed distance of every point to every primitive, negative inside, infinite for padding; exact."""
+    flat, positions = _aligned(batch, points)
+    found = positions.new_full((*flat.mask.shape, points.shape[-2]), torch.inf)
     for kind in flat.kinds:
         element, slot = (flat.mask & (flat.kind == kind)).nonzero(as_tuple=True)
         offset = positions[element] - flat.centre[element, slot][:, None]
         size = flat.size[element, slot][:, None].expand(*offset.shape[:2], SIZES)
         values = primitives[kind].distance(offset @ flat.rotation[element, slot], size)
         found = found.index_put((element, slot), values)
-    return found.mT.reshape(*lead, points.shape[-2], flat.mask.shape[-1])
+    return found.mT.reshape(*batch.batch_shape, points.shape[-2], flat.mask.shape[-1])
 
 
-def nearest_slot(batch: Batch, points: Float[Tensor, "*shared P 3"]) -> Int[Tensor, "*batch P"]:
-    """The primitive with the smallest signed distance to each point; found without gradient."""
+@torch.no_grad()
+def nearest_primitive(batch: Batch, points: Float[Tensor, "*shared P 3"]) -> Nearest:
+    """The slot with the smallest signed distance to each point, and that distance; without gradient."""
     flat, positions = _aligned(batch, points)
-    return _chosen(flat, positions)[0].reshape(*batch.batch_shape, points.shape[-2])
-
-
-def union_distance(batch: Batch, points: Float[Tensor, "*shared P 3"]) -> Float[Tensor, "*batch P"]:
-    """The values of :func:`signed_distance` without gradient."""
-    flat, positions = _aligned(batch, points)
-    return _chosen(flat, positions)[1].reshape(*batch.batch_shape, points.shape[-2])
+    if by_kernel(flat.mask):
+        slot, value = nearest_by_kernel(flat, positions, table_of(flat))
+        if declared := declared_kinds(flat):
+            rest = replace(flat, mask=flat.mask & torch.isin(flat.kind, torch.tensor(declared)))
+            other, closer = nearest(rest, positions)
+            slot, value = torch.where(closer < value, other, slot), torch.minimum(closer, value)
+    else:
+        slot, value = nearest(flat, positions)
+    shape = *batch.batch_shape, points.shape[-2]
+    return slot.reshape(shape), value.reshape(shape)
 
 
 def signed_distance(batch: Batch, points: Float[Tensor, "*shared P 3"]) -> Float[Tensor, "*batch P"]:
     """Signed distance of points to the union of each element, with gradient to points, sizes and poses.
 
-    The nearest primitive is selected without gradient, its numbers are gathered, and only its distance is
-    differentiated: the gradient of the minimum over all primitives for one evaluation a point.  Inside the union the
-    value is a bound (see above).  An empty union is infinitely far away.
+    The nearest primitive is selected without gradient, and only its distance is differentiated: the gradient of the
+    minimum over all primitives for one evaluation a point.  An empty union is infinitely far away.
     """
     flat, positions = _aligned(batch, points)
     if by_kernel(flat):
-        found: Tensor = _UnionDistance.apply(  # type: ignore[no-untyped-call]
-            flat, flat.size, flat.centre, flat.rotation, positions
-        )
+        data = flat, flat.size, flat.centre, flat.rotation, positions
+        found: Tensor = _UnionDistance.apply(*data)  # type: ignore[no-untyped-call]
     else:
         found = gathered_distance(flat, positions)
     return found.reshape(*batch.batch_shape, points.shape[-2])
@@ -81,7 +79,7 @@ def gathered_distance(flat: Batch, positions: Float[Tensor, "B P 3"]) -> Float[T
     found = torch.full_like(positions[..., 0], torch.inf)
     if not flat.mask.shape[-1]:
         return found
-    kind, size, centre, rotation = flat.at(_chosen(flat, positions)[0])
+    kind, size, centre, rotation = flat.at(nearest_primitive(flat, positions)[0])
     local = ((positions - centre)[..., :, None] * rotation).sum(-2)
     there = flat.mask.any(-1, keepdim=True)
     for each in flat.kinds:
@@ -111,7 +109,7 @@ class _UnionDistance(torch.autograd.Function):
             ctx.table, many, numbers(points).reshape(-1, 3), count, slots.numpy().reshape(-1),
             numbers(slope).reshape(-1), to_table, to_points,
         )  # fmt: skip
-        over_threads(lambda first, last: kernels.pull(*data, first, last), scenes)
+        over_threads(partial(kernels.pull, *data), scenes)
         to_points = to_points.reshape(scenes, count, 3)
         return None, *gradients(to_table, points, scenes, many), torch.from_numpy(to_points).to(points)
 
@@ -122,36 +120,17 @@ def _aligned(batch: Batch, points: Tensor) -> tuple[Batch, Float[Tensor, "B P 3"
     return batch.flatten(), points.expand(*batch.batch_shape, *shape).reshape(-1, *shape)
 
 
-@torch.no_grad()
-def _chosen(flat: Batch, points: Float[Tensor, "B P 3"]) -> tuple[Int[Tensor, "B P"], Float[Tensor, "B P"]]:
-    """Slot and signed distance of the nearest primitive, by the kernel as far as there is one."""
-    if not by_kernel(flat.mask):
-        return nearest(flat, points)
-    slot, value = nearest_by_kernel(flat, points)
-    declared = declared_kinds(flat)
-    if declared:
-        rest = replace(flat, mask=flat.mask & torch.isin(flat.kind, torch.tensor(declared)))
-        other, closer = nearest(rest, points)
-        slot, value = torch.where(closer < value, other, slot), torch.minimum(closer, value)
-    return slot, value
-
-
-def nearest_by_kernel(
-    flat: Batch, points: Float[Tensor, "B P 3"], table: Array | None = None
-) -> tuple[Int[Tensor, "B P"], Float[Tensor, "B P"]]:
-    """The nearest of the primitives that kernels know."""
+def nearest_by_kernel(flat: Batch, points: Float[Tensor, "B P 3"], table: Array) -> Nearest:
+    """The nearest of the primitives that kernels know, which are rows of the table."""
     scenes, count = points.shape[:-1]
     slots, values = np.empty(scenes * count, np.int64), np.empty(scenes * count)
-    data = (
-        table_of(flat) if table is None else table, flat.mask.shape[-1], numbers(points).reshape(-1, 3), count,
-        slots, values,
-    )  # fmt: skip
-    over_threads(lambda first, last: kernels.nearest(*data, first, last), len(slots), least=2048)
+    data = table, flat.mask.shape[-1], numbers(points).reshape(-1, 3), count, slots, values
+    over_threads(partial(kernels.nearest, *data), len(slots), least=2048)
     found = torch.from_numpy(slots), torch.from_numpy(values).to(points.dtype)
     return found[0].reshape(scenes, count), found[1].reshape(scenes, count)
 
 
-def nearest(flat: Batch, points: Float[Tensor, "B P 3"]) -> tuple[Int[Tensor, "B P"], Float[Tensor, "B P"]]:
+def nearest(flat: Batch, points: Float[Tensor, "B P 3"]) -> Nearest:
     """The same over all pairs, in pieces that fit in memory; the twin of the kernel."""
     if not flat.mask.shape[-1]:
         nothing = torch.full_like(points[..., 0], torch.inf)

@@ -10,14 +10,9 @@ from shapeprog.geometry.dispatch import bound, distance, slopes
 from shapeprog.kernels.compile import helper, kernel
 from shapeprog.kernels.table import CENTRE, KIND, ROTATION, SIZE, local
 
-ROUNDING = 2e-6
-"""Error of a bound in single precision against the size of the coordinates, generously."""
-
-STRIDE = 2.0
-"""How far in cells from a point its list of possible nearest primitives is used."""
-
-FARTHEST = 1e18
-"""Coordinates in cells up to which bounds are taken in single precision, whose squares end at 3e38."""
+ROUNDING = 2e-6  # error of a bound in single precision against the size of the coordinates, generously
+STRIDE = 2.0  # how far in cells from a point its list of possible nearest primitives is used
+FARTHEST = 1e18  # coordinates up to which bounds are taken in single precision, whose squares end at 3e38
 
 
 @helper

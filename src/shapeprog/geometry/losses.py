@@ -28,15 +28,7 @@ Cells = Float[Tensor, "*cells"]
 
 
 class Chamfer(NamedTuple):
-    """The two directions of the chamfer distance and their sum.
-
-    Parameters
-    ----------
-    to_target
-        Mean squared distance of the points to the target: is what is there right?
-    from_target
-        Mean squared distance of the target to the points: is everything there?
-    """
+    """Mean squared distance of points to the target (is what is there right?) and back (is everything there?)."""
 
     to_target: Values
     from_target: Values
@@ -50,14 +42,9 @@ class Chamfer(NamedTuple):
 def chamfer_directions(
     points: Cloud, target: Target, *, weights: Weights | None = None, target_weights: TargetWeights | None = None
 ) -> Chamfer:
-    """Both directions of the chamfer distance, as means of squared distances (..., ).
+    """Both directions of the chamfer distance, as means of squared distances over clouds that may differ in size.
 
-    Parameters
-    ----------
-    points, target
-        Clouds in cells; they may differ in size.
-    weights, target_weights
-        How much each point counts in the mean, such as the weights of a surface sample; evenly by default.
+    Weights say how much each point counts in its mean, such as those of a surface sample; evenly by default.
     """
     if weights is None and target_weights is None:
         return Chamfer(*mean_squared_distances(points, target))
@@ -75,13 +62,8 @@ def chamfer(
 def coverage(scene: Batch, target: Cloud, *, surface: bool = False) -> Values:
     """How far the target is from the union on average: the paper's coverage loss (equation of section 3.4).
 
-    A target point inside a primitive is covered and costs nothing, so alone it is minimised by one box that fills
-    everything: add :func:`excess` and a price.
-
-    Parameters
-    ----------
-    surface
-        Ask for the distance to the surface instead, so that points deep inside cost too.
+    A target point inside a primitive costs nothing, so alone it is minimised by one box that fills everything: add
+    :func:`excess` and a price.  With ``surface`` the distance to the surface counts, and points deep inside cost too.
     """
     distance = signed_distance(scene, target)
     return (distance.abs() if surface else distance.clamp(min=0)).mean(-1)
@@ -89,14 +71,13 @@ def coverage(scene: Batch, target: Cloud, *, surface: bool = False) -> Values:
 
 def excess(points: Cloud, target: Target, *, weights: Weights | None = None) -> Values:
     """How far points of the prediction are from the target on average: the reverse of coverage."""
-    squared = squared_distance(points, target)
-    return _mean(torch.sqrt(squared.clamp(min=1e-12)), weights)
+    return _mean(torch.sqrt(squared_distance(points, target).clamp(min=1e-12)), weights)
 
 
 def volume(scene: Batch) -> Values:
     """Price of volume: the volumes of all primitives added, in cubic cells; overlaps are paid for twice."""
     total = torch.zeros_like(scene.centre[..., 0])
-    for kind in torch.unique(scene.kind[scene.mask]).tolist():
+    for kind in scene.kinds:
         here = scene.mask & (scene.kind == kind)
         total = total + torch.where(here, primitives[kind].volume(scene.size), 0)
     return total.sum(-1)
@@ -109,27 +90,13 @@ def parts(scene: Batch, presence: Float[Tensor, "*batch N"] | None = None) -> Va
 
 
 def cell_cross_entropy(logits: Cells, target: Cells, reduction: str = "none") -> Tensor:
-    """Cross-entropy of the occupancy of each cell against what it is in the target, from logits.
-
-    Parameters
-    ----------
-    reduction
-        ``none``, or ``mean`` for the mean over all cells.
-    """
+    """Cross-entropy of the occupancy of each cell against the target, or its ``mean``, from logits."""
     return torch.nn.functional.binary_cross_entropy_with_logits(logits, target, reduction=reduction)
 
 
 def occupancy_cross_entropy(logits: Grid, target: Marked) -> Values:
-    """Cross-entropy of soft occupancy against target cells, as a mean over cells.
-
-    Parameters
-    ----------
-    logits
-        Logits of the occupancy, see ``soft_logits``; finite for any scene that is not empty.
-    target
-        Cells, 0 or 1 or a share between.
-    """
-    logits = logits.clamp(-1e4, 1e4)
+    """Cross-entropy of soft occupancy, see ``soft_logits``, as a mean over target cells, 0, 1 or a share between."""
+    logits = logits.clamp(-1e4, 1e4)  # an empty scene is infinitely far away
     return cell_cross_entropy(logits, target.to(logits)).flatten(-3).mean(-1)
 
 
@@ -148,6 +115,4 @@ def weighted_iou(occupancy: Row, target: Row, weights: Row | None = None) -> Val
 
 
 def _mean(values: Weights, weights: Weights | None) -> Values:
-    if weights is None:
-        return values.mean(-1)
-    return (values * weights).sum(-1) / weights.sum(-1)
+    return values.mean(-1) if weights is None else (values * weights).sum(-1) / weights.sum(-1)

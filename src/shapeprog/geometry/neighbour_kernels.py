@@ -14,11 +14,8 @@ import numpy as np
 
 from shapeprog.kernels.compile import helper, kernel
 
-PER_CELL = 6.0
-"""Points aimed at in each cell that a surface passes through."""
-
-MOST_CELLS = 48
-"""Most cells along an axis."""
+PER_CELL = 6.0  # points aimed at in each cell that a surface passes through
+MOST_CELLS = 48  # along an axis
 
 
 @helper

@@ -6,7 +6,7 @@ four sizes.  All functions are vectorised over leading batch dimensions and diff
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
@@ -20,12 +20,12 @@ from torch import Tensor
 
 from shapeprog.errors import DeclarationError
 from shapeprog.kernels.compile import helper
-from shapeprog.space import Array
+from shapeprog.space import Array, FloatArray
 
 SIZES = 4
 """Slots for the sizes of one primitive."""
 
-Mesh = tuple[npt.NDArray[np.float64], npt.NDArray[np.int64]]
+Mesh = tuple[FloatArray, npt.NDArray[np.int64]]
 """Vertices (V, 3) and faces (F, 3), counter-clockwise from outside."""
 
 Points = Float[Tensor, "*batch 3"]
@@ -43,16 +43,13 @@ def tested(table: Array, row: int, square: bool, planes: Array, plane: int, low:
 
 @dataclass(frozen=True)
 class Kernels:
-    """What kernels ask a primitive: the twins, one row of the table at a time, of its functions of the same name.
-
-    All take ``(table, row, ...)``, see :mod:`shapeprog.kernels.table`, and are declared with ``@helper``.
+    """Twins of the functions of a primitive: helpers that take ``(table, row, ...)``, see ``kernels.table``.
 
     Parameters
     ----------
-    distance
-        ``(..., a, b, c)``: signed distance of a local point.
-    slopes
-        ``(..., a, b, c, out)``: fill out (7,) with the derivatives of that distance by a, b, c and the four sizes.
+    distance, slopes
+        ``(..., a, b, c)``: signed distance of a local point; with ``out`` (7,) to fill with its derivatives by a, b, c
+        and the four sizes.
     bound
         ``(...)``: three half extents of the local bounding box.
     excess
@@ -65,8 +62,8 @@ class Kernels:
         given that by its local coordinates.
     cells
         ``(..., square, planes, plane, low, high) -> bool``: where cells follow a rule of their own, fill them and say
-        so, or change the sizes in the row to those by which they are tested; ``low`` and ``high`` (3,) are scratch,
-        ``square`` says whether all axes stand along those of the grid.  Positions and sizes are in cells.
+        so, or change the sizes in the row to those by which they are tested.  All is in cells; ``square`` says whether
+        the axes stand along those of the grid; ``low`` and ``high`` (3,) are scratch.
     """
 
     distance: Helper
@@ -81,9 +78,9 @@ class Kernels:
 
 
 class Spans(NamedTuple):
-    """Cells of M solids by a rule of their own: which of them it is for, and what these cover from low to high.
+    """Cells of M solids by a rule of their own: for which of them, and the layers they cover, from low to high.
 
-    That are layers, and in every layer of the grid cells along depth and left-right.
+    ``depth`` and ``side`` are what they cover in every layer of the grid along depth and left-right.
     """
 
     known: Bool[Tensor, " M"]
@@ -98,35 +95,25 @@ class Primitive:
 
     Parameters
     ----------
-    name
-        What declarations and exports call it.
-    sizes
-        Names of the sizes in use, at most four.  The first ``extents`` of them are lengths that must not be negative.
-    extents
-        How many of the sizes are lengths.
+    name, sizes, extents
+        What it and its sizes, at most four, are called; the first ``extents`` of them are lengths, never negative.
     distance
-        ``(points (..., 3), size (..., 4)) -> (...)``: exact signed Euclidean distance in the local frame, negative
-        inside, with a finite gradient everywhere.
-    bound
-        ``size -> (..., 3)``: half extents of the local bounding box, which is centred at the origin.
-    areas
-        ``size -> (..., F)``: area of each of the F faces that ``sample`` knows.
+        ``(points (..., 3), size (..., 4)) -> (...)``: exact signed distance in the local frame, negative inside, with a
+        finite gradient everywhere.
+    bound, areas, volume
+        Of a size: half extents (..., 3) of the box around it, centred at the origin; areas (..., F) of the faces that
+        ``sample`` knows; exact volume (...).
     sample
         ``(size, face (...), u (..., 3)) -> unit (..., 3)``: place on a face for three uniform numbers in [0, 1), such
         that ``place(size, unit)`` is uniform by area.  Called without gradient.
-    place
-        ``(size, unit) -> (..., 3)``: the surface point of a unit place, with gradient to the sizes.
-    normal
-        ``(size, unit, face) -> (..., 3)``: outward unit normal there.
+    place, normal
+        ``(size, unit) -> (..., 3)``: surface point of a unit place, with gradient to the sizes; ``(size, unit, face)``
+        to the outward unit normal there.
     mesh
         ``size (4,) -> Mesh``: watertight triangles.
-    volume
-        ``size -> (...)``: exact volume.
-    cell_size
-        ``size -> size``: the sizes by which cells are tested, in cells; a cell is filled when its centre is inside.
-    spans
-        ``(size, centre, rotation, square, resolution) -> Spans``: cells by another rule, see :class:`Spans`; centres
-        and sizes are in cells from the low corner of the grid.
+    cell_size, spans
+        The sizes by which cells are tested, in cells: one is filled when its centre is inside.  Or another rule,
+        ``(size, centre, rotation, square, resolution) -> Spans``, in cells from the low corner of the grid.
     kernels
         Its twins for kernels; without them the functions above are used everywhere, which is slower.
     """
@@ -140,7 +127,7 @@ class Primitive:
     sample: Callable[[Sizes, Int[Tensor, "*batch"], Points], Points]
     place: Callable[[Sizes, Points], Points]
     normal: Callable[[Sizes, Points, Int[Tensor, "*batch"]], Points]
-    mesh: Callable[[npt.NDArray[np.float64]], Mesh]
+    mesh: Callable[[FloatArray], Mesh]
     volume: Callable[[Sizes], Scalars]
     cell_size: Callable[[Sizes], Sizes] = lambda size: size
     spans: Callable[..., Spans] | None = None
@@ -160,18 +147,14 @@ class Primitives:
     def register(self, primitive: Primitive) -> Primitive:
         """Add a primitive and return it.
 
-        Raises
-        ------
-        DeclarationError
-            If the name is taken, the sizes do not fit the four slots, or a function fails or returns a wrong shape.
+        A ``DeclarationError`` if its name is taken, or its sizes or what its functions return do not fit.
         """
+        said = f"primitive {primitive.name!r}"
         if primitive.name in self.names:
-            raise DeclarationError(f"primitive {primitive.name!r} is declared twice", "give one of them another name")
+            raise DeclarationError(f"{said} is declared twice", "give one of them another name")
         if not 1 <= len(primitive.sizes) <= SIZES or not 0 <= primitive.extents <= len(primitive.sizes):
-            raise DeclarationError(
-                f"primitive {primitive.name!r} has {len(primitive.sizes)} sizes, {primitive.extents} of them lengths",
-                f"a primitive has 1 to {SIZES} sizes",
-            )
+            said += f" has {len(primitive.sizes)} sizes, {primitive.extents} of them lengths"
+            raise DeclarationError(said, f"a primitive has 1 to {SIZES} sizes")
         _try(primitive)
         self._kinds.append(primitive)
         self.names[primitive.name] = len(self._kinds) - 1
@@ -191,19 +174,8 @@ class Primitives:
         finally:
             self._names.reset(token)
 
-    def restore(self, names: Mapping[str, int]) -> None:
-        """Forget the names declared since, as when the module that declares them fails."""
-        for name in set(self.names) - set(names):
-            del self.names[name]
-
     def kind(self, name: str) -> int:
-        """Number of the primitive called ``name``.
-
-        Raises
-        ------
-        DeclarationError
-            If there is none.
-        """
+        """Number of the primitive called ``name``; a ``DeclarationError`` if there is none."""
         if name not in self.names:
             raise DeclarationError(f"no primitive is called {name!r}", f"known are {', '.join(self.names)}")
         return self.names[name]
@@ -234,31 +206,25 @@ def safe_norm(squared: Scalars) -> Scalars:
 def _try(primitive: Primitive) -> None:
     """Call every function once, so that a wrong shape is refused now and not amid a run."""
     size, points, face = torch.ones(2, SIZES), torch.full((2, 3), 0.5), torch.zeros(2, dtype=torch.long)
-    word = "sample"
-    try:
-        unit = primitive.sample(size, face, points)
-        calls: dict[str, tuple[Callable[[], Tensor], tuple[int | None, ...]]] = {
-            "sample": (lambda: unit, (2, 3)),
-            "distance": (lambda: primitive.distance(points, size), (2,)),
-            "bound": (lambda: primitive.bound(size), (2, 3)),
-            "areas": (lambda: primitive.areas(size), (2, None)),
-            "place": (lambda: primitive.place(size, unit), (2, 3)),
-            "normal": (lambda: primitive.normal(size, unit, face), (2, 3)),
-            "volume": (lambda: primitive.volume(size), (2,)),
-            "cell_size": (lambda: primitive.cell_size(size), (2, SIZES)),
-            "mesh": (lambda: torch.as_tensor(primitive.mesh(np.ones(SIZES))[0]), (None, 3)),
-        }
-        for word, (call, wanted) in calls.items():
-            found = tuple(call().shape)
-            if len(found) != len(wanted) or any(w not in (None, f) for f, w in zip(found, wanted, strict=True)):
-                raise DeclarationError(
-                    f"{word} of primitive {primitive.name!r} returns shape {found}",
-                    f"for 2 sizes it should be {wanted}".replace("None", "any number"),
-                )
-    except DeclarationError:
-        raise
-    except Exception as cause:
-        raise DeclarationError(
-            f"{word} of primitive {primitive.name!r} fails: {cause}",
-            "it gets sizes (..., 4) and what else Primitive says, with any leading dimensions",
-        ) from cause
+    calls: dict[str, tuple[tuple[Any, ...], tuple[int | None, ...]]] = {
+        "sample": ((size, face, points), (2, 3)),
+        "distance": ((points, size), (2,)),
+        "bound": ((size,), (2, 3)),
+        "areas": ((size,), (2, None)),
+        "place": ((size, points), (2, 3)),
+        "normal": ((size, points, face), (2, 3)),
+        "volume": ((size,), (2,)),
+        "cell_size": ((size,), (2, SIZES)),
+        "mesh": ((np.ones(SIZES),), (None, 3)),
+    }
+    for word, (arguments, wanted) in calls.items():
+        try:
+            result = getattr(primitive, word)(*arguments)
+            found = tuple((result[0] if word == "mesh" else result).shape)
+        except Exception as cause:
+            said = f"{word} of primitive {primitive.name!r} fails: {cause}"
+            hint = "it gets sizes (..., 4) and what else Primitive says, with any leading dimensions"
+            raise DeclarationError(said, hint) from cause
+        if len(found) != len(wanted) or any(w not in (None, f) for f, w in zip(found, wanted, strict=True)):
+            said = f"{word} of primitive {primitive.name!r} returns shape {found}"
+            raise DeclarationError(said, f"for 2 sizes it should be {wanted}".replace("None", "any number"))

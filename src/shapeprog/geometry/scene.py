@@ -17,15 +17,7 @@ from shapeprog.space import RESOLUTION
 
 @dataclass(frozen=True)
 class Scene(Batch):
-    """Unrolled programs: ``N`` slots of primitives for each program of a batch, padded with a mask.
-
-    Parameters
-    ----------
-    statement
-        Id of the statement that drew it.
-    block, copy
-        Which block of the program it came from, and which of its copies it is.
-    """
+    """Unrolled programs: of each primitive the id of its statement, its block, and which of the copies it is."""
 
     statement: Int[Tensor, "*batch N"]
     block: Int[Tensor, "*batch N"]

@@ -145,7 +145,7 @@ def propose_form(form: int, covered: Rows, waste: float, box: FloatArray, target
     cells = places(gained)
     if len(cells) < FEWEST:
         return 0.0, np.zeros(WIDTH)
-    rough = np.empty((GUESSES, WIDTH))
+    rough: FloatArray = np.empty((GUESSES, WIDTH))
     rough = rough[: guess(form, cells, box, rough)]
     if not len(rough):
         return 0.0, np.zeros(WIDTH)

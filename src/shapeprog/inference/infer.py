@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -19,8 +19,9 @@ from torch import Tensor
 
 from shapeprog.data.shape import Shape
 from shapeprog.geometry.cells import iou, pack, rasterise
-from shapeprog.geometry.distance import union_distance
+from shapeprog.geometry.distance import nearest_primitive
 from shapeprog.inference.blocks import to_program
+from shapeprog.inference.budget import BUDGET, Deadline
 from shapeprog.inference.refine import REACH, Schedule, refine
 from shapeprog.inference.structure import Settings, search_structure
 from shapeprog.inference.surface import points_of_cells
@@ -56,23 +57,29 @@ class Result:
     snapped
         The same statements with whole numbers, each within one of the rounded parameter of ``program``.
     scores
-        ``iou`` of the snapped program at 32^3, and ``blocks``, ``statements``, ``primitives``, ``seconds``; with a
-        generator its ``generator_seconds``, and ``proposed``: 1 if the program is its own or grew from it, else 0.
+        ``iou`` of the snapped program at 32^3, and ``blocks``, ``statements``, ``primitives``; with a generator
+        ``proposed``: 1 if the program is its own or grew from it, else 0.
     reason
-        Why the search stopped, where the program came from, and what to try next.
+        Why the search stopped, where the program came from, what the time budget cut short, and what to try next.
+    cut
+        What the time budget cut short, and how far that had come; if nothing, the same seed gives an equal result.
+    seconds
+        How long it took, which counts for nothing when results are compared.
     """
 
     program: Program
     snapped: Program
     scores: dict[str, float]
     reason: str
+    cut: tuple[str, ...]
+    seconds: float = field(compare=False)
 
 
 def infer(
     shape: Shape | str | Path,
     *,
     blocks: int = 10,
-    budget: float = 4.0,
+    budget: float = BUDGET,
     seed: int = 0,
     settings: Settings | None = None,
     schedule: Schedule | None = None,
@@ -85,7 +92,7 @@ def infer(
 
     Structure is searched on the touched cells, with whole numbers, with the help of a generator where there is one;
     then all parameters are refined together on surface points through the renderer.  The result is the same for the
-    same seed unless the time budget cuts in.
+    same seed unless the time budget cuts in, which ``cut`` and ``reason`` tell.
 
     Parameters
     ----------
@@ -94,9 +101,10 @@ def infer(
     blocks
         Most blocks of the program.
     budget
-        Seconds after which neither search nor refinement starts another step.
+        Seconds after which neither search nor refinement starts another step: a safety net.  What they may spend in
+        the common case is up to ``settings`` and ``schedule``.
     settings, schedule
-        What search and refinement may spend; the defaults were chosen on validation shapes.
+        Rounds of the search and steps of refinement, and more; the defaults were chosen on validation shapes.
     generator
         A generator, the path of its weights, or the name of weights that ship.  The search goes without for ``None``,
         and as long as no default weights ship.
@@ -120,6 +128,9 @@ def infer(
     prepare_kernels()
     writer, hindered = ready_generator(generator if proposals or not search else None, needed=not search)
     started = time.monotonic()
+    proposing, searching, refining = (
+        Deadline(started + share * budget) for share in (PROPOSAL_SHARE, SEARCH_SHARE, 1.0)
+    )
     target = _load(shape)
     scores: dict[str, float] = {}
     if search:
@@ -128,15 +139,14 @@ def infer(
         if writer is not None:
             offered = propose_program(
                 writer, target.voxels, blocks=blocks, suggestions=proposals, price=chosen.price, seed=seed,
-                deadline=started + PROPOSAL_SHARE * budget,
+                deadline=proposing,
             )  # fmt: skip
-            scores["generator_seconds"] = time.monotonic() - started
         structure = search_structure(
-            target.voxels, chosen, proposals=offered, seed=seed, deadline=started + SEARCH_SHARE * budget,
-            progress=progress,
-        )  # fmt: skip
+            target.voxels, chosen, proposals=offered, seed=seed, deadline=searching, progress=progress
+        )
         program = snapped = to_program(structure.blocks)
-        reason = _advice(structure.reason, snapped.blocks, blocks)
+        reason = f"Stopped because {structure.reason}"
+        reason += "." if searching.cut else _advice(snapped.blocks, blocks)
         if writer is not None:
             scores["proposed"] = float(structure.proposed)
             grown = (
@@ -146,23 +156,26 @@ def infer(
     else:
         assert writer is not None
         program, snapped = single_pass(writer, target.voxels, blocks)
-        scores |= {"generator_seconds": time.monotonic() - started, "proposed": 1.0}
+        scores["proposed"] = 1.0
         reason = "A single pass of the generator wrote this; the search would improve it."
     if hindered:
         reason += f" The generator was left out: {hindered}."
     if search or schedule is not None:
         program = refine(
             snapped, outer_points(target, snapped, seed), voxels=target.voxels if target.points is None else None,
-            schedule=schedule, reach=REACH, seed=seed, deadline=started + budget, progress=progress,
+            schedule=schedule, reach=REACH, seed=seed, deadline=refining, progress=progress,
         )  # fmt: skip
+    cut = tuple(each.cut for each in (proposing, searching, refining) if each.cut)
+    if cut:
+        reason += f" The time budget of {budget:g} s cut short {' and '.join(cut)}: "
+        reason += "give it a larger --budget, and the seed alone decides."
     scores |= {
         "iou": float(iou(rasterise(unroll(snapped)), pack(target.voxels))),
         "blocks": float(snapped.blocks),
         "statements": float(snapped.statements),
         "primitives": float(snapped.size),
-        "seconds": time.monotonic() - started,
     }
-    return Result(program, snapped, scores, reason)
+    return Result(program, snapped, scores, reason, cut, time.monotonic() - started)
 
 
 @cache
@@ -194,13 +207,11 @@ def outer_points(target: Shape, snapped: Program, seed: int) -> Float[Tensor, "P
     if target.points is None:
         return torch.from_numpy(points_of_cells(target.voxels, seed=seed))
     points = torch.from_numpy(np.asarray(target.points, np.float32))
-    outer = points[union_distance(unroll(snapped), points) > -DEEP] if snapped.size else points
+    outer = points[nearest_primitive(unroll(snapped), points)[1] > -DEEP] if snapped.size else points
     return outer if len(outer) else points
 
 
-def _advice(reason: str, used: int, allowed: int) -> str:
-    if "budget" in reason:
-        return f"Stopped because {reason}; give it a larger --budget to search on."
+def _advice(used: int, allowed: int) -> str:
     if used >= allowed:
-        return f"Stopped because {reason} and every one of the {allowed} blocks is in use; allow more with --blocks."
-    return f"Stopped because {reason}; {used} of {allowed} blocks were enough, another would not earn its price."
+        return f" and every one of the {allowed} blocks is in use; allow more with --blocks."
+    return f"; {used} of {allowed} blocks were enough, another would not earn its price."

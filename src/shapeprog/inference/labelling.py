@@ -1,22 +1,48 @@
 """Labelling: programs for all shapes of a pack by search, several at a time, for generators to learn from.
 
-Labels are lines of JSON: ``name``, ``program`` and ``snapped`` as text, and the scores of the search.  A file that was
-cut short is gone on with.
+Labels are lines of JSON, in the order of the pack: ``name``, ``program`` and ``snapped`` as text, the scores of the
+search, and in ``cut`` what the time budget cut short.  A file that is not complete is gone on with.  The search runs in
+processes of its own, which end with this one.
 """
 
 from __future__ import annotations
 
 import json
 import os
-import signal
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Sequence
+from contextlib import closing
+from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
 
 from shapeprog.data.packs import Pack, read_pack
-from shapeprog.errors import InputError
-from shapeprog.files import output_error, write_text
+from shapeprog.errors import InputError, ShapeProgError
+from shapeprog.files import append_line, remove_unfinished, write_text
+from shapeprog.inference.budget import BUDGET
+from shapeprog.processes import Answer, answers, serve
+
+
+@dataclass(frozen=True)
+class Labelled:
+    """How far the labels of a pack are.
+
+    Parameters
+    ----------
+    done, total
+        How many shapes have a label, of how many.
+    cut
+        How many of those done the time budget cut short.
+    name
+        The shape just searched; empty in the first record, which tells what the file held before.
+    error
+        Why it got no label, if it got none.
+    """
+
+    done: int
+    total: int
+    cut: int
+    name: str = ""
+    error: ShapeProgError | None = None
 
 
 def label(
@@ -24,12 +50,15 @@ def label(
     out: Path,
     *,
     blocks: int = 10,
-    budget: float = 60.0,
+    budget: float = BUDGET,
     seed: int = 0,
     processes: int | None = None,
     modules: Sequence[Path] = (),
-) -> Iterator[tuple[int, int]]:
-    """Label the shapes of a pack, yielding how many are done and how many there are, at first and after each.
+) -> Generator[Labelled, None, None]:
+    """Label the shapes of a pack in its order, yielding one record at first and one after each.
+
+    A shape that cannot be labelled is told and stops nothing.  Closing the iterator ends the search; what is in the
+    file stays.
 
     Parameters
     ----------
@@ -38,7 +67,7 @@ def label(
     out
         File of the labels; shapes that it holds are not labelled again, and nothing else in it is touched.
     blocks, budget, seed
-        As those of :func:`shapeprog.inference.infer`; without a tight budget the labels are the same every time.
+        As those of :func:`shapeprog.inference.infer`.
     processes
         Shapes at a time; by default as many as there are cores.
     modules
@@ -51,81 +80,100 @@ def label(
     OutputError
         If the labels cannot be written.
     """
-    from concurrent.futures import ProcessPoolExecutor, as_completed
-    from multiprocessing import get_context
-
-    shapes = read_pack(pack)
-    done = _done(out)
-    left = [place for place, name in enumerate(shapes.ids) if str(name) not in done]
-    count = len(shapes)
-    yield count - len(left), count
-    if not left:
-        return
-    workers = min(processes or os.cpu_count() or 1, len(left))
-    words = (str(pack), blocks, budget, seed)
-    try:
-        stream = out.open("a", encoding="utf-8")
-    except OSError as error:
-        raise output_error(out, error) from error
-    # Spawned, not forked: kernels of numba that have run with threads do not survive a fork.
-    with stream, ProcessPoolExecutor(workers, get_context("spawn"), _begin, (list(modules),)) as pool:
-        waiting = [pool.submit(_labelled, place, *words) for place in left]
-        try:
-            for number, future in enumerate(as_completed(waiting), 1):
-                try:
-                    stream.write(json.dumps(future.result(), allow_nan=False) + "\n")
-                    stream.flush()
-                except OSError as error:
-                    raise output_error(out, error) from error
-                yield count - len(left) + number, count
-        finally:
-            for future in waiting:
-                future.cancel()
+    names = [str(name) for name in read_pack(pack, whole=False).ids]
+    remove_unfinished(out.parent)
+    held = _held(out)
+    left = [place for place, name in enumerate(names) if name not in held]
+    done, cut = len(names) - len(left), sum(held.get(name, False) for name in names)
+    yield Labelled(done, len(names), cut)
+    task = {"pack": str(pack), "blocks": blocks, "budget": budget, "seed": seed, "modules": [str(m) for m in modules]}
+    tasks = [json.dumps({**task, "place": place}) for place in left]
+    with closing(answers(__name__, tasks, min(processes or os.cpu_count() or 1, len(left)))) as found:
+        for place, answer in zip(left, found, strict=True):
+            error = _error_of(answer)
+            if isinstance(answer, str) and error is None:
+                append_line(out, answer)
+                done += 1
+                cut += bool(json.loads(answer)["cut"])
+            yield Labelled(done, len(names), cut, names[place], error)
 
 
-def _done(out: Path) -> set[str]:
-    """Names of the shapes that a file of labels holds; a last line that was cut short is taken off it."""
+def _held(out: Path) -> dict[str, bool]:
+    """The shapes that a file of labels holds, and which of them the time budget cut short.
+
+    The last line of the file is mended: given its end, or taken off if it is incomplete.
+    """
+    from shapeprog.formats.shape import read_text
+
     if not out.exists():
-        return set()
+        return {}
+    if not out.is_file():
+        raise InputError(f"{out} is not a file", "give another --out")
+    text = read_text(out)
+    *lines, last = text.split("\n")
+    held = [_label_in(line) for line in lines]
+    for number, (line, label) in enumerate(zip(lines, held, strict=True), 1):
+        if label is None and line.strip():
+            raise InputError(f"line {number} of {out} is no label", "mend that line, or give another --out")
+    if last:
+        held.append(_label_in(last))
+        write_text(out, text.removesuffix(last) if held[-1] is None else f"{text}\n")
+    return dict(label for label in held if label is not None)
+
+
+def _label_in(line: str) -> tuple[str, bool] | None:
+    """The name of the shape that a line labels and whether the label was cut short, if it is a label."""
     try:
-        lines = out.read_text(encoding="utf-8").splitlines(keepends=True)
-    except (OSError, ValueError) as error:
-        raise InputError(f"cannot read {out}: {error}", "give another --out") from error
-    names = set()
-    for number, line in enumerate(lines):
-        try:
-            names.add(str(json.loads(line)["name"]))
-        except (ValueError, KeyError, TypeError) as error:
-            if number < len(lines) - 1 or line.endswith("\n"):
-                raise InputError(f"line {number + 1} of {out} is no label", "give another --out") from error
-            write_text(out, "".join(lines[:-1]))
-    return names
+        row = json.loads(line)
+        return str(row["name"]), bool(row.get("cut"))
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
+        return None
 
 
-def _begin(modules: list[Path]) -> None:
-    """Make a worker ready: interruptions are for the process that asked, which then ends the others."""
+def _error_of(answer: Answer) -> ShapeProgError | None:
+    """Why a shape got no label, if the answer is none."""
+    if isinstance(answer, ShapeProgError):
+        return answer
+    told = json.loads(answer)
+    return ShapeProgError(told["error"], told["hint"]) if "error" in told else None
+
+
+def _labelled(task: str) -> str:
+    """What a process that labels answers: the line of a label, or the error."""
+    from shapeprog.inference.infer import infer
+    from shapeprog.language.text import format_program
+
+    told = json.loads(task)
+    try:
+        _make_ready(*told["modules"])
+        shape = _pack(told["pack"])[told["place"]]
+        words = {name: told[name] for name in ("blocks", "budget", "seed")}
+        found = infer(shape, **words, generator=None)  # labels owe nothing to any weights
+    except ShapeProgError as error:
+        return json.dumps({"error": error.message, "hint": error.hint})
+    except Exception as error:  # a fault of ours with this shape costs its label, not those of the others
+        cause = f"the search failed: {type(error).__name__}: {error}"
+        return json.dumps({"error": cause, "hint": "please report it, with the pack"})
+    texts = {"program": format_program(found.program), "snapped": format_program(found.snapped)}
+    return json.dumps({"name": shape.name, **texts, **found.scores, "cut": found.cut}, allow_nan=False)
+
+
+@lru_cache(1)
+def _make_ready(*modules: str) -> None:
+    """Let the processes share the cores, and declare a user's statements."""
     import torch
 
     from shapeprog.formats.plugins import load_statements
 
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
     torch.set_num_threads(1)
     for module in modules:
-        load_statements(module)
+        load_statements(Path(module))
 
 
 @lru_cache(1)
 def _pack(path: str) -> Pack:
-    return read_pack(path)
+    return read_pack(path, whole=False)
 
 
-def _labelled(place: int, path: str, blocks: int, budget: float, seed: int) -> dict[str, Any]:
-    from shapeprog.inference.infer import infer
-    from shapeprog.language.text import format_program
-
-    shape = _pack(path)[place]
-    found = infer(shape, blocks=blocks, budget=budget, seed=seed, generator=None)  # labels owe nothing to any weights
-    return {
-        "name": shape.name, "program": format_program(found.program), "snapped": format_program(found.snapped),
-        **found.scores,
-    }  # fmt: skip
+if __name__ == "__main__":
+    serve(_labelled)

@@ -7,7 +7,6 @@ generator looks again.  So a program is as good as the best the generator can th
 
 from __future__ import annotations
 
-import time
 from functools import lru_cache
 from pathlib import Path
 
@@ -18,7 +17,8 @@ import torch
 from shapeprog.errors import ShapeProgError
 from shapeprog.geometry.cells import cells_of, pack, words_of
 from shapeprog.inference.block_layout import WIDTH
-from shapeprog.inference.drawing import draw_all
+from shapeprog.inference.budget import NEVER, Deadline
+from shapeprog.inference.drawing import Rows, draw_all
 from shapeprog.inference.editing import improve_block
 from shapeprog.inference.pool import Pool
 from shapeprog.inference.raster_kernels import ROWS
@@ -54,7 +54,7 @@ def propose_program(
     suggestions: int,
     price: float,
     seed: int = 0,
-    deadline: float = float("inf"),
+    deadline: Deadline = NEVER,
 ) -> Proposals:
     """A program for a solid of cells (32, 32, 32), built of the suggestions of a generator, and all it suggested.
 
@@ -67,18 +67,21 @@ def propose_program(
     price
         IoU that one statement has to earn.
     deadline
-        Value of ``time.monotonic()`` after which the generator is not asked again.
+        When the generator is not asked again.
     """
     occupied = words_of(pack(voxels)).reshape(-1)
     cost = price * int(voxels.sum())
     device = next(generator.parameters()).device
     target = torch.from_numpy(voxels.astype(np.uint8))[None].to(device)
     random = torch.Generator(device).manual_seed(seed)
-    covered, program = np.zeros(ROWS, np.uint32), np.zeros((0, WIDTH))
+    covered: Rows = np.zeros(ROWS, np.uint32)
+    program: FloatArray = np.zeros((0, WIDTH))
     loose: list[FloatArray] = []
     memory, fruitless = None, 0
     with single_threaded():
-        while len(program) < blocks and fruitless < FRUITLESS and time.monotonic() < deadline:
+        while len(program) < blocks and fruitless < FRUITLESS:
+            if deadline.passed(f"the generator after {len(program)} of at most {blocks} blocks"):
+                break
             canvas = cells_of(covered).reshape(1, RESOLUTION, RESOLUTION).to(device)
             code, memory = suggest(generator, target, canvas, memory, suggestions, random)
             suggested = from_code(code)

@@ -8,7 +8,6 @@ grid are asked to keep touching, which no point can tell: contact faces are hidd
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -26,6 +25,7 @@ from shapeprog.geometry.nearest import squared_distance
 from shapeprog.geometry.primitive import primitives
 from shapeprog.geometry.scene import Scene
 from shapeprog.geometry.surface import sample_surface
+from shapeprog.inference.budget import NEVER, Deadline
 from shapeprog.language.program import Program
 from shapeprog.language.statement import language
 from shapeprog.language.tensors import Code, decode, encode
@@ -89,7 +89,7 @@ def refine(
     schedule: Schedule | None = None,
     reach: float | None = None,
     seed: int = 0,
-    deadline: float = float("inf"),
+    deadline: Deadline = NEVER,
     progress: Callable[[str, float], None] | None = None,
 ) -> Program:
     """The same program with parameters that fit target points (P, 3) on a surface, in the grid frame.
@@ -104,7 +104,7 @@ def refine(
     reach
         Farthest that any parameter may move from where it is, in cells; anywhere by default.
     deadline
-        Value of ``time.monotonic()`` after which no further step starts.
+        When no further step starts.
 
     Raises
     ------
@@ -132,7 +132,7 @@ def refine(
     shell = None if voxels is None else _shell(voxels)
     with single_threaded():
         for step in range(plan.steps):
-            if time.monotonic() > deadline:
+            if deadline.passed(f"the refinement after {step} of {plan.steps} steps"):
                 break
             scene = render.scene(moved)
             if not bool(scene.mask.any()):

@@ -7,7 +7,6 @@ and blocks that somebody else proposes, such as a generator, take part in both.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
@@ -17,6 +16,7 @@ import numpy.typing as npt
 
 from shapeprog.geometry.cells import pack, words_of
 from shapeprog.inference.block_layout import WIDTH
+from shapeprog.inference.budget import NEVER, Deadline
 from shapeprog.inference.families import families
 from shapeprog.inference.reading import from_program
 from shapeprog.language.program import Program
@@ -54,7 +54,7 @@ class Settings:
     rounds
         Most rounds of ruin and recreate.
     chunk
-        Rounds between two looks at the clock.
+        Rounds with the same heat and the same pool, before the next look at the clock.
     families
         Ways of repeating a box that one round tries, drawn at random.
     forms
@@ -124,7 +124,7 @@ def search_structure(
     *,
     proposals: Proposals | None = None,
     seed: int = 0,
-    deadline: float = float("inf"),
+    deadline: Deadline = NEVER,
     progress: Callable[[str, float], None] | None = None,
 ) -> Structure:
     """Blocks for a solid of cells (32, 32, 32); the same for the same seed unless the deadline cuts it short.
@@ -134,7 +134,7 @@ def search_structure(
     proposals
         Programs to start from beside the greedy ones, and blocks to put in; what does not help is not kept.
     deadline
-        Value of ``time.monotonic()`` after which no further round starts.
+        When no further round starts.
     progress
         Called with what is being done and the share done.
     """
@@ -154,11 +154,11 @@ def search_structure(
     own = [*rough[len(offered.programs) :], *starts]
     done, gained, reason = 0, 0, f"all {settings.rounds} rounds of editing were done"
     while done < settings.rounds:
-        if time.monotonic() > deadline:
-            reason = f"the time budget ran out after {done} of {settings.rounds} rounds of editing"
-            break
         if done - gained >= settings.patience:
             reason = f"{done - gained} rounds of editing in a row gained nothing"
+            break
+        if deadline.passed(f"the search after {done} of {settings.rounds} rounds"):
+            reason = f"the time budget ran out after {done} of {settings.rounds} rounds of editing"
             break
         rounds = min(settings.chunk, settings.rounds - done)
         heat = settings.heat * (1 - done / settings.rounds)
@@ -188,7 +188,7 @@ def greedy_starts(target: Target, most: int) -> list[FloatArray]:
     everything = np.arange(len(target.table))
     starts = []
     for waste in STARTS:
-        blocks = np.zeros((0, WIDTH))
+        blocks: FloatArray = np.zeros((0, WIDTH))
         while len(blocks) < most:
             gain, block = best_box(draw_all(blocks), float(np.float32(waste)), everything, target)
             if gain <= 0:

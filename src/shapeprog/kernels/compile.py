@@ -23,10 +23,7 @@ import gc
 import importlib
 import inspect
 import os
-import subprocess
-import sys
 import threading
-import time
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
@@ -34,6 +31,9 @@ from functools import cache, cached_property
 from hashlib import sha256
 from types import CodeType, FunctionType
 from typing import Any
+
+from shapeprog.errors import ShapeProgError
+from shapeprog.processes import Worker, serve
 
 Function = Callable[..., Any]
 
@@ -49,13 +49,7 @@ _kernels: dict[str, Kernel] = {}
 
 
 def helper(function: Function | None = None, **options: Any) -> Any:
-    """Declare a function that only kernels call; it stays a plain Python function.
-
-    Parameters
-    ----------
-    options
-        More options of numba, such as ``fastmath`` or ``inline``.
-    """
+    """Declare a function that only kernels call; it stays a plain one.  Options are numba's, such as ``inline``."""
     if function is None:
         return lambda wanted: helper(wanted, **options)
     plain = inspect.unwrap(function)
@@ -69,21 +63,10 @@ def kernel(signature: str, **options: Any) -> Callable[[Function], Kernel]:
 
 
 class Kernel:
-    """A compiled function, loaded from the cache or compiled when it is first called.
-
-    Parameters
-    ----------
-    function
-        The loop in Python.
-    signature
-        Its types.
-    options
-        More options of numba.
-    """
+    """A compiled function, loaded from the cache or compiled when it is first called."""
 
     def __init__(self, function: Function, signature: str, options: dict[str, Any]) -> None:
-        self.function, self.signature = function, signature
-        self._options = options
+        self.function, self.signature, self._options = function, signature, options
         self._compiled: Any = None
         self.__name__, self.__doc__ = function.__name__, function.__doc__
         self.name = f"{function.__module__}:{function.__qualname__}"
@@ -105,16 +88,14 @@ class Kernel:
 
     def load(self) -> bool:
         """Load it from the cache; whether it was there."""
-        with _lock, _without_collector():
+        with _lock:
             if self._compiled is None:
-                dispatcher, types = self._dispatcher, self._types()
-                kept = dispatcher._cache.load_overload(types, dispatcher.targetctx)
-                if kept is not None:
-                    dispatcher.add_overload(kept)
-                    dispatcher.targetctx.insert_user_function(kept.entry_point, kept.fndesc, [kept.library])
-                    dispatcher.disable_compile()
-                    self._compiled = dispatcher
-            return self._compiled is not None
+                cache = self._dispatcher._cache
+                key = cache._index_key(self._types(), self._dispatcher.targetctx.codegen())
+                if key not in cache._cache_file._load_index():
+                    return False
+            self.compile()
+            return True
 
     @cached_property
     def _dispatcher(self) -> Any:
@@ -131,22 +112,16 @@ class Kernel:
 
 
 def prepare(modules: Sequence[str], tell: Callable[[str], None] | None = None) -> None:
-    """Make all kernels of some modules ready, so that nobody waits for them later.
+    """Make all kernels of some modules, given by full name, ready, so that nobody waits for them later.
 
     What the cache lacks is compiled by several processes at once: the others take kernels from the front, this one from
-    the back, so name first what is quickly imported and last what is not.
-
-    Parameters
-    ----------
-    modules
-        Full names of the modules that declare kernels.
-    tell
-        Called with a sentence before anything is compiled, which takes seconds.
+    the back, so name first what is quickly imported and last what is not.  ``tell`` is called with a sentence before
+    anything is compiled, which takes seconds.
     """
     lacking: list[Kernel] = []
     waiting: deque[str] = deque()
-    others: list[_Other] = []
-    done = False
+    complete = threading.Event()
+    others: list[threading.Thread] = []
     try:
         for name in modules:
             importlib.import_module(name)
@@ -156,62 +131,39 @@ def prepare(modules: Sequence[str], tell: Callable[[str], None] | None = None) -
                         tell("compiling kernels for this machine, once; this may take half a minute")
                     lacking.append(each)
                     waiting.append(each.name)
-            if waiting and not others:
-                others = [_Other(waiting) for _ in range(min(max((os.cpu_count() or 2) - 1, 1), MOST))]
+            while waiting and len(others) < min(max((os.cpu_count() or 2) - 1, 1), MOST):
+                others.append(threading.Thread(target=_serve, args=(waiting, complete), daemon=True))
+                others[-1].start()
         while waiting:
             with suppress(IndexError):  # another process took the last one
                 _kernels[waiting.pop()].compile()
-        done = True
     finally:
-        for other in others:
-            other.finish(wait=done)
+        waiting.clear()
+        complete.set()
+    for other in others:
+        other.join()
     for each in lacking:  # from the cache now; compiled here should another process have failed
         each.compile()
 
 
-class _Other:
-    """Another process that compiles kernels into the cache: it asks for one of the names waiting after another."""
-
-    def __init__(self, waiting: deque[str]) -> None:
-        self._waiting = waiting
-        self._complete = False
-        command = [sys.executable, "-m", "shapeprog.kernels.compile"]
-        pipe, nothing = subprocess.PIPE, subprocess.DEVNULL
-        self._process = subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=nothing, text=True)
-        self._thread = threading.Thread(target=self._serve, daemon=True)
-        self._thread.start()
-
-    def _serve(self) -> None:
-        asked, answers = self._process.stdout, self._process.stdin
-        assert asked is not None
-        assert answers is not None
-        with suppress(OSError), asked, answers:  # should it fail, its kernels are compiled here
-            while asked.readline():
-                name = self._next()
-                if not name:
-                    break
-                answers.write(f"{name}\n")
-                answers.flush()
-
-    def _next(self) -> str:
-        """The next name, once there is one; none at the end."""
-        while True:
-            with suppress(IndexError):
-                return self._waiting.popleft()
-            if self._complete:
-                return ""
-            time.sleep(0.01)
-
-    def finish(self, wait: bool) -> None:
-        """Tell it that no more will come, and wait for what it is at, or end it."""
-        self._complete = True
+def _serve(waiting: deque[str], complete: threading.Event) -> None:
+    """Have another process compile kernels into the cache, one of the names waiting after another."""
+    with suppress(ShapeProgError):  # should it fail, its kernels are compiled here
+        worker = Worker("shapeprog.kernels.compile", quiet=True)
         try:
-            if wait:
-                self._process.wait()
+            while name := _next(waiting, complete):
+                worker.ask(name)
         finally:
-            self._process.kill()
-            self._process.wait()
-            self._thread.join()
+            worker.close()
+
+
+def _next(waiting: deque[str], complete: threading.Event) -> str:
+    """The next name, once there is one; none at the end."""
+    while True:
+        with suppress(IndexError):
+            return waiting.popleft()
+        if complete.wait(0.01):
+            return ""
 
 
 def _linked(function: Function) -> FunctionType:
@@ -239,35 +191,27 @@ def _compiled_helper(function: Function) -> Any:
 
 def _read(function: FunctionType) -> dict[str, Any]:
     """What a function reads of its module, by name."""
-    names = [name for name in function.__code__.co_names if name in function.__globals__]
-    return {name: function.__globals__[name] for name in names}
+    known = function.__globals__
+    return {name: known[name] for name in function.__code__.co_names if name in known}
 
 
 def _is_helper(value: Any) -> bool:
     return isinstance(value, FunctionType) and value in _helpers
 
 
-def _reached(function: Function) -> Iterator[tuple[CodeType, dict[str, Any]]]:
-    """Code and read constants of a function and, one after another, of all helpers that it reaches."""
-    seen: set[Function] = set()
-    stack = [function]
+def _digest(function: Function, compiler: str) -> str:
+    """Changes with the code of a kernel, of the helpers it reaches, and with every number or text that these read."""
+    found, seen, stack = sha256(compiler.encode()), set[Function](), [function]
     while stack:
         current = stack.pop()
         if current in seen or not isinstance(current, FunctionType):
             continue
         seen.add(current)
-        values = _read(current)
-        yield current.__code__, values
-        stack += [value for value in values.values() if isinstance(value, FunctionType)]
-
-
-def _digest(function: Function, compiler: str) -> str:
-    """Changes with the code of a kernel, of its helpers, and with every number or text that these read."""
-    found = sha256(compiler.encode())
-    for code, values in _reached(function):
+        code, values = current.__code__, _read(current)
         read = sorted((name, repr(value)) for name, value in values.items() if isinstance(value, (int, float, str)))
         constants = [value.co_code if isinstance(value, CodeType) else value for value in code.co_consts]
         found.update(repr((code.co_name, code.co_code, constants, code.co_names, read)).encode())
+        stack += [value for value in values.values() if isinstance(value, FunctionType)]
     return found.hexdigest()
 
 
@@ -283,19 +227,14 @@ def _without_collector() -> Iterator[None]:
             gc.enable()
 
 
-def _main() -> None:
-    """What another process does: ask for the names of kernels and compile them into the cache."""
+def _compile(name: str) -> str:
+    """What another process does: compile a kernel into the cache, given its name."""
     from shapeprog.kernels import compile as room  # not the copy of this module that runs as a script
 
-    while True:
-        sys.stdout.write("next\n")
-        sys.stdout.flush()
-        name = sys.stdin.readline().strip()
-        if not name:
-            return
-        importlib.import_module(name.partition(":")[0])
-        room._kernels[name].compile()
+    importlib.import_module(name.partition(":")[0])
+    room._kernels[name].compile()
+    return name
 
 
 if __name__ == "__main__":
-    _main()
+    serve(_compile)

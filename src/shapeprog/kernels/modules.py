@@ -5,28 +5,19 @@ They are named, not imported: kernels are the lowest room.
 
 from __future__ import annotations
 
-READING = ("shapeprog.data.voxelise_kernels",)
-"""Meshes and points into cells."""
-
-PICTURES = ("shapeprog.view.raster_kernels",)
-"""Pictures of shapes and programs."""
-
-SEARCH = (
+READING = ("shapeprog.data.voxelise_kernels",)  # meshes and points into cells
+PICTURES = ("shapeprog.view.raster_kernels",)  # of shapes and programs
+SEARCH = (  # for a structure
     "shapeprog.inference.proposal_kernels",
     "shapeprog.inference.raster_kernels",
     "shapeprog.inference.descent_kernels",
     "shapeprog.inference.form_kernels",
     "shapeprog.inference.chance_kernels",
 )
-"""Structure search."""
-
-GEOMETRY = (
+GEOMETRY = (  # of scenes: distances, samples, cells and neighbours; they import torch
     "shapeprog.geometry.neighbour_kernels",
     "shapeprog.geometry.distance_kernels",
     "shapeprog.geometry.surface_kernels",
     "shapeprog.geometry.cell_kernels",
 )
-"""Distances, samples, cells and neighbours of scenes; they import torch."""
-
 INFERENCE = (*SEARCH, *GEOMETRY)
-"""Search and refinement of a program."""

@@ -8,11 +8,8 @@ from __future__ import annotations
 from shapeprog.kernels.bits import span
 from shapeprog.kernels.compile import helper
 
-REACH = 1.01
-"""A cell belongs to a cylinder when its centre is within this many radii of the axis, as in the published executor."""
-
-CAP = 1e-3
-"""Slack in cells along the axis of a cylinder, so that a cap through a cell centre takes that cell."""
+REACH = 1.01  # radii from the axis of a cylinder up to which cells belong to it, as in the published executor
+CAP = 1e-3  # slack in cells along that axis, so that a cap through the centre of a cell takes it
 
 
 @helper

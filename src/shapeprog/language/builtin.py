@@ -10,11 +10,8 @@ from shapeprog.language.parameters import Count, Extent, Half, Length, Position,
 from shapeprog.language.shapes import bar, box, cuboid, disc, slab
 from shapeprog.language.statement import Motion, loop, statement
 
-CELL_CENTRE = 0.5
-"""Ends of a line name cells, not boundaries: the centre of cell c lies half a cell above its boundary."""
-
-ARM_HALF_WIDTH = 1.0
-"""Half width in cells of one arm of a cross base, which is always two cells wide."""
+CELL_CENTRE = 0.5  # ends of a line name cells, not boundaries: the centre lies half a cell above the boundary
+ARM_HALF_WIDTH = 1.0  # in cells, of one arm of a cross base, which is always two cells wide
 
 
 def _box(at: Position, size: Extent) -> Solids:

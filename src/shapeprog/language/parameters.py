@@ -19,18 +19,15 @@ from shapeprog.space import HALF, RESOLUTION
 
 Kind = Literal["position", "length", "shift", "count", "turn"]
 
-LARGEST = 3.4028234663852886e38
-"""The largest finite float32."""
-
-LARGEST_WHOLE = 1 << 24
-"""Up to here float32 holds every whole number; counts and turns end here."""
+LARGEST = float(np.finfo(np.float32).max)
+LARGEST_WHOLE = 1 << 24  # up to here float32 holds every whole number; counts and turns end here
 
 
 def to_float32(value: float) -> float:
     """The float32 nearest to ``value``; a ``ShapeProgError`` if it is not finite, or too large for float32."""
     try:
         single: float = struct.unpack("f", struct.pack("f", value))[0]
-    except OverflowError:
+    except (OverflowError, struct.error):  # the latter for a whole number beyond float64
         single = math.inf
     if not math.isfinite(single):
         limits = f"numbers go from -{LARGEST:.7e} to {LARGEST:.7e}"
@@ -39,17 +36,12 @@ def to_float32(value: float) -> float:
 
 
 def shortest(value: float) -> str:
-    """The shortest decimal that reads back as exactly this float32, such as ``0.1``, ``-0.0`` or ``1e-40``.
-
-    Raises what :func:`to_float32` raises.
-    """
+    """The shortest decimal that reads back as exactly this float32, such as ``0.1``, ``-0.0`` or ``1e-40``."""
     single = to_float32(value)
     decimal = float(str(np.float32(single)))
     if to_float32(decimal) != single:  # it was rounded twice on its way through float64
         decimal = single
-    if single == 0 and math.copysign(1, single) < 0:
-        return "-0.0"
-    return repr(decimal).removesuffix(".0")
+    return repr(decimal).removesuffix(".0") if single or math.copysign(1, single) > 0 else "-0.0"
 
 
 @dataclass(frozen=True)
@@ -106,23 +98,21 @@ class Parameter:
         """Its slots among those of the statement."""
         return slice(self.start, self.start + self.quantity.width)
 
+    def call(self, numbers: Sequence[str]) -> str:
+        """How it is written with these numbers: ``at=(4, 0, -2.5)``."""
+        return f"{self.name}=" + (numbers[0] if self.quantity.width == 1 else f"({', '.join(numbers)})")
+
     @property
     def blank(self) -> str:
         """How it is written, with a blank for each number: ``at=(_, _, _)``."""
-        width = self.quantity.width
-        return f"{self.name}=" + ("_" if width == 1 else f"({', '.join('_' * width)})")
+        return self.call("_" * self.quantity.width)
 
     def checked(self, owner: str, numbers: Sequence[float]) -> list[float]:
-        """Its numbers in a call of the statement ``owner``, rounded to float32.
+        """Its numbers in a call of the statement ``owner``, rounded to float32; a ``ShapeProgError`` if they are wrong.
 
         Coordinates and lengths may be any finite number: the declared range is where programs are sampled from, and a
         negative length draws nothing.  Counts and turns must be whole; beyond their range they stay legal as far as
         float32 holds whole numbers, since a count of zero or less erases what is inside.
-
-        Raises
-        ------
-        ShapeProgError
-            If there are too many or too few, or one is not finite, or a count or turn is not whole or too large.
         """
         quantity, place = self.quantity, f"{self.name} of {owner}"
         if len(numbers) != quantity.width:

@@ -33,7 +33,7 @@ class Loop:
 
 
 Node = Draw | Loop
-Chain = tuple[Draw | Loop, ...]
+Chain = tuple[Node, ...]
 """Loops from the outermost inwards, without bodies, and the drawing statement they repeat: one block."""
 
 
@@ -68,12 +68,10 @@ class Program:
 
     def walk(self) -> Iterator[Node]:
         """Every node in the order of the text."""
-        stack = list(reversed(self.body))
+        stack = [*reversed(self.body)]
         while stack:
-            node = stack.pop()
-            yield node
-            if isinstance(node, Loop):
-                stack.extend(reversed(node.body))
+            yield (node := stack.pop())
+            stack += reversed(node.body) if isinstance(node, Loop) else ()
 
     def flat(self) -> Program:
         """The same shape with one drawing statement in each loop nest."""

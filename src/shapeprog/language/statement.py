@@ -28,11 +28,8 @@ from shapeprog.geometry.primitive import SIZES, primitives
 from shapeprog.geometry.primitives import built_in_names
 from shapeprog.language.parameters import Parameter, Quantity
 
-SLOTS = 7
-"""Tensor slots for the parameters of one statement."""
-
-EMPTY, END = 0, 21
-"""Ids without a statement: nothing, and the end of a loop in flat listings."""
+SLOTS = 7  # in tensors for the parameters of one statement
+EMPTY, END = 0, 21  # ids without a statement: nothing, and the end of a loop in flat listings
 
 
 @dataclass(frozen=True)
@@ -52,19 +49,15 @@ class Statement:
 
     Parameters
     ----------
-    name, id, doc, parameters
-        Word in program text, number in tensors, one line of manual, and named parameters in slot order.
-    draw
-        For a drawing statement: parameter tensors by name to one or more :class:`Solids`; else ``None``.
-    move
-        For a loop: ``(copy index, quarter, **parameters) -> Motion``; else ``None``.
-    pivot
+    name, id, doc, parameters, paper
+        Word in program text, number in tensors, one line of manual, and named parameters in slot order; names in the
+        notation of the paper, such as ``("Leg", "Cub")``.
+    draw, move
+        What a drawing statement makes of parameter tensors by name, one or more :class:`Solids`; or for a loop
+        ``(copy index, quarter, **parameters) -> Motion``.
+    pivot, quarter
         Parameter tensors by name to a point (..., 3) on the vertical axis about which rotation loops turn what the
-        statement draws; ``None`` is the axis of the grid.
-    quarter
-        Whether rotation loops advance it by quarter turns instead of spreading copies evenly.
-    paper
-        Names in the notation of the paper, such as ``("Leg", "Cub")``.
+        statement draws, by default that of the grid; whether they do so by quarter turns instead of evenly.
     """
 
     name: str
@@ -92,22 +85,25 @@ class Statement:
         """Quantity of every slot in use, in order."""
         return tuple(p.quantity for p in self.parameters for _ in range(p.quantity.width))
 
+    def call(self, numbers: Sequence[str]) -> str:
+        """How it is written with these numbers, in slot order; the count of a loop goes without its name."""
+        words = [parameter.call(numbers[parameter.slots]) for parameter in self.parameters]
+        if self.is_loop:
+            words[0] = words[0].removeprefix(f"{self.parameters[0].name}=")
+        return f"{self.name}({', '.join(words)})"
+
     @property
     def signature(self) -> str:
         """How it is written, with a blank for each number; loops begin with ``for i in``."""
-        words = [parameter.blank for parameter in self.parameters]
-        if self.is_loop:
-            return f"for i in {self.name}({', '.join(['_', *words[1:]])}):"
-        return f"{self.name}({', '.join(words)})"
+        call = self.call("_" * self.size)
+        return f"for i in {call}:" if self.is_loop else call
 
     def split(self, values: Float[Tensor, "*batch 7"]) -> dict[str, Tensor]:
         """Parameter tensors by name: (...) for one slot, (..., width) for several; turns and counts are rounded."""
         named = {}
         for parameter in self.parameters:
-            part = values[..., parameter.slots]
-            if parameter.quantity.discrete:
-                part = part.detach().round()
-            named[parameter.name] = part if parameter.quantity.width > 1 else part[..., 0]
+            part = values[..., parameter.slots if parameter.quantity.width > 1 else parameter.start]
+            named[parameter.name] = part.detach().round() if parameter.quantity.discrete else part
         return named
 
     def solids(self, values: Float[Tensor, "*batch 7"]) -> list[Solids]:
@@ -120,19 +116,13 @@ class Statement:
 class Language:
     """A registry of statements and loops, found by name or by id, and the names of its primitives."""
 
-    def __init__(self) -> None:
+    def __init__(self, solids: dict[str, int] | None = None) -> None:
         self._by_id: dict[int, Statement] = {}
         self._by_name: dict[str, Statement] = {}
-        self.primitives = built_in_names()
+        self.primitives = built_in_names() if solids is None else solids
 
     def register(self, declared: Statement) -> Statement:
-        """Add a declaration and return it.
-
-        Raises
-        ------
-        DeclarationError
-            If its name or id is taken or its parameters do not fit, in words.
-        """
+        """Add a declaration and return it; a ``DeclarationError`` if its name or id is taken or it does not fit."""
         for message, hint in self._faults(declared):
             raise DeclarationError(message, hint)
         _try(declared)
@@ -143,21 +133,21 @@ class Language:
     def _faults(self, declared: Statement) -> Iterator[tuple[str, str]]:
         """What is wrong with a declaration before it is tried, and the cure."""
         said = f"statement {declared.name!r}"
+        owners = dict.fromkeys((EMPTY, END), "the language itself") | {each.id: each.name for each in self}
         if not declared.name.isidentifier() or keyword.iskeyword(declared.name):
             yield f"{declared.name!r} is not a word of Python", "use letters, digits and underscores"
         if declared.is_loop and [p.quantity.kind for p in declared.parameters][:1] != ["count"]:
             yield f"loop {declared.name!r} has no count", "annotate its first parameter with Count"
         if declared.size > SLOTS:
-            numbers = f"{declared.size} numbers, but a statement has {SLOTS} slots"
-            yield f"{said} has {numbers}", "use fewer or narrower parameters"
+            limit = f"{declared.size} numbers, but a statement has {SLOTS} slots"
+            yield f"{said} has {limit}", "use fewer or narrower parameters"
         if any(quantity.low > quantity.high for quantity in declared.quantities):
             yield f"a range of {said} ends before it starts", "swap low and high"
         if declared.name in self._by_name:
             yield f"{said} is declared twice", "give one of them another name"
-        if declared.id in self._by_id or declared.id in (EMPTY, END):
-            owner = self._by_id[declared.id].name if declared.id in self._by_id else "the language itself"
+        if declared.id in owners:
             free = f"leave the id out; the next free one is {self.free_id()}"
-            yield f"{said} wants id {declared.id}, which belongs to {owner}", free
+            yield f"{said} wants id {declared.id}, which belongs to {owners[declared.id]}", free
         for twin in self:
             if declared.paper and twin.paper == declared.paper:
                 own = "leave it out; the notation then uses the statement's own name"
@@ -186,10 +176,8 @@ class Language:
         return [declared.name for declared in self]
 
 
-standard = Language()
+standard = Language(primitives.names)
 """The language of this process: the built-in statements and those that users register."""
-
-standard.primitives = primitives.names
 
 _active: ContextVar[Language] = ContextVar("language", default=standard)
 
@@ -257,22 +245,21 @@ def _try(declared: Statement) -> None:
     """Draw or move once with mid-range parameters, so that a wrong shape is refused now and not amid a run."""
     values = torch.zeros(2, SLOTS)
     values[:, : declared.size] = torch.tensor([(quantity.low + quantity.high) / 2 for quantity in declared.quantities])
-    shapes: list[Any]
+    kind = "loop" if declared.is_loop else "statement"
     try:
         if declared.move is not None:
             motion = declared.move(torch.arange(2.0), torch.zeros(2, dtype=torch.bool), **declared.split(values))
-            shapes = [part if part is None else tuple(part.shape) for part in (motion.turn, motion.shift)]
+            shapes: list[Any] = [part if part is None else tuple(part.shape) for part in (motion.turn, motion.shift)]
             fitting = shapes[0] in (None, (2,)) and shapes[1] in (None, (2, 3))
-            found, wanted = f"loop {declared.name!r} returns a motion", "a turn must be (...) and a shift (..., 3)"
+            found, wanted = "a motion", "a turn must be (...) and a shift (..., 3)"
         else:
             shapes = [(tuple(solids.size.shape), tuple(solids.centre.shape)) for solids in declared.solids(values)]
             fitting = bool(shapes) and all(pair == ((2, SIZES), (2, 3)) for pair in shapes)
-            found, wanted = f"statement {declared.name!r} returns solids", "sizes must be (..., 4) and centres (..., 3)"
+            found, wanted = "solids", "sizes must be (..., 4) and centres (..., 3)"
     except Exception as cause:
-        raise DeclarationError(
-            f"statement {declared.name!r} cannot be {'moved' if declared.is_loop else 'drawn'}: {cause}",
-            "its function gets one tensor (...) or (..., width) per parameter, with any leading dimensions",
-        ) from cause
+        said = f"statement {declared.name!r} cannot be {'moved' if declared.is_loop else 'drawn'}: {cause}"
+        hint = "its function gets one tensor (...) or (..., width) per parameter, with any leading dimensions"
+        raise DeclarationError(said, hint) from cause
     if not fitting:
-        leading = "with the leading dimensions of the parameters"
-        raise DeclarationError(f"{found} of shapes {shapes}", f"{wanted} {leading}")
+        said = f"{kind} {declared.name!r} returns {found} of shapes {shapes}"
+        raise DeclarationError(said, f"{wanted} with the leading dimensions of the parameters")

@@ -11,32 +11,23 @@ from shapeprog.language.parameters import Parameter, to_float32
 from shapeprog.language.program import Draw, Loop, Node, Program
 from shapeprog.language.statement import Statement, language
 
-DEEPEST = 64
-"""How deep loops may nest in text; Python itself ends at 100 levels of indentation."""
+DEEPEST = 64  # levels of loops in text; Python itself ends at 100 levels of indentation
+
+LONGEST = 500_000
+"""Letters of the longest text: a syntax tree takes a thousand times the memory of its text."""
 
 _FORBIDDEN = (
     (r"^[^\S\t]*\t(?=.*\S)", "this line is indented with a tab", "indent with four spaces"),
     (r"\0", "there is a null byte in this line", "is this a text file?"),
 )
 _SHOWN = 60
-_WIDEST = 200
 
 
 def parse(text: str, name: str = "<program>") -> Program:
-    """The program of a text.
+    """The program of a text: calls of drawing statements with literal numbers, and ``for`` loops over calls of loops.
 
-    Parameters
-    ----------
-    text
-        Calls of drawing statements with literal numbers, and ``for`` loops over calls of loops.  Comments are allowed
-        and forgotten.  Numbers are rounded to float32.
-    name
-        What error messages call the text, a path for instance.
-
-    Raises
-    ------
-    ProgramError
-        At the first mistake, with line, column, the nearest name or the legal range.
+    Comments are allowed and forgotten; numbers are rounded to float32.  A ``ProgramError`` says where in ``name``, such
+    as a path, the first mistake is, and the nearest name or the legal range.
     """
     text = proper_text(text, name)
     reader = _Reader(re.split(r"\r\n|\r|\n", text), name)
@@ -60,6 +51,8 @@ class _Reader:
         self.name = name
 
     def tree(self, text: str) -> ast.Module:
+        if len(text) > LONGEST:
+            raise self._at(1, 1, f"this text has more than {LONGEST:,} letters", "keep such a program as .json")
         for number, line in enumerate(self.lines, 1):
             for pattern, message, hint in _FORBIDDEN:
                 found = re.search(pattern, line)
@@ -180,7 +173,4 @@ class _Reader:
         return self._at(node.lineno, len(before.decode(errors="replace")) + 1, message, hint)
 
     def _at(self, line: int, column: int, message: str, hint: str) -> ProgramError:
-        source = re.sub(r"[\0-\x1f]", " ", self.lines[line - 1])
-        if len(source) > _WIDEST:
-            source = source[:_WIDEST] if column <= _WIDEST else ""
-        return ProgramError(message, line=line, column=column, source=source, hint=hint, name=self.name)
+        return ProgramError(message, line=line, column=column, source=self.lines[line - 1], hint=hint, name=self.name)

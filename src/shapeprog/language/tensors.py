@@ -20,10 +20,7 @@ from shapeprog.space import Array
 
 @dataclass(frozen=True)
 class Code:
-    """A batch of programs as tensors: the statement of each step of each block, and its parameters in slot order.
-
-    Id 0 is an empty step; unused slots are ignored.
-    """
+    """Programs as tensors: the statement of each step of each block, 0 for none, and its parameters in slot order."""
 
     ids: Int[Tensor, "*batch K J"]
     parameters: Float[Tensor, "*batch K J 7"]
@@ -34,43 +31,30 @@ class Code:
 
 
 def encode(
-    programs: Program | Sequence[Program],
-    *,
-    blocks: int | None = None,
-    steps: int | None = None,
-    dtype: torch.dtype = torch.float32,
-    device: torch.device | str = "cpu",
+    programs: Program | Sequence[Program], *, blocks: int | None = None, dtype: torch.dtype = torch.float32
 ) -> Code:
     """Tensors of programs: (B, K, J) for a sequence, (K, J) for one program.
 
-    Parameters
-    ----------
-    blocks, steps
-        K and J; by default the longest program and at least the published three steps.
-
-    Raises
-    ------
-    ShapeProgError
-        If a program has more blocks, or loops nested deeper, than asked for.
+    There are as many steps J as the longest block has, at least the published three, and as many blocks K as the
+    longest program has, or as are asked for; a ``ShapeProgError`` if a program has more.
     """
     batch = [programs] if isinstance(programs, Program) else list(programs)
     chains = [program.chains for program in batch]
-    needed = max((len(each) for each in chains), default=0)
-    depth = max((len(chain) for each in chains for chain in each), default=0)
+    needed = max([0, *map(len, chains)])
+    steps = max([PUBLISHED_DEPTH, *(len(chain) for each in chains for chain in each)])
     rows = needed if blocks is None else blocks
-    columns = max(depth, PUBLISHED_DEPTH) if steps is None else steps
-    if needed > rows or depth > columns:
-        said = f"a program of {needed} blocks and {depth} steps does not fit {rows} blocks of {columns} steps"
-        raise ShapeProgError(said, "allow more blocks or steps, or shorten the program")
-    ids = np.zeros((len(batch), rows, columns), np.int64)
-    parameters = np.zeros((len(batch), rows, columns, SLOTS), np.float64)
+    if needed > rows:
+        said = f"a program of {needed} blocks does not fit {rows} blocks"
+        raise ShapeProgError(said, "allow more blocks, or shorten the program")
+    ids = np.zeros((len(batch), rows, steps), np.int64)
+    parameters = np.zeros((len(batch), rows, steps, SLOTS), np.float64)
     known = language()
     for b, each in enumerate(chains):
         for k, chain in enumerate(each):
             for j, node in enumerate(chain):
                 ids[b, k, j] = known[node.name].id
                 parameters[b, k, j, : len(node.values)] = node.values
-    code = Code(torch.from_numpy(ids).to(device), torch.from_numpy(parameters).to(device, dtype))
+    code = Code(torch.from_numpy(ids), torch.from_numpy(parameters).to(dtype))
     return code[0] if isinstance(programs, Program) else code
 
 

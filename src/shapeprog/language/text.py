@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from shapeprog.errors import ShapeProgError
 from shapeprog.language.program import Loop, Node, Program
 from shapeprog.language.statement import language
-from shapeprog.language.syntax import DEEPEST
+from shapeprog.language.syntax import DEEPEST, LONGEST
 from shapeprog.language.syntax import parse as parse
 
 INDENT = "    "
@@ -21,12 +21,13 @@ INDENT = "    "
 def format_program(program: Program) -> str:
     """The canonical text of a program: parameters by name in declared order, the fewest digits, loops i, j, k...
 
-    Raises
-    ------
-    ShapeProgError
-        If a number is not finite, a statement is not declared or has more or fewer, or loops nest deeper than text can.
+    A ``ShapeProgError`` if a number is not finite, a statement is not declared or has more or fewer, or the text would
+    be longer, or its loops deeper, than can be read back.
     """
-    return "".join(f"{line}\n" for node in program.body for line in _lines(node, 0))
+    text = "".join(f"{line}\n" for node in program.body for line in _lines(node, 0))
+    if len(text) > LONGEST:
+        raise ShapeProgError(f"the text of this program has more than {LONGEST:,} letters", "keep it as .json")
+    return text
 
 
 def _call(node: Node) -> str:
@@ -37,12 +38,7 @@ def _call(node: Node) -> str:
     if len(node.values) != declared.size:
         said = f"{node.name} has {len(node.values)} numbers instead of {declared.size}"
         raise ShapeProgError(said, "mend the program")
-    words: list[str] = []
-    for parameter in declared.parameters:
-        numbers = [parameter.quantity.written(value) for value in node.values[parameter.slots]]
-        group = numbers[0] if len(numbers) == 1 else f"({', '.join(numbers)})"
-        words.append(group if declared.is_loop and not words else f"{parameter.name}={group}")
-    return f"{node.name}({', '.join(words)})"
+    return declared.call([each.written(value) for each, value in zip(declared.quantities, node.values, strict=True)])
 
 
 def _lines(node: Node, depth: int) -> Iterator[str]:

@@ -30,12 +30,7 @@ def unroll(program: Program | Sequence[Program] | Code) -> Scene:
     """The scene of a program, or scenes (B, N) of a batch; N is the largest number of primitives in it.
 
     Blocks that are not loops followed by one drawing statement draw nothing, nor do loops without copies, nor
-    primitives with a negative extent.
-
-    Raises
-    ------
-    ShapeProgError
-        If the loop counts multiply to more primitives than ``MOST_PRIMITIVES``.
+    primitives with a negative extent.  A ``ShapeProgError`` if there are more than ``MOST_PRIMITIVES``.
     """
     code = program if isinstance(program, Code) else encode(program)
     return Plan(code).scene(code.parameters)
@@ -213,10 +208,10 @@ def _copies(
     legal = draws & ((ids == EMPTY) | (ids == END) | (place <= step)).all(-1, keepdim=True)
     counts = values[..., 0].round().nan_to_num(0).clamp(0, MOST_PRIMITIVES + 1).long()
     counts = torch.where((place < step) & legal, counts, 1)
-    total = counts.double().prod(-1) * legal[:, 0]
+    total = torch.where((counts == 0).any(-1), 0, counts.double().prod(-1)) * legal[:, 0]  # the product may be infinite
     if float(total.sum()) > MOST_PRIMITIVES:
-        hint = f"lower the counts: at most {MOST_PRIMITIVES} primitives can be drawn at once"
-        raise ShapeProgError(f"the loops of this program make {float(total.sum()):.0f} copies", hint)
+        said = f"the loops of this program make more than {MOST_PRIMITIVES} copies"
+        raise ShapeProgError(said, "lower their counts: so many primitives can be drawn at once")
     last = total.long().cumsum(0)
     many = torch.arange(int(total.sum()), device=ids.device)
     row = torch.searchsorted(last, many, right=True)  # repeat_interleave wakes threads for a handful of rows

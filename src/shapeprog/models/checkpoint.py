@@ -9,26 +9,27 @@ import json
 import math
 import os
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import MISSING, asdict, dataclass, field, fields
 from pathlib import Path
-from typing import Any
+from typing import Any, get_origin, get_type_hints
 
 import torch
 from torch import Tensor, nn
 
 from shapeprog.errors import InputError, OutputError, ShapeProgError, did_you_mean
 from shapeprog.files import write_bytes
+from shapeprog.language.parameters import LARGEST
 from shapeprog.models.designs import build_generator
 from shapeprog.models.executor import NeuralExecutor
 from shapeprog.models.generator import Generator
+from shapeprog.models.tensor_file import Header, file_bytes, read_header, read_tensors, same_kind
 from shapeprog.models.vocabulary import Vocabulary
 
 SUFFIX = ".safetensors"
 SHIPPED = Path(__file__).with_name("weights")
 """Folder of the weights that ship with the package."""
 
-_LARGEST_HEADER = 100 << 20
-_LENGTH = 8
+_CALLED = {str: "text", int: "whole number", dict: "set of entries"}
 
 
 @dataclass(frozen=True)
@@ -122,8 +123,6 @@ def save_checkpoint(path: str | os.PathLike[str], module: nn.Module, card: Card,
     OutputError
         If the file cannot be written, or a weight is not finite (as after training that diverged).
     """
-    from safetensors.torch import save
-
     tensors = {}
     for name, value in module.state_dict().items():
         stored = value.detach().to(
@@ -134,7 +133,7 @@ def save_checkpoint(path: str | os.PathLike[str], module: nn.Module, card: Card,
         tensors[name] = stored.contiguous()
     parameters = sum(each.numel() for each in module.parameters())
     metadata = {"card": json.dumps(asdict(card), allow_nan=False), "parameters": str(parameters)}
-    write_bytes(path, save(tensors, metadata))  # safetensors' own files are for their owner alone
+    write_bytes(path, file_bytes(tensors, metadata))  # safetensors' own files are for their owner alone
 
 
 def load_checkpoint(name: str | os.PathLike[str], *, device: torch.device | str = "cpu") -> tuple[nn.Module, Card]:
@@ -152,16 +151,15 @@ def load_checkpoint(name: str | os.PathLike[str], *, device: torch.device | str 
     ShapeProgError
         If the design is not known, or a statement it was trained with has changed.
     """
-    from safetensors.torch import load_file
-
     path = _found(name)
-    card = read_card(path).card
+    header = read_header(path)
+    card = _listed(path, header).card
     module = _build(path, card)
-    stored = load_file(path)
+    _check_fit(path, header, module.state_dict())
+    stored = read_tensors(path)
     for key, value in stored.items():
         if not value.isfinite().all():
             raise InputError(f"{path}: {_bad(value)} of {key} are not finite", "use weights of an earlier step")
-    _check_shapes(path, stored, module.state_dict())
     module.load_state_dict(stored)
     return module.to(device).eval(), card
 
@@ -188,20 +186,14 @@ def list_checkpoints(
     """Weights that ship, then those in folders, with what is wrong with a file instead where it cannot be used.
 
     Only headers are read.
-
-    Raises
-    ------
-    InputError
-        If a folder does not exist.
     """
     for folder in [*([SHIPPED] if shipped and SHIPPED.is_dir() else []), *(Path(each) for each in folders)]:
-        if not folder.exists():
-            raise InputError(f"there is no folder {folder}", "check the path")
         for path in sorted(folder.glob(f"*{SUFFIX}")) if folder.is_dir() else [folder]:
             try:
-                if folder.is_dir() and "card" not in _header(path).get("__metadata__", {}):
+                header = read_header(path)
+                if folder.is_dir() and "card" not in header.metadata:
                     continue  # something else, such as the state of a run
-                yield path, read_card(path)
+                yield path, _listed(path, header)
             except ShapeProgError as error:
                 yield path, error
 
@@ -212,10 +204,14 @@ def read_card(path: str | os.PathLike[str]) -> Listed:
     Raises
     ------
     InputError
-        If it is no file of weights of this package, or is cut short.
+        If it is no file of weights of this package, or is damaged.
     """
     path = Path(path)
-    metadata = _header(path).get("__metadata__", {})
+    return _listed(path, read_header(path))
+
+
+def _listed(path: Path, header: Header) -> Listed:
+    metadata = header.metadata
     if "card" not in metadata:
         raise InputError(
             f"{path} holds weights without a card, so nothing tells which network they are for",
@@ -223,11 +219,30 @@ def read_card(path: str | os.PathLike[str]) -> Listed:
         )
     try:
         told = json.loads(metadata["card"])
-        known = {each.name for each in fields(Card)}
-        card = Card(**{key: value for key, value in told.items() if key in known})
-        return Listed(path.stem, path, card, int(metadata["parameters"]), path.stat().st_size)
-    except (ValueError, TypeError, KeyError, AttributeError) as error:
-        raise InputError(f"the card of {path} cannot be read: {error}", "use weights of this version") from error
+        json.dumps(told, allow_nan=False)  # numbers that are not finite are no JSON, whatever Python reads
+        parameters = int(metadata["parameters"])
+    except (ValueError, KeyError, RecursionError) as error:
+        raise _unreadable(path, "it is no JSON, or the number of parameters is missing") from error
+    if not isinstance(told, dict):
+        raise _unreadable(path, "it holds no entries")
+    kinds = get_type_hints(Card)
+    for each in fields(Card):
+        kind = get_origin(kinds[each.name]) or kinds[each.name]
+        if each.name in told and type(told[each.name]) is not kind:
+            raise _unreadable(path, f"its {each.name} is no {_CALLED[kind]}")
+        if each.name not in told and each.default is each.default_factory is MISSING:
+            raise _unreadable(path, f"it tells no {each.name}")
+    scores = told.get("scores", {}).values()
+    if not all(type(score) in (int, float) and abs(score) <= LARGEST for score in scores):
+        raise _unreadable(path, "its scores are no numbers")
+    card = Card(**{each.name: told[each.name] for each in fields(Card) if each.name in told})
+    return Listed(path.stem, path, card, parameters, header.size)
+
+
+def _unreadable(path: Path, why: str) -> InputError:
+    return InputError(
+        f"the card of {path} cannot be read: {why}", "copy the file again, or use weights of this version"
+    )
 
 
 def _found(name: str | os.PathLike[str]) -> Path:
@@ -242,57 +257,35 @@ def _found(name: str | os.PathLike[str]) -> Path:
     return path
 
 
-def _header(path: Path) -> dict[str, Any]:
-    """The header of a safetensors file: 8 bytes of length, then JSON; the last tensor must lie within the file."""
-    if path.is_dir():
-        raise InputError(f"{path} is a folder, not a file of weights", f"list what it holds: shapeprog models {path}")
-    try:
-        size = path.stat().st_size
-        with open(path, "rb") as file:
-            length = int.from_bytes(file.read(_LENGTH), "little")
-            text = file.read(min(length, _LARGEST_HEADER))
-    except FileNotFoundError as error:
-        raise InputError(f"there is no file {path}", "check the path; list weights with: shapeprog models") from error
-    except OSError as error:
-        raise InputError(f"cannot read {path}: {error.strerror}", "check the path and its permissions") from error
-    if not text.startswith(b"{"):
-        raise InputError(
-            f"{path} is no safetensors file", "published .t7 files become one by: shapeprog import-weights"
-        )
-    cut = InputError(f"{path} is cut short: it has only {size} bytes", "copy or download it again")
-    if len(text) < length:
-        raise cut
-    try:
-        header: dict[str, Any] = json.loads(text)
-        end = max((each["data_offsets"][1] for key, each in header.items() if key != "__metadata__"), default=0)
-    except (ValueError, KeyError, TypeError, IndexError) as error:
-        raise InputError(f"{path} is no safetensors file: its header is broken", "copy or make it again") from error
-    if size < _LENGTH + length + end:
-        raise cut
-    return header
-
-
 def _build(path: Path, card: Card) -> nn.Module:
-    vocabulary = Vocabulary.check(card.vocabulary)
-    if card.kind == "executor":
-        return NeuralExecutor(vocabulary)
-    if card.kind != "generator":
-        raise InputError(f"{path} is for a {card.kind!r}", "it was written by a newer version; update shapeprog")
+    """A fresh network as the card tells it."""
+    if card.kind not in ("generator", "executor"):
+        raise InputError(f"{path} is for a {card.kind[:80]!r}", "it was written by a newer version; update shapeprog")
     settings = {key: tuple(value) if isinstance(value, list) else value for key, value in card.settings.items()}
     try:
+        vocabulary = Vocabulary.check(card.vocabulary)
+        if card.kind == "executor":
+            return NeuralExecutor(vocabulary)
         return build_generator(card.design, settings, vocabulary)
     except ShapeProgError as error:
         raise ShapeProgError(f"{path}: {error.message}", error.hint) from error
 
 
-def _check_shapes(path: Path, stored: dict[str, Tensor], wanted: dict[str, Tensor]) -> None:
-    for key in sorted(stored.keys() | wanted.keys()):
-        one, two = (tuple(each[key].shape) if key in each else None for each in (stored, wanted))
+def _check_fit(path: Path, header: Header, wanted: dict[str, Tensor]) -> None:
+    """Refuse tensors that the network does not have, lacks, or has with another shape or type."""
+    for key in sorted(header.tensors.keys() | wanted.keys()):
+        dtype, one = header.tensors.get(key, ("", None))
+        two = tuple(wanted[key].shape) if key in wanted else None
         if one != two:
             told = [f"has the shape {shape}" if shape is not None else "is missing" for shape in (one, two)]
             raise InputError(
-                f"{path} does not fit its network: {key} {told[0]} in the file and {told[1]} in the network",
+                f"{path} does not fit its network: {key[:80]!r} {told[0]} in the file and {told[1]} in the network",
                 "it was written by another version; make it again",
+            )
+        if not same_kind(dtype, wanted[key].dtype):
+            raise InputError(
+                f"{path} does not fit its network: the numbers of {key} are {dtype}, which it cannot use",
+                "make it again",
             )
 
 

@@ -8,8 +8,11 @@ a file that asks for anything else is refused.
 from __future__ import annotations
 
 import argparse
+import io
 import os
 import pickle
+import warnings
+import zipfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -28,6 +31,10 @@ PARALLEL = "module."
 
 COUNTER = "num_batches_tracked"
 """End of the names that older versions of torch did not write."""
+
+
+LARGEST = 256 << 20
+"""Bytes of the largest file that is read, many times those of the published ones."""
 
 
 def read_published(path: str | os.PathLike[str]) -> nn.Module:
@@ -50,6 +57,9 @@ def read_published(path: str | os.PathLike[str]) -> nn.Module:
     ):
         fitted = _fitted(state, module.state_dict())
         if isinstance(fitted, dict):
+            broken = [name for name, each in fitted.items() if not each.isfinite().all()]
+            if broken:
+                raise InputError(f"{path}: not all values of {broken[0]} are finite", "get the file again")
             module.load_state_dict(fitted)
             return module.eval()
         problems.append((len(fitted), f"as a {what} {_few(fitted)}"))
@@ -60,49 +70,80 @@ def read_published(path: str | os.PathLike[str]) -> nn.Module:
 
 
 def _weights(path: Path) -> dict[str, Tensor]:
-    """The tensors of a file by name, without the prefix of parallel training."""
+    """The weights of a file by name, without the prefix of parallel training and without counters."""
+    content = _content(path)
     try:
-        with torch.serialization.safe_globals([argparse.Namespace]):
-            content = torch.load(path, map_location="cpu", weights_only=True)
-    except FileNotFoundError as error:
-        raise InputError(f"there is no file {path}", "check the path") from error
-    except (IsADirectoryError, PermissionError) as error:
-        raise InputError(f"cannot read {path}: {error.strerror}", "check the path") from error
+        with torch.serialization.safe_globals([argparse.Namespace]), warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            told = torch.load(io.BytesIO(content), map_location="cpu", weights_only=True)
     except pickle.UnpicklingError as error:
         raise InputError(
             f"{path} is no file of weights, or holds more than weights and settings; nothing in it was run",
             "only weights and an argparse.Namespace are read; get the file again from where it was published",
         ) from error
     except Exception as error:  # what a torn or foreign file makes torch raise is not said anywhere
-        told = (str(error) or type(error).__name__).splitlines()[0]
-        raise InputError(f"{path} is no file of weights, or is cut short: {told}", "get it again") from error
-    state: Any = content.get("model", content) if isinstance(content, Mapping) else None
+        raise InputError(f"{path} is no file of weights, or is damaged", "get it again") from error
+    state: Any = told.get("model", told) if isinstance(told, Mapping) else None
     if not isinstance(state, Mapping) or not state or not all(isinstance(each, Tensor) for each in state.values()):
         raise InputError(f"{path} holds no weights under 'model'", "give a checkpoint of Tian et al.")
-    broken = [name for name, each in state.items() if not each.isfinite().all()]
-    if broken:
-        raise InputError(f"{path}: not all values of {broken[0]} are finite", "get the file again")
-    return {str(name).removeprefix(PARALLEL): each for name, each in state.items()}
+    weights = {
+        str(name).removeprefix(PARALLEL): each for name, each in state.items() if not str(name).endswith(COUNTER)
+    }
+    odd = [name[:80] for name, each in weights.items() if not _plain(each)]
+    if odd:
+        raise InputError(f"{path}: {odd[0]} is no plain tensor of real numbers", "give a checkpoint of Tian et al.")
+    return weights
+
+
+def _content(path: Path) -> bytes:
+    """The bytes of a file; torch packs nothing, so archives that unpack to more are refused unread."""
+    if path.exists() and not path.is_file():
+        raise InputError(f"{path} is no regular file", "name a published checkpoint")
+    try:
+        if path.stat().st_size > LARGEST:
+            raise InputError(f"{path} is larger than {LARGEST >> 20} MB", "published checkpoints have about 6 MB")
+        content = path.read_bytes()
+    except FileNotFoundError as error:
+        raise InputError(f"there is no file {path}", "check the path") from error
+    except OSError as error:
+        raise InputError(f"cannot read {path}: {error.strerror}", "check the path") from error
+    if content.startswith(b"PK"):
+        try:
+            sizes = [each.file_size for each in zipfile.ZipFile(io.BytesIO(content)).infolist()]
+        except Exception as error:  # nor is it said what a damaged archive makes zipfile raise
+            raise InputError(f"{path} is no file of weights, or is damaged", "get it again") from error
+        if sum(sizes) > len(content):
+            raise InputError(f"{path} is a packed archive, which torch does not write", "unpack it, or get it again")
+    return content
+
+
+def _plain(tensor: Tensor) -> bool:
+    """Whether a tensor is dense, in memory, and holds a real number of its own for each of its places."""
+    dense = tensor.layout == torch.strided and not tensor.is_nested and not tensor.is_quantized
+    if not dense or tensor.device.type != "cpu" or not tensor.is_floating_point():
+        return False
+    return tensor.untyped_storage().nbytes() >= tensor.numel() * tensor.element_size()
 
 
 def _fitted(state: dict[str, Tensor], wanted: dict[str, Tensor]) -> dict[str, Tensor] | list[str]:
     """The weights under the names of the network, or what does not fit: by names, else by their order and shapes."""
-    found = {name: each for name, each in state.items() if not name.endswith(COUNTER)}
     places = {name: each for name, each in wanted.items() if not name.endswith(COUNTER)}
     counters = {name: each for name, each in wanted.items() if name.endswith(COUNTER)}
-    lacking = [f"{name} is missing" for name in places if name not in found]
-    lacking += [f"{name} is not known" for name in found if name not in places]
+    lacking = [f"{name} is missing" for name in places if name not in state]
+    lacking += [f"{name} is not known" for name in state if name not in places]
     lacking += [
-        f"{name} has the shape {tuple(found[name].shape)}, not {tuple(each.shape)}"
+        f"{name} has the shape {tuple(state[name].shape)}, not {tuple(each.shape)}"
         for name, each in places.items()
-        if name in found and found[name].shape != each.shape
+        if name in state and state[name].shape != each.shape
     ]
     if not lacking:
-        return {**found, **counters}
-    if [each.shape for each in found.values()] == [each.shape for each in places.values()]:
-        return {**dict(zip(places, found.values(), strict=True)), **counters}
-    return lacking
+        fitting = state
+    elif [each.shape for each in state.values()] == [each.shape for each in places.values()]:
+        fitting = dict(zip(places, state.values(), strict=True))
+    else:
+        return lacking
+    return {name: each.to(wanted[name].dtype) for name, each in fitting.items()} | counters
 
 
 def _few(lacking: list[str]) -> str:
-    return ", ".join(lacking[:3]) + (f" and {len(lacking) - 3} more" if len(lacking) > 3 else "")
+    return ", ".join(each[:200] for each in lacking[:3]) + (f" and {len(lacking) - 3} more" if len(lacking) > 3 else "")

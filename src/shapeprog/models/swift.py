@@ -16,9 +16,13 @@ import torch
 from jaxtyping import Bool, Float, Int, UInt8
 from torch import Tensor, nn
 
+from shapeprog.errors import ShapeProgError
 from shapeprog.language.statement import SLOTS
 from shapeprog.models.generator import Generator, Memory, Said, Step, stacked
 from shapeprog.models.vocabulary import Vocabulary
+
+LARGEST_SIZE = 1024
+"""Channels of the widest layer, and the largest value: what a damaged card asks for still fits the memory."""
 
 WINDOW = 2
 """Values on either side of the likeliest over which the mean is taken."""
@@ -45,6 +49,19 @@ class SwiftSettings:
     feature: int = 256
     low: int = -24
     high: int = 40
+
+    def __post_init__(self) -> None:
+        sizes = (*self.widths, self.squeeze, self.feature) if isinstance(self.widths, tuple) else ()
+        if len(sizes) != 5 or not all(type(each) is int and 0 < each <= LARGEST_SIZE for each in sizes):
+            raise ShapeProgError(
+                "three widths, squeeze and feature are sizes of layers",
+                f"choose whole numbers from 1 to {LARGEST_SIZE}",
+            )
+        ends = (self.low, self.high)
+        if not all(type(each) is int and abs(each) <= LARGEST_SIZE for each in ends) or self.low >= self.high:
+            raise ShapeProgError(
+                "low and high are no range of whole numbers", f"they end at {LARGEST_SIZE}, as -24 to 40"
+            )
 
 
 class Swift(Generator):

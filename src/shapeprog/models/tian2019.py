@@ -20,6 +20,7 @@ import torch.nn.functional as F
 from jaxtyping import Bool, Float, Int, UInt8
 from torch import Tensor, nn
 
+from shapeprog.errors import ShapeProgError
 from shapeprog.geometry.cells import unpack
 from shapeprog.language.statement import EMPTY, SLOTS
 from shapeprog.language.tensors import Code
@@ -60,6 +61,12 @@ class Tian2019Settings:
     legal: bool = True
     padding: float = 1.0
     unused: float = 0.0
+
+    def __post_init__(self) -> None:
+        if self.statistics not in ("running", "batch"):
+            raise ShapeProgError(f"there are no statistics {self.statistics!r}", "they are 'running' or 'batch'")
+        if type(self.legal) is not bool or not all(type(each) in (int, float) for each in (self.padding, self.unused)):
+            raise ShapeProgError("legal is true or false, padding and unused are weights", "write numbers such as 0.1")
 
 
 PUBLISHED = Tian2019Settings(statistics="batch", legal=False, padding=0.1, unused=0.1)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from reprlib import repr as shortened
 from typing import Any
 
 import torch
@@ -116,13 +117,15 @@ class Vocabulary:
         for name, described in record.items():
             if name not in known:
                 raise ShapeProgError(
-                    f"the weights know a statement {name!r} that is not registered",
+                    f"the weights know a statement {name[:80]!r} that is not registered",
                     "load the module that declares it (--with FILE), or use weights trained without it",
                 )
+            if not isinstance(described, dict):
+                raise ShapeProgError(f"the weights do not say what the statement {name!r} was", "use other weights")
             current = _described(known[name])
             changed = sorted(key for key in described | current if described.get(key) != current.get(key))
             if changed:
-                told = "; ".join(f"{key} was {described.get(key)}, is {current.get(key)}" for key in changed)
+                told = "; ".join(f"{key} was {shortened(described.get(key))}, is {current.get(key)}" for key in changed)
                 raise ShapeProgError(
                     f"the statement {name!r} has changed since the weights were trained: {told}",
                     "restore its declaration, give the new one another name, or train new weights",

@@ -5,14 +5,16 @@ from __future__ import annotations
 import contextlib
 import json
 import math
-import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 from shapeprog.errors import InputError, ShapeProgError
-from shapeprog.files import make_folder, output_error, write_bytes, write_text
+from shapeprog.files import append_line, lock, make_folder, output_error, sync, write_bytes, write_text
+from shapeprog.training.state import card_of
 
 STATE, WEIGHTS, BEST, LOG, LOCK = "state.safetensors", "weights.safetensors", "best.safetensors", "log.jsonl", "lock"
+PREVIOUS = "previous.safetensors"
+"""The state before the last one."""
 
 Record = dict[str, float]
 """What one step has to tell, by name: always ``step`` and ``visits``."""
@@ -43,49 +45,69 @@ def locked(folder: Path, needed: bool = True) -> Iterator[None]:
     except OSError as error:
         raise output_error(path, error) from error
     with stream:
-        if not _take(stream.fileno()):
+        if not lock(stream.fileno()):
             raise ShapeProgError(
                 f"another process is training into {folder}", "wait for it, stop it, or choose another folder"
             )
         yield
 
 
-def _take(file: int) -> bool:
-    """Lock an open file if nobody else has."""
-    try:
-        if os.name == "nt":
-            import msvcrt
-
-            msvcrt.locking(file, msvcrt.LK_NBLCK, 1)  # type: ignore[attr-defined,unused-ignore]
-        else:
-            import fcntl
-
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError:
-        return False
-    return True
-
-
 def read_state(folder: Path, restart: bool) -> bytes | None:
-    """The bytes of the state in a folder; ``None`` where there is none or the run shall begin anew.
+    """The bytes of the state in a folder; ``None`` where it holds no run or the run shall begin anew.
 
     Raises
     ------
     InputError
-        If it cannot be read.
+        If it cannot be read, is damaged, or is missing from a run: names the last state that is good.
     """
     path = folder / STATE
-    if restart or not path.exists():
+    if restart:
         return None
+    if not path.exists():
+        if (folder / LOG).exists():
+            raise _lost(folder, f"{folder} holds the log of a run but no {STATE}")
+        return None
+    content = _content(path)
+    try:
+        card_of(content, str(path))
+    except InputError as error:
+        raise _lost(folder, error.message) from error
+    return content
+
+
+def _content(path: Path) -> bytes:
     try:
         return path.read_bytes()
     except OSError as error:
         raise InputError(f"cannot read {path}: {error.strerror}", "check the file, or begin with --restart") from error
 
 
-def write_state(folder: Path, content: bytes) -> None:
-    """Keep a state, whole or not at all: the last good one stays if this fails."""
+def _lost(folder: Path, problem: str) -> InputError:
+    """The error for a run whose state is lost, with what it can go on from."""
+    path = folder / PREVIOUS
+    try:
+        step = card_of(_content(path), str(path))["step"]
+    except InputError:
+        return InputError(f"{problem}; there is no other state", "begin anew with --restart")
+    return InputError(
+        f"{problem}; the last good state is {path}, of step {step}",
+        f"rename it to {STATE} and give the same command, which then goes on from there; or begin anew with --restart",
+    )
+
+
+def begin_state(folder: Path, content: bytes) -> None:
+    """Keep the first state of a run, in the place of whatever run the folder held."""
+    with contextlib.suppress(OSError):
+        (folder / PREVIOUS).unlink(missing_ok=True)
     write_bytes(folder / STATE, content)
+
+
+def write_state(folder: Path, content: bytes) -> None:
+    """Keep a state, whole or not at all, and beside it the one before."""
+    path = folder / STATE
+    with contextlib.suppress(OSError):  # there is none, or it cannot be read
+        write_bytes(folder / PREVIOUS, path.read_bytes())
+    write_bytes(path, content)
 
 
 class Log:
@@ -102,6 +124,8 @@ class Log:
 
     Raises
     ------
+    InputError
+        If the log that is gone on with is damaged, or lacks records.
     ShapeProgError
         If TensorBoard is asked for and not installed.
     """
@@ -111,8 +135,15 @@ class Log:
         if folder is None:
             return
         self._path = folder / LOG
-        kept = [json.dumps(each) for each in read_log(folder) if each["step"] <= step]
-        write_text(self._path, "".join(f"{line}\n" for line in kept))
+        if step == 0:
+            write_text(self._path, "")
+        elif self._path.exists():
+            records = read_log(folder)
+            unbroken = [each for place, each in enumerate(records) if each["step"] == records[0]["step"] + place]
+            kept = [each for each in unbroken if each["step"] <= step]
+            if not kept or kept[-1]["step"] < step:
+                raise _broken(self._path, f"it does not reach to step {step}, that of the state", kept)
+            write_text(self._path, "".join(f"{json.dumps(each)}\n" for each in kept))
         if tensorboard:
             self._curves = _curves(folder, step)
 
@@ -128,27 +159,51 @@ class Log:
         if self._path is None:
             return
         finite = {name: value for name, value in record.items() if math.isfinite(value)}
-        try:
-            with self._path.open("a", encoding="utf-8") as stream:
-                stream.write(json.dumps(finite) + "\n")
-            if self._curves is not None:
+        append_line(self._path, json.dumps(finite))
+        if self._curves is not None:
+            try:
                 for name, value in finite.items():
                     self._curves.add_scalar(name, value, int(record["step"]))
-        except OSError as error:
-            raise output_error(self._path, error) from error
+            except OSError as error:
+                raise output_error(self._path.parent, error) from error
+
+    def settle(self) -> None:
+        """See to it that the records are on the disk, before a state that relies on them."""
+        if self._path is not None:
+            sync(self._path)
 
 
 def read_log(folder: Path) -> list[Record]:
-    """The records of a run, in order; a line that was cut short ends them."""
+    """The records of a run, in order; a last line that was cut short is left out.
+
+    Raises
+    ------
+    InputError
+        If the log cannot be read or another line of it is damaged: names the last record that is good.
+    """
     path = folder / LOG
+    if not path.exists():
+        return []
+    *lines, _ = _content(path).split(b"\n")
     records: list[Record] = []
-    for line in path.read_text(encoding="utf-8").splitlines() if path.exists() else []:
+    for number, line in enumerate(lines, 1):
         try:
             record = json.loads(line)
-        except ValueError:
-            break
+            if not (isinstance(record["step"], int) and all(isinstance(each, int | float) for each in record.values())):
+                raise TypeError
+        except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+            raise _broken(path, f"line {number} is no record", records) from error
         records.append(record)
     return records
+
+
+def _broken(path: Path, problem: str, good: Sequence[Record]) -> InputError:
+    """The error for a log that does not belong to the state beside it any more."""
+    last = f"the last good record is that of step {good[-1]['step']:.0f}" if good else "there is no good record"
+    return InputError(
+        f"the log {path} is damaged: {problem}; {last}",
+        "the state is not: move the log away and the run goes on with a new one, or begin anew with --restart",
+    )
 
 
 def _curves(folder: Path, step: int):  # type: ignore[no-untyped-def]  # a SummaryWriter, which may not be installed

@@ -138,7 +138,7 @@ def _read(source: Path, form: Form) -> Iterator[tuple[str, Program]]:
         for path in sorted(source.glob("*.shape")):
             yield path.stem, parse(read_text(path), str(path))
         return
-    for number, line in enumerate(read_text(source).splitlines(), 1):
+    for number, line in enumerate(read_text(source).split("\n"), 1):
         if line.strip():
             yield _entry(line, form, f"line {number} of {source.name}")
 

@@ -17,7 +17,7 @@ from torch import Tensor, nn
 
 from shapeprog.errors import ShapeProgError
 from shapeprog.training.engine import Engine
-from shapeprog.training.folder import BEST, WEIGHTS, Log, Record, locked, read_state, write_state
+from shapeprog.training.folder import BEST, WEIGHTS, Log, Record, begin_state, locked, read_state, write_state
 from shapeprog.training.settings import Settings
 from shapeprog.training.state import capture, card_of, restore
 
@@ -61,8 +61,9 @@ def run(
 ) -> Iterator[Record]:
     """Train, yielding one record per step; a run that the folder holds goes on where it was saved.
 
-    The folder gets ``state.safetensors``, from which the run goes on; ``log.jsonl``; after each validation
-    ``weights.safetensors``; and ``best.safetensors`` whenever the score is the best so far.
+    The folder gets ``state.safetensors``, from which the run goes on, and ``previous.safetensors``, the one before it;
+    ``log.jsonl``; after each validation ``weights.safetensors``; and ``best.safetensors`` whenever the score is the
+    best so far.
 
     Parameters
     ----------
@@ -104,10 +105,15 @@ def run(
         restore(state, module, optimiser)
         step, best, steps = card["step"], card["best"], settings.steps(engine.processes)
         if engine.writes and step == 0:
-            write_state(folder, state)  # tells at once where nothing can be written, and replaces an older run
+            begin_state(folder, state)  # tells at once where nothing can be written, and replaces an older run
         if engine.writes and step >= steps and not (folder / WEIGHTS).exists():
             objective.save(folder / WEIGHTS, step * together, _validate(objective, engine))  # fewer visits than before
         with Log(folder if engine.writes else None, step, tensorboard) as log:
+
+            def save() -> None:
+                log.settle()
+                write_state(folder, capture(module, optimiser, step, told, best))
+
             saved = clock = time.monotonic()
             for batch in engine.ahead(objective.batch, range(step, steps)):
                 for group in optimiser.param_groups:
@@ -143,13 +149,13 @@ def run(
                 log.write(record)
                 ending = step == steps or stopping > 0
                 if engine.writes and (ending or time.monotonic() - saved >= save_seconds):
-                    write_state(folder, capture(module, optimiser, step, told, best))
+                    save()
                     saved = time.monotonic()
                 try:
                     yield record
                 except GeneratorExit:
                     if engine.writes:
-                        write_state(folder, capture(module, optimiser, step, told, best))
+                        save()
                     raise
                 if ending:
                     break

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
+from hashlib import sha256
 from typing import Any
 
 import torch
@@ -15,6 +16,9 @@ from torch import Tensor, nn
 from shapeprog.errors import InputError
 
 _MODULE, _OPTIMISER = "module/", "optimiser/"
+
+_UNSIGNED = "0" * 64
+"""What stands in a state for its digest while that is computed."""
 
 
 def capture(
@@ -36,8 +40,9 @@ def capture(
         for name, value in optimiser.state.get(weight, {}).items():
             tensors[f"{_OPTIMISER}{place}/{name}"] = value
     whole = {name: value.detach().cpu().contiguous().clone() for name, value in tensors.items()}
-    card = {"step": step, "settings": settings, "best": best}
-    return save(whole, {"run": json.dumps(card, allow_nan=True)})
+    card = {"digest": _UNSIGNED, "step": step, "settings": settings, "best": best}
+    content = save(whole, {"run": json.dumps(card, allow_nan=True)})
+    return content.replace(_UNSIGNED.encode(), sha256(content).hexdigest().encode(), 1)
 
 
 def restore(content: bytes, module: nn.Module, optimiser: torch.optim.Optimizer) -> None:
@@ -66,7 +71,7 @@ def restore(content: bytes, module: nn.Module, optimiser: torch.optim.Optimizer)
 
 
 def card_of(content: bytes, where: str) -> dict[str, Any]:
-    """Step, settings and best score of a captured state.
+    """Step, settings and best score of a captured state, every byte of which is checked.
 
     Raises
     ------
@@ -75,14 +80,15 @@ def card_of(content: bytes, where: str) -> dict[str, Any]:
     """
     try:
         size = int.from_bytes(content[:8], "little")
-        header = json.loads(content[8 : 8 + size])
-        card = json.loads(header["__metadata__"]["run"])
-        last = max([0, *(each["data_offsets"][1] for name, each in header.items() if name != "__metadata__")])
-        if len(content) != 8 + size + last or not isinstance(card["step"], int):
-            raise ValueError
-    except (ValueError, KeyError, TypeError) as error:
-        raise InputError(f"{where} is no state of a training run, or damaged", "begin anew with --restart") from error
-    return dict(card)
+        card = dict(json.loads(json.loads(content[8 : 8 + size])["__metadata__"]["run"]))
+        digest = str(card.pop("digest"))
+        good = digest == sha256(content.replace(digest.encode(), _UNSIGNED.encode(), 1)).hexdigest()
+    except (ValueError, KeyError, TypeError, RecursionError):
+        good = False
+    if not good:
+        problem = "is damaged, or no state of a training run" if content else "is empty"
+        raise InputError(f"{where} {problem}", "begin anew with --restart")
+    return card
 
 
 def _weights(optimiser: torch.optim.Optimizer) -> Iterator[Tensor]:

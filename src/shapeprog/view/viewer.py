@@ -83,7 +83,8 @@ def _creases(corners: Array, normals: Array) -> Array:
     starts, ends = corners.reshape(-1, 3), np.roll(corners, -1, 1).reshape(-1, 3)
     tilt = np.asarray(normals).reshape(-1, 3) + np.roll(normals, -1, 1).reshape(-1, 3)
     extent = float(np.ptp(corners.reshape(-1, 3), axis=0).max()) if len(corners) else 1.0
-    keys = np.rint(np.stack([starts, ends], 1) / max(extent, 1e-30) * 1e5).astype(np.int64)
+    inside = np.stack([starts, ends], 1) - corners.reshape(-1, 3).min(0, initial=np.inf)
+    keys = np.rint(inside / max(extent, 1e-30) * 1e5).astype(np.int64)
     swap = [tuple(one) > tuple(two) for one, two in keys.tolist()]
     keys[swap] = keys[swap][:, ::-1]
     _, first, place, count = np.unique(

@@ -8,7 +8,8 @@ from __future__ import annotations
 from importlib import import_module
 from pkgutil import iter_modules
 
-from shapeprog.geometry.primitive import Primitive, primitives
+from shapeprog.geometry.primitive import Primitive
+from shapeprog.geometry.primitive import primitives as primitives
 
 BUILT_IN: tuple[Primitive, ...] = tuple(
     primitives.register(import_module(f"{__name__}.{module.name}").PRIMITIVE) for module in iter_modules(__path__)

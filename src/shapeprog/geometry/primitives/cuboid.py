@@ -11,7 +11,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import numpy.typing as npt
 import torch
 from jaxtyping import Bool, Float, Int
 from torch import Tensor
@@ -20,7 +19,7 @@ from shapeprog.geometry.primitive import Kernels, Mesh, Points, Primitive, Scala
 from shapeprog.kernels.compile import helper
 from shapeprog.kernels.rows import clip, fill_box
 from shapeprog.kernels.table import CENTRE, ROTATION, SIZE
-from shapeprog.space import Array
+from shapeprog.space import Array, FloatArray
 
 FACES = 6
 """Faces in the order -0, +0, -1, +1, -2, +2."""
@@ -52,9 +51,13 @@ def distance(points: Points, size: Sizes) -> Scalars:
 
     inside = (over_up < 0) & (cross.abs() < half_depth * half_up)
     plane = safe_norm(torch.minimum(to_cap, to_side)) * torch.where(inside, -1.0, 1.0).to(points)
-    over_side = side.abs() - half_side
-    outer = safe_norm(plane.clamp(min=0) ** 2 + over_side.clamp(min=0) ** 2)
-    inner = torch.maximum(plane, over_side)
+    return meet(plane, side.abs() - half_side)
+
+
+def meet(one: Scalars, two: Scalars) -> Scalars:
+    """Signed distance to what two bodies at right angles have in common, by the signed distances to each."""
+    outer = safe_norm(one.clamp(min=0) ** 2 + two.clamp(min=0) ** 2)
+    inner = torch.maximum(one, two)
     return torch.where(inner > 0, outer, inner)
 
 
@@ -71,12 +74,16 @@ def areas(size: Sizes) -> Float[Tensor, "*batch faces"]:
     return torch.stack([cap, cap, slanted, slanted, end, end], -1)
 
 
+def _facing(face: Int[Tensor, "*batch"], like: Points) -> tuple[Float[Tensor, "*batch 1"], Bool[Tensor, "*batch 3"]]:
+    """Sign of a face, and which axis it is on."""
+    sign = (2 * (face % 2) - 1).to(like)
+    return sign[..., None], torch.arange(3, device=face.device) == (face // 2)[..., None]
+
+
 def sample(size: Sizes, face: Int[Tensor, "*batch"], u: Points) -> Points:
     """Uniform place on a face of the cube [-1, 1]^3."""
-    unit = 2 * u - 1
-    axis = face.div(2, rounding_mode="floor")
-    sign = (2 * (face % 2) - 1).to(unit)
-    return torch.where(torch.arange(3, device=u.device) == axis[..., None], sign[..., None], unit)
+    sign, axis = _facing(face, u)
+    return torch.where(axis, sign, 2 * u - 1)
 
 
 def place(size: Sizes, unit: Points) -> Points:
@@ -89,14 +96,12 @@ def normal(size: Sizes, unit: Points, face: Int[Tensor, "*batch"]) -> Points:
     """Outward normal of a face; the two slanted faces lean with the shear."""
     half_up, slant = size[..., 0], size[..., 3] / 2
     length = safe_norm(half_up**2 + slant**2)
-    axis = face.div(2, rounding_mode="floor")
-    sign = (2 * (face % 2) - 1).to(unit)
-    flat = (torch.arange(3, device=unit.device) == axis[..., None]).to(unit)
+    sign, axis = _facing(face, unit)
     slanted = torch.stack([-slant / length, half_up / length, torch.zeros_like(slant)], -1)
-    return sign[..., None] * torch.where((axis == 1)[..., None], slanted, flat)
+    return sign * torch.where(axis[..., 1:2], slanted, axis.to(unit))
 
 
-def mesh(size: npt.NDArray[np.float64]) -> Mesh:
+def mesh(size: FloatArray) -> Mesh:
     """Eight corners, twelve triangles."""
     corners = np.array([[a, b, c] for a in (-1, 1) for b in (-1, 1) for c in (-1, 1)], np.float64)
     vertices = corners * size[:3]

@@ -9,33 +9,22 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import numpy.typing as npt
 import torch
 from jaxtyping import Float, Int
 from torch import Tensor
 
-from shapeprog.geometry.primitive import Kernels, Mesh, Points, Primitive, Scalars, Sizes, Triple
+from shapeprog.geometry.primitive import Kernels, Mesh, Points, Primitive, Scalars, Sizes, Triple, safe_norm
 from shapeprog.geometry.random import uniform as uniform_at
 from shapeprog.kernels.bits import uniform
 from shapeprog.kernels.compile import helper
 from shapeprog.kernels.table import SIZE
-from shapeprog.space import Array
+from shapeprog.space import Array, FloatArray
 
-THINNEST = 1e-6
-"""Half axes in cells below this count as this where they divide."""
-
-STEPS = 24
-"""Newton steps to a foot; kernels stop once it no longer moves."""
-
-CLOSE = 1e-9
-"""How far from 1 the squared length of a place may be that counts as on the unit sphere: errors of the distance, which
-is least at the foot, are squares of this."""
-
-NODES = 12
-"""Places along each axis of the quadrature for the area."""
-
-TRIES = 40
-"""Places drawn before one is taken as it comes; at least half of them are kept each time."""
+THINNEST = 1e-6  # half axes in cells below this count as this where they divide
+STEPS = 24  # Newton steps to a foot; kernels stop once it no longer moves
+CLOSE = 1e-9  # of the squared length of a place to 1, for kernels; the distance, least at the foot, errs by its square
+NODES = 12  # places along each axis of the quadrature for the area
+TRIES = 40  # places drawn before one is taken as it comes; at least half of them are kept each time
 
 
 def _axes(size: Sizes) -> Points:
@@ -64,22 +53,21 @@ def foot(points: Points, size: Sizes) -> Points:
     return torch.where(points < 0, -u, u).to(points)
 
 
-def _outward(size: Sizes, unit: Points) -> Points:
-    """Outward unit normal at the image of a place on the unit sphere."""
-    a = _axes(size).clamp(min=THINNEST)
-    return torch.nn.functional.normalize(unit * a.amin(-1, keepdim=True) / a, dim=-1)
-
-
 def distance(points: Points, size: Sizes) -> Scalars:
     """Exact signed distance: along the normal from the foot to the point."""
     unit = foot(points, size)
-    return (_outward(size, unit).detach() * (points - _axes(size) * unit)).sum(-1)
+    return (normal(size, unit).detach() * (points - place(size, unit))).sum(-1)
+
+
+def _cuts(size: Sizes) -> Points:
+    """Products of two half axes each: the areas of the cuts across an axis, in units of pi."""
+    a, b, c = _axes(size).unbind(-1)
+    return torch.stack([b * c, a * c, a * b], -1)
 
 
 def _stretch(size: Sizes, unit: Points) -> Scalars:
     """How much larger the ellipsoid is than the unit sphere, per area, at a place on the sphere."""
-    a, b, c = _axes(size).unbind(-1)
-    return ((unit * torch.stack([b * c, a * c, a * b], -1)) ** 2).sum(-1).clamp(min=1e-24).sqrt()
+    return safe_norm(((unit * _cuts(size)) ** 2).sum(-1))
 
 
 def areas(size: Sizes) -> Float[Tensor, "*batch faces"]:
@@ -106,8 +94,7 @@ def sample(size: Sizes, face: Int[Tensor, "*batch"], u: Points) -> Points:
 
     Numbers for further places come from the stream whose seed is the third number.
     """
-    a, b, c = _axes(size).unbind(-1)
-    most = torch.stack([b * c, a * c, a * b], -1).amax(-1)
+    most = _cuts(size).amax(-1)
     one, two, three = u.unbind(-1)
     seed = (three.double() * 2**53).long()
     unit = _sphere(one, two)
@@ -127,12 +114,13 @@ def place(size: Sizes, unit: Points) -> Points:
     return _axes(size) * unit
 
 
-def normal(size: Sizes, unit: Points, face: Int[Tensor, "*batch"]) -> Points:
-    """Outward unit normal at a place."""
-    return _outward(size, unit)
+def normal(size: Sizes, unit: Points, face: Int[Tensor, "*batch"] | None = None) -> Points:
+    """Outward unit normal at the image of a place on the unit sphere, which is the one face."""
+    a = _axes(size).clamp(min=THINNEST)
+    return torch.nn.functional.normalize(unit * a.amin(-1, keepdim=True) / a, dim=-1)
 
 
-def mesh(size: npt.NDArray[np.float64], rings: int = 16, sides: int = 32) -> Mesh:
+def mesh(size: FloatArray, rings: int = 16, sides: int = 32) -> Mesh:
     """Rings between two poles, grown a little so that the volume is that of the ellipsoid."""
     height = np.cos(np.pi * np.arange(1, rings) / rings)[:, None]
     angle = 2 * np.pi * np.arange(sides) / sides

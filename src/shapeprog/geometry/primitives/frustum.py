@@ -5,16 +5,15 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import numpy.typing as npt
 import torch
 from jaxtyping import Float, Int
 from torch import Tensor
 
 from shapeprog.geometry.primitive import Kernels, Mesh, Points, Primitive, Scalars, Sizes, Triple, safe_norm
-from shapeprog.geometry.primitives.cylinder import SEGMENTS
+from shapeprog.geometry.primitives.cylinder import frustum_mesh
 from shapeprog.kernels.compile import helper
 from shapeprog.kernels.table import SIZE
-from shapeprog.space import Array
+from shapeprog.space import Array, FloatArray
 
 
 def _lengths(size: Sizes) -> tuple[Scalars, Scalars, Scalars]:
@@ -59,7 +58,7 @@ def sample(size: Sizes, face: Int[Tensor, "*batch"], u: Points) -> Points:
     root = (bottom**2 + (top**2 - bottom**2) * u[..., 2]).clamp(min=0).sqrt()
     along = u[..., 2] * (bottom + top) / (bottom + root).clamp(min=1e-12)
     side = face == 2
-    rim = torch.where(side, torch.ones_like(angle), u[..., 1].sqrt())
+    rim = torch.where(side, 1.0, u[..., 1].sqrt())
     axial = torch.where(side, 2 * along - 1, (2 * face - 1).to(u))
     return torch.stack([axial, rim * angle.cos(), rim * angle.sin()], -1)
 
@@ -80,18 +79,9 @@ def normal(size: Sizes, unit: Points, face: Int[Tensor, "*batch"]) -> Points:
     return torch.where((face == 2)[..., None], side, cap)
 
 
-def mesh(size: npt.NDArray[np.float64]) -> Mesh:
-    """A frustum over regular polygons with the areas of the circles, so that the volume is exact."""
-    half, bottom, top = (float(length) for length in size[:3])
-    step = 2 * math.pi / SEGMENTS
-    angle = step * np.arange(SEGMENTS)
-    ring = math.sqrt(step / math.sin(step)) * np.stack([np.zeros(SEGMENTS), np.cos(angle), np.sin(angle)], 1)
-    rise = np.array([half, 0.0, 0.0])
-    vertices = np.concatenate([bottom * ring - rise, top * ring + rise, [-rise, rise]])
-    a = np.arange(SEGMENTS)
-    b, low, high = (a + 1) % SEGMENTS, np.full(SEGMENTS, 2 * SEGMENTS), np.full(SEGMENTS, 2 * SEGMENTS + 1)
-    sides = [(a, b, b + SEGMENTS), (a, b + SEGMENTS, a + SEGMENTS), (low, b, a), (high, a + SEGMENTS, b + SEGMENTS)]
-    return vertices, np.concatenate([np.stack(side, 1) for side in sides]).astype(np.int64)
+def mesh(size: FloatArray) -> Mesh:
+    """Rings of the two circles, see :func:`frustum_mesh`."""
+    return frustum_mesh(*size[:3])
 
 
 def volume(size: Sizes) -> Scalars:

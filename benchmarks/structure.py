@@ -1,0 +1,210 @@
+"""What a person sees of inferred programs: meshes, objects in physical parts, and scans made of these.
+
+    python -m benchmarks.structure DATA --split val --out structure_val.jsonl
+    python -m benchmarks.structure --table structure_val.jsonl
+
+DATA holds ``shapenet_meshes/{bench,cabinet}_{val,test}/ID.ply`` (+Y up, front -Z) and
+``ikea_parts/CLASS/OBJECT/NN.ply`` (+Y up; in the order of their names every second object is test, the others val).
+One line of JSON is kept for every object; a run that was stopped goes on where it was.
+
+=======  ==============================================================================================================
+set      what inference is given
+=======  ==============================================================================================================
+bench    the mesh
+cabinet  the mesh
+ikea     the union of the part meshes
+fused    that union filled at 256 cells along its longest side, as one smooth mesh by marching cubes (scikit-image)
+noisy    20,000 points of that union, each coordinate with normal noise of .5 % of the diagonal of its box
+open     20,000 points of that union without the fifth that lies farthest to one side
+=======  ==============================================================================================================
+
+All are measured against the whole mesh, as ``shapeprog evaluate --parts`` does.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import multiprocessing
+import time
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+SETS = ("bench", "cabinet", "ikea", "fused", "noisy", "open")
+
+COLUMNS = (
+    "f1_half_percent", "f1_percent", "normals", "silhouette", "one_piece", "slivers", "part_recall", "part_precision",
+    "iou", "cd", "blocks", "statements", "primitives", "numbers", "seconds",
+)  # fmt: skip
+
+FLOORS = {"f1_half_percent": "f1_half_percent_floor", "f1_percent": "f1_percent_floor", "normals": "normals_floor"}
+
+SCANNED = 20_000
+"""Points of a scan."""
+
+NOISE = 0.005
+"""Standard deviation of the noise of a scan, as a share of the diagonal of the box of the object."""
+
+CELLS, MARGIN, SMOOTHING = 256, 4, 1.0
+"""Of a fused mesh: cells along the longest side, free cells around, standard deviation in cells of the smoothing."""
+
+MISSING = 0.2
+"""Share of the points of a scan that its missing side held."""
+
+
+@dataclass(frozen=True)
+class Task:
+    """One object of one set, as files, and how it is inferred."""
+
+    set: str
+    name: str
+    files: tuple[Path, ...]
+    blocks: int
+    seed: int
+
+
+def objects(data: Path, which: str, split: str) -> Iterator[tuple[str, tuple[Path, ...]]]:
+    """Names and mesh files of the objects of a set."""
+    from shapeprog.data.parts import part_files
+
+    if which in ("bench", "cabinet"):
+        for file in sorted((data / "shapenet_meshes" / f"{which}_{split}").glob("*.ply")):
+            yield file.stem, (file,)
+        return
+    known = part_files(data / "ikea_parts")
+    for name in list(known)[split == "test" :: 2]:
+        yield name, tuple(known[name])
+
+
+def measure(task: Task) -> dict[str, Any]:
+    """The row of one object."""
+    import torch
+
+    from shapeprog.data.orientation import axes_of
+    from shapeprog.data.parts import read_parts
+    from shapeprog.data.placement import shape_from_mesh, shape_from_points
+    from shapeprog.data.sampling import sample_surface
+    from shapeprog.evaluation.likeness import Triangles
+    from shapeprog.evaluation.metrics import evaluate_program
+    from shapeprog.evaluation.parts import part_scores
+    from shapeprog.inference import infer
+    from shapeprog.language.unroll import unroll
+
+    torch.set_num_threads(1)
+    started = time.perf_counter()
+    parts = read_parts(list(task.files))
+    counts = np.cumsum([0, *(len(vertices) for vertices, _ in parts)])
+    vertices = np.concatenate([vertices for vertices, _ in parts])
+    faces = np.concatenate([faces + first for (_, faces), first in zip(parts, counts, strict=False)])
+    axes = axes_of(task.files[0], "+y", "-z" if task.set in ("bench", "cabinet") else None)
+    if task.set in ("noisy", "open"):
+        cloud = scanned(sample_surface(vertices, faces, SCANNED, task.seed).astype(np.float64), task)
+        shape = shape_from_points(cloud, name=task.name, axes=axes, seed=task.seed)
+    else:
+        given = fused(vertices, faces) if task.set == "fused" else (vertices, faces)
+        shape = shape_from_mesh(*given, name=task.name, axes=axes, seed=task.seed)
+    result = infer(shape, blocks=task.blocks, seed=task.seed, budget=60)
+    seconds = time.perf_counter() - started
+    target = replace(shape, points=None, vertices=shape.frame.to_grid(vertices), faces=faces)
+    row = evaluate_program(result.program, target, result.snapped, seed=task.seed, looks=True)
+    if len(parts) > 1:
+        placed = [Triangles(shape.frame.to_grid(vertices), faces) for vertices, faces in parts]
+        row = replace(row, **part_scores(placed, unroll(result.program), task.seed)._asdict())
+    return asdict(row) | {"set": task.set, "seconds": seconds, "allowed": task.blocks, "seed": task.seed}
+
+
+def scanned(points: Any, task: Task) -> Any:
+    """The points of a scan: with noise, or without those of one side."""
+    random = np.random.default_rng((task.seed, *task.name.encode()))
+    if task.set == "noisy":
+        return points + random.normal(0, NOISE * np.linalg.norm(np.ptp(points, axis=0)), points.shape)
+    angle = random.uniform(0, 2 * np.pi)
+    side = points @ [np.cos(angle), 0, np.sin(angle)]
+    return points[side <= np.quantile(side, 1 - MISSING)]
+
+
+def fused(vertices: Any, faces: Any) -> tuple[Any, Any]:
+    """One closed mesh without inner faces, as scanning and image-to-3D models give: parts have grown together."""
+    from scipy.ndimage import gaussian_filter
+    from skimage.measure import marching_cubes
+
+    from shapeprog.data.voxelise import voxelise_mesh
+
+    low, high = vertices.min(0), vertices.max(0)
+    scale, middle = CELLS / (high - low).max(), (low + high) / 2
+    cells = voxelise_mesh((vertices - middle) * scale, faces, resolution=CELLS + 2 * MARGIN)
+    corners, triangles, *_ = marching_cubes(gaussian_filter(cells.astype(np.float32), SMOOTHING), 0.5)
+    return (corners + 0.5 - CELLS / 2 - MARGIN) / scale + middle, triangles.astype(np.int64)
+
+
+def run(args: argparse.Namespace) -> None:
+    """Measure what is not in the output yet, object after object, in several processes."""
+    out = Path(args.out)
+    out.parent.mkdir(parents=True, exist_ok=True)
+    known = [json.loads(line) for line in out.read_text().splitlines()] if out.exists() else []
+    done = {(row["set"], row["name"], row["allowed"]) for row in known}
+    todo = [
+        Task(which, name, files, blocks, args.seed)
+        for which in args.sets
+        for name, files in list(objects(Path(args.data), which, args.split))[: args.objects]
+        for blocks in args.blocks
+        if (which, name, blocks) not in done
+    ]
+    with multiprocessing.get_context("spawn").Pool(args.workers) as pool, out.open("a") as file:
+        for number, row in enumerate(pool.imap_unordered(measure, todo), 1):
+            file.write(json.dumps(row) + "\n")
+            file.flush()
+            print(f"\r{number}/{len(todo)}", end="", flush=True)
+    print()
+
+
+def table(path: Path) -> str:
+    """Markdown: the mean of every measure, with the floor in brackets where there is one."""
+    groups: dict[tuple[int, str], list[dict[str, Any]]] = {}
+    for line in path.read_text().splitlines():
+        row = json.loads(line)
+        groups.setdefault((row["allowed"], row["set"]), []).append(row)
+    lines = ["| set, objects | " + " | ".join(COLUMNS) + " |", "|" + "---|" * (len(COLUMNS) + 1)]
+    for (allowed, name), rows in sorted(groups.items(), key=lambda item: (item[0][0], SETS.index(item[0][1]))):
+        cells = [f"{name}, {len(rows)}, <= {allowed} blocks"]
+        for column in COLUMNS:
+            mean, floor = (_mean(rows, each) for each in (column, FLOORS.get(column, "")))
+            digits = 5 if column == "cd" else 1 if column in ("blocks", "statements", "primitives", "numbers") else 3
+            floored = "" if np.isnan(floor) else f" ({floor:.3f})"
+            cells.append("-" if np.isnan(mean) else f"{mean:.{digits}f}{floored}")
+        lines.append("| " + " | ".join(cells) + " |")
+    return "\n".join(lines)
+
+
+def _mean(rows: list[dict[str, Any]], column: str) -> float:
+    values = np.array([row.get(column, np.nan) for row in rows], np.float64)
+    known = values[np.isfinite(values)]
+    return float(known.mean()) if len(known) else float("nan")
+
+
+def main() -> None:
+    """Run, or print the table of a run."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("data", nargs="?", help="the folder described above")
+    parser.add_argument("--split", default="val", choices=("val", "test"))
+    parser.add_argument("--sets", nargs="*", default=list(SETS), choices=SETS)
+    parser.add_argument("--objects", type=int, default=None, help="only the first so many of each set")
+    parser.add_argument("--blocks", type=int, nargs="*", default=[10], help="most blocks, one run for each")
+    parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--out", default="structure.jsonl", help="rows, one line of JSON each; appended to")
+    parser.add_argument("--table", default=None, help="print the table of these rows and do nothing else")
+    args = parser.parse_args()
+    if args.table is None:
+        if args.data is None:
+            parser.error("name the folder of the data")
+        run(args)
+    print(table(Path(args.table or args.out)))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,120 @@
+"""What stands around every reader of shapes: regular files only, limits on what is read, and every failure in words."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import os
+import stat
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+
+from shapeprog.errors import InputError, ShapeProgError
+
+BYTES = 2**30
+"""Most bytes of a file that is read whole, and of an array once it is unpacked: 1 GiB."""
+
+CELLS = 1024**3
+"""Most cells of a voxel grid."""
+
+POINTS = 5_000_000
+"""Most points of a cloud, and most triangles of a mesh with all its parts placed."""
+
+SHAPES = 1_000_000
+"""Most shapes in one file."""
+
+_FEW = 5
+
+_UNREADABLE = {
+    errno.EACCES: ("there is no permission to read it", "change its permissions, or leave it out"),
+    errno.EPERM: ("there is no permission to read it", "change its permissions, or leave it out"),
+    errno.ENOENT: ("it is not there", "check the path"),
+    errno.ENOTDIR: ("a part of its path is a file, not a folder", "correct the path"),
+    errno.EISDIR: ("it is a folder", "name a file in it"),
+    errno.ELOOP: ("it is a link that leads to itself", "correct the link"),
+    errno.ENAMETOOLONG: ("its name is too long", "check the path"),
+    errno.EIO: ("the disk has a fault there", "copy the file from where it came from"),
+}
+
+
+def check_file(path: Path) -> None:
+    """Refuse what is no regular file (a pipe or a device may never end) before it is opened.
+
+    Raises
+    ------
+    InputError
+        If there is no such file, or it is a folder, a pipe, a socket or a device.
+    """
+    try:
+        kind = os.stat(path).st_mode
+    except FileNotFoundError as error:
+        raise InputError(f"there is no file {path}", "check the path") from error
+    except ValueError as error:  # a zero byte in the name
+        raise InputError(f"there is no file {str(path)!r}", "check the path") from error
+    if stat.S_ISDIR(kind):
+        raise InputError(f"{path} is a folder", "name a file in it, or read the whole folder with load_all")
+    if not stat.S_ISREG(kind):
+        raise InputError(f"{path} is a pipe, a socket or a device, no file", "copy what it gives into a file first")
+
+
+def read_whole(path: Path) -> bytes:
+    """The bytes of a regular file.
+
+    Raises
+    ------
+    InputError
+        If it is no regular file, is empty, or is larger than :data:`BYTES`.
+    """
+    check_file(path)
+    check_count(path.name, "bytes", path.stat().st_size, BYTES)
+    content = path.read_bytes()
+    if not content[:1000].strip() and not content.strip():
+        raise InputError(f"{path.name} is empty", "write the file again")
+    return content
+
+
+def check_count(name: str, what: str, count: int, most: int) -> None:
+    """Refuse a file that announces or holds more than can be read, before memory is taken for it."""
+    if count > most:
+        raise InputError(f"{name} has {count:,} {what}; at most {most:,} can be read", "make it smaller, or split it")
+
+
+@contextlib.contextmanager
+def in_words(path: Path, kind: str = "") -> Iterator[None]:
+    """Everything that a reader may raise, as an ``InputError`` that keeps its cause; ``kind`` is what it reads.
+
+    The readers of the libraries raise whatever the bytes of a damaged file lead them to, so that no list of
+    exceptions is complete.
+    """
+    try:
+        yield
+    except ShapeProgError:
+        raise
+    except MemoryError as error:
+        raise InputError(f"{path.name} needs more memory than there is", "make it smaller, or split it") from error
+    except OSError as error:
+        if error.errno is None:  # a library says so of what it read
+            raise _damaged(path, kind) from error
+        raise unreadable(path, error) from error
+    except Exception as error:
+        raise _damaged(path, kind) from error
+
+
+def unreadable(path: Path, error: OSError) -> InputError:
+    """The error in words for an ``OSError`` met while reading a file or a folder."""
+    cause, cure = _UNREADABLE.get(error.errno or 0, (error.strerror or "the system refuses it", "check the path"))
+    return InputError(f"{path} cannot be read: {cause}", cure)
+
+
+def few(names: Iterable[object]) -> str:
+    """The first of some names, for a message; ``nothing`` where there are none."""
+    listed = [str(name)[:40] for name in names]
+    return ", ".join(listed[:_FEW]) + (", ..." if len(listed) > _FEW else "") or "nothing"
+
+
+def _damaged(path: Path, kind: str) -> InputError:
+    kind = kind or path.suffix.removeprefix(".").upper() or "a shape"
+    return InputError(
+        f"{path.name} cannot be read as {kind}: it is damaged, cut short or of another format",
+        "write the file again, or convert it; --debug shows what its reader met",
+    )

@@ -1,0 +1,82 @@
+"""Does one physical part become one primitive?  Recall and precision of the parts of an object.
+
+A part is recovered where a primitive that no other part took, best pairs first, has IoU >= .5 with its oriented box.
+"""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+import torch
+
+from shapeprog.evaluation.likeness import Triangles
+from shapeprog.geometry.distance import each_distance
+from shapeprog.geometry.primitive import primitives
+from shapeprog.geometry.scene import Scene
+from shapeprog.space import Array
+
+ENOUGH = 0.5
+"""IoU with which a primitive stands for a part."""
+
+THINNEST = 0.1
+"""Half extents in cells that the box of a part has at least, so that sheets have a volume."""
+
+POINTS = 20_000
+"""Points drawn in the box of each part."""
+
+
+class PartScores(NamedTuple):
+    """How many parts have a primitive of their own, over the parts and over the primitives."""
+
+    part_recall: float
+    part_precision: float
+
+
+class Box(NamedTuple):
+    """An oriented box: centre (3,), axes (3, 3) as columns, and half extents (3,)."""
+
+    centre: Array
+    axes: Array
+    half: Array
+
+
+def oriented_box(part: Triangles) -> Box:
+    """The smallest box around a part, in any direction."""
+    bounds: Any = importlib.import_module("trimesh.bounds")
+    used = np.asarray(part.vertices, np.float64)[np.unique(part.faces)]
+    to_box, extents = bounds.oriented_bounds(used)
+    pose = np.linalg.inv(to_box)
+    return Box(pose[:3, 3], pose[:3, :3], np.maximum(extents / 2, THINNEST))
+
+
+def overlaps(parts: Sequence[Box], scene: Scene, seed: int = 0) -> npt.NDArray[np.float64]:
+    """IoU (parts, primitives) of boxes with the primitives of one scene, by sampling the boxes."""
+    here = scene.mask.nonzero()[:, 0]
+    volume = torch.zeros(len(scene.mask), dtype=torch.float64)
+    for kind in scene.kinds:
+        of_kind = scene.mask & (scene.kind == kind)
+        volume[of_kind] = primitives[kind].volume(scene.size[of_kind].double())
+    drawn = np.random.default_rng(seed).uniform(-1, 1, (POINTS, 3))
+    found = np.zeros((len(parts), len(here)))
+    for row, part in enumerate(parts):
+        points = torch.from_numpy(part.centre + (drawn * part.half) @ part.axes.T)
+        inside = (each_distance(scene, points.to(scene.size.dtype)) <= 0).double().mean(0)[here].numpy()
+        own = float(np.prod(2 * part.half))
+        shared = inside * own
+        found[row] = shared / np.maximum(own + volume[here].numpy() - shared, 1e-12)
+    return found
+
+
+def part_scores(parts: Sequence[Triangles], scene: Scene, seed: int = 0) -> PartScores:
+    """Recall and precision of the physical parts of an object, placed in the grid as the target is."""
+    table = overlaps([oriented_box(part) for part in parts], scene, seed)
+    recovered, primitive_count = 0, table.shape[1]
+    while table.size and table.max() >= ENOUGH:
+        row, column = np.unravel_index(table.argmax(), table.shape)
+        table[row], table[:, column] = -1, -1
+        recovered += 1
+    return PartScores(recovered / max(len(parts), 1), recovered / max(primitive_count, 1))

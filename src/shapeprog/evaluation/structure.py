@@ -1,0 +1,43 @@
+"""What a program is made of, as a person who edits it sees it: numbers, slivers, pieces."""
+
+from __future__ import annotations
+
+import torch
+
+from shapeprog.errors import ShapeProgError
+from shapeprog.geometry.mesh import pieces
+from shapeprog.geometry.primitive import primitives
+from shapeprog.geometry.scene import Scene
+from shapeprog.language.program import Program
+from shapeprog.language.statement import language
+from shapeprog.space import SPAN
+
+SLIVER = 0.004
+"""Share of the longest side of the target below which a primitive is too thin to be a part."""
+
+
+def numbers(program: Program) -> int:
+    """How many continuous numbers are written; counts and steps of loops are none."""
+    known = language()
+    return sum(not each.discrete for node in program.walk() for each in known[node.name].quantities)
+
+
+def slivers(scene: Scene) -> float:
+    """Share of the primitives of a scene that are thinner than ``SLIVER``; not a number where there are none.
+
+    The thickness is that of the local bounding box of the primitive without its shear.
+    """
+    thin = []
+    for kind in scene.kinds:
+        size = scene.size[scene.mask & (scene.kind == kind)]
+        straight = torch.where(torch.arange(size.shape[-1]) < primitives[kind].extents, size, 0)
+        thin.append(2 * primitives[kind].bound(straight).amin(-1) < SLIVER * SPAN)
+    return float(torch.cat(thin).double().mean()) if thin else float("nan")
+
+
+def one_piece(scene: Scene) -> float:
+    """1 where the union is one connected solid, 0 where it is several; not a number where it has no volume."""
+    try:
+        return float(pieces(scene) == 1)
+    except ShapeProgError:
+        return float("nan")

@@ -49,9 +49,10 @@ def test_a_bad_file_between_two_good_ones_is_told_in_words_and_stops_nothing(tmp
     "error",
     [
         ValueError("x"), KeyError(3), AttributeError("'NoneType' object has no attribute 'a'"), AssertionError(),
-        MemoryError(), RecursionError(), OSError(22, "Invalid argument"), OverflowError(), NotImplementedError(), StopIteration(), SyntaxError(),
+        MemoryError(), RecursionError(), OverflowError(), NotImplementedError(), StopIteration(), SyntaxError(),
         ModuleNotFoundError("No module named 'charset_normalizer'"), OSError("of a library"), OSError(5, "of disks"),
         PermissionError(13, "Permission denied"), UnicodeDecodeError("ascii", b"x", 0, 1, "x"), EOFError(), Exception(),
+        OSError(22, "Invalid argument"),
     ],
     ids=lambda error: type(error).__name__,
 )  # fmt: skip

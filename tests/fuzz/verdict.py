@@ -12,7 +12,7 @@ from shapeprog.errors import InputError, ProgramError, ShapeProgError
 RAW = re.compile(
     r"object has no attribute|Traceback|NoneType|not subscriptable|not iterable|not callable|unhashable|invalid literal"
     r"|codec can't|out of bounds|out of range|index \d+ is|unpack|must be str|cannot reshape|could not convert"
-    r"|(keyword|positional|required) argument(?! follows)|Invalid argument|not supported between|<class '|list index"
+    r"|(keyword|positional|required) argument|Invalid argument|not supported between|<class '|list index"
     r"|cannot be interpreted|broadcast|buffer size|\[Errno|dtype\(|operand|dictionary|numpy|trimesh|\b0x[0-9a-f]{6,}"
     r"|no len|\b[A-Z]\w*(Error|Exception|Warning)\b"
 )

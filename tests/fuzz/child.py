@@ -145,7 +145,8 @@ def _tried(path: Path, watch: Watch) -> list[tuple[str, str, str]]:
                     said = f"{step}: {type(error).__name__}: {error}"[:600]
                     found.append((reason, said, verdict.place(error)))
         watch.on = False
-    found += [("warning", f"{each.category.__name__}: {each.message}"[:300], f"{each.filename}") for each in told]
+    warned = [(f"{each.category.__name__}: {each.message}"[:300], f"{each.filename}:{each.lineno}") for each in told]
+    found += [("warning", *each) for each in dict.fromkeys(warned)]
     found += [("touched", each, "") for each in watch.seen]
     if path.read_bytes() != content or len(list(path.parent.iterdir())) != 2:
         found.append(("touched", f"something beside {path.name}", ""))

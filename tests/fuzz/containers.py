@@ -15,8 +15,8 @@ from .mutations import BYTES, TEXT, flip_bits
 
 ODD: tuple[Any, ...] = (
     None, True, 0, 1, -1, 3, 2**31, 2**64, 10**310, 0.5, 1e300, -1e19, float("nan"), float("inf"),
-    "", "x", "4", "../../secret", "data:,", "data:application/octet-stream;base64,!!", [], [0], [[]],
-    [-1, 10**9], {}, {"x": 0},
+    "", "x", "leg", "\ud800", "\x1b[2J", "4", "../../secret", "data:,", "data:application/octet-stream;base64,!!",
+    [], [0], [[]], [-1, 10**9], {}, {"x": 0},
 )  # fmt: skip
 """What is put in the place of a JSON value."""
 

@@ -14,5 +14,5 @@ def seeds() -> dict[str, bytes]:
 
 def cases(seed: int) -> Iterator[tuple[str, bytes]]:
     """Two files of shapes, a program, and weights, again and again."""
-    kinds = [loaders.cases(seed), loaders.cases(seed + 1), programs.cases(seed), weights.cases(seed)]
+    kinds = [loaders.mutants(seed), loaders.mutants(seed + 1), programs.mutants(seed), weights.mutants(seed)]
     return (case for four in zip(*kinds, strict=False) for case in four)

@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import functools
 import io
-import itertools
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
-from random import Random
 from typing import Any
 
 import numpy as np
 
 from .containers import change_glb, change_hdf5, change_head, change_json, change_json_line, change_npy, change_zip
-from .mutations import BYTES, TEXT, Mutation, mutated
+from .mutations import BYTES, TEXT, Mutation, mutants_of
 
 WAYS: dict[str, tuple[Mutation, ...]] = {
     ".obj": (*BYTES, *TEXT, *TEXT),
@@ -65,14 +63,13 @@ end_header
 
 
 def cases(seed: int) -> Iterator[tuple[str, bytes]]:
+    """The broken files alone; those that are crafted are a corpus of their own, ``tests/bad_files.py``."""
+    return mutants(seed)
+
+
+def mutants(seed: int) -> Iterator[tuple[str, bytes]]:
     """Names and contents of broken files without an end."""
-    valid = list(seeds().items())
-    for index in itertools.count():
-        random = Random(f"{seed}/{index}")
-        name, content = random.choice(valid)
-        stem, _, suffix = name.rpartition(".")
-        others = [each for other, each in valid if other.endswith(suffix)]
-        yield f"{stem}-{index}.{suffix}", mutated(random, content, WAYS[f".{suffix}"], others)
+    return mutants_of(seeds(), WAYS, seed)
 
 
 @functools.cache

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 import struct
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from random import Random
 
 Mutation = Callable[[Random, bytes], bytes]
@@ -14,7 +15,9 @@ FLOATS = (0.0, -0.0, 1e-38, 1e-30, 5e-324, 1e19, -1e19, 3e38, -3e38, 1.7e308, fl
 WORDS = (
     "0", "-0", "-1", "1", "2147483648", "-2147483649", "18446744073709551616", "1e19", "-1e19", "3e38", "-3e38",
     "3.5e38", "1e-38", "5e-324", "1.7e308", "1e999", "nan", "-nan", "inf", "-inf", "1" + 400 * "0", 5000 * "9", "0x10",
-    "1_0", "1,5", "1e", ".", "-", "\u0663", "true", "null", '"4"', "", "1/1", "1//2",
+    "1_0", "1,5", "1e", ".", "-", "\u0663", "true", "null", '"4"', "", "1/1", "1//2", "64", "65", "1048577", "16777217",
+    "3.4028234663852886e38", "1e-45", "1e309", "0." + 400 * "0" + "1", "2.5", "1j", "--1", "+1", "\u00bd",
+    "()", "(1,)", "[1]", "1 2",
 )  # fmt: skip
 """What is written in the place of a number."""
 
@@ -74,13 +77,13 @@ def set_number(random: Random, content: bytes) -> bytes:
 
 def write_number(random: Random, content: bytes) -> bytes:
     """A number that is written in digits becomes an extreme one, or another kind of word."""
-    return _replaced(random, content, _NUMBER, lambda _: random.choice(WORDS).encode())
+    return replaced(random, content, _NUMBER, lambda _: random.choice(WORDS).encode())
 
 
 def count_otherwise(random: Random, content: bytes) -> bytes:
     """A written whole number grows or shrinks a little: what is announced is not what there is."""
     step = random.choice((-2, -1, 1, 2, 10))
-    return _replaced(random, content, re.compile(rb"\d{1,15}"), lambda found: str(int(found) + step).encode())
+    return replaced(random, content, re.compile(rb"\d{1,15}"), lambda found: str(int(found) + step).encode())
 
 
 def change_words(random: Random, content: bytes) -> bytes:
@@ -103,10 +106,10 @@ def change_words(random: Random, content: bytes) -> bytes:
 
 
 def change_lines(random: Random, content: bytes) -> bytes:
-    """A line is doubled, left out, moved, joined with the next, very long, or all lines end in another way."""
+    """A line is doubled, left out, moved, indented, joined with the next or very long, or all end in another way."""
     lines = content.split(b"\n")
     at, to = random.randrange(len(lines)), random.randrange(len(lines))
-    how = random.randrange(6)
+    how = random.randrange(8)
     if how == 0:
         lines[at:at] = [lines[at]] * random.choice((1, 1, 40))
     elif how == 1:
@@ -117,7 +120,11 @@ def change_lines(random: Random, content: bytes) -> bytes:
         lines[at] += random.choice((b"\\", b" ", b"#", b"\x0b", b"\x85")) + b"".join(lines[at + 1 : at + 2])
     elif how == 4:
         lines[at] = lines[at] * random.choice((3, 2000))
-    return random.choice((b"\r\n", b"\r", b"\n\n") if how == 5 else (b"\n",)).join(lines)[:_LONGEST]
+    elif how == 5:
+        lines[at] = random.choice((b" ", b"\t", b"    ", b"\x0c")) + lines[at]
+    elif how == 6:
+        lines[at] = lines[at].lstrip()
+    return random.choice((b"\r\n", b"\r", b"\n\n") if how == 7 else (b"\n",)).join(lines)[:_LONGEST]
 
 
 def change_letters(random: Random, content: bytes) -> bytes:
@@ -126,8 +133,9 @@ def change_letters(random: Random, content: bytes) -> bytes:
     odd = random.choice(
         (b"\0", b"\xff", b"\xc3", b"\xed\xa0\x80", "\u2028".encode(), b"\x1b[31m", b"\t", b"\x1a", b'"')
     )
-    whole = (b"\xef\xbb\xbf" + content, content.decode("latin-1").encode("utf-16"), content[:at] + odd + content[at:])
-    return random.choice((*whole, whole[-1]))
+    if random.random() < 0.5:
+        return content[:at] + odd + content[at:]
+    return content.decode("latin-1").encode(random.choice(("utf-8-sig", "utf-16", "utf-32", "utf-7")))
 
 
 BYTES: tuple[Mutation, ...] = (flip_bits, set_run, repeat_run, delete_run, cut, insert, set_number)
@@ -150,12 +158,27 @@ def mutated(random: Random, content: bytes, ways: Sequence[Mutation], others: Se
     return content
 
 
-def _replaced(random: Random, content: bytes, pattern: re.Pattern[bytes], by: Callable[[bytes], bytes]) -> bytes:
+def replaced(random: Random, content: bytes, pattern: re.Pattern[bytes], by: Callable[[bytes], bytes]) -> bytes:
+    """``content`` with one match of a pattern replaced, as often as not one of the first twelve."""
     found = list(pattern.finditer(content))
     if not found:
         return content
     one = random.choice(random.choice((found, found[:12])))  # counts stand in the head
     return content[: one.start()] + by(one[0]) + content[one.end() :]
+
+
+def mutants_of(
+    valid: Mapping[str, bytes], ways: Mapping[str, Sequence[Mutation]], seed: int
+) -> Iterator[tuple[str, bytes]]:
+    """Names and contents without an end of valid files that are mutated in the ``ways`` of their suffix."""
+    listed = list(valid.items())
+    often = [1 if len(content) < _LONGEST else 0.1 for _, content in listed]
+    for index in itertools.count():
+        random = Random(f"{seed}/{index}")
+        [(name, content)] = random.choices(listed, often)
+        stem, _, suffix = name.rpartition(".")
+        others = [each for other, each in listed if other.endswith(suffix)]
+        yield f"{stem}-{index}.{suffix}", mutated(random, content, ways[f".{suffix}"], others)
 
 
 def _place(random: Random, content: bytes) -> int:

@@ -4,13 +4,31 @@ from __future__ import annotations
 
 import functools
 import itertools
+import re
 from collections.abc import Iterator
 from random import Random
 
 from .containers import change_json
-from .mutations import BYTES, TEXT, Mutation, change_words, count_otherwise, mutated, write_number
+from .crafted_programs import crafted
+from .mutations import BYTES, TEXT, Mutation, change_words, count_otherwise, mutants_of, replaced, write_number
 
-NUMBERS: tuple[Mutation, ...] = (*4 * (write_number,), *4 * (count_otherwise,), change_words)
+NAMES = (
+    "leg", "legg", "translate", "rotate", "at", "size", "by", "count", "step", "pass", "end", "for", "draw",
+    "import os", "__import__('os')", "lambda: 0", "\U0001f600", "e\u0301", "\u202e", "\x1b[2J", "\x00", "\ufeff",
+    "'Leg', 'Cub'", "P", "G", "theta*i", "axis", "# frame:", "# frame: {", '# frame: {"scale": 0}', "statement", "body",
+    "null", "true", "\t", "\\", ";", ":", "(", ")", "[", "]", "{", "}", "'", '"', "\r", "\x0c", "\u2028", "=", "==",
+    "*", "**", "...", "async ", "$",
+)  # fmt: skip
+"""What is written in the place of a name or behind it."""
+
+
+def write_name(random: Random, content: bytes) -> bytes:
+    """A name becomes another, or something that is none, or comes behind it."""
+    word, behind = random.choice(NAMES).encode(), random.random() < 0.5
+    return replaced(random, content, re.compile(rb"[A-Za-z_']+"), lambda found: found + word if behind else word)
+
+
+NUMBERS: tuple[Mutation, ...] = (*4 * (write_number,), *4 * (count_otherwise,), *2 * (write_name,), change_words)
 WAYS: dict[str, tuple[Mutation, ...]] = {
     ".shape": (*BYTES, *TEXT, *2 * NUMBERS),
     ".notation": (*BYTES, *TEXT, *2 * NUMBERS),
@@ -26,23 +44,15 @@ for i in rotate(4, step=0):
     line(start=(-6, -10, -8), end=(-6, 9, -8), radius=0.75)
 """
 
-LOOPS = "for i in translate({0}, by=({1}, {2}, 0)):\n    leg(at=(0, 0, {2}), size=({1}, 2, 2))\n"
-DEPTHS = (1, 3, 30, 64, 65, 300, 3000)
-COUNTS = ("0", "2", "1000", "100000", "1048576", "1e12", "3e38")
-
 
 def cases(seed: int) -> Iterator[tuple[str, bytes]]:
-    """Names and contents of programs without an end, most of them broken."""
-    valid = list(seeds().items())
-    for index in itertools.count():
-        random = Random(f"{seed}/{index}")
-        if random.random() < 0.01:
-            yield f"extreme-{index}.shape", _extreme(random).encode()
-            continue
-        name, content = random.choice(valid)
-        stem, _, suffix = name.rpartition(".")
-        others = [each for other, each in valid if other.endswith(suffix)]
-        yield f"{stem}-{index}.{suffix}", mutated(random, content, WAYS[f".{suffix}"], others)
+    """Names and contents without an end: first those that are crafted, then broken ones."""
+    return itertools.chain(crafted(), mutants(seed))
+
+
+def mutants(seed: int) -> Iterator[tuple[str, bytes]]:
+    """Names and contents of broken programs without an end."""
+    return mutants_of(seeds(), WAYS, seed)
 
 
 @functools.cache
@@ -66,21 +76,3 @@ def seeds() -> dict[str, bytes]:
         found[f"{name}.shape"] = (frame_comment(frame) + sp.format_program(program)).encode()
         found[f"{name}.notation"] = sp.format_notation(program).encode()
     return found
-
-
-def _extreme(random: Random) -> str:
-    """Many copies, deep nests, wide or many lines."""
-    how = random.randrange(4)
-    if how == 0:
-        return LOOPS.format(
-            random.choice(COUNTS), random.choice(("0", "0.01", "7", "1e19")), random.choice(("0", "3", "3e38"))
-        )
-    if how == 1:
-        depth = random.choice(DEPTHS)
-        rows = ["    " * level + f"for i{level} in translate(1, by=(0, 0, 1)):" for level in range(depth)]
-        return "\n".join([*rows, "    " * depth + "leg(at=(0, 0, 0), size=(1, 1, 1))\n"])
-    if how == 2:
-        return random.choice(
-            ("(" * 5000, "-" * 50000, "leg(at=" + "[" * 200, " " * 100000 + "x", "leg(" + "a=1, " * 20000)
-        )
-    return "leg(at=(0, 0, 0), size=(1, 1, 1))\n" * random.choice((100, 2000))

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from . import by_hand
 from .containers import change_glb, change_hdf5, change_head, change_json, change_json_line, change_npy, change_zip
 from .mutations import BYTES, TEXT, Mutation, mutants_of
 
@@ -31,35 +32,8 @@ WAYS: dict[str, tuple[Mutation, ...]] = {
 }
 """How files of a suffix are broken: as bytes, and in the way of their format."""
 
-OBJ = b"""mtllib parts.mtl
-o seat
-v 0 0 0
-v 1 0 0
-v 1 0 1
-v 0 0 1
-vt 0.5 0.5
-vn 0 1 0
-usemtl wood
-f 1/1/1 2/1/1 3/1/1 4/1/1
-g leg
-v 0 -1 0 0.5 0.5 0.5
-s 1
-f -1//1 1//1 2//1
-f 5 1 4
-"""
-
-BIG_ENDIAN = b"""ply
-format binary_big_endian 1.0
-comment by hand
-element vertex 3
-property float x
-property float y
-property float z
-property uchar red
-element face 1
-property list uchar int vertex_indices
-end_header
-"""
+PROGRAMS = "programs.npz"
+"""The one file that holds no shape for any reader of shapes but programs."""
 
 
 def cases(seed: int) -> Iterator[tuple[str, bytes]]:
@@ -85,6 +59,7 @@ def seeds() -> dict[str, bytes]:
 def _write_programs(folder: Path) -> None:
     """What our own writers make of a program."""
     import shapeprog as sp
+    from shapeprog.data.synthetic import write_programs
     from shapeprog.formats.json_form import result_json
 
     program = sp.parse(
@@ -94,6 +69,7 @@ def _write_programs(folder: Path) -> None:
         sp.export(program, folder / f"program{suffix}")
     sp.export(program, folder / "program.npy", resolution=8)
     sp.export(program, folder / "program.xyz", points=40)
+    write_programs(folder / PROGRAMS, sp.encode([program, program]))
     text = result_json(program, name="stool").replace("\n", "")
     (folder / "labels.jsonl").write_text(
         f'{text}\n{{"name": "bench", "program": "leg(at=(0, 0, 0), size=(4, 2, 2))"}}\n'
@@ -121,10 +97,11 @@ def _write_shapes(folder: Path) -> None:
     (folder / "ascii.ply").write_bytes(stool.export(file_type="ply", encoding="ascii"))
     (folder / "ascii.stl").write_text(stool.export(file_type="stl_ascii"))
     (folder / "stool.gltf").write_bytes(export_gltf(scene, embed_buffers=True)["model.gltf"])
-    (folder / "hand.obj").write_bytes(OBJ)
-    corners = np.zeros(3, [("at", ">f4", 3), ("red", "u1")])
-    corners["at"] = np.eye(3)
-    (folder / "swapped.ply").write_bytes(BIG_ENDIAN + corners.tobytes() + b"\x03" + np.arange(3, dtype=">i4").tobytes())
+    (folder / "hand.obj").write_bytes(by_hand.OBJ)
+    (folder / "hand.off").write_bytes(by_hand.OFF)
+    (folder / "hand.glb").write_bytes(by_hand.glb())
+    (folder / "ragged.ply").write_bytes(by_hand.RAGGED_PLY)
+    (folder / "swapped.ply").write_bytes(by_hand.big_endian_ply())
 
     cells = np.zeros((2, 8, 8, 8), np.bool_)
     cells[:, 1:7, 2:6, :3] = True

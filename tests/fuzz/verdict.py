@@ -34,7 +34,7 @@ def complaint(error: BaseException, path: Path) -> str:
     if not isinstance(error, ShapeProgError):
         return "foreign exception"
     text = str(error)
-    if RAW.search(error.message.replace(path.stem, "")):
+    if RAW.search(_unquoted(error.message.replace(path.stem, ""), path)):
         return "raw Python text"
     if any(unicodedata.category(letter) in ("Cc", "Cs") for letter in text.replace("\n", "")):
         return "unprintable"
@@ -43,6 +43,12 @@ def complaint(error: BaseException, path: Path) -> str:
     if isinstance(error, (InputError, ProgramError)) and path.stem not in text:
         return "no name"
     return "" if error.hint else "no cure"
+
+
+def _unquoted(message: str, path: Path) -> str:
+    """A message without what it quotes from the file: that may be any text, such as the name of a library."""
+    content = path.read_bytes()
+    return re.sub(r"'([^']+)'", lambda found: "" if found[1].encode() in content else found[0], message)
 
 
 def place(error: BaseException) -> str:

@@ -16,9 +16,12 @@ hypothesis.settings.load_profile("quick")
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--typecheck", action="store_true", help="check the shapes of all annotated tensors; slower")
+    parser.addoption("--nightly", action="store_true", help="many more random cases, and the tests marked nightly")
 
 
 def pytest_configure(config: pytest.Config) -> None:
+    if config.getoption("--nightly"):
+        hypothesis.settings.load_profile("nightly")
     if config.getoption("--typecheck"):
         from jaxtyping import install_import_hook
 
@@ -38,6 +41,17 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         for item in items:
             if item.get_closest_marker("wrong_types"):
                 item.add_marker(refused)
+    if not config.getoption("--nightly"):
+        late = [item for item in items if item.get_closest_marker("nightly")]
+        config.hook.pytest_deselected(items=late)
+        items[:] = [item for item in items if item not in late]
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:
+    from tests.fuzz.campaign import tonight
+
+    if config.getoption("--nightly"):
+        terminalreporter.write_line(f"seeds of the fuzz suite: {', '.join(map(str, tonight()))}")
 
 
 @pytest.fixture(autouse=True)

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from bad_arrays import binvox
 from bad_files import BAD, BOMBS, BOX, CELLS, archive, glb, npy, npz, written
 
 from shapeprog.data import Shape, load, load_all, loading, prepare, read_pack
@@ -51,6 +52,7 @@ def test_a_bad_file_between_two_good_ones_is_told_in_words_and_stops_nothing(tmp
         MemoryError(), RecursionError(), OverflowError(), NotImplementedError(), StopIteration(), SyntaxError(),
         ModuleNotFoundError("No module named 'charset_normalizer'"), OSError("of a library"), OSError(5, "of disks"),
         PermissionError(13, "Permission denied"), UnicodeDecodeError("ascii", b"x", 0, 1, "x"), EOFError(), Exception(),
+        OSError(22, "Invalid argument"),
     ],
     ids=lambda error: type(error).__name__,
 )  # fmt: skip
@@ -65,6 +67,28 @@ def test_whatever_a_reader_raises_becomes_words_and_keeps_its_cause(tmp_path, mo
     assert [type(each) for each in found] == [Shape, InputError, Shape]
     assert in_plain_words(found[1])
     assert found[1].__cause__ is error
+
+
+def test_numbers_of_a_file_that_are_no_numbers_are_told_by_name_without_a_warning(tmp_path):
+    signalling = np.array([0x7F800001] * 9, "<u4").view("<f4").reshape(3, 3)  # which warns when it is converted
+    head = "ply\nformat binary_little_endian 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
+    ply = (head + "property float z\nend_header\n").encode() + signalling.tobytes()
+    stl = bytes(80) + (1).to_bytes(4, "little") + bytes(12) + signalling.tobytes() + bytes(2)
+    for name, content in (("x.ply", ply), ("x.stl", stl), ("x.npy", npy(signalling))):
+        with pytest.raises(InputError, match="3 of 3 positions are not finite"):
+            load(written(tmp_path / name, content))
+
+
+@pytest.mark.parametrize("suffix", ["npy", "npz", "binvox", "h5"])
+def test_a_grid_without_cells_is_told_by_name(suffix, tmp_path):
+    empty, path = np.zeros((4, 4, 4), np.uint8), tmp_path / f"hollow.{suffix}"
+    if suffix == "h5":
+        with pytest.importorskip("h5py").File(path, "w") as file:
+            file["data"] = empty
+    else:
+        written(path, {"npy": npy(empty), "npz": npz(voxels=empty), "binvox": binvox(4, bytes([0, 64]))}[suffix])
+    with pytest.raises(InputError, match="hollow has no occupied cell"):
+        load(path)
 
 
 @pytest.mark.parametrize("stop", [KeyboardInterrupt, SystemExit])

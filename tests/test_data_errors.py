@@ -106,7 +106,7 @@ def test_wrong_arrays(tmp_path):
         ("b", np.zeros((4, 5, 6)), "shape"),
         ("c", np.full((8, 8, 8), 0.3), "only 0 and 1"),
         ("d", np.full((8, 8, 8), np.nan), "only 0 and 1"),
-        ("e", np.zeros((8, 8, 8)), "empty"),
+        ("e", np.zeros((8, 8, 8)), "no occupied cell"),
         ("f", np.array([None, "x"], dtype=object), "pickle"),
         ("g", np.array(["x", "y"]), "numbers"),
         ("h", np.float64(3), "shape"),
@@ -125,7 +125,7 @@ def test_bad_binvox_heads(tmp_path):
         ("b", b"#binvox 1\ndim two\ndata\n\x01\x08", "head"),
         ("c", b"#binvox 1\ndim 2 2 2\ndata\n\x07\x08", "only 0 and 1"),
         ("d", b"#binvox 1\ndim 2 2 2\ndata\n\x01\x07", "cut short"),
-        ("e", b"#binvox 1\ndim 2 2 2\ndata\n\x00\x08", "empty"),
+        ("e", b"#binvox 1\ndim 2 2 2\ndata\n\x00\x08", "no occupied cell"),
         ("f", b"#binvox 1\ndim 2 2 2\nscale nan\ndata\n\x01\x08", "no cube"),
     ]:
         (tmp_path / f"{name}.binvox").write_bytes(content)

@@ -80,6 +80,14 @@ def test_the_shapes_of_a_pack_are_chosen_by_number_or_name(tmp_path, shapes):
     ]
 
 
+@pytest.mark.parametrize("kind", ["f2", "f4", "f8", "i2", "u8"])
+def test_the_longest_sides_of_a_pack_are_numbers_of_any_kind(tmp_path, kind):
+    voxels = np.full((3, 4096), 255, np.uint8)
+    sides = np.array([1, 24, 7], kind)
+    np.savez(tmp_path / "p.npz", ids=np.array(["a", "b", "c"]), voxels=voxels, longest_side=sides)
+    assert [24 * shape.frame.scale for shape in read_pack(tmp_path / "p.npz")] == [1, 24, 7]
+
+
 def test_a_truncated_pack_is_refused(tmp_path, shapes):
     write_pack(tmp_path / "p.npz", shapes)
     whole = (tmp_path / "p.npz").read_bytes()

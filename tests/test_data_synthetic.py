@@ -209,15 +209,34 @@ def test_data_sets_that_cannot_be_used_are_refused_in_words(tmp_path: Path) -> N
         read_programs(tmp_path / "none.npz")
     damaged = tmp_path / "damaged.npz"
     damaged.write_bytes(b"PK\x03\x04 nothing")
-    with pytest.raises(InputError, match="is no data set of programs, or it is damaged"):
+    with pytest.raises(InputError, match="cannot be read as NPZ: it is damaged"):
         read_programs(damaged)
     np.savez(tmp_path / "other.npz", voxels=np.zeros(3))
-    with pytest.raises(InputError, match="is no data set of programs"):
+    with pytest.raises(InputError, match="is no data set of programs: it has no ids and no parameters"):
         read_programs(tmp_path / "other.npz")
     with using(LANGUAGE):
         write_programs(tmp_path / "own.npz", drawn(prior("wide"), 0))
     with pytest.raises(InputError, match="which the language in force does not have"):
         read_programs(tmp_path / "own.npz")
+
+
+ODD_ARRAYS = {
+    "ids": [np.zeros((2, 3), int), np.zeros((2, 3, 3)), np.array(["a"]), np.array(3), np.array([None])],
+    "parameters": [np.zeros((2, 3, 3, 6), int), np.zeros((2, 3, 3, 7)), np.array(["a"]), np.zeros(0, int)],
+    "statement_ids": [np.array(1), np.array([1, 2]), np.array(["leg"])],
+    "statement_names": [np.array("leg"), np.array([1]), np.array(["leg", "leg"]), np.array([b"leg"])],
+}
+
+
+@pytest.mark.parametrize("name", ODD_ARRAYS)
+def test_data_sets_of_other_arrays_are_refused_in_words(name: str, tmp_path: Path) -> None:
+    write_programs(tmp_path / "good.npz", drawn(prior("wide"), 0, 4))
+    with np.load(tmp_path / "good.npz") as content:
+        good = dict(content)
+    for odd in ODD_ARRAYS[name]:
+        np.savez(tmp_path / "odd.npz", **{**good, name: odd})
+        with pytest.raises(InputError, match=r"^odd\.npz[: ](?!.*(invalid|literal|pickled)).*(not|no|objects|which) "):
+            read_programs(tmp_path / "odd.npz")
 
 
 def test_wrong_names_and_sizes_are_refused_in_words() -> None:

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import itertools
 import json
 import os
 from pathlib import Path
 
 import pytest
 import torch
-from fuzz_weights import ODD, cases, crafted, published, safetensors
 from safetensors.torch import load, save_file
 
 from shapeprog.cli import main
@@ -18,6 +16,8 @@ from shapeprog.models.checkpoint import Listed, list_checkpoints, load_checkpoin
 from shapeprog.models.designs import build_generator
 from shapeprog.models.published import LARGEST, read_published
 from shapeprog.models.tensor_file import file_bytes, read_header
+from tests.fuzz.crafted_weights import ODD, crafted
+from tests.fuzz.weight_files import checkpoint, published
 
 
 def ends(name: str, content: bytes, folder: Path) -> bool:
@@ -35,7 +35,7 @@ def ends(name: str, content: bytes, folder: Path) -> bool:
 
 
 def test_what_is_mutated_is_good_itself(tmp_path: Path) -> None:
-    for name, content in (("a.safetensors", safetensors()), ("a.t7", published()), ("b.t7", published(legacy=True))):
+    for name, content in (("a.safetensors", checkpoint()), ("a.t7", published()), ("b.t7", published(legacy=True))):
         assert ends(name, content, tmp_path)
 
 
@@ -47,20 +47,12 @@ def test_crafted_files_end_in_a_network_or_in_words(tmp_path: Path) -> None:
         assert not ends(name, content, tmp_path) or Path(name).stem in good, name
 
 
-@pytest.mark.wrong_types
-@pytest.mark.parametrize("seed", range(2))
-def test_mutated_files_end_in_a_network_or_in_words(seed: int, tmp_path: Path) -> None:
-    many = sum(1 for _ in crafted())
-    read = [ends(name, content, tmp_path) for name, content in itertools.islice(cases(seed), many, many + 60)]
-    assert 0 < sum(read) < 40
-
-
 @pytest.mark.parametrize(
     "kind", ["sparse", "meta", "quantised", "expanded", "expanded-far", "nested", "complex", "whole"]
 )
 def test_tensors_of_other_kinds_are_named(kind: str, tmp_path: Path) -> None:
     assert kind in ODD
-    (tmp_path / "one.t7").write_bytes(published(change=kind))
+    (tmp_path / "one.t7").write_bytes(published(ODD[kind]))
     with pytest.raises(InputError, match=r"pgm_embed\.weight (is no plain|has the shape|are finite)|holds more"):
         read_published(tmp_path / "one.t7")
 
@@ -72,7 +64,7 @@ def test_a_bad_file_hides_no_good_one(tmp_path: Path, capsys: pytest.CaptureFixt
     os.mkfifo(tmp_path / "pipe.safetensors")
     (tmp_path / "lost.safetensors").symlink_to(tmp_path / "nowhere")
     for name in ("000-a-good", "zz-good"):
-        (tmp_path / f"{name}.safetensors").write_bytes(safetensors())
+        (tmp_path / f"{name}.safetensors").write_bytes(checkpoint())
     found = dict(list_checkpoints([tmp_path], shipped=False))
     assert isinstance(found[tmp_path / "zz-good.safetensors"], Listed)
     for words in (["models", str(tmp_path)], ["models", str(tmp_path), "--json"]):
@@ -119,8 +111,8 @@ def test_a_card_cannot_ask_for_more_than_a_network_may_have() -> None:
 
 
 def test_numbers_of_a_type_that_the_network_cannot_use_are_refused(tmp_path: Path) -> None:
-    weights = load(safetensors())
-    (tmp_path / "one.safetensors").write_bytes(safetensors())
+    weights = load(checkpoint())
+    (tmp_path / "one.safetensors").write_bytes(checkpoint())
     texts = read_header(tmp_path / "one.safetensors").metadata
     for name, dtype in (("bins.1.bias", torch.float64), ("bins.1.bias", torch.int64), ("bins.1.bias", torch.bool)):
         changed = {**weights, name: weights[name].to(dtype)}
@@ -130,8 +122,8 @@ def test_numbers_of_a_type_that_the_network_cannot_use_are_refused(tmp_path: Pat
 
 
 def test_scores_of_a_card_are_numbers(tmp_path: Path) -> None:
-    weights, path = load(safetensors()), tmp_path / "one.safetensors"
-    path.write_bytes(safetensors())
+    weights, path = load(checkpoint()), tmp_path / "one.safetensors"
+    path.write_bytes(checkpoint())
     texts = read_header(path).metadata
     for scores in ({"iou": None}, {"iou": "x"}, {"iou": 10**400}, {"iou": True}, {"iou": float("nan")}):
         card = json.dumps(json.loads(texts["card"]) | {"scores": scores})

@@ -255,3 +255,24 @@ def test_broken_json_is_refused_in_words() -> None:
     for ids in ([[1, "x"]], [[[1]], [[2, 3]]], [1.5], "x", None):
         with pytest.raises(InputError):
             code_from_json(json.dumps({"format": "shapeprog-code", "version": 1, "shape": [1, 2], "ids": ids}))
+
+
+@pytest.mark.parametrize("error", [ShapeProgError, InputError, ProgramError])
+@pytest.mark.parametrize(
+    "odd", ["\x1b[31m", "\t", "\r", "\0", "\x9b", "\N{RIGHT-TO-LEFT OVERRIDE}", "\u2028", "\ud800"]
+)
+def test_what_cannot_be_printed_is_told_as_its_escape(error: type[ShapeProgError], odd: str) -> None:
+    told = error(f"no \N{GREEK SMALL LETTER PI} is called a{odd}b", hint=f"write {odd}")
+    assert odd not in str(told)
+    assert f"a{odd.encode('unicode_escape').decode()}b" in told.message
+    assert "\N{GREEK SMALL LETTER PI}" in str(told)
+
+
+def test_lines_and_names_of_texts_command_no_terminal() -> None:
+    told = ProgramError("x", source="a\x1bb", name="c\x1bd")
+    assert str(told) == "c\\x1bd, line 1, column 1: x\n  a b\n  ^"
+
+
+def test_numbers_without_names_behind_those_with_names_are_told_in_our_words() -> None:
+    with pytest.raises(ProgramError, match="a number without a name follows one with a name"):
+        parse("leg(at=(1, 2, 3), 5)")

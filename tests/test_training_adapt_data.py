@@ -88,9 +88,10 @@ def test_labels_are_read_from_lines_and_folders(pack: Path, tmp_path: Path):
     assert bool(read_labels([path, folder], names, vocabulary, 4).known.all())
     with pytest.raises(InputError, match="has no program for any of the shapes"):
         read_labels([folder], ["a", "b"], vocabulary, 4)
-    path.write_text('{"name": "s0"}\n')
-    with pytest.raises(InputError, match=r"line 1 of labels\.jsonl is no label"):
-        read_labels([path], names, vocabulary, 4)
+    for line in ('{"name": "s0"}', "[" * 9999, f'{{"name": "s0", "program": {"[" * 980}{"]" * 980}}}', "3"):
+        path.write_text(f"{line}\n")
+        with pytest.raises(InputError, match=r"line 1 of labels\.jsonl(: \S+)? is no (label|list)"):
+            read_labels([path], names, vocabulary, 4)
 
 
 def test_blocks_that_cannot_be_said_are_left_out(tmp_path: Path):
@@ -210,7 +211,7 @@ def test_what_is_no_file_of_labels_is_left_as_it_is(pack: Path, tmp_path: Path, 
 def test_a_shape_that_cannot_be_labelled_is_told_and_stops_nothing(
     pack: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ):
-    answer = {name: json.dumps({"name": name, "program": TEXTS[0]}) for name in ("s0", "s2")}
+    answer = {name: json.dumps({"name": name, "program": TEXTS[0], "cut": []}) for name in ("s0", "s2")}
     error = json.dumps({"error": "it is too odd", "hint": "leave it out"})
     monkeypatch.setattr(labelling, "answers", lambda *_: (each for each in (answer["s0"], error, answer["s2"])))
     out = tmp_path / "labels.jsonl"

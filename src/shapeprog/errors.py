@@ -13,12 +13,19 @@ _LONGEST = 200
 """Letters of a word that are compared with known ones, which takes as long as the word has letters."""
 
 
+_UNPRINTABLE = re.compile("[\0-\t\x0b-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069\ud800-\udfff]")
+"""What commands a terminal, turns its lines round, or cannot be shown; a new line is none."""
+
+
 class ShapeProgError(Exception):
-    """A mistake that the user can mend: ``message`` says what is wrong, ``hint`` in a line of its own what to do."""
+    """A mistake that the user can mend: ``message`` says what is wrong, ``hint`` in a line of its own what to do.
+
+    They may repeat what a file holds: what cannot be printed is told as its escape, such as ``\\x1b``.
+    """
 
     def __init__(self, message: str, hint: str = "") -> None:
-        super().__init__(message)
-        self.message, self.hint = message, hint
+        self.message, self.hint = _printable(message), _printable(hint)
+        super().__init__(self.message)
 
     def __str__(self) -> str:
         return f"{self.message}\n  hint: {self.hint}" if self.hint else self.message
@@ -47,13 +54,17 @@ class ProgramError(ShapeProgError):
         self, message: str, *, line: int = 1, column: int = 1, source: str = "", hint: str = "", name: str = "<program>"
     ) -> None:
         super().__init__(message, hint)
-        self.line, self.column, self.name = line, column, name
-        self.source = re.sub(r"[\0-\x1f\x7f-\x9f]", " ", source[:_WIDEST]) if column <= _WIDEST else ""
+        self.line, self.column, self.name = line, column, _printable(name)
+        self.source = _UNPRINTABLE.sub(" ", source[:_WIDEST]) if column <= _WIDEST else ""
 
     def __str__(self) -> str:
         shown = f"\n  {self.source}\n  {' ' * (self.column - 1)}^" if self.source else ""
         hint = f"\n  hint: {self.hint}" if self.hint else ""
         return f"{self.name}, line {self.line}, column {self.column}: {self.message}{shown}{hint}"
+
+
+def _printable(text: str) -> str:
+    return _UNPRINTABLE.sub(lambda found: found[0].encode("unicode_escape").decode(), text)
 
 
 def did_you_mean(word: str, known: Iterable[str], otherwise: str = "", *, quoted: bool = False) -> str:

@@ -15,7 +15,18 @@ from typing import IO, Any
 
 import numpy as np
 
-from shapeprog.data.reading import BYTES, CELLS, POINTS, SHAPES, check_count, check_file, few, in_words, read_whole
+from shapeprog.data.reading import (
+    ANY_NUMBERS,
+    BYTES,
+    CELLS,
+    POINTS,
+    SHAPES,
+    check_count,
+    check_file,
+    few,
+    in_words,
+    read_whole,
+)
 from shapeprog.errors import InputError
 from shapeprog.space import Array
 
@@ -44,6 +55,7 @@ def read_array(path: Path) -> Array:
     return checked(_read_text(path) if path.suffix.lower() == ".xyz" else _chosen(path), path.name)
 
 
+@ANY_NUMBERS
 def checked(array: Array, name: str) -> Array:
     """``array`` as points (P, 3) in float64, or as voxel grids (N, R, R, R) whose values are not looked at yet.
 

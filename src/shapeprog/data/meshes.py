@@ -18,7 +18,7 @@ from shapeprog.data.gltf import Part, read_gltf
 from shapeprog.data.obj import read_obj
 from shapeprog.data.off import read_off
 from shapeprog.data.ply import read_ply
-from shapeprog.data.reading import POINTS, check_count, read_whole
+from shapeprog.data.reading import ANY_NUMBERS, POINTS, check_count, read_whole
 from shapeprog.data.stl import read_stl
 from shapeprog.errors import InputError
 from shapeprog.space import Array, FloatArray
@@ -38,6 +38,7 @@ def mesh_formats() -> set[str]:
     return (set(trimesh.available_formats()) | set(COMMON)) - _NO_MESH
 
 
+@ANY_NUMBERS
 def read_mesh(path: Path) -> tuple[Array, Array]:
     """Vertices (V, 3) in float64 and faces (F, 3) of every part of a file, placed as its scene places them.
 
@@ -74,9 +75,8 @@ def _joined(parts: Sequence[tuple[FloatArray, Part]]) -> Part:
     faces: list[Array] = [np.zeros((0, 3), np.int64)]
     count = 0
     for matrix, (own, listed) in solid or parts:
-        with np.errstate(invalid="ignore", over="ignore"):  # infinite coordinates are told by name later
-            still = np.array_equal(matrix, np.eye(4))
-            vertices.append(own if still else own @ matrix[:3, :3].T + matrix[:3, 3])
+        still = np.array_equal(matrix, np.eye(4))
+        vertices.append(own if still else own @ matrix[:3, :3].T + matrix[:3, 3])
         known = (listed >= 0) & (listed < len(own))  # a face names no vertex of another part
         faces.append(np.where(known, listed + count, -1))
         count += len(own)

@@ -193,7 +193,8 @@ def _check(name: str, arrays: dict[str, Array]) -> None:
 
 def _usable(side: Array | float) -> Any:
     """Whether longest sides can be those of shapes; what is no number is not."""
-    return (side > LEAST_SIDE) & (side < MOST_SIDE)
+    exact = np.asarray(side, np.float64)  # the bounds are beyond float16
+    return (exact > LEAST_SIDE) & (exact < MOST_SIDE)
 
 
 def write_pack(path: str | os.PathLike[str], shapes: Iterable[Shape]) -> int:

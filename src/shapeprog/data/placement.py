@@ -106,7 +106,7 @@ def shape_from_voxels(
     backward = tuple(axis for axis in range(3) if turn[order[axis], axis] < 0)
     turned = np.flip(np.asarray(voxels, np.bool_).transpose(order), backward)
     start, size = np.zeros(3) if corner is None else np.asarray(corner, np.float64), len(turned)
-    first, last = occupied_bounds(voxels)
+    first, last = occupied_bounds(voxels, name)
     frame = _around(start + cell * first, start + cell * last, name, turn)
     low, high = first[order], last[order]
     low, high = np.where(np.isin(range(3), backward), (size - high, size - low), (low, high))

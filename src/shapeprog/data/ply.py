@@ -55,8 +55,7 @@ def read_ply(name: str, content: bytes) -> tuple[Array, Array]:
             corners, widths = next((columns[each] for each in _CORNERS if each in columns), (None, None))
             if corners is None or widths is None:
                 raise InputError(f"{name} has faces without vertex_indices", "export the model again")
-            with np.errstate(invalid="ignore"):  # what is no whole number names no vertex, which is told later
-                faces = fans(corners.astype(np.int64), widths)
+            faces = fans(corners.astype(np.int64), widths)
     if at != len(body):
         raise InputError(f"{name} holds more than its head announces", _AGAIN)
     return vertices, faces

@@ -9,6 +9,8 @@ import stat
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
+import numpy as np
+
 from shapeprog.errors import InputError, ShapeProgError
 
 BYTES = 2**30
@@ -22,6 +24,9 @@ POINTS = 5_000_000
 
 SHAPES = 1_000_000
 """Most shapes in one file."""
+
+ANY_NUMBERS = np.errstate(invalid="ignore", over="ignore")
+"""Around the numbers of a file, which may be any: those that are not finite are told by name when a shape is made."""
 
 _FEW = 5
 
@@ -93,7 +98,7 @@ def in_words(path: Path, kind: str = "") -> Iterator[None]:
     except MemoryError as error:
         raise InputError(f"{path.name} needs more memory than there is", "make it smaller, or split it") from error
     except OSError as error:
-        if error.errno is None:  # a library says so of what it read
+        if error.errno in (None, errno.EINVAL):  # from a library, or a place in the file that cannot be
             raise _damaged(path, kind) from error
         raise unreadable(path, error) from error
     except Exception as error:

@@ -115,8 +115,15 @@ def resample_voxels(voxels: Array, low: Array, scale: float, resolution: int = R
     return np.ascontiguousarray(reduced)
 
 
-def occupied_bounds(voxels: Array) -> tuple[Array, Array]:
+def occupied_bounds(voxels: Array, name: str = "the voxel grid") -> tuple[Array, Array]:
     """Lowest and highest boundary of the occupied cells along each axis, in cells from the corner of the array.
+
+    Parameters
+    ----------
+    voxels
+        Occupied cells (A, B, C).
+    name
+        What an error calls them.
 
     Raises
     ------
@@ -126,7 +133,7 @@ def occupied_bounds(voxels: Array) -> tuple[Array, Array]:
     layer: Array = np.any(voxels, 0)  # then only a layer is left to look at, however large the grid
     sides = [np.flatnonzero(each) for each in (np.any(voxels, (1, 2)), layer.any(1), layer.any(0))]
     if len(sides[0]) == 0:
-        raise InputError("the voxel grid is empty", "give a grid in which at least one cell is occupied")
+        raise InputError(f"{name} has no occupied cell", "give a grid in which at least one is")
     return np.array([side[0] for side in sides]), np.array([side[-1] + 1 for side in sides])
 
 

@@ -20,6 +20,7 @@ _FORBIDDEN = (
     (r"^[^\S\t]*\t(?=.*\S)", "this line is indented with a tab", "indent with four spaces"),
     (r"\0", "there is a null byte in this line", "is this a text file?"),
 )
+_WORDS_OF_PYTHON = {"positional argument": "a number without a name", "keyword argument": "one with a name"}
 _SHOWN = 60
 
 
@@ -65,8 +66,11 @@ class _Reader:
         except SyntaxError as error:
             row = min(max(error.lineno or 1, 1), len(self.lines))
             column = min(max(error.offset or 1, 1), len(self.lines[row - 1]) + 1)
-            said = f"this cannot be read: {(error.msg or 'invalid syntax').split(';')[0]}"
-            raise self._at(row, column, said, "a line is name(parameter=number, ...) or a for loop") from None
+            said = (error.msg or "invalid syntax").split(";")[0]
+            for word, ours in _WORDS_OF_PYTHON.items():
+                said = said.replace(word, ours)
+            hint = "a line is name(parameter=number, ...) or a for loop"
+            raise self._at(row, column, f"this cannot be read: {said}", hint) from None
         except (RecursionError, MemoryError):
             raise self._at(1, 1, "this is nested too deeply to be a program", "write plain numbers") from None
 

@@ -150,10 +150,9 @@ def _entry(line: str, form: Form, where: str) -> tuple[str, Program]:
     try:
         told: Mapping[str, Any] = json.loads(line)
         name, program = str(told["name"]), told.get(form, told["program"])
-    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        whole = json.dumps({"format": FORMAT, "version": VERSION, "program": program})
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise InputError(
             f"{where} is no label", "each line is a JSON object with a name and a program, as 'shapeprog label' writes"
         ) from error
-    if isinstance(program, str):
-        return name, parse(program, where)
-    return name, program_from_json(json.dumps({"format": FORMAT, "version": VERSION, "program": program}), where)
+    return name, parse(program, where) if isinstance(program, str) else program_from_json(whole, where)

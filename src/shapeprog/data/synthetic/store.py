@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import os
-import zipfile
 from pathlib import Path
 
 import numpy as np
 import torch
 
+from shapeprog.data.arrays import read_numpy
+from shapeprog.data.reading import few
 from shapeprog.errors import InputError, OutputError
 from shapeprog.files import atomic_path
-from shapeprog.language.statement import language
+from shapeprog.language.statement import SLOTS, language
 from shapeprog.language.tensors import Code
 
 _SUFFIX = ".npz"
+_ARRAYS = ("ids", "parameters", "statement_ids", "statement_names")
+_CURE = "write one with: shapeprog sample wide --programs FILE.npz"
 
 
 def write_programs(path: str | os.PathLike[str], code: Code) -> int:
@@ -58,22 +61,22 @@ def read_programs(path: str | os.PathLike[str]) -> Code:
         If there is no such file, it is none of those, it is damaged, or its statements are not those in force.
     """
     target = Path(path)
-    if not target.is_file():
-        raise InputError(f"there is no file {target}", "write one with: shapeprog sample wide --programs FILE.npz")
-    try:
-        with target.open("rb") as stream, np.load(stream, allow_pickle=False) as content:
-            ids, numbers = content["ids"].astype(np.int64), content["parameters"].astype(np.float32)
-            known = list(zip(content["statement_ids"].tolist(), content["statement_names"].tolist(), strict=True))
-        if ids.ndim != 3 or numbers.shape[:3] != ids.shape:
-            raise ValueError(f"ids {ids.shape} and parameters {numbers.shape} do not belong together")
-    except (OSError, KeyError, ValueError, zipfile.BadZipFile, EOFError) as error:
+    arrays = read_numpy(target, _ARRAYS)
+    missing = [name for name in _ARRAYS if name not in arrays]
+    if missing:
+        raise InputError(f"{target.name} is no data set of programs: it has no {' and no '.join(missing)}", _CURE)
+    ids, numbers, statement_ids, names = (arrays[name] for name in _ARRAYS)
+    if ids.ndim != 3 or numbers.shape != (*ids.shape, SLOTS) or {ids.dtype.kind, numbers.dtype.kind} != {"i"}:
         raise InputError(
-            f"{target} is no data set of programs, or it is damaged: {error}", "write it anew with: shapeprog sample"
-        ) from error
-    for number, name in known:
+            f"{target.name}: ids are {few([ids.dtype])} {ids.shape} and parameters {few([numbers.dtype])} "
+            f"{numbers.shape}, not whole numbers (B, K, J) and (B, K, J, {SLOTS})", _CURE
+        )  # fmt: skip
+    if names.dtype.kind != "U" or names.ndim != 1 or names.shape != statement_ids.shape:
+        raise InputError(f"{target.name}: its statements are no list of names with an id each", _CURE)
+    for number, name in zip(statement_ids.tolist(), names.tolist(), strict=True):
         if name not in language() or language()[name].id != number:
             raise InputError(
-                f"{target} uses the statement {name} with id {number}, which the language in force does not have",
-                "load the module that declares it with --with",
-            )
-    return Code(torch.from_numpy(ids), torch.from_numpy(numbers))
+                f"{target.name} uses the statement {name!r} with id {number}, which the language in force does not "
+                "have", "load the module that declares it with --with"
+            )  # fmt: skip
+    return Code(torch.from_numpy(ids.astype(np.int64)), torch.from_numpy(numbers.astype(np.float32)))

@@ -1,0 +1,101 @@
+"""Program files made for one weakness each: depth, length, repetition, copies and numbers that are hard to hold."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+LEG = "leg(at=(-12, -8, -10), size=(16, 2, 2))"
+
+COPIES = (
+    *((count, "0.01") for count in ("0", "2", "1000", "100000", "1048576", "1e12", "3e38")),
+    *(("1000", step) for step in ("0", "7", "1e19", "3e38")),
+    *(("100000", step) for step in ("0", "7")),
+    ("1048576", "1e19"),
+)
+"""How often a leg is repeated, and how far apart."""
+
+
+def crafted() -> Iterator[tuple[str, bytes]]:
+    """Names and contents of such files."""
+    from shapeprog.formats.json_form import result_json
+    from shapeprog.language.text import parse
+    from shapeprog.space import Frame
+
+    deep = 100_000
+    for number, (count, step) in enumerate(COPIES):
+        yield f"copies-{number}.shape", _nest([f"translate({count}, by=({step}, 3, 0))"], LEG).encode()
+    for name, text in (
+        ("deep-parentheses", f"leg(at={'(' * deep}1{')' * deep})"),
+        ("deep-signs", f"leg(at={'-' * deep}1)"),
+        ("deep-sum", "+".join(["1"] * deep)),
+        ("deep-attributes", "a" + ".a" * deep),
+        ("deep-calls", "a" + "()" * deep),
+        ("deep-loops", "".join(f"{' ' * n}for i in translate(2, by=(0, 0, 1)):\n" for n in range(99)) + " " * 99 + LEG),
+        ("deepest-loops", _nest(["translate(1, by=(0, 0, 1))"] * 64, LEG)),
+        ("many-lines", f"{LEG}\n" * 2000),
+        ("deep-frame", f"# frame: {'[' * deep}\n{LEG}"),
+        ("deep-frame-object", f'# frame: {{"scale": {"[" * 990}{"]" * 990}}}\n{LEG}'),
+        ("long-frame-number", f'# frame: {{"scale": {"9" * 400}}}\n{LEG}'),
+        ("longer-frame-number", f'# frame: {{"scale": {"9" * 5000}}}\n{LEG}'),
+        ("long-name", "a" * 900_000),
+        ("long-text", "a\n" * 600_000),
+        ("many-names", "a;" * 400_000),
+        ("many-copies", _nest(["translate(1048577, by=(0, 0, 1))"] * 60, LEG)),
+        ("many-and-none", _nest([*["translate(16777216, by=(0, 0, 1))"] * 62, "translate(0, by=(0, 0, 1))"], LEG)),
+        ("latin", "leg(at=(1, 2, 3), size=(1, 2, 3))  # \u00e9"),
+    ):
+        yield f"{name}.shape", text.encode("latin-1" if name == "latin" else "utf-8")
+    start = '{"format": "shapeprog", "version": 1, "program": '
+    good = result_json(parse(LEG), Frame(0.25, (1.0, -2.0, 3.5)))[:-2]
+    for name, text in (
+        ("deep-lists", start + "[" * deep),
+        ("deep-program", start + "[" * 990 + "]" * 990 + "}"),
+        ("deep-frame", f'{good}, "frame": {"[" * 980}{"]" * 980}}}'),
+        ("deep-snapped", f'{good}, "snapped": {"[" * 980}{"]" * 980}}}'),
+        ("deep-scores", f'{good}, "scores": {{"iou": {"[" * 980}{"]" * 980}}}}}'),
+        ("long-integer", start + '[{"statement": "leg", "parameters": {"at": [' + "9" * 400 + "]}}]}"),
+        ("longer-integer", start + '[{"statement": "leg", "parameters": {"at": [' + "9" * 5000 + "]}}]}"),
+        ("long-frame-integer", good.replace('"scale": 0.25', f'"scale": {"9" * 400}') + "}"),
+        ("many-keys", start[:-12] + ", ".join(f'"{n}": 0' for n in range(200_000)) + ', "7": 1}'),
+        ("long-key", start + '[{"statement": "' + "a" * 1_000_000 + '"}]}'),
+        ("scores-text", f'{good}, "scores": "good"}}'),
+        ("scores-list", f'{good}, "scores": [1, 2]}}'),
+        ("scores-odd", f'{good}, "scores": {{"iou": "x", "cd": null, "f1": [1], "seconds": 1e999}}}}'),
+        ("scores-large", f'{good}, "scores": {{"iou": {"9" * 400}, "cd": -1e308, "f1": true}}}}'),
+        ("source-list", f'{good}, "source": ["/etc/passwd"]}}'),
+        ("source-null-byte", f'{good}, "source": "a\\u0000b"}}'),
+        ("source-half", f'{good}, "source": "\\ud800"}}'),
+        ("source-long", f'{good}, "source": "{"a" * 5000}"}}'),
+        ("source-device", f'{good}, "source": "/dev/zero"}}'),
+        ("wide", '{"format"'.encode("utf-16").decode("latin-1")),
+    ):
+        yield f"{name}.json", text.encode()
+    blanks = " " * 100_000
+    for name, text in (
+        ("blanks-in-group", f"draw('Leg', 'Cub', P=(1, 2,{blanks}x"),
+        ("blanks-after-number", f"draw('Leg', 'Cub', P=1{blanks}x"),
+        ("blanks-after-copies", f"draw('Leg', 'Cub', P=(1, 2, 3)+i*u{blanks}x"),
+        ("blanks-after-end", f"draw('Leg', 'Cub', P=(1, 2, 3), G=(1, 2, 3)){blanks}x"),
+        ("blanks-after-word", f"draw('Leg'{blanks}x"),
+        ("blanks-in-for", f"for(i<2{blanks}x"),
+        ("many-copies", "draw('Leg', 'Cub', P=(1, 2, 3)" + "+i*u" * 100_000 + "x"),
+        ("many-numbers", "draw('Leg', 'Cub', P=(" + "1," * 100_000 + "x"),
+        ("long-number", "draw('Leg', 'Cub', P=(" + "1" * 100_000 + "x"),
+        ("many-words", "draw(" + "'Leg', " * 100_000),
+        ("open-quote", "draw('" + "a" * 100_000),
+        ("deep-loops", "".join(f"{' ' * n}for(i<2, 'Trans', u=(0, 0, 1))\n" for n in range(2000))),
+        ("tilt-of-a-right-angle", "draw('Back', 'Cub', P=(0, 0, 0), G=(3e38, 1, 1), theta=90)"),
+        ("tilt-beyond-numbers", "draw('Back', 'Cub', P=(0, 0, 0), G=(1, 1, 1), theta=1e999)"),
+        (
+            "count-beyond-numbers",
+            "for(i<1e999, 'Rot', theta=1, axis)\n    draw('Leg', 'Cub', P=(0, 0, 0), G=(1, 1, 1))",
+        ),
+        ("deep-frame", f"# frame: {'[' * deep}\n"),
+        ("blank-frame", "#" + "\n" * 200_000 + "frame:\n"),
+    ):
+        yield f"{name}.notation", text.encode()
+
+
+def _nest(loops: list[str], drawn: str) -> str:
+    lines = [f"{'    ' * depth}for i in {loop}:" for depth, loop in enumerate(loops)]
+    return "\n".join([*lines, "    " * len(loops) + drawn])

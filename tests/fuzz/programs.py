@@ -1,0 +1,78 @@
+"""Programs as text, JSON and in the notation of the paper: valid ones, and broken or extreme ones."""
+
+from __future__ import annotations
+
+import functools
+import itertools
+import re
+from collections.abc import Iterator
+from random import Random
+
+from .containers import change_json
+from .crafted_programs import crafted
+from .mutations import BYTES, TEXT, Mutation, change_words, count_otherwise, mutants_of, replaced, write_number
+
+NAMES = (
+    "leg", "legg", "translate", "rotate", "at", "size", "by", "count", "step", "pass", "end", "for", "draw",
+    "import os", "__import__('os')", "lambda: 0", "\U0001f600", "e\u0301", "\u202e", "\x1b[2J", "\x00", "\ufeff",
+    "'Leg', 'Cub'", "P", "G", "theta*i", "axis", "# frame:", "# frame: {", '# frame: {"scale": 0}', "statement", "body",
+    "null", "true", "\t", "\\", ";", ":", "(", ")", "[", "]", "{", "}", "'", '"', "\r", "\x0c", "\u2028", "=", "==",
+    "*", "**", "...", "async ", "$",
+)  # fmt: skip
+"""What is written in the place of a name or behind it."""
+
+
+def write_name(random: Random, content: bytes) -> bytes:
+    """A name becomes another, or something that is none, or comes behind it."""
+    word, behind = random.choice(NAMES).encode(), random.random() < 0.5
+    return replaced(random, content, re.compile(rb"[A-Za-z_']+"), lambda found: found + word if behind else word)
+
+
+NUMBERS: tuple[Mutation, ...] = (*4 * (write_number,), *4 * (count_otherwise,), *2 * (write_name,), change_words)
+WAYS: dict[str, tuple[Mutation, ...]] = {
+    ".shape": (*BYTES, *TEXT, *2 * NUMBERS),
+    ".notation": (*BYTES, *TEXT, *2 * NUMBERS),
+    ".json": (*BYTES, *TEXT, *NUMBERS, *10 * (change_json,)),
+}
+
+TABLE = """# frame: {"scale": 0.04, "centre": [0, 0.5, 0], "axes": [[0, 0, 1], [1, 0, 0], [0, 1, 0]]}
+top_rectangle(at=(4, 0, 0), thickness=2, half=(9, 11))
+for i in translate(2, by=(0, 0, 18)):
+    for j in translate(2, by=(0, 14, 0)):
+        leg(at=(-12, -8, -10), size=(16, 2, 2))
+for i in rotate(4, step=0):
+    line(start=(-6, -10, -8), end=(-6, 9, -8), radius=0.75)
+"""
+
+
+def cases(seed: int) -> Iterator[tuple[str, bytes]]:
+    """Names and contents without an end: first those that are crafted, then broken ones."""
+    return itertools.chain(crafted(), mutants(seed))
+
+
+def mutants(seed: int) -> Iterator[tuple[str, bytes]]:
+    """Names and contents of broken programs without an end."""
+    return mutants_of(seeds(), WAYS, seed)
+
+
+@functools.cache
+def seeds() -> dict[str, bytes]:
+    """Valid programs by name: a table with all that text may hold, and one with every statement, in each form."""
+    import torch
+
+    import shapeprog as sp
+    from shapeprog.data.random import random_program
+    from shapeprog.formats.frames import frame_comment
+    from shapeprog.formats.json_form import result_json
+    from shapeprog.language.program import Program
+
+    found, frame = {}, sp.Frame(0.04, (0.0, 0.5, 0.0))
+    random = torch.Generator().manual_seed(0)
+    some = {f"drawn{number}": random_program(random, blocks=3) for number in range(6)}
+    every = {declared: each for number in range(40) for each in random_program(random).body for declared in [each.name]}
+    for name, program in {"table": sp.parse(TABLE), "every": Program(tuple(every.values())), **some}.items():
+        more = {"snapped": [], "scores": {"iou": 0.5}, "reason": "done", "source": "stool.obj"}
+        found[f"{name}.json"] = result_json(program, frame, **more).encode()
+        found[f"{name}.shape"] = (frame_comment(frame) + sp.format_program(program)).encode()
+        found[f"{name}.notation"] = sp.format_notation(program).encode()
+    return found

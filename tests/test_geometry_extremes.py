@@ -1,16 +1,27 @@
 """No number that fits into float32 makes a kernel read or write beside its arrays, and large ones are not too large."""
 
+import re
+from contextlib import suppress
+
+import numpy as np
 import pytest
 import torch
+import trimesh
 from geometry_helpers import NAMES, make_scene, random_scene, require, with_leaves
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+from shapeprog import export, parse
 from shapeprog.errors import ShapeProgError
+from shapeprog.formats.format import suffixes
+from shapeprog.geometry import surface
 from shapeprog.geometry.cells import rasterise
 from shapeprog.geometry.distance import each_distance, nearest_primitive, signed_distance
 from shapeprog.geometry.nearest import nearest, squared_distance
 from shapeprog.geometry.surface import sample_surface
+from shapeprog.space import Frame
+from shapeprog.view.page import picture
+from shapeprog.view.viewer import viewer
 
 ANY = st.floats(width=32)
 ODD = [1e19, -1e19, 3e38, -3e38, 1e-38, 0.0, float("nan"), float("inf"), -float("inf")]
@@ -73,3 +84,63 @@ def test_solids_far_apart_find_the_nearer_one(name):
     slots, distances = nearest_primitive(scene, points)
     assert slots.tolist() == [0, 1, 0]
     torch.testing.assert_close(distances / 1e20, torch.tensor([2.0, 1, 0.5], dtype=torch.float64))
+
+
+@pytest.mark.parametrize("by_kernel", [True, False])
+@pytest.mark.parametrize("far", [2e18, 1e30, float("inf"), float("nan")])
+def test_points_that_leave_single_precision_are_refused(monkeypatch, far, by_kernel):
+    monkeypatch.setattr(surface, "by_kernel", lambda batch: by_kernel)
+    scene = make_scene(["cuboid"] * 2, [[1.0, 1, 1]] * 2, [[0.0, 0, 0], [0, far, 0]])
+    with pytest.raises(ShapeProgError, match="farther than 1e\\+18 cells"):
+        sample_surface(scene, 50)
+    near = require(scene, centre=scene.centre.nan_to_num(0, 0, 0).clamp(max=9e17))
+    assert sample_surface(near, 50).points.square().sum(-1).isfinite().all()
+
+
+def test_a_surface_without_end_is_named_as_such():
+    with pytest.raises(ShapeProgError, match="no finite number"):
+        sample_surface(make_scene(["cuboid"], [[3e38] * 3], [[0.0, 0, 0]]), 50)
+
+
+PLACES = {
+    "position": "leg(at=({0}, 0, {0}), size=(2, 2, 2))\nleg(at=(0, 0, 0), size=(1, 1, 1))\n",
+    "size": "leg(at=(0, 0, 0), size=({0}, 2, {0}))\nback(at=(0, 0, 0), size=(2, 2, 2), tilt={0})\n",
+    "radius": "line(start=(0, {0}, 0), end=({0}, 0, 0), radius={0})\nbase_circle(at=(0, 0, 0), thickness=1, radius=9)",
+    "shift": "for i in translate(3, by=(0, {0}, 0)):\n    leg(at=(0, 0, 0), size=(2, 2, 2))\n",
+}
+NO_NUMBER = re.compile(rb"\b(nan|inf|infinity)\b", re.IGNORECASE)
+
+
+@pytest.mark.parametrize("number", ["1e19", "-3e38", "3e38", "1e-38", "4e13"])
+@pytest.mark.parametrize("place", PLACES)
+def test_every_exit_of_a_program_ends_in_finite_numbers_or_in_words(tmp_path, place, number):
+    program = parse(PLACES[place].format(number))
+    for suffix in suffixes():
+        if suffix in (".step", ".stp"):  # a script that another library runs
+            continue
+        path = tmp_path / f"a{suffix}"
+        try:
+            export(program, path)
+        except ShapeProgError:
+            continue
+        if suffix == ".npz":
+            with np.load(path) as arrays:
+                assert all(np.isfinite(arrays[name]).all() for name in arrays.files)
+        elif suffix in (".glb", ".stl", ".ply"):
+            assert np.isfinite(trimesh.load(path, force="mesh", process=False).vertices).all()
+        elif suffix not in (".npy", ".binvox"):
+            assert not NO_NUMBER.search(path.read_bytes())
+    for draw in (
+        lambda: picture(None, program, tmp_path / "a.png", view=48),
+        lambda: viewer(program, tmp_path / "a.html"),
+    ):
+        with suppress(ShapeProgError):
+            draw()
+
+
+def test_a_frame_that_leaves_single_precision_is_refused(tmp_path):
+    program, frame = parse("leg(at=(0, 0, 0), size=(2, 2, 2))\n"), Frame(scale=1e38)
+    for suffix in (".glb", ".obj", ".ply", ".stl"):
+        with pytest.raises(ShapeProgError, match="single precision"):
+            export(program, tmp_path / f"a{suffix}", Frame(scale=1e39))
+    export(program, tmp_path / "a.ply", frame)

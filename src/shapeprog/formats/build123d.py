@@ -27,6 +27,7 @@ from build123d import Color, Compound, Face, Location, Plane, Shell, Solid, Vect
 
 _TOOLS = '''
 parts = []
+numbers = {}
 
 
 def scaled(values):
@@ -81,8 +82,8 @@ def draw(name, colour, solid, at=Location()):
     """Put a solid into the world and keep it; one without volume draws nothing."""
     if solid is not None:
         part = world * at * solid
-        number = 1 + sum(other.label.rpartition("_")[0] == name for other in parts)
-        part.label, part.color = f"{name}_{number}", Color(*colour)
+        numbers[name] = numbers.get(name, 0) + 1
+        part.label, part.color = f"{name}_{numbers[name]}", Color(*colour)
         parts.append(part)
 
 
@@ -107,20 +108,28 @@ def write_script(program: Program, path: Path, frame: Frame) -> None:
     write_text(path, script_text(program, frame, path.stem))
 
 
+MOST_SOLIDS = 1 << 11
+"""Most solids of a STEP file: build123d takes some milliseconds for each."""
+
+
 def write_step(program: Program, path: Path, frame: Frame) -> None:
     """Write named, coloured solids as STEP; a world unit counts as a millimetre.
 
     Raises
     ------
     OutputError
-        If build123d is not installed or the program draws nothing.
+        If build123d is not installed, or the program draws nothing or more than ``MOST_SOLIDS``.
     """
+    if (count := len(drawn_parts(program))) > MOST_SOLIDS:
+        raise OutputError(
+            f"the {count} parts of this program are too many for STEP, which takes at most {MOST_SOLIDS}",
+            "lower the counts, or export a .py script, which keeps the loops, and run it where there is time",
+        )
     if importlib.util.find_spec("build123d") is None:
         raise OutputError(
             f"cannot write {path}: STEP needs the library build123d, which is not installed",
             "pip install 'shapeprog[step]', or export a .py script and run it where build123d is",
         )
-    drawn_parts(program)
     made: dict[str, Any] = {"__name__": "shapeprog_model"}
     # The script is made by this module from checked names and numbers; running it keeps one home for the geometry.
     exec(compile(script_text(program, frame, path.stem), f"{path.stem}.py", "exec"), made)

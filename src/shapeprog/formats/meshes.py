@@ -7,17 +7,26 @@ from typing import Any
 
 import numpy as np
 
+from shapeprog.errors import OutputError
 from shapeprog.files import write_bytes, write_text
 from shapeprog.formats.colours import colour
-from shapeprog.formats.parts import Faces, Part, Vertices, crease_normals, drawn_parts, solid
+from shapeprog.formats.parts import Faces, Part, Vertices, drawn_parts, part_normals, solid
 from shapeprog.language.program import Program
 from shapeprog.space import Frame
+
+MOST_NODES = 1 << 14
+"""Most named nodes of a GLB: each takes half a millisecond to write, and viewers list them all."""
 
 
 def write_glb(program: Program, path: Path, frame: Frame) -> None:
     """One named node per part (``leg_1``, ``leg_2``...) and one material per statement.
 
     The material is what a viewer shows; vertices are split along creases, so that boards look flat and bars round.
+
+    Raises
+    ------
+    OutputError
+        If there are no parts, or more than ``MOST_NODES``.
     """
     import trimesh
     from trimesh.visual.material import PBRMaterial
@@ -26,12 +35,18 @@ def write_glb(program: Program, path: Path, frame: Frame) -> None:
     make_visual: Any = trimesh.visual.TextureVisuals
     scene: Any = trimesh.Scene()
     materials: dict[str, Any] = {}
-    for part in drawn_parts(program, frame):
+    each = drawn_parts(program, frame)
+    if len(each) > MOST_NODES:
+        raise OutputError(
+            f"the {len(each)} parts of this program are too many named nodes: a GLB takes at most {MOST_NODES}",
+            "lower the counts, or export .ply, which has all parts in one mesh",
+        )
+    for part, of_corners in zip(each, part_normals(each), strict=True):
         if part.word not in materials:
             materials[part.word] = make_material(
                 name=part.word, baseColorFactor=[*colour(part.statement), 255], metallicFactor=0.0, roughnessFactor=0.7
             )
-        vertices, normals, faces = _split(part)
+        vertices, normals, faces = _split(part, of_corners)
         mesh = trimesh.Trimesh(vertices, faces, vertex_normals=normals, process=False)
         mesh.visual = make_visual(uv=np.zeros((len(vertices), 2)), material=materials[part.word])
         scene.add_geometry(mesh, node_name=part.name, geom_name=part.name)
@@ -46,8 +61,8 @@ def write_obj(program: Program, path: Path, frame: Frame) -> None:
     lines, first = [f"mtllib {library.name}"], 1
     for part in each:
         lines += [f"o {part.name}", f"usemtl {part.word}"]
-        lines += ["v {:.9g} {:.9g} {:.9g}".format(*vertex) for vertex in part.vertices]
-        lines += ["f {} {} {}".format(*face) for face in part.faces + first]
+        lines += ["v {:.9g} {:.9g} {:.9g}".format(*vertex) for vertex in part.vertices.tolist()]
+        lines += ["f {} {} {}".format(*face) for face in (part.faces + first).tolist()]
         first += len(part.vertices)
     materials = []
     for word, statement in {part.word: part.statement for part in each}.items():
@@ -82,9 +97,9 @@ def write_stl(program: Program, path: Path, frame: Frame) -> None:
     write_bytes(path, content)
 
 
-def _split(part: Part) -> tuple[Vertices, Vertices, Faces]:
+def _split(part: Part, of_corners: Vertices) -> tuple[Vertices, Vertices, Faces]:
     """Vertices, normals and faces where corners share a vertex only if they share a normal."""
-    normals = crease_normals(part.vertices, part.faces).reshape(-1, 3)
+    normals = of_corners.reshape(-1, 3)
     corners = part.faces.reshape(-1)
     key = np.concatenate([corners[:, None], np.rint(normals * 1e4)], 1)
     _, first, index = np.unique(key, axis=0, return_index=True, return_inverse=True)

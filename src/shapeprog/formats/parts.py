@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,6 +20,9 @@ Faces = npt.NDArray[np.int64]
 
 _LARGEST_FAN = 400
 """Vertices with more corners than this keep the normals of their triangles: all pairs of corners are compared."""
+
+_AT_ONCE = 1 << 15
+"""Triangles whose pairs of corners are compared together."""
 
 
 @dataclass(frozen=True)
@@ -59,8 +63,10 @@ def parts(program: Program, frame: Frame | None = None) -> list[Part]:
 
     Raises
     ------
+    ShapeProgError
+        If they are too many or too far away to be meshed, see :func:`shapeprog.geometry.mesh.part_meshes`.
     OutputError
-        If they reach further than files and pictures can say.
+        If the frame leads beyond single precision, which files of meshes hold.
     """
     import torch
 
@@ -72,12 +78,13 @@ def parts(program: Program, frame: Frame | None = None) -> list[Part]:
     scene = unroll(encode(program, dtype=torch.float64))
     numbers: Counter[str] = Counter()
     found = []
+    statements, blocks = scene.statement.tolist(), scene.block.tolist()
+    words = {statement: language()[statement].name for statement in set(statements) if statement in language()}
     for slot, vertices, faces in part_meshes(scene):
-        statement = int(scene.statement[slot])
-        word = language()[statement].name
+        word = words[statements[slot]]
         numbers[word] += 1
-        name, where = f"{word}_{numbers[word]}", placed(vertices, frame)
-        found.append(Part(name, statement, word, int(scene.block[slot]), where, faces))
+        where = placed(vertices, frame)
+        found.append(Part(f"{word}_{numbers[word]}", statements[slot], word, blocks[slot], where, faces))
     return found
 
 
@@ -93,7 +100,7 @@ def placed(points: npt.NDArray[Any], frame: Frame | None = None) -> Vertices:
     with np.errstate(over="ignore", invalid="ignore"):
         found = found if frame is None else frame.to_world(found)
     if not (np.abs(found) <= LARGEST).all():
-        said = "a part of this program, or its frame, is too large or too far away to be drawn"
+        said = "a part of this program, or its frame, is too large or too far away to be drawn in single precision"
         raise OutputError(said, f"coordinates go from -{LARGEST:.7e} to {LARGEST:.7e}")
     return found
 
@@ -118,7 +125,7 @@ def solid(program: Program, frame: Frame | None = None) -> tuple[Vertices, Faces
     Raises
     ------
     OutputError
-        If nothing in the program has a volume, or it reaches further than files can say.
+        If nothing in the program has a volume, it is more than can be joined, or reaches further than files can say.
     """
     import torch
 
@@ -133,19 +140,41 @@ def solid(program: Program, frame: Frame | None = None) -> tuple[Vertices, Faces
     return placed(vertices, frame), faces
 
 
-def crease_normals(vertices: npt.NDArray[Any], faces: npt.NDArray[Any], angle: float = 40.0) -> Vertices:
+def part_normals(each: Sequence[Part]) -> Iterator[Vertices]:
+    """The :func:`crease_normals` of every part; many small parts are worked on together."""
+    start = 0
+    while start < len(each):
+        stop, triangles = start + 1, len(each[start].faces)
+        while stop < len(each) and triangles + len(each[stop].faces) <= _AT_ONCE:
+            triangles += len(each[stop].faces)
+            stop += 1
+        some = each[start:stop]
+        starts = np.cumsum([0, *(len(part.vertices) for part in some)])
+        faces = np.concatenate([part.faces + first for part, first in zip(some, starts, strict=False)])
+        vertices, owner = np.concatenate([part.vertices for part in some]), np.repeat(range(len(some)), np.diff(starts))
+        yield from np.split(
+            crease_normals(vertices, faces, owner=owner), np.cumsum([len(part.faces) for part in some[:-1]])
+        )
+        start = stop
+
+
+def crease_normals(
+    vertices: npt.NDArray[Any],
+    faces: npt.NDArray[Any],
+    angle: float = 40.0,
+    owner: npt.NDArray[np.int64] | None = None,
+) -> Vertices:
     """Unit normals (F, 3, 3) of the corners of every triangle: smooth across shallow edges, sharp across steep ones.
 
     The normal of a corner is the area-weighted mean over the triangles at its vertex whose own normals are within
-    ``angle`` degrees of its triangle's.  Vertices at one place are taken as one.
+    ``angle`` degrees of its triangle's.  Vertices at one place are taken as one, if they have the same ``owner`` (V,),
+    in rising order.
     """
     corners = np.asarray(vertices, np.float64)[faces]
     area = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     length = np.linalg.norm(area, axis=1, keepdims=True)
     flat = area / np.where(length > 0, length, 1)
-    inside = vertices - vertices.min(0) if len(vertices) else np.zeros((0, 3))
-    keys = np.rint(inside / max(inside.max(initial=0), 1e-30) * 1e6).astype(np.int64)
-    place = np.unique(keys, axis=0, return_inverse=True)[1].reshape(-1)[faces].reshape(-1)
+    place = _places(np.asarray(vertices, np.float64), owner)[faces].reshape(-1)
     order = np.argsort(place, kind="stable")
     starts = np.flatnonzero(np.diff(place[order], prepend=-1))
     counts = np.diff(starts, append=len(order))
@@ -163,3 +192,19 @@ def crease_normals(vertices: npt.NDArray[Any], faces: npt.NDArray[Any], angle: f
     fallback = np.repeat(flat, 3, axis=0)
     normals: Vertices = np.where(size > 1e-30, total / np.where(size > 1e-30, size, 1), fallback).reshape(-1, 3, 3)
     return normals
+
+
+def _places(vertices: Vertices, owner: npt.NDArray[np.int64] | None) -> npt.NDArray[np.int64]:
+    """A number for each vertex, the same for those of one owner within a millionth of its extent."""
+    if not len(vertices):
+        return np.zeros(0, np.int64)
+    owner = np.zeros(len(vertices), np.int64) if owner is None else owner
+    first = np.flatnonzero(np.diff(owner, prepend=-1))
+    low, counts = np.minimum.reduceat(vertices, first), np.diff(first, append=len(owner))
+    extent = (np.maximum.reduceat(vertices, first) - low).max(-1)
+    scale = np.repeat(np.maximum(extent, 1e-30), counts)[:, None]
+    keys = np.column_stack([owner, np.rint((vertices - np.repeat(low, counts, 0)) / scale * 1e6).astype(np.int64)])
+    order = np.lexsort(keys.T[::-1])
+    place = np.empty(len(vertices), np.int64)
+    place[order] = np.cumsum((np.diff(keys[order], axis=0, prepend=keys[order[:1]]) != 0).any(-1))
+    return place

@@ -12,7 +12,9 @@ from shapeprog.kernels.table import CENTRE, KIND, ROTATION, SIZE, local
 
 ROUNDING = 2e-6  # error of a bound in single precision against the size of the coordinates, generously
 STRIDE = 2.0  # how far in cells from a point its list of possible nearest primitives is used
-FARTHEST = 1e18  # coordinates up to which bounds are taken in single precision, whose squares end at 3e38
+LONG_STRIDE, MANY = 8.0, 1024  # the same among more primitives than this, which take longer than a longer list
+RIVAL = 8  # what a distance costs, in bounds
+FARTHEST = 1e18  # coordinates whose squares fit into single precision, in which bounds are taken and points drawn
 
 
 @helper
@@ -87,6 +89,15 @@ def _best(table, first, kept, lower, count, x, y, z):
 
 
 @helper
+def _rivals(lower, count, best):
+    """How many primitives had to be looked at because their bound is not above the best distance."""
+    number = 0
+    for n in range(count):
+        number += lower[n] <= best
+    return number
+
+
+@helper
 def _few(all_kept, all_box, lower, used, limit, kept, box):
     """Keep the boxes whose bound is not above a limit, or no number; returns how many."""
     number = 0
@@ -99,33 +110,36 @@ def _few(all_kept, all_box, lower, used, limit, kept, box):
     return number
 
 
-@kernel("void(f8[:, ::1], i8, f8[:, ::1], i8, i8[::1], f8[::1], i8, i8)")
-def nearest(table, many, points, count, slots, values, begin, end):
+@kernel("void(f8[:, ::1], i8, f8[:, ::1], i8, i8, i8[::1], f8[::1], i8, i8)")
+def nearest(table, many, points, count, most, slots, values, begin, end):
     """Nearest primitive and signed distance of the union for the points ``begin`` to ``end`` of all scenes.
 
     Each scene has ``many`` rows of the table and ``count`` points.  The turned box around a primitive bounds its
     signed distance from below, inside too.  Distances change no faster than points move: a primitive whose bound at
-    one point exceeds the best there by more than twice ``STRIDE`` is not the nearest within ``STRIDE`` of it, so
+    one point exceeds the best there by more than twice the stride is not the nearest within a stride of it, so
     points that come in order, such as cells, look at few primitives.  Where coordinates are too large for bounds, or
-    no numbers, every primitive is looked at.
+    no numbers, every primitive is looked at.  Among more than ``MANY`` primitives, once these points have had their
+    share of ``most`` bounds looked at, the slots of all others are -1.
     """
+    left = (most // len(points) + MANY) * (end - begin)
     all_kept, kept = np.empty(many, np.int64), np.empty(many, np.int64)
     all_box, box = np.empty((15, many), np.float32), np.empty((15, many), np.float32)
     up, depth, lower = np.empty(many, np.float32), np.empty(many, np.float32), np.empty(many, np.float32)
-    scene, used, number, extent, least = -1, 0, 0, 0.0, 0.0
+    scene, used, number, extent, least, stride = -1, 0, 0, 0.0, 0.0, STRIDE
     px, py, pz = np.inf, np.inf, np.inf
     for item in range(begin, end):
         if item // count != scene:
             scene, px = item // count, np.inf
             used, extent = _boxes(table, scene * many, many, all_kept, all_box)
+            stride = STRIDE if used <= MANY else LONG_STRIDE
         if used == 0:
             slots[item], values[item] = 0, np.inf
             continue
         x, y, z = points[item, 0], points[item, 1], points[item, 2]
         far = not abs(x) + abs(y) + abs(z) + extent < FARTHEST
-        if not far and (x - px) * (x - px) + (y - py) * (y - py) + (z - pz) * (z - pz) < STRIDE * STRIDE:
+        if not far and (x - px) * (x - px) + (y - py) * (y - py) + (z - pz) * (z - pz) < stride * stride:
             if number == 0:
-                number = _few(all_kept, all_box, lower, used, least + 2 * STRIDE + 1e-3, kept, box)
+                number = _few(all_kept, all_box, lower, used, least + 2 * stride + 1e-3, kept, box)
             of, some, those = number, kept, box
         else:
             px, py, pz, number = x, y, z, 0
@@ -138,6 +152,11 @@ def nearest(table, many, points, count, slots, values, begin, end):
         slots[item], values[item] = some[found], best
         if number == 0:
             least = best
+        if used > MANY:
+            left -= of + RIVAL * _rivals(lower, of, best)
+            if left < 0:
+                slots[item:end] = -1
+                return
 
 
 @kernel("void(f8[:, ::1], i8, f8[:, ::1], i8, i8[::1], f8[::1], f8[:, ::1], f8[:, ::1], i8, i8)")

@@ -17,6 +17,26 @@ from shapeprog.space import FloatArray
 FLAT = 1e-6
 """A part that is thinner than this, in cells, has no solid to mesh and is left out."""
 
+FARTHEST = 1 << 24
+"""Coordinates in cells up to which parts are meshed: files of meshes hold single precision, which ends to tell one cell
+from the next there."""
+
+MOST_TRIANGLES = 1 << 21
+"""Most triangles of the parts of a scene together."""
+
+MOST_TOUCHING = 1 << 14
+"""Most pairs of parts that touch, of which one solid is made: each takes up to a millisecond."""
+
+AT_ONCE = 64
+"""Solids that are joined together."""
+
+PAIRS_AT_ONCE = 1 << 21
+"""Pairs of boxes that are looked at together."""
+
+
+Single = tuple[npt.NDArray[np.float32], npt.NDArray[np.int64]]
+"""Vertices in single precision and triangles."""
+
 
 class PartMesh(NamedTuple):
     """The watertight mesh of the primitive in one slot of a scene, in the grid frame."""
@@ -27,40 +47,128 @@ class PartMesh(NamedTuple):
 
 
 def part_meshes(scene: Batch) -> list[PartMesh]:
-    """A mesh of every primitive of one scene, in the order of the slots; degenerate ones are left out."""
+    """A watertight mesh of every primitive of one scene, in the order of the slots; degenerate ones are left out.
+
+    Raises
+    ------
+    ShapeProgError
+        If given a batch, or a part lies beyond ``FARTHEST``, or there are more triangles than ``MOST_TRIANGLES``.
+    """
     if scene.batch_shape:
-        said = f"a batch of shape {tuple(scene.batch_shape)} has no single mesh"
-        raise ShapeProgError(said, "mesh its scenes one by one")
-    found = []
-    reach = {kind: array(primitives[kind].bound(scene.size.detach())) for kind in set(scene.kind.tolist())}
+        raise ShapeProgError(
+            f"a batch of shape {tuple(scene.batch_shape)} has no single mesh", "mesh its scenes one by one"
+        )
+    found, triangles, known = [], 0, dict[bytes, Triangles]()
+    solid, reach = array(scene.mask).copy(), np.zeros((len(scene.mask), 3))
     size, centre, rotation = (array(t.double()) for t in (scene.size, scene.centre, scene.rotation))
-    for slot, (kind, present) in enumerate(zip(scene.kind.tolist(), scene.mask.tolist(), strict=True)):
-        declared = primitives[kind]
-        thick = (reach[kind][slot] > FLAT).all() and (size[slot, : declared.extents] > FLAT).all()
-        if present and thick and np.isfinite(size[slot]).all():
-            vertices, faces = declared.mesh(size[slot])
-            found.append(PartMesh(slot, vertices @ rotation[slot].T + centre[slot], np.asarray(faces, np.int64)))
+    for kind in scene.kinds:
+        here, declared = array(scene.kind) == kind, primitives[kind]
+        reach[here] = array(declared.bound(scene.size.detach()))[here]
+        solid[here] &= (reach[here] > FLAT).all(-1) & (size[here, : declared.extents] > FLAT).all(-1)
+    far = solid & ~((np.abs(centre) + np.linalg.norm(reach, axis=-1, keepdims=True)).max(-1, initial=0) <= FARTHEST)
+    if far.any():
+        raise ShapeProgError(
+            f"{int(far.sum())} of {int(solid.sum())} parts reach farther than {FARTHEST} cells from the centre",
+            "lower their positions, sizes or shifts: nearer to it, single precision still tells cells apart",
+        )
+    for slot, kind in zip(np.flatnonzero(solid).tolist(), array(scene.kind)[solid].tolist(), strict=True):
+        key = kind.to_bytes(4, "little") + size[slot].tobytes()  # copies share their sizes
+        if key not in known:
+            vertices, faces = primitives[kind].mesh(size[slot])
+            known[key] = vertices, np.asarray(faces, np.int64)
+        vertices, faces = known[key]
+        triangles += len(faces)
+        if triangles > MOST_TRIANGLES:
+            raise ShapeProgError(
+                f"the {int(solid.sum())} parts of this program have more than {MOST_TRIANGLES} triangles",
+                "lower its counts, or save it as program text, .scad or .py, which keep its loops",
+            )
+        found.append(PartMesh(slot, vertices @ rotation[slot].T + centre[slot], faces))
     return found
 
 
 def union_mesh(scene: Batch) -> Triangles:
-    """One watertight mesh of the union of all primitives of one scene; a ``ShapeProgError`` if it holds no solid."""
-    merged = _union(scene).to_mesh()
-    if not len(merged.tri_verts):
+    """One watertight mesh of the union of all primitives of one scene.
+
+    Only parts that touch are joined; the others are put beside them as they are.  A ``ShapeProgError`` if the scene
+    holds no solid part, a batch is given, or more than ``MOST_TOUCHING`` pairs of parts touch.
+    """
+    solids: list[Single] = []
+    for group in _touching(scene):
+        if len(group) == 1:
+            solids += group
+        else:
+            merged = _joined(group).to_mesh()
+            solids.append((merged.vert_properties[:, :3], np.asarray(merged.tri_verts, np.int64)))
+    starts = np.cumsum([0, *(len(vertices) for vertices, _ in solids)])
+    if not starts[-1]:
         raise ShapeProgError("the union of the parts is empty", "a part may be too thin; give it some thickness")
-    return np.asarray(merged.vert_properties[:, :3], np.float64), np.asarray(merged.tri_verts, np.int64)
+    vertices = np.concatenate([vertices for vertices, _ in solids]).astype(np.float64)
+    return vertices, np.concatenate([faces + start for (_, faces), start in zip(solids, starts, strict=False)])
 
 
 def pieces(scene: Batch) -> int:
     """How many connected solids that union is, which must hold one; a cavity within one is no piece."""
-    return sum(piece.volume() > 0 for piece in _union(scene).decompose())
+    joined = (_joined(group).decompose() for group in _touching(scene))
+    return sum(piece.volume() > 0 for solids in joined for piece in solids)
 
 
-def _union(scene: Batch) -> Any:
+def _touching(scene: Batch) -> list[list[Single]]:
+    """The parts of a scene in single precision, those together whose boxes touch."""
+    parts = [(part.vertices.astype(np.float32), part.faces) for part in part_meshes(scene)]
+    if not parts:
+        raise ShapeProgError("the scene holds no solid part", "draw something that has a thickness")
+    return [[parts[number] for number in group] for group in _groups([vertices for vertices, _ in parts])]
+
+
+def _joined(parts: list[Single]) -> Any:
+    """The union of parts as a manifold: some at once, since the time of all at once grows with the square."""
     from manifold3d import Manifold, Mesh, OpType
 
-    parts = part_meshes(scene)
-    if not parts:
-        raise ShapeProgError("the scene holds no solid part", "give the program a statement that draws something")
-    solids = [Manifold(Mesh(part.vertices.astype(np.float32), part.faces.astype(np.uint32))) for part in parts]
-    return Manifold.batch_boolean(solids, OpType.Add)
+    solids = [Manifold(Mesh(vertices, faces.astype(np.uint32))) for vertices, faces in parts]
+    while len(solids) > 1:
+        solids = [Manifold.batch_boolean(solids[n : n + AT_ONCE], OpType.Add) for n in range(0, len(solids), AT_ONCE)]
+        for solid in solids:
+            solid.num_tri()  # nothing is computed before somebody asks
+    return solids[0]
+
+
+def _groups(parts: list[npt.NDArray[np.float32]]) -> list[list[int]]:
+    """Numbers of the parts that hang together: their boxes touch.
+
+    Boxes are swept along the axis on which the fewest overlap.
+    """
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    low, high = (np.array([corner(vertices, 0) for vertices in parts]).T for corner in (np.min, np.max))
+    sweeps = []
+    for axis in range(3):
+        order = np.argsort(low[axis], kind="stable")
+        later = np.searchsorted(low[axis, order], high[axis, order], "right") - np.arange(len(parts)) - 1
+        sweeps.append((int(later.sum()), axis, order, later))
+    _, swept, order, later = min(sweeps, key=lambda sweep: sweep[0])
+    low, high, ends = low[:, order], high[:, order], np.cumsum(later)
+    pairs, start = [np.zeros((2, 0), np.int64)], 0
+    while start < len(parts):
+        before = ends[start] - later[start]
+        stop = max(start + 1, int(np.searchsorted(ends, before + PAIRS_AT_ONCE, "right")))
+        one = np.repeat(np.arange(start, stop), later[start:stop])
+        two = one + 1 + np.arange(len(one)) - (ends - later - before)[one]
+        for axis in {0, 1, 2} - {swept}:
+            near = (low[axis, one] <= high[axis, two]) & (low[axis, two] <= high[axis, one])
+            one, two = one[near], two[near]
+        pairs.append(order[np.stack([one, two])])
+        if sum(each.shape[1] for each in pairs) > MOST_TOUCHING:
+            raise ShapeProgError(
+                f"more than {MOST_TOUCHING} pairs of the {len(parts)} parts touch, too many to join into one solid",
+                "lower the counts, or export the parts as they are, as .ply",
+            )
+        start = stop
+    one, two = np.concatenate(pairs, 1)
+    graph = coo_matrix((np.ones(len(one), np.bool_), (one, two)), shape=(len(parts), len(parts)))
+    label = connected_components(graph, directed=False)[1]
+    groups: dict[int, list[int]] = {}
+    for number, group in enumerate(label.tolist()):
+        groups.setdefault(group, []).append(number)
+    return list(groups.values())

@@ -25,6 +25,7 @@ from shapeprog.geometry import surface_kernels as kernels
 from shapeprog.geometry.arrays import array, by_kernel, cast, gradients, numbers, over_threads, table_of
 from shapeprog.geometry.batch import Batch
 from shapeprog.geometry.distance import each_distance
+from shapeprog.geometry.distance_kernels import FARTHEST
 from shapeprog.geometry.primitive import primitives
 from shapeprog.geometry.random import uniform
 from shapeprog.kernels.table import WIDTH
@@ -68,7 +69,7 @@ class Choice(NamedTuple):
     places
         Its unit place, its position and its normal, three numbers each.
     found
-        How many points each element has.
+        How many points each element has; -1 if some are farther away than ``FARTHEST``.
     """
 
     chosen: Int[Tensor, "B n 2"]
@@ -96,7 +97,7 @@ def sample_surface(batch: Batch, n: int, generator: torch.Generator | None = Non
     Raises
     ------
     ShapeProgError
-        If an element has no surface.
+        If an element has no surface, or one that is too large or too far away for single precision.
     """
     flat = batch.flatten()
     areas = face_areas(flat)
@@ -142,7 +143,7 @@ def area_shares(areas: Float[Tensor, "B N F"], batch: Batch) -> Float[Tensor, "B
     Raises
     ------
     ShapeProgError
-        If an element has no area.
+        If an element has no area, or an infinite one.
     """
     total = areas.double().flatten(-2).cumsum(-1)
     whole = total[..., -1:] if total.shape[-1] else total.new_zeros(len(total), 1)
@@ -150,6 +151,8 @@ def area_shares(areas: Float[Tensor, "B N F"], batch: Batch) -> Float[Tensor, "B
     if bool(bare.any()):
         number = int(bare.nonzero()[0, 0])
         which = f"scene {number} of {len(bare)}" if batch.batch_shape else "the scene"
+        if not bool(whole[number].isfinite()):
+            raise ShapeProgError(f"{which} has a surface whose area is no finite number", "lower sizes and positions")
         raise ShapeProgError(
             f"{which} has no surface to draw points from", "give the program a statement that draws something"
         )
@@ -189,7 +192,9 @@ def visible(flat: Batch, shares: Float[Tensor, "B C"], n: int, seed: int) -> Cho
         drawn += more
     chosen, places, seen = (torch.cat(each, 1) for each in zip(*pieces, strict=True))
     first = torch.argsort(~seen, dim=-1, stable=True)[:, :n]
-    return Choice(_rows(chosen, first), _rows(places, first), found.clamp(max=n))
+    places = _rows(places, first)
+    far = ~(places[..., 3:6].abs().sum(-1) < FARTHEST) & (torch.arange(n, device=found.device) < found[:, None])
+    return Choice(_rows(chosen, first), places, torch.where(far.any(-1), -1, found.clamp(max=n)))
 
 
 def place(flat: Batch, areas: Float[Tensor, "B N F"], choice: Choice) -> tuple[Tensor, Tensor]:
@@ -233,9 +238,14 @@ class _Placed(torch.autograd.Function):
 
 
 def _whole(choice: Choice, n: int) -> Choice:
-    """Repeat the points of elements that are nearly hidden; refuse those that are hidden altogether."""
+    """Repeat the points of elements that are nearly hidden; refuse those that are hidden altogether, or too far."""
     if bool((choice.found >= n).all()):
         return choice
+    if bool((choice.found < 0).any()):
+        raise ShapeProgError(
+            f"parts of the surface are farther than {FARTHEST:.0e} cells away, where distances leave single precision",
+            "lower positions, sizes and shifts",
+        )
     if bool((choice.found == 0).any()):
         raise ShapeProgError("no point of the surface is visible", "the primitives of the scene hide each other")
     turn = torch.arange(n, device=choice.found.device) % choice.found[:, None]

@@ -6,6 +6,7 @@ import numpy as np
 
 from shapeprog.geometry.dispatch import bound, excess, normal, place, sample
 from shapeprog.geometry.dispatch import pull as pull_sizes
+from shapeprog.geometry.distance_kernels import FARTHEST
 from shapeprog.kernels.bits import uniform
 from shapeprog.kernels.compile import helper, kernel
 from shapeprog.kernels.table import CENTRE, KIND, ROTATION, local, turned
@@ -13,12 +14,18 @@ from shapeprog.kernels.table import CENTRE, KIND, ROTATION, local, turned
 GUIDE = 256
 """Steps of the table that shortens the search for a face."""
 
+LISTED = 512
+"""Most primitives of a scene of which each gets a list of those near it; in larger scenes they are found anew for each
+point, by the boxes around runs of primitives that follow each other."""
+
+RUN = 256
+"""Primitives in such a run."""
+
 
 @helper
-def _around(table, first, many, skin, box, near, nears):
-    """Boxes around the primitives, and for each of them the others whose box touches its own: only they can hide it."""
+def _around(table, first, many, skin, box):
+    """Boxes around the primitives: centre and reach along each axis."""
     for slot in range(many):
-        nears[slot] = 0
         if table[first + slot, KIND] < 0:
             continue
         one, two, three = bound(table, first + slot)
@@ -27,15 +34,22 @@ def _around(table, first, many, skin, box, near, nears):
             reach = abs(table[first + slot, column]) * one + abs(table[first + slot, column + 1]) * two
             box[slot, axis] = table[first + slot, CENTRE + axis]
             box[slot, 3 + axis] = skin + reach + abs(table[first + slot, column + 2]) * three
+
+
+@helper
+def _list_near(table, first, many, box, near, nears):
+    """For each primitive the others whose box touches its own: only they can hide it."""
     for slot in range(many):
-        for other in range(many):
-            apart = other == slot or table[first + slot, KIND] < 0 or table[first + other, KIND] < 0
+        nears[slot] = 0
+        for other in range(slot):
+            apart = table[first + slot, KIND] < 0 or table[first + other, KIND] < 0
             for axis in range(3):
                 gap = abs(box[slot, axis] - box[other, axis]) - box[slot, 3 + axis] - box[other, 3 + axis]
                 apart = apart or gap > 0
             if not apart:
-                near[slot, nears[slot]] = other
+                near[slot, nears[slot]], near[other, nears[other]] = other, slot
                 nears[slot] += 1
+                nears[other] += 1
 
 
 @helper
@@ -46,17 +60,57 @@ def _inside(table, row, x, y, z):
 
 
 @helper
-def _hidden(table, first, box, near, nears, slot, x, y, z, dx, dy, dz):
-    """Whether another part begins just outside the point, or an earlier part has the same face there."""
-    for turn in range(nears[slot]):
-        other = near[slot, turn]
-        if abs(x - box[other, 0]) > box[other, 3] or abs(y - box[other, 1]) > box[other, 4]:
-            continue
-        if abs(z - box[other, 2]) > box[other, 5]:
+def _join(table, first, many, box, joined):
+    """Boxes around runs of primitives: low and high corner."""
+    for run in range(len(joined)):
+        for axis in range(3):
+            joined[run, axis], joined[run, 3 + axis] = np.inf, -np.inf
+        for slot in range(run * RUN, min(run * RUN + RUN, many)):
+            if table[first + slot, KIND] >= 0:
+                for axis in range(3):
+                    joined[run, axis] = min(joined[run, axis], box[slot, axis] - box[slot, 3 + axis])
+                    joined[run, 3 + axis] = max(joined[run, 3 + axis], box[slot, axis] + box[slot, 3 + axis])
+
+
+@helper
+def _beyond(box, slot, x, y, z):
+    """Whether a point is not in the box around a primitive."""
+    if abs(x - box[slot, 0]) > box[slot, 3] or abs(y - box[slot, 1]) > box[slot, 4]:
+        return True
+    return abs(z - box[slot, 2]) > box[slot, 5]
+
+
+@helper
+def _hidden(table, first, box, near, line, count, slot, x, y, z, dx, dy, dz):
+    """Whether another part begins just outside the point, or an earlier part has the same face there.
+
+    The parts looked at are the first ``count`` in a line of ``near``.
+    """
+    for turn in range(count):
+        other = near[line, turn]
+        if _beyond(box, other, x, y, z):
             continue
         if _inside(table, first + other, x + dx, y + dy, z + dz):
             return True
         if other < slot and _inside(table, first + other, x - dx, y - dy, z - dz):
+            return True
+    return False
+
+
+@helper
+def _hidden_in_runs(table, first, many, box, joined, near, slot, x, y, z, dx, dy, dz):
+    """The same for all parts, run by run."""
+    for run in range(len(joined)):
+        if x < joined[run, 0] or y < joined[run, 1] or z < joined[run, 2]:
+            continue
+        if x > joined[run, 3] or y > joined[run, 4] or z > joined[run, 5]:
+            continue
+        count = 0
+        for other in range(run * RUN, min(run * RUN + RUN, many)):
+            if other != slot and table[first + other, KIND] >= 0:
+                near[0, count] = other
+                count += 1
+        if _hidden(table, first, box, near, 0, count, slot, x, y, z, dx, dy, dz):
             return True
     return False
 
@@ -67,14 +121,19 @@ def visible(table, many, shares, seed, skin, most, n, chosen, places, found, beg
 
     ``shares`` (B, N * F) are cumulative shares of area.  ``chosen`` (B * n, 2) receives slot and face, ``places``
     (B * n, 9) the unit place, the grid position and the normal, and ``found`` (B,) how many of at most ``most``
-    candidates were visible, n at most.
+    candidates were visible, n at most; -1 if one of them is farther away than ``FARTHEST``.
     """
-    box, near, nears = np.empty((many, 6)), np.empty((many, many), np.int64), np.empty(many, np.int64)
+    listed = many if many <= LISTED else 0
+    box, joined = np.empty((many, 6)), np.empty((0 if listed else -(-many // RUN), 6))
+    near = np.empty((listed, listed) if listed > 0 else (1, RUN), np.int64)
+    nears = np.empty(listed, np.int64)
     guide = np.empty(GUIDE + 1, np.int64)
     per = shares.shape[1] // max(many, 1)
     for scene in range(begin, end):
         first, stream, base = scene * many, scene << 40, scene * n
-        _around(table, first, many, skin, box, near, nears)
+        _around(table, first, many, skin, box)
+        _list_near(table, first, listed, box, near, nears)
+        _join(table, first, many, box, joined)
         cell = 0
         for step in range(GUIDE + 1):
             while cell < shares.shape[1] and shares[scene, cell] <= step / GUIDE:
@@ -98,7 +157,12 @@ def visible(table, many, shares, seed, skin, most, n, chosen, places, found, beg
             x, y, z = x + table[row, CENTRE], y + table[row, CENTRE + 1], z + table[row, CENTRE + 2]
             a, b, c = normal(table, row, face, u, v, w)
             a, b, c = turned(table, row, a, b, c)
-            if _hidden(table, first, box, near, nears, slot, x, y, z, skin * a, skin * b, skin * c):
+            dx, dy, dz = skin * a, skin * b, skin * c
+            if listed > 0:
+                hidden = _hidden(table, first, box, near, slot, nears[slot], slot, x, y, z, dx, dy, dz)
+            else:
+                hidden = _hidden_in_runs(table, first, many, box, joined, near, slot, x, y, z, dx, dy, dz)
+            if hidden:
                 continue
             item = base + kept
             chosen[item, 0], chosen[item, 1] = slot, face
@@ -107,6 +171,9 @@ def visible(table, many, shares, seed, skin, most, n, chosen, places, found, beg
             places[item, 6], places[item, 7], places[item, 8] = a, b, c
             kept += 1
         found[scene] = kept
+        for item in range(base, base + kept):
+            if not abs(places[item, 3]) + abs(places[item, 4]) + abs(places[item, 5]) < FARTHEST:
+                found[scene] = -1
 
 
 @kernel("void(f8[:, ::1], i8, i8, i8[:, ::1], f8[:, ::1], f8[:, ::1], f8[::1], f8[:, ::1], f8[:, ::1], i8, i8)")

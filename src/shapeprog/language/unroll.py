@@ -22,6 +22,9 @@ from shapeprog.language.program import Program
 from shapeprog.language.statement import EMPTY, END, Statement, language
 from shapeprog.language.tensors import Code, encode
 
+MOST_COPIES = 1 << 17
+"""Most copies that one program may unroll to: points, cells, meshes and pictures of so many take seconds."""
+
 MOST_PRIMITIVES = 1 << 20
 """Most copies that one batch may unroll to; more is a mistake in a loop count."""
 
@@ -30,7 +33,8 @@ def unroll(program: Program | Sequence[Program] | Code) -> Scene:
     """The scene of a program, or scenes (B, N) of a batch; N is the largest number of primitives in it.
 
     Blocks that are not loops followed by one drawing statement draw nothing, nor do loops without copies, nor
-    primitives with a negative extent.  A ``ShapeProgError`` if there are more than ``MOST_PRIMITIVES``.
+    primitives with a negative extent.  A ``ShapeProgError`` if a program makes more than ``MOST_COPIES`` copies, or the
+    batch more than ``MOST_PRIMITIVES``.
     """
     code = program if isinstance(program, Code) else encode(program)
     return Plan(code).scene(code.parameters)
@@ -81,7 +85,7 @@ class Plan:
     def __init__(self, code: Code) -> None:
         self._lead, (blocks, steps) = code.ids.shape[:-2], code.ids.shape[-2:]
         ids = code.ids.reshape(-1, steps)
-        row, step, index = _copies(ids, code.parameters.detach().reshape(-1, *code.parameters.shape[-2:]))
+        row, step, index = _copies(ids, code.parameters.detach().reshape(-1, *code.parameters.shape[-2:]), blocks)
         copy = torch.arange(len(row), device=row.device) - torch.searchsorted(row, row)
         statement = ids[row, step]
         self._rank = torch.argsort(statement, stable=True)
@@ -198,9 +202,9 @@ def _are(ids: Int[Tensor, "*batch"], wanted: Callable[[Statement], bool]) -> Boo
 
 
 def _copies(
-    ids: Int[Tensor, "R J"], values: Float[Tensor, "R J 7"]
+    ids: Int[Tensor, "R J"], values: Float[Tensor, "R J 7"], blocks: int
 ) -> tuple[Int[Tensor, " M"], Int[Tensor, " M"], Int[Tensor, "M J"]]:
-    """Block row, drawing step and copy index at each loop level of every drawn copy."""
+    """Block row, drawing step and copy index at each loop level of every drawn copy; programs have ``blocks`` rows."""
     steps = ids.shape[-1]
     step = _are(ids, lambda declared: declared.is_loop).long().cumprod(-1).sum(-1, keepdim=True).clamp(max=steps - 1)
     place = torch.arange(steps, device=ids.device)
@@ -209,9 +213,14 @@ def _copies(
     counts = values[..., 0].round().nan_to_num(0).clamp(0, MOST_PRIMITIVES + 1).long()
     counts = torch.where((place < step) & legal, counts, 1)
     total = torch.where((counts == 0).any(-1), 0, counts.double().prod(-1)) * legal[:, 0]  # the product may be infinite
-    if float(total.sum()) > MOST_PRIMITIVES:
-        said = f"the loops of this program make more than {MOST_PRIMITIVES} copies"
-        raise ShapeProgError(said, "lower their counts: so many primitives can be drawn at once")
+    drawn = total.reshape(-1, max(blocks, 1)).sum(-1)
+    if float(drawn.sum()) > MOST_COPIES:
+        if float(drawn.max()) > MOST_COPIES:
+            said = f"the loops of this program make more than {MOST_COPIES} copies"
+            raise ShapeProgError(said, "lower their counts: so many copies can be drawn of one program")
+        if float(drawn.sum()) > MOST_PRIMITIVES:
+            said = f"these {len(drawn)} programs make more than {MOST_PRIMITIVES} copies together"
+            raise ShapeProgError(said, "unroll fewer of them at once")
     last = total.long().cumsum(0)
     many = torch.arange(int(total.sum()), device=ids.device)
     row = torch.searchsorted(last, many, right=True)  # repeat_interleave wakes threads for a handful of rows

@@ -11,9 +11,10 @@ from typing import Any
 import numpy as np
 
 from shapeprog.data.shape import Shape
+from shapeprog.errors import OutputError
 from shapeprog.files import write_text
 from shapeprog.formats.colours import colour
-from shapeprog.formats.parts import crease_normals, parts
+from shapeprog.formats.parts import part_normals, parts
 from shapeprog.language.program import Program
 from shapeprog.space import Array
 from shapeprog.view.listing import listing, parted
@@ -33,10 +34,15 @@ def viewer(
     Raises
     ------
     OutputError
-        If the file cannot be written.
+        If the file cannot be written, or the program has more than ``FINE`` triangles.
     """
     drawn = parts(program)
     # A page of hundreds of megabytes opens nowhere: of such a mesh the cells are shown.
+    if (triangles := sum(len(part.faces) for part in drawn)) > FINE:
+        raise OutputError(
+            f"the {len(drawn)} parts of this program have {triangles} triangles: a page holds at most {FINE}",
+            "lower the counts, or draw a picture",
+        )
     large = shape is not None and shape.faces is not None and len(shape.faces) > FINE
     model = None if shape is None else of_cells(shape.voxels) if large else of_shape(shape)
     places = [part.vertices for part in drawn] + ([] if model is None else [model.vertices])
@@ -51,8 +57,8 @@ def viewer(
         "lines": [_line(line) for line in listing(program, None)],
         "parts": [
             {"name": part.name, "block": part.block, "colour": [channel / 255 for channel in colour(part.statement)]}
-            | _buffers(part.vertices, part.faces, crease_normals(part.vertices, part.faces))
-            for part in drawn
+            | _buffers(part.vertices, part.faces, normals)
+            for part, normals in zip(drawn, part_normals(drawn), strict=True)
         ],
         "input": None if model is None else _buffers(model.vertices, model.faces, model.normals),
     }

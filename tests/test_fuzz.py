@@ -46,7 +46,7 @@ def test_faults_are_seen(tmp_path: Path) -> None:
 
 
 def test_a_little_of_every_kind_ends_in_a_result_or_in_words() -> None:
-    found = run("everything", 1, 80)
+    found = run("everything", 1, 60)
     assert not found, summary(found)
 
 

@@ -268,6 +268,15 @@ def test_what_cannot_be_printed_is_told_as_its_escape(error: type[ShapeProgError
     assert "\N{GREEK SMALL LETTER PI}" in str(told)
 
 
+@pytest.mark.parametrize("error", [ShapeProgError, InputError, ProgramError])
+def test_the_middle_of_a_message_that_repeats_something_endless_is_left_out(error: type[ShapeProgError]) -> None:
+    told = error(f"a.off announces {'9' * 4000} faces", hint=f"write {'a' * 10**6} again")
+    assert told.message.startswith("a.off announces 999")
+    assert told.message.endswith("999 faces")
+    assert told.hint.endswith("a again")
+    assert len(str(told)) < 2000
+
+
 def test_lines_and_names_of_texts_command_no_terminal() -> None:
     told = ProgramError("x", source="a\x1bb", name="c\x1bd")
     assert str(told) == "c\\x1bd, line 1, column 1: x\n  a b\n  ^"

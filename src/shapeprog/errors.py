@@ -12,6 +12,8 @@ _WIDEST = 200
 _LONGEST = 200
 """Letters of a word that are compared with known ones, which takes as long as the word has letters."""
 
+_MOST = 800
+"""Letters of a message."""
 
 _UNPRINTABLE = re.compile("[\0-\t\x0b-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069\ud800-\udfff]")
 """What commands a terminal, turns its lines round, or cannot be shown; a new line is none."""
@@ -20,11 +22,12 @@ _UNPRINTABLE = re.compile("[\0-\t\x0b-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069\ud
 class ShapeProgError(Exception):
     """A mistake that the user can mend: ``message`` says what is wrong, ``hint`` in a line of its own what to do.
 
-    They may repeat what a file holds: what cannot be printed is told as its escape, such as ``\\x1b``.
+    They may repeat what a file holds: what cannot be printed is told as its escape, such as ``\\x1b``; what is too long
+    is told without its middle.
     """
 
     def __init__(self, message: str, hint: str = "") -> None:
-        self.message, self.hint = _printable(message), _printable(hint)
+        self.message, self.hint = _shown(message), _shown(hint)
         super().__init__(self.message)
 
     def __str__(self) -> str:
@@ -54,7 +57,7 @@ class ProgramError(ShapeProgError):
         self, message: str, *, line: int = 1, column: int = 1, source: str = "", hint: str = "", name: str = "<program>"
     ) -> None:
         super().__init__(message, hint)
-        self.line, self.column, self.name = line, column, _printable(name)
+        self.line, self.column, self.name = line, column, _shown(name)
         self.source = _UNPRINTABLE.sub(" ", source[:_WIDEST]) if column <= _WIDEST else ""
 
     def __str__(self) -> str:
@@ -63,7 +66,9 @@ class ProgramError(ShapeProgError):
         return f"{self.name}, line {self.line}, column {self.column}: {self.message}{shown}{hint}"
 
 
-def _printable(text: str) -> str:
+def _shown(text: str) -> str:
+    if len(text) > _MOST:
+        text = f"{text[: _MOST // 2]} ... {text[-_MOST // 2 :]}"
     return _UNPRINTABLE.sub(lambda found: found[0].encode("unicode_escape").decode(), text)
 
 

@@ -18,7 +18,7 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--start", type=int, default=0, help="number of the first case")
     parser.add_argument("--cases", type=int, default=1000)
-    parser.add_argument("--seconds", type=float, default=SECONDS, help="time of one case")
+    parser.add_argument("--seconds", type=float, default=SECONDS, help="time of one use of a case")
     parser.add_argument("--keep", type=Path, default=KEPT, help="folder for files of cases that fail")
     asked = vars(parser.parse_args())
     found = run(**asked)

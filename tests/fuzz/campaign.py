@@ -24,7 +24,7 @@ KEPT = ROOT / "fuzz-failures"
 """Folder of files that fail; git ignores it."""
 
 SECONDS = 20.0
-"""Time of the processor for one case."""
+"""Time of the processor for one way of using a case: what a command does with a file."""
 
 _DOUBTFUL = ("crash", "hang")
 """Faults that count only if they come again in a fresh process."""
@@ -106,7 +106,7 @@ def run(
     keep
         Folder for the files of cases that fail.
     seconds
-        Time of the processor for one case.
+        Time of the processor for one way of using a case.
     stop_after
         Failures after which no further case is taken.
     """

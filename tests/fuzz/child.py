@@ -13,6 +13,7 @@ import shutil
 import signal
 import sys
 import warnings
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -29,7 +30,7 @@ LEFTOVER = 200 << 20
 """Bytes that cases may leave behind before another process takes the next."""
 
 PATIENCE = 5
-"""The time of a case is that of the processor; so many times as long on the clock ends it too: it may wait for ever."""
+"""The time of a use is that of the processor; so many times as long on the clock ends it too: it may wait for ever."""
 
 KINDS = {
     "loaders": "tests.fuzz.loaders",
@@ -104,9 +105,7 @@ def main(argument: str) -> None:
         log.truncate()
         path = _fresh(folder / "case") / name
         path.write_bytes(content)
-        signal.setitimer(signal.ITIMER_PROF, asked["seconds"])
-        faulthandler.dump_traceback_later(PATIENCE * asked["seconds"], exit=True, file=log)
-        failures = _tried(path, watch)
+        failures = _tried(path, watch, lambda: _timed(asked["seconds"], log))
         faulthandler.cancel_dump_traceback_later()
         signal.setitimer(signal.ITIMER_PROF, 0)
         sys.stdout.flush()
@@ -119,8 +118,14 @@ def main(argument: str) -> None:
             break  # another process begins with a clean memory
 
 
-def _tried(path: Path, watch: Watch) -> list[tuple[str, str, str]]:
-    """What went wrong with a file in any way of using it: reason, detail and place."""
+def _timed(seconds: float, log: Any) -> None:
+    """From now on, end the process after so much time of the processor, or :data:`PATIENCE` times that on the clock."""
+    signal.setitimer(signal.ITIMER_PROF, seconds)
+    faulthandler.dump_traceback_later(PATIENCE * seconds, exit=True, file=log)
+
+
+def _tried(path: Path, watch: Watch, start: Callable[[], None]) -> list[tuple[str, str, str]]:
+    """What went wrong with a file in any way of using it: reason, detail and place; ``start`` comes before each."""
     found: list[tuple[str, str, str]] = []
     out = path.parent / "out"
     content = path.read_bytes()
@@ -132,10 +137,12 @@ def _tried(path: Path, watch: Watch) -> list[tuple[str, str, str]]:
         step = "reading"
         while True:
             try:
+                start()
                 following = next(steps, None)
                 if following is None:
                     break
                 step, call = following
+                start()
                 call()
             except KeyboardInterrupt:
                 raise

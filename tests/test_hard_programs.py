@@ -142,7 +142,7 @@ def test_endless_products_of_counts_are_refused_and_those_with_a_zero_draw_nothi
             node = Loop("translate", (count, 0, 0, 1), (node,))
         return Program((node,))
 
-    with pytest.raises(ShapeProgError, match="more than 1048576 copies"):
+    with pytest.raises(ShapeProgError, match=f"more than {MOST_COPIES} copies"):
         unroll(nest(*[16777216.0] * 60))
     assert not unroll(nest(*[16777216.0] * 60, 0.0)).mask.any()
 

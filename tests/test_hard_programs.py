@@ -28,6 +28,7 @@ from shapeprog.formats.shape import LARGEST_FILE, read_text
 from shapeprog.language import Draw, Loop, Program, unroll
 from shapeprog.language.syntax import LONGEST
 from shapeprog.language.text import format_program, parse
+from shapeprog.language.unroll import MOST_COPIES
 from shapeprog.space import Frame
 from shapeprog.view import viewer
 from shapeprog.view.page import scores_text

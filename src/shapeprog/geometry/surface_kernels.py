@@ -41,15 +41,14 @@ def _list_near(table, first, many, box, near, nears):
     """For each primitive the others whose box touches its own: only they can hide it."""
     for slot in range(many):
         nears[slot] = 0
-        for other in range(slot):
-            apart = table[first + slot, KIND] < 0 or table[first + other, KIND] < 0
+        for other in range(many):
+            apart = other == slot or table[first + slot, KIND] < 0 or table[first + other, KIND] < 0
             for axis in range(3):
                 gap = abs(box[slot, axis] - box[other, axis]) - box[slot, 3 + axis] - box[other, 3 + axis]
                 apart = apart or gap > 0
             if not apart:
-                near[slot, nears[slot]], near[other, nears[other]] = other, slot
+                near[slot, nears[slot]] = other
                 nears[slot] += 1
-                nears[other] += 1
 
 
 @helper

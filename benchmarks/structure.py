@@ -107,7 +107,7 @@ def measure(task: Task) -> dict[str, Any]:
     else:
         given = fused(vertices, faces) if task.set == "fused" else (vertices, faces)
         shape = shape_from_mesh(*given, name=task.name, axes=axes, seed=task.seed)
-    result = infer(shape, blocks=task.blocks, seed=task.seed, budget=60)
+    result = infer(shape, blocks=task.blocks, seed=task.seed)
     seconds = time.perf_counter() - started
     target = replace(shape, points=None, vertices=shape.frame.to_grid(vertices), faces=faces)
     row = evaluate_program(result.program, target, result.snapped, seed=task.seed, looks=True)

@@ -1,12 +1,13 @@
 """What a person sees of a program beside its target, on shapes whose answer is known."""
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
 import trimesh
 
+from shapeprog.data.shape import Shape
 from shapeprog.evaluation.likeness import Samples, Triangles, likeness, sampled, silhouette
 from shapeprog.evaluation.metrics import evaluate_program
 from shapeprog.evaluation.parts import oriented_box, overlaps, part_scores
@@ -23,21 +24,13 @@ for i in translate(2, by=(0, 0, 18)):
 """
 
 
-@dataclass(frozen=True)
-class Target:
-    name: str
-    voxels: np.ndarray
-    points: np.ndarray | None = None
-    vertices: np.ndarray | None = None
-    faces: np.ndarray | None = None
-
-
 def mesh(text):
     return Triangles(*union_mesh(unroll(parse(text))))
 
 
 def target(text):
-    return Target("it", np.zeros((32, 32, 32), bool), None, *mesh(text))
+    vertices, faces = mesh(text)
+    return Shape("it", np.zeros((32, 32, 32), bool), vertices=vertices, faces=faces)
 
 
 def test_a_program_beside_its_own_mesh_reads_the_floors_and_outlines_are_equal():
@@ -95,8 +88,8 @@ def test_outlines_agree_with_the_area_of_a_projected_ball():
 
 def test_a_touching_stack_is_one_piece_a_gap_makes_two_and_a_cavity_none():
     stack = "leg(at=(0, 0, 0), size=(4, 4, 4))\nleg(at=({}, 0, 0), size=(4, 4, 4))"
-    assert one_piece(unroll(parse(stack.format(4)))) == 1
-    assert one_piece(unroll(parse(stack.format(4.01)))) == 0
+    assert one_piece(mesh(stack.format(4))) == 1
+    assert one_piece(mesh(stack.format(4.01))) == 0
     closed = """
 for i in translate(2, by=(9, 0, 0)):
     layer(at=(-5, 0, 0), thickness=1, half=(5, 5))
@@ -105,8 +98,8 @@ for i in translate(2, by=(0, 9, 0)):
 for i in translate(2, by=(0, 0, 9)):
     locker(at=(-5, -5, -5), size=(10, 10, 1))
 """
-    assert one_piece(unroll(parse(closed))) == 1
-    assert math.isnan(one_piece(unroll(parse(""))))
+    assert one_piece(mesh(closed)) == 1
+    assert math.isnan(one_piece(None))
 
 
 def test_slivers_are_thinner_than_a_250th_of_the_grid_and_shear_does_not_thicken_them():
@@ -171,3 +164,4 @@ def test_a_program_that_draws_nothing_looks_like_nothing():
     row = evaluate_program(parse(""), target(TABLE), looks=True)
     assert (row.f1_half_percent, row.f1_percent, row.normals, row.silhouette) == (0, 0, 0, 0)
     assert math.isnan(row.slivers)
+    assert math.isnan(row.one_piece)

@@ -192,7 +192,7 @@ def evaluate_program(
     except ShapeProgError:  # nothing in it has a volume
         mesh = None
     return replace(
-        with_likeness(row, mesh, target, seed), one_piece=structure.one_piece(scene), slivers=structure.slivers(scene)
+        with_likeness(row, mesh, target, seed), one_piece=structure.one_piece(mesh), slivers=structure.slivers(scene)
     )
 
 

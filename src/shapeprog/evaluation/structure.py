@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import torch
 
-from shapeprog.errors import ShapeProgError
+from shapeprog.evaluation.likeness import Triangles
 from shapeprog.geometry.mesh import pieces
 from shapeprog.geometry.primitive import primitives
 from shapeprog.geometry.scene import Scene
@@ -35,9 +35,6 @@ def slivers(scene: Scene) -> float:
     return float(torch.cat(thin).double().mean()) if thin else float("nan")
 
 
-def one_piece(scene: Scene) -> float:
-    """1 where the union is one connected solid, 0 where it is several; not a number where it has no volume."""
-    try:
-        return float(pieces(scene) == 1)
-    except ShapeProgError:
-        return float("nan")
+def one_piece(union: Triangles | None) -> float:
+    """1 where a union is one connected solid, 0 where it is several; not a number where there is none."""
+    return float("nan") if union is None else float(pieces(*union) == 1)

@@ -12,7 +12,7 @@ from shapeprog.geometry.arrays import array
 from shapeprog.geometry.batch import Batch
 from shapeprog.geometry.primitive import Mesh as Triangles
 from shapeprog.geometry.primitive import primitives
-from shapeprog.space import FloatArray
+from shapeprog.space import Array, FloatArray
 
 FLAT = 1e-6
 """A part that is thinner than this, in cells, has no solid to mesh and is left out."""
@@ -107,10 +107,12 @@ def union_mesh(scene: Batch) -> Triangles:
     return vertices, np.concatenate([faces + start for (_, faces), start in zip(solids, starts, strict=False)])
 
 
-def pieces(scene: Batch) -> int:
-    """How many connected solids that union is, which must hold one; a cavity within one is no piece."""
-    joined = (_joined(group).decompose() for group in _touching(scene))
-    return sum(piece.volume() > 0 for solids in joined for piece in solids)
+def pieces(vertices: Array, faces: Array) -> int:
+    """How many connected solids a watertight mesh, such as a union, is; a cavity within one is no piece."""
+    from manifold3d import Manifold, Mesh
+
+    solid = Manifold(Mesh(vertices.astype(np.float32), faces.astype(np.uint32)))
+    return sum(piece.volume() > 0 for piece in solid.decompose())
 
 
 def _touching(scene: Batch) -> list[list[Single]]:

@@ -37,12 +37,12 @@ def viewer(
         If the file cannot be written, or the program has more than ``FINE`` triangles.
     """
     drawn = parts(program)
-    # A page of hundreds of megabytes opens nowhere: of such a mesh the cells are shown.
     if (triangles := sum(len(part.faces) for part in drawn)) > FINE:
         raise OutputError(
             f"the {len(drawn)} parts of this program have {triangles} triangles: a page holds at most {FINE}",
             "lower the counts, or draw a picture",
         )
+    # A page of hundreds of megabytes opens nowhere: of such a mesh the cells are shown.
     large = shape is not None and shape.faces is not None and len(shape.faces) > FINE
     model = None if shape is None else of_cells(shape.voxels) if large else of_shape(shape)
     places = [part.vertices for part in drawn] + ([] if model is None else [model.vertices])

@@ -9,15 +9,17 @@ from hypothesis import strategies as st
 from shapeprog.formats.plugins import load_statements
 from shapeprog.language import Draw, Language, Loop, Program, Statement, standard, using
 from shapeprog.language import builtin as builtin
-from shapeprog.language.parameters import LARGEST_WHOLE
+from shapeprog.language import furniture as furniture
+from shapeprog.language.parameters import LARGEST_WHOLE, Quantity
 
 EXAMPLES = Path(__file__).parents[1] / "examples" / "statements"
 MODULES = sorted(EXAMPLES.glob("*.py"))
 
 LANGUAGE = Language()
 for _declared in list(standard):
-    if _declared.id <= 21:
+    if _declared.id <= 21 or not _declared.taught:
         LANGUAGE.register(_declared)
+LANGUAGE.roles.update(standard.roles)
 with using(LANGUAGE):
     for _module in MODULES:
         load_statements(_module)
@@ -34,7 +36,7 @@ def middle(declared: Statement) -> tuple[float, ...]:
     """Plain parameters inside the declared ranges, all different, none at a symmetric place."""
     values = []
     for slot, quantity in enumerate(declared.quantities):
-        whole = {"count": 3.0, "turn": 1.0}.get(quantity.kind)
+        whole = {"count": min(3.0, quantity.high), "turn": 1.0, "axis": 2.0}.get(quantity.kind)
         real = 9.7 - 1.3 * slot if quantity.kind == "length" else -3.3 + 1.3 * slot + 0.17 * slot**2
         values.append(real if whole is None else whole)
     return tuple(values)
@@ -44,11 +46,23 @@ def numbers(declared: Statement) -> st.SearchStrategy[tuple[float, ...]]:
     """Every finite float32 for continuous parameters, every exact whole number for discrete ones."""
     real = st.floats(width=32, allow_nan=False, allow_infinity=False)
     whole = st.integers(-LARGEST_WHOLE, LARGEST_WHOLE).map(float)
-    return st.tuples(*(whole if quantity.discrete else real for quantity in declared.quantities))
+    few = [_few(each) for each in declared.quantities]
+    chosen = zip(declared.quantities, few, strict=True)
+    return st.tuples(*((whole if each.discrete else real) if some is None else some for each, some in chosen))
+
+
+def _few(quantity: Quantity) -> st.SearchStrategy[float] | None:
+    """The values of a number that has but a few."""
+    if quantity.kind != "axis" and quantity.written_out:
+        return None
+    return st.integers(int(quantity.low), int(quantity.high)).map(float)
 
 
 def draws() -> st.SearchStrategy[Draw]:
-    return st.sampled_from(STATEMENTS).flatmap(lambda d: st.builds(Draw, st.just(d.name), numbers(d)))
+    roles = st.sampled_from(["", *LANGUAGE.roles])
+    return st.sampled_from(STATEMENTS).flatmap(
+        lambda d: st.builds(Draw, st.just(d.name), numbers(d), roles.map(lambda role: "" if role == d.name else role))
+    )
 
 
 def loops(inner: st.SearchStrategy[Draw | Loop]) -> st.SearchStrategy[Loop]:

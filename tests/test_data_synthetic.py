@@ -174,7 +174,7 @@ def test_statements_of_users_take_part_and_suffice_on_their_own() -> None:
         assert not (drawn(prior("narrow"), 0, 64).ids > END).any()
     alone = Language()
     for declared in LANGUAGE:
-        if declared.id > END and not declared.is_loop:
+        if declared.id > END and not declared.is_loop and declared.taught:
             alone.register(declared)
     with using(alone):
         code = drawn(prior("wide"), 0, 32)

@@ -39,7 +39,7 @@ def test_a_program_beside_its_own_mesh_reads_the_floors_and_outlines_are_equal()
     assert row.f1_percent == pytest.approx(row.f1_percent_floor, abs=0.01)
     assert row.normals == pytest.approx(row.normals_floor, abs=0.01)
     assert (row.silhouette, row.one_piece, row.slivers) == (1, 1, 0)
-    assert row == evaluate_program(parse(TABLE), target(TABLE), looks=True)
+    assert repr(row) == repr(evaluate_program(parse(TABLE), target(TABLE), looks=True))  # some measures are not known
 
 
 def test_a_plate_moved_along_its_normal_is_found_within_that_distance_alone():

@@ -49,7 +49,7 @@ def test_a_program_against_itself_reads_the_noise_floor(table):
     assert row.f1 > 0.98
     assert row.cd == pytest.approx(row.noise_floor, rel=0.1)
     assert (row.blocks, row.statements, row.primitives) == (2, 4, 5)
-    assert row == evaluate_program(TABLE, table, points=2000)
+    assert repr(row) == repr(evaluate_program(TABLE, table, points=2000))  # some measures are not known
     assert row.cd != evaluate_program(TABLE, table, points=2000, seed=1).cd
 
 

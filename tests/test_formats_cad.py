@@ -88,15 +88,17 @@ def evaluate(made, changed=None):
                         here = here @ move(*(eval(word, {}, inner) for word in step.shift))
                     if step.turn:
                         here = here @ turn(*(eval(word, {}, inner) for word in step.turn))
+                    if step.signs:
+                        here = here @ np.diag([*eval(step.signs, {}, inner), 1])
                     run(step.body, here, inner)
                 continue
             arguments = [np.array(eval(word, {}, scope), float) for word in step.arguments]
-            if step.kind == "cylinder":
-                start, end, radius = arguments
+            if step.kind in ("cylinder", "frustum"):
+                start, end, *radii = arguments
                 along = (end - start) / max(np.linalg.norm(end - start), 1e-12)
-                spread = radius * np.sqrt(np.maximum(0, 1 - (place[:3, :3] @ along) ** 2))
+                spread = np.outer(radii, np.sqrt(np.maximum(0, 1 - (place[:3, :3] @ along) ** 2)))
                 ends = np.stack([start, end]) @ place[:3, :3].T + place[:3, 3]
-                found.append((ends.mean(0), ends.min(0) - spread, ends.max(0) + spread))
+                found.append((ends.mean(0), (ends - spread).min(0), (ends + spread).max(0)))
                 continue
             if step.kind == "cuboid":
                 size, lean = arguments[1], float(arguments[2]) if len(arguments) > 2 else 0.0
@@ -127,6 +129,11 @@ def expected(program):
             spread = np.abs(rotation[:, 0]) * size[0] + size[1] * np.sqrt(np.maximum(0, 1 - rotation[:, 0] ** 2))
             found.append((centre, centre - spread, centre + spread))
             continue
+        if kind.name == "frustum":
+            spread = np.outer(size[1:3], np.sqrt(np.maximum(0, 1 - rotation[:, 0] ** 2)))
+            ends = centre + np.outer([-size[0], size[0]], rotation[:, 0])
+            found.append((centre, (ends - spread).min(0), (ends + spread).max(0)))
+            continue
         world = kind.mesh(size)[0] @ rotation.T + centre
         found.append(((world.min(0) + world.max(0)) / 2, world.min(0), world.max(0)))
     return sorted((np.round(np.concatenate(each), 5) + 0.0).tolist() for each in found)
@@ -145,7 +152,8 @@ def changed_program(program, generator):
     def change(node):
         heading, declared = next(made), language()[node.name]
         values = list(node.values)
-        for parameter, variable in zip(declared.parameters, heading.variables, strict=True):
+        shown = [p for p in declared.parameters if p.quantity.kind != "axis" and p.quantity.written_out]
+        for parameter, variable in zip(shown, heading.variables, strict=True):
             for slot in range(parameter.slots.start, parameter.slots.stop):
                 if parameter.quantity.kind == "count":
                     values[slot] += 1
@@ -177,7 +185,9 @@ def test_numbers_at_the_top_stay_live(text):
 
 @pytest.mark.parametrize("declared", [each for each in language() if not each.is_loop], ids=lambda each: each.name)
 @pytest.mark.parametrize("around", ["", "translate", "rotate"])
-def test_every_statement_keeps_its_parameters(declared, around):
+def test_every_statement_keeps_its_parameters(declared, around, request):
+    if declared.name in ("bar", "board"):
+        request.applymarker(pytest.mark.xfail(reason="their ends and tilt are fixed in scripts", strict=True))
     generator = np.random.default_rng(declared.id)
     low = {"length": 1, "turn": 0}
     values = tuple(float(generator.integers(low.get(q.kind, -8), 6)) for q in declared.quantities)

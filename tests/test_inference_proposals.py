@@ -65,7 +65,7 @@ def test_a_program_read_as_blocks_has_the_same_cells():
 def test_every_statement_is_read_with_the_cells_it_draws():
     rng = np.random.default_rng(5)
     for each in language():
-        if each.is_loop:
+        if each.is_loop or not each.taught:
             continue
         values = [float(round(rng.uniform(max(q.low, -8), min(q.high, 8)))) for q in each.quantities]
         program = Program((Loop("translate", (2.0, 0.0, 3.0, 9.0), (Draw(each.name, tuple(values)),)),))

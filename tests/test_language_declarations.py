@@ -64,8 +64,8 @@ def no_kind(at: Position, size) -> Solids:  # type: ignore[no-untyped-def]
     return box(at, size)
 
 
-def too_wide(at: Position, size: Extent, more: Extent) -> Solids:
-    """Nine numbers."""
+def too_wide(at: Position, size: Extent, a: Extent, b: Extent, c: Extent, d: Extent) -> Solids:
+    """Eighteen numbers."""
     return box(at, size)
 
 
@@ -105,7 +105,7 @@ def backwards(at: Annotated[torch.Tensor, Quantity("length", 3, 4, 2)]) -> Solid
         ("for", {}, crate, "not a word of Python"),
         ("crate", {}, no_doc, "no docstring"),
         ("crate", {}, no_kind, "parameter 'size' of statement 'crate' has no kind"),
-        ("crate", {}, too_wide, "9 numbers, but a statement has 7 slots"),
+        ("crate", {}, too_wide, "18 numbers, but a statement has at most 16"),
         ("crate", {}, wrong_shape, "solids of shapes|Type-check error"),
         ("crate", {}, no_batch, "solids of shapes"),
         ("crate", {}, failing, "cannot be drawn: index 5"),
@@ -183,7 +183,7 @@ def test_modules_load_into_any_language_once(empty: Language) -> None:
         assert load_statements(str(module)) == first
         assert all(empty[declared.name] is declared for declared in first)
     assert len(primitives) == kinds
-    assert sorted(empty.names) == ["arch", "bolster", "cone_leg", "cushion"]
+    assert sorted(empty.names) == ["arch", "bolster", "cone_leg", "pouf"]
     assert primitives[primitives.kind("capsule")].name == "capsule"
     with using(Language()), pytest.raises(DeclarationError, match="no primitive is called 'capsule'"):
         primitives.kind("capsule")
@@ -212,7 +212,7 @@ TWIN = "\nimport dataclasses\nprimitives.register(dataclasses.replace(primitives
         ("1 / 0", r"bad.py, line 1: ZeroDivisionError: division by zero"),
         (f"{CRATE}{TWIN}1 / 0", r"bad.py, line 14: ZeroDivisionError"),
         (f"{CRATE}{TWIN}raise SystemExit(3)", r"line 14: SystemExit: 3"),
-        (f"{CRATE}{CRATE}", r"line 17: statement 'crate' is declared twice"),
+        (f"{CRATE}{CRATE}", r"line 1[78]: statement 'crate' is declared twice"),
         ("def (", r"line 1: SyntaxError"),
         ("import no_such_module_anywhere", r"line 1: ModuleNotFoundError"),
         ("x = 1", r"bad.py: .*declares no statement"),

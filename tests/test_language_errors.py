@@ -63,7 +63,7 @@ PINNED = [
         "t.shape, line 1, column 10: no loop is called 'range'\n"
         "  for i in range(4):\n"
         "           ^\n"
-        "  hint: known are translate, rotate",
+        "  hint: known are translate, rotate, mirror",
     ),
     (
         "translate(2, by=(0, 0, 1))",

@@ -19,7 +19,7 @@ from shapeprog.language import Draw, Language, Program, Statement, standard, usi
 
 SEAT = """\
 arch(at=(-12, -8, -8), size=(12, 16, 16), thickness=3)
-cushion(at=(0, -6, -6), size=(4, 12, 12))
+pouf(at=(0, -6, -6), size=(4, 12, 12))
 for i in translate(2, by=(0, 0, 10)):
     cone_leg(at=(4, 0, -5), height=8, bottom=1, top=3)
 """

@@ -31,7 +31,7 @@ def surface(kind: Primitive, size: torch.Tensor, count: int) -> tuple[torch.Tens
 
 
 def test_the_examples_are_among_them() -> None:
-    assert {"cushion", "cone_leg", "arch", "bolster"} <= set(LANGUAGE.names)
+    assert {"pouf", "cone_leg", "arch", "bolster"} <= set(LANGUAGE.names)
     assert {"cuboid", "cylinder", "ellipsoid", "frustum", "capsule"} == {kind.name for kind in KINDS}
 
 

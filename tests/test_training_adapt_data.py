@@ -90,7 +90,7 @@ def test_labels_are_read_from_lines_and_folders(pack: Path, tmp_path: Path):
         read_labels([folder], ["a", "b"], vocabulary, 4)
     for line in ('{"name": "s0"}', "[" * 9999, f'{{"name": "s0", "program": {"[" * 980}{"]" * 980}}}', "3"):
         path.write_text(f"{line}\n")
-        with pytest.raises(InputError, match=r"line 1 of labels\.jsonl(: \S+)? is no (label|list)"):
+        with pytest.raises(InputError, match=r"line 1 of labels\.jsonl(: \S+)? is no(t a)? (label|list|statement)"):
             read_labels([path], names, vocabulary, 4)
 
 

@@ -75,6 +75,8 @@ def slots_of(kinds: tuple[str, ...]) -> Bool[Tensor, "V 7"]:
     """The slots of each statement that are of one of the kinds."""
     table = torch.zeros(max(each.id for each in language()) + 1, SLOTS, dtype=torch.bool)
     for each in language():
+        if not each.taught:
+            continue
         for slot, quantity in enumerate(each.quantities):
             table[each.id, slot] = quantity.kind in kinds
     return table

@@ -24,6 +24,7 @@ HALF = RESOLUTION // 2  # distance in cells from the centre of the grid to its s
 SPAN = 24  # cells along the longest side of a shape that is in the grid frame
 LEAST_SIDE, MOST_SIDE = 1e-30, 1e30  # longest sides of shapes, in world units, that all exports can hold
 UP, DEPTH, SIDE = 0, 1, 2  # grid axes
+AXES = ("up", "depth", "side")  # their names in programs
 
 Array = npt.NDArray[Any]
 FloatArray = npt.NDArray[np.float64]

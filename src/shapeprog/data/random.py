@@ -69,7 +69,8 @@ def _step(generator: torch.Generator, declared: Statement, copies: int, whole: b
     for quantity in declared.quantities:
         low, high = quantity.low, quantity.high
         if quantity.kind == "count":
-            low, high = max(low, 1.0), min(high, float(copies))
+            low = max(low, 1.0)
+            high = max(low, min(high, float(copies)))
         if quantity.discrete or whole:
             values.append(float(low + _pick(generator, int(high - low) + 1)))
         else:

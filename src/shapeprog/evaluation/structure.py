@@ -18,8 +18,7 @@ SLIVER = 0.004
 
 def numbers(program: Program) -> int:
     """How many continuous numbers are written; counts and steps of loops are none."""
-    known = language()
-    return sum(not each.discrete for node in program.walk() for each in known[node.name].quantities)
+    return sum(language()[node.name].written(node.values) for node in program.walk())
 
 
 def slivers(scene: Scene) -> float:

@@ -44,13 +44,15 @@ def cuboid(low, size, lean=0):
     return Solid.extrude(Face(Wire.make_polygon([Vector(*corner) for corner in corners])), Vector(0, 0, c))
 
 
-def cylinder_between(start, end, radius):
-    """A round bar between two points."""
-    height = dist(start, end)
-    if min(height, radius) <= 0:
+def cylinder_between(start, end, radius, end_radius=None):
+    """A round bar between two points, which may be tapered."""
+    height, last = dist(start, end), radius if end_radius is None else end_radius
+    if height <= 0 or min(radius, last) < 0 or max(radius, last) == 0:
         return None
-    along = tuple(b - a for a, b in zip(start, end))
-    return Solid.make_cylinder(scale * radius, scale * height, Plane(origin=scaled(start), z_dir=along))
+    plane = Plane(origin=scaled(start), z_dir=tuple(b - a for a, b in zip(start, end)))
+    if radius == last:
+        return Solid.make_cylinder(scale * radius, scale * height, plane)
+    return Solid.make_cone(scale * radius, scale * last, scale * height, plane)
 
 
 def shell(centre, half, mesh):
@@ -61,27 +63,53 @@ def shell(centre, half, mesh):
     return Solid(Shell([Face(Wire.make_polygon([points[k] for k in face])) for face in mesh[1]]))
 
 
+class Place:
+    """Where a solid goes: steps of which the last is done first."""
+
+    def __init__(self, *steps):
+        self.steps = steps
+
+    def __mul__(self, inner):
+        return Place(*self.steps, *inner.steps)
+
+    def __call__(self, solid):
+        for step in reversed(self.steps):
+            solid = step(solid)
+        return solid
+
+
+def located(location):
+    """A rigid motion."""
+    return Place(lambda solid: location * solid)
+
+
 def posed(centre, axes):
     """Local axes as columns of a rotation, about a point."""
     x, _, z = zip(*axes)
-    return Location(Plane(origin=scaled(centre), x_dir=x, z_dir=z))
+    return located(Location(Plane(origin=scaled(centre), x_dir=x, z_dir=z)))
 
 
 def move(i, by):
     """Copy i of a translation loop."""
-    return Location(scaled(i * step for step in by))
+    return located(Location(scaled(i * step for step in by)))
 
 
 def turn(degrees, about):
     """A turn about the vertical axis (x) through a point."""
     there, back = scaled((0, about[1], about[2])), scaled((0, -about[1], -about[2]))
-    return Location(there) * Location((0, 0, 0), (degrees, 0, 0)) * Location(back)
+    return located(Location(there) * Location((0, 0, 0), (degrees, 0, 0)) * Location(back))
 
 
-def draw(name, colour, solid, at=Location()):
+def reflect(signs):
+    """The mirror image along every axis whose sign is negative."""
+    planes = [plane for plane, sign in zip((Plane.YZ, Plane.XZ, Plane.XY), signs) if sign < 0]
+    return Place(*[lambda solid, plane=plane: solid.mirror(plane) for plane in planes])
+
+
+def draw(name, colour, solid, at=Place()):
     """Put a solid into the world and keep it; one without volume draws nothing."""
     if solid is not None:
-        part = world * at * solid
+        part = world * at(solid)
         numbers[name] = numbers.get(name, 0) + 1
         part.label, part.color = f"{name}_{numbers[name]}", Color(*colour)
         parts.append(part)
@@ -177,6 +205,7 @@ def _step(step: Solid | Repetition, depth: int, place: str) -> Iterator[str]:
         words = [place] if place else []
         words += [f"move({step.shift[0]}, {step.shift[1]})"] if step.shift else []
         words += [f"turn({', '.join(step.turn)})"] if step.turn else []
+        words += [f"reflect({step.signs})"] if step.signs else []
         yield f"{indent}for {step.letter} in range({step.count}):"
         if words[1 if place else 0 :]:
             yield f"{indent}    at_{step.letter} = {' * '.join(words)}"
@@ -185,7 +214,7 @@ def _step(step: Solid | Repetition, depth: int, place: str) -> Iterator[str]:
             yield from _step(inner, depth + 1, place)
         return
     arguments, around = list(step.arguments), place
-    function = "cylinder_between" if step.kind == "cylinder" else step.kind
+    function = "cylinder_between" if step.kind in ("cylinder", "frustum") else step.kind
     if step.axes is not None:
         axes = f"({', '.join(_tuple(np.round(row, 12)) for row in step.axes)})"
         around = f"{place} * posed({arguments[0]}, {axes})" if place else f"posed({arguments[0]}, {axes})"

@@ -20,12 +20,13 @@ from shapeprog.errors import InputError, ProgramError, ShapeProgError, did_you_m
 from shapeprog.files import write_text
 from shapeprog.formats.frames import frame_dict, frame_from
 from shapeprog.formats.shape import LARGEST_FILE, read_text
-from shapeprog.language.parameters import LARGEST
+from shapeprog.language.parameters import LARGEST, Parameter
 from shapeprog.language.program import Draw, Loop, Node, Program
 from shapeprog.language.statement import SLOTS, Statement, language
 from shapeprog.language.syntax import DEEPEST, proper_text
 from shapeprog.language.tensors import Code
-from shapeprog.space import Frame
+from shapeprog.language.text import checked_role
+from shapeprog.space import AXES, Frame
 
 FORMAT, CODE_FORMAT = "shapeprog", "shapeprog-code"
 VERSION = 1
@@ -145,6 +146,8 @@ def code_to_json(code: Code) -> str:
             "these program tensors hold numbers that are not finite", "JSON cannot say them; mend them"
         )
     content = {"ids": code.ids.tolist(), "parameters": code.parameters.detach().tolist()}
+    if code.roles is not None:
+        content["roles"] = code.roles.tolist()
     shape = {"dtype": str(code.parameters.dtype).removeprefix("torch."), "shape": list(code.ids.shape)}
     return json.dumps({"format": CODE_FORMAT, "version": VERSION, **shape, **content}) + "\n"
 
@@ -162,15 +165,19 @@ def code_from_json(text: str, name: str = "<json>") -> Code:
     try:
         shape = [int(extent) for extent in content["shape"]]
         ids = torch.tensor(content["ids"], dtype=torch.long).reshape(shape)
-        parameters = torch.tensor(content["parameters"], dtype=dtype).reshape(*shape, SLOTS)
-    except (KeyError, TypeError, ValueError, RuntimeError, OverflowError) as error:
+        numbers = torch.tensor(content["parameters"], dtype=dtype)
+        parameters = numbers.reshape(*shape, numbers.shape[-1] if numbers.numel() else SLOTS)
+        roles = None
+        if "roles" in content:
+            roles = torch.tensor(content["roles"], dtype=torch.long).reshape(shape[:-1])
+    except (KeyError, TypeError, ValueError, RuntimeError, OverflowError, IndexError) as error:
         raise InputError(
             f"{name}: ids and parameters are no tensors of programs",
-            f"ids are (..., blocks, steps), parameters the same with {SLOTS} numbers each, shape that of the ids",
+            "ids are (..., blocks, steps), parameters as many numbers for each of them, shape that of the ids",
         ) from error
     if dtype is None or len(shape) < 2 or not bool(torch.isfinite(parameters).all()):
         raise InputError(f"{name}: these program tensors are incomplete", "write them with code_to_json")
-    return Code(ids, parameters)
+    return Code(ids, parameters, roles)
 
 
 def _node_to_json(node: Node, depth: int) -> dict[str, Any]:
@@ -181,12 +188,21 @@ def _node_to_json(node: Node, depth: int) -> dict[str, Any]:
         raise ShapeProgError(f"loops are nested more than {DEEPEST} deep", "put some of them side by side")
     parameters = {}
     for parameter in known[node.name].parameters:
-        numbers = [json.loads(parameter.quantity.written(value)) for value in node.values[parameter.slots]]
+        if not parameter.quantity.written_out:
+            continue
+        texts = [parameter.quantity.written(value) for value in node.values[parameter.slots]]
+        numbers = texts if parameter.quantity.kind == "axis" else [json.loads(text) for text in texts]
         parameters[parameter.name] = numbers if parameter.quantity.width > 1 else numbers[0]
     found: dict[str, Any] = {"statement": node.name, "parameters": parameters}
+    if isinstance(node, Draw) and node.role:
+        found["role"] = checked_role(node)
     if isinstance(node, Loop):
         found["body"] = [_node_to_json(inner, depth + 1) for inner in node.body]
     return found
+
+
+def _wanted(parameter: Parameter) -> str:
+    return parameter.quantity.range_text if parameter.quantity.kind == "axis" else "a number"
 
 
 def _document(text: str, name: str, wanted: str) -> dict[str, Any]:
@@ -239,7 +255,7 @@ def _node(entry: Any, name: str, place: str, depth: int) -> Node:
     if word not in known:
         raise InputError(f"{name}: {place}: no statement is called {shortened(word)}", did_you_mean(word, known.names))
     declared = known[word]
-    allowed = {"statement", "parameters", "body"} if declared.is_loop else {"statement", "parameters"}
+    allowed = {"statement", "parameters", "body" if declared.is_loop else "role"}
     extra = sorted(set(entry) - allowed)
     if extra:
         raise InputError(
@@ -247,8 +263,17 @@ def _node(entry: Any, name: str, place: str, depth: int) -> Node:
         )
     values = _values(declared, entry.get("parameters"), name, place)
     if not declared.is_loop:
-        return Draw(word, values)
+        return Draw(word, values, _role(entry, word, name, place))
     return Loop(word, values, _body(entry.get("body"), name, f"{place}.body", depth + 1))
+
+
+def _role(entry: dict[str, Any], word: str, name: str, place: str) -> str:
+    role, roles = entry.get("role", ""), language().roles
+    if not isinstance(role, str) or (role and role not in roles):
+        raise InputError(f"{name}: {place}: no role is called {shortened(role)}", did_you_mean(str(role), roles))
+    if role == word:
+        raise InputError(f"{name}: {place}: {word} is a {word} without being called one", "leave the role out")
+    return role
 
 
 def _values(declared: Statement, given: Any, name: str, place: str) -> tuple[float, ...]:
@@ -262,15 +287,18 @@ def _values(declared: Statement, given: Any, name: str, place: str) -> tuple[flo
             )
     values: list[float] = []
     for parameter in declared.parameters:
+        if parameter.name not in given and parameter.unsaid is not None:
+            values.append(parameter.unsaid)
+            continue
         if parameter.name not in given:
             raise InputError(f"{name}: {place}: {declared.name} lacks {parameter.name}", f"it has {', '.join(words)}")
         found = given[parameter.name]
         numbers = found if isinstance(found, list) else [found]
+        if parameter.quantity.kind == "axis":
+            numbers = [float(AXES.index(each)) if each in AXES else each for each in numbers]
         if any(type(number) not in (int, float) for number in numbers):
-            raise InputError(
-                f"{name}: {place}: {parameter.name} of {declared.name} holds something that is not a number",
-                "write plain numbers such as 4 or -2.5",
-            )
+            said = f"{parameter.name} of {declared.name} holds something that is not {_wanted(parameter)}"
+            raise InputError(f"{name}: {place}: {said}", "write plain numbers such as 4 or -2.5")
         try:
             values += parameter.checked(declared.name, numbers)
         except ShapeProgError as mistake:

@@ -22,7 +22,7 @@ from shapeprog.language.parameters import Parameter
 from shapeprog.language.program import Draw, Loop, Node, Program
 from shapeprog.language.statement import Statement, language
 from shapeprog.language.syntax import DEEPEST, proper_text
-from shapeprog.language.text import INDENT, variable
+from shapeprog.language.text import INDENT, checked_role, variable
 from shapeprog.space import Frame
 
 _NUMBER = r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?"
@@ -134,9 +134,9 @@ def _lines(node: Node, loops: list[Loop], numbered: bool) -> Iterator[str]:
     shifts = [depth for depth, outer in enumerate(loops) if _moves(outer)]
     names = [f"u{place + 1}" if numbered else "u" for place in range(len(shifts) + 1)]
     moved = "".join(f"+{variable(depth)}*{u}" for depth, u in zip(shifts, names, strict=False))
-    words = [_quoted(_words(declared))]
+    words = [_quoted([checked_role(node), declared.name] if isinstance(node, Draw) and node.role else _words(declared))]
     for symbol, parameters in groups(declared).items():
-        numbers = [p.quantity.written(value) for p in parameters for value in node.values[p.slots]]
+        numbers = [_number(p, value) for p in parameters for value in node.values[p.slots]]
         group = numbers[0] if len(numbers) == 1 else f"({', '.join(numbers)})"
         at = moved if parameters[0].quantity.kind == "position" else ""
         words.append(f"{names[-1] if symbol == 'u' else symbol}={group}{at}")
@@ -149,6 +149,11 @@ def _lines(node: Node, loops: list[Loop], numbered: bool) -> Iterator[str]:
         count = declared.parameters[0].quantity.written(node.values[0])
         yield f"{indent}for({variable(len(loops))}<{count}, {', '.join(words)})"
         yield from body
+
+
+def _number(parameter: Parameter, value: float) -> str:
+    """A number as the notation has it, which knows no words."""
+    return f"{value:.0f}" if parameter.quantity.kind == "axis" else parameter.quantity.written(value)
 
 
 class _Reader:
@@ -203,7 +208,8 @@ class _Reader:
         declared, values = self._declared(words, groups, is_loop)
         self.next += 1
         if not is_loop:
-            return Draw(declared.name, values)
+            role = words[0] if words == [words[0], declared.name] != _words(declared) else ""
+            return Draw(declared.name, values, role)
         if depth >= DEEPEST:
             self.next = row
             raise self._error(f"loops are nested more than {DEEPEST} deep", "put some of them side by side")
@@ -236,6 +242,8 @@ class _Reader:
     def _declared(self, words: list[str], found: Groups, is_loop: bool) -> tuple[Statement, tuple[float, ...]]:
         known = [declared for declared in language() if declared.is_loop == is_loop]
         fitting = next((declared for declared in known if _words(declared) == words), None)
+        if fitting is None and not is_loop and len(words) > 1 and words[0] in language().roles:
+            fitting = next((declared for declared in known if [words[0], declared.name] == words), None)
         try:
             if is_published(words, found):
                 name, numbers, note = restored(words, found)

@@ -22,14 +22,16 @@ module cuboid(low, size, lean = 0) {
     multmatrix([[1, 0, 0, 0], [lean / size[0], 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]) cube(size);
 }
 
-// A round bar between two points; as a prism of the same volume as the true cylinder.
-module cylinder_between(start, end, radius) {
+// A round bar between two points, which may be tapered; as a prism of the same volume as the true one.
+module cylinder_between(start, end, radius, end_radius = undef) {
+  last = is_undef(end_radius) ? radius : end_radius;
+  fuller = sqrt(2 * PI / segments / sin(360 / segments));
   along = end - start;
   height = norm(along);
   flat = norm([along[0], along[1]]);
-  if (height > 0 && radius > 0) translate(start)
+  if (height > 0 && min(radius, last) >= 0 && max(radius, last) > 0) translate(start)
     rotate([0, acos(max(-1, min(1, along[2] / height))), flat > 0 ? atan2(along[1], along[0]) : 0])
-      cylinder(h = height, r = radius * sqrt(2 * PI / segments / sin(360 / segments)), $fn = segments);
+      cylinder(h = height, r1 = radius * fuller, r2 = last * fuller, $fn = segments);
 }
 
 // Any other solid: its mesh in a box of half extents 1, stretched and put at its centre.
@@ -44,6 +46,11 @@ module posed(centre, axes) {
 
 // Copy i of a translation loop.
 module move(i, by) { translate(i * by) children(); }
+
+// The mirror image along every axis whose sign is negative.
+module reflect(signs) {
+  multmatrix([[signs[0], 0, 0, 0], [0, signs[1], 0, 0], [0, 0, signs[2], 0], [0, 0, 0, 1]]) children();
+}
 
 // A turn about the vertical axis (x) through a point.
 module turn(degrees, about = [0, 0, 0]) {
@@ -107,6 +114,7 @@ def _step(step: Solid | Repetition, depth: int) -> Iterator[str]:
         words = [f"for ({step.letter} = [0 : 1 : {step.count} - 1])"]
         words += [f"move({step.shift[0]}, {step.shift[1]})"] if step.shift else []
         words += [f"turn({', '.join(step.turn)})"] if step.turn else []
+        words += [f"reflect({step.signs})"] if step.signs else []
         yield f"{indent}{' '.join(words)} {{"
         for inner in step.body:
             yield from _step(inner, depth + 1)
@@ -118,7 +126,7 @@ def _step(step: Solid | Repetition, depth: int) -> Iterator[str]:
 
 def _call(step: Solid) -> str:
     arguments = list(step.arguments)
-    if step.kind == "cylinder":
+    if step.kind in ("cylinder", "frustum"):
         return f"cylinder_between({', '.join(arguments)})"
     around = ""
     if step.axes is not None:

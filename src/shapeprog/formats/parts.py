@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from shapeprog.errors import OutputError, ShapeProgError
 from shapeprog.language.parameters import LARGEST
-from shapeprog.language.program import Program
+from shapeprog.language.program import Draw, Program
 from shapeprog.space import Frame
 
 Vertices = npt.NDArray[np.float64]
@@ -32,11 +32,11 @@ class Part:
     Parameters
     ----------
     name
-        Statement and number, such as ``leg_3``.
+        Role or statement and number, such as ``leg_3``.
     statement
-        Id of the statement that drew it.
+        Id of that role or statement.
     word
-        Name of that statement.
+        Its name.
     block
         Which of the program's drawing statements, in the order of the text, from 0.
     vertices, faces
@@ -78,13 +78,14 @@ def parts(program: Program, frame: Frame | None = None) -> list[Part]:
     scene = unroll(encode(program, dtype=torch.float64))
     numbers: Counter[str] = Counter()
     found = []
-    statements, blocks = scene.statement.tolist(), scene.block.tolist()
-    words = {statement: language()[statement].name for statement in set(statements) if statement in language()}
+    blocks = scene.block.tolist()
+    called = [language().called(chain[-1].word) for chain in program.chains if isinstance(chain[-1], Draw)]
     for slot, vertices, faces in part_meshes(scene):
-        word = words[statements[slot]]
+        block = blocks[slot]
+        word = called[block].name
         numbers[word] += 1
         where = placed(vertices, frame)
-        found.append(Part(f"{word}_{numbers[word]}", statements[slot], word, blocks[slot], where, faces))
+        found.append(Part(f"{word}_{numbers[word]}", called[block].id, word, block, where, faces))
     return found
 
 

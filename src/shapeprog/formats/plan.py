@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from shapeprog.formats.symbolic import Affine, Piece, Repeat, number, pieces, point, repeat
 from shapeprog.language.parameters import Quantity
-from shapeprog.language.program import Loop, Node, Program
+from shapeprog.language.program import Draw, Loop, Node, Program
 from shapeprog.language.statement import Statement, language
 from shapeprog.language.text import variable
 from shapeprog.space import FloatArray
@@ -51,12 +51,13 @@ class Solid:
 
 @dataclass(frozen=True)
 class Repetition:
-    """A loop: its letter, how many copies, and the expressions that move a copy."""
+    """A loop: its letter, how many copies, and the expressions that reflect, turn and shift a copy, in this order."""
 
     letter: str
     count: str
     shift: tuple[str, str] | None
     turn: tuple[str, str] | None
+    signs: str | None
     body: tuple[Solid | Repetition, ...]
 
 
@@ -116,7 +117,7 @@ def plan(program: Program) -> Plan:
 
 def _named(node: Node, made: Plan, counter: Counter[str]) -> _Named:
     declared = language()[node.name]
-    word = re.sub(r"[^A-Za-z0-9_]", "_", node.name)
+    word = re.sub(r"[^A-Za-z0-9_]", "_", node.word if isinstance(node, Draw) else node.name)
     counter[word] += 1
     name = f"{word}_{counter[word]}"
     slots = tuple(
@@ -126,6 +127,8 @@ def _named(node: Node, made: Plan, counter: Counter[str]) -> _Named:
     )
     place = len(made.headings)
     if isinstance(node, Loop):
+        if not declared.quantities[0].written_out:
+            slots = (declared.quantities[0].written(node.values[0]), *slots[1:])
         inner = tuple(_named(each, made, counter) for each in node.body)
         each = _Named(node, declared, name, slots, inner)
         used = [repeat(declared, node.values, flag)[1] for flag in {leaf.declared.quarter for leaf in each.draws}]
@@ -136,7 +139,7 @@ def _named(node: Node, made: Plan, counter: Counter[str]) -> _Named:
     pivot, _ = point(declared, node.values)
     made.headings.insert(place, _heading(declared, name, node.values, fixed))
     drawn = tuple(
-        _solid(piece, f"{name}_{index}" if len(found) > 1 else name, declared, slots, made)
+        _solid(piece, f"{name}_{index}" if len(found) > 1 else name, language().called(node.word).id, slots, made)
         for index, piece in enumerate(found, 1)
     )
     return _Named(node, declared, name, slots, (), drawn, "[0, 0, 0]" if pivot is None else _vector(pivot, slots))
@@ -145,6 +148,8 @@ def _named(node: Node, made: Plan, counter: Counter[str]) -> _Named:
 def _heading(declared: Statement, name: str, values: Sequence[float], fixed: frozenset[int]) -> Heading:
     variables = []
     for parameter in declared.parameters:
+        if parameter.quantity.kind == "axis" or not parameter.quantity.written_out:
+            continue
         numbers = [parameter.quantity.written(value) for value in values[parameter.slots]]
         text = numbers[0] if len(numbers) == 1 else f"[{', '.join(numbers)}]"
         still = set(range(parameter.slots.start, parameter.slots.stop)) <= fixed
@@ -152,7 +157,7 @@ def _heading(declared: Statement, name: str, values: Sequence[float], fixed: fro
     return Heading(name, declared.doc, tuple(variables))
 
 
-def _solid(piece: Piece, name: str, declared: Statement, slots: tuple[str, ...], made: Plan) -> Solid:
+def _solid(piece: Piece, name: str, statement: int, slots: tuple[str, ...], made: Plan) -> Solid:
     shell = None
     if piece.vertices is not None and piece.faces is not None:
         shell = f"{name}_shell"
@@ -160,7 +165,7 @@ def _solid(piece: Piece, name: str, declared: Statement, slots: tuple[str, ...],
     arguments = tuple(_vector(group, slots) if len(group) > 1 else group[0].text(slots) for group in piece.groups)
     if piece.kind == "cuboid" and arguments[-1] == "0":
         arguments = arguments[:-1]
-    return Solid(name, declared.id, piece.kind, arguments, piece.axes, shell)
+    return Solid(name, statement, piece.kind, arguments, piece.axes, shell)
 
 
 def _vector(group: tuple[Affine, ...], slots: tuple[str, ...]) -> str:
@@ -191,7 +196,10 @@ def _repetition(
     each: _Named, motion: Repeat, pivot: str, letter: str, body: tuple[Solid | Repetition, ...], made: Plan
 ) -> Repetition:
     count = each.slots[0]
-    shift = turn = None
+    shift = turn = signs = None
+    if motion.signs is not None:
+        count, signs = number(len(motion.signs)), f"{each.name}_signs[{letter}]"
+        made.tables[f"{each.name}_signs"] = motion.signs
     if motion.table is not None:
         count = number(len(motion.table))
         made.tables[f"{each.name}_turns"], made.tables[f"{each.name}_shifts"] = motion.table[:, 0], motion.table[:, 1:]
@@ -203,4 +211,4 @@ def _repetition(
     elif motion.turn is not None:
         angle = motion.turn.text(each.slots)
         turn = (f"{letter} * ({angle})" if " " in angle.replace(" * ", "") else f"{letter} * {angle}", pivot)
-    return Repetition(letter, count, shift, turn, body)
+    return Repetition(letter, count, shift, turn, signs, body)

@@ -11,9 +11,9 @@ from pathlib import Path
 
 from shapeprog.errors import DeclarationError, InputError, ShapeProgError
 from shapeprog.geometry.primitive import primitives
-from shapeprog.language.statement import Statement, language
+from shapeprog.language.statement import Role, Statement, language
 
-_loaded: dict[Path, tuple[tuple[Statement, ...], dict[str, int]]] = {}
+_loaded: dict[Path, tuple[tuple[Statement, ...], tuple[Role, ...], dict[str, int]]] = {}
 
 
 def load_statements(path: str | os.PathLike[str]) -> tuple[Statement, ...]:
@@ -35,23 +35,26 @@ def load_statements(path: str | os.PathLike[str]) -> tuple[Statement, ...]:
     if not file.is_file():
         found = "a folder" if file.is_dir() else "no file"
         raise InputError(f"{path} is {found}", "give the path of a Python file that declares statements")
-    before, solids = set(language().names), dict(primitives.names)
+    before, roles, solids = set(language().names), set(language().roles), dict(primitives.names)
     module_name = f"shapeprog_statements_{len(_loaded)}_{file.stem}"
     try:
         _run(file, module_name)
         declared = tuple(each for each in language() if each.name not in before)
-        if not declared:
+        played = tuple(each for name, each in language().roles.items() if name not in roles)
+        if not declared and not played:
             raise DeclarationError(f"{path} declares no statement", "decorate a function with @statement or @loop")
     except BaseException as cause:
         for name in set(language().names) - before:
             language().forget(name)
+        for name in language().roles.keys() - roles:
+            del language().roles[name]
         for name in primitives.names.keys() - solids:
             del primitives.names[name]
         sys.modules.pop(module_name, None)
         if isinstance(cause, (Exception, SystemExit)):
             raise _in_words(path, file, cause) from cause
         raise
-    _loaded[file] = declared, {name: kind for name, kind in primitives.names.items() if name not in solids}
+    _loaded[file] = declared, played, {name: kind for name, kind in primitives.names.items() if name not in solids}
     return declared
 
 
@@ -67,12 +70,15 @@ def _run(file: Path, module_name: str) -> None:
 def _declare_again(file: Path) -> tuple[Statement, ...]:
     known = language()
     declared = []
-    statements, solids = _loaded[file]
+    statements, roles, solids = _loaded[file]
     primitives.names.update(solids)
     for each in statements:
         if each.name not in known:
             known.register(replace(each, id=known.free_id()) if each.id in known else each)
         declared.append(known[each.name])
+    for role in roles:
+        if role.name not in known.roles:
+            known.add_role(role.name, role.doc, role.label)
     return tuple(declared)
 
 

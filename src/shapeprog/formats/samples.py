@@ -63,7 +63,7 @@ def write_arrays(program: Program, path: Path, frame: Frame) -> None:
     ==========================  ===================  ==========================================================
     ``voxels``                  (32, 32, 32) bool    cells of the program snapped to the grid
     ``points``, ``normals``     (5000, 3) float32    on the surface of the union of the program as it is, in cells
-    ``ids``, ``parameters``     (K, J), (K, J, 7)    the program as tensors
+    ``ids``, ``parameters``     (K, J), (K, J, 7+)   the program as tensors
     ``scale, centre, axes``     (), (3,), (3, 3)     the way to the world: centre + axes @ (scale * point)
     ==========================  ===================  ==========================================================
     """

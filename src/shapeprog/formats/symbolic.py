@@ -17,7 +17,7 @@ import torch
 
 from shapeprog.geometry.batch import Solids
 from shapeprog.geometry.primitive import primitives
-from shapeprog.language.statement import SLOTS, Statement
+from shapeprog.language.statement import Motion, Statement
 from shapeprog.space import FloatArray
 
 Measure = Callable[[torch.Tensor], "list[_Measured]"]
@@ -55,10 +55,11 @@ class Piece:
     Parameters
     ----------
     kind
-        ``cuboid``, ``cylinder`` or, for every other primitive, ``shell``.
+        ``cuboid``, ``cylinder``, ``frustum`` or, for every other primitive, ``shell``.
     groups
         The vectors and numbers that place and shape it: for a cuboid its low corner, its extents and its lean; for a
-        cylinder both ends and its radius; for a shell its centre and the half extents of its local box.
+        cylinder both ends and its radius, for a frustum both radii; for a shell its centre and the half extents of its
+        local box.
     axes
         Its local axes as columns (3, 3), where they are not those of the grid and the groups do not tell them.  A
         cuboid with axes has its centre in place of the corner.
@@ -112,13 +113,15 @@ def point(declared: Statement, values: Sequence[float]) -> tuple[tuple[Affine, .
 class Repeat:
     """How a loop moves copy i: by a turn of ``i * turn`` degrees, or evenly over the circle, and by ``i * shift``.
 
-    Where a loop follows no such rule, ``table`` holds its degrees and shift for every copy.
+    Where a loop follows no such rule, ``table`` holds its degrees and shift for every copy.  Where it reflects, which
+    comes first, ``signs`` has -1 or 1 for each axis of every copy.
     """
 
     turn: Affine | None = None
     even: bool = False
     shift: tuple[Affine, ...] | None = None
     table: FloatArray | None = None
+    signs: FloatArray | None = None
 
     @property
     def turns(self) -> bool:
@@ -129,10 +132,12 @@ class Repeat:
 def repeat(declared: Statement, values: Sequence[float], quarter: bool) -> tuple[Repeat, frozenset[int]]:
     """The motion of a loop as expressions in its slots, and the slots that are fixed (the count is never)."""
 
-    def moved(rows: torch.Tensor, copy: torch.Tensor) -> FloatArray:
+    def motion_of(rows: torch.Tensor, copy: torch.Tensor) -> Motion:
         assert declared.move is not None
-        flags = torch.full((len(rows),), quarter)
-        motion = declared.move(copy, flags, **declared.split(rows))
+        return declared.move(copy, torch.full((len(rows),), quarter), **declared.split(rows))
+
+    def moved(rows: torch.Tensor, copy: torch.Tensor) -> FloatArray:
+        motion = motion_of(rows, copy)
         turn = torch.zeros(len(rows), dtype=rows.dtype) if motion.turn is None else motion.turn
         shift = torch.zeros(len(rows), 3, dtype=rows.dtype) if motion.shift is None else motion.shift
         return np.concatenate([360 * turn.numpy()[:, None], shift.numpy()], 1)
@@ -145,22 +150,23 @@ def repeat(declared: Statement, values: Sequence[float], quarter: bool) -> tuple
 
         return around
 
-    slots = range(declared.size)
-    here = torch.zeros(8, SLOTS, dtype=torch.float64)
-    here[:, : len(values)] = torch.tensor(values, dtype=torch.float64)
+    slots = [slot for slot, quantity in enumerate(declared.quantities) if quantity.kind != "axis"]
+    here = torch.tensor(values, dtype=torch.float64).expand(8, declared.size).clone()
+    count = max(0, round(values[0]))
+    each = here[:1].expand(count, declared.size)
+    signs = motion_of(each, torch.arange(count, dtype=torch.float64)).signs
+    reflected = None if signs is None or bool((signs == 1).all()) else signs.numpy()
     here[:, 0] = torch.arange(1, 9)
     copies = torch.tensor([0, 1, 1, 3, 4, 5, 2, 7], dtype=torch.float64)
     even = bool(np.abs(moved(here, copies)[:, 0] - 360 * (copies / here[:, 0]).numpy()).max() < TOLERANCE)
     turn = _Probe(declared, values, measure(slice(0, 0 if even else 1)), slots, 1.0)
     shift = _Probe(declared, values, measure(slice(1, 4)), slots, 1.0)
     if max(np.abs(probe.base[0].still[0]).max(initial=0) for probe in (turn, shift)) > TOLERANCE:
-        count = max(0, round(values[0]))
-        rows = here[:1].expand(count, SLOTS).clone()
-        rows[:, 0] = values[0]
-        return Repeat(table=moved(rows, torch.arange(count, dtype=torch.float64))), frozenset(slots) - {0}
+        table = moved(each, torch.arange(count, dtype=torch.float64))
+        return Repeat(table=table, signs=reflected), frozenset(slots) - {0}
     angle = None if even else _unless_zero((turn.affine(0),))
     by = _unless_zero(tuple(shift.affine(axis) for axis in range(3)))
-    found = Repeat(None if angle is None else angle[0], even, by)
+    found = Repeat(None if angle is None else angle[0], even, by, signs=reflected)
     return found, (turn.fixed & shift.fixed) - {0}
 
 
@@ -187,11 +193,10 @@ def _measured(solids: Solids) -> _Measured:
     rotation = np.tile(np.eye(3), (rows, 1, 1)) if solids.rotation is None else solids.rotation.numpy()
     turned = bool(np.abs(rotation - np.eye(3)).max() > 0)
     name = primitives[solids.kind].name
-    if name == "cylinder":
-        reach = rotation[..., 0] * size[:, :1]
-        return _Measured(
-            name, (3, 3, 1), np.concatenate([centre - reach, centre + reach, size[:, 1:2]], 1), np.zeros((rows, 0))
-        )
+    if name in ("cylinder", "frustum"):
+        reach, radii = rotation[..., 0] * size[:, :1], size[:, 1 : 2 if name == "cylinder" else 3]
+        linear = np.concatenate([centre - reach, centre + reach, radii], 1)
+        return _Measured(name, (3, 3, *[1] * radii.shape[1]), linear, np.zeros((rows, 0)))
     axes, still = (rotation[0], rotation.reshape(rows, 9)) if turned else (None, np.zeros((rows, 0)))
     if name == "cuboid":
         low = centre - size[:, :3]
@@ -214,18 +219,17 @@ class _Probe:
     def __init__(
         self, declared: Statement, values: Sequence[float], measure: Measure, slots: Sequence[int], step: float
     ) -> None:
-        here = np.zeros(SLOTS)
-        here[: len(values)] = values
-        along = [far * np.eye(SLOTS)[slot] for slot in slots for far in (step, 2 * step)]
+        here = np.asarray(values, np.float64)
+        along = [far * np.eye(len(here))[slot] for slot in slots for far in (step, 2 * step)]
         self.base, linear, still = _evaluate(measure, np.stack([here, *(here + move for move in along)]))
         one, two = linear[1::2] - linear[0], linear[2::2] - linear[0]
         bent = np.abs(two - 2 * one).max(1, initial=0) > TOLERANCE
         moved = np.abs(still[1:] - still[0]).max(1, initial=0).reshape(-1, 2).max(1, initial=0) > TOLERANCE
         live = [slot for slot, bad in zip(slots, bent | moved, strict=True) if not bad]
-        slope = np.zeros((SLOTS, linear.shape[1]))
+        slope = np.zeros((len(here), linear.shape[1]))
         slope[list(slots)] = one / step
         # Linear in each slot alone is not linear in all: move the live ones together, and give up where that differs.
-        mixed = np.zeros((2, SLOTS))
+        mixed = np.zeros((2, len(here)))
         mixed[:, live] = step * np.outer([1, 3], 1 + np.arange(len(live)) % 3)
         _, together, pose = _evaluate(measure, np.concatenate([here[None], here + mixed]))
         gap = np.abs(together[1:] - linear[0] - mixed @ slope).max(initial=0)

@@ -1,7 +1,8 @@
 """One declaration per primitive: distance, surface, mesh and size; everything else is derived from it.
 
 A primitive lives in a local frame with its centre at the origin and its axis along local axis 0, and has up to
-four sizes.  All functions are vectorised over leading batch dimensions and differentiable in the sizes.
+four sizes.  It is its own mirror image along local axis 2, so that mirroring a scene turns its primitives only.  All
+functions are vectorised over leading batch dimensions and differentiable in the sizes.
 """
 
 from __future__ import annotations
@@ -228,3 +229,9 @@ def _try(primitive: Primitive) -> None:
         if len(found) != len(wanted) or any(w not in (None, f) for f, w in zip(found, wanted, strict=True)):
             said = f"{word} of primitive {primitive.name!r} returns shape {found}"
             raise DeclarationError(said, f"for 2 sizes it should be {wanted}".replace("None", "any number"))
+    here = torch.tensor([[0.9, 0.7, 0.8], [-0.6, 1.3, 0.4], [0.3, -0.5, 1.1], [-1.2, -0.2, 0.6]])
+    there = here * torch.tensor([1.0, 1.0, -1.0])
+    sizes = torch.tensor([1.0, 0.8, 0.6, 0.4]).expand(4, SIZES)
+    if not torch.allclose(primitive.distance(here, sizes), primitive.distance(there, sizes), atol=1e-5):
+        said = f"primitive {primitive.name!r} is not its own mirror image along its local axis 2"
+        raise DeclarationError(said, "turn its local frame: one of its planes of symmetry must lie across that axis")

@@ -23,7 +23,7 @@ from shapeprog.inference.block_layout import (
     WIDTH,
 )
 from shapeprog.language.program import Program
-from shapeprog.language.statement import EMPTY, END, SLOTS, language
+from shapeprog.language.statement import EMPTY, END, language
 from shapeprog.language.tensors import Code, encode
 from shapeprog.space import FloatArray
 
@@ -61,7 +61,7 @@ def from_code(code: Code) -> FloatArray:
     quarter, and numbers beyond ``FARTHEST`` or not finite; and what draws nothing.
     """
     ids = code.ids.detach().cpu().reshape(-1, code.ids.shape[-1]).numpy()
-    said = code.parameters.detach().cpu().double().reshape(*ids.shape, SLOTS).numpy()
+    said = code.parameters.detach().cpu().double().reshape(*ids.shape, code.parameters.shape[-1]).numpy()
     finite = np.isfinite(said).all((1, 2))
     numbers = np.rint(np.where(finite[:, None, None], said, 0.0))
     rows = np.zeros((len(ids), WIDTH))

@@ -158,10 +158,10 @@ def refine(
             if progress:
                 progress("refining", (step + 1) / plan.steps)
     tidy = torch.where(free, moved.detach().double().round(decimals=DECIMALS).to(values), values)
-    return decode(Code(start.ids, tidy))[0]
+    return decode(start.having(tidy))[0]
 
 
-def _slots(code: Code) -> tuple[Bool[Tensor, "K J 7"], Bool[Tensor, "K J 7"]]:
+def _slots(code: Code) -> tuple[Bool[Tensor, "K J slots"], Bool[Tensor, "K J slots"]]:
     """Which slots of a program may move, and which of those in use are lengths.
 
     Continuous parameters move; a shift that is exactly zero stays zero, so that a loop along an axis keeps to it.
@@ -170,6 +170,8 @@ def _slots(code: Code) -> tuple[Bool[Tensor, "K J 7"], Bool[Tensor, "K J 7"]]:
     length = torch.zeros_like(free)
     for declared in language():
         here = code.ids == declared.id
+        if not bool(here.any()):
+            continue
         for slot, quantity in enumerate(declared.quantities):
             still = (code.parameters[..., slot] == 0) & (quantity.kind == "shift")
             free[..., slot] |= here & (not quantity.discrete) & ~still

@@ -53,7 +53,7 @@ def snap(program: Program, voxels: npt.NDArray[np.bool_]) -> Program:
                 best, best_iou = trials[chosen], ious[chosen]
         if best_iou <= before:
             break
-    return decode(Code(start.ids, best))[0]
+    return decode(start.having(best))[0]
 
 
 def snapped_from(program: Program, snapped: Program) -> bool:

@@ -15,9 +15,9 @@ import numpy as np
 from torch import Tensor
 
 from shapeprog.errors import ShapeProgError
-from shapeprog.space import HALF, RESOLUTION
+from shapeprog.space import AXES, HALF, RESOLUTION
 
-Kind = Literal["position", "length", "shift", "count", "turn"]
+Kind = Literal["position", "length", "shift", "angle", "count", "turn", "axis"]
 
 LARGEST = float(np.finfo(np.float32).max)
 LARGEST_WHOLE = 1 << 24  # up to here float32 holds every whole number; counts and turns end here
@@ -49,54 +49,98 @@ class Quantity:
     """A group of numbers of one kind.
 
     ``position`` and ``shift`` are coordinates in cells (a shift is relative), ``length`` is an extent in cells,
-    ``count`` a number of copies, ``turn`` a number of quarter turns.  The width is how many numbers there are, one
-    tensor slot each; programs are sampled from ``low`` to ``high``, which errors name.
+    ``angle`` is in degrees, ``count`` a number of copies, ``turn`` a number of quarter turns, ``axis`` an axis of the
+    grid, written as its word.  The width is how many numbers there are, one tensor slot each, and ``each`` says which
+    is which; programs are sampled from ``low`` to ``high``, which errors name.  A count with one legal value, such as
+    that of a mirror, is not written.
     """
 
     kind: Kind
     width: int = 1
     low: float = 0.0
     high: float = 0.0
+    each: str = ""
 
     @property
     def discrete(self) -> bool:
         """Whether the numbers are whole and carry no gradient."""
-        return self.kind in ("count", "turn")
+        return self.kind in ("count", "turn", "axis")
+
+    @property
+    def written_out(self) -> bool:
+        """Whether it stands in the text at all."""
+        return self.kind != "count" or self.low < self.high
+
+    @property
+    def blank(self) -> str:
+        """What stands for a number of it that is left open."""
+        return self.written(self.high) if self.kind == "axis" or not self.written_out else "_"
+
+    def nearest(self, value: float) -> float:
+        """The legal whole number nearest to ``value``: counts and turns end where float32 does not hold them all."""
+        kept = self.kind == "axis" or not self.written_out
+        low, high = (self.low, self.high) if kept else (-LARGEST_WHOLE, LARGEST_WHOLE)
+        return float(round(min(max(value, low), high)))
 
     @property
     def range_text(self) -> str:
         """The declared range in words."""
+        if self.kind == "axis":
+            return f"one of {', '.join(AXES)}"
         whole = "whole numbers " if self.discrete else ""
         return f"{whole}from {shortest(self.low)} to {shortest(self.high)}"
 
     def written(self, value: float) -> str:
-        """A number as program text: whole for counts and turns, else the shortest decimal."""
+        """A number as program text: whole for counts and turns, the word of an axis, else the shortest decimal."""
+        if self.kind == "axis":
+            return AXES[int(value)]
         return str(int(to_float32(value))) if self.discrete else shortest(value)
 
 
-Position = Annotated[Tensor, Quantity("position", 3, -HALF, HALF)]
-Extent = Annotated[Tensor, Quantity("length", 3, 0, RESOLUTION)]
-Half = Annotated[Tensor, Quantity("length", 2, 0, HALF)]
+_ALL, _LEVEL = "up, depth, left-right", "depth, left-right"
+
+Position = Annotated[Tensor, Quantity("position", 3, -HALF, HALF, _ALL)]
+Extent = Annotated[Tensor, Quantity("length", 3, 0, RESOLUTION, _ALL)]
+Half = Annotated[Tensor, Quantity("length", 2, 0, HALF, _LEVEL)]
 Length = Annotated[Tensor, Quantity("length", 1, 0, RESOLUTION)]
 Radius = Annotated[Tensor, Quantity("length", 1, 0, HALF)]
 Shift = Annotated[Tensor, Quantity("shift", 1, -RESOLUTION, RESOLUTION)]
-Shift3 = Annotated[Tensor, Quantity("shift", 3, -RESOLUTION, RESOLUTION)]
+Shift3 = Annotated[Tensor, Quantity("shift", 3, -RESOLUTION, RESOLUTION, _ALL)]
 Count = Annotated[Tensor, Quantity("count", 1, 0, 64)]
 Turn = Annotated[Tensor, Quantity("turn", 1, -64, 64)]
+Angle = Annotated[Tensor, Quantity("angle", 1, -45, 45)]
+Axis = Annotated[Tensor, Quantity("axis", 1, 0, 2)]
+Two = Annotated[Tensor, Quantity("count", 1, 2, 2)]
+Section = Annotated[Tensor, Quantity("length", 2, 0, RESOLUTION, "first, second")]
+Radii = Annotated[Tensor, Quantity("length", 2, 0, HALF, "start, end")]
+Place = Annotated[Tensor, Quantity("position", 1, -HALF, HALF)]
 
 
 @dataclass(frozen=True)
 class Parameter:
-    """One named parameter of a statement and the first of the tensor slots it takes."""
+    """One named parameter of a statement and the first of the tensor slots it takes.
+
+    A parameter of one number may have a default, which goes without saying in program text.
+    """
 
     name: str
     quantity: Quantity
     start: int
+    default: float | None = None
 
     @property
     def slots(self) -> slice:
         """Its slots among those of the statement."""
         return slice(self.start, self.start + self.quantity.width)
+
+    def silent(self, numbers: Sequence[str]) -> bool:
+        """Whether text leaves it out, with these numbers as text."""
+        return self.unsaid is not None and list(numbers) == [self.quantity.written(self.unsaid)]
+
+    @property
+    def unsaid(self) -> float | None:
+        """The number it has where text leaves it out, if it may."""
+        return self.default if self.quantity.written_out else float(self.quantity.low)
 
     def call(self, numbers: Sequence[str]) -> str:
         """How it is written with these numbers: ``at=(4, 0, -2.5)``."""
@@ -105,7 +149,7 @@ class Parameter:
     @property
     def blank(self) -> str:
         """How it is written, with a blank for each number: ``at=(_, _, _)``."""
-        return self.call("_" * self.quantity.width)
+        return self.call([self.quantity.blank] * self.quantity.width)
 
     def checked(self, owner: str, numbers: Sequence[float]) -> list[float]:
         """Its numbers in a call of the statement ``owner``, rounded to float32; a ``ShapeProgError`` if they are wrong.
@@ -122,6 +166,11 @@ class Parameter:
         if not quantity.discrete:
             return singles
         for number in numbers:
+            if quantity.kind == "axis" and number not in range(len(AXES)):
+                raise ShapeProgError(f"{place} is {number!r}, which is no axis", f"it is {quantity.range_text}")
+            if not quantity.written_out and number != quantity.low:
+                only = quantity.written(quantity.low)
+                raise ShapeProgError(f"{place} is {number!r}, but {owner} always has {only}", f"leave it at {only}")
             if number != math.floor(number):
                 raise ShapeProgError(f"{place} is {number!r}, but must be whole", f"it takes {quantity.range_text}")
             if abs(number) > LARGEST_WHOLE:

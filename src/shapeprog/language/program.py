@@ -12,10 +12,19 @@ PUBLISHED_DEPTH = 3
 
 @dataclass(frozen=True)
 class Draw:
-    """A drawing statement with its parameters in slot order; every number is exact in float32."""
+    """A drawing statement with its parameters in slot order, and the role it plays, if another than its own name.
+
+    Every number is exact in float32.
+    """
 
     name: str
     values: tuple[float, ...]
+    role: str = ""
+
+    @property
+    def word(self) -> str:
+        """What the part is called: its role, or else its statement."""
+        return self.role or self.name
 
 
 @dataclass(frozen=True)
@@ -102,5 +111,5 @@ def _chains(node: Node, *loops: Loop) -> Iterator[Chain]:
 def _snap(node: Node) -> Node:
     values = tuple(float(round(value)) for value in node.values)
     if isinstance(node, Draw):
-        return Draw(node.name, values)
+        return Draw(node.name, values, node.role)
     return Loop(node.name, values, tuple(_snap(inner) for inner in node.body))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import torch
-from jaxtyping import Float
+from jaxtyping import Float, Int
 from torch import Tensor
 
 from shapeprog.geometry.batch import Solids
@@ -63,6 +63,33 @@ def align(direction: Vector) -> Float[Tensor, "*batch 3 3"]:
     second = torch.linalg.cross(first, helper)
     second = second / safe_norm((second**2).sum(-1, keepdim=True))
     return torch.stack([first, second, torch.linalg.cross(first, second)], -1)
+
+
+def leaned(direction: Vector, axis: Int[Tensor, "*batch"]) -> Float[Tensor, "*batch 3 3"]:
+    """The least rotation that brings a grid axis onto the line along ``direction``; none for a zero vector.
+
+    The other two columns are the other grid axes, leaned as little as can be.
+    """
+    length = safe_norm((direction**2).sum(-1, keepdim=True))
+    main = torch.nn.functional.one_hot(axis, 3).to(direction)
+    along = torch.where(length > 1e-9, direction / length, main)
+    along = along * torch.where((along * main).sum(-1, keepdim=True) < 0, -1.0, 1.0).to(along)
+    cross = _cross(torch.linalg.cross(main, along))
+    cos = (along * main).sum(-1)[..., None, None]
+    return torch.eye(3, device=main.device).to(main) + cross + cross @ cross / (1 + cos)
+
+
+def about_axis(axis: Int[Tensor, "*batch"], degrees: Scalar) -> Float[Tensor, "*batch 3 3"]:
+    """Rotation about a grid axis, counter-clockwise seen from its end."""
+    angle = torch.deg2rad(degrees)[..., None, None]
+    cross = _cross(torch.nn.functional.one_hot(axis, 3).to(angle))
+    return torch.eye(3, device=angle.device).to(angle) + angle.sin() * cross + (1 - angle.cos()) * cross @ cross
+
+
+def _cross(vector: Vector) -> Float[Tensor, "*batch 3 3"]:
+    """The matrix that takes the cross product with ``vector`` from the left."""
+    (a, b, c), zero = vector.unbind(-1), torch.zeros_like(vector[..., 0])
+    return torch.stack([zero, -c, b, c, zero, -a, -b, a, zero], -1).unflatten(-1, (3, 3))
 
 
 def _raised(at: Vector, thickness: Scalar) -> Vector:

@@ -12,10 +12,11 @@ from __future__ import annotations
 
 import inspect
 import keyword
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
+from itertools import count
 from typing import Any, get_type_hints
 
 import torch
@@ -26,21 +27,48 @@ from shapeprog.errors import DeclarationError
 from shapeprog.geometry.batch import Solids
 from shapeprog.geometry.primitive import SIZES, primitives
 from shapeprog.geometry.primitives import built_in_names
+from shapeprog.language.hints import Box
 from shapeprog.language.parameters import Parameter, Quantity
 
-SLOTS = 7  # in tensors for the parameters of one statement
+SLOTS = 7  # in published tensors for the parameters of one statement
+MOST_SLOTS = 16  # tensors are as wide as the statements at hand need, up to here
 EMPTY, END = 0, 21  # ids without a statement: nothing, and the end of a loop in flat listings
+ROLES = 127  # ids of roles that are no statements lie above
+
+
+Hint = Callable[[Box], Iterable[Sequence[float]]]
 
 
 @dataclass(frozen=True)
 class Motion:
-    """How a loop moves one copy: a turn about the vertical axis through the pivot, then a shift in cells.
+    """How a loop moves one copy: reflections, a turn about the vertical axis through the pivot, then a shift in cells.
 
-    The turn is a fraction of a full circle, from depth towards left-right.
+    The reflections are -1 or 1 for each axis of the grid, about the planes through its origin.  The turn is a fraction
+    of a full circle, from depth towards left-right.
     """
 
     turn: Float[Tensor, "*batch"] | None = None
     shift: Float[Tensor, "*batch 3"] | None = None
+    signs: Float[Tensor, "*batch 3"] | None = None
+
+
+@dataclass(frozen=True)
+class Role:
+    """What a part is for, whatever its solid: ``leg(taper(...))`` and ``leg(bar(...))`` are both legs.
+
+    Parameters
+    ----------
+    name, id, doc
+        Word in program text, number in tensors, one line of manual.  A role may share them with a statement, which then
+        brings its solid along: ``leg(at=..., size=...)`` is a leg, too.
+    label
+        What data sets of labelled parts call it; empty if they have no word for it.
+    """
+
+    name: str
+    id: int
+    doc: str
+    label: str = ""
 
 
 @dataclass(frozen=True)
@@ -58,6 +86,10 @@ class Statement:
     pivot, quarter
         Parameter tensors by name to a point (..., 3) on the vertical axis about which rotation loops turn what the
         statement draws, by default that of the grid; whether they do so by quarter turns instead of evenly.
+    taught
+        Whether synthetic furniture draws it, so that generators learn it.
+    hint
+        How inference starts to fit it: values for an oriented box that its solid about fills, none where it would not.
     """
 
     name: str
@@ -69,6 +101,8 @@ class Statement:
     pivot: Callable[..., Float[Tensor, "*batch 3"]] | None = None
     quarter: bool = False
     paper: tuple[str, str] | None = None
+    taught: bool = True
+    hint: Hint | None = None
 
     @property
     def is_loop(self) -> bool:
@@ -86,19 +120,29 @@ class Statement:
         return tuple(p.quantity for p in self.parameters for _ in range(p.quantity.width))
 
     def call(self, numbers: Sequence[str]) -> str:
-        """How it is written with these numbers, in slot order; the count of a loop goes without its name."""
-        words = [parameter.call(numbers[parameter.slots]) for parameter in self.parameters]
+        """How it is written with these numbers, in slot order; what a loop begins with goes without its name."""
+        words = [p.call(numbers[p.slots]) for p in self.parameters if not p.silent(numbers[p.slots])]
         if self.is_loop:
-            words[0] = words[0].removeprefix(f"{self.parameters[0].name}=")
+            words[0] = words[0].removeprefix(f"{self.first.name}=")
         return f"{self.name}({', '.join(words)})"
+
+    def written(self, values: Sequence[float]) -> int:
+        """How many continuous numbers text writes for these values."""
+        shown = [each for each in self.parameters if not each.quantity.discrete]
+        return sum(each.quantity.width for each in shown if each.unsaid is None or values[each.start] != each.unsaid)
+
+    @property
+    def first(self) -> Parameter:
+        """The first parameter that is written."""
+        return next(parameter for parameter in self.parameters if parameter.quantity.written_out)
 
     @property
     def signature(self) -> str:
-        """How it is written, with a blank for each number; loops begin with ``for i in``."""
-        call = self.call("_" * self.size)
+        """How it is written, with a blank for each number that it leaves open; loops begin with ``for i in``."""
+        call = self.call([each.blank for each in self.quantities])
         return f"for i in {call}:" if self.is_loop else call
 
-    def split(self, values: Float[Tensor, "*batch 7"]) -> dict[str, Tensor]:
+    def split(self, values: Float[Tensor, "*batch slots"]) -> dict[str, Tensor]:
         """Parameter tensors by name: (...) for one slot, (..., width) for several; turns and counts are rounded."""
         named = {}
         for parameter in self.parameters:
@@ -106,19 +150,28 @@ class Statement:
             named[parameter.name] = part.detach().round() if parameter.quantity.discrete else part
         return named
 
-    def solids(self, values: Float[Tensor, "*batch 7"]) -> list[Solids]:
-        """What the statement draws for parameters (..., 7), before any loop."""
+    def solids(self, values: Float[Tensor, "*batch slots"]) -> list[Solids]:
+        """What the statement draws for parameters, of which it takes the first, before any loop."""
         assert self.draw is not None
         drawn = self.draw(**self.split(values))
         return [drawn] if isinstance(drawn, Solids) else list(drawn)
 
 
+WORDS = "use letters, digits and underscores"
+
+
+def is_word(name: str) -> bool:
+    """Whether program text can call something by this name."""
+    return name.isidentifier() and not keyword.iskeyword(name)
+
+
 class Language:
-    """A registry of statements and loops, found by name or by id, and the names of its primitives."""
+    """A registry of statements and loops, found by name or by id, of roles, and the names of its primitives."""
 
     def __init__(self, solids: dict[str, int] | None = None) -> None:
         self._by_id: dict[int, Statement] = {}
         self._by_name: dict[str, Statement] = {}
+        self.roles: dict[str, Role] = {}
         self.primitives = built_in_names() if solids is None else solids
 
     def register(self, declared: Statement) -> Statement:
@@ -130,16 +183,45 @@ class Language:
         self._by_name[declared.name] = declared
         return declared
 
+    def add_role(self, name: str, doc: str, label: str = "") -> Role:
+        """Add a role and return it; a ``DeclarationError`` if there is one, or a loop, of this name.
+
+        It has the id of the statement of its name, which brings its solid along, or else one above all others.
+        """
+        if name in self.roles:
+            raise DeclarationError(f"role {name!r} is declared twice", "give one of them another name")
+        if not is_word(name):
+            raise DeclarationError(f"{name!r} is not a word of Python", WORDS)
+        if name in self and self[name].is_loop:
+            raise DeclarationError(f"{name!r} is a loop, and no role", "give the role another name")
+        number = max([ROLES, *self._by_id, *(role.id for role in self.roles.values())]) + 1
+        self.roles[name] = Role(name, self[name].id if name in self else number, doc, label)
+        return self.roles[name]
+
+    def role(self, number: int) -> Role | None:
+        """The role with this id, if there is one."""
+        return next((role for role in self.roles.values() if role.id == number), None)
+
+    def called(self, word: str) -> Role | Statement:
+        """What parts are called by a word: a role, or a statement that is none."""
+        return self.roles[word] if word in self.roles else self._by_name[word]
+
+    def word(self, number: int) -> str:
+        """The role or statement with this id."""
+        found = self.role(number)
+        return self._by_id[number].name if found is None else found.name
+
     def _faults(self, declared: Statement) -> Iterator[tuple[str, str]]:
         """What is wrong with a declaration before it is tried, and the cure."""
         said = f"statement {declared.name!r}"
         owners = dict.fromkeys((EMPTY, END), "the language itself") | {each.id: each.name for each in self}
-        if not declared.name.isidentifier() or keyword.iskeyword(declared.name):
-            yield f"{declared.name!r} is not a word of Python", "use letters, digits and underscores"
+        owners = {role.id: f"the role {role.name}" for role in self.roles.values()} | owners
+        if not is_word(declared.name):
+            yield f"{declared.name!r} is not a word of Python", WORDS
         if declared.is_loop and [p.quantity.kind for p in declared.parameters][:1] != ["count"]:
             yield f"loop {declared.name!r} has no count", "annotate its first parameter with Count"
-        if declared.size > SLOTS:
-            limit = f"{declared.size} numbers, but a statement has {SLOTS} slots"
+        if declared.size > MOST_SLOTS:
+            limit = f"{declared.size} numbers, but a statement has at most {MOST_SLOTS}"
             yield f"{said} has {limit}", "use fewer or narrower parameters"
         if any(quantity.low > quantity.high for quantity in declared.quantities):
             yield f"a range of {said} ends before it starts", "swap low and high"
@@ -158,8 +240,9 @@ class Language:
         del self._by_id[self._by_name.pop(name).id]
 
     def free_id(self) -> int:
-        """The smallest id above all that are taken."""
-        return max([END, *self._by_id]) + 1
+        """The smallest id above those of the paper that is not taken."""
+        taken = {*self._by_id, *(role.id for role in self.roles.values())}
+        return next(number for number in count(END + 1) if number not in taken)
 
     def __contains__(self, key: str | int) -> bool:
         return key in (self._by_name if isinstance(key, str) else self._by_id)
@@ -198,6 +281,11 @@ def using(other: Language) -> Iterator[Language]:
         _active.reset(token)
 
 
+def role(name: str, doc: str, label: str = "") -> Role:
+    """Declare a role in the language in force, see :meth:`Language.add_role`."""
+    return language().add_role(name, doc, label)
+
+
 def statement(
     name: str,
     *,
@@ -206,33 +294,41 @@ def statement(
     paper: tuple[str, str] | None = None,
     pivot: Callable[..., Tensor] | None = None,
     quarter: bool = False,
+    taught: bool = True,
+    hint: Hint | None = None,
 ) -> Callable[[Callable[..., Any]], Statement]:
     """Declare a drawing statement from a function of annotated parameters that returns its solids.
 
     Without ``doc`` the manual shows the first paragraph of the function's docstring.
     """
-    return lambda draw: _declare(name, id, doc, draw, 0, draw=draw, pivot=pivot, quarter=quarter, paper=paper)
+    fields = {"pivot": pivot, "quarter": quarter, "paper": paper, "taught": taught, "hint": hint}
+    return lambda draw: _declare(name, id, doc, draw, 0, draw=draw, **fields)
 
 
 def loop(
-    name: str, *, id: int | None = None, paper: tuple[str, str] | None = None
+    name: str, *, id: int | None = None, paper: tuple[str, str] | None = None, taught: bool = True
 ) -> Callable[[Callable[..., Motion]], Statement]:
     """Declare a loop from a function ``(copy, quarter, count, ...) -> Motion``; the first parameter is the count."""
-    return lambda move: _declare(name, id, "", move, 2, move=move, paper=paper)
+    return lambda move: _declare(name, id, "", move, 2, move=move, paper=paper, taught=taught)
 
 
 def _declare(name: str, id: int | None, doc: str, function: Callable[..., Any], skip: int, **fields: Any) -> Statement:
     """Register what a function declares by its annotations, the first ``skip`` left out."""
     hints = get_type_hints(function, include_extras=True)
     parameters, start = [], 0
-    for word in list(inspect.signature(function).parameters)[skip:]:
+    for word, given in list(inspect.signature(function).parameters.items())[skip:]:
         quantity = next((m for m in getattr(hints.get(word), "__metadata__", ()) if isinstance(m, Quantity)), None)
         if quantity is None:
             raise DeclarationError(
                 f"parameter {word!r} of statement {name!r} has no kind",
-                "annotate it with one of Position, Extent, Half, Length, Radius, Shift, Shift3, Count, Turn",
+                "annotate it with one of Position, Extent, Half, Section, Length, Radius, Radii, Place, Shift, Shift3, "
+                "Angle, Count, Turn, Axis",
             )
-        parameters.append(Parameter(word, quantity, start))
+        default = None if given.default is inspect.Parameter.empty else float(given.default)
+        if default is not None and quantity.width > 1:
+            said = f"parameter {word!r} of statement {name!r} has a default, but more than one number"
+            raise DeclarationError(said, "leave the default out")
+        parameters.append(Parameter(word, quantity, start, default))
         start += quantity.width
     doc = doc or inspect.getdoc(function) or ""
     if not doc:
@@ -243,15 +339,16 @@ def _declare(name: str, id: int | None, doc: str, function: Callable[..., Any], 
 
 def _try(declared: Statement) -> None:
     """Draw or move once with mid-range parameters, so that a wrong shape is refused now and not amid a run."""
-    values = torch.zeros(2, SLOTS)
-    values[:, : declared.size] = torch.tensor([(quantity.low + quantity.high) / 2 for quantity in declared.quantities])
+    values = torch.zeros(2, declared.size)
+    values[:] = torch.tensor([(quantity.low + quantity.high) / 2 for quantity in declared.quantities])
     kind = "loop" if declared.is_loop else "statement"
     try:
         if declared.move is not None:
             motion = declared.move(torch.arange(2.0), torch.zeros(2, dtype=torch.bool), **declared.split(values))
-            shapes: list[Any] = [part if part is None else tuple(part.shape) for part in (motion.turn, motion.shift)]
-            fitting = shapes[0] in (None, (2,)) and shapes[1] in (None, (2, 3))
-            found, wanted = "a motion", "a turn must be (...) and a shift (..., 3)"
+            moved = (motion.turn, motion.shift, motion.signs)
+            shapes: list[Any] = [part if part is None else tuple(part.shape) for part in moved]
+            fitting = shapes[0] in (None, (2,)) and all(shape in (None, (2, 3)) for shape in shapes[1:])
+            found, wanted = "a motion", "a turn must be (...), a shift and signs (..., 3)"
         else:
             shapes = [(tuple(solids.size.shape), tuple(solids.centre.shape)) for solids in declared.solids(values)]
             fitting = bool(shapes) and all(pair == ((2, SIZES), (2, 3)) for pair in shapes)

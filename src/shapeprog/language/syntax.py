@@ -10,6 +10,7 @@ from shapeprog.errors import ProgramError, ShapeProgError, did_you_mean
 from shapeprog.language.parameters import Parameter, to_float32
 from shapeprog.language.program import Draw, Loop, Node, Program
 from shapeprog.language.statement import Statement, language
+from shapeprog.space import AXES
 
 DEEPEST = 64  # levels of loops in text; Python itself ends at 100 levels of indentation
 
@@ -85,10 +86,26 @@ class _Reader:
         if not isinstance(statement, ast.Expr):
             hint = "write name(parameter=number, ...) or for i in loop(count, ...):"
             raise self._error(statement, "a program holds only drawing statements and for loops", hint)
-        declared, call = self._call(statement.value, "statement")
+        role, solid = self._role(statement.value)
+        declared, call = self._call(solid, "statement")
         if declared.is_loop:
             raise self._misused(call, f"{declared.name} is a loop and draws nothing itself", declared)
-        return Draw(declared.name, self._values(declared, call))
+        if declared.name == role:
+            raise self._error(call, f"{role} is a {role} without being called one", f"write {declared.signature}")
+        return Draw(declared.name, self._values(declared, call), role)
+
+    def _role(self, node: ast.expr) -> tuple[str, ast.expr]:
+        """The role that is put around a call, and what it is put around; no role and the same if there is none."""
+        roles = language().roles
+        if not isinstance(node, ast.Call) or not isinstance(node.func, ast.Name) or node.func.id not in roles:
+            return "", node
+        role = node.func.id
+        if len(node.args) == 1 and isinstance(node.args[0], ast.Call) and not node.keywords:
+            return role, node.args[0]
+        if role in language() and not any(isinstance(each, ast.Call) for each in node.args):
+            return "", node
+        said = f"{role} is what a part is for, and stands around one solid"
+        raise self._error(node, said, f"write {role}(box(at=(_, _, _), size=(_, _, _))), or another solid")
 
     def _loop(self, statement: ast.For, depth: int) -> Loop:
         if depth >= DEEPEST:
@@ -111,6 +128,7 @@ class _Reader:
             raise self._error(node, f"{self._shown(node)} is no {wanted}", hint)
         if function.id not in known:
             fitting = [declared.name for declared in known if declared.is_loop == (wanted == "loop")]
+            fitting += [] if wanted == "loop" else known.roles
             raise self._error(function, f"no {wanted} is called {function.id!r}", did_you_mean(function.id, fitting))
         declared = known[function.id]
         if not isinstance(node, ast.Call):
@@ -122,9 +140,9 @@ class _Reader:
         found: dict[str, list[float]] = {}
         for argument in call.args:
             if not declared.is_loop or found or isinstance(argument, ast.Starred):
-                allowed = "only its count" if declared.is_loop else "nothing"
+                allowed = f"only its {declared.first.name}" if declared.is_loop else "nothing"
                 raise self._misused(argument, f"{declared.name} takes {allowed} without a name", declared)
-            found[declared.parameters[0].name] = self._numbers(declared, declared.parameters[0], argument)
+            found[declared.first.name] = self._numbers(declared, declared.first, argument)
         for word in call.keywords:
             if word.arg is None or word.arg not in parameters:
                 what = f"parameter {word.arg!r}" if word.arg else "parameter **"
@@ -132,7 +150,9 @@ class _Reader:
             if word.arg in found:
                 raise self._error(word, f"{word.arg} of {declared.name} is given twice", "leave one of them out")
             found[word.arg] = self._numbers(declared, parameters[word.arg], word.value)
-        for name in parameters:
+        for name, parameter in parameters.items():
+            if name not in found and (silent := parameter.unsaid) is not None:
+                found[name] = [silent]
             if name not in found:
                 raise self._misused(call, f"{declared.name} lacks {name}", declared)
         return tuple(number for name in parameters for number in found[name])
@@ -141,11 +161,21 @@ class _Reader:
         place = f"{parameter.name} of {declared.name}"
         if isinstance(node, ast.Tuple) and parameter.quantity.width == 1:
             raise self._error(node, f"{place} takes 1 number, not a group", f"write {parameter.blank}")
-        numbers = [self._number(place, each) for each in (node.elts if isinstance(node, ast.Tuple) else [node])]
+        if parameter.quantity.kind == "axis":
+            numbers = [self._axis(place, node, parameter)]
+        else:
+            numbers = [self._number(place, each) for each in (node.elts if isinstance(node, ast.Tuple) else [node])]
         try:
             return parameter.checked(declared.name, numbers)
         except ShapeProgError as mistake:
             raise self._error(node, mistake.message, mistake.hint) from None
+
+    def _axis(self, place: str, node: ast.expr, parameter: Parameter) -> float:
+        if isinstance(node, ast.Name) and node.id in AXES:
+            return float(AXES.index(node.id))
+        said = f"{place} holds {self._shown(node)}, which is no axis"
+        hint = did_you_mean(node.id, AXES) if isinstance(node, ast.Name) else ""
+        raise self._error(node, said, hint or f"it is {parameter.quantity.range_text}")
 
     def _number(self, place: str, node: ast.expr) -> float:
         sign, bare = 1.0, node

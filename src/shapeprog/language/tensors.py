@@ -1,10 +1,10 @@
-"""Programs as tensors: ids and parameters of K blocks x 3 steps x 7 slots, batched."""
+"""Programs as tensors: ids and parameters of K blocks x 3 steps x 7 slots, or more where needed, batched."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
@@ -12,7 +12,6 @@ from jaxtyping import Float, Int
 from torch import Tensor
 
 from shapeprog.errors import ShapeProgError
-from shapeprog.language.parameters import LARGEST_WHOLE
 from shapeprog.language.program import PUBLISHED_DEPTH, Chain, Draw, Loop, Program, nest
 from shapeprog.language.statement import EMPTY, END, SLOTS, language
 from shapeprog.space import Array
@@ -20,14 +19,22 @@ from shapeprog.space import Array
 
 @dataclass(frozen=True)
 class Code:
-    """Programs as tensors: the statement of each step of each block, 0 for none, and its parameters in slot order."""
+    """Programs as tensors: the statement of each step of each block, 0 for none, and its parameters in slot order.
+
+    ``roles`` are those of the blocks, 0 for none; ``None`` if no block has any, as generators write.
+    """
 
     ids: Int[Tensor, "*batch K J"]
-    parameters: Float[Tensor, "*batch K J 7"]
+    parameters: Float[Tensor, "*batch K J slots"]
+    roles: Int[Tensor, "*batch K"] | None = None
 
     def __getitem__(self, index: int | slice) -> Code:
         """The programs at an index of the first batch dimension."""
-        return Code(self.ids[index], self.parameters[index])
+        return Code(self.ids[index], self.parameters[index], None if self.roles is None else self.roles[index])
+
+    def having(self, parameters: Float[Tensor, "*batch K J slots"]) -> Code:
+        """The same statements and roles with other parameters."""
+        return replace(self, parameters=parameters)
 
 
 def encode(
@@ -36,7 +43,8 @@ def encode(
     """Tensors of programs: (B, K, J) for a sequence, (K, J) for one program.
 
     There are as many steps J as the longest block has, at least the published three, and as many blocks K as the
-    longest program has, or as are asked for; a ``ShapeProgError`` if a program has more.
+    longest program has, or as are asked for; a ``ShapeProgError`` if a program has more.  There are as many slots as
+    the longest statement takes, at least the published seven.
     """
     batch = [programs] if isinstance(programs, Program) else list(programs)
     chains = [program.chains for program in batch]
@@ -47,14 +55,19 @@ def encode(
         said = f"a program of {needed} blocks does not fit {rows} blocks"
         raise ShapeProgError(said, "allow more blocks, or shorten the program")
     ids = np.zeros((len(batch), rows, steps), np.int64)
-    parameters = np.zeros((len(batch), rows, steps, SLOTS), np.float64)
+    slots = max([SLOTS, *(len(node.values) for each in chains for chain in each for node in chain)])
+    parameters = np.zeros((len(batch), rows, steps, slots), np.float64)
+    roles = np.zeros((len(batch), rows), np.int64)
     known = language()
     for b, each in enumerate(chains):
         for k, chain in enumerate(each):
             for j, node in enumerate(chain):
                 ids[b, k, j] = known[node.name].id
                 parameters[b, k, j, : len(node.values)] = node.values
-    code = Code(torch.from_numpy(ids), torch.from_numpy(parameters).to(dtype))
+                if isinstance(node, Draw) and node.role:
+                    roles[b, k] = known.roles[node.role].id
+    played = torch.from_numpy(roles) if roles.any() else None
+    code = Code(torch.from_numpy(ids), torch.from_numpy(parameters).to(dtype), played)
     return code[0] if isinstance(programs, Program) else code
 
 
@@ -67,28 +80,32 @@ def decode(code: Code) -> list[Program]:
     programs = math.prod(code.ids.shape[:-2])
     ids = code.ids.detach().cpu().reshape(programs, *code.ids.shape[-2:]).numpy()
     values = code.parameters.detach().cpu().float().reshape(programs, *code.parameters.shape[-3:]).numpy()
-    blocks = (map(_chain, *program) for program in zip(ids, values, strict=True))
+    played = torch.zeros(code.ids.shape[:-1], dtype=torch.long) if code.roles is None else code.roles
+    roles = played.cpu().reshape(programs, -1).tolist()
+    blocks = (map(_chain, *program) for program in zip(ids, values, roles, strict=True))
     return [Program(tuple(nest(chain) for chain in chains if chain is not None)) for chains in blocks]
 
 
-def _chain(ids: Array, values: Array) -> Chain | None:
-    """The loops and the statement of one block; ``None`` where it is no such thing."""
+def _chain(ids: Array, values: Array, role: int) -> Chain | None:
+    """The loops and the statement of one block with its role; ``None`` where it is no such thing."""
     known = language()
     chain: list[Loop] = []
     for place, number in enumerate(ids.tolist()):
-        if number not in known:
+        if number not in known or known[number].size > values.shape[1]:
             return None
         declared = known[number]
         used = values[place, : declared.size]
         if not np.isfinite(used).all():
             return None
         numbers = tuple(
-            float(round(min(max(value, -LARGEST_WHOLE), LARGEST_WHOLE))) if quantity.discrete else value
+            quantity.nearest(value) if quantity.discrete else value
             for value, quantity in zip(used.tolist(), declared.quantities, strict=True)
         )
         if declared.is_loop:
             chain.append(Loop(declared.name, numbers, ()))
             continue
         rest = set(ids[place + 1 :].tolist())
-        return (*chain, Draw(declared.name, numbers)) if rest <= {EMPTY, END} else None
+        played = known.role(role) if role else None
+        drawn = Draw(declared.name, numbers, played.name if played else "")
+        return (*chain, drawn) if rest <= {EMPTY, END} else None
     return None

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from shapeprog.errors import ShapeProgError
-from shapeprog.language.program import Loop, Node, Program
+from shapeprog.errors import ShapeProgError, did_you_mean
+from shapeprog.language.program import Draw, Loop, Node, Program
 from shapeprog.language.statement import language
 from shapeprog.language.syntax import DEEPEST, LONGEST
 from shapeprog.language.syntax import parse as parse
@@ -38,7 +38,17 @@ def _call(node: Node) -> str:
     if len(node.values) != declared.size:
         said = f"{node.name} has {len(node.values)} numbers instead of {declared.size}"
         raise ShapeProgError(said, "mend the program")
-    return declared.call([each.written(value) for each, value in zip(declared.quantities, node.values, strict=True)])
+    text = declared.call([each.written(value) for each, value in zip(declared.quantities, node.values, strict=True)])
+    return text if isinstance(node, Loop) or not node.role else f"{checked_role(node)}({text})"
+
+
+def checked_role(node: Draw) -> str:
+    """The role of a part; a ``ShapeProgError`` if it is not declared, or no other than the name of its statement."""
+    if node.role and node.role not in language().roles:
+        raise ShapeProgError(f"no role is called {node.role!r}", did_you_mean(node.role, language().roles))
+    if node.role == node.name:
+        raise ShapeProgError(f"{node.name} is a {node.name} without being called one", "leave the role out")
+    return node.role
 
 
 def _lines(node: Node, depth: int) -> Iterator[str]:

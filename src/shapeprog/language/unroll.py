@@ -21,6 +21,7 @@ from shapeprog.geometry.scene import Scene
 from shapeprog.language.program import Program
 from shapeprog.language.statement import EMPTY, END, Statement, language
 from shapeprog.language.tensors import Code, encode
+from shapeprog.space import DEPTH, SIDE
 
 MOST_COPIES = 1 << 17
 """Most copies that one program may unroll to: points, cells, meshes and pictures of so many take seconds."""
@@ -105,7 +106,7 @@ class Plan:
                 self._levels.append(_Level(language()[number], moved, place, index[moved, level], quarter[moved]))
         self._known: _Layout | None = None
 
-    def scene(self, parameters: Float[Tensor, "*batch K J 7"]) -> Scene:
+    def scene(self, parameters: Float[Tensor, "*batch K J slots"]) -> Scene:
         """The scenes for parameters of the same programs, with gradient."""
         values = parameters.reshape(-1, parameters.shape[-1])
         pieces = values.index_select(0, self._place).split(self._counts)
@@ -118,10 +119,12 @@ class Plan:
         if any(part.rotation is not None for part in parts):
             turns = [identity.expand(len(p.size), 3, 3) if p.rotation is None else p.rotation for p in parts]
             rotation = torch.cat(turns)
-        turn, shift = self._motion(values, layout.source)
-        if turn is not None:
-            centre = (turn @ centre[..., None])[..., 0]
-            rotation = turn if rotation is None else turn @ rotation
+        motion, hand, shift = self._motion(values, layout.source)
+        if motion is not None:
+            centre = (motion @ centre[..., None])[..., 0]
+            rotation = motion if rotation is None else motion @ rotation
+        if rotation is not None and hand is not None:  # primitives are their own mirror images along their last axis
+            rotation = torch.cat([rotation[..., :2], rotation[..., 2:] * hand[:, None, None]], -1)
         if shift is not None:
             centre = centre + shift
         table = torch.cat([size, centre] if rotation is None else [size, centre, rotation.flatten(1)], -1)
@@ -161,17 +164,24 @@ class Plan:
         return self._known
 
     def _motion(
-        self, values: Float[Tensor, "R 7"], source: Int[Tensor, " S"] | None
-    ) -> tuple[Float[Tensor, "S 3 3"] | None, Float[Tensor, "S 3"] | None]:
-        """The rigid motion of each solid: the loops of its copy composed from the innermost outwards."""
+        self, values: Float[Tensor, "R slots"], source: Int[Tensor, " S"] | None
+    ) -> tuple[Float[Tensor, "S 3 3"] | None, Float[Tensor, " S"] | None, Float[Tensor, "S 3"] | None]:
+        """The turn or reflection of each solid, -1 where it is a reflection, and its shift.
+
+        Loops are composed from the innermost outwards; there is nothing where no loop turns, reflects or moves.
+        """
         if not self._levels:
-            return None, None
+            return None, None, None
         shift = values.new_zeros(len(self._rank), 3)
-        turn = axis = None
+        turn = axis = signs = None
         for level in self._levels:
             assert level.declared.move is not None
             named = level.declared.split(values.index_select(0, level.place))
             motion = level.declared.move(level.index.to(values), level.quarter, **named)
+            if motion.signs is not None:  # a reflection after a turn is the other way round before it
+                flip = torch.ones_like(shift).index_copy(0, level.copies, motion.signs.detach())
+                shift, turn = flip * shift, None if turn is None else turn * flip[:, DEPTH] * flip[:, SIDE]
+                signs = flip if signs is None else signs * flip
             if motion.turn is not None:
                 axis = self._axes(values) if axis is None else axis
                 angle = torch.zeros_like(shift[:, 0]).index_copy(0, level.copies, motion.turn.detach())
@@ -179,11 +189,15 @@ class Plan:
                 turn = angle if turn is None else turn + angle
             if motion.shift is not None:
                 shift = shift.index_add(0, level.copies, motion.shift)
-        if source is not None:
-            turn, shift = None if turn is None else turn.index_select(0, source), shift.index_select(0, source)
-        return None if turn is None else _turned(turn), shift
+        pose, hand = None if turn is None else _turned(turn), None
+        if signs is not None:
+            hand = signs.prod(-1)
+            pose = torch.diag_embed(signs) if pose is None else pose * signs[:, None]
+        if source is None:
+            return pose, hand, shift
+        return _some(pose, source), _some(hand, source), shift.index_select(0, source)
 
-    def _axes(self, values: Float[Tensor, "R 7"]) -> Float[Tensor, "M 3"]:
+    def _axes(self, values: Float[Tensor, "R slots"]) -> Float[Tensor, "M 3"]:
         """A point at height zero on the axis about which rotation loops turn each copy, in drawing order."""
         points = []
         for declared, place in zip(self._kinds, self._place.split(self._counts), strict=True):
@@ -202,7 +216,7 @@ def _are(ids: Int[Tensor, "*batch"], wanted: Callable[[Statement], bool]) -> Boo
 
 
 def _copies(
-    ids: Int[Tensor, "R J"], values: Float[Tensor, "R J 7"], blocks: int
+    ids: Int[Tensor, "R J"], values: Float[Tensor, "R J slots"], blocks: int
 ) -> tuple[Int[Tensor, " M"], Int[Tensor, " M"], Int[Tensor, "M J"]]:
     """Block row, drawing step and copy index at each loop level of every drawn copy; programs have ``blocks`` rows."""
     steps = ids.shape[-1]
@@ -230,6 +244,10 @@ def _copies(
         index.append(rest % count)
         rest = rest.div(count, rounding_mode="floor")
     return row, step[row, 0], torch.stack(index[::-1], -1)
+
+
+def _some(each: Tensor | None, rows: Int[Tensor, " S"]) -> Tensor | None:
+    return None if each is None else each.index_select(0, rows)
 
 
 def _turned(turn: Float[Tensor, "*batch"]) -> Float[Tensor, "*batch 3 3"]:

@@ -39,8 +39,8 @@ class Vocabulary:
 
     @classmethod
     def current(cls) -> Vocabulary:
-        """All statements in force."""
-        return cls(tuple(language()))
+        """All statements in force that generators are taught."""
+        return cls(tuple(each for each in language() if each.taught))
 
     @property
     def size(self) -> int:

@@ -19,6 +19,7 @@ from torch import Tensor
 from shapeprog.errors import InputError
 from shapeprog.geometry.cells import union, unpack
 from shapeprog.language.program import Program
+from shapeprog.language.statement import SLOTS
 from shapeprog.language.tensors import Code, encode
 from shapeprog.language.unroll import draw_blocks
 from shapeprog.models.vocabulary import Vocabulary
@@ -74,7 +75,7 @@ def read_labels(
             raise InputError(f"{source} has no program for any of the shapes", f"they are called {shown}, ...")
         found |= {places[name]: program for name, program in told.items()}
     ids = torch.zeros(len(names), blocks, vocabulary.steps, dtype=torch.long)
-    parameters = torch.zeros(*ids.shape, 7)
+    parameters = torch.zeros(*ids.shape, SLOTS)
     dropped = 0
     for place, program in found.items():
         whole = encode(program)
@@ -82,7 +83,7 @@ def read_labels(
         dropped += len(whole.ids) - len(kept)
         few = slice(0, vocabulary.steps)
         ids[place, : len(kept)] = whole.ids[kept, few]
-        parameters[place, : len(kept)] = whole.parameters[kept, few]
+        parameters[place, : len(kept)] = whole.parameters[kept, few, :SLOTS]
     known = torch.zeros(len(names), dtype=torch.bool)
     known[list(found)] = True
     return Labels(Code(ids, parameters), known, dropped)

@@ -22,9 +22,9 @@ class Line:
     text
         As printed.
     word
-        The statement or loop on it.
+        The role, statement or loop on it.
     statement
-        Its id if it draws, else None.
+        The id of that role or statement if it draws, else None.
     blocks
         The drawing statements, counted from 0 in the order of the text, that it draws or repeats.
     """
@@ -49,7 +49,7 @@ def _collect(body: tuple[Node, ...], texts: Iterator[str], found: list[Line], fi
     for node in body:
         text = next(texts)
         if isinstance(node, Draw):
-            found.append(Line(text, node.name, language()[node.name].id, (first,)))
+            found.append(Line(text, node.word, language().called(node.word).id, (first,)))
             first += 1
             continue
         place = len(found)
@@ -66,7 +66,7 @@ def _collect(body: tuple[Node, ...], texts: Iterator[str], found: list[Line], fi
 def _rounded(node: Node, digits: int) -> Node:
     values = tuple(round(value, digits) + 0.0 for value in node.values)
     if isinstance(node, Draw):
-        return Draw(node.name, values)
+        return Draw(node.name, values, node.role)
     return Loop(node.name, values, tuple(_rounded(inner, digits) for inner in node.body))
 
 

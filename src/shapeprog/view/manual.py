@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from shapeprog.errors import ShapeProgError, did_you_mean
 from shapeprog.formats.notation import groups
 from shapeprog.language.parameters import Parameter
-from shapeprog.language.statement import Statement, language
+from shapeprog.language.statement import Role, Statement, language
 
-_UNITS = {"position": "cells", "length": "cells", "shift": "cells", "count": "copies", "turn": "quarter turns"}
-_AXES = {2: "(depth, left-right)", 3: "(up, depth, left-right)"}
+_UNITS = {
+    "position": " in cells", "length": " in cells", "shift": " in cells", "angle": " in degrees", "count": " in copies",
+    "turn": " in quarter turns", "axis": " of the grid",
+}  # fmt: skip
 
 
 def manual(name: str | None = None) -> str:
@@ -23,10 +27,20 @@ def manual(name: str | None = None) -> str:
     if name is None:
         drawing = [declared for declared in known if not declared.is_loop]
         loops = [declared for declared in known if declared.is_loop]
-        return "\n".join([*_index("Statements", drawing), "", *_index("Loops", loops), ""])
-    if name not in known:
-        raise ShapeProgError(f"no statement is called {name!r}", did_you_mean(name, known.names))
-    return page(known[name])
+        roles = [role for role in known.roles.values() if role.name not in known]
+        title = "Roles: what a part is for, around its solid, as in seat(box(...))"
+        return "\n".join([*_index("Statements", drawing), "", *_index("Loops", loops), "", *_index(title, roles), ""])
+    if name in known:
+        return page(known[name])
+    if name in known.roles:
+        return _role_page(known.roles[name])
+    raise ShapeProgError(f"no statement is called {name!r}", did_you_mean(name, [*known.names, *known.roles]))
+
+
+def _role_page(role: Role) -> str:
+    """The page of a role that brings no solid along."""
+    label = f"; in labelled parts it is a {role.label}" if role.label else ""
+    return f"{role.name}(box(at=_, size=_))\n\n  {role.doc}: a role, around any solid.\n\n  role {role.id}{label}\n"
 
 
 def page(declared: Statement) -> str:
@@ -41,7 +55,7 @@ def page(declared: Statement) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _index(title: str, declared: list[Statement]) -> list[str]:
+def _index(title: str, declared: Sequence[Statement | Role]) -> list[str]:
     width = max((len(each.name) for each in declared), default=0)
     return [title, *(f"  {each.id:>3}  {each.name:<{width}}  {_plain(each.doc)}" for each in declared)]
 
@@ -52,10 +66,12 @@ def _plain(doc: str) -> str:
 
 def _meaning(parameter: Parameter) -> str:
     quantity = parameter.quantity
-    axes = f" {_AXES[quantity.width]}" if quantity.width in _AXES else ""
+    each = f" ({quantity.each})" if quantity.each else ""
     first, last = parameter.start, parameter.start + quantity.width - 1
     slots = f"slot {first}" if first == last else f"slots {first} to {last}"
-    return f"{quantity.kind}{axes} in {_UNITS[quantity.kind]}, {quantity.range_text}; {slots}"
+    default = "" if parameter.default is None else f", {quantity.written(parameter.default)} unless given"
+    known = quantity.range_text if quantity.written_out else f"always {quantity.written(quantity.low)}"
+    return f"{quantity.kind}{each}{_UNITS[quantity.kind]}, {known}{default}; {slots}"
 
 
 def _notation(declared: Statement) -> str:

@@ -138,7 +138,7 @@ def contact_sheet(
         for offset, statement in entries:
             _swatch(draw, _PAD + offset, head - 30 * (len(legend) - line) + 4, 13, statement)
             corner = (_PAD + offset + 20, head - 30 * (len(legend) - line))
-            _text(draw, corner, language()[statement].name, 15, _INK)
+            _text(draw, corner, language().word(statement), 15, _INK)
     for number, (item, (left, right, _)) in enumerate(zip(items, drawn, strict=True)):
         x, y = _PAD + number % across * cell, head + number // across * row
         for offset, image in ((0, left), (beside, right)):
@@ -216,7 +216,7 @@ def _legend_rows(words: Sequence[int], width: int) -> list[list[tuple[int, int]]
     rows: list[list[tuple[int, int]]] = [[]]
     offset = 0
     for statement in words:
-        wide = int(_font(15).getlength(language()[statement].name)) + 44
+        wide = int(_font(15).getlength(language().word(statement))) + 44
         if offset and offset + wide > width:
             rows.append([])
             offset = 0

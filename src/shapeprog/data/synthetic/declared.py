@@ -15,8 +15,8 @@ LARGEST = SPAN / 2
 
 
 def own_statements() -> list[Statement]:
-    """The drawing statements of the language in force that are not built in."""
-    return [declared for declared in language() if not declared.is_loop and declared.id > END]
+    """The drawing statements of the language in force that are taught and not built in."""
+    return [each for each in language() if each.taught and not each.is_loop and each.id > END]
 
 
 def random_blocks(dice: Dice) -> Code:

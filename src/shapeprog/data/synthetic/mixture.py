@@ -164,6 +164,8 @@ def _moved(code: Code, shift: Float[Tensor, "n 3"]) -> Float[Tensor, "n K J 7"]:
     """The parameters of whole shapes that are moved: the shift is added to every position that a statement names."""
     parameters = code.parameters.clone()
     for declared in language():
+        if not declared.taught:
+            continue
         for parameter in declared.parameters:
             if parameter.quantity.kind == "position" and parameter.quantity.width == 3 and not declared.is_loop:
                 here: Int[Tensor, "n K J"] = (code.ids == declared.id).long()

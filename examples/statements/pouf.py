@@ -1,4 +1,4 @@
-"""A cushion: an ellipsoid, one of the built-in primitives (``--with examples/statements/cushion.py``)."""
+"""A pouf: an ellipsoid, one of the built-in primitives (``--with examples/statements/pouf.py``)."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from shapeprog.language.parameters import Extent, Position
 from shapeprog.language.shapes import solid
 
 
-@statement("cushion")
-def cushion(at: Position, size: Extent) -> Solids:
-    """A cushion or bolster: an ellipsoid from the low corner of its box and its full extents."""
+@statement("pouf")
+def pouf(at: Position, size: Extent) -> Solids:
+    """A pouf: an ellipsoid from the low corner of its box and its full extents."""
     return solid(ELLIPSOID, at + size / 2, *(size / 2).unbind(-1))

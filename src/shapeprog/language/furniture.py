@@ -1,0 +1,136 @@
+"""Statements of our own beside those of the paper: solids in any direction, the mirror loop, and roles.
+
+A solid says what a part looks like, a role what it is for: ``leg(taper(...))``, ``arm(bent_rod(...))``.
+"""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor
+from torch.nn.functional import one_hot
+
+from shapeprog.geometry.batch import Solids
+from shapeprog.geometry.primitive import safe_norm
+from shapeprog.geometry.primitives.cuboid import CUBOID
+from shapeprog.geometry.primitives.frustum import PRIMITIVE as FRUSTUM
+from shapeprog.language import hints, shapes
+from shapeprog.language.parameters import (
+    Angle,
+    Axis,
+    Extent,
+    Length,
+    Place,
+    Position,
+    Radii,
+    Radius,
+    Section,
+    Two,
+)  # fmt: skip
+from shapeprog.language.statement import Motion, loop, role, statement
+
+
+@statement("box", id=64, taught=False, hint=hints.upright_box)
+def box(at: Position, size: Extent) -> Solids:
+    """An upright box from its low, front, left corner."""
+    return shapes.box(at, size)
+
+
+@statement("board", id=65, taught=False, hint=hints.tilted_board)
+def board(at: Position, size: Extent, tilt: Angle) -> Solids:
+    """A board from the low, front, left corner that it has upright, then leaned to the rear by ``tilt`` degrees
+    about its bottom front edge."""
+    angle = torch.deg2rad(tilt)
+    sin, cos, zero, one = angle.sin(), angle.cos(), torch.zeros_like(tilt), torch.ones_like(tilt)
+    rotation = torch.stack([cos, -sin, zero, sin, cos, zero, zero, zero, one], -1).unflatten(-1, (3, 3))
+    half = size / 2
+    return shapes.solid(CUBOID, at + (rotation @ half[..., None])[..., 0], *half.unbind(-1), rotation=rotation)
+
+
+@statement("bar", id=66, taught=False, hint=hints.straight_bar)
+def bar(start: Position, end: Position, section: Section, turn: Angle = 0) -> Solids:  # type: ignore[assignment]
+    """A straight bar between two points: the two sides of its section lie along the grid axes that it runs along least,
+    in their order, and are turned about it by ``turn`` degrees."""
+    along = end - start
+    length = safe_norm((along**2).sum(-1))
+    main = along.detach().abs().argmax(-1)
+    first, second = torch.where(main == 0, 1, 0), torch.where(main == 2, 1, 2)
+    half = length[..., None] * one_hot(main, 3) + section[..., :1] * one_hot(first, 3)
+    half = (half + section[..., 1:] * one_hot(second, 3)) / 2
+    rotation = shapes.leaned(along, main) @ shapes.about_axis(main, turn)
+    return shapes.solid(CUBOID, (start + end) / 2, *half.unbind(-1), rotation=rotation)
+
+
+@statement("cylinder", id=67, taught=False, hint=hints.upright_cylinder)
+def cylinder(at: Position, height: Length, radius: Radius) -> Solids:
+    """An upright cylinder on the centre of its bottom face."""
+    return shapes.disc(at, height, radius)
+
+
+@statement("rod", id=68, taught=False, hint=hints.straight_rod)
+def rod(start: Position, end: Position, radius: Radius) -> Solids:
+    """A round rod between two points, with flat ends."""
+    return shapes.bar(start, end, radius)
+
+
+@statement("taper", id=69, taught=False, hint=hints.tapered_rod)
+def taper(start: Position, end: Position, radius: Radii) -> Solids:
+    """A round rod between two points with a radius at each of them."""
+    along = end - start
+    half = safe_norm((along**2).sum(-1)) / 2
+    return shapes.solid(FRUSTUM, (start + end) / 2, half, *radius.unbind(-1), rotation=shapes.align(along))
+
+
+@loop("mirror", id=80, taught=False)
+def mirror(copy: Tensor, quarter: Tensor, count: Two, axis: Axis, at: Place = 0) -> Motion:  # type: ignore[assignment]
+    """Repeats what is inside twice: as it is, and its mirror image along an axis, about the plane across it that lies
+    at ``at``."""
+    across = one_hot(axis.long(), 3).to(at) * copy[..., None]
+    return Motion(shift=2 * at[..., None] * across, signs=1 - 2 * across)
+
+
+# The statements of the paper are roles that bring their solid along.
+for _name, _doc, _label in (
+    ("leg", "A leg", "leg"),
+    ("top_rectangle", "A rectangular top or seat", "seat"),
+    ("top_square", "A square top or seat", "seat"),
+    ("top_circle", "A round top or seat", "seat"),
+    ("layer", "A shelf or layer", "seat"),
+    ("support_cylinder", "A round central support", "leg"),
+    ("support_cuboid", "A square central support", "leg"),
+    ("base_circle", "A round base plate", "leg"),
+    ("base_square", "A square base plate", "leg"),
+    ("base_cross", "One arm of a cross base", "leg"),
+    ("sideboard", "A side board", "arm"),
+    ("horizontal_bar", "A horizontal bar", "leg"),
+    ("vertical_board", "A vertical board", "back"),
+    ("locker", "A locker, drawer or solid body", "seat"),
+    ("back", "What one leans on", "back"),
+    ("chair_beam", "A beam of an arm rest or a back", "arm"),
+    ("line", "A round bar", "leg"),
+    ("back_support", "A support that carries a back", "back"),
+    ("seat", "What one sits on", "seat"),
+    ("top", "The top of a table, desk or cabinet", "seat"),
+    ("arm", "An arm rest", "arm"),
+    ("arm_post", "What carries an arm rest", "arm"),
+    ("headboard", "The board at the head of a bed", "back"),
+    ("footboard", "The board at the foot of a bed", "leg"),
+    ("mattress", "A mattress", "seat"),
+    ("cushion", "A loose cushion of a seat", "seat"),
+    ("pillow", "A pillow, or a loose cushion of a back", "back"),
+    ("shelf", "A shelf", ""),
+    ("drawer", "A drawer, or its front", ""),
+    ("door", "A door", ""),
+    ("handle", "A handle or knob", ""),
+    ("side", "A side of a cabinet, shelf or bed", ""),
+    ("panel", "A panel that closes a frame or a cabinet", ""),
+    ("body", "A solid body", "seat"),
+    ("base", "What everything else stands on", "leg"),
+    ("foot", "A foot under a leg or a body", "leg"),
+    ("rail", "A rail along the top of a back or around a bed", "back"),
+    ("slat", "One of the slats or spindles of a back", "back"),
+    ("post", "An upright post of a back or a frame", "back"),
+    ("apron", "A beam under the edge of a seat or top", "seat"),
+    ("stretcher", "A beam between legs", "leg"),
+    ("brace", "A slanting beam that stiffens a frame", "leg"),
+):
+    role(_name, _doc, _label)

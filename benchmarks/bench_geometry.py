@@ -111,7 +111,8 @@ def turned(name: str, count: int, seed: int = 0, batch: int = 1) -> tuple[Scene,
     """Scenes of turned primitives of one name, and their leaves."""
     g = torch.Generator().manual_seed(seed)
     size = torch.rand(batch, count, 4, generator=g) * 3 + 0.3
-    size[..., 3] = 0
+    if name == "cuboid":
+        size[..., 3] = 0  # upright, as most are
     leaves = [size, torch.rand(batch, count, 3, generator=g) * 24 - 12]
     leaves.append(torch.linalg.qr(torch.randn(batch, count, 3, 3, generator=g))[0])
     leaves = [leaf.requires_grad_() for leaf in leaves]

@@ -37,7 +37,7 @@ def middle(declared: Statement) -> tuple[float, ...]:
     values = []
     for slot, quantity in enumerate(declared.quantities):
         whole = {"count": min(3.0, quantity.high), "turn": 1.0, "axis": 2.0}.get(quantity.kind)
-        real = 9.7 - 1.3 * slot if quantity.kind == "length" else -3.3 + 1.3 * slot + 0.17 * slot**2
+        real = 9.7 - 0.9 * slot if quantity.kind == "length" else -3.3 + 1.3 * slot + 0.17 * slot**2
         values.append(real if whole is None else whole)
     return tuple(values)
 

@@ -28,7 +28,7 @@ def make_scene(kinds, sizes, centres, rotation=None, dtype=torch.float32, lead=(
 
 
 def random_scene(seed, lead=(), slots=5, dtype=torch.float32, user=False, names=NAMES):
-    """Primitives of these names, turned and upright, sheared cuboids among them; the last slot is padding."""
+    """Primitives of these names, turned and upright, sheared and rounded ones among them; the last slot is padding."""
     g = torch.Generator().manual_seed(seed)
     kinds = torch.tensor([*map(primitives.kind, names), *([ellipsoid_kind()] if user else [])])
     kind = kinds[torch.randint(0, len(kinds), (*lead, slots), generator=g)]
@@ -36,7 +36,8 @@ def random_scene(seed, lead=(), slots=5, dtype=torch.float32, user=False, names=
         kind[..., 0] = ellipsoid_kind()
     size = torch.rand(*lead, slots, 4, generator=g, dtype=torch.float64) * 4 + 0.5
     size[..., 3] = torch.where(torch.rand(*lead, slots, generator=g) < 0.5, size[..., 3] - 2, 0)
-    size[..., 3] *= kind == primitives.kind("cuboid")
+    lean, radius = (kind == primitives.kind(name) for name in ("cuboid", "rounded_box"))
+    size[..., 3] = torch.where(radius, size[..., 3].abs(), size[..., 3] * lean)
     centre = torch.rand(*lead, slots, 3, generator=g, dtype=torch.float64) * 16 - 8
     rotation = torch.linalg.qr(torch.randn(*lead, slots, 3, 3, generator=g, dtype=torch.float64))[0]
     upright = torch.rand(*lead, slots, generator=g) < 0.4

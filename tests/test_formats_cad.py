@@ -186,8 +186,8 @@ def test_numbers_at_the_top_stay_live(text):
 @pytest.mark.parametrize("declared", [each for each in language() if not each.is_loop], ids=lambda each: each.name)
 @pytest.mark.parametrize("around", ["", "translate", "rotate"])
 def test_every_statement_keeps_its_parameters(declared, around, request):
-    if declared.name in ("bar", "board"):
-        request.applymarker(pytest.mark.xfail(reason="their ends and tilt are fixed in scripts", strict=True))
+    if declared.name in ("bar", "board", "bent_rod", "cushion"):
+        request.applymarker(pytest.mark.xfail(reason="some of their numbers are fixed in scripts", strict=True))
     generator = np.random.default_rng(declared.id)
     low = {"length": 1, "turn": 0}
     values = tuple(float(generator.integers(low.get(q.kind, -8), 6)) for q in declared.quantities)
@@ -209,8 +209,8 @@ def own():
     with using(Language()):
         ball = primitives.register(_ball())
 
-        @statement("cushion")
-        def cushion(at: Position, half: Extent):
+        @statement("puff")
+        def puff(at: Position, half: Extent):
             """A soft cushion."""
             return draw_solid(ball, at, *half.unbind(-1))
 
@@ -235,9 +235,9 @@ def own():
             return Motion(turn=copy / 9, shift=torch.stack([copy**2 * rise / 8, zero, zero], -1))
 
         yield parse(
-            "cushion(at=(3, 0, 0), half=(2, 5, 6))\n"
+            "puff(at=(3, 0, 0), half=(2, 5, 6))\n"
             "for i in spiral(4, rise=2):\n"
-            "    tipped(at=(-4, 6, -3), size=(4, 3, 2))\n    cushion(at=(-4, 0, 5), half=(2, 1, 1))\n"
+            "    tipped(at=(-4, 6, -3), size=(4, 3, 2))\n    puff(at=(-4, 0, 5), half=(2, 1, 1))\n"
             "posts(at=(-12, 0, 0), radius=4, angle=1.25)\n"
         )
 

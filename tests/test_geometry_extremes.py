@@ -79,7 +79,8 @@ def test_distances_far_away_are_those_of_all_pairs(far):
 
 @pytest.mark.parametrize("name", NAMES)
 def test_solids_far_apart_find_the_nearer_one(name):
-    scene = make_scene([name] * 2, [[1e20, 1e20, 1e20]] * 2, [[0.0, 0, 0], [4e20, 0, 0]], dtype=torch.float64)
+    size = [1e20, 1e20, 0 if name == "arc" else 1e20]
+    scene = make_scene([name] * 2, [size] * 2, [[0.0, 0, 0], [4e20, 0, 0]], dtype=torch.float64)
     points = torch.tensor([[-3e20, 0, 0], [6e20, 0, 0], [1.5e20, 0, 0]], dtype=torch.float64)
     slots, distances = nearest_primitive(scene, points)
     assert slots.tolist() == [0, 1, 0]

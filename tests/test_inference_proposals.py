@@ -249,13 +249,13 @@ def test_statements_that_weights_do_not_know_hinder_nothing(weights):
         for known in standard:
             language().register(known)
 
-        @statement("cushion")
-        def cushion(at: Position, height: Length, radius: Length):
+        @statement("puff")
+        def puff(at: Position, height: Length, radius: Length):
             """A round cushion."""
             return disc(at, height, radius)
 
         assert ready_generator("default")[1] == ""
-        both = Program((*parse(TABLE).body, Draw("cushion", (0.0, 0.0, 0.0, 2.0, 3.0))))
+        both = Program((*parse(TABLE).body, Draw("puff", (0.0, 0.0, 0.0, 2.0, 3.0))))
         assert np.array_equal(from_program(both), from_program(parse(TABLE)))
 
 

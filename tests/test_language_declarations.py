@@ -161,7 +161,7 @@ def test_bad_primitives_are_refused() -> None:
     ]:
         with pytest.raises(DeclarationError, match=said):
             primitives.register(Primitive(**{**words, "name": "big", field: wrong}))
-    with pytest.raises(DeclarationError, match="known are cuboid, cylinder"):
+    with pytest.raises(DeclarationError, match="known are arc, cuboid, cylinder"):
         primitives.kind("sphere")
 
 

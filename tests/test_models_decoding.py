@@ -289,8 +289,8 @@ def test_registered_statements_are_legal_and_sayable(small: Callable[..., Genera
         other.register(declared)
     with using(other):
 
-        @statement("cushion")
-        def cushion(at: Position, size: Extent) -> object:
+        @statement("puff")
+        def puff(at: Position, size: Extent) -> object:
             """A soft box."""
             return box(at, size)
 

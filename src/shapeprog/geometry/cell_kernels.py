@@ -9,7 +9,7 @@ import numpy as np
 from shapeprog.geometry.dispatch import bound, cells, excess
 from shapeprog.kernels.bits import ones
 from shapeprog.kernels.compile import helper, kernel
-from shapeprog.kernels.rows import clip, fill_row
+from shapeprog.kernels.rows import clip, fill_row, stretch
 from shapeprog.kernels.table import CENTRE, KIND, ROTATION, SIZE, WIDTH
 
 SQUARE = 1e-6
@@ -28,26 +28,11 @@ def _excess(table, row, x, y, z):
 
 
 @helper
-def _stretch(table, row, half, x, y, reach):
-    """Where along left-right the row of cells through (x, y) can be inside the local box, relative to the centre."""
-    near, far = -reach - 1e-6, reach + 1e-6
-    for axis in range(3):
-        start = table[row, ROTATION + axis] * x + table[row, ROTATION + 3 + axis] * y
-        slope = table[row, ROTATION + 6 + axis]
-        if abs(slope) < 1e-12:
-            if abs(start) > half[axis] + 1e-9:
-                return 1.0, -1.0
-        else:
-            one, two = (-half[axis] - start) / slope, (half[axis] - start) / slope
-            near, far = max(near, min(one, two)), min(far, max(one, two))
-    return near, far
-
-
-@helper
 def _fill_turned(table, row, planes, plane, half, low, high):
     """Any primitive in any pose: cells whose centre is inside.
 
-    Primitives are convex, so the cells of a row are a stretch: it is found for the box and its ends are tested.
+    For convex primitives, the others have a rule of their own: the cells of a row are a stretch, which is found for the
+    box and its ends are tested.
     """
     resolution, reach = planes.shape[2], 0.0
     half[0], half[1], half[2] = bound(table, row)
@@ -64,7 +49,7 @@ def _fill_turned(table, row, planes, plane, half, low, high):
         x = i + 0.5 - table[row, CENTRE]
         for j in range(low[1], high[1]):
             y = j + 0.5 - table[row, CENTRE + 1]
-            near, far = _stretch(table, row, half, x, y, reach)
+            near, far = stretch(table, row, half, x, y, reach)
             if near > far:
                 continue
             first = max(clip(np.floor(near + side - 0.5), resolution), low[2])

@@ -64,7 +64,8 @@ class Kernels:
     cells
         ``(..., square, planes, plane, low, high) -> bool``: where cells follow a rule of their own, fill them and say
         so, or change the sizes in the row to those by which they are tested.  All is in cells; ``square`` says whether
-        the axes stand along those of the grid; ``low`` and ``high`` (3,) are scratch.
+        the axes stand along those of the grid; ``low`` and ``high`` (3,) are scratch.  What is not convex fills all of
+        its cells here.
     """
 
     distance: Helper

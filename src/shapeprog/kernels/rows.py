@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from shapeprog.kernels.bits import span
 from shapeprog.kernels.compile import helper
+from shapeprog.kernels.table import ROTATION
 
 REACH = 1.01  # radii from the axis of a cylinder up to which cells belong to it, as in the published executor
 CAP = 1e-3  # slack in cells along that axis, so that a cap through the centre of a cell takes it
@@ -33,3 +34,19 @@ def fill_box(planes, plane, low, high):
         for i in range(low[0], high[0]):
             for j in range(low[1], high[1]):
                 planes[plane, word, i, j] |= bits
+
+
+@helper
+def stretch(table, row, half, x, y, reach):
+    """Where along left-right the row of cells through (x, y) can be inside the local box, relative to the centre."""
+    near, far = -reach - 1e-6, reach + 1e-6
+    for axis in range(3):
+        start = table[row, ROTATION + axis] * x + table[row, ROTATION + 3 + axis] * y
+        slope = table[row, ROTATION + 6 + axis]
+        if abs(slope) < 1e-12:
+            if abs(start) > half[axis] + 1e-9:
+                return 1.0, -1.0
+        else:
+            one, two = (-half[axis] - start) / slope, (half[axis] - start) / slope
+            near, far = max(near, min(one, two)), min(far, max(one, two))
+    return near, far

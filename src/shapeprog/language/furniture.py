@@ -11,8 +11,10 @@ from torch.nn.functional import one_hot
 
 from shapeprog.geometry.batch import Solids
 from shapeprog.geometry.primitive import safe_norm
+from shapeprog.geometry.primitives.arc import ARC
 from shapeprog.geometry.primitives.cuboid import CUBOID
-from shapeprog.geometry.primitives.frustum import PRIMITIVE as FRUSTUM
+from shapeprog.geometry.primitives.frustum import FRUSTUM
+from shapeprog.geometry.primitives.rounded_box import ROUNDED_BOX
 from shapeprog.language import hints, shapes
 from shapeprog.language.parameters import (
     Angle,
@@ -27,6 +29,8 @@ from shapeprog.language.parameters import (
     Two,
 )  # fmt: skip
 from shapeprog.language.statement import Motion, loop, role, statement
+
+FLAT = 1e-6  # cells below which three points are in line
 
 
 @statement("box", id=64, taught=False, hint=hints.upright_box)
@@ -78,6 +82,30 @@ def taper(start: Position, end: Position, radius: Radii) -> Solids:
     along = end - start
     half = safe_norm((along**2).sum(-1)) / 2
     return shapes.solid(FRUSTUM, (start + end) / 2, half, *radius.unbind(-1), rotation=shapes.align(along))
+
+
+@statement("bent_rod", id=70, taught=False, hint=hints.bent)
+def bent_rod(start: Position, through: Position, end: Position, radius: Radius) -> Solids:
+    """A round rod along the circle from one point through a second to a third."""
+    chord, middle = end - start, (start + end) / 2
+    frame = shapes.align(chord)
+    half = safe_norm((chord**2).sum(-1)) / 2
+    along = ((through - middle) * frame[..., 0]).sum(-1)
+    away = through - middle - along[..., None] * frame[..., 0]
+    height = safe_norm((away**2).sum(-1))
+    bulge = torch.where((height > FLAT)[..., None], away / height[..., None], frame[..., 1])
+    # The height of the circle over its chord; nothing cancels where the three points are nearly in line.
+    rest = half**2 - along**2 - height**2
+    root = safe_norm(4 * height**2 * half**2 + rest**2)
+    sagitta = 2 * height * half**2 / (root + rest).clamp(min=1e-9)
+    rotation = torch.stack([frame[..., 0], bulge, torch.linalg.cross(frame[..., 0], bulge)], -1)
+    return shapes.solid(ARC, middle + bulge * sagitta[..., None] / 2, half, radius, sagitta, rotation=rotation)
+
+
+@statement("cushion", id=71, taught=False, hint=hints.rounded)
+def cushion(at: Position, size: Extent, edge: Radius) -> Solids:
+    """A box with rounded edges, from its low, front, left corner; ``edge`` is the radius of the edges."""
+    return shapes.solid(ROUNDED_BOX, at + size / 2, *(size / 2).unbind(-1), edge)
 
 
 @loop("mirror", id=80, taught=False)

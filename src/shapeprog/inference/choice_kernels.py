@@ -26,12 +26,9 @@ def gain(rows, weights, words, begins, own, charges, prices, cover, chosen, coun
 
 
 @helper
-def charged(own, charges, cover, last, chosen, count):
-    """What is charged to the chosen: nobody can gain more by hiding it."""
-    total = 0.0
-    for place in range(count):
-        total += charges[chosen[place]] * ones(own[chosen[place]] & ~cover[last + chosen[place]])
-    return total
+def charge(own, charges, cover, last, candidate):
+    """What is charged to a candidate: nobody can gain more by hiding it."""
+    return charges[candidate] * ones(own[candidate] & ~cover[last + candidate])
 
 
 @kernel(
@@ -41,8 +38,9 @@ def charged(own, charges, cover, last, chosen, count):
 def search(rows, weights, words, begins, own, charges, prices, bounds, order, rounds, blink, seed, values, sets):
     """Ruin and recreate: drop some of the chosen, fill up greedily, keep what is no worse; the best set of each size.
 
-    The best candidate is sought in falling order of its bound, which no gain exceeds by more than what is charged to
-    the chosen; with probability ``blink`` one is overlooked (Christiaens and Vanden Berghe 2020).
+    A gain never grows while others are added, but for what is charged to these and could be hidden: one that was known
+    before bounds it, and few have to be found again.  With probability ``blink`` the best candidate is overlooked
+    (Christiaens and Vanden Berghe 2020).
 
     Parameters
     ----------
@@ -61,6 +59,7 @@ def search(rows, weights, words, begins, own, charges, prices, bounds, order, ro
     most, last = sets.shape[1], len(weights)
     cover = np.empty(rows.shape[1], np.uint64)
     kept, chosen = np.empty(most, np.int64), np.empty(most, np.int64)
+    known, since = np.empty(len(rows)), np.empty(len(rows))
     size, best_value, draws = 0, 0.0, 0
     values[0] = 0.0
     for turn in range(rounds + 1):
@@ -78,16 +77,29 @@ def search(rows, weights, words, begins, own, charges, prices, bounds, order, ro
             cover |= rows[one]
             chosen[count] = one
             count += 1
+        since[:] = 0.0
+        known[:] = bounds
+        charged = 0.0
+        for place in range(count):
+            charged += charge(own, charges, cover, last, chosen[place])
         while count < most:
-            best, found, slack = 0.0, -1, charged(own, charges, cover, last, chosen, count)
+            best, found, first = 0.0, -1, -1
             for place in range(len(order)):
                 one = order[place]
-                if bounds[one] + slack <= best:
+                if known[one] + charged - since[one] > best:
+                    best, first = known[one] + charged - since[one], place
+            best = 0.0
+            for step in range(-1, len(order)):
+                one = order[first if step < 0 else step]
+                if first < 0 or bounds[one] + charged <= best:
                     break
+                if step == first or known[one] + charged - since[one] <= best:
+                    continue
                 draws += 1
                 if turn > 0 and uniform(seed, draws) < blink:
                     continue
                 more = gain(rows, weights, words, begins, own, charges, prices, cover, chosen, count, one)
+                known[one], since[one] = more, charged
                 if more > best:
                     best, found = more, one
             if found < 0:
@@ -96,6 +108,7 @@ def search(rows, weights, words, begins, own, charges, prices, bounds, order, ro
             cover |= rows[found]
             chosen[count] = found
             count += 1
+            charged += charge(own, charges, cover, last, found)
             if value > values[count]:
                 values[count] = value
                 sets[count, :count] = chosen[:count]

@@ -42,6 +42,9 @@ DRAWN, LEAST, MOST = 16, 64, 256
 SKIN = 0.5
 """How far above the surface, in tolerances, a sample is looked at to see whether another candidate hides it."""
 
+AWAY = 4.0 * HALF
+"""A coordinate where no candidate is looked for: that of samples which a word does not have."""
+
 FREE_POINTS = 2048
 """Points drawn in free space."""
 
@@ -129,16 +132,15 @@ def covers(candidates: Sequence[Program], evidence: Evidence, prices: Prices, se
     free, volume = free_points(evidence, seed)
     filled = holds(scene, free, evidence.tolerance)
     places, owners, areas = unsupported(scene, evidence, seed)
-    own, charges, positions = np.zeros(count, np.uint64), np.zeros(count), np.zeros((count * WORD, 3))
-    bits, samples = np.zeros((count, WORD), np.bool_), positions.reshape(count, WORD, 3)
-    for owner in np.unique(owners):
-        mine = np.flatnonzero(owners == owner)
-        chosen = mine[np.arange(min(len(mine), WORD)) * len(mine) // min(len(mine), WORD)]
-        samples[owner, : len(chosen)], bits[owner, : len(chosen)] = places[chosen], True
-        charges[owner] = areas[mine].sum() / len(chosen)
-    hidden = holds(scene, positions, 0.0)
-    itself = hidden[np.arange(count), np.arange(count)]
-    own = pack(bits)[:, 0] & ~itself
+    own, charges = np.zeros(count, np.uint64), np.zeros(count)
+    samples = np.full((count, WORD, 3), AWAY)
+    for owner, mine in enumerate(np.split(np.arange(len(owners)), np.searchsorted(owners, np.arange(1, count)))):
+        if number := min(len(mine), WORD):
+            samples[owner, :number] = places[mine[np.arange(number) * len(mine) // number]]
+            own[owner] = np.uint64(2**number - 1)
+            charges[owner] = areas[mine].sum() / number
+    hidden = holds(scene, samples.reshape(-1, 3), 0.0)
+    own &= ~hidden[np.arange(count), np.arange(count)]
     weights = np.concatenate([
         by_word(evidence.weights[order]), by_word(np.full(len(free), -prices.free * volume / evidence.area)),
     ])  # fmt: skip

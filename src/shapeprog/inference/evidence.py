@@ -38,7 +38,7 @@ NOISE = 2.0
 CELL_TOLERANCE = 0.65
 """The same for cells: a surface is anywhere within the cells that it touches."""
 
-AGREEMENT, SCANNED = 0.5, 0.7
+AGREEMENT, SCANNED = 0.5, 0.6
 """Least cosine between normals that fit; and of scans, of which noise could pass for a surface otherwise.
 
 It only tells sides apart: near an edge of a thin part the nearest surface is often another, a slope of cells a stair.
@@ -124,7 +124,7 @@ def _of_mesh(vertices: FloatArray, faces: npt.NDArray[np.int64], seed: int) -> E
     coarse: Flags = np.any(barrier.reshape((FREE, LOOKING // FREE) * 3), (1, 3, 5))
     return Evidence(
         points, normals[:POINTS], weights / weights.sum(), TOLERANCE, AGREEMENT, surface, normals,
-        _reach(TOLERANCE, area), area * float(weights.mean()), free_cells(coarse, through=False),
+        _reach(TOLERANCE, area), area * float(weights.mean()), free_cells(coarse, surface, through=False),
     )  # fmt: skip
 
 
@@ -135,11 +135,7 @@ def _of_points(surface: FloatArray, voxels: Flags, seed: int) -> Evidence:
     tolerance, area = min(max(TOLERANCE, NOISE * noise), MOST_TOLERANCE), each * len(surface)
     reach = _reach(tolerance, area, len(surface))
     fine = voxels.repeat(FREE // RESOLUTION, 0).repeat(FREE // RESOLUTION, 1).repeat(FREE // RESOLUTION, 2)
-    free = free_cells(fine, through=True)
-    centres = (np.arange(FREE) + 0.5) * (RESOLUTION / FREE) - HALF
-    for axis, (low, high) in enumerate(zip(surface.min(0), surface.max(0), strict=True)):
-        beyond = (centres < low) | (centres > high)  # what a scan has not reached may have been left out
-        np.moveaxis(free, axis, 0)[beyond] = False
+    free = free_cells(fine, surface, through=True)
     weights = np.full(len(chosen), 1 / len(chosen))
     return Evidence(
         surface[chosen], normals[chosen], weights, tolerance, SCANNED, surface, normals, reach, area, free
@@ -203,12 +199,19 @@ def visible(points: FloatArray, normals: FloatArray, barrier: Flags) -> Flags:
     return seen
 
 
-def free_cells(barrier: Flags, *, through: bool) -> Flags:
-    """The cells (R, R, R) from which enough directions lead out of the grid; ``through``: both ways."""
-    starts = np.argwhere(np.ones_like(barrier)).astype(np.float64) + 0.5
-    steps = directions(DIRECTIONS)
-    steps, wanted = (steps[::2], CLEAR_THROUGH) if through else (steps, CLEAR)
-    return looking(barrier, starts, steps, wanted, through=through).reshape(barrier.shape)
+def free_cells(barrier: Flags, surface: FloatArray, *, through: bool) -> Flags:
+    """The cells (R, R, R) from which enough directions lead out of the grid; ``through``: both ways.
+
+    All that lies beyond the box of the surface is free; or, of a scan, not known to be: it may have been left out.
+    """
+    scale = len(barrier) / RESOLUTION
+    low, high = ((end + HALF) * scale for end in (surface.min(0), surface.max(0)))
+    starts = np.argwhere(np.ones_like(barrier)) + 0.5
+    within = ((starts >= low) & (starts <= high)).all(1).reshape(barrier.shape)
+    free: Flags = ~(barrier | within) & (not through)
+    steps, wanted = (directions(DIRECTIONS)[::2], CLEAR_THROUGH) if through else (directions(DIRECTIONS), CLEAR)
+    free[within] = looking(barrier, starts[within.reshape(-1)], steps, wanted, through=through)
+    return free
 
 
 def directions(count: int) -> FloatArray:

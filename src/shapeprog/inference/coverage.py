@@ -62,9 +62,9 @@ class Prices:
     Parameters
     ----------
     unsupported
-        Of visible surface without a reason, as large as that of the target.
+        Of surface that the target gives no reason for and nobody hides, over the area of the target.
     free
-        Of a cell of free space filled, times the area of the target in cells.
+        Of free space filled, in cells, over the same area.
     statement, loop, number
         Of a drawing statement, of a loop, and of every continuous number written in either.
     """

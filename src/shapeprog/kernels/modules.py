@@ -13,8 +13,6 @@ SEARCH = (  # for a structure
     "shapeprog.inference.descent_kernels",
     "shapeprog.inference.form_kernels",
     "shapeprog.inference.chance_kernels",
-    "shapeprog.inference.evidence_kernels",
-    "shapeprog.inference.choice_kernels",
 )
 GEOMETRY = (  # of scenes: distances, samples, cells and neighbours; they import torch
     "shapeprog.geometry.neighbour_kernels",
@@ -22,5 +20,9 @@ GEOMETRY = (  # of scenes: distances, samples, cells and neighbours; they import
     "shapeprog.geometry.surface_kernels",
     "shapeprog.geometry.cell_kernels",
 )
-COVERAGE = ("shapeprog.inference.coverage_kernels",)  # of a target by candidates; they stand on those of geometry
-INFERENCE = (*SEARCH, *GEOMETRY, *COVERAGE)
+CHOICE = (  # of blocks by the surface of the target
+    "shapeprog.inference.evidence_kernels",
+    "shapeprog.inference.choice_kernels",
+    "shapeprog.inference.coverage_kernels",
+)
+INFERENCE = (*SEARCH, *GEOMETRY, *CHOICE)

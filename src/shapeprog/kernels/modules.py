@@ -20,4 +20,9 @@ GEOMETRY = (  # of scenes: distances, samples, cells and neighbours; they import
     "shapeprog.geometry.surface_kernels",
     "shapeprog.geometry.cell_kernels",
 )
-INFERENCE = (*SEARCH, *GEOMETRY)
+CHOICE = (  # of blocks by the surface of the target
+    "shapeprog.inference.evidence_kernels",
+    "shapeprog.inference.choice_kernels",
+    "shapeprog.inference.coverage_kernels",
+)
+INFERENCE = (*SEARCH, *GEOMETRY, *CHOICE)

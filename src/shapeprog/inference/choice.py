@@ -1,0 +1,75 @@
+"""Choosing few of many candidates: as much of the target explained as possible, for as little written as possible.
+
+    value = share explained - unsupported surface - free space filled - price of what is written
+
+all in shares of the target, see :class:`shapeprog.inference.coverage.Prices`.  A candidate that explains what others
+explain gains nothing and costs its price; surface that lies inside another chosen one costs nothing.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from shapeprog.inference.choice_kernels import search
+from shapeprog.inference.coverage import Bits, Covers
+from shapeprog.space import Array
+
+ROUNDS = 1000
+"""Rounds of ruin and recreate."""
+
+BLINK = 0.05
+"""Probability with which a round overlooks a candidate."""
+
+
+class Option(NamedTuple):
+    """The best set of one size that was found: indices of candidates, value, and share of the target explained."""
+
+    chosen: tuple[int, ...]
+    value: float
+    explained: float
+
+
+class Choice(NamedTuple):
+    """The best option, and the best of each number of blocks that was found: numbers against what is explained."""
+
+    best: Option
+    options: tuple[Option, ...]
+
+
+def choose(covers: Covers, blocks: int, *, rounds: int = ROUNDS, seed: int = 0) -> Choice:
+    """The most valuable at most ``blocks`` of the candidates: greedily, then by ruin and recreate."""
+    values, sets = np.full(blocks + 1, -np.inf), np.full((blocks + 1, blocks), -1, np.int64)
+    gains = np.bitwise_count(covers.rows[:, : covers.evidence]) @ covers.weights[: covers.evidence]
+    bounds = gains - covers.prices
+    order = np.argsort(-bounds, kind="stable")
+    order = order[bounds[order] > 0]
+    candidate, words = np.nonzero(covers.rows[:, : len(covers.weights)])
+    words, begins = np.ascontiguousarray(words), np.searchsorted(candidate, np.arange(len(covers.rows) + 1))
+    search(
+        covers.rows, covers.weights, words, begins, covers.own, covers.charges, covers.prices, bounds, order, rounds,
+        BLINK, seed, values, sets,
+    )  # fmt: skip
+    found = [
+        Option(tuple(map(int, chosen[:size])), float(value), explained(covers, chosen[:size]))
+        for size, (value, chosen) in enumerate(zip(values, sets, strict=True))
+        if np.isfinite(value)
+    ]
+    return Choice(max(found, key=lambda option: option.value), tuple(found))
+
+
+def explained(covers: Covers, chosen: Array) -> float:
+    """Share of the target that some of the candidates explain together."""
+    union: Bits = np.bitwise_or.reduce(covers.rows[chosen, : covers.evidence], axis=0, initial=0)
+    return float(np.bitwise_count(union) @ covers.weights[: covers.evidence])
+
+
+def value(covers: Covers, chosen: tuple[int, ...]) -> float:
+    """The value of a set of candidates, by its definition: what the kernel adds up piece by piece."""
+    rows, known = covers.rows[list(chosen)], len(covers.weights)
+    union: Bits = np.bitwise_or.reduce(rows, axis=0, initial=0)
+    total = float(np.bitwise_count(union[:known]) @ covers.weights)
+    for one in chosen:
+        total -= covers.prices[one] + covers.charges[one] * int(np.bitwise_count(covers.own[one] & ~union[known + one]))
+    return total

@@ -1,0 +1,120 @@
+"""Kernels that ask which points the primitives of many candidates explain, hold, or have a reason for.
+
+Points come sorted by the cells of a grid of ``cells`` along each side, row after row; ``starts`` says where in the list
+the points of each cell begin.  Candidates are rows of the table, ``many`` each; their answers are rows of bits.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from shapeprog.geometry.dispatch import bound, distance, slopes
+from shapeprog.kernels.compile import helper, kernel
+from shapeprog.kernels.table import CENTRE, KIND, ROTATION, local, turned
+from shapeprog.space import HALF, RESOLUTION
+
+LIFT = 1e-3
+"""How far in cells above a point the slope of a distance is taken: on a surface it has none."""
+
+
+@helper
+def cell_of(value, cells):
+    """The cell that holds a coordinate, the nearest one if none does."""
+    return min(max(int((min(max(value, -64.0), 64.0) + HALF) * cells / RESOLUTION), 0), cells - 1)
+
+
+@helper
+def box_of(table, row, margin, cells, ends):
+    """First and last cells along each axis that the box around a primitive reaches, widened by a margin."""
+    one, two, three = bound(table, row)
+    for axis in range(3):
+        column = ROTATION + 3 * axis
+        reach = abs(table[row, column]) * one + abs(table[row, column + 1]) * two + abs(table[row, column + 2]) * three
+        ends[axis] = cell_of(table[row, CENTRE + axis] - reach - margin, cells)
+        ends[3 + axis] = cell_of(table[row, CENTRE + axis] + reach + margin, cells)
+
+
+@helper
+def has(rows, row, bit):
+    """Whether a bit of a row is set."""
+    return (rows[row, bit >> 6] >> np.uint64(bit & 63)) & np.uint64(1)
+
+
+@helper
+def put(rows, row, bit):
+    """Set a bit of a row."""
+    rows[row, bit >> 6] |= np.uint64(1) << np.uint64(bit & 63)
+
+
+@kernel("void(f8[:, ::1], i8, f8[:, ::1], f8[:, ::1], i8[::1], i8[::1], i8, f8, f8, u8[:, ::1], i8, i8)")
+def explain(table, many, points, normals, bits, starts, cells, tolerance, agreement, rows, begin, end):
+    """Set the bits of the points within a tolerance of a surface whose normal fits theirs; zero normals fit all."""
+    ends, part = np.empty(6, np.int64), np.empty(7)
+    for row in range(begin * many, end * many):
+        if table[row, KIND] < 0:
+            continue
+        box_of(table, row, tolerance, cells, ends)
+        for i in range(ends[0], ends[3] + 1):
+            for j in range(ends[1], ends[4] + 1):
+                line = (i * cells + j) * cells
+                for item in range(starts[line + ends[2]], starts[line + ends[5] + 1]):
+                    if has(rows, row // many, bits[item]):
+                        continue
+                    a, b, c = local(table, row, points[item, 0], points[item, 1], points[item, 2])
+                    if abs(distance(table, row, a, b, c)) > tolerance:
+                        continue
+                    x, y, z = normals[item, 0], normals[item, 1], normals[item, 2]
+                    a, b, c = local(
+                        table, row, points[item, 0] + LIFT * x, points[item, 1] + LIFT * y, points[item, 2] + LIFT * z
+                    )
+                    slopes(table, row, a, b, c, part)
+                    one, two, three = turned(table, row, part[0], part[1], part[2])
+                    if abs(one * x + two * y + three * z) >= agreement or x * x + y * y + z * z < 0.25:
+                        put(rows, row // many, bits[item])
+
+
+@kernel("void(f8[:, ::1], i8, f8[:, ::1], i8[::1], i8[::1], i8, f8, u8[:, ::1], i8, i8)")
+def hold(table, many, points, bits, starts, cells, depth, rows, begin, end):
+    """Set the bits of the points that lie deeper than ``depth`` inside a primitive."""
+    ends = np.empty(6, np.int64)
+    for row in range(begin * many, end * many):
+        if table[row, KIND] < 0:
+            continue
+        box_of(table, row, 0.0, cells, ends)
+        for i in range(ends[0], ends[3] + 1):
+            for j in range(ends[1], ends[4] + 1):
+                line = (i * cells + j) * cells
+                for item in range(starts[line + ends[2]], starts[line + ends[5] + 1]):
+                    if has(rows, row // many, bits[item]):
+                        continue
+                    a, b, c = local(table, row, points[item, 0], points[item, 1], points[item, 2])
+                    if distance(table, row, a, b, c) < -depth:
+                        put(rows, row // many, bits[item])
+
+
+@kernel("void(f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], i8[::1], i8, f8, f8, b1[::1], i8, i8)")
+def support(samples, sides, points, normals, starts, cells, reach, agreement, found, begin, end):
+    """Say which samples have a point within reach whose normal fits their own; zero normals fit all."""
+    low, high = np.empty(3, np.int64), np.empty(3, np.int64)
+    for sample in range(begin, end):
+        x, y, z = samples[sample, 0], samples[sample, 1], samples[sample, 2]
+        for axis in range(3):
+            low[axis] = cell_of(samples[sample, axis] - reach, cells)
+            high[axis] = cell_of(samples[sample, axis] + reach, cells)
+        found[sample] = False
+        for i in range(low[0], high[0] + 1):
+            for j in range(low[1], high[1] + 1):
+                line = (i * cells + j) * cells
+                for item in range(starts[line + low[2]], starts[line + high[2] + 1]):
+                    dx, dy, dz = points[item, 0] - x, points[item, 1] - y, points[item, 2] - z
+                    if dx * dx + dy * dy + dz * dz > reach * reach:
+                        continue
+                    u, v, w = normals[item, 0], normals[item, 1], normals[item, 2]
+                    fit = abs(sides[sample, 0] * u + sides[sample, 1] * v + sides[sample, 2] * w)
+                    if fit >= agreement or u * u + v * v + w * w < 0.25:
+                        found[sample] = True
+                        break
+                if found[sample]:
+                    break
+            if found[sample]:
+                break

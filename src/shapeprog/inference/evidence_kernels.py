@@ -1,0 +1,41 @@
+"""The kernel that looks from places outwards: which directions meet nothing on their way out of the grid."""
+
+from __future__ import annotations
+
+from shapeprog.kernels.compile import kernel
+
+
+@kernel("void(b1[:, :, ::1], f8[:, ::1], f8[:, ::1], i8, b1, b1[::1], i8, i8)")
+def look_out(barrier, starts, directions, wanted, through, seen, begin, end):
+    """Mark the starts ``begin`` to ``end`` from which ``wanted`` directions lead out of the grid; a twin is beside it.
+
+    Steps are one cell along the longest axis of a direction, so no ray slips through a wall of touched cells.
+
+    Parameters
+    ----------
+    barrier
+        Cells (R, R, R) that stop a ray.
+    starts
+        Where rays begin (N, 3), in cells from the corner of the grid; in a barrier none leads out.
+    directions
+        Steps (D, 3), of which the largest coordinate is 1 or -1.
+    through
+        Whether the way back along a direction must be clear as well.
+    """
+    size = len(barrier)
+    for item in range(begin, end):
+        found = 0
+        for turn in range(len(directions)):
+            clear = True
+            for sign in range(2 if through else 1):
+                dx, dy, dz = directions[turn, 0], directions[turn, 1], directions[turn, 2]
+                if sign == 1:
+                    dx, dy, dz = -dx, -dy, -dz
+                x, y, z = starts[item, 0], starts[item, 1], starts[item, 2]
+                while clear and 0 <= x < size and 0 <= y < size and 0 <= z < size:
+                    clear = not barrier[int(x), int(y), int(z)]
+                    x, y, z = x + dx, y + dy, z + dz
+            found += clear
+            if found >= wanted:
+                break
+        seen[item] = found >= wanted

@@ -1,0 +1,267 @@
+"""Evidence, what candidates cover of it, and which are chosen: known answers, and kernels against their twins."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+
+from shapeprog.data.placement import shape_from_mesh, shape_from_points, shape_from_voxels
+from shapeprog.data.sampling import sample_surface
+from shapeprog.data.shape import Shape
+from shapeprog.geometry.mesh import union_mesh
+from shapeprog.inference import evidence as seen
+from shapeprog.inference.choice import Choice, choose, value
+from shapeprog.inference.coverage import (
+    Covers,
+    Prices,
+    covers,
+    explains,
+    explains_twin,
+    holds,
+    holds_twin,
+    pack,
+    supported,
+    supported_twin,
+)  # fmt: skip
+from shapeprog.inference.evidence import Evidence, evidence_of
+from shapeprog.language.program import Program
+from shapeprog.language.syntax import parse
+from shapeprog.language.unroll import unroll
+from tests.geometry_helpers import random_scene
+
+TOP = "locker(at=(10, -8, -12), size=(2, 16, 24))"
+LEGS = [f"leg(at=(-12, {y}, {z}), size=(22, 2, 2))" for y in (-8, 6) for z in (-12, 10)]
+LOOP = f"for i in translate(2, by=(0, 14, 0)):\n    for j in translate(2, by=(0, 0, 22)):\n        {LEGS[0]}\n"
+TABLE = [parse(text) for text in (TOP, *LEGS)]
+
+
+def joined(programs: list[Program]) -> Program:
+    return Program(tuple(node for program in programs for node in program.body))
+
+
+def mesh_of(*programs: Program) -> Shape:
+    """The shape of what programs draw; it spans 24 cells about the origin, so it stays where it is."""
+    vertices, faces = union_mesh(unroll(joined(list(programs))))
+    return shape_from_mesh(vertices, faces)
+
+
+def random_blocks(count: int, seed: int) -> list[Program]:
+    random = np.random.default_rng(seed)
+    rows = np.concatenate([random.uniform(-12, 8, (count, 3)), random.uniform(0.5, 10, (count, 3))], 1).round(2)
+    return [parse("leg(at=({}, {}, {}), size=({}, {}, {}))".format(*row)) for row in rows]
+
+
+@pytest.fixture(scope="module")
+def table() -> Evidence:
+    return evidence_of(mesh_of(*TABLE))
+
+
+def chosen(candidates: list[Program], evidence: Evidence, blocks: int = 10) -> Choice:
+    return choose(covers(candidates, evidence, Prices()), blocks)
+
+
+# ---------------------------------------------------------------- choice
+
+
+def test_a_planted_table_is_chosen_exactly_among_hundreds(table):
+    found = chosen([*random_blocks(150, 1), *TABLE, *random_blocks(150, 2)], table)
+    assert set(found.best.chosen) == set(range(150, 155))
+    assert found.best.explained > 0.99
+
+
+def test_a_loop_of_four_legs_is_chosen_before_four_legs(table):
+    found = chosen([*TABLE, parse(LOOP)], table)
+    assert set(found.best.chosen) == {0, 5}
+
+
+def test_every_block_more_explains_more_up_to_the_best(table):
+    options = chosen(TABLE, table).options
+    assert [len(option.chosen) for option in options] == list(range(6))
+    assert all(one.value < two.value and one.explained < two.explained for one, two in itertools.pairwise(options))
+    assert all(len(option.chosen) <= 2 for option in chosen(TABLE, table, blocks=2).options)
+
+
+def test_a_block_that_fills_free_space_is_not_chosen(table):
+    under = parse("locker(at=(-12, -8, -12), size=(22, 16, 24))")  # its sides pass through those of all legs
+    floating = parse("locker(at=(-4, -3, -5), size=(6, 6, 10))")
+    assert chosen([under, floating], table).best.chosen == ()
+
+
+def test_what_lies_inside_another_costs_its_price_and_no_more():
+    body, board = (
+        parse("locker(at=(-12, -8, -12), size=(24, 16, 24))"),
+        parse("layer(at=(0, 0, 0), thickness=1, half=(6, 9))"),
+    )
+    made = covers([body, board], evidence_of(mesh_of(body)), Prices())
+    assert value(made, (1,)) < -2 * made.prices[1]
+    assert value(made, (0, 1)) == pytest.approx(value(made, (0,)) - made.prices[1])
+
+
+def test_copies_of_a_loop_hide_each_other(table):
+    crossing = "for i in translate(2, by=(0, 3, 0)):\n    locker(at=(-4, -3, -5), size=(6, 6, 10))\n"
+    apart = crossing.replace("(0, 3, 0)", "(0, 6.5, 0)")
+    costs = [-value(covers([parse(text)], table, Prices(free=0)), (0,)) for text in (crossing, apart)]
+    assert costs[0] < 0.85 * costs[1]
+
+
+def test_two_equal_blocks_do_not_hide_each_other(table):
+    floating = parse("locker(at=(-4, -3, -5), size=(6, 6, 10))")
+    made = covers([floating, floating], table, Prices(free=0))
+    assert value(made, (0, 1)) == pytest.approx(2 * value(made, (0,)), rel=0.05)
+
+
+def test_nothing_is_chosen_for_points_of_noise():
+    noise = np.random.default_rng(3).uniform(-1, 1, (5000, 3))
+    assert chosen(random_blocks(200, 4), evidence_of(shape_from_points(noise))).best.chosen == ()
+
+
+def test_nothing_is_chosen_from_nothing(table):
+    empty = parse("for i in translate(0, by=(1, 0, 0)):\n    leg(at=(0, 0, 0), size=(1, 1, 1))\n")
+    assert chosen([empty, parse("leg(at=(0, 0, 0), size=(0, 0, 0))")], table).best.chosen == ()
+    assert chosen([], table).best.chosen == ()
+
+
+def test_the_same_seed_chooses_the_same():
+    shape, pool = mesh_of(*TABLE), [*random_blocks(60, 1), *TABLE]
+    one, two = (choose(covers(pool, evidence_of(shape, 5), Prices(), 5), 4, seed=5) for _ in range(2))
+    assert one == two
+
+
+def random_covers(seed: int, count: int, free: int = 1) -> Covers:
+    """Bits of which each is set with a probability of a quarter, and costs of the size of gains."""
+    random = np.random.default_rng(seed)
+    flags = random.random((count, 64 * (2 + free + count))) < 0.25
+    weights = np.concatenate([random.random(2) / 64, -random.random(free) / 400])
+    rows = pack(flags)
+    own = pack(random.random((count, 64)) < 0.5)[:, 0] & ~rows[np.arange(count), 2 + free + np.arange(count)]
+    return Covers(rows, weights, 2, own, random.random(count) / 600, random.random(count) / 50)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_the_search_finds_the_best_of_all_sets(seed):
+    made = random_covers(seed, 11)
+    every = [c for size in range(5) for c in itertools.combinations(range(11), size)]
+    found = choose(made, 4)
+    assert found.best.value == pytest.approx(max(value(made, one) for one in every))
+    for option in found.options:
+        assert option.value == pytest.approx(value(made, option.chosen))
+
+
+# ---------------------------------------------------------------- kernels and their twins
+
+
+@pytest.mark.parametrize("user", [False, True])
+def test_points_explained_and_held_are_those_of_the_declarations(user):
+    scene = random_scene(7, lead=(6,), user=user)
+    random = np.random.default_rng(0)
+    points = random.uniform(-13, 13, (3000, 3))
+    normals = random.normal(size=(3000, 3))
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    normals[::5] = 0
+    mesh = evidence_of(mesh_of(*TABLE))
+    at, facing = torch.from_numpy(points), torch.from_numpy(normals)
+    wanted = explains_twin(scene, at, facing, mesh.tolerance, mesh.agreement)
+    assert 50 < wanted.sum() < 15_000
+    assert np.array_equal(explains(scene, points, normals, mesh), pack(wanted.numpy()))
+    for depth in (0.0, 0.3):
+        assert np.array_equal(holds(scene, points, depth), pack(holds_twin(scene, at, depth).numpy()))
+
+
+def test_supported_samples_are_those_of_all_pairs(table):
+    random = np.random.default_rng(0)
+    few = replace(table, surface=table.surface[::40], surface_normals=table.surface_normals[::40])
+    samples = random.uniform(-13, 13, (500, 3))
+    samples[:250] = few.surface[:250] + random.normal(0, 0.3, (250, 3))
+    normals = np.eye(3)[random.integers(3, size=500)]
+    wanted = supported_twin(samples, normals, few)
+    assert 20 < wanted.sum() < 400
+    assert np.array_equal(supported(samples, normals, few), wanted)
+
+
+@pytest.mark.parametrize("through", [False, True])
+def test_rays_find_the_way_out_as_their_twin_does(through):
+    random = np.random.default_rng(1)
+    barrier = random.random((12, 12, 12)) < 0.12
+    data = barrier, random.uniform(-1, 13, (300, 3)), seen.directions(16), 3
+    wanted = seen.looking_twin(*data, through=through)
+    assert 50 < wanted.sum() < 290
+    assert np.array_equal(seen.looking(*data, through=through), wanted)
+
+
+# ---------------------------------------------------------------- evidence
+
+
+def cell(evidence: Evidence, *place: float) -> bool:
+    """Whether the space at a place is known to be free."""
+    scale = len(evidence.free) / 32
+    return bool(evidence.free[tuple(int((value + 16) * scale) for value in place)])
+
+
+def test_faces_that_are_doubled_count_once_in_whatever_order():
+    vertices = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [0, 0, 0], [0, 1, 0.0]])
+    faces = np.array([[0, 1, 2], [2, 1, 0], [4, 1, 5], [0, 1, 3]])
+    assert seen.single_faces(vertices, faces).tolist() == [[0, 1, 2], [0, 1, 3]]
+
+
+def test_inner_faces_count_little_and_space_within_is_not_free():
+    outer, inner = (
+        parse("locker(at=(-12, -8, -12), size=(24, 16, 24))"),
+        parse("locker(at=(-6, -4, -6), size=(12, 8, 12))"),
+    )
+    (places, faces), (others, more) = (union_mesh(unroll(each)) for each in (outer, inner))
+    made = evidence_of(shape_from_mesh(np.concatenate([places, others]), np.concatenate([faces, more + len(places)])))
+    inside = np.abs(made.points).max(1) < 7
+    assert inside.mean() > 0.1
+    assert made.weights[inside].max() == pytest.approx(seen.HIDDEN * made.weights[~inside].min())
+    assert made.weights.sum() == pytest.approx(1)
+    assert not cell(made, 0, 0, 0)
+    assert not cell(made, 10, 0, 0)
+    assert cell(made, 14, 0, 0)
+    assert made.area == pytest.approx(2 * (24 * 16 * 2 + 24 * 24) + seen.HIDDEN * 2 * (12 * 8 * 2 + 144), rel=0.03)
+
+
+def test_space_behind_an_open_front_is_free():
+    sides = ["(1, 16, 24)", "(24, 1, 24)", "(24, 16, 1)"]
+    corners = [
+        ("(-12, -8, -12)", 0),
+        ("(11, -8, -12)", 0),
+        ("(-12, 7, -12)", 1),
+        ("(-12, -8, -12)", 2),
+        ("(-12, -8, 11)", 2),
+    ]
+    boards = [parse(f"locker(at={at}, size={sides[which]})") for at, which in corners]
+    made = evidence_of(mesh_of(*boards))
+    assert cell(made, 0, 0, 0)
+    assert not cell(made, 0, 7.5, 0)
+
+
+@pytest.mark.parametrize("deviation", [0.15, 0.3])
+def test_the_tolerance_of_a_scan_follows_its_noise(deviation):
+    shape = mesh_of(*TABLE)
+    points = sample_surface(shape.vertices, shape.faces, 5000, 1).astype(np.float64)
+    noisy = points + np.random.default_rng(2).normal(0, deviation, points.shape)
+    made = evidence_of(Shape("scan", shape.voxels, noisy.astype(np.float32), kind="points"))
+    assert made.tolerance == pytest.approx(max(seen.TOLERANCE, seen.NOISE * deviation), rel=0.25)
+    clean = evidence_of(Shape("scan", shape.voxels, points.astype(np.float32), kind="points"))
+    assert clean.tolerance == seen.TOLERANCE
+    assert clean.area == pytest.approx(evidence_of(shape).area, rel=0.2)
+
+
+def test_a_missing_side_of_a_scan_frees_nothing():
+    body = mesh_of(parse("locker(at=(-12, -8, -12), size=(24, 16, 24))"))
+    points = sample_surface(body.vertices, body.faces, 5000, 1).astype(np.float64)
+    made = evidence_of(shape_from_points(points[points[:, 1] > -7]))
+    assert made.free.mean() < 0.001  # of the grid: at the rim
+
+
+def test_the_free_space_of_cells_is_the_empty_cells_and_a_box_through_them_is_explained():
+    drawn = unroll(parse("locker(at=(-12, -6, -12), size=(24, 12, 24))")).voxels().numpy().astype(bool)
+    made = evidence_of(shape_from_voxels(drawn))
+    assert np.array_equal(made.free, ~drawn)
+    found = chosen([*random_blocks(50, 1), parse("locker(at=(-12, -5.5, -12), size=(24, 11, 24))")], made)
+    assert found.best.chosen == (50,)
+    assert found.best.explained > 0.95

@@ -167,7 +167,7 @@ def test_the_top_and_each_leg_of_a_table_in_one_piece_are_found(given):
     found = find_pieces(shape).boxes
     for centre, half in TABLE_PARTS:
         middle = 0 if given == "mesh" else 1.25  # clouds and cells are centred
-        best = overlap(found, np.array(centre) + [middle, 0, 0], np.array(half)).max()
+        best = overlap(found, np.add(centre, (middle, 0, 0)), np.array(half)).max()
         assert best > (0.5 if given == "cells" else 0.8), (centre, best)
 
 

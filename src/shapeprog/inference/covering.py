@@ -19,6 +19,9 @@ NEAR = 0.2
 UNSEEN = 0.6
 """Price of a box's surface where no point is, against that of explained points."""
 
+FILLED = 0.35
+"""Share of the surface of a solid near which there are points, at least: the box around a chair is mostly air."""
+
 CHOSEN = 40
 """Boxes chosen, at most."""
 
@@ -35,6 +38,8 @@ class Support:
         Points that it explains (B, N), of those looked at.
     fill
         Share of its own surface (B,) near which there are points.
+    filled
+        Whether that share is large enough (B,) for a solid.
     value
         Points that it explains, less the price (B,) of the surface where none are.
     """
@@ -45,14 +50,15 @@ class Support:
         self.near = np.zeros((len(boxes.half), len(points)), np.bool_)
         self.fill = np.zeros(len(boxes.half))
         near_boxes(points, *map(np.ascontiguousarray, boxes), max(NEAR, 2 * cloud.noise), self.near, self.fill)
+        self.filled = self.fill >= FILLED
         self.price = UNSEEN * boxes.area() * (1 - self.fill) / (cloud.spacing**2 * every)
         self.value: FloatArray = self.near.sum(1) - self.price
 
     def cover(self) -> npt.NDArray[np.int64]:
-        """The boxes that greed chooses, best first."""
+        """The boxes that greed chooses among those that are filled, best first."""
         left, chosen = np.ones(self.near.shape[1], np.bool_), list[int]()
         while len(chosen) < min(CHOSEN, len(self.fill)):
-            gain = self.near[:, left].sum(1) - self.price
+            gain = np.where(self.filled, self.near[:, left].sum(1) - self.price, 0)
             best = int(gain.argmax())
             if gain[best] < LEAST:
                 break

@@ -48,9 +48,6 @@ COMPONENTS, SLABS, SHEETS, LIMBS = 300, 600, 60, 100
 MOST = 600
 """Most pieces of one target."""
 
-FILLED = 0.35
-"""Share of the surface of a slab near which there are points, at least."""
-
 SAME = 0.25
 """Difference in cells in place and size below which two pieces are the same; a component's is kept as it is."""
 
@@ -109,7 +106,8 @@ class Pieces(NamedTuple):
 def find_pieces(shape: Shape, seed: int = 0) -> Pieces:
     """Pieces of a mesh, a point cloud or cells; the same for the same seed.
 
-    Those that a greedy choice takes come first, then components by falling area, then by what they explain.
+    Those that a greedy choice takes come first, then components, then the few of groups, rods and limbs, then the many
+    of slabs and sheets; among these, those that explain most.
     """
     mesh = None
     if shape.vertices is not None and shape.faces is not None:
@@ -154,7 +152,7 @@ def _told(cloud: Cloud, seed: int) -> list[tuple[Source, Boxes]]:
     between = slabs(patches)
     between = between.take(distinct(between, SAME))
     support = Support(cloud, between)
-    kept = np.flatnonzero(support.fill >= FILLED)
+    kept = np.flatnonzero(support.filled)
     kept = kept[np.argsort(-support.near[kept].sum(1), kind="stable")[:SLABS]]
     along = limbs(cloud)[:LIMBS]
     members = cloud.points[np.concatenate(along)] if along else np.zeros((0, 3))
@@ -181,7 +179,7 @@ def _ranked(cloud: Cloud, listed: list[tuple[Source, Boxes]], whole: Boxes, owne
     first = np.full(len(once), len(once))
     cover = support.cover()
     first[cover] = np.arange(len(cover))
-    order = np.lexsort((-np.round(support.value, 6), source != Source.COMPONENT.value, first))[:MOST]
+    order = np.lexsort((-np.round(support.value, 6), (source > Source.LIMB.value) + (source > 0), first))[:MOST]
     return Pieces(boxes.take(order), source[order], np.where(order < count, order, -1), cloud, owner)
 
 

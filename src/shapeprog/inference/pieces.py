@@ -145,7 +145,7 @@ def _of_points(cloud: Cloud, seed: int) -> Pieces:
 
 
 def _told(cloud: Cloud, seed: int) -> list[tuple[Source, Boxes]]:
-    """Pieces that points with normals tell of, by source."""
+    """Pieces that points with normals tell of, by source, and groups of those that explain the points together."""
     if len(cloud.points) < LEAST:
         return [(Source.GROUP, boxes_around(cloud.points, np.array([0, len(cloud.points)])))]
     patches = planar_patches(cloud)
@@ -156,20 +156,20 @@ def _told(cloud: Cloud, seed: int) -> list[tuple[Source, Boxes]]:
     kept = kept[np.argsort(-support.near[kept].sum(1), kind="stable")[:SLABS]]
     along = limbs(cloud)[:LIMBS]
     members = cloud.points[np.concatenate(along)] if along else np.zeros((0, 3))
-    return [
+    found = [
         (Source.ROD, rods(cloud, seed)),
         (Source.LIMB, boxes_around(members, bounds(along))),
         (Source.SLAB, between.take(kept)),
         (Source.SHEET, sheets(patches, SHEETS)),
     ]
+    boxes = join([each for _, each in found])
+    return [*found, (Source.GROUP, groups(boxes.take(Support(cloud, boxes).cover())))]
 
 
 def _ranked(cloud: Cloud, listed: list[tuple[Source, Boxes]], whole: Boxes, owner: npt.NDArray[np.int64]) -> Pieces:
-    """All pieces, each once, and groups of those that explain the target together; the most important first."""
+    """All pieces, each once, the most important first."""
     count = len(whole.half)
     listed = [(Source.COMPONENT, whole), *listed]
-    boxes = join([boxes for _, boxes in listed])
-    listed.append((Source.GROUP, groups(boxes.take(Support(cloud, boxes).cover()))))
     boxes = join([boxes for _, boxes in listed])
     source = np.concatenate([np.full(len(boxes.half), source.value) for source, boxes in listed])
     once = distinct(boxes, SAME)
@@ -179,7 +179,8 @@ def _ranked(cloud: Cloud, listed: list[tuple[Source, Boxes]], whole: Boxes, owne
     first = np.full(len(once), len(once))
     cover = support.cover()
     first[cover] = np.arange(len(cover))
-    order = np.lexsort((-np.round(support.value, 6), (source > Source.LIMB.value) + (source > 0), first))[:MOST]
+    turn = np.searchsorted([Source.COMPONENT.value, Source.LIMB.value], source)
+    order = np.lexsort((-np.round(support.value, 6), turn, first))[:MOST]
     return Pieces(boxes.take(order), source[order], np.where(order < count, order, -1), cloud, owner)
 
 

@@ -22,19 +22,11 @@ def points_of_cells(
     Uniform on the exposed faces of the cells, moved inwards by ``inset``; a face at the end of the longest side
     is exact, since that side is 24 cells long by definition, and stays.
     """
-    padded = np.pad(voxels, 1)
     low, high = np.argwhere(voxels).min(0), np.argwhere(voxels).max(0) + 1
-    faces = []
-    for axis in range(3):
-        for sign in (-1, 1):
-            beyond = np.roll(padded, -sign, axis)[1:-1, 1:-1, 1:-1]
-            cells = np.argwhere(voxels & ~beyond)
-            depth = np.full(len(cells), inset)
-            if high[axis] - low[axis] == SPAN:
-                outer = low[axis] if sign < 0 else high[axis] - 1
-                depth[cells[:, axis] == outer] = 0
-            faces.append(np.column_stack([cells, np.full(len(cells), axis), np.full(len(cells), sign), depth]))
-    table = np.concatenate(faces)
+    faces = exposed_faces(voxels)
+    outer = np.where(faces[:, 4] < 0, low[faces[:, 3]], high[faces[:, 3]] - 1)
+    exact = (high - low == SPAN)[faces[:, 3]] & (faces[np.arange(len(faces)), faces[:, 3]] == outer)
+    table = np.column_stack([faces, np.where(exact, 0.0, inset)])
     random = np.random.default_rng(seed)
     chosen = table[random.integers(len(table), size=count)]
     points = chosen[:, :3] + random.random((count, 3))
@@ -45,3 +37,28 @@ def points_of_cells(
     full = high - low == SPAN
     points = np.clip(points, np.where(full, low, edge_low), np.where(full, high, edge_high))
     return (points - HALF).astype(np.float32)
+
+
+def faces_of_cells(
+    voxels: npt.NDArray[np.bool_], count: int, *, seed: int = 0
+) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+    """Points (count, 3), uniform on the outer faces of the touched cells, and their outward normals (count, 3)."""
+    faces = exposed_faces(voxels)
+    random = np.random.default_rng(seed)
+    chosen = faces[random.integers(len(faces), size=count)]
+    rows, axis, outwards = np.arange(count), chosen[:, 3], chosen[:, 4]
+    points, normals = chosen[:, :3] + random.random((count, 3)), np.zeros((count, 3))
+    points[rows, axis] = chosen[rows, axis] + (outwards > 0)
+    normals[rows, axis] = outwards
+    return points - HALF, normals
+
+
+def exposed_faces(voxels: npt.NDArray[np.bool_]) -> npt.NDArray[np.int64]:
+    """Faces between a touched cell and one that is not: cell (3), axis, and on which side of the cell: (F, 5)."""
+    padded, found = np.pad(voxels, 1), []
+    for axis in range(3):
+        for sign in (-1, 1):
+            beyond = np.roll(padded, -sign, axis)[1:-1, 1:-1, 1:-1]
+            cells = np.argwhere(voxels & ~beyond)
+            found.append(np.column_stack([cells, np.full(len(cells), axis), np.full(len(cells), sign)]))
+    return np.concatenate(found)

@@ -25,4 +25,10 @@ CHOICE = (  # of blocks by the surface of the target
     "shapeprog.inference.choice_kernels",
     "shapeprog.inference.coverage_kernels",
 )
-INFERENCE = (*SEARCH, *GEOMETRY, *CHOICE)
+PIECES = (  # of the surface of the target
+    "shapeprog.inference.cover_kernels",
+    "shapeprog.inference.oriented_kernels",
+    "shapeprog.inference.patch_kernels",
+    "shapeprog.inference.rod_kernels",
+)
+INFERENCE = (*SEARCH, *GEOMETRY, *CHOICE, *PIECES)

@@ -1,0 +1,73 @@
+"""A surface as points with normals, and who is near whom."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from scipy.spatial import cKDTree
+
+from shapeprog.space import Array, FloatArray
+
+NEAREST = 12
+"""Neighbours of a point."""
+
+AROUND = 20
+"""Neighbours from which a normal is estimated."""
+
+NOISY = 0.05
+"""Noise in cells above which normals are trusted less."""
+
+CLOSEST = 1e-3
+"""Least spacing in cells: points may coincide."""
+
+LIKE = 0.98
+"""Cosine between normals that face the same way."""
+
+
+class Cloud(NamedTuple):
+    """Points (N, 3) on a surface with unit normals (N, 3) of either sign, near points (N, k), and how exact it all is.
+
+    ``spacing`` is the side of the square that a point stands for; ``noise`` how far points are off their planes.
+    """
+
+    points: FloatArray
+    normals: FloatArray
+    neighbours: npt.NDArray[np.int32]
+    spacing: float
+    noise: float
+
+
+def cloud_of(points: Array, normals: Array | None = None) -> Cloud:
+    """The cloud of points in cells, at least one; normals are estimated from near points where none are given."""
+    points = np.ascontiguousarray(points, np.float64)
+    around = (AROUND if normals is None else NEAREST) + 1
+    distance, near = cKDTree(points).query(points, k=range(1, min(around, len(points)) + 1), workers=2)
+    spacing = max(float(np.median(distance[:, -1])) * (np.pi / near.shape[1]) ** 0.5, CLOSEST)
+    if normals is None:
+        facing, noise = plane_normals(points, near)
+    else:
+        facing = np.ascontiguousarray(normals, np.float64)
+        noise = roughness(points, facing, near)
+    return Cloud(points, facing, np.ascontiguousarray(near[:, 1 : NEAREST + 1], np.int32), spacing, noise)
+
+
+def plane_normals(points: FloatArray, near: npt.NDArray[np.int64]) -> tuple[FloatArray, float]:
+    """Unit normals (N, 3) of the planes that fit near points (N, k) best, and how far these usually are from them."""
+    off = points[near]
+    off -= off.mean(1, keepdims=True)
+    spread, axes = np.linalg.eigh(off.transpose(0, 2, 1) @ off / near.shape[1])
+    return np.ascontiguousarray(axes[:, :, 0]), float(np.sqrt(max(np.median(spread[:, 0]), 0.0)))
+
+
+def roughness(points: FloatArray, normals: FloatArray, near: npt.NDArray[np.int64]) -> float:
+    """How far near points that face the same way usually are from the plane of a point."""
+    alike = np.abs(np.einsum("nki,ni->nk", normals[near[:, 1:]], normals)) > LIKE
+    off = np.abs(np.einsum("nki,ni->nk", points[near[:, 1:]] - points[:, None], normals))[alike]
+    return float(np.median(off)) if len(off) else 0.0
+
+
+def tolerance(cloud: Cloud) -> float:
+    """Distance in cells within which a point is on a plane or a cylinder."""
+    return float(np.clip(2.5 * cloud.noise, 0.06, 0.4))

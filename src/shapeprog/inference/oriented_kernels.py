@@ -1,0 +1,227 @@
+"""Kernels that find small boxes around points, in any direction but along the world's axes where these do."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from shapeprog.kernels.compile import helper, kernel
+
+WORTH = 0.93
+"""Volume, as a share of what a plainer direction needs, below which a freer direction is taken."""
+
+SLACK = 1.05
+"""How much larger than the smallest box the one along the principal axis of a rod may be and still be taken."""
+
+COMPACT, ROD, FLAT = 0, 1, 2
+"""Kinds of things that boxes are put around."""
+
+SWEEPS = 6
+"""Rounds of turning a box about each of its own axes in search of the smallest."""
+
+MANY = 160
+"""Points above which directions are chosen by the outermost ones alone."""
+
+
+@helper
+def extents(points, first, last, frame, low, high):
+    """Write how far the points ``first`` to ``last - 1`` reach along the columns of a frame."""
+    for axis in range(3):
+        low[axis], high[axis] = np.inf, -np.inf
+        for k in range(first, last):
+            at = points[k, 0] * frame[0, axis] + points[k, 1] * frame[1, axis] + points[k, 2] * frame[2, axis]
+            low[axis] = min(low[axis], at)
+            high[axis] = max(high[axis], at)
+
+
+@helper
+def volume(points, count, frame, floor, low, high):
+    """The volume of the box of the first points along a frame, each side at least ``floor``."""
+    extents(points, 0, count, frame, low, high)
+    product = 1.0
+    for axis in range(3):
+        product *= max(high[axis] - low[axis], floor)
+    return product
+
+
+@helper
+def sort(flat, count, order):
+    """Write the order of points in the plane along a direction that no edges of furniture are square to."""
+    for k in range(count):
+        key, at = flat[k, 0] * 0.7648 + flat[k, 1] * 0.6442, k
+        while at > 0 and flat[order[at - 1], 0] * 0.7648 + flat[order[at - 1], 1] * 0.6442 > key:
+            order[at] = order[at - 1]
+            at -= 1
+        order[at] = k
+
+
+@helper
+def hull(flat, order, count, outline):
+    """Write the corners of the convex hull of points in the plane, anticlockwise; their number is returned.
+
+    Andrew's monotone chain, along the order given.
+    """
+    corners = 0
+    for way in range(2):
+        least = corners + 1
+        for step in range(count):
+            k = order[step] if way == 0 else order[count - 1 - step]
+            while corners > least:
+                a, b = outline[corners - 2], outline[corners - 1]
+                turn = (flat[b, 0] - flat[a, 0]) * (flat[k, 1] - flat[a, 1])
+                turn -= (flat[b, 1] - flat[a, 1]) * (flat[k, 0] - flat[a, 0])
+                if turn > 0:
+                    break
+                corners -= 1
+            outline[corners] = k
+            corners += 1
+        corners -= 1
+    return max(corners, 1)
+
+
+@helper
+def turn_about(points, count, frame, axis, floor, flat, order, outline):
+    """Turn a frame about one of its columns so that the rectangle about the first points, seen along it, is smallest.
+
+    One of its sides lies on an edge of the convex hull (Freeman and Shapira 1975).
+    """
+    one, two = (axis + 1) % 3, (axis + 2) % 3
+    for k in range(count):
+        for side in range(2):
+            at = one if side == 0 else two
+            flat[k, side] = points[k, 0] * frame[0, at] + points[k, 1] * frame[1, at] + points[k, 2] * frame[2, at]
+    sort(flat, count, order)
+    corners = hull(flat, order, count, outline)
+    best, cosine, sine = np.inf, 1.0, 0.0
+    for k in range(corners + 1):
+        x, y = 1.0, 0.0  # as it is, for the first
+        if k > 0:
+            a, b = outline[k - 1], outline[k % corners]
+            x, y = flat[b, 0] - flat[a, 0], flat[b, 1] - flat[a, 1]
+            length = np.sqrt(x * x + y * y)
+            if length < 1e-9:
+                continue
+            x, y = x / length, y / length
+        low0, high0, low1, high1 = np.inf, -np.inf, np.inf, -np.inf
+        for m in range(corners):
+            c = outline[m]
+            along, across = flat[c, 0] * x + flat[c, 1] * y, flat[c, 1] * x - flat[c, 0] * y
+            low0, high0 = min(low0, along), max(high0, along)
+            low1, high1 = min(low1, across), max(high1, across)
+        area = max(high0 - low0, floor) * max(high1 - low1, floor)
+        if area < best * (1 - 1e-6):
+            best, cosine, sine = area, x, y
+    if abs(sine) > abs(cosine):  # the same rectangle, turned by less
+        cosine, sine = (sine, -cosine) if sine > 0 else (-sine, cosine)
+    if cosine < 0:
+        cosine, sine = -cosine, -sine
+    for row in range(3):
+        u, v = frame[row, one], frame[row, two]
+        frame[row, one], frame[row, two] = cosine * u + sine * v, cosine * v - sine * u
+
+
+@helper
+def settle(points, count, frame, floor, flat, order, outline, low, high):
+    """Turn a frame about its own axes in turn while the box becomes smaller; its volume is returned."""
+    best = volume(points, count, frame, floor, low, high)
+    for _ in range(SWEEPS):
+        before = best
+        for axis in range(3):
+            turn_about(points, count, frame, axis, floor, flat, order, outline)
+        best = volume(points, count, frame, floor, low, high)
+        if best > before * 0.999:
+            break
+    return best
+
+
+@helper
+def outermost(points, first, last, directions, kept):
+    """Copy the points that lie farthest out along some directions, or all of a few; their number is returned."""
+    if last - first <= MANY:
+        for k in range(first, last):
+            kept[k - first] = points[k]
+        return last - first
+    for d in range(directions.shape[0]):
+        low, high = first, first
+        least, most = np.inf, -np.inf
+        for k in range(first, last):
+            at = points[k, 0] * directions[d, 0] + points[k, 1] * directions[d, 1] + points[k, 2] * directions[d, 2]
+            if at < least:
+                least, low = at, k
+            if at > most:
+                most, high = at, k
+        kept[2 * d], kept[2 * d + 1] = points[low], points[high]
+    return 2 * directions.shape[0]
+
+
+@kernel("void(f8[:, ::1], i8[::1], f8[:, ::1], f8[:, :, ::1], i8[::1], f8, f8[:, ::1], f8[:, :, ::1], f8[:, ::1])")
+def box_each(points, start, directions, given, kind, floor, centre, rotation, half):
+    """A small oriented box around each run of points.
+
+    The world's axes where no other direction is much better, then one turned about one of them, then the smallest.
+
+    Parameters
+    ----------
+    points, start
+        Points (P, 3); run g holds those from ``start[g]`` to ``start[g + 1] - 1``, at least one.
+    directions
+        Unit vectors (D, 3), one of each opposite pair, in which the outermost points are looked for; 2 D <= MANY.
+    given, kind
+        Frames (G, 3, 3), and what they are (G,): ``COMPACT``, principal axes to start from, longest first; ``ROD``, the
+        same of a long thin thing, whose first is preferred to that of the smallest box; ``FLAT``, only to be turned
+        about its last column.
+    floor
+        Least side that counts: what is thinner is as good as flat.
+    centre, rotation, half
+        Output (G, 3), (G, 3, 3) with axes as columns, and (G, 3).
+    """
+    kept, flat = np.empty((MANY, 3)), np.empty((MANY, 2))
+    order, outline = np.empty(MANY, np.int64), np.empty(2 * MANY + 2, np.int64)
+    low, high = np.empty(3), np.empty(3)
+    frame, trial = np.empty((3, 3)), np.empty((3, 3))
+    for g in range(len(start) - 1):
+        first, last = start[g], start[g + 1]
+        count = outermost(points, first, last, directions, kept)
+        flattened = kind[g] == FLAT
+        if flattened:
+            frame[:] = given[g]
+        else:
+            frame[:] = np.eye(3)
+        start_volume = volume(kept, count, frame, floor, low, high)
+        best = WORTH * start_volume
+        plain = True
+        for axis in range(2 if flattened else 0, 3):
+            if flattened:
+                trial[:] = given[g]
+            else:
+                trial[:] = np.eye(3)
+            turn_about(kept, count, trial, axis, floor, flat, order, outline)
+            size = volume(kept, count, trial, floor, low, high)
+            if size < best:
+                best, plain = size, False
+                frame[:] = trial
+        if not flattened:
+            best = WORTH * (start_volume if plain else best)
+            free = False
+            for way in range(2):
+                if way == 0:
+                    trial[:] = frame
+                else:
+                    trial[:] = given[g]
+                size = settle(kept, count, trial, floor, flat, order, outline, low, high)
+                if size < best:
+                    best, free = size, True
+                    rotation[g] = trial
+            if free:
+                frame[:] = rotation[g]
+                if kind[g] == ROD:
+                    trial[:] = given[g]
+                    turn_about(kept, count, trial, 0, floor, flat, order, outline)
+                    if volume(kept, count, trial, floor, low, high) < SLACK * best:
+                        frame[:] = trial
+        extents(points, first, last, frame, low, high)
+        for row in range(3):
+            centre[g, row] = 0.0
+            for axis in range(3):
+                rotation[g, row, axis] = frame[row, axis]
+                centre[g, row] += frame[row, axis] * (low[axis] + high[axis]) / 2
+            half[g, row] = (high[row] - low[row]) / 2

@@ -1,0 +1,75 @@
+"""Kernels that grow planar patches over points."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from shapeprog.kernels.compile import kernel
+
+
+@kernel("i8(f8[:, ::1], f8[:, ::1], i4[:, ::1], i8[::1], f8, f8, i8, i8[::1])")
+def grow_patches(points, normals, neighbours, order, cosine, tolerance, least, label):
+    """Label points by the planar patch they belong to, -1 for none; the number of patches is returned.
+
+    A patch grows from a seed to neighbours that lie in its plane and face its way, while the plane follows its points.
+
+    Parameters
+    ----------
+    points, normals
+        Points (N, 3) and unit normals (N, 3) of either sign.
+    neighbours
+        Indices (N, k) of near points.
+    order
+        Seeds, the flattest first.
+    cosine, tolerance
+        How well a point's normal agrees with the plane's, and how far it may lie from it.
+    least
+        Points of the smallest patch.
+    label
+        Output (N,).
+    """
+    label[:] = -2
+    stack = np.empty(len(points), np.int64)
+    mean, total, normal = np.empty(3), np.empty(3), np.empty(3)
+    patches = 0
+    for seed in order:
+        if label[seed] != -2:
+            continue
+        for axis in range(3):
+            normal[axis] = total[axis] = normals[seed, axis]
+            mean[axis] = points[seed, axis]
+        size, at = 1, 0
+        stack[0] = seed
+        label[seed] = patches
+        while at < size:
+            here = stack[at]
+            at += 1
+            for k in range(neighbours.shape[1]):
+                there = neighbours[here, k]
+                if label[there] >= 0:
+                    continue
+                facing, off = 0.0, 0.0
+                for axis in range(3):
+                    facing += normals[there, axis] * normal[axis]
+                    off += (points[there, axis] - mean[axis]) * normal[axis]
+                if abs(facing) < cosine or abs(off) > tolerance:
+                    continue
+                label[there] = patches
+                stack[size] = there
+                size += 1
+                length = 0.0
+                for axis in range(3):
+                    total[axis] += normals[there, axis] if facing > 0 else -normals[there, axis]
+                    mean[axis] += (points[there, axis] - mean[axis]) / size
+                    length += total[axis] * total[axis]
+                for axis in range(3):
+                    normal[axis] = total[axis] / np.sqrt(length)
+        if size < least:
+            for k in range(size):
+                label[stack[k]] = -2
+            label[seed] = -1
+        else:
+            patches += 1
+    for k in range(len(label)):
+        label[k] = max(label[k], -1)
+    return patches

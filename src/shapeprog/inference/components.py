@@ -66,7 +66,7 @@ def components(vertices: Array, faces: Array) -> Components:
         np.searchsorted(rank[of_face][sequence], bounds),
         corner[: np.searchsorted(rank[label][corner], len(order))],
         np.searchsorted(rank[label][corner], bounds),
-        total[order],
+        np.asarray(total[order], np.float64),
     )
 
 

@@ -1,0 +1,189 @@
+"""Candidates: blocks that a program may consist of, from the pieces of a target.
+
+Every statement that hints how it starts from an oriented box is tried on every piece.  What fits the points of its
+piece best is kept, and of several statements that draw the same solid the one that writes the fewest numbers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+import torch
+from jaxtyping import Float
+from torch import Tensor
+
+from shapeprog.geometry.distance import signed_distance
+from shapeprog.geometry.primitive import SIZES, primitives
+from shapeprog.geometry.scene import Scene
+from shapeprog.inference.pieces import Pieces
+from shapeprog.language.hints import Box
+from shapeprog.language.parameters import to_float32
+from shapeprog.language.program import Draw, Loop, Node, Program
+from shapeprog.language.statement import language
+from shapeprog.language.tensors import encode
+from shapeprog.language.unroll import unroll
+from shapeprog.space import Array, FloatArray
+
+NEAR = 0.3
+"""Cells around a piece within which points of the surface belong to it."""
+
+POINTS = 64
+"""Points of a piece that a statement is measured by."""
+
+SEEN = 5_000
+"""Points of the surface among which they are looked for."""
+
+WRONG = 0.5
+"""Distance in cells that counts as much as a normal at right angles."""
+
+SLACK = 0.05
+"""How much worse than the best a statement may fit if it writes fewer numbers, see :func:`misfits`."""
+
+BESIDE = 0.01
+"""Cells off the surface at which the direction of a solid is asked for."""
+
+SAME = 0.02
+"""Relative difference of moments below which two solids are the same."""
+
+THINNEST = 0.2
+"""Least thickness in cells of a part, where a piece is thinner: what is a single sheet has no thickness of its own."""
+
+
+class Looks(NamedTuple):
+    """What tells whether candidates are copies of each other.
+
+    Parameters
+    ----------
+    kind
+        The statements and counts that a block is made of.
+    middle, spread, skew
+        The mean (C, 3) of the centres of its solids, second moments (C, 3, 3) and third moments (C, 3) about it.
+    """
+
+    kind: tuple[str, ...]
+    middle: FloatArray
+    spread: FloatArray
+    skew: FloatArray
+
+    @property
+    def size(self) -> FloatArray:
+        """How far a candidate reaches from its middle (C,)."""
+        return np.sqrt(np.trace(self.spread, axis1=1, axis2=2))
+
+
+def single_candidates(pieces: Pieces) -> list[Node]:
+    """One drawing statement or a few for every piece."""
+    boxes, known = pieces.boxes, [each for each in language() if each.hint is not None]
+    half = np.maximum(boxes.half, THINNEST / 2)
+    drawn: list[Draw] = []
+    owner: list[int] = []
+    for piece in range(len(half)):
+        box = Box(boxes.centre[piece], boxes.rotation[piece], half[piece])
+        for declared in known:
+            assert declared.hint is not None
+            for values in declared.hint(box):
+                drawn.append(Draw(declared.name, tuple(to_float32(value) for value in values)))
+                owner.append(piece)
+    if not drawn:
+        return []
+    misfit = misfits(drawn, np.array(owner), pieces)
+    found: list[Node] = []
+    begins = np.searchsorted(owner, np.arange(len(half) + 1))
+    for begin, end in pairwise(begins.tolist()):
+        if not (mine := range(begin, end)):
+            continue
+        least = min(misfit[k] for k in mine)
+        fitting = [k for k in mine if misfit[k] <= least + SLACK]
+        found.append(min((drawn[k] for k in fitting), key=_written))
+    return found
+
+
+def _written(node: Draw) -> int:
+    return language()[node.name].written(node.values)
+
+
+def misfits(drawn: Sequence[Draw], owner: Array, pieces: Pieces) -> FloatArray:
+    """How far statements are from the points of their pieces: mean distance over ``WRONG`` plus 1 - the mean cosine.
+
+    Zero for pieces without points.
+    """
+    cloud = pieces.cloud
+    step = max(1, len(cloud.points) // SEEN)
+    points, normals = cloud.points[::step], cloud.normals[::step]
+    chosen = np.zeros((len(pieces.boxes.half), POINTS), np.int64)
+    empty = np.ones(len(chosen), np.bool_)
+    for piece, (centre, rotation, half) in enumerate(zip(*pieces.boxes, strict=True)):
+        at = np.abs((points - centre) @ rotation)
+        inside = np.flatnonzero((at <= half + NEAR).all(1) & (at >= half - NEAR).any(1))
+        if len(inside):
+            chosen[piece] = inside[np.arange(POINTS) * len(inside) // POINTS]
+            empty[piece] = False
+    beside = points + BESIDE * normals  # on a surface itself the distance has no slope
+    where = torch.from_numpy(beside[chosen[owner]]).requires_grad_()
+    scene = unroll(encode([Program((node,)) for node in drawn], dtype=torch.float64))
+    distance = signed_distance(scene, where)
+    (slope,) = torch.autograd.grad(distance.sum(), where)
+    cosine = (slope.numpy() * normals[chosen[owner]]).sum(-1)
+    wrong = np.minimum(np.abs(distance.detach().numpy()) / WRONG, 1).mean(1) + 1 - np.abs(cosine).mean(1)
+    return np.where(empty[owner], 0.0, wrong)
+
+
+def looks(nodes: Sequence[Node]) -> Looks:
+    """What tells whether blocks are copies of each other."""
+    scene = unroll(encode([Program((node,)) for node in nodes], dtype=torch.float64))
+    share = scene.mask.double()
+    share = share / share.sum(-1, keepdim=True).clamp(min=1)
+    own, lean = _own_looks(scene)
+    middle = (share[..., None] * scene.centre).sum(1)
+    away = scene.centre - middle[:, None]
+    squared = (away**2).sum(-1) + own.diagonal(dim1=-2, dim2=-1).sum(-1)
+    spread = own + away[..., :, None] * away[..., None, :]
+    skew = lean + squared[..., None] * away + 2 * (own @ away[..., None])[..., 0]
+    found = (share[..., None, None] * spread).sum(1), (share[..., None] * skew).sum(1)
+    return Looks(tuple(_kind(node) for node in nodes), middle.numpy(), *(each.numpy() for each in found))
+
+
+def _own_looks(scene: Scene) -> tuple[Float[Tensor, "C N 3 3"], Float[Tensor, "C N 3"]]:
+    """Second and third moments that stand for each solid: of its box, and how its distance differs between its sides.
+
+    They turn and mirror with the solid, and are the same for solids that are the same however their axes are named.
+    """
+    spread, skew = torch.zeros_like(scene.rotation), torch.zeros_like(scene.centre)
+    signs = torch.cartesian_prod(*[torch.tensor([-1.0, 0.0, 1.0], dtype=torch.float64)] * 3)
+    for kind in scene.kinds:
+        here = scene.mask & (scene.kind == kind)
+        size, rotation = scene.size[here], scene.rotation[here]
+        half = primitives[kind].bound(size)
+        places = signs * half[:, None]
+        level = primitives[kind].distance(places, size[:, None].expand(*places.shape[:2], SIZES))
+        lean = (level[..., None] * places).mean(1) * half
+        twist = torch.einsum("mp,mpi,mpj->mij", level, places, places) / len(signs) / half.amax(-1)[:, None, None]
+        twist = twist - torch.diag_embed(twist.diagonal(dim1=-2, dim2=-1))
+        own = torch.diag_embed(half**2) + twist
+        spread[here] = rotation @ own @ rotation.mT
+        skew[here] = (rotation @ lean[..., None])[..., 0]
+    return spread, skew
+
+
+def _kind(node: Node) -> str:
+    if isinstance(node, Loop):
+        return f"{node.name} {node.count} {' '.join(_kind(inner) for inner in node.body)}"
+    return node.name
+
+
+def distinct(nodes: list[Node], seen: Looks) -> list[int]:
+    """Of candidates that draw the same, the first; in their order."""
+    kept: list[int] = []
+    middle, spread = np.zeros((0, 3)), np.zeros((0, 3, 3))
+    for place in range(len(nodes)):
+        scale = max(float(np.sqrt(np.trace(seen.spread[place]))), 1e-3)
+        near = np.abs(middle - seen.middle[place]).max(1, initial=0) < SAME * scale if len(kept) else np.zeros(0, bool)
+        same = near & (np.abs(spread - seen.spread[place]).max((1, 2), initial=0) < SAME * scale**2)
+        if any(seen.kind[kept[k]] == seen.kind[place] for k in np.flatnonzero(same)):
+            continue
+        kept.append(place)
+        middle, spread = np.append(middle, seen.middle[place][None], 0), np.append(spread, seen.spread[place][None], 0)
+    return kept

@@ -1,0 +1,127 @@
+"""Loops over candidates that are copies of each other: runs of equal steps, mirror images, and these of these.
+
+Copies are told by their looks (:class:`shapeprog.inference.candidates.Looks`), so whatever a statement draws, one of a
+user's own too, is rolled up the same way.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from shapeprog.inference.candidates import Looks, distinct, looks
+from shapeprog.language.parameters import to_float32
+from shapeprog.language.program import Loop, Node
+from shapeprog.space import DEPTH, SIDE, Array, FloatArray
+
+ALIKE = 0.08
+"""Relative difference of moments up to which two candidates count as copies."""
+
+STRAY = 0.35
+"""Cells by which a copy may miss its place."""
+
+LEAST_STEP = 0.4
+"""Cells between two copies, at least."""
+
+MOST_ALIKE = 48
+"""Most copies of one group that are rolled up: those that come first."""
+
+MOST_RUNS = 160
+"""Most runs that are made of one set of candidates, the longest."""
+
+CENTRED = 0.2
+"""Cells within which a mirror plane is taken as the middle plane of the shape, and a step as along an axis."""
+
+
+def repeated(singles: Sequence[Node]) -> list[Node]:
+    """Runs and mirror images of candidates, and runs and mirror images of these; each once."""
+    once = _rolled(singles)
+    twice = _rolled(once)
+    return [*once, *twice]
+
+
+def _rolled(nodes: Sequence[Node]) -> list[Node]:
+    if len(nodes) < 2:
+        return []
+    seen = looks(nodes)
+    found: list[Node] = [Loop("translate", _values(len(run), *step), (nodes[run[0]],)) for run, step in runs(seen)]
+    for axis in (SIDE, DEPTH):
+        found += [Loop("mirror", _values(2, axis, plane), (nodes[one],)) for one, _, plane in mirrored(seen, axis)]
+    if not found:
+        return []
+    return [found[place] for place in distinct(found, looks(found))]
+
+
+def _values(*numbers: float) -> tuple[float, ...]:
+    return tuple(to_float32(number) + 0.0 for number in numbers)
+
+
+def runs(seen: Looks) -> Iterator[tuple[tuple[int, ...], tuple[float, float, float]]]:
+    """Indices of copies in equal steps, and the step; the longest first."""
+    found: dict[tuple[int, ...], FloatArray] = {}
+    for group in groups(seen):
+        places = seen.middle[group]
+        steps = places[None] - places[:, None]
+        onwards = (np.abs(steps).max(-1) > LEAST_STEP) & ~_backwards(steps)
+        first = onwards & (_nearest(places, places[:, None] - steps) < 0)
+        after = _nearest(places, places[None] + steps)
+        for a, b in np.argwhere(first).tolist():
+            run = [a, b]
+            while (third := int(after[run[-2], run[-1]])) >= 0 and third not in run:
+                run.append(third)
+            found.setdefault(tuple(group[run].tolist()), (places[run[-1]] - places[a]) / (len(run) - 1))
+    for members in sorted(found, key=lambda members: (-len(members), members))[:MOST_RUNS]:
+        step = np.where(np.abs(found[members]) * (len(members) - 1) < CENTRED, 0.0, found[members])
+        yield members, (float(step[0]), float(step[1]), float(step[2]))
+
+
+def mirrored(seen: Looks, axis: int) -> Iterator[tuple[int, int, float]]:
+    """Pairs of mirror images along an axis, the farther along first, and where the plane between them is."""
+    signs = np.ones(3)
+    signs[axis] = -1
+    across = [other for other in range(3) if other != axis]
+    scale = np.maximum(seen.size, 1e-3)
+    kind = np.array(seen.kind)
+    turned = seen.spread * signs[:, None] * signs
+    count = 0
+    for one in range(len(kind)):
+        off = np.abs(seen.middle[:, across] - seen.middle[one, across]).max(1)
+        same = (off < STRAY) & (kind == kind[one]) & (seen.middle[:, axis] < seen.middle[one, axis] - LEAST_STEP)
+        same &= np.abs(seen.spread - turned[one]).max((1, 2)) < ALIKE * scale[one] ** 2
+        same &= np.abs(seen.skew - signs * seen.skew[one]).max(1) < ALIKE * scale[one] ** 3
+        for other in np.flatnonzero(same).tolist():
+            plane = float(seen.middle[one, axis] + seen.middle[other, axis]) / 2
+            yield one, other, 0.0 if abs(plane) < CENTRED else plane
+            count += 1
+            if count == MOST_RUNS:
+                return
+
+
+def groups(seen: Looks) -> Iterator[Array]:
+    """Indices of candidates that are copies of each other by translation, each group once."""
+    kind, scale = np.array(seen.kind), np.maximum(seen.size, 1e-3)
+    known: set[tuple[int, ...]] = set()
+    for one in range(len(kind)):
+        same = kind == kind[one]
+        same &= np.abs(seen.spread - seen.spread[one]).max((1, 2)) < ALIKE * scale[one] ** 2
+        same &= np.abs(seen.skew - seen.skew[one]).max(1) < ALIKE * scale[one] ** 3
+        group = np.flatnonzero(same)[:MOST_ALIKE]
+        if len(group) > 1 and (key := tuple(group.tolist())) not in known:
+            known.add(key)
+            yield group
+
+
+def _nearest(places: FloatArray, wanted: FloatArray) -> Array:
+    """Which place is where it is wanted (..., 3); -1 if none."""
+    off = np.abs(places - wanted[..., None, :]).max(-1)
+    nearest = off.argmin(-1)
+    return np.where(off.min(-1) < STRAY, nearest, -1)
+
+
+def _backwards(steps: FloatArray) -> npt.NDArray[np.bool_]:
+    """Whether steps (..., 3) go down, or level and to the front, or only to the left: those runs begin at their end."""
+    signs = np.sign(np.where(np.abs(steps) < CENTRED, 0, steps))
+    found: npt.NDArray[np.bool_] = signs @ np.array([9, 3, 1]) < 0
+    return found

@@ -85,7 +85,7 @@ def measure(task: Task) -> list[dict[str, Any]]:
         before = time.thread_time()
         result = infer(
             shape, blocks=blocks, seed=seed, budget=math.inf, settings=settings, generator=generator,
-            search=method != SINGLE,
+            search=method != SINGLE, statements="paper",
         )  # fmt: skip
         keep(method, result.program, result.snapped, result.seconds, time.thread_time() - before)
         if method == SEARCH and ALONE in methods and cloud is not None:  # the same structure: it is found on cells

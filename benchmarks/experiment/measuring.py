@@ -201,7 +201,7 @@ def searched(job: Job) -> Row:
 
     shape, weights, told = _prepared(job)
     started = time.process_time()
-    result = infer(shape, blocks=BLOCKS, budget=math.inf, generator=weights)
+    result = infer(shape, blocks=BLOCKS, budget=math.inf, generator=weights, statements="paper")
     told["cpu_seconds"] = time.process_time() - started
     return _row(Written(result.program, result.snapped), result.snapped, shape) | told | AS_DRAWN_UNKNOWN
 

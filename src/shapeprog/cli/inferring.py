@@ -33,7 +33,7 @@ class Found:
     """A program for one shape.  Its files leave the seconds out: the same seed writes the same bytes."""
 
     program: Program
-    snapped: Program
+    snapped: Program | None
     scores: dict[str, float]
     reason: str
     seconds: float
@@ -62,6 +62,12 @@ def infer_command(
     no_search: Annotated[
         bool, typer.Option("--no-search", help="What the generator writes in a single pass, as it is.")
     ] = False,
+    paper: Annotated[
+        bool, typer.Option("--paper", help="The statements of the paper alone, found on cells and refined.")
+    ] = False,
+    detail: Annotated[
+        float, typer.Option(help="How fine: the price of what is written is divided by it.", min=0.01, max=100)
+    ] = 1.0,
     baseline: Annotated[bool, typer.Option("--baseline", help="Greedy boxes instead of the search.")] = False,
 ) -> None:
     """Infer a program from each shape and write NAME.shape, NAME.json, NAME.glb and NAME.png.
@@ -79,7 +85,7 @@ def infer_command(
     terminal.check_axes(up, front)
     _prepare(picture=not no_picture, talk=not (quiet or as_json))
     terminal.load_modules(modules)
-    infer_one = _baseline if baseline else _chosen(weights, proposals, rounds, no_search)
+    infer_one = _baseline if baseline else _chosen(weights, proposals, rounds, no_search, paper, detail)
     folder = make_folder(out)
     failures: list[tuple[Path, ShapeProgError]] = []
     stopped: OutputError | None = None
@@ -147,15 +153,15 @@ def infer_command(
 def _prepare(picture: bool, talk: bool) -> None:
     """Make the kernels ready that all inference needs, and say so where that takes a while."""
     from shapeprog.kernels.compile import prepare
-    from shapeprog.kernels.modules import GEOMETRY, PICTURES, READING, SEARCH
+    from shapeprog.kernels.modules import INFERENCE, PICTURES, READING
 
     def tell(sentence: str) -> None:
         terminal.errors().print(f"{sentence.capitalize()}.", style="dim", markup=False)
 
-    prepare([*SEARCH, *READING, *(PICTURES if picture else ()), *GEOMETRY], tell if talk else None)
+    prepare([*INFERENCE, *READING, *(PICTURES if picture else ())], tell if talk else None)
 
 
-def _chosen(weights: str, proposals: int, rounds: int | None, no_search: bool) -> Inference:
+def _chosen(weights: str, proposals: int, rounds: int | None, no_search: bool, paper: bool, detail: float) -> Inference:
     """Inference with what was asked for, which is looked at before any shape is."""
     from shapeprog.inference import Settings, infer
     from shapeprog.inference.proposing import ready_generator
@@ -167,7 +173,7 @@ def _chosen(weights: str, proposals: int, rounds: int | None, no_search: bool) -
     def one(shape: Shape, blocks: int, budget: float, seed: int, progress: Progress) -> Found:
         result = infer(
             shape, blocks=blocks, budget=budget, seed=seed, settings=settings, generator=asked, proposals=proposals,
-            search=not no_search, progress=progress,
+            search=not no_search, statements="paper" if paper else "all", detail=detail, progress=progress,
         )  # fmt: skip
         scores = _scores(result.program, result.snapped, shape, result.scores, seed)
         return Found(result.program, result.snapped, scores, result.reason, result.seconds)
@@ -187,7 +193,9 @@ def _baseline(shape: Shape, blocks: int, budget: float, seed: int, progress: Pro
     return Found(program, program.snap(), _scores(program, program.snap(), shape, {}, seed), reason, seconds)
 
 
-def _scores(program: Program, snapped: Program, shape: Shape, known: dict[str, float], seed: int) -> dict[str, float]:
+def _scores(
+    program: Program, snapped: Program | None, shape: Shape, known: dict[str, float], seed: int
+) -> dict[str, float]:
     """Everything that was said about the program, and how close it comes to the input."""
     from shapeprog.evaluation.metrics import evaluate_program
 
@@ -200,9 +208,9 @@ def _scores(program: Program, snapped: Program, shape: Shape, known: dict[str, f
 def _document(found: Found, shape: Shape) -> str:
     from shapeprog.formats.json_form import program_to_json, result_json
 
-    snapped = json.loads(program_to_json(found.snapped))["program"]
+    whole = {} if found.snapped is None else {"snapped": json.loads(program_to_json(found.snapped))["program"]}
     return result_json(
-        found.program, shape.frame, scores=found.scores, reason=found.reason, source=_source(shape), snapped=snapped
+        found.program, shape.frame, scores=found.scores, reason=found.reason, source=_source(shape), **whole
     )
 
 

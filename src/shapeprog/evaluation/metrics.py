@@ -8,7 +8,7 @@ CD
 F1
     F-score of the same points at a distance of one grid cell.
 IoU
-    Cells of the program snapped to whole numbers against the touched cells of the target, at 32^3.
+    Cells of the program, see :func:`occupied`, against the touched cells of the target, at 32^3.
 Likeness
     F1@.5 %, F1@1 %, normals and silhouette: see :mod:`shapeprog.evaluation.likeness`.  Normals and silhouette need a
     mesh as target; F1 needs points at least.
@@ -30,10 +30,11 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 import numpy.typing as npt
 import torch
-from jaxtyping import Float
+from jaxtyping import Float, Int
 from torch import Tensor
 
 from shapeprog.data.sampling import sample_surface as sample_triangles
+from shapeprog.data.voxelise import voxelise_mesh
 from shapeprog.errors import ShapeProgError
 from shapeprog.evaluation import likeness, structure
 from shapeprog.evaluation.likeness import Samples, Triangles
@@ -43,7 +44,9 @@ from shapeprog.geometry.nearest import squared_distance
 from shapeprog.geometry.scene import Scene
 from shapeprog.geometry.surface import sample_surface
 from shapeprog.language.program import Program
+from shapeprog.language.statement import language
 from shapeprog.language.unroll import unroll
+from shapeprog.space import RESOLUTION
 
 POINTS = 5000
 """Points drawn on each of the two surfaces."""
@@ -165,7 +168,7 @@ def evaluate_program(
     target
         The shape it should be.
     snapped
-        The whole-numbered program whose IoU is measured; ``program`` rounded by default.
+        The whole-numbered program whose IoU is measured; by default see :func:`occupied`.
     points
         Points on each surface.
     seed
@@ -177,8 +180,7 @@ def evaluate_program(
     """
     scene = unroll(program)
     if iou is None:
-        drawn = cells.rasterise(unroll(program.snap() if snapped is None else snapped))
-        iou = float(cells.iou(drawn, cells.pack(target.voxels)))
+        iou = float(cells.iou(occupied(program, scene, snapped), cells.pack(target.voxels)))
     to_target, from_target, f1, floor = _distances(scene, target, points, seed)
     row = Metrics(
         name=target.name, cd=to_target + from_target, to_target=to_target, from_target=from_target,
@@ -194,6 +196,20 @@ def evaluate_program(
     return replace(
         with_likeness(row, mesh, target, seed), one_piece=structure.one_piece(mesh), slivers=structure.slivers(scene)
     )
+
+
+def occupied(program: Program, scene: Scene, snapped: Program | None = None) -> Int[Tensor, "32 32"]:
+    """The packed cells whose share with those of a target is measured.
+
+    Those of the whole-numbered program, as published, if all statements are of the kind that generators are taught: by
+    default of the program rounded.  Of others, whose parts may be thinner than a cell, those that the solid touches.
+    """
+    if snapped is None and not all(language()[node.name].taught for node in program.walk()):
+        try:
+            return cells.pack(voxelise_mesh(*union_mesh(scene)))
+        except ShapeProgError:  # nothing in it has a volume
+            return cells.pack(np.zeros((RESOLUTION,) * 3, np.bool_))
+    return cells.rasterise(unroll(program.snap() if snapped is None else snapped))
 
 
 def with_likeness(row: Metrics, predicted: Triangles | None, target: Target, seed: int = 0) -> Metrics:

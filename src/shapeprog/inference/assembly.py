@@ -7,20 +7,30 @@ numbers is chosen.  The search works on program objects: it knows no statement b
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 from shapeprog.data.shape import Shape
 from shapeprog.inference.budget import NEVER, Deadline
 from shapeprog.inference.candidates import distinct, looks, single_candidates
 from shapeprog.inference.choice import Choice, choose
-from shapeprog.inference.coverage import Covers, Prices, covers
-from shapeprog.inference.evidence import Evidence, evidence_of
+from shapeprog.inference.coverage import Prices, covers
+from shapeprog.inference.evidence import evidence_of
 from shapeprog.inference.pieces import find_pieces
 from shapeprog.inference.repeating import repeated
 from shapeprog.language.program import Node, Program
+from shapeprog.language.statement import language
 
 MOST_CANDIDATES = 1_500
 """Most candidates that are compared; loops come first, then the most important pieces."""
+
+
+class TradeOff(NamedTuple):
+    """The best program of so many blocks that was seen: numbers written, and share of the surface explained."""
+
+    blocks: int
+    numbers: int
+    explained: float
 
 
 @dataclass(frozen=True)
@@ -31,15 +41,18 @@ class Assembly:
     ----------
     program
         The blocks chosen.
-    evidence
-        What was known of the target.
-    choice
-        The best sets of every number of blocks.
+    explained
+        Share of the visible surface that they explain.
+    reason
+        Why there are no more of them.
+    trade_off
+        The best of every number of blocks.
     """
 
     program: Program
-    evidence: Evidence
-    choice: Choice
+    explained: float
+    reason: str
+    trade_off: tuple[TradeOff, ...]
 
 
 def assemble(
@@ -48,6 +61,7 @@ def assemble(
     blocks: int = 10,
     more: Sequence[Node] = (),
     prices: Prices | None = None,
+    detail: float = 1.0,
     seed: int = 0,
     deadline: Deadline = NEVER,
     progress: Callable[[str, float], None] | None = None,
@@ -60,8 +74,8 @@ def assemble(
         Most blocks of the program.
     more
         Blocks from elsewhere that compete with those found here.
-    prices
-        What counts against a program.
+    prices, detail
+        What counts against a program; the prices of what is written are divided by ``detail``.
     deadline, progress
         As for :func:`shapeprog.inference.infer`.
     """
@@ -78,15 +92,30 @@ def assemble(
     candidates = [*more, *singles[: MOST_CANDIDATES // 2], *repeated(singles)][:MOST_CANDIDATES]
     told(0.7)
     cost = prices or Prices()
-    choice, program = _chosen(candidates, evidence, cost, blocks, seed)
+    cost = replace(cost, **{name: getattr(cost, name) / detail for name in ("statement", "loop", "number")})
+    choice = choose(covers([Program((node,)) for node in candidates], evidence, cost, seed), blocks, seed=seed)
+    chosen = [Program(tuple(candidates[place] for place in option.chosen)) for option in choice.options]
+    seen = tuple(
+        TradeOff(len(program.body), sum(_numbers(node) for node in program.walk()), option.explained)
+        for program, option in zip(chosen, choice.options, strict=True)
+    )
+    program = Program(tuple(candidates[place] for place in choice.best.chosen))
     told(1.0)
-    return Assembly(program, evidence, choice)
+    return Assembly(program, choice.best.explained, _reason(choice, seen, blocks), seen)
 
 
-def _chosen(
-    candidates: Sequence[Node], evidence: Evidence, prices: Prices, blocks: int, seed: int
-) -> tuple[Choice, Program]:
-    pool = [Program((node,)) for node in candidates]
-    covered: Covers = covers(pool, evidence, prices, seed)
-    choice = choose(covered, blocks, seed=seed)
-    return choice, Program(tuple(candidates[place] for place in choice.best.chosen))
+def _numbers(node: Node) -> int:
+    return language()[node.name].written(node.values)
+
+
+def _reason(choice: Choice, seen: Sequence[TradeOff], allowed: int) -> str:
+    used, share = len(choice.best.chosen), choice.best.explained
+    told = f"{used} block{'s' if used != 1 else ''} explain{'s' if used == 1 else ''} {share:.0%} of the surface"
+    if used >= allowed:
+        return f"{told} and every one of the {allowed} blocks is in use; allow more with --blocks."
+    now = next(each for each in seen if each.blocks == used)
+    more = next((each for each in seen if each.blocks == used + 1), None)
+    if more is None:
+        return f"{told}, and no other block that was seen would help."
+    gain, cost = max(more.explained - share, 0.0), more.numbers - now.numbers
+    return f"{told}; one more would explain {gain:.1%} for {cost} more numbers: raise --detail to have it."

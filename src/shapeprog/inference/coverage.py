@@ -79,7 +79,7 @@ class Prices:
         """The price of a program as it is written."""
         known, total = language(), 0.0
         for node in program.walk():
-            written = sum(not quantity.discrete for quantity in known[node.name].quantities)
+            written = known[node.name].written(node.values)
             total += (self.loop if isinstance(node, Loop) else self.statement) + self.number * written
         return total
 

@@ -1,6 +1,8 @@
 """Inference: a shape in, a program out, with its scores and a sentence that says why the search stopped.
 
-Where there are weights, a generator proposes programs and blocks, and the search keeps what helps.
+A program of the paper's statements is searched on cells; where there are weights, a generator proposes programs and
+blocks, and the search keeps what helps.  For shapes whose surface is known its blocks then compete with those found on
+the surface, from every statement there is.
 """
 
 from __future__ import annotations
@@ -10,7 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 import torch
@@ -20,6 +22,7 @@ from torch import Tensor
 from shapeprog.data.shape import Shape
 from shapeprog.geometry.cells import iou, pack, rasterise
 from shapeprog.geometry.distance import nearest_primitive
+from shapeprog.inference.assembly import TradeOff, assemble
 from shapeprog.inference.blocks import to_program
 from shapeprog.inference.budget import BUDGET, Deadline
 from shapeprog.inference.refine import REACH, Schedule, refine
@@ -55,24 +58,29 @@ class Result:
     program
         The program with continuous parameters.
     snapped
-        The same statements with whole numbers, each within one of the rounded parameter of ``program``.
+        Of a program of the paper's statements, the same with whole numbers, each within one of the rounded parameter of
+        ``program``; others have no such form.
     scores
-        ``iou`` of the snapped program at 32^3, and ``blocks``, ``statements``, ``primitives``; with a generator
-        ``proposed``: 1 if the program is its own or grew from it, else 0.
+        ``blocks``, ``statements``, ``primitives``; ``explained``, the share of the surface, where it was looked at,
+        else ``iou`` of the snapped program at 32^3; with a generator ``proposed``: 1 if the program on cells is its own
+        or grew from it, else 0.
     reason
         Why the search stopped, where the program came from, what the time budget cut short, and what to try next.
     cut
         What the time budget cut short, and how far that had come; if nothing, the same seed gives an equal result.
     seconds
         How long it took, which counts for nothing when results are compared.
+    trade_off
+        For every number of blocks the best program that was seen: numbers written, and share of the surface explained.
     """
 
     program: Program
-    snapped: Program
+    snapped: Program | None
     scores: dict[str, float]
     reason: str
     cut: tuple[str, ...]
     seconds: float = field(compare=False)
+    trade_off: tuple[TradeOff, ...] = ()
 
 
 def infer(
@@ -86,13 +94,17 @@ def infer(
     generator: Generator | str | Path | None = "default",
     proposals: int = PROPOSALS,
     search: bool = True,
+    statements: Literal["all", "paper"] = "all",
+    detail: float = 1.0,
     progress: Progress | None = None,
 ) -> Result:
     """A short program of at most ``blocks`` blocks that rebuilds a shape.
 
     Structure is searched on the touched cells, with whole numbers, with the help of a generator where there is one;
-    then all parameters are refined together on surface points through the renderer.  The result is the same for the
-    same seed unless the time budget cuts in, which ``cut`` and ``reason`` tell.
+    then all parameters are refined together on surface points through the renderer.  Where the shape came with a
+    surface, as a mesh or points, these blocks and those that the surface itself suggests are candidates of one choice,
+    whose parameters are adjusted and whose parts are named.  The result is the same for the same seed unless the time
+    budget cuts in, which ``cut`` and ``reason`` tell.
 
     Parameters
     ----------
@@ -113,6 +125,11 @@ def infer(
     search
         Whether to search; else the program is what the generator writes in a single pass, refined only when a
         ``schedule`` is given.
+    statements
+        All statements in force, or those of the paper alone, which generators can be taught.
+    detail
+        How much finer than usual the program may be where the surface is known: prices of what is written are divided
+        by it.
     progress
         Called with what is being done and the share of it that is done.
 
@@ -133,6 +150,7 @@ def infer(
     )
     target = _load(shape)
     scores: dict[str, float] = {}
+    snapped: Program | None
     if search:
         chosen = replace(settings or Settings(), blocks=blocks)
         offered = None
@@ -146,7 +164,7 @@ def infer(
         )
         program = snapped = to_program(structure.blocks)
         reason = f"Stopped because {structure.reason}"
-        reason += "." if searching.cut else _advice(snapped.blocks, blocks)
+        reason += "." if searching.cut else _advice(program.blocks, blocks)
         if writer is not None:
             scores["proposed"] = float(structure.proposed)
             grown = (
@@ -165,17 +183,28 @@ def infer(
             snapped, outer_points(target, snapped, seed), voxels=target.voxels if target.points is None else None,
             schedule=schedule, reach=REACH, seed=seed, deadline=refining, progress=progress,
         )  # fmt: skip
+    trade_off: tuple[TradeOff, ...] = ()
+    if search and statements == "all" and target.points is not None:
+        found = assemble(
+            target, blocks=blocks, more=program.flat().body, detail=detail, seed=seed, deadline=refining,
+            progress=progress,
+        )  # fmt: skip
+        if found.program.size:
+            program, snapped, trade_off = found.program, None, found.trade_off
+            scores["explained"] = found.explained
+            reason = f"Stopped because {found.reason}"
     cut = tuple(each.cut for each in (proposing, searching, refining) if each.cut)
     if cut:
         reason += f" The time budget of {budget:g} s cut short {' and '.join(cut)}: "
         reason += "give it a larger --budget, and the seed alone decides."
+    if snapped is not None:
+        scores["iou"] = float(iou(rasterise(unroll(snapped)), pack(target.voxels)))
     scores |= {
-        "iou": float(iou(rasterise(unroll(snapped)), pack(target.voxels))),
-        "blocks": float(snapped.blocks),
-        "statements": float(snapped.statements),
-        "primitives": float(snapped.size),
+        "blocks": float(program.blocks),
+        "statements": float(program.statements),
+        "primitives": float(program.size),
     }
-    return Result(program, snapped, scores, reason, cut, time.monotonic() - started)
+    return Result(program, snapped, scores, reason, cut, time.monotonic() - started, trade_off)
 
 
 @cache

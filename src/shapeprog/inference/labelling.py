@@ -148,12 +148,14 @@ def _labelled(task: str) -> str:
         _make_ready(*told["modules"])
         shape = _pack(told["pack"])[told["place"]]
         words = {name: told[name] for name in ("blocks", "budget", "seed")}
-        found = infer(shape, **words, generator=None)  # labels owe nothing to any weights
+        # Labels owe nothing to any weights, and are of statements that generators can be taught.
+        found = infer(shape, **words, generator=None, statements="paper")
     except ShapeProgError as error:
         return json.dumps({"error": error.message, "hint": error.hint})
     except Exception as error:  # a fault of ours with this shape costs its label, not those of the others
         cause = f"the search failed: {type(error).__name__}: {error}"
         return json.dumps({"error": cause, "hint": "please report it, with the pack"})
+    assert found.snapped is not None
     texts = {"program": format_program(found.program), "snapped": format_program(found.snapped)}
     return json.dumps({"name": shape.name, **texts, **found.scores, "cut": found.cut}, allow_nan=False)
 

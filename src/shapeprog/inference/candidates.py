@@ -61,12 +61,15 @@ class Looks(NamedTuple):
         The statements and counts that a block is made of.
     middle, spread, skew
         The mean (C, 3) of the centres of its solids, second moments (C, 3, 3) and third moments (C, 3) about it.
+    lean
+        How solids differ between their sides, in cells along each axis (C, 3): where a leg tapers, an arc bulges.
     """
 
     kind: tuple[str, ...]
     middle: FloatArray
     spread: FloatArray
     skew: FloatArray
+    lean: FloatArray
 
     @property
     def size(self) -> FloatArray:
@@ -141,17 +144,18 @@ def looks(nodes: Sequence[Node]) -> Looks:
     away = scene.centre - middle[:, None]
     squared = (away**2).sum(-1) + own.diagonal(dim1=-2, dim2=-1).sum(-1)
     spread = own + away[..., :, None] * away[..., None, :]
-    skew = lean + squared[..., None] * away + 2 * (own @ away[..., None])[..., 0]
-    found = (share[..., None, None] * spread).sum(1), (share[..., None] * skew).sum(1)
+    skew = squared[..., None] * away + 2 * (own @ away[..., None])[..., 0]
+    vectors = ((share[..., None] * each).sum(1) for each in (skew, lean))
+    found = (share[..., None, None] * spread).sum(1), *vectors
     return Looks(tuple(_kind(node) for node in nodes), middle.numpy(), *(each.numpy() for each in found))
 
 
 def _own_looks(scene: Scene) -> tuple[Float[Tensor, "C N 3 3"], Float[Tensor, "C N 3"]]:
-    """Second and third moments that stand for each solid: of its box, and how its distance differs between its sides.
+    """Second moments that stand for each solid, those of its box, and how its distance differs between its sides.
 
     They turn and mirror with the solid, and are the same for solids that are the same however their axes are named.
     """
-    spread, skew = torch.zeros_like(scene.rotation), torch.zeros_like(scene.centre)
+    spread, leans = torch.zeros_like(scene.rotation), torch.zeros_like(scene.centre)
     signs = torch.cartesian_prod(*[torch.tensor([-1.0, 0.0, 1.0], dtype=torch.float64)] * 3)
     for kind in scene.kinds:
         here = scene.mask & (scene.kind == kind)
@@ -159,13 +163,13 @@ def _own_looks(scene: Scene) -> tuple[Float[Tensor, "C N 3 3"], Float[Tensor, "C
         half = primitives[kind].bound(size)
         places = signs * half[:, None]
         level = primitives[kind].distance(places, size[:, None].expand(*places.shape[:2], SIZES))
-        lean = (level[..., None] * places).mean(1) * half
+        lean = level @ signs / len(signs)
         twist = torch.einsum("mp,mpi,mpj->mij", level, places, places) / len(signs) / half.amax(-1)[:, None, None]
         twist = twist - torch.diag_embed(twist.diagonal(dim1=-2, dim2=-1))
         own = torch.diag_embed(half**2) + twist
         spread[here] = rotation @ own @ rotation.mT
-        skew[here] = (rotation @ lean[..., None])[..., 0]
-    return spread, skew
+        leans[here] = (rotation @ lean[..., None])[..., 0]
+    return spread, leans
 
 
 def _kind(node: Node) -> str:

@@ -19,6 +19,9 @@ from shapeprog.space import DEPTH, SIDE, Array, FloatArray
 ALIKE = 0.08
 """Relative difference of moments up to which two candidates count as copies."""
 
+LEANING = 0.1
+"""The same for how they differ between their sides, in cells."""
+
 STRAY = 0.35
 """Cells by which a copy may miss its place."""
 
@@ -91,6 +94,7 @@ def mirrored(seen: Looks, axis: int) -> Iterator[tuple[int, int, float]]:
         same = (off < STRAY) & (kind == kind[one]) & (seen.middle[:, axis] < seen.middle[one, axis] - LEAST_STEP)
         same &= np.abs(seen.spread - turned[one]).max((1, 2)) < ALIKE * scale[one] ** 2
         same &= np.abs(seen.skew - signs * seen.skew[one]).max(1) < ALIKE * scale[one] ** 3
+        same &= np.abs(seen.lean - signs * seen.lean[one]).max(1) < LEANING
         for other in np.flatnonzero(same).tolist():
             plane = float(seen.middle[one, axis] + seen.middle[other, axis]) / 2
             yield one, other, 0.0 if abs(plane) < CENTRED else plane
@@ -107,6 +111,7 @@ def groups(seen: Looks) -> Iterator[Array]:
         same = kind == kind[one]
         same &= np.abs(seen.spread - seen.spread[one]).max((1, 2)) < ALIKE * scale[one] ** 2
         same &= np.abs(seen.skew - seen.skew[one]).max(1) < ALIKE * scale[one] ** 3
+        same &= np.abs(seen.lean - seen.lean[one]).max(1) < LEANING
         group = np.flatnonzero(same)[:MOST_ALIKE]
         if len(group) > 1 and (key := tuple(group.tolist())) not in known:
             known.add(key)

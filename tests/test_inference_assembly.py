@@ -1,0 +1,169 @@
+"""Structure from the surface: candidates from pieces, loops over copies, and programs of planted furniture."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import numpy as np
+import pytest
+import torch
+
+import shapeprog as sp
+from shapeprog.data.placement import shape_from_mesh
+from shapeprog.data.shape import Shape
+from shapeprog.evaluation.metrics import evaluate_program
+from shapeprog.formats.parts import parts, solid
+from shapeprog.geometry.batch import Solids
+from shapeprog.inference.assembly import assemble
+from shapeprog.inference.candidates import distinct, looks
+from shapeprog.inference.repeating import repeated
+from shapeprog.language import Draw, Language, Loop, Program, language, standard, statement, using
+from shapeprog.language.hints import Box
+from shapeprog.language.parameters import Length, Position, Radius
+from shapeprog.language.program import Node
+from shapeprog.language.shapes import disc
+from shapeprog.language.text import parse
+
+SPLAYED = """\
+box(at=(3, -7, -7), size=(1, 14, 14))
+for i in mirror(side):
+    for j in mirror(depth):
+        bar(start=(-12, 7, 7), end=(3, 5, 5), section=(1.5, 1.5))
+"""
+
+SLATS = """\
+for i in translate(2, by=(0, 10, 0)):
+    for j in translate(5, by=(0, 0, 5)):
+        box(at=(-6, -6, -11.5), size=(12, 1, 2))
+box(at=(6, -6, -12), size=(1.5, 12, 24))
+"""
+
+
+def whole(text: str) -> Shape:
+    """A program as the mesh of the union of its parts."""
+    return shape_from_mesh(*solid(parse(text)), name="planted", axes=np.eye(3))
+
+
+def apart(text: str) -> Shape:
+    """A program as a soup of its parts."""
+    drawn = parts(parse(text))
+    starts = np.cumsum([0, *(len(part.vertices) for part in drawn)])
+    vertices = np.concatenate([part.vertices for part in drawn])
+    faces = np.concatenate([part.faces + start for part, start in zip(drawn, starts, strict=False)])
+    return shape_from_mesh(vertices, faces, name="planted", axes=np.eye(3))
+
+
+def unrolled(text: str) -> list[Node]:
+    """The single solids of a program of boxes and bars, each as a statement of its own."""
+    drawn: list[Node] = []
+    for node in parse(text).flat().body:
+        drawn += _copies(node)
+    return drawn
+
+
+def _copies(node: Node) -> list[Node]:
+    if isinstance(node, Draw):
+        return [node]
+    assert node.name == "translate"
+    step = np.array(node.values[1:])
+    found: list[Node] = []
+    for inner in (each for body in node.body for each in _copies(body)):
+        for copy in range(node.count):
+            at = tuple(float(value) for value in np.array(inner.values[:3]) + copy * step)
+            found.append(Draw(inner.name, (*at, *inner.values[3:])))
+    return found
+
+
+def words(program: Program) -> Counter[str]:
+    return Counter(node.name for node in program.walk())
+
+
+@pytest.mark.parametrize("given", [whole, apart])
+def test_splayed_legs_are_one_bar_in_two_mirrors(given):
+    shape = given(SPLAYED)
+    found = assemble(shape)
+    assert words(found.program) == Counter(mirror=2, box=1, bar=1)
+    measured = evaluate_program(found.program, shape, looks=True)
+    assert measured.f1_percent > 0.97
+    assert measured.silhouette > 0.95
+    assert found.explained > 0.95
+
+
+def test_slats_are_loops_in_loops():
+    found = assemble(apart(SLATS)).program
+    assert found.blocks == 2
+    assert found.size == 11
+    assert words(found)["box"] == 2
+
+
+def test_a_grid_of_boxes_is_rolled_up_whole():
+    singles = unrolled(SLATS)
+    nested = [node for node in repeated(singles) if Program((node,)).size == 10]
+    assert nested
+    expected = sp.unroll(Program(tuple(singles[:10]))).centre
+    for node in nested:
+        centres = sp.unroll(Program((node,))).centre
+        gaps = torch.cdist(expected, centres).amin(1)
+        assert gaps.max() < 1e-3
+
+
+def test_mirror_images_are_found_about_any_plane():
+    one = Draw("taper", (-12.0, 1.0, 6.0, 2.0, 2.0, 5.0, 0.5, 1.0))
+    other = Draw("taper", (-12.0, 1.0, -3.0, 2.0, 2.0, -2.0, 0.5, 1.0))
+    (found,) = repeated([one, other])
+    assert found == Loop("mirror", (2.0, 2.0, 1.5), (one,))
+
+
+def test_a_tapered_leg_is_no_mirror_image_of_one_that_stands_on_its_head():
+    one = Draw("taper", (-12.0, 1.0, 6.0, 2.0, 1.0, 6.0, 0.5, 1.0))
+    other = Draw("taper", (-12.0, 1.0, -6.0, 2.0, 1.0, -6.0, 1.0, 0.5))
+    assert repeated([one, other]) == []
+
+
+def test_looks_do_not_depend_on_how_a_solid_is_written():
+    upright = Draw("box", (-2.0, -1.0, -0.5, 4.0, 2.0, 1.0))
+    as_bar = Draw("bar", (-2.0, 0.0, 0.0, 2.0, 0.0, 0.0, 2.0, 1.0, 0.0))
+    other_way = Draw("bar", (0.0, -1.0, 0.0, 0.0, 1.0, 0.0, 4.0, 1.0, 0.0))
+    seen = looks([upright, as_bar, other_way])
+    np.testing.assert_allclose(seen.spread[1:], seen.spread[:1].repeat(2, 0), atol=1e-5)
+    np.testing.assert_allclose(seen.skew, 0, atol=1e-5)
+    assert distinct([upright, as_bar, as_bar], looks([upright, as_bar, as_bar])) == [0, 1]
+
+
+def test_the_same_seed_gives_the_same_program():
+    assert assemble(whole(SPLAYED), seed=3) == assemble(whole(SPLAYED), seed=3)
+
+
+def test_fewer_blocks_are_kept_to_and_the_trade_off_is_told():
+    found = assemble(apart(SLATS), blocks=1)
+    assert found.program.blocks == 1
+    assert [each.blocks for each in found.trade_off] == [0, 1]
+    assert found.trade_off[0] == (0, 0, 0.0)
+    assert "every one of the 1 blocks is in use" in found.reason
+
+
+def test_a_statement_of_a_users_own_is_proposed_by_its_hint():
+    own = Language()
+    for declared in standard:
+        if declared.name in ("translate", "rotate", "mirror"):
+            own.register(declared)
+    with using(own):
+
+        @statement("drum", hint=lambda box: [_drum(box)])
+        def drum(at: Position, height: Length, radius: Radius) -> Solids:
+            """A drum on the middle of its bottom."""
+            return disc(at, height, radius)
+
+        text = "for i in mirror(side):\n    drum(at=(-6, 0, 6), height=12, radius=3)\n"
+        found = assemble(whole(text)).program
+        assert words(found)["drum"] == 1
+        assert found.size == 2
+        assert sorted(set(words(found)) - {"drum"})[0] in ("mirror", "translate")
+    assert "drum" not in language()
+
+
+def _drum(box: Box) -> list[float]:
+    rising = int(np.abs(box.rotation[0]).argmax())
+    height, radius = float(2 * box.half[rising]), float(np.delete(box.half, rising).mean())
+    up, depth, side = box.centre.tolist()
+    return [up - height / 2, depth, side, height, radius]

@@ -120,6 +120,16 @@ def test_a_tapered_leg_is_no_mirror_image_of_one_that_stands_on_its_head():
     assert repeated([one, other]) == []
 
 
+@pytest.mark.parametrize("count", [3, 4, 5, 6])
+def test_legs_around_the_middle_are_turned(count):
+    text = f"for i in rotate({count}, step=1):\n    rod(start=(-12, 7, 1), end=(2, 3, 1), radius=0.8)\n"
+    scene = sp.unroll(parse(text))
+    ends = [scene.centre + sign * scene.rotation[..., 0] * scene.size[..., :1] for sign in (-1, 1)]
+    singles = [Draw("rod", (*a, *b, 0.8)) for a, b in zip(*(each.tolist() for each in ends), strict=True)]
+    found = [node for node in repeated(singles) if node.name == "rotate" and node.values[0] == count]
+    assert any(torch.cdist(sp.unroll(Program((node,))).centre, scene.centre).amin(1).max() < 1e-3 for node in found)
+
+
 def test_looks_do_not_depend_on_how_a_solid_is_written():
     upright = Draw("box", (-2.0, -1.0, -0.5, 4.0, 2.0, 1.0))
     as_bar = Draw("bar", (-2.0, 0.0, 0.0, 2.0, 0.0, 0.0, 2.0, 1.0, 0.0))

@@ -1,4 +1,4 @@
-"""Loops over candidates that are copies of each other: runs of equal steps, mirror images, and these of these.
+"""Loops over candidates that are copies of each other: runs of equal steps, mirror images, turns, and these of these.
 
 Copies are told by their looks (:class:`shapeprog.inference.candidates.Looks`), so whatever a statement draws, one of a
 user's own too, is rolled up the same way.
@@ -34,12 +34,15 @@ MOST_ALIKE = 48
 MOST_RUNS = 160
 """Most runs that are made of one set of candidates, the longest."""
 
+TURNS = (6, 5, 4, 3)
+"""Copies around the vertical axis of the grid that are looked for."""
+
 CENTRED = 0.2
 """Cells within which a mirror plane is taken as the middle plane of the shape, and a step as along an axis."""
 
 
 def repeated(singles: Sequence[Node]) -> list[Node]:
-    """Runs and mirror images of candidates, and runs and mirror images of these; each once."""
+    """Runs, mirror images and turns of candidates, and runs and mirror images of these; each once."""
     once = _rolled(singles)
     twice = _rolled(once)
     return [*once, *twice]
@@ -52,6 +55,8 @@ def _rolled(nodes: Sequence[Node]) -> list[Node]:
     found: list[Node] = [Loop("translate", _values(len(run), *step), (nodes[run[0]],)) for run, step in runs(seen)]
     for axis in (SIDE, DEPTH):
         found += [Loop("mirror", _values(2, axis, plane), (nodes[one],)) for one, _, plane in mirrored(seen, axis)]
+    for count in () if isinstance(nodes[0], Loop) else TURNS:  # turned pairs would be drawn twice
+        found += [Loop("rotate", _values(count, 1), (nodes[one],)) for one in turned(seen, count)]
     if not found:
         return []
     return [found[place] for place in distinct(found, looks(found))]
@@ -101,6 +106,34 @@ def mirrored(seen: Looks, axis: int) -> Iterator[tuple[int, int, float]]:
             count += 1
             if count == MOST_RUNS:
                 return
+
+
+def turned(seen: Looks, count: int) -> Iterator[int]:
+    """The first of ``count`` copies spread evenly around the vertical axis of the grid."""
+    angle = 2 * np.pi / count
+    turn = np.array([[1, 0, 0], [0, np.cos(angle), -np.sin(angle)], [0, np.sin(angle), np.cos(angle)]])
+    middle, spread = seen.middle @ turn.T, turn @ seen.spread @ turn.T
+    skew, lean = seen.skew @ turn.T, seen.lean @ turn.T
+    scale, kind = np.maximum(seen.size, 1e-3), np.array(seen.kind)
+    after = np.full(len(kind), -1)
+    for one in np.flatnonzero(np.abs(middle - seen.middle).max(1, initial=0) > LEAST_STEP).tolist():
+        off = np.abs(seen.middle - middle[one]).max(1)
+        same = (kind == kind[one]) & (off < STRAY)
+        same &= np.abs(seen.spread - spread[one]).max((1, 2)) < ALIKE * scale[one] ** 2
+        same &= np.abs(seen.skew - skew[one]).max(1) < ALIKE * scale[one] ** 3
+        same &= np.abs(seen.lean - lean[one]).max(1) < LEANING
+        if same.any():
+            after[one] = np.where(same, off, np.inf).argmin()
+    known = np.zeros(len(kind), np.bool_)
+    opposite = _nearest(seen.middle, seen.middle * [1, 1, -1])
+    for one in range(len(kind)):
+        circle = [one]
+        while len(circle) < count and after[circle[-1]] >= 0:
+            circle.append(int(after[circle[-1]]))
+        mirrors = count == 4 and opposite[one] in circle[1:]  # four legs in a square are better said by two mirrors
+        if len(set(circle)) == count and not known[circle].all() and not mirrors:
+            known[circle] = True
+            yield one
 
 
 def groups(seen: Looks) -> Iterator[Array]:

@@ -55,6 +55,38 @@ def test_flat_and_missing_parts_are_left_out():
         part_meshes(random_scene(0, lead=(2,)))
 
 
+@pytest.mark.parametrize("radii", [(2, 0), (0, 2)])
+def test_a_cone_with_a_point_has_a_mesh_with_its_volume(radii):
+    scene = make_scene(["frustum"], [[3.0, *radii]], [[1.0, 2, 3]])
+    for vertices, faces in (part_meshes(scene)[0][1:], union_mesh(scene)):
+        mesh = trimesh.Trimesh(vertices, faces)
+        assert mesh.is_watertight
+        assert mesh.volume == pytest.approx(np.pi * 2**2 * 6 / 3, rel=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("kind", "size"),
+    [
+        ("cuboid", [2.0, 0, 2, 3]),  # its lean gives it a box with a volume
+        ("cuboid", [2.0, 1e-6, 2, 3]),
+        ("cuboid", [2.0, 2, 1e-6]),
+        ("cylinder", [2.0, 0]),
+        ("frustum", [0.0, 2, 1]),
+        ("frustum", [2.0, 0, 0]),
+        ("arc", [3.0, 0, 1]),
+        ("arc", [0.0, 2, 0]),
+        ("rounded_box", [2.0, 0, 2, 1]),
+    ],
+)
+def test_parts_without_thickness_have_no_mesh(kind, size):
+    assert not part_meshes(make_scene([kind], [size], [[0.0, 0, 0]]))
+
+
+def test_a_thin_ring_has_a_mesh_though_it_fills_little_of_its_box():
+    (part,) = part_meshes(make_scene(["arc"], [[1.0, 0.002, 20]], [[0.0, 0, 0]]))
+    assert trimesh.Trimesh(part.vertices, part.faces).volume > 0
+
+
 def test_a_user_primitive_is_meshed():
     scene = make_scene([ellipsoid_kind(), "cuboid"], [[3.0, 2, 1], [1, 1, 1]], [[0.0, 0, 0], [2, 0, 0]])
     assert trimesh.Trimesh(*union_mesh(scene)).is_watertight

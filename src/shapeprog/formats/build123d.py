@@ -20,9 +20,9 @@ from shapeprog.space import Frame
 
 _HEAD = '''"""Made by shapeprog. Change the numbers, then run this file to write {stem}.step (pip install build123d)."""
 
-from math import dist
+from math import atan2, degrees, dist, hypot
 
-from build123d import Color, Compound, Face, Location, Plane, Shell, Solid, Vector, Wire, export_step
+from build123d import Axis, Color, Compound, Face, Location, Plane, Shell, Solid, Vector, Wire, export_step
 '''
 
 _TOOLS = '''
@@ -53,6 +53,56 @@ def cylinder_between(start, end, radius, end_radius=None):
     if radius == last:
         return Solid.make_cylinder(scale * radius, scale * height, plane)
     return Solid.make_cone(scale * radius, scale * last, scale * height, plane)
+
+
+def tilted_box(at, size, tilt):
+    """A box from its low corner, turned to the rear by tilt degrees about its bottom front edge."""
+    return Location(scaled(at), (0, 0, tilt)) * Solid.make_box(*scaled(size)) if min(size) > 0 else None
+
+
+def bar_between(start, end, section, turn):
+    """A bar between two points, turned about them by turn degrees: the sides of its section lie along the axes that it
+    runs along least, in their order, and are leaned with it."""
+    along = [b - a for a, b in zip(start, end)]
+    main = max(range(3), key=lambda k: abs(along[k]))
+    size = [*section[:main], dist(start, end), *section[main:]]
+    if min(size) <= 0:
+        return None
+    axis = Vector(*(float(k == main) for k in range(3)))
+    leaned = Vector(*along) * (-1 if along[main] < 0 else 1)
+    across = axis.cross(leaned)
+    box = Solid.make_box(*scaled(size), Plane(scaled(-s / 2 for s in size))).rotate(Axis((0, 0, 0), axis), turn)
+    if across.length > 0:
+        box = box.rotate(Axis((0, 0, 0), across), degrees(atan2(across.length, axis.dot(leaned))))
+    return Location(scaled((a + b) / 2 for a, b in zip(start, end))) * box
+
+
+def arc_through(start, through, end, radius):
+    """A round bar along the circle from one point through a second to a third, at most as thick as fills the ring."""
+    half = dist(start, end) / 2
+    if min(half, radius) <= 0:
+        return None
+    middle = (Vector(*start) + Vector(*end)) / 2
+    unit, beside = (Vector(*end) - middle) / half, Vector(*through) - middle
+    away = beside - unit * beside.dot(unit)
+    rest = half**2 - beside.length**2
+    # How high the circle rises over its chord.
+    rise = 2 * away.length * half**2 / max(hypot(2 * away.length * half, rest) + rest, 1e-9)
+    if rise <= half / 100000:
+        return cylinder_between(start, end, radius)
+    ring, bulge = (half**2 + rise**2) / (2 * rise), away.normalized()
+    centre = middle + bulge * (rise - ring)
+    plane = Plane(scaled(centre), x_dir=Vector(*start) - centre, z_dir=bulge.cross(unit))
+    angle = degrees(4 * atan2(rise, half))
+    return Solid.make_torus(scale * ring, scale * min(radius, 0.9999 * ring), plane, major_angle=angle)
+
+
+def rounded_box(at, size, edge):
+    """A box from its low corner, with rounded edges."""
+    if min(size) <= 0:
+        return None
+    box, radius = Solid.make_box(*scaled(size), Plane(scaled(at))), min(edge, 0.9999 * min(size) / 2)
+    return box.fillet(scale * radius, box.edges()) if radius > 0 else box
 
 
 def shell(centre, half, mesh):
@@ -214,7 +264,6 @@ def _step(step: Solid | Repetition, depth: int, place: str) -> Iterator[str]:
             yield from _step(inner, depth + 1, place)
         return
     arguments, around = list(step.arguments), place
-    function = "cylinder_between" if step.kind in ("cylinder", "frustum") else step.kind
     if step.axes is not None:
         axes = f"({', '.join(_tuple(np.round(row, 12)) for row in step.axes)})"
         around = f"{place} * posed({arguments[0]}, {axes})" if place else f"posed({arguments[0]}, {axes})"
@@ -222,7 +271,7 @@ def _step(step: Solid | Repetition, depth: int, place: str) -> Iterator[str]:
         half = [f"-({arguments[1]})[{k}] / 2" for k in range(3)]
         half[1] += lean
         arguments[0] = f"[{', '.join(half)}]" if step.kind == "cuboid" else "(0, 0, 0)"
-    call = f"{function}({', '.join([*arguments, *([step.shell] if step.shell else [])])})"
+    call = f"{step.kind}({', '.join([*arguments, *([step.shell] if step.shell else [])])})"
     name = step.name.rpartition("_")[0]
     shade = "({:.3f}, {:.3f}, {:.3f})".format(*(channel / 255 for channel in colour(step.statement)))
     yield f'{indent}draw("{name}", {shade}, {call}{f", {around}" if around else ""})'

@@ -34,6 +34,71 @@ module cylinder_between(start, end, radius, end_radius = undef) {
       cylinder(h = height, r1 = radius * fuller, r2 = last * fuller, $fn = segments);
 }
 
+// A box from its low corner, turned to the rear by tilt degrees about its bottom front edge.
+module tilted_box(at, size, tilt) {
+  if (min(size) > 0) translate(at) rotate([0, 0, tilt]) cube(size);
+}
+
+// A bar between two points, turned about them by turn degrees: the sides of its section lie along the axes that it runs
+// along least, in their order, and are leaned with it.
+module bar_between(start, end, section, turn) {
+  along = end - start;
+  far = [for (way = along) abs(way)];
+  main = far[0] == max(far) ? 0 : far[1] == max(far) ? 1 : 2;
+  axis = [for (k = [0:2]) k == main ? 1 : 0];
+  size = main == 0 ? [norm(along), section[0], section[1]] :
+         main == 1 ? [section[0], norm(along), section[1]] : [section[0], section[1], norm(along)];
+  leaned = along[main] < 0 ? -along : along;
+  across = cross(axis, leaned);
+  if (min(size) > 0) translate((start + end) / 2)
+    rotate(atan2(norm(across), leaned[main]), across) rotate(turn * axis) cube(size, center = true);
+}
+
+// A round bar along the circle from one point through a second to a third, at most as thick as fills the ring; its
+// prisms have the volume of the true one.
+module arc_through(start, through, end, radius) {
+  middle = (start + end) / 2;
+  half = norm(end - start) / 2;
+  unit = (end - start) / (2 * half);
+  along = (through - middle) * unit;
+  away = through - middle - along * unit;
+  height = norm(away);
+  rest = half * half - along * along - height * height;
+  // How high the circle rises over its chord.
+  rise = 2 * height * half * half / (norm([2 * height * half, rest]) + rest);
+  if (half > 0 && radius > 0) {
+    if (rise > half / 100000) {
+      ring = (half * half + rise * rise) / (2 * rise);
+      angle = 4 * atan2(rise, half);
+      step = angle / segments;
+      fuller = sqrt(2 * PI / segments / sin(360 / segments) * step * PI / 180 / sin(step));
+      thick = min(min(radius, ring) * fuller, 0.9999 * ring / cos(180 / segments));
+      bulge = away / height;
+      side = cross(bulge, unit);
+      posed(middle + (rise - ring) * bulge, [for (k = [0:2]) [bulge[k], unit[k], side[k]]])
+        rotate([0, 0, -angle / 2]) rotate_extrude(angle = angle, $fn = segments * 360 / angle)
+          translate([ring, 0]) rotate(180 / segments) circle(r = thick, $fn = segments);
+    } else cylinder_between(start, end, radius);
+  }
+}
+
+// A box from its low corner, with rounded edges: a ball of polygons around it, pulled apart.
+module rounded_box(at, size, edge) {
+  radius = min(edge, min(size) / 2);
+  last = segments / 2 - 1;
+  step = 360 / segments;
+  fuller = 1 / cos(step / 2);
+  if (min(size) > 0 && radius > 0) {
+    points = [for (tilt = [step / 2:step:180], a = [step / 2:step:360])
+      let (way = [cos(tilt), sin(tilt) * cos(a) * fuller, sin(tilt) * sin(a) * fuller])
+        [for (n = [0:2]) at[n] + size[n] / 2 + sign(way[n]) * (size[n] / 2 - radius) + way[n] * radius * fuller]];
+    caps = [[for (j = [1:segments]) segments - j], [for (j = [0:segments - 1]) last * segments + j]];
+    sides = [for (k = [0:last - 1], j = [0:segments - 1])
+      let (a = k * segments + j, b = k * segments + (j + 1) % segments) [a, b, b + segments, a + segments]];
+    polyhedron(points = points, faces = concat(caps, sides), convexity = 2);
+  } else cuboid(at, size);
+}
+
 // Any other solid: its mesh in a box of half extents 1, stretched and put at its centre.
 module shell(centre, half, mesh) {
   if (min(half) > 0) translate(centre) scale(half) polyhedron(points = mesh[0], faces = mesh[1], convexity = 10);
@@ -125,15 +190,10 @@ def _step(step: Solid | Repetition, depth: int) -> Iterator[str]:
 
 
 def _call(step: Solid) -> str:
-    arguments = list(step.arguments)
-    if step.kind in ("cylinder", "frustum"):
-        return f"cylinder_between({', '.join(arguments)})"
-    around = ""
+    arguments, around = list(step.arguments), ""
     if step.axes is not None:
         axes = ", ".join(f"[{', '.join(number(round(value, 12)) for value in row)}]" for row in step.axes)
         around = f"posed({arguments[0]}, [{axes}]) "
         lean = f" - [0, {arguments[2]} / 2, 0]" if len(arguments) > 2 else ""
         arguments[0] = f"-{arguments[1]} / 2{lean}" if step.kind == "cuboid" else "[0, 0, 0]"
-    if step.kind == "cuboid":
-        return f"{around}cuboid({', '.join(arguments)})"
-    return f"{around}shell({', '.join(arguments)}, {step.shell})"
+    return f"{around}{step.kind}({', '.join([*arguments, *([step.shell] if step.shell else [])])})"

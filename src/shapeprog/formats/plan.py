@@ -171,7 +171,8 @@ def _solid(piece: Piece, name: str, statement: int, slots: tuple[str, ...], made
 def _vector(group: tuple[Affine, ...], slots: tuple[str, ...]) -> str:
     words = [one.text(slots) for one in group]
     stem = words[0].partition("[")[0]
-    return stem if words == [f"{stem}[{place}]" for place in range(3)] else f"[{', '.join(words)}]"
+    whole = [slot for slot in slots if slot.startswith(f"{stem}[")]
+    return stem if words == whole else f"[{', '.join(words)}]"
 
 
 def _steps(each: _Named, depth: int, made: Plan) -> list[Solid | Repetition]:

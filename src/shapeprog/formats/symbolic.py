@@ -55,11 +55,12 @@ class Piece:
     Parameters
     ----------
     kind
-        ``cuboid``, ``cylinder``, ``frustum`` or, for every other primitive, ``shell``.
+        The function of a script that draws it: that of its :class:`~shapeprog.geometry.batch.Form`, or else ``cuboid``,
+        ``cylinder_between`` or, for every other primitive, ``shell``.
     groups
-        The vectors and numbers that place and shape it: for a cuboid its low corner, its extents and its lean; for a
-        cylinder both ends and its radius, for a frustum both radii; for a shell its centre and the half extents of its
-        local box.
+        The vectors and numbers that place and shape it: the arguments of its form; for a cuboid its low corner, its
+        extents and its lean; for a cylinder both ends and its radius, for a frustum both radii; for a shell its centre
+        and the half extents of its local box.
     axes
         Its local axes as columns (3, 3), where they are not those of the grid and the groups do not tell them.  A
         cuboid with axes has its centre in place of the corner.
@@ -190,13 +191,17 @@ class _Measured:
 def _measured(solids: Solids) -> _Measured:
     size, centre = solids.size.numpy(), solids.centre.numpy()
     rows = len(size)
+    if solids.form is not None:
+        groups = [argument.numpy().reshape(rows, -1) for argument in solids.form.arguments]
+        widths = tuple(group.shape[1] for group in groups)
+        return _Measured(solids.form.name, widths, np.concatenate(groups, 1), np.zeros((rows, 0)))
     rotation = np.tile(np.eye(3), (rows, 1, 1)) if solids.rotation is None else solids.rotation.numpy()
     turned = bool(np.abs(rotation - np.eye(3)).max() > 0)
     name = primitives[solids.kind].name
     if name in ("cylinder", "frustum"):
         reach, radii = rotation[..., 0] * size[:, :1], size[:, 1 : 2 if name == "cylinder" else 3]
         linear = np.concatenate([centre - reach, centre + reach, radii], 1)
-        return _Measured(name, (3, 3, *[1] * radii.shape[1]), linear, np.zeros((rows, 0)))
+        return _Measured("cylinder_between", (3, 3, *[1] * radii.shape[1]), linear, np.zeros((rows, 0)))
     axes, still = (rotation[0], rotation.reshape(rows, 9)) if turned else (None, np.zeros((rows, 0)))
     if name == "cuboid":
         low = centre - size[:, :3]

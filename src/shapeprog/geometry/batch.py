@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, fields
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
 import torch
 from jaxtyping import Bool, Float, Int
@@ -15,18 +15,28 @@ from shapeprog.geometry.primitive import SIZES
 Some = TypeVar("Some", bound="Batch")
 
 
+class Form(NamedTuple):
+    """How a solid was constructed: the name of the construction, a function of scripts that are exported, and its
+    arguments (...) or (..., width) in order."""
+
+    name: str
+    arguments: tuple[Tensor, ...]
+
+
 @dataclass(frozen=True)
 class Solids:
     """Primitives of one kind as a statement returns them, in cells of the grid frame, with any leading dimensions.
 
     ``kind`` is the number in the registry; sizes are in the order that the primitive declares; the columns of
-    ``rotation`` are the local axes, ``None`` when they are those of the grid.
+    ``rotation`` are the local axes, ``None`` when they are those of the grid.  A ``form`` tells exports how the solid
+    follows from numbers that it is not linear in; nothing is drawn from it.
     """
 
     kind: int
     size: Float[Tensor, "*batch 4"]
     centre: Float[Tensor, "*batch 3"]
     rotation: Float[Tensor, "*batch 3 3"] | None = None
+    form: Form | None = None
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+import torch
 
 from shapeprog.errors import ShapeProgError
 from shapeprog.geometry.arrays import array
@@ -14,8 +15,9 @@ from shapeprog.geometry.primitive import Mesh as Triangles
 from shapeprog.geometry.primitive import primitives
 from shapeprog.space import Array, FloatArray
 
-FLAT = 1e-6
-"""A part that is thinner than this, in cells, has no solid to mesh and is left out."""
+FLAT = 1e-5
+"""A part that is thinner than this, in cells, or fills less than this share of the box around it, has no solid to mesh
+and is left out.  It is well above the lengths that primitives take for zero."""
 
 FARTHEST = 1 << 24
 """Coordinates in cells up to which parts are meshed: files of meshes hold single precision, which ends to tell one cell
@@ -63,8 +65,10 @@ def part_meshes(scene: Batch) -> list[PartMesh]:
     size, centre, rotation = (array(t.double()) for t in (scene.size, scene.centre, scene.rotation))
     for kind in scene.kinds:
         here, declared = array(scene.kind) == kind, primitives[kind]
-        reach[here] = array(declared.bound(scene.size.detach()))[here]
-        solid[here] &= (reach[here] > FLAT).all(-1) & (size[here, : declared.extents] > FLAT).all(-1)
+        of_kind = torch.tensor(size[here])
+        reach[here] = array(declared.bound(of_kind))
+        filled = array(declared.volume(of_kind)) / (2 * reach[here].clip(FLAT)).prod(-1)
+        solid[here] &= (reach[here] > FLAT).all(-1) & (filled > FLAT)
     far = solid & ~((np.abs(centre) + np.linalg.norm(reach, axis=-1, keepdims=True)).max(-1, initial=0) <= FARTHEST)
     if far.any():
         raise ShapeProgError(

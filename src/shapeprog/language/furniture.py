@@ -5,16 +5,10 @@ A solid says what a part looks like, a role what it is for: ``leg(taper(...))``,
 
 from __future__ import annotations
 
-import torch
 from torch import Tensor
 from torch.nn.functional import one_hot
 
 from shapeprog.geometry.batch import Solids
-from shapeprog.geometry.primitive import safe_norm
-from shapeprog.geometry.primitives.arc import ARC
-from shapeprog.geometry.primitives.cuboid import CUBOID
-from shapeprog.geometry.primitives.frustum import FRUSTUM
-from shapeprog.geometry.primitives.rounded_box import ROUNDED_BOX
 from shapeprog.language import hints, shapes
 from shapeprog.language.parameters import (
     Angle,
@@ -30,8 +24,6 @@ from shapeprog.language.parameters import (
 )  # fmt: skip
 from shapeprog.language.statement import Motion, loop, role, statement
 
-FLAT = 1e-6  # cells below which three points are in line
-
 
 @statement("box", id=64, taught=False, hint=hints.upright_box)
 def box(at: Position, size: Extent) -> Solids:
@@ -43,25 +35,14 @@ def box(at: Position, size: Extent) -> Solids:
 def board(at: Position, size: Extent, tilt: Angle) -> Solids:
     """A board from the low, front, left corner that it has upright, then leaned to the rear by ``tilt`` degrees
     about its bottom front edge."""
-    angle = torch.deg2rad(tilt)
-    sin, cos, zero, one = angle.sin(), angle.cos(), torch.zeros_like(tilt), torch.ones_like(tilt)
-    rotation = torch.stack([cos, -sin, zero, sin, cos, zero, zero, zero, one], -1).unflatten(-1, (3, 3))
-    half = size / 2
-    return shapes.solid(CUBOID, at + (rotation @ half[..., None])[..., 0], *half.unbind(-1), rotation=rotation)
+    return shapes.tilted_box(at, size, tilt)
 
 
 @statement("bar", id=66, taught=False, hint=hints.straight_bar)
 def bar(start: Position, end: Position, section: Section, turn: Angle = 0) -> Solids:  # type: ignore[assignment]
     """A straight bar between two points: the two sides of its section lie along the grid axes that it runs along least,
     in their order, and are turned about it by ``turn`` degrees."""
-    along = end - start
-    length = safe_norm((along**2).sum(-1))
-    main = along.detach().abs().argmax(-1)
-    first, second = torch.where(main == 0, 1, 0), torch.where(main == 2, 1, 2)
-    half = length[..., None] * one_hot(main, 3) + section[..., :1] * one_hot(first, 3)
-    half = (half + section[..., 1:] * one_hot(second, 3)) / 2
-    rotation = shapes.leaned(along, main) @ shapes.about_axis(main, turn)
-    return shapes.solid(CUBOID, (start + end) / 2, *half.unbind(-1), rotation=rotation)
+    return shapes.bar_between(start, end, section, turn)
 
 
 @statement("cylinder", id=67, taught=False, hint=hints.upright_cylinder)
@@ -79,33 +60,19 @@ def rod(start: Position, end: Position, radius: Radius) -> Solids:
 @statement("taper", id=69, taught=False, hint=hints.tapered_rod)
 def taper(start: Position, end: Position, radius: Radii) -> Solids:
     """A round rod between two points with a radius at each of them."""
-    along = end - start
-    half = safe_norm((along**2).sum(-1)) / 2
-    return shapes.solid(FRUSTUM, (start + end) / 2, half, *radius.unbind(-1), rotation=shapes.align(along))
+    return shapes.cone_between(start, end, radius)
 
 
 @statement("bent_rod", id=70, taught=False, hint=hints.bent)
 def bent_rod(start: Position, through: Position, end: Position, radius: Radius) -> Solids:
     """A round rod along the circle from one point through a second to a third."""
-    chord, middle = end - start, (start + end) / 2
-    frame = shapes.align(chord)
-    half = safe_norm((chord**2).sum(-1)) / 2
-    along = ((through - middle) * frame[..., 0]).sum(-1)
-    away = through - middle - along[..., None] * frame[..., 0]
-    height = safe_norm((away**2).sum(-1))
-    bulge = torch.where((height > FLAT)[..., None], away / height[..., None], frame[..., 1])
-    # The height of the circle over its chord; nothing cancels where the three points are nearly in line.
-    rest = half**2 - along**2 - height**2
-    root = safe_norm(4 * height**2 * half**2 + rest**2)
-    sagitta = 2 * height * half**2 / (root + rest).clamp(min=1e-9)
-    rotation = torch.stack([frame[..., 0], bulge, torch.linalg.cross(frame[..., 0], bulge)], -1)
-    return shapes.solid(ARC, middle + bulge * sagitta[..., None] / 2, half, radius, sagitta, rotation=rotation)
+    return shapes.arc_through(start, through, end, radius)
 
 
 @statement("cushion", id=71, taught=False, hint=hints.rounded)
 def cushion(at: Position, size: Extent, edge: Radius) -> Solids:
     """A box with rounded edges, from its low, front, left corner; ``edge`` is the radius of the edges."""
-    return shapes.solid(ROUNDED_BOX, at + size / 2, *(size / 2).unbind(-1), edge)
+    return shapes.rounded_box(at, size, edge)
 
 
 @loop("mirror", id=80, taught=False)

@@ -5,23 +5,35 @@ from __future__ import annotations
 import torch
 from jaxtyping import Float, Int
 from torch import Tensor
+from torch.nn.functional import one_hot
 
-from shapeprog.geometry.batch import Solids
+from shapeprog.geometry.batch import Form, Solids
 from shapeprog.geometry.primitive import SIZES, Primitive, primitives, safe_norm
+from shapeprog.geometry.primitives.arc import ARC
 from shapeprog.geometry.primitives.cuboid import CUBOID
 from shapeprog.geometry.primitives.cylinder import CYLINDER
+from shapeprog.geometry.primitives.frustum import FRUSTUM
+from shapeprog.geometry.primitives.rounded_box import ROUNDED_BOX
+from shapeprog.space import SIDE
 
 Scalar = Float[Tensor, "*batch"]
+Pair = Float[Tensor, "*batch 2"]
 Vector = Float[Tensor, "*batch 3"]
+
+FLAT = 1e-6  # cells below which three points are in line
 
 
 def solid(
-    primitive: Primitive, centre: Vector, *sizes: Scalar, rotation: Float[Tensor, "*batch 3 3"] | None = None
+    primitive: Primitive,
+    centre: Vector,
+    *sizes: Scalar,
+    rotation: Float[Tensor, "*batch 3 3"] | None = None,
+    form: Form | None = None,
 ) -> Solids:
     """A solid of any declared primitive from its sizes in the order it declares them."""
     zero = torch.zeros_like(centre[..., 0])
     padded = [*sizes, *[zero] * (SIZES - len(sizes))]
-    return Solids(primitives.number(primitive), torch.stack(padded, -1), centre, rotation)
+    return Solids(primitives.number(primitive), torch.stack(padded, -1), centre, rotation, form)
 
 
 def cuboid(centre: Vector, half: Vector, lean: Scalar | None = None) -> Solids:
@@ -50,6 +62,59 @@ def bar(start: Vector, end: Vector, radius: Scalar) -> Solids:
     return solid(CYLINDER, (start + end) / 2, safe_norm((along**2).sum(-1)) / 2, radius, rotation=align(along))
 
 
+def cone_between(start: Vector, end: Vector, radii: Pair) -> Solids:
+    """A cone between two points, cut across its axis, with a radius at each of them."""
+    along = end - start
+    half = safe_norm((along**2).sum(-1)) / 2
+    return solid(FRUSTUM, (start + end) / 2, half, *radii.unbind(-1), rotation=align(along))
+
+
+def tilted_box(at: Vector, size: Vector, tilt: Scalar) -> Solids:
+    """A cuboid from its low, front, left corner, turned to the rear by ``tilt`` degrees about its bottom front edge."""
+    form = Form("tilted_box", (at, size, tilt))
+    rotation = about_axis(torch.full_like(tilt, SIDE, dtype=torch.long), tilt)
+    half = size / 2
+    return solid(CUBOID, at + (rotation @ half[..., None])[..., 0], *half.unbind(-1), rotation=rotation, form=form)
+
+
+def bar_between(start: Vector, end: Vector, section: Pair, turn: Scalar) -> Solids:
+    """A cuboid between two points, turned about them by ``turn`` degrees: the sides of its section lie along the grid
+    axes that it runs along least, in their order, and are leaned with it."""
+    form = Form("bar_between", (start, end, section, turn))
+    along = end - start
+    length = safe_norm((along**2).sum(-1))
+    main = along.detach().abs().argmax(-1)
+    first, second = torch.where(main == 0, 1, 0), torch.where(main == 2, 1, 2)
+    half = length[..., None] * one_hot(main, 3) + section[..., :1] * one_hot(first, 3)
+    half = (half + section[..., 1:] * one_hot(second, 3)) / 2
+    rotation = leaned(along, main) @ about_axis(main, turn)
+    return solid(CUBOID, (start + end) / 2, *half.unbind(-1), rotation=rotation, form=form)
+
+
+def arc_through(start: Vector, through: Vector, end: Vector, radius: Scalar) -> Solids:
+    """A round rod along the circle from one point through a second to a third."""
+    form = Form("arc_through", (start, through, end, radius))
+    chord, middle = end - start, (start + end) / 2
+    frame = align(chord)
+    half = safe_norm((chord**2).sum(-1)) / 2
+    along = ((through - middle) * frame[..., 0]).sum(-1)
+    away = through - middle - along[..., None] * frame[..., 0]
+    height = safe_norm((away**2).sum(-1))
+    bulge = torch.where((height > FLAT)[..., None], away / height[..., None], frame[..., 1])
+    # The height of the circle over its chord; nothing cancels where the three points are nearly in line.
+    rest = half**2 - along**2 - height**2
+    root = safe_norm(4 * height**2 * half**2 + rest**2)
+    sagitta = 2 * height * half**2 / (root + rest).clamp(min=1e-9)
+    rotation = torch.stack([frame[..., 0], bulge, torch.linalg.cross(frame[..., 0], bulge)], -1)
+    return solid(ARC, middle + bulge * sagitta[..., None] / 2, half, radius, sagitta, rotation=rotation, form=form)
+
+
+def rounded_box(at: Vector, size: Vector, edge: Scalar) -> Solids:
+    """A box from its low, front, left corner, with edges rounded to the radius ``edge``."""
+    form = Form("rounded_box", (at, size, edge))
+    return solid(ROUNDED_BOX, at + size / 2, *(size / 2).unbind(-1), edge, form=form)
+
+
 def align(direction: Vector) -> Float[Tensor, "*batch 3 3"]:
     """A rotation whose first column points along ``direction``; up for a zero vector.
 
@@ -59,7 +124,7 @@ def align(direction: Vector) -> Float[Tensor, "*batch 3 3"]:
     up = torch.zeros_like(direction)
     up[..., 0] = 1
     first = torch.where(length > 1e-9, direction / length, up)
-    helper = torch.nn.functional.one_hot(first.detach().abs().argmin(-1), 3).to(direction)
+    helper = one_hot(first.detach().abs().argmin(-1), 3).to(direction)
     second = torch.linalg.cross(first, helper)
     second = second / safe_norm((second**2).sum(-1, keepdim=True))
     return torch.stack([first, second, torch.linalg.cross(first, second)], -1)
@@ -71,7 +136,7 @@ def leaned(direction: Vector, axis: Int[Tensor, "*batch"]) -> Float[Tensor, "*ba
     The other two columns are the other grid axes, leaned as little as can be.
     """
     length = safe_norm((direction**2).sum(-1, keepdim=True))
-    main = torch.nn.functional.one_hot(axis, 3).to(direction)
+    main = one_hot(axis, 3).to(direction)
     along = torch.where(length > 1e-9, direction / length, main)
     along = along * torch.where((along * main).sum(-1, keepdim=True) < 0, -1.0, 1.0).to(along)
     cross = _cross(torch.linalg.cross(main, along))
@@ -82,7 +147,7 @@ def leaned(direction: Vector, axis: Int[Tensor, "*batch"]) -> Float[Tensor, "*ba
 def about_axis(axis: Int[Tensor, "*batch"], degrees: Scalar) -> Float[Tensor, "*batch 3 3"]:
     """Rotation about a grid axis, counter-clockwise seen from its end."""
     angle = torch.deg2rad(degrees)[..., None, None]
-    cross = _cross(torch.nn.functional.one_hot(axis, 3).to(angle))
+    cross = _cross(one_hot(axis, 3).to(angle))
     return torch.eye(3, device=angle.device).to(angle) + angle.sin() * cross + (1 - angle.cos()) * cross @ cross
 
 

@@ -71,7 +71,10 @@ def mesh(size: FloatArray) -> Mesh:
 
 
 def frustum_mesh(half_height: float, bottom: float, top: float) -> Mesh:
-    """A frustum over regular polygons with the areas of the circles, so that the volume is exact."""
+    """A frustum over regular polygons with the areas of the circles, so that the volume is exact.
+
+    A circle without radius is one vertex.
+    """
     step = 2 * math.pi / SEGMENTS
     angle = step * np.arange(SEGMENTS)
     low, high = (radius * math.sqrt(step / math.sin(step)) for radius in (bottom, top))
@@ -80,7 +83,14 @@ def frustum_mesh(half_height: float, bottom: float, top: float) -> Mesh:
     a = np.arange(SEGMENTS)
     b, foot, head = (a + 1) % SEGMENTS, np.full(SEGMENTS, 2 * SEGMENTS), np.full(SEGMENTS, 2 * SEGMENTS + 1)
     sides = [(a, b, b + SEGMENTS), (a, b + SEGMENTS, a + SEGMENTS), (foot, b, a), (head, a + SEGMENTS, b + SEGMENTS)]
-    return vertices, np.concatenate([np.stack(side, 1) for side in sides]).astype(np.int64)
+    vertex = np.arange(len(vertices))
+    if bottom <= 0:
+        vertex[:SEGMENTS] = foot
+    if top <= 0:
+        vertex[SEGMENTS : 2 * SEGMENTS] = head
+    faces = vertex[np.concatenate([np.stack(side, 1) for side in sides])]
+    used, faces = np.unique(faces[(faces != np.roll(faces, 1, 1)).all(1)], return_inverse=True)
+    return vertices[used], faces.reshape(-1, 3).astype(np.int64)
 
 
 def volume(size: Sizes) -> Scalars:

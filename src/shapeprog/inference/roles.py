@@ -1,0 +1,177 @@
+"""What the parts of a program are for: a role for every drawing statement, by rules that look at its solids alone.
+
+First it is seen what the whole is: something to sit on, or a bed, has a main surface that something rises behind; all
+else is a table or a case.  Then the first rule of its list that fits a solid gives it a role; copies of one statement
+have one role, that of most of their surface.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from shapeprog.inference.measures import Mask, Parts
+from shapeprog.language.program import Draw, Loop, Node, Program
+from shapeprog.language.statement import language
+from shapeprog.language.unroll import unroll
+from shapeprog.space import DEPTH, SIDE, UP, Array
+
+Rule = tuple[str, Callable[[Parts], Mask]]
+
+BACKED = 0.12
+"""Share of the height by which the back of a seat rises above it."""
+
+BROAD = 0.4
+"""Share of the width of the main surface that a back is wide, with all its posts and rails."""
+
+LOW = 0.6
+"""A bed is at most this share of its depth high."""
+
+MANY = 3
+"""So many equal parts are slats."""
+
+
+def anything(p: Parts) -> Mask:
+    """Whatever is left."""
+    return np.ones(p.count, bool)
+
+
+STANDING: tuple[Rule, ...] = (
+    # What carries a main surface, or hangs below it.
+    ("pedestal", lambda p: p.below & p.central & p.upright),
+    ("foot", lambda p: p.below & p.grounded & ~p.level & p.small),
+    ("leg", lambda p: p.below & p.upright),
+    ("base", lambda p: p.below & p.slender & (p.grounded | p.on_pedestal)),
+    ("apron", lambda p: (p.below | p.beside) & p.level & (p.top >= p.main_low[UP] - 1.5 * p.near)),
+    ("stretcher", lambda p: p.below & p.level),
+    ("leg", lambda p: p.below & p.slender & p.grounded),
+    ("brace", lambda p: p.below & p.slender),
+    ("leg", lambda p: p.below & p.facing_side & (p.aside > 0.25)),
+    ("panel", lambda p: p.below & (p.facing_side | p.facing_front)),
+    ("leg", lambda p: p.below),
+)
+
+SEATING: tuple[Rule, ...] = (
+    ("base", lambda p: p.below & p.grounded & (p.top < p.main_high[UP] + p.near) & (p.span > 0.3) & ~p.slender),
+    ("shelf", lambda p: p.wide & p.below & (p.top < p.main_low[UP] - 1.5 * p.near)),
+    ("cushion", lambda p: p.wide & p.beside & p.padded & (p.bottom >= p.main_low[UP] - p.near)),
+    ("seat", lambda p: p.wide & (p.main | p.beside | p.below) & (p.top <= p.main_high[UP] + 2 * p.near)),
+    # What goes on above the seat from the ground is a leg all the same.
+    ("leg", lambda p: p.rising & p.grounded & p.upright),
+    # Behind: a back, its rails and slats, its posts.
+    ("rail", lambda p: p.rising & p.behind & (p.span >= 0.5) & p.level & (p.equal < MANY)),
+    ("slat", lambda p: p.rising & p.behind & (p.span >= 0.5) & p.level),
+    ("back", lambda p: p.rising & p.behind & (p.span >= 0.5)),
+    # Beside: arm rests and what carries them.
+    ("arm_post", lambda p: p.rising & (p.aside > 0.3) & (p.rear < 0.25) & p.upright),
+    ("arm", lambda p: p.rising & (p.aside > 0.3) & ((p.rear < 0.25) | (p.run > 0.5))),
+    ("arm", lambda p: (p.top >= p.main_high[UP]) & ~p.slender & (p.aside > 0.4) & (p.run > 0.5)),
+    ("slat", lambda p: p.rising & p.upright & (p.aside < 0.35) & (p.equal >= MANY)),
+    ("post", lambda p: p.rising & p.slender),
+    ("back", lambda p: p.rising),
+    *STANDING,
+    ("panel", lambda p: p.facing_side | p.facing_front),
+    ("block", anything),
+)
+
+BED: tuple[Rule, ...] = (
+    ("headboard", lambda p: p.rising & p.facing_front & (p.span >= 0.6) & (p.rear > 0.25)),
+    ("footboard", lambda p: p.facing_front & (p.span >= 0.6) & (p.rear < -0.25)),
+    ("base", lambda p: p.below & p.wide & p.grounded),
+    ("mattress", lambda p: p.wide & ~p.below & (p.top <= p.main_high[UP] + 2 * p.near)),
+    ("base", lambda p: p.below & p.wide),
+    ("pillow", lambda p: p.above & ~p.slender & (p.run <= 0.5)),
+    ("rail", lambda p: p.rising & p.behind & p.level),
+    ("slat", lambda p: p.rising & p.behind & p.upright & (p.aside < 0.35)),
+    ("post", lambda p: p.rising & p.slender),
+    ("side", lambda p: (p.aside > 0.3) & (p.run >= 0.5)),
+    ("slat", lambda p: p.level & (p.equal >= MANY)),
+    *STANDING,
+    ("body", anything),
+)
+
+CASE: tuple[Rule, ...] = (
+    # Lying boards: the highest is the top, one on the ground the base.
+    ("top", lambda p: p.wide & (p.top >= p.floor + p.size[UP] - p.near) & (p.up <= 0.3 * p.size[UP])),
+    ("base", lambda p: p.wide & p.flat & (p.grounded | (p.cased & p.lowest))),
+    ("shelf", lambda p: p.wide & p.flat),
+    # Standing boards: at the sides, within, behind and in front.
+    ("side", lambda p: p.facing_side & p.outermost & (p.long >= 0.3 * p.size[UP])),
+    ("panel", lambda p: p.facing_side),
+    ("base", lambda p: p.facing_front & p.in_front & p.grounded & (p.span >= 0.6) & (p.up <= 0.15 * p.size[UP])),
+    ("door", lambda p: p.facing_front & p.in_front & p.cased & (p.up >= p.side)),
+    ("drawer", lambda p: p.facing_front & p.in_front & p.cased),
+    ("side", lambda p: p.facing_front & p.grounded & (np.abs(p.rear) > 0.25) & (p.equal > 1) & ~p.cased),
+    ("panel", lambda p: p.facing_front),
+    # Sticks.
+    ("handle", lambda p: p.small & (p.rear < -0.4) & ~p.grounded),
+    ("foot", lambda p: p.grounded & ~p.level & p.small),
+    ("pedestal", lambda p: p.upright & p.central),
+    ("leg", lambda p: p.upright & p.grounded),
+    ("post", lambda p: p.upright),
+    ("base", lambda p: p.level & p.grounded),
+    ("leg", lambda p: p.slender & p.grounded),
+    ("apron", lambda p: p.level & (p.top >= p.floor + 0.8 * p.size[UP])),
+    ("stretcher", lambda p: p.level),
+    ("brace", lambda p: p.slender),
+    # Bodies.
+    ("body", lambda p: p.bulky),
+    ("drawer", lambda p: p.cased & p.in_front),
+    ("block", anything),
+)
+
+
+def with_roles(program: Program) -> Program:
+    """The program with a role for every plain solid; what has a role, or is a statement of one, keeps it.
+
+    A box that is a leg is written as the statement ``leg``.
+    """
+    scene = unroll(program)
+    if not scene.mask.any():
+        return program
+    roles = iter(_roles_of_blocks(Parts(scene), program.blocks))
+    return Program(tuple(_named(node, roles) for node in program.body))
+
+
+def roles_of(parts: Parts) -> Array:
+    """The role of each part (N,)."""
+    found = np.full(parts.count, "", object)
+    for role, fits in _rules(parts):
+        found[(found == "") & fits(parts)] = role
+    return found
+
+
+def _roles_of_blocks(parts: Parts, blocks: int) -> list[str]:
+    """The role of each block: that of most of the surface of its copies, none where it draws nothing."""
+    shares: list[dict[str, float]] = [{} for _ in range(blocks)]
+    for block, role, surface in zip(parts.block.tolist(), roles_of(parts), parts.surface.tolist(), strict=True):
+        shares[block][role] = shares[block].get(role, 0.0) + surface
+    return [max(share, key=share.__getitem__, default="") for share in shares]
+
+
+def _named(node: Node, roles: Iterator[str]) -> Node:
+    """The node with the next roles, which are those of the drawing statements in it, in their order."""
+    if isinstance(node, Loop):
+        return replace(node, body=tuple(_named(inner, roles) for inner in node.body))
+    role = next(roles)
+    if node.role or role not in language().roles or language()[node.name].hint is None:
+        return node
+    if (node.name, role) == ("box", "leg"):
+        return Draw("leg", node.values)
+    return replace(node, role="" if role == node.name else role)
+
+
+def _rules(p: Parts) -> tuple[Rule, ...]:
+    """The rules for what the whole seems to be."""
+    if p.count == 1:
+        return (("body", anything),)
+    back = p.rising & (p.rear > 0.1) & (p.aside < 0.6)
+    if not p.main.any() or not back.any():
+        return CASE
+    width = p.high[back, SIDE].max() - p.low[back, SIDE].min()
+    height = p.top[back].max() - p.main_high[UP]
+    if height < BACKED * p.size[UP] or width < BROAD * (p.main_high[SIDE] - p.main_low[SIDE]):
+        return CASE
+    return BED if p.size[DEPTH] > p.size[SIDE] and p.size[UP] < LOW * p.size[DEPTH] else SEATING

@@ -1,0 +1,169 @@
+"""Roles: what a person would call the parts of furniture made by hand, however it is written."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+
+import shapeprog as sp
+from shapeprog.geometry.primitive import primitives
+from shapeprog.inference import roles
+from shapeprog.inference.roles import with_roles
+from shapeprog.language.hints import Box, straight_bar, upright_box
+from shapeprog.language.program import Draw, Program
+from shapeprog.language.statement import language
+
+CHAIR = """
+for i in mirror(side):
+    box(at=(-12, -6, 4), size=(10, 1.2, 1.2))  # leg
+    bar(start=(-12, 6, 4.6), end=(12, 8, 4.6), section=(1.2, 1.2))  # leg
+    bar(start=(-8, -5, 4.6), end=(-8, 6, 4.6), section=(0.8, 0.8))  # stretcher
+    box(at=(2, -6, 5), size=(0.8, 12.5, 1.4))  # arm
+    box(at=(-2, -5, 5), size=(4, 1, 1))  # arm_post
+box(at=(-2, -6.5, -6), size=(1.5, 13, 12))  # seat
+box(at=(8, 7, -4), size=(2, 0.8, 8))  # rail
+box(at=(-3.5, -5.8, -4), size=(1.5, 0.6, 8))  # apron
+for i in translate(5, by=(0, 0, 1.5)):
+    box(at=(-0.5, 6.6, -3.2), size=(8.5, 0.5, 0.5))  # slat
+"""
+
+STOOL_BACK = """
+cylinder(at=(-0.5, -1, 0), height=1.5, radius=6)  # seat
+cylinder(at=(-10, -1, 0), height=9.5, radius=0.8)  # pedestal
+for i in rotate(5, step=2):
+    box(at=(-12, -1, -0.5), size=(1.5, 6, 1))  # base
+for i in mirror(side):
+    rod(start=(0, 4, 3), end=(8, 5, 3), radius=0.4)  # post
+board(at=(6, 4.5, -5), size=(6, 0.8, 10), tilt=8)  # back
+"""
+
+TABLE = """
+box(at=(7, -8, -12), size=(1, 16, 24))  # top
+for i in mirror(depth):
+    for j in mirror(side):
+        taper(start=(-9, 7, 11), end=(7, 7, 11), radius=(0.4, 0.9))  # leg
+    box(at=(5.5, 6, -10.5), size=(1.5, 0.5, 21))  # apron
+bar(start=(-5, 0, -11), end=(-5, 0, 11), section=(0.6, 0.6))  # stretcher
+box(at=(-2, -7, -11), size=(0.5, 14, 22))  # shelf
+bar(start=(-6, 7, -8), end=(5, 7, 2), section=(0.5, 0.5))  # brace
+"""
+
+BOOKCASE = """
+for i in mirror(side):
+    box(at=(-12, -4, 7), size=(24, 8, 0.6))  # side
+box(at=(11.4, -4, -7), size=(0.6, 8, 14))  # top
+box(at=(-12, -4, -7), size=(0.6, 8, 14))  # base
+for i in translate(3, by=(6, 0, 0)):
+    box(at=(-6, -3.8, -7), size=(0.5, 7.5, 14))  # shelf
+box(at=(-12, 3.7, -7), size=(24, 0.3, 14))  # panel
+"""
+
+CABINET = """
+for i in mirror(side):
+    box(at=(-10, -5, 11), size=(20, 10, 0.8))  # side
+    box(at=(-9, -5.3, 0.1), size=(12, 0.4, 11))  # door
+    box(at=(-3, -5.9, 1), size=(2, 0.6, 0.3))  # handle
+    for j in mirror(depth):
+        box(at=(-12, 3, 9), size=(2, 1.5, 1.5))  # foot
+box(at=(10, -5.5, -12), size=(0.8, 11, 24))  # top
+box(at=(-10, -5, -11), size=(0.8, 10, 22))  # base
+box(at=(-9, 4.8, -11), size=(19, 0.3, 22))  # panel
+for i in translate(2, by=(0, 0, 11.2)):
+    box(at=(4, -5.3, -11.1), size=(5, 0.4, 10.8))  # drawer
+"""
+
+BED = """
+box(at=(-3, -11, -8), size=(3, 21, 16))  # mattress
+box(at=(-6, 10.5, -9), size=(12, 1, 18))  # headboard
+box(at=(-6, -12, -9), size=(6, 1, 18))  # footboard
+for i in mirror(side):
+    box(at=(-4.5, -11, 8.2), size=(3, 21.5, 0.6))  # side
+    box(at=(0, 5.5, 0.8), size=(1.2, 4, 6))  # pillow
+    for j in mirror(depth):
+        box(at=(-7.5, 10, 7.5), size=(3, 1, 1))  # leg
+"""
+
+SOFA = """
+box(at=(-5, -5, -10), size=(3, 10, 20))  # seat
+for i in mirror(side):
+    cushion(at=(-2, -5, 0.1), size=(2, 8, 9.8), edge=0.5)  # cushion
+    box(at=(-5, -5, 10), size=(7, 11, 2))  # arm
+    for j in mirror(depth):
+        cylinder(at=(-6.5, 4, 11), height=1.5, radius=0.5)  # foot
+box(at=(-5, 4, -10), size=(12, 2, 20))  # back
+"""
+
+WHOLE = [CHAIR, STOOL_BACK, TABLE, BOOKCASE, CABINET, BED, SOFA]
+NAMES = ["chair", "swivel chair", "table", "bookcase", "cabinet", "bed", "sofa"]
+
+
+def wanted(text: str) -> list[str]:
+    return [line.split("#")[1].strip() for line in text.splitlines() if "#" in line]
+
+
+def words(program: Program) -> list[str]:
+    return [node.word for node in program.walk() if isinstance(node, Draw)]
+
+
+def copies(program: Program, scale: float = 1, shift: float = 0) -> tuple[Program, list[int]]:
+    """A box or bar about each copy that a program draws, and the blocks they come from."""
+    scene = sp.unroll(program)
+    half = torch.stack([primitives[int(k)].bound(size) for k, size in zip(scene.kind, scene.size, strict=True)])
+    drawn = []
+    for centre, rotation, each in zip(scene.centre, scene.rotation, half, strict=True):
+        box = Box(scale * centre.double().numpy() + shift, rotation.double().numpy(), scale * each.double().numpy())
+        values = next(upright_box(box), None)
+        name = "bar" if values is None else "box"
+        values = next(straight_bar(box)) if values is None else values
+        drawn.append(Draw(name, tuple(float(np.float32(value)) for value in values)))
+    return Program(tuple(drawn)), scene.block.tolist()
+
+
+@pytest.mark.parametrize("text", WHOLE, ids=NAMES)
+def test_parts_get_the_roles_a_person_would_give(text: str) -> None:
+    assert words(with_roles(sp.parse(text))) == wanted(text)
+
+
+@pytest.mark.parametrize("text", WHOLE, ids=NAMES)
+@pytest.mark.parametrize(("scale", "shift"), [(1, 0), (0.6, 1.5)])
+def test_copies_written_one_by_one_as_boxes_of_any_size_and_place_get_the_same_roles(
+    text: str, scale: float, shift: float
+) -> None:
+    alone, block = copies(sp.parse(text), scale, shift)
+    assert words(with_roles(alone)) == [wanted(text)[each] for each in block]
+
+
+def test_a_single_solid_is_a_body() -> None:
+    assert words(with_roles(sp.parse("box(at=(-12, -3, -2), size=(24, 6, 4))"))) == ["body"]
+
+
+def test_a_program_that_draws_nothing_stays_as_it_is() -> None:
+    for text in (
+        "",
+        "box(at=(0, 0, 0), size=(-1, 2, 2))",
+        "for i in translate(0, by=(0, 0, 1)):\n    rod(start=(0, 0, 0), end=(1, 0, 0), radius=1)",
+    ):
+        assert with_roles(sp.parse(text)) == sp.parse(text)
+
+
+def test_solids_without_any_extent_are_named_without_a_warning() -> None:
+    with_roles(sp.parse("box(at=(1, 1, 1), size=(0, 0, 0))\ncylinder(at=(1, 1, 1), height=0, radius=0)"))
+
+
+def test_what_has_a_role_keeps_it() -> None:
+    given = sp.parse("arm(box(at=(7, -8, -12), size=(1, 16, 24)))\nlocker(at=(0, -8, -12), size=(1, 16, 24))\n" + TABLE)
+    named = with_roles(given)
+    assert words(named)[:2] == ["arm", "locker"]
+    assert with_roles(named) == named
+
+
+def test_a_box_that_is_a_leg_is_written_as_the_statement() -> None:
+    text = "for i in mirror(side):\n    box(at=(-12, -6, 4), size=(10, 1, 1))\nbox(at=(-2, -8, -8), size=(1, 16, 16))"
+    assert (
+        sp.format_program(with_roles(sp.parse(text))).splitlines()[1].strip() == "leg(at=(-12, -6, 4), size=(10, 1, 1))"
+    )
+
+
+def test_every_role_that_rules_give_is_declared() -> None:
+    assert {role for role, _ in (*roles.SEATING, *roles.BED, *roles.CASE)} <= set(language().roles)

@@ -56,6 +56,9 @@ NEIGHBOURS = 16
 FLAT = 0.25
 """Quantile of the noise about such planes that is believed: at edges and in thin parts they do not fit anyway."""
 
+AGREED = 0.95
+"""Share of the normals known to point outwards, or inwards, that must agree before those of all are believed."""
+
 LOOKING, FREE = 128, 64
 """Cells along each side of the grids in which points look outwards, and in which space is free."""
 
@@ -75,8 +78,10 @@ class Evidence:
     Parameters
     ----------
     points, normals, weights
-        Points (P, 3) to be explained, their unit normals (P, 3), zero where unknown, of either sign; and what each
-        counts (P,), 1 in all.
+        Points (P, 3) to be explained, their unit normals (P, 3), zero where unknown; and what each counts (P,), 1 in
+        all.
+    outward
+        Whose normals are known to point outwards (P,); others are of either sign.
     tolerance, agreement
         A surface explains a point within this distance, if the cosine between the normals is at least this.
     surface, surface_normals, reach
@@ -91,6 +96,7 @@ class Evidence:
     points: FloatArray
     normals: FloatArray
     weights: FloatArray
+    outward: Flags
     tolerance: float
     agreement: float
     surface: FloatArray
@@ -118,12 +124,13 @@ def _of_mesh(vertices: FloatArray, faces: npt.NDArray[np.int64], seed: int) -> E
     normals = (across / np.where(length > 0, length, 1))[face]
     barrier = touched(corners, LOOKING)
     points = surface[:POINTS]
-    seen = visible(points, normals[:POINTS], barrier)
-    weights = np.where(seen, 1.0, HIDDEN)
+    front, back = (visible(points, sign * normals[:POINTS], barrier) for sign in (1, -1))
+    weights = np.where(front | back, 1.0, HIDDEN)
+    facing, known = outward(normals[:POINTS], front, back)
     area = float(length.sum() / 2)
     coarse: Flags = np.any(barrier.reshape((FREE, LOOKING // FREE) * 3), (1, 3, 5))
     return Evidence(
-        points, normals[:POINTS], weights / weights.sum(), TOLERANCE, AGREEMENT, surface, normals,
+        points, facing, weights / weights.sum(), known, TOLERANCE, AGREEMENT, surface, normals,
         _reach(TOLERANCE, area), area * float(weights.mean()), free_cells(coarse, surface, through=False),
     )  # fmt: skip
 
@@ -136,9 +143,11 @@ def _of_points(surface: FloatArray, voxels: Flags, seed: int) -> Evidence:
     reach = _reach(tolerance, area, len(surface))
     fine = voxels.repeat(FREE // RESOLUTION, 0).repeat(FREE // RESOLUTION, 1).repeat(FREE // RESOLUTION, 2)
     free = free_cells(fine, surface, through=True)
-    weights = np.full(len(chosen), 1 / len(chosen))
+    weights, points = np.full(len(chosen), 1 / len(chosen)), surface[chosen]
+    above = 1.5 * RESOLUTION / FREE * normals[chosen]
+    facing, known = outward(normals[chosen], *(_within(free, points + sign * above) for sign in (1, -1)))
     return Evidence(
-        surface[chosen], normals[chosen], weights, tolerance, SCANNED, surface, normals, reach, area, free
+        points, facing, weights, known, tolerance, SCANNED, surface, normals, reach, area, free
     )  # fmt: skip
 
 
@@ -159,8 +168,8 @@ def _of_cells(voxels: Flags) -> Evidence:
     surface, directions = np.concatenate(points), np.concatenate(normals)
     count = len(surface)
     return Evidence(
-        surface, directions, np.full(count, 1 / count), CELL_TOLERANCE, AGREEMENT, surface, directions,
-        _reach(CELL_TOLERANCE, count, count), float(count), ~voxels,
+        surface, directions, np.full(count, 1 / count), np.ones(count, np.bool_), CELL_TOLERANCE, AGREEMENT,
+        surface, directions, _reach(CELL_TOLERANCE, count, count), float(count), ~voxels,
     )  # fmt: skip
 
 
@@ -189,14 +198,32 @@ def touched(triangles: FloatArray, resolution: int) -> Flags:
 
 
 def visible(points: FloatArray, normals: FloatArray, barrier: Flags) -> Flags:
-    """Which points (P,) of a surface can be seen from outside on either side; ``barrier`` are the cells it touches."""
+    """Which points (P,) of a surface can be seen from outside on the side that their normals point to; ``barrier`` are
+    the cells it touches."""
     scale = len(barrier) / RESOLUTION
-    seen = np.zeros(len(points), np.bool_)
-    for side in (-1, 1):
-        offset = side * normals / np.maximum(np.abs(normals).max(1, keepdims=True), 1e-9)
-        starts = (points + HALF) * scale + 1.5 * offset  # out of the cells that the surface itself touches
-        seen |= looking(barrier, starts, directions(DIRECTIONS), 1, through=False)
-    return seen
+    offset = normals / np.maximum(np.abs(normals).max(1, keepdims=True), 1e-9)
+    starts = (points + HALF) * scale + 1.5 * offset  # out of the cells that the surface itself touches
+    return looking(barrier, starts, directions(DIRECTIONS), 1, through=False)
+
+
+def outward(normals: FloatArray, front: Flags, back: Flags) -> tuple[FloatArray, Flags]:
+    """Normals (P, 3) turned outwards, and of which of them it is known where that is (P,).
+
+    It is where only the front or only the back of a point is free; and everywhere, thin parts included, if nearly all
+    such normals agree, as those of a mesh do whose faces are all wound the same way.
+    """
+    known = (front != back) & ((normals**2).sum(1) > 0.25)
+    share = float(front[known].mean()) if known.any() else 0.5
+    if max(share, 1 - share) >= AGREED:
+        return normals * (1.0 if share > 0.5 else -1.0), np.ones(len(known), np.bool_)
+    return normals * np.where(known & back, -1.0, 1.0)[:, None], known
+
+
+def _within(cells: Flags, points: FloatArray) -> Flags:
+    """Which points (P,) of the grid lie in cells that are set."""
+    index = np.floor((points + HALF) * (len(cells) / RESOLUTION)).astype(np.int64).clip(0, len(cells) - 1)
+    found: Flags = cells[tuple(index.T)]
+    return found
 
 
 def free_cells(barrier: Flags, surface: FloatArray, *, through: bool) -> Flags:

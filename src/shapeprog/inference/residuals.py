@@ -1,0 +1,190 @@
+"""How far the surface of a program is from that of a target, pair by pair, and what would mend it.
+
+A point of the target and a sample of the program's surface are a pair when they are close and their normals fit.  The
+residual of a pair is the distance from the point to the surface around the sample, along its normal: sliding along a
+face costs nothing.  What no part explains has no partner nearby, and its weight vanishes (Geman & McClure 1987).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+import torch
+from jaxtyping import Bool, Float, Int
+from scipy.spatial import cKDTree
+from torch import Tensor
+
+from shapeprog.geometry.batch import Batch
+from shapeprog.geometry.distance import nearest_primitive, signed_distance
+from shapeprog.geometry.scene import Scene
+from shapeprog.geometry.surface import sample_surface
+from shapeprog.inference.evidence import Evidence
+from shapeprog.inference.tunable import ROW
+from shapeprog.space import FloatArray
+
+POINTS, SAMPLES = 1_500, 1_500
+"""Points of the target, and samples of the surface of the program, that one step looks at."""
+
+NEAR = 6
+"""Samples among which the partner of a point is found, and points among which that of a sample is."""
+
+TURNED = 0.5
+"""How far away, in cells, a sample of right place counts whose normal is at a right angle to that of the point."""
+
+NEVER = 1e9
+"""The same for a sample that faces the other way than a point whose normal is known to point outwards."""
+
+SAME, OTHER = 0.5, 0.5
+"""Least cosine between normals on one face; and the share of its distance from which a sample leaves a point alone
+that the opposite side of its own part explains: a sheet is evidence for one side of a board, not for both."""
+
+BACK, PLAIN = 0.5, 0.03
+"""Weights, against that of the points of the target, of the samples of the program, and of plain distances of points
+to the union: these alone tell how far a part reaches along a sheet that has no edges."""
+
+
+class Pairs(NamedTuple):
+    """Points of the target (R, 3) with their partners on the surface of the program.
+
+    Parameters
+    ----------
+    points, places, normals, slots
+        The points, the samples and their outward normals (R, 3), and the primitives (R,) that the samples lie on.
+    offset
+        What beside the distance along the normal tells against the pair (R,), squared: how far the two lie apart along
+        the surface, beyond the spacing of samples, and how much their normals differ.
+    weights
+        What each counts (R,).
+    either
+        Whether the normals are parallel and it is not known on which side of its surface the point lies (R,).
+    anywhere
+        Whether the nearest place of the primitive is meant (R,), whatever its normal.
+    """
+
+    points: Float[Tensor, "R 3"]
+    places: Float[Tensor, "R 3"]
+    normals: Float[Tensor, "R 3"]
+    slots: Int[Tensor, " R"]
+    offset: Float[Tensor, " R"]
+    weights: Float[Tensor, " R"]
+    either: Bool[Tensor, " R"]
+    anywhere: Bool[Tensor, " R"]
+
+
+class Pull(NamedTuple):
+    """Sum of weighted squared residuals to second order in the numbers of each primitive, by Gauss and Newton."""
+
+    slope: Float[Tensor, "N 16"]
+    curvature: Float[Tensor, "N 16 16"]
+
+
+class Target:
+    """The evidence, ready to be paired with."""
+
+    def __init__(self, evidence: Evidence) -> None:
+        self.evidence = evidence
+        self._points = torch.from_numpy(evidence.points)
+        normals, sides = evidence.normals, evidence.outward
+        self._normals, self._sides = torch.from_numpy(normals), torch.from_numpy(sides)
+        self._shares = np.cumsum(evidence.weights)
+        unsure = np.flatnonzero(~sides)
+        self._owner = torch.from_numpy(np.concatenate([np.arange(len(sides)), unsure]))
+        self._tree = cKDTree(np.concatenate([
+            _joint(evidence.points, normals), _joint(evidence.points[unsure], -normals[unsure])
+        ]))  # fmt: skip
+
+    def pairs(self, scene: Scene, generator: torch.Generator) -> Pairs:
+        """Pairs both ways, drawn at random: from points to the program, and from its surface to points."""
+        sample = sample_surface(scene, SAMPLES, generator)
+        places, facing = sample.points, sample.normals
+        spacing = 1.5 * math.sqrt(self.evidence.area / min(SAMPLES, len(self._points)))
+        drawn = torch.rand(POINTS, generator=generator, dtype=torch.float64).numpy() * self._shares[-1]
+        some = torch.from_numpy(np.searchsorted(self._shares, drawn).clip(0, len(self._points) - 1))
+        points, normals, sides = self._points[some], self._normals[some], self._sides[some]
+        tree = cKDTree(_joint(places.numpy(), facing.numpy()))
+        near = torch.from_numpy(tree.query(_joint(points.numpy(), normals.numpy()), NEAR)[1])
+        behind = torch.from_numpy(tree.query(_joint(points.numpy(), -normals.numpy()), NEAR)[1])
+        near = torch.cat([near, torch.where(sides[:, None], near, behind)], 1)
+        offset, best = _closest(points[:, None], normals[:, None], sides[:, None], places[near], facing[near], spacing)
+        partner = near.gather(1, best)[:, 0]
+        back = torch.from_numpy(self._tree.query(_joint(places.numpy(), facing.numpy()), NEAR)[1])
+        back = self._owner[back]
+        other, chosen = _closest(
+            self._points[back], self._normals[back], self._sides[back], places[:, None], facing[:, None], spacing
+        )
+        found = back.gather(1, chosen)[:, 0]
+        union = nearest_primitive(scene, points)[0]
+        along = torch.cat([(normals * facing[partner]).sum(1), (self._normals[found] * facing).sum(1)])
+        either = ~torch.cat([sides, self._sides[found]]) & (along.abs() >= SAME)
+        zeros, ones = torch.zeros(POINTS, dtype=torch.float64), torch.ones(POINTS, dtype=torch.float64)
+        return Pairs(
+            torch.cat([points, self._points[found], points]),
+            torch.cat([places[partner], places, points]),
+            torch.cat([facing[partner], facing, normals]),
+            torch.cat([sample.slot[partner], sample.slot, union]),
+            torch.cat([offset, other, zeros]),
+            torch.cat([ones / POINTS, torch.full((SAMPLES,), BACK / SAMPLES).double(), PLAIN * ones / POINTS]),
+            torch.cat([either, torch.zeros(POINTS).bool()]),
+            torch.cat([torch.zeros(POINTS + SAMPLES), ones]).bool(),
+        )
+
+
+def pull(scene: Scene, pairs: Pairs, width: float) -> Pull:
+    """What the pairs ask of every primitive, where residuals of ``width`` cells count for a quarter."""
+    single, leaves = rows_of(scene, pairs.slots)
+    at = pairs.points[:, None].clone().requires_grad_()
+    value = signed_distance(single, at)[:, 0]
+    (slope,) = torch.autograd.grad(value.sum(), at)
+    value, slope = value.detach(), slope[:, 0]
+    cosine = (slope * pairs.normals).sum(1)
+    plane = ((pairs.points - pairs.places) * pairs.normals).sum(1)
+    same = (cosine >= SAME) | pairs.anywhere
+    residual = torch.where(same, value, plane)
+    taken = pairs.either & ~same & (value.abs() < OTHER * plane.abs())
+    at = torch.where(same[:, None], pairs.points, pairs.places + 1e-3 * pairs.normals)[:, None]
+    by_row = torch.cat([each.flatten(1) for each in torch.autograd.grad(
+        signed_distance(single, at).sum(), leaves
+    )], 1)  # fmt: skip
+    robust = (width**2 / (width**2 + residual**2 + pairs.offset)) ** 2
+    weight = torch.where(taken, 0.0, pairs.weights * robust)
+    count = len(scene.mask)
+    gradient = by_row.new_zeros(count, ROW).index_add(0, pairs.slots, (weight * residual)[:, None] * by_row)
+    outer = (weight[:, None] * by_row)[:, :, None] * by_row[:, None]
+    return Pull(gradient, by_row.new_zeros(count, ROW, ROW).index_add(0, pairs.slots, outer))
+
+
+def rows_of(scene: Scene, slots: Int[Tensor, " R"]) -> tuple[Batch, list[Tensor]]:
+    """The primitives in some slots as a batch (R, 1), and its sizes, centres and rotations to differentiate by."""
+    size, centre, rotation = (
+        each[slots][:, None].clone().requires_grad_() for each in (scene.size, scene.centre, scene.rotation)
+    )
+    single = Batch(scene.kind[slots][:, None], size, centre, rotation, scene.mask[slots][:, None])
+    return single, [size, centre, rotation]
+
+
+def _joint(points: FloatArray, normals: FloatArray) -> FloatArray:
+    """Points and normals (P, 6), in which distances are those of places and of directions together."""
+    return np.concatenate([points, TURNED / math.sqrt(2) * normals], 1)
+
+
+def _closest(
+    points: Float[Tensor, "#R #k 3"],
+    normals: Float[Tensor, "#R #k 3"],
+    sides: Bool[Tensor, "#R #k"],
+    places: Float[Tensor, "#R #k 3"],
+    facing: Float[Tensor, "#R #k 3"],
+    spacing: float,
+) -> tuple[Float[Tensor, " R"], Int[Tensor, "R 1"]]:
+    """The best of several partners (R, 1), and what beside the distance along its normal tells against it, squared."""
+    apart = points - places
+    plane = (apart * facing).sum(-1)
+    along = ((apart**2).sum(-1) - plane**2).clamp(min=0).sqrt()
+    known = (normals**2).sum(-1) > 0.25
+    cosine = (normals * facing).sum(-1)
+    differ = torch.where(known, (1 - cosine**2).clamp(min=0), 0.0)
+    differ = torch.where(known & sides & (cosine < 0), NEVER, differ)
+    offset = (along - spacing).clamp(min=0) ** 2 + TURNED**2 * differ
+    best = (plane**2 + offset).argmin(1, keepdim=True)
+    return offset.gather(1, best)[:, 0], best

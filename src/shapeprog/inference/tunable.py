@@ -1,0 +1,194 @@
+"""The continuous parameters of a program as one vector, and what each of them does to every primitive."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from itertools import count
+from typing import NamedTuple
+
+import numpy as np
+import torch
+from jaxtyping import Bool, Float, Int
+from torch import Tensor
+
+from shapeprog.geometry.primitive import SIZES, primitives
+from shapeprog.geometry.scene import Scene
+from shapeprog.language.parameters import Kind, to_float32
+from shapeprog.language.program import Draw, Loop, Node, Program
+from shapeprog.language.statement import language
+from shapeprog.language.tensors import Code, encode
+from shapeprog.language.unroll import Plan
+from shapeprog.space import HALF
+
+ROW = SIZES + 3 + 9
+"""Numbers that place one primitive: sizes, centre and rotation."""
+
+THINNEST = 0.2
+"""Least thickness in cells that is left of any part; below half of it the eye takes it for a sliver."""
+
+DEGREES, CELLS = 1, 2
+"""Decimals that tidy numbers keep: tenths of degrees, hundredths of cells."""
+
+
+class Poses(NamedTuple):
+    """The primitives of a program and what moves them.
+
+    Parameters
+    ----------
+    scene
+        The primitives (N,), without gradient.
+    slopes
+        Derivatives (N, 16, F) of sizes, centre and rotation of each by the numbers of the vector.
+    """
+
+    scene: Scene
+    slopes: Float[Tensor, "N 16 F"]
+
+
+class Tunable:
+    """The numbers of a program that may move, as a vector (F,), and the way from such a vector to its primitives.
+
+    Counts, turns and axes stay, and so does what is exactly zero of a shift or of the plane of a mirror: the loop along
+    an axis keeps to it, the symmetric object stays symmetric.  A loop around several statements has its numbers once.
+
+    Attributes
+    ----------
+    values, kinds
+        Where the numbers are at the start (F,), and of which kind each is.
+    low
+        What they must not fall below (F,): lengths a thickness of ``THINNEST``.
+    scale
+        How many cells the surface moves for one unit of each (F,), at most: 1 for places and lengths, more for shifts
+        of many copies, a lever for angles.
+    """
+
+    def __init__(self, program: Program) -> None:
+        self.program = program
+        nodes = list(program.walk())
+        code = encode(program, dtype=torch.float64)
+        self._start = code.parameters
+        moving = [(n, slot) for n, node in enumerate(nodes) for slot in _moving(node)]
+        number = {place: f for f, place in enumerate(moving)}
+        index = torch.full(code.parameters.shape, -1)
+        for block, chain in enumerate(_chains(program.body)):
+            for step, n in enumerate(chain):
+                for slot in range(len(nodes[n].values)):
+                    index[block, step, slot] = number.get((n, slot), -1)
+        self._index: Int[Tensor, "K J slots"] = index
+        self._moving = moving
+        quantities = [language()[nodes[n].name].quantities[slot] for n, slot in moving]
+        self.kinds: list[Kind] = [quantity.kind for quantity in quantities]
+        self.values = torch.tensor([nodes[n].values[slot] for n, slot in moving], dtype=torch.float64)
+        thinnest = [THINNEST / 2 if quantity.high == HALF else THINNEST for quantity in quantities]
+        self.low = torch.tensor(thinnest, dtype=torch.float64).where(self.are("length"), torch.tensor(-torch.inf))
+        first = Plan(code).scene(code.parameters)
+        self._row = _rank(first.block)
+        self._copies = int(self._row.max()) + 1
+        many = (part.expand(self._copies * ROW, *part.shape) for part in (code.ids, code.parameters))
+        self._plan = Plan(Code(*many))
+        self.scale = self._scales(nodes, first)
+
+    def poses(self, values: Float[Tensor, " F"]) -> Poses:
+        """Primitives and slopes where the numbers are these.
+
+        Primitives of different blocks have no numbers of a block in common, so one backward pass through a batch of
+        equal programs gives them all: each of these asks for one number of one primitive of every block.
+        """
+        inner = self._filled(values).expand(self._copies * ROW, *self._index.shape).clone().requires_grad_()
+        scene = self._plan.scene(inner)
+        rows = torch.cat([scene.size, scene.centre, scene.rotation.flatten(-2)], -1)
+        asked = rows.unflatten(0, (self._copies, ROW))
+        slot, which = torch.arange(len(self._row))[:, None], torch.arange(ROW)
+        (slope,) = torch.autograd.grad(asked[self._row[:, None], which, slot, which].sum(), inner)
+        found = slope.unflatten(0, (self._copies, ROW))
+        block = scene.block[0]
+        mine = found[self._row[:, None], which, block[:, None]].nan_to_num(0).flatten(2)  # (N, 16, J * slots)
+        index = self._index[block].flatten(1)
+        slopes = mine.new_zeros(*mine.shape[:2], len(self._moving) + 1)
+        slopes.scatter_add_(2, (index % slopes.shape[2])[:, None].expand_as(mine), mine)
+        return Poses(scene[0].detach(), slopes[..., :-1])
+
+    def settled(self, values: Float[Tensor, " F"]) -> Program:
+        """The program with these numbers, rounded."""
+        tidy = self.rounded(values).tolist()
+        table = {place: to_float32(value) for place, value in zip(self._moving, tidy, strict=True)}
+        return Program(_rebuilt(self.program.body, count(), table))
+
+    def rounded(self, values: Float[Tensor, " F"]) -> Float[Tensor, " F"]:
+        """The numbers with as many decimals as their kind keeps."""
+        return torch.tensor(
+            [
+                round(value, DEGREES if kind == "angle" else CELLS)
+                for value, kind in zip(values.tolist(), self.kinds, strict=True)
+            ],
+            dtype=torch.float64,
+        )
+
+    def are(self, kind: str) -> Bool[Tensor, " F"]:
+        """Which numbers are of a kind."""
+        return torch.tensor([each == kind for each in self.kinds], dtype=torch.bool)
+
+    def _filled(self, values: Float[Tensor, " F"]) -> Float[Tensor, "K J slots"]:
+        if not len(values):
+            return self._start
+        return torch.where(self._index >= 0, values[self._index.clamp(min=0)], self._start)
+
+    def _scales(self, nodes: Sequence[Node], scene: Scene) -> Float[Tensor, " F"]:
+        reach = bounds(scene).norm(dim=-1)
+        scale = torch.ones(len(self._moving), dtype=torch.float64)
+        for f, (n, _) in enumerate(self._moving):
+            node = nodes[n]
+            if self.kinds[f] == "shift" and isinstance(node, Loop):
+                scale[f] = max(node.count - 1, 1)
+            if self.kinds[f] == "angle":
+                touched = (self._index == f).flatten(1).any(1)
+                scale[f] = float(reach[touched[scene.block]].max()) * np.pi / 180
+        return scale
+
+
+def bounds(scene: Scene) -> Float[Tensor, "N 3"]:
+    """Half extents of the local bounding boxes of primitives, with gradient to their sizes."""
+    found = torch.zeros_like(scene.centre)
+    for kind in scene.kinds:
+        here = scene.mask & (scene.kind == kind)
+        found = torch.where(here[..., None], primitives[kind].bound(scene.size), found)
+    return found
+
+
+def _moving(node: Node) -> Iterator[int]:
+    """The slots of a node that may move."""
+    declared = language()[node.name]
+    for slot, quantity in enumerate(declared.quantities):
+        kept = declared.is_loop and node.values[slot] == 0
+        if not quantity.discrete and not kept:
+            yield slot
+
+
+def _chains(body: Sequence[Node], first: int = 0, *outer: int) -> Iterator[tuple[int, ...]]:
+    """The blocks of a program as numbers of its nodes in the order of the text, loops first."""
+    for node in body:
+        if isinstance(node, Loop):
+            yield from _chains(node.body, first + 1, *outer, first)
+            first += Program(node.body).statements
+        else:
+            yield (*outer, first)
+        first += 1
+
+
+def _rebuilt(body: Sequence[Node], counter: Iterator[int], table: dict[tuple[int, int], float]) -> tuple[Node, ...]:
+    """The nodes with the numbers of a table by node and slot."""
+    found: list[Node] = []
+    for node in body:
+        n = next(counter)
+        values = tuple(table.get((n, slot), value) for slot, value in enumerate(node.values))
+        if isinstance(node, Draw):
+            found.append(Draw(node.name, values, node.role))
+        else:
+            found.append(Loop(node.name, values, _rebuilt(node.body, counter, table)))
+    return tuple(found)
+
+
+def _rank(block: Int[Tensor, " N"]) -> Int[Tensor, " N"]:
+    """Of each primitive how many of its block come before it."""
+    same = block[:, None] == block
+    return (same.tril(-1)).sum(1)

@@ -15,7 +15,7 @@ from shapeprog.evaluation.metrics import evaluate_program
 from shapeprog.formats.parts import parts, solid
 from shapeprog.geometry.batch import Solids
 from shapeprog.inference.assembly import assemble
-from shapeprog.inference.candidates import distinct, looks
+from shapeprog.inference.candidates import distinct, looks, plain
 from shapeprog.inference.repeating import repeated
 from shapeprog.language import Draw, Language, Loop, Program, language, standard, statement, using
 from shapeprog.language.hints import Box
@@ -93,7 +93,7 @@ def test_slats_are_loops_in_loops():
     found = assemble(apart(SLATS)).program
     assert found.blocks == 2
     assert found.size == 11
-    assert words(found)["box"] == 2
+    assert words(found)["translate"] == 2
 
 
 def test_a_grid_of_boxes_is_rolled_up_whole():
@@ -128,6 +128,15 @@ def test_legs_around_the_middle_are_turned(count):
     singles = [Draw("rod", (*a, *b, 0.8)) for a, b in zip(*(each.tolist() for each in ends), strict=True)]
     found = [node for node in repeated(singles) if node.name == "rotate" and node.values[0] == count]
     assert any(torch.cdist(sp.unroll(Program((node,))).centre, scene.centre).amin(1).max() < 1e-3 for node in found)
+
+
+def test_a_block_is_written_by_the_plainest_statement_that_draws_it():
+    back = Loop("translate", (2.0, 0.0, 0.0, 8.0), (Draw("back", (3.0, 3.0, -5.0, 2.0, 1.0, 8.0, 0.0)),))
+    assert plain(back) == Loop("translate", (2.0, 0.0, 0.0, 8.0), (Draw("box", (3.0, 3.0, -5.0, 2.0, 1.0, 8.0)),))
+    leaning = Draw("back", (3.0, 3.0, -5.0, 8.0, 1.0, 8.0, 2.0))
+    assert plain(leaning) == leaning
+    spoke = Loop("rotate", (5.0, 1.0), (Draw("line", (0.0, 0.0, 0.0, 0.0, 6.0, 0.0, 1.0)),))
+    assert plain(spoke) == spoke
 
 
 def test_looks_do_not_depend_on_how_a_solid_is_written():

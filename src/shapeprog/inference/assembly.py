@@ -1,7 +1,8 @@
 """Structure from the surface: a program of few blocks that explains what is seen of a target.
 
 Pieces of the target become candidates, those that are copies of each other loops; what explains most for the fewest
-numbers is chosen.  The search works on program objects: it knows no statement by name.
+numbers is chosen, its numbers are adjusted together, and its parts are named by what they are for.  All of it works on
+program objects and knows no statement by name.
 """
 
 from __future__ import annotations
@@ -11,13 +12,15 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 from shapeprog.data.shape import Shape
+from shapeprog.inference.adjustment import adjust
 from shapeprog.inference.budget import NEVER, Deadline
-from shapeprog.inference.candidates import distinct, looks, single_candidates
+from shapeprog.inference.candidates import distinct, looks, plain, single_candidates
 from shapeprog.inference.choice import Choice, choose
 from shapeprog.inference.coverage import Prices, covers
 from shapeprog.inference.evidence import evidence_of
 from shapeprog.inference.pieces import find_pieces
 from shapeprog.inference.repeating import repeated
+from shapeprog.inference.roles import with_roles
 from shapeprog.language.program import Node, Program
 from shapeprog.language.statement import language
 
@@ -89,7 +92,9 @@ def assemble(
     singles = single_candidates(find_pieces(shape, seed))
     singles = [singles[place] for place in distinct(singles, looks(singles))] if singles else []
     told(0.5)
-    candidates = [*more, *singles[: MOST_CANDIDATES // 2], *repeated(singles)][:MOST_CANDIDATES]
+    candidates = [*(plain(node) for node in more), *singles[: MOST_CANDIDATES // 2], *repeated(singles)][
+        :MOST_CANDIDATES
+    ]
     told(0.7)
     cost = prices or Prices()
     cost = replace(cost, **{name: getattr(cost, name) / detail for name in ("statement", "loop", "number")})
@@ -101,6 +106,7 @@ def assemble(
     )
     program = Program(tuple(candidates[place] for place in choice.best.chosen))
     told(1.0)
+    program = with_roles(adjust(program, evidence, seed=seed, deadline=deadline, progress=progress))
     return Assembly(program, choice.best.explained, _reason(choice, seen, blocks), seen)
 
 

@@ -18,6 +18,7 @@ from torch import Tensor
 from shapeprog.geometry.distance import signed_distance
 from shapeprog.geometry.primitive import SIZES, primitives
 from shapeprog.geometry.scene import Scene
+from shapeprog.geometry.surface import sample_surface
 from shapeprog.inference.pieces import Pieces
 from shapeprog.language.hints import Box
 from shapeprog.language.parameters import to_float32
@@ -102,6 +103,35 @@ def single_candidates(pieces: Pieces) -> list[Node]:
         fitting = [k for k in mine if misfit[k] <= least + SLACK]
         found.append(min((drawn[k] for k in fitting), key=_written))
     return found
+
+
+def plain(node: Node) -> Node:
+    """The same block drawn by the statement that writes the fewest numbers, of those with a hint that draw the same.
+
+    Nothing changes where the statement turns about an axis of its own, or draws several solids.
+    """
+    if isinstance(node, Loop):
+        return Loop(node.name, node.values, tuple(plain(inner) for inner in node.body))
+    if language()[node.name].pivot is not None:
+        return node
+    scene = unroll(encode(Program((node,)), dtype=torch.float64))
+    if int(scene.mask.sum()) != 1:
+        return node
+    slot = int(scene.mask.nonzero()[0])
+    half = primitives[int(scene.kind[slot])].bound(scene.size[slot])
+    box = Box(*(each.numpy() for each in (scene.centre[slot], scene.rotation[slot], half)))
+    others = [
+        Draw(declared.name, tuple(to_float32(value) for value in values), node.role)
+        for declared in language()
+        if declared.hint is not None
+        for values in declared.hint(box)
+    ]
+    if not others:
+        return node
+    points = sample_surface(scene, POINTS, torch.Generator().manual_seed(0)).points.double()
+    drawn = unroll(encode([Program((other,)) for other in others], dtype=torch.float64))
+    off = signed_distance(drawn, points.expand(len(others), -1, -1)).abs().amax(-1).tolist()
+    return min((other for other, far in zip(others, off, strict=True) if far < SAME), key=_written, default=node)
 
 
 def _written(node: Draw) -> int:

@@ -34,6 +34,9 @@ MOST_ALIKE = 48
 MOST_RUNS = 160
 """Most runs that are made of one set of candidates, the longest."""
 
+APART = 1.6
+"""Least step, in half extents of what is repeated; two are where copies just touch."""
+
 TURNS = (6, 5, 4, 3)
 """Copies around the vertical axis of the grid that are looked for."""
 
@@ -72,7 +75,7 @@ def runs(seen: Looks) -> Iterator[tuple[tuple[int, ...], tuple[float, float, flo
     for group in groups(seen):
         places = seen.middle[group]
         steps = places[None] - places[:, None]
-        onwards = (np.abs(steps).max(-1) > LEAST_STEP) & ~_backwards(steps)
+        onwards = (np.abs(steps).max(-1) > LEAST_STEP) & ~_backwards(steps) & ~_overlap(seen.spread[group[0]], steps)
         first = onwards & (_nearest(places, places[:, None] - steps) < 0)
         after = _nearest(places, places[None] + steps)
         for a, b in np.argwhere(first).tolist():
@@ -100,6 +103,7 @@ def mirrored(seen: Looks, axis: int) -> Iterator[tuple[int, int, float]]:
         same &= np.abs(seen.spread - turned[one]).max((1, 2)) < ALIKE * scale[one] ** 2
         same &= np.abs(seen.skew - signs * seen.skew[one]).max(1) < ALIKE * scale[one] ** 3
         same &= np.abs(seen.lean - signs * seen.lean[one]).max(1) < LEANING
+        same &= ~_overlap(seen.spread[one], (seen.middle - seen.middle[one]) * (1 - signs) / 2)
         for other in np.flatnonzero(same).tolist():
             plane = float(seen.middle[one, axis] + seen.middle[other, axis]) / 2
             yield one, other, 0.0 if abs(plane) < CENTRED else plane
@@ -156,6 +160,14 @@ def _nearest(places: FloatArray, wanted: FloatArray) -> Array:
     off = np.abs(places - wanted[..., None, :]).max(-1)
     nearest = off.argmin(-1)
     return np.where(off.min(-1) < STRAY, nearest, -1)
+
+
+def _overlap(spread: FloatArray, steps: FloatArray) -> npt.NDArray[np.bool_]:
+    """Whether copies so far apart (..., 3) lie over each other by much."""
+    length = np.linalg.norm(steps, axis=-1)
+    reach = np.sqrt(np.einsum("...i,ij,...j->...", steps, spread, steps)) / np.maximum(length, 1e-9)
+    found: npt.NDArray[np.bool_] = length < APART * reach
+    return found
 
 
 def _backwards(steps: FloatArray) -> npt.NDArray[np.bool_]:

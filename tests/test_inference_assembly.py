@@ -186,3 +186,17 @@ def _drum(box: Box) -> list[float]:
     height, radius = float(2 * box.half[rising]), float(np.delete(box.half, rising).mean())
     up, depth, side = box.centre.tolist()
     return [up - height / 2, depth, side, height, radius]
+
+
+def test_inference_tells_what_it_explains_and_what_more_would_cost():
+    shape = whole(SPLAYED)
+    found = sp.infer(shape, generator=None)
+    assert found.snapped is None
+    assert found.scores["explained"] > 0.95
+    assert found.reason.startswith(f"Stopped because {found.program.blocks} blocks explain")
+    numbers = [each.numbers for each in found.trade_off]
+    assert [each.blocks for each in found.trade_off] == list(range(len(numbers)))
+    assert {node.word for node in found.program.walk() if isinstance(node, Draw)} >= {"leg"}
+    published = sp.infer(shape, generator=None, statements="paper")
+    assert published.snapped is not None
+    assert all(language()[node.name].taught for node in published.program.walk())

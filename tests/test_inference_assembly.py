@@ -9,7 +9,7 @@ import pytest
 import torch
 
 import shapeprog as sp
-from shapeprog.data.placement import shape_from_mesh
+from shapeprog.data.placement import shape_from_mesh, shape_from_points
 from shapeprog.data.shape import Shape
 from shapeprog.evaluation.metrics import evaluate_program
 from shapeprog.formats.parts import parts, solid
@@ -186,6 +186,20 @@ def _drum(box: Box) -> list[float]:
     height, radius = float(2 * box.half[rising]), float(np.delete(box.half, rising).mean())
     up, depth, side = box.centre.tolist()
     return [up - height / 2, depth, side, height, radius]
+
+
+@pytest.mark.parametrize("what", ["three points", "two places", "a line", "noise"])
+def test_what_has_no_surface_is_rebuilt_from_its_cells_or_said_to_be_explained(what):
+    random = np.random.default_rng(0)
+    points = {
+        "three points": random.random((3, 3)),
+        "two places": np.repeat([[0.0, 0, 0], [1, 1, 1]], 50, 0),
+        "a line": np.linspace(0, 1, 200)[:, None] * [1.0, 2, 3],
+        "noise": random.random((300, 3)),
+    }[what]
+    found = sp.infer(shape_from_points(points, name=what, axes=np.eye(3)), blocks=2, generator=None)
+    assert found.snapped is not None or found.scores["explained"] >= 0.5
+    assert found.program.blocks >= 1
 
 
 def test_inference_tells_what_it_explains_and_what_more_would_cost():

@@ -92,10 +92,11 @@ def assemble(
     singles = single_candidates(find_pieces(shape, seed))
     singles = [singles[place] for place in distinct(singles, looks(singles))] if singles else []
     told(0.5)
-    candidates = [*(plain(node) for node in more), *singles[: MOST_CANDIDATES // 2], *repeated(singles)][
-        :MOST_CANDIDATES
-    ]
+    elsewhere = [plain(node) for node in more]
+    candidates = [*elsewhere, *singles[: MOST_CANDIDATES // 2], *repeated(singles)][:MOST_CANDIDATES]
     told(0.7)
+    if not candidates or evidence.area <= 0:
+        return Assembly(Program(), 0.0, "there is no surface to speak of.", ())
     cost = prices or Prices()
     cost = replace(cost, **{name: getattr(cost, name) / detail for name in ("statement", "loop", "number")})
     choice = choose(covers([Program((node,)) for node in candidates], evidence, cost, seed), blocks, seed=seed)
@@ -123,5 +124,5 @@ def _reason(choice: Choice, seen: Sequence[TradeOff], allowed: int) -> str:
     more = next((each for each in seen if each.blocks == used + 1), None)
     if more is None:
         return f"{told}, and no other block that was seen would help."
-    gain, cost = max(more.explained - share, 0.0), more.numbers - now.numbers
+    gain, cost = max(more.explained - share, 0.0), max(more.numbers - now.numbers, 0)
     return f"{told}; one more would explain {gain:.1%} for {cost} more numbers: raise --detail to have it."

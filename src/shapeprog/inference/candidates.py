@@ -47,7 +47,7 @@ BESIDE = 0.01
 """Cells off the surface at which the direction of a solid is asked for."""
 
 SAME = 0.02
-"""Relative difference of moments below which two solids are the same."""
+"""Relative difference of moments, and distance in cells, below which two solids are the same."""
 
 THINNEST = 0.2
 """Least thickness in cells of a part, where a piece is thinner: what is a single sheet has no thickness of its own."""

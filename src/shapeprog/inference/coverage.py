@@ -70,7 +70,7 @@ class Prices:
     """
 
     unsupported: float = 0.4
-    free: float = 0.2
+    free: float = 0.5
     statement: float = 0.005
     loop: float = 0.002
     number: float = 0.0004

@@ -43,6 +43,9 @@ PROPOSAL_SHARE = 0.2
 PROPOSALS = 16
 """Blocks that the generator suggests for each place; chosen on val."""
 
+EXPLAINED = 0.5
+"""Share of the surface that blocks must explain; else what has a surface is no furniture, and its cells are rebuilt."""
+
 DEEP = 2.5
 """Depth in cells below the surface of the snapped program beyond which points are inner faces; chosen on val."""
 
@@ -189,7 +192,7 @@ def infer(
             target, blocks=blocks, more=program.flat().body, detail=detail, seed=seed, deadline=refining,
             progress=progress,
         )  # fmt: skip
-        if found.program.size:
+        if found.explained >= EXPLAINED:
             program, snapped, trade_off = found.program, None, found.trade_off
             scores["explained"] = found.explained
             reason = f"Stopped because {found.reason}"

@@ -36,6 +36,10 @@ class TradeOff(NamedTuple):
     explained: float
 
 
+LEAST_GAIN = 0.0005
+"""Share of the surface that is worth telling."""
+
+
 @dataclass(frozen=True)
 class Assembly:
     """A program and what it was chosen from.
@@ -122,7 +126,7 @@ def _reason(choice: Choice, seen: Sequence[TradeOff], allowed: int) -> str:
         return f"{told} and every one of the {allowed} blocks is in use; allow more with --blocks."
     now = next(each for each in seen if each.blocks == used)
     more = next((each for each in seen if each.blocks == used + 1), None)
-    if more is None:
-        return f"{told}, and no other block that was seen would help."
-    gain, cost = max(more.explained - share, 0.0), max(more.numbers - now.numbers, 0)
+    if more is None or more.explained - share < LEAST_GAIN:
+        return f"{told}, and no other block that was seen would explain more."
+    gain, cost = more.explained - share, max(more.numbers - now.numbers, 0)
     return f"{told}; one more would explain {gain:.1%} for {cost} more numbers: raise --detail to have it."

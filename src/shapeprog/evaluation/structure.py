@@ -9,7 +9,7 @@ from shapeprog.geometry.mesh import pieces
 from shapeprog.geometry.primitive import primitives
 from shapeprog.geometry.scene import Scene
 from shapeprog.language.program import Program
-from shapeprog.language.statement import language
+from shapeprog.language.text import numbers_written
 from shapeprog.space import SPAN
 
 SLIVER = 0.004
@@ -18,7 +18,7 @@ SLIVER = 0.004
 
 def numbers(program: Program) -> int:
     """How many continuous numbers are written; counts and steps of loops are none."""
-    return sum(language()[node.name].written(node.values) for node in program.walk())
+    return sum(numbers_written(node) for node in program.walk())
 
 
 def slivers(scene: Scene) -> float:

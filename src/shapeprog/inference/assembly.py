@@ -22,7 +22,7 @@ from shapeprog.inference.pieces import find_pieces
 from shapeprog.inference.repeating import repeated
 from shapeprog.inference.roles import with_roles
 from shapeprog.language.program import Node, Program
-from shapeprog.language.statement import language
+from shapeprog.language.text import numbers_written
 
 MOST_CANDIDATES = 1_500
 """Most candidates that are compared; loops come first, then the most important pieces."""
@@ -106,17 +106,13 @@ def assemble(
     choice = choose(covers([Program((node,)) for node in candidates], evidence, cost, seed), blocks, seed=seed)
     chosen = [Program(tuple(candidates[place] for place in option.chosen)) for option in choice.options]
     seen = tuple(
-        TradeOff(len(program.body), sum(_numbers(node) for node in program.walk()), option.explained)
+        TradeOff(len(program.body), sum(numbers_written(node) for node in program.walk()), option.explained)
         for program, option in zip(chosen, choice.options, strict=True)
     )
     program = Program(tuple(candidates[place] for place in choice.best.chosen))
     told(1.0)
     program = with_roles(adjust(program, evidence, seed=seed, deadline=deadline, progress=progress))
     return Assembly(program, choice.best.explained, _reason(choice, seen, blocks), seen)
-
-
-def _numbers(node: Node) -> int:
-    return language()[node.name].written(node.values)
 
 
 def _reason(choice: Choice, seen: Sequence[TradeOff], allowed: int) -> str:

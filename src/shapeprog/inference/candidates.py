@@ -25,6 +25,7 @@ from shapeprog.language.parameters import to_float32
 from shapeprog.language.program import Draw, Loop, Node, Program
 from shapeprog.language.statement import language
 from shapeprog.language.tensors import encode
+from shapeprog.language.text import numbers_written
 from shapeprog.language.unroll import unroll
 from shapeprog.space import Array, FloatArray
 
@@ -101,7 +102,7 @@ def single_candidates(pieces: Pieces) -> list[Node]:
             continue
         least = min(misfit[k] for k in mine)
         fitting = [k for k in mine if misfit[k] <= least + SLACK]
-        found.append(min((drawn[k] for k in fitting), key=_written))
+        found.append(min((drawn[k] for k in fitting), key=numbers_written))
     return found
 
 
@@ -131,11 +132,7 @@ def plain(node: Node) -> Node:
     points = sample_surface(scene, POINTS, torch.Generator().manual_seed(0)).points.double()
     drawn = unroll(encode([Program((other,)) for other in others], dtype=torch.float64))
     off = signed_distance(drawn, points.expand(len(others), -1, -1)).abs().amax(-1).tolist()
-    return min((other for other, far in zip(others, off, strict=True) if far < SAME), key=_written, default=node)
-
-
-def _written(node: Draw) -> int:
-    return language()[node.name].written(node.values)
+    return min((other for other, far in zip(others, off, strict=True) if far < SAME), key=numbers_written, default=node)
 
 
 def misfits(drawn: Sequence[Draw], owner: Array, pieces: Pieces) -> FloatArray:

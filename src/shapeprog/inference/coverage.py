@@ -29,7 +29,7 @@ from shapeprog.geometry.surface import face_areas, sample_surface
 from shapeprog.inference.coverage_kernels import LIFT, explain, hold, support
 from shapeprog.inference.evidence import Evidence
 from shapeprog.language.program import Loop, Program
-from shapeprog.language.statement import language
+from shapeprog.language.text import numbers_written
 from shapeprog.language.unroll import unroll
 from shapeprog.space import HALF, RESOLUTION, FloatArray
 
@@ -77,10 +77,9 @@ class Prices:
 
     def of(self, program: Program) -> float:
         """The price of a program as it is written."""
-        known, total = language(), 0.0
+        total = 0.0
         for node in program.walk():
-            written = known[node.name].written(node.values)
-            total += (self.loop if isinstance(node, Loop) else self.statement) + self.number * written
+            total += (self.loop if isinstance(node, Loop) else self.statement) + self.number * numbers_written(node)
         return total
 
 

@@ -9,7 +9,9 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
+import torch
 
+from shapeprog.language.shapes import leaned
 from shapeprog.space import DEPTH, SIDE, UP, FloatArray
 
 STRAIGHT = 0.9986
@@ -64,7 +66,7 @@ def straight_bar(box: Box) -> Iterator[list[float]]:
     main = int(np.abs(along).argmax())
     along = along * np.sign(along[main])
     first, second = (axis for axis in range(3) if axis != main)
-    frame = _leaned(along, main)
+    frame = leaned(torch.from_numpy(along), torch.tensor(main)).numpy()
     others = [axis for axis in range(3) if axis != long]
     near = max(others, key=lambda axis: abs(box.rotation[:, axis] @ frame[:, first]))
     far = others[0] if near == others[1] else others[1]
@@ -132,11 +134,3 @@ def _radius(box: Box, axis: int) -> float:
     """Radius of the section across an axis; none where it is not nearly square."""
     small, large = sorted(np.delete(box.half, axis))
     return float((small + large) / 2) if small >= ROUND * large else 0.0
-
-
-def _leaned(along: FloatArray, main: int) -> FloatArray:
-    """The least rotation that brings grid axis ``main`` onto ``along``, whose part along it is positive."""
-    axis = np.cross(np.eye(3)[main], along)
-    cross = np.cross(axis, np.eye(3)).T
-    found: FloatArray = np.eye(3) + cross + cross @ cross / (1 + along[main])
-    return found

@@ -42,6 +42,11 @@ def _call(node: Node) -> str:
     return text if isinstance(node, Loop) or not node.role else f"{checked_role(node)}({text})"
 
 
+def numbers_written(node: Node) -> int:
+    """How many continuous numbers the line of a statement or loop has; counts and steps of loops are none."""
+    return language()[node.name].written(node.values)
+
+
 def checked_role(node: Draw) -> str:
     """The role of a part; a ``ShapeProgError`` if it is not declared, or no other than the name of its statement."""
     if node.role and node.role not in language().roles:

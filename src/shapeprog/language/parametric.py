@@ -57,7 +57,7 @@ class Parametric:
         self.slots = torch.tensor(list(moving), dtype=torch.long)
         self.matrix = self.offset = None
         try:
-            forms = list(self._moving({name: Linear.of(name) for name in self.names}).values())
+            forms = list(self._moving({name: Linear.of(name) for name in self.names}).values()) if moving else []
         except ShapeProgError:  # a product of names
             return
         factors = [dict(form.factors) for form in forms]

@@ -114,10 +114,13 @@ def _lines(lines: Iterable[Line], depth: int, loops: int, taken: set[str]) -> It
 
 def _call(line: WrittenDraw | WrittenLoop) -> str:
     declared = declared_of(line)
-    return declared.call([_number(each, value) for each, value in zip(declared.quantities, line.values, strict=True)])
+    return declared.call(
+        [number_text(each, value) for each, value in zip(declared.quantities, line.values, strict=True)]
+    )
 
 
-def _number(quantity: Quantity, value: Value) -> str:
+def number_text(quantity: Quantity, value: Value) -> str:
+    """A number or expression of a statement as text."""
     return str(value) if isinstance(value, Expression) else quantity.written(value)
 
 

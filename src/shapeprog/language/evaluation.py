@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
@@ -59,6 +60,13 @@ def expanded(source: Source, given: Mapping[str, Any] | None = None) -> tuple[No
     return tuple(_Run(source, given).block(source.lines, {}, 0, 0))
 
 
+def occurrences(source: Source) -> dict[int, list[Node]]:
+    """What every statement and loop comes to, once for each time it is met, by the ``id`` of its line."""
+    run = _Run(source, None)
+    run.block(source.lines, {}, 0, 0)
+    return run.met
+
+
 class _Run:
     """One evaluation of a program."""
 
@@ -67,6 +75,7 @@ class _Run:
         self.functions = source.functions
         self.outermost: dict[str, Any] = {}
         self.made = 0
+        self.met: dict[int, list[Node]] = defaultdict(list)
 
     def block(self, lines: tuple[Line, ...], scope: dict[str, Any], loops: int, calls: int) -> list[Node]:
         """What the lines of a program, function or loop come to; names are added to ``scope``."""
@@ -76,6 +85,7 @@ class _Run:
                 case WrittenDraw():
                     self._count(line, calls)
                     found.append(Draw(line.name, self._values(line, scope), line.role))
+                    self.met[id(line)].append(found[-1])
                 case WrittenLoop():
                     self._count(line, calls)
                     if loops >= DEEPEST:
@@ -83,6 +93,7 @@ class _Run:
                         raise Fault(line, f"loops are nested more than {DEEPEST} deep", cure)
                     body = self.block(line.body, scope, loops + 1, calls)
                     found.append(Loop(line.name, self._values(line, scope), tuple(body)))
+                    self.met[id(line)].append(found[-1])
                 case Call():
                     self._count(line, calls + 1)
                     if calls >= DEEPEST:

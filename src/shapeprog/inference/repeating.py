@@ -65,6 +65,11 @@ def _rolled(nodes: Sequence[Node]) -> list[Node]:
     return [found[place] for place in distinct(found, looks(found))]
 
 
+def mirrors(node: Node, axis: int) -> bool:
+    """Whether a loop mirrors along an axis."""
+    return isinstance(node, Loop) and node.name == "mirror" and node.values[1] == axis
+
+
 def _values(*numbers: float) -> tuple[float, ...]:
     return tuple(to_float32(number) + 0.0 for number in numbers)
 

@@ -30,7 +30,8 @@ FLUSH = 1e-4
 
 
 def connected(program: Program, evidence: Evidence, prices: Prices, seed: int = 0) -> Program:
-    """The program with parts that float extended to others, as far as that costs little of its value."""
+    """The program with parts that float extended to others, as far as that costs little of its value; each of its nodes
+    is one block."""
     while (better := _less_apart(program, evidence, prices, seed)) is not None:
         program = better
     return program

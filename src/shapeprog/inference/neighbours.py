@@ -41,7 +41,7 @@ CORNERS = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
 
 
 def neighbours(program: Program) -> list[Node]:
-    """Blocks close to those of a program, each once, none of them its own."""
+    """Blocks close to those of a program, whose nodes are one block each; each once, none of them its own."""
     chains = program.chains
     if not chains:
         return []

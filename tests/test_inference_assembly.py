@@ -107,6 +107,18 @@ def test_a_grid_of_boxes_is_rolled_up_whole():
         assert gaps.max() < 1e-3
 
 
+@pytest.mark.parametrize("missing", [1, 2, 3, 4])
+def test_a_run_with_a_missing_copy_is_written_as_one_loop(missing):
+    copies: list[Node] = [Draw("box", (-12.0, 0.0, -11.0 + 4 * k, 20.0, 1.0, 2.0)) for k in range(6) if k != missing]
+    found = [node for node in repeated(copies) if isinstance(node, Loop) and node.count == 6]
+    assert found == [Loop("translate", (6.0, 0.0, 0.0, 4.0), (copies[0],))]
+
+
+def test_three_copies_are_no_run_of_four():
+    copies: list[Node] = [Draw("box", (-12.0, 0.0, -11.0 + 4 * k, 20.0, 1.0, 2.0)) for k in (0, 1, 3)]
+    assert all(node.count < 4 for node in repeated(copies) if isinstance(node, Loop))
+
+
 def test_mirror_images_are_found_about_any_plane():
     one = Draw("taper", (-12.0, 1.0, 6.0, 2.0, 2.0, 5.0, 0.5, 1.0))
     other = Draw("taper", (-12.0, 1.0, -3.0, 2.0, 2.0, -2.0, 0.5, 1.0))

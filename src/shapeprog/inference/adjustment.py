@@ -35,8 +35,8 @@ nothing else may hold, and of places."""
 FARTHEST = 0.7
 """Farthest that one step moves the surface by one number, in cells."""
 
-KEPT, CLOSED = 0.003, 1.0
-"""Weight of a squared gap, while parts still move and at the end."""
+KEPT, CLOSED = 0.003, 0.03
+"""Weight of a squared gap, while parts still move and at the end: it stretches a leg, but does not lift a seat."""
 
 WIDEST = 1.0
 """Gap in cells up to which parts that touched at the start are brought together again at the end."""
@@ -97,6 +97,14 @@ def adjust(
             if progress:
                 progress("adjusting", (step + 1) / steps)
     return tunable.settled(values)
+
+
+def tidy(program: Program) -> Program:
+    """The same program in hundredths of cells and tenths of degrees."""
+    if not program.size:
+        return program
+    tunable = Tunable(program)
+    return tunable.settled(tunable.values)
 
 
 System = tuple[Float[Tensor, " F"], Float[Tensor, "F F"]]

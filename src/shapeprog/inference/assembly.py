@@ -1,8 +1,8 @@
 """Structure from the surface: a program of few blocks that explains what is seen of a target.
 
 Pieces of the target become candidates, those that are copies of each other loops; what explains most for the fewest
-numbers is chosen, its numbers are adjusted together, and its parts are named by what they are for.  All of it works on
-program objects and knows no statement by name.
+numbers is chosen, then once more among its neighbours.  Its numbers are adjusted together, parts that float are
+connected, and all are named by what they are for.  All of it works on program objects and knows no statement by name.
 """
 
 from __future__ import annotations
@@ -12,12 +12,14 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 from shapeprog.data.shape import Shape
-from shapeprog.inference.adjustment import adjust
+from shapeprog.inference.adjustment import adjust, tidy
 from shapeprog.inference.budget import NEVER, Deadline
 from shapeprog.inference.candidates import distinct, looks, plain, single_candidates
-from shapeprog.inference.choice import Choice, choose
-from shapeprog.inference.coverage import Prices, covers
-from shapeprog.inference.evidence import evidence_of
+from shapeprog.inference.choice import Choice, choose, explained, missed, value
+from shapeprog.inference.connecting import connected
+from shapeprog.inference.coverage import Covers, Prices, covers
+from shapeprog.inference.evidence import Evidence, evidence_of
+from shapeprog.inference.neighbours import neighbours
 from shapeprog.inference.pieces import find_pieces
 from shapeprog.inference.repeating import repeated
 from shapeprog.inference.roles import with_roles
@@ -26,6 +28,18 @@ from shapeprog.language.text import numbers_written
 
 MOST_CANDIDATES = 1_500
 """Most candidates that are compared; loops come first, then the most important pieces."""
+
+ROUNDS = 1
+"""Most rounds in which neighbours of what is chosen compete with it."""
+
+ROUGH = 8
+"""Steps of adjustment before such a round."""
+
+HARM = 0.005
+"""Share of the target beyond which a block is put back to where it was before its adjustment."""
+
+REST = 200
+"""Most of the candidates passed over that compete again: those that would add most."""
 
 
 class TradeOff(NamedTuple):
@@ -103,20 +117,63 @@ def assemble(
         return Assembly(Program(), 0.0, "there is no surface to speak of.", ())
     cost = prices or Prices()
     cost = replace(cost, **{name: getattr(cost, name) / detail for name in ("statement", "loop", "number")})
-    choice = choose(covers([Program((node,)) for node in candidates], evidence, cost, seed), blocks, seed=seed)
-    chosen = [Program(tuple(candidates[place] for place in option.chosen)) for option in choice.options]
-    seen = tuple(
-        TradeOff(len(program.body), sum(numbers_written(node) for node in program.walk()), option.explained)
-        for program, option in zip(chosen, choice.options, strict=True)
-    )
-    program = Program(tuple(candidates[place] for place in choice.best.chosen))
+    choice, candidates = _improved(candidates, evidence, cost, blocks, seed, deadline)
     told(1.0)
-    program = with_roles(adjust(program, evidence, seed=seed, deadline=deadline, progress=progress))
-    return Assembly(program, choice.best.explained, _reason(choice, seen, blocks), seen)
+    start = connected(_chosen(candidates, choice.best.chosen), evidence, cost, seed)
+    adjusted = adjust(start, evidence, seed=seed, deadline=deadline, progress=progress)
+    program = connected(_unharmed(adjusted, start, evidence, cost, seed), evidence, cost, seed)
+    program = with_roles(tidy(Program(tuple(plain(node) for node in program.body))))
+    seen = tuple(_trade_off(_chosen(candidates, option.chosen), option.explained) for option in choice.options)
+    share = explained(_covers(program.body, evidence, cost, seed), tuple(range(len(program.body))))
+    return Assembly(program, share, _reason(len(program.body), share, seen, blocks), seen)
 
 
-def _reason(choice: Choice, seen: Sequence[TradeOff], allowed: int) -> str:
-    used, share = len(choice.best.chosen), choice.best.explained
+def _improved(
+    candidates: list[Node], evidence: Evidence, prices: Prices, blocks: int, seed: int, deadline: Deadline
+) -> tuple[Choice, list[Node]]:
+    """What is chosen, and from which candidates: also from neighbours of what was chosen before, while that pays."""
+    made = _covers(candidates, evidence, prices, seed)
+    choice = choose(made, blocks, seed=seed)
+    for _ in range(ROUNDS):
+        program = _chosen(candidates, choice.best.chosen)
+        if not program.body or deadline.passed("another choice among neighbours"):
+            break
+        rest = [candidates[place] for place in missed(made, choice.best.chosen)[:REST]]
+        adjusted = adjust(program, evidence, steps=ROUGH, seed=seed, deadline=deadline)
+        near = list(dict.fromkeys([*program.body, *adjusted.body, *neighbours(adjusted), *rest]))
+        more = _covers(near, evidence, prices, seed)
+        better = choose(more, blocks, seed=seed)
+        if better.best.value <= choice.best.value + LEAST_GAIN:
+            break
+        made, choice, candidates = more, better, near
+    return choice, candidates
+
+
+def _unharmed(adjusted: Program, start: Program, evidence: Evidence, prices: Prices, seed: int) -> Program:
+    """The adjusted program, with blocks as they were at the start where adjustment has clearly done harm."""
+    both, count = (*adjusted.body, *start.body), len(start.body)
+    made = _covers(both, evidence, prices, seed)
+    kept = tuple(range(count))
+    for place in range(count):
+        other = (*kept[:place], count + place, *kept[place + 1 :])
+        if value(made, other) > value(made, kept) + HARM:
+            kept = other
+    return _chosen(both, kept)
+
+
+def _covers(nodes: Sequence[Node], evidence: Evidence, prices: Prices, seed: int) -> Covers:
+    return covers([Program((node,)) for node in nodes], evidence, prices, seed)
+
+
+def _chosen(candidates: Sequence[Node], places: Sequence[int]) -> Program:
+    return Program(tuple(candidates[place] for place in places))
+
+
+def _trade_off(program: Program, share: float) -> TradeOff:
+    return TradeOff(len(program.body), sum(numbers_written(node) for node in program.walk()), share)
+
+
+def _reason(used: int, share: float, seen: Sequence[TradeOff], allowed: int) -> str:
     told = f"{used} block{'s' if used != 1 else ''} explain{'s' if used == 1 else ''} {share:.0%} of the surface"
     if used >= allowed:
         return f"{told} and every one of the {allowed} blocks is in use; allow more with --blocks."

@@ -7,6 +7,7 @@ piece best is kept, and of several statements that draw the same solid the one t
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -20,6 +21,7 @@ from shapeprog.geometry.primitive import SIZES, primitives
 from shapeprog.geometry.scene import Scene
 from shapeprog.geometry.surface import sample_surface
 from shapeprog.inference.pieces import Pieces
+from shapeprog.inference.tunable import THINNEST, bounds
 from shapeprog.language.hints import Box
 from shapeprog.language.parameters import to_float32
 from shapeprog.language.program import Draw, Loop, Node, Program
@@ -50,9 +52,6 @@ BESIDE = 0.01
 SAME = 0.02
 """Relative difference of moments, and distance in cells, below which two solids are the same."""
 
-THINNEST = 0.2
-"""Least thickness in cells of a part, where a piece is thinner: what is a single sheet has no thickness of its own."""
-
 
 class Looks(NamedTuple):
     """What tells whether candidates are copies of each other.
@@ -81,17 +80,14 @@ class Looks(NamedTuple):
 
 def single_candidates(pieces: Pieces) -> list[Node]:
     """One drawing statement or a few for every piece."""
-    boxes, known = pieces.boxes, [each for each in language() if each.hint is not None]
-    half = np.maximum(boxes.half, THINNEST / 2)
+    boxes = pieces.boxes
+    half = np.maximum(boxes.half, THINNEST / 2)  # a single sheet has no thickness of its own
     drawn: list[Draw] = []
     owner: list[int] = []
     for piece in range(len(half)):
-        box = Box(boxes.centre[piece], boxes.rotation[piece], half[piece])
-        for declared in known:
-            assert declared.hint is not None
-            for values in declared.hint(box):
-                drawn.append(Draw(declared.name, tuple(to_float32(value) for value in values)))
-                owner.append(piece)
+        tried = drawings(Box(boxes.centre[piece], boxes.rotation[piece], half[piece]))
+        drawn += tried
+        owner += [piece] * len(tried)
     if not drawn:
         return []
     misfit = misfits(drawn, np.array(owner), pieces)
@@ -115,24 +111,36 @@ def plain(node: Node) -> Node:
         return Loop(node.name, node.values, tuple(plain(inner) for inner in node.body))
     if language()[node.name].pivot is not None:
         return node
-    scene = unroll(encode(Program((node,)), dtype=torch.float64))
-    if int(scene.mask.sum()) != 1:
-        return node
-    slot = int(scene.mask.nonzero()[0])
-    half = primitives[int(scene.kind[slot])].bound(scene.size[slot])
-    box = Box(*(each.numpy() for each in (scene.centre[slot], scene.rotation[slot], half)))
-    others = [
-        Draw(declared.name, tuple(to_float32(value) for value in values), node.role)
-        for declared in language()
-        if declared.hint is not None
-        for values in declared.hint(box)
-    ]
+    (boxes,) = solid_boxes([node])
+    others = [replace(other, role=node.role) for other in drawings(boxes[0])] if len(boxes) == 1 else []
     if not others:
         return node
+    scene = unroll(encode(Program((node,)), dtype=torch.float64))
     points = sample_surface(scene, POINTS, torch.Generator().manual_seed(0)).points.double()
     drawn = unroll(encode([Program((other,)) for other in others], dtype=torch.float64))
     off = signed_distance(drawn, points.expand(len(others), -1, -1)).abs().amax(-1).tolist()
     return min((other for other, far in zip(others, off, strict=True) if far < SAME), key=numbers_written, default=node)
+
+
+def drawings(box: Box) -> list[Draw]:
+    """How the statements that have a hint draw a box."""
+    return [
+        Draw(declared.name, tuple(to_float32(value) for value in values))
+        for declared in language()
+        if declared.hint is not None
+        for values in declared.hint(box)
+    ]
+
+
+def solid_boxes(nodes: Sequence[Node]) -> list[list[Box]]:
+    """The boxes around all solids that each block draws."""
+    scene = unroll(encode([Program((node,)) for node in nodes], dtype=torch.float64))
+    half = bounds(scene)
+    return [
+        [Box(*(each[row, slot].numpy() for each in (scene.centre, scene.rotation, half)))
+         for slot in scene.mask[row].nonzero()[:, 0].tolist()]
+        for row in range(len(nodes))
+    ]  # fmt: skip
 
 
 def misfits(drawn: Sequence[Draw], owner: Array, pieces: Pieces) -> FloatArray:

@@ -8,6 +8,7 @@ explain gains nothing and costs its price; surface that lies inside another chos
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -59,10 +60,19 @@ def choose(covers: Covers, blocks: int, *, rounds: int = ROUNDS, seed: int = 0) 
     return Choice(max(found, key=lambda option: option.value), tuple(found))
 
 
-def explained(covers: Covers, chosen: Array) -> float:
+def explained(covers: Covers, chosen: Sequence[int] | Array) -> float:
     """Share of the target that some of the candidates explain together."""
-    union: Bits = np.bitwise_or.reduce(covers.rows[chosen, : covers.evidence], axis=0, initial=0)
+    union: Bits = np.bitwise_or.reduce(covers.rows[list(chosen), : covers.evidence], axis=0, initial=0)
     return float(np.bitwise_count(union) @ covers.weights[: covers.evidence])
+
+
+def missed(covers: Covers, chosen: tuple[int, ...]) -> Array:
+    """The candidates that are not chosen, those first that would explain most of what is not explained."""
+    rows = covers.rows[:, : covers.evidence]
+    union: Bits = np.bitwise_or.reduce(rows[list(chosen)], axis=0, initial=0)
+    more = np.bitwise_count(rows & ~union) @ covers.weights[: covers.evidence] - covers.prices
+    order = np.argsort(-more, kind="stable")
+    return order[~np.isin(order, chosen)]
 
 
 def value(covers: Covers, chosen: tuple[int, ...]) -> float:

@@ -68,20 +68,35 @@ class Needs(NamedTuple):
 def find_joints(scene: Scene, floor: float, generator: torch.Generator) -> Joints:
     """The joints of a scene: of parts that touch, and of those that nearly touch where nothing else joins them."""
     count = len(scene.mask)
-    places, apart = _samples(scene, generator)
-    first, second = (torch.minimum(apart, apart.T) < CANDIDATE).triu(1).nonzero(as_tuple=True)
-    area = bounds(scene).prod(-1)
-    swap = area[first] > area[second]
-    first, second = torch.where(swap, second, first), torch.where(swap, first, second)
-    start = places[first, second]
-    points = projected(scene, first, second, start, FIRST)
-    gap = signed_distance(rows_of(scene, second)[0], points[:, None])[:, 0].detach()
-    gap = gap + signed_distance(rows_of(scene, first)[0], points[:, None])[:, 0].detach().clamp(min=0)
+    first, second, points, gap = gaps(scene, generator)
     chosen = (joining(first, second, gap, count, NEARLY) | (gap <= TOUCHING)).nonzero()[:, 0]
     lowest = _lowest(scene, torch.arange(count))[:, 0]
     standing = ((lowest - floor).abs() <= NEARLY).nonzero()[:, 0]
     inner = _inner(scene, first[chosen], points[chosen])
     return Joints(first[chosen], second[chosen], inner, standing, floor)
+
+
+class Gaps(NamedTuple):
+    """Pairs of primitives close to each other: slots (C,) of the two, the place (C, 3) where the gap is narrowest, and
+    how wide it is there (C,)."""
+
+    first: Int[Tensor, " C"]
+    second: Int[Tensor, " C"]
+    points: Float[Tensor, "C 3"]
+    width: Float[Tensor, " C"]
+
+
+def gaps(scene: Scene, generator: torch.Generator) -> Gaps:
+    """The gaps of a scene, those between parts that overlap below zero; the smaller part of each pair comes first."""
+    places, apart = _samples(scene, generator)
+    first, second = (torch.minimum(apart, apart.T) < CANDIDATE).triu(1).nonzero(as_tuple=True)
+    area = bounds(scene).prod(-1)
+    swap = area[first] > area[second]
+    first, second = torch.where(swap, second, first), torch.where(swap, first, second)
+    points = projected(scene, first, second, places[first, second], FIRST)
+    width = signed_distance(rows_of(scene, second)[0], points[:, None])[:, 0].detach()
+    width = width + signed_distance(rows_of(scene, first)[0], points[:, None])[:, 0].detach().clamp(min=0)
+    return Gaps(first, second, points, width)
 
 
 def joining(

@@ -28,6 +28,9 @@ STRAY = 0.35
 LEAST_STEP = 0.4
 """Cells between two copies, at least."""
 
+MISSING, LEAST_PRESENT = -1, 4
+"""What stands for a copy that is not there, and how many others must be."""
+
 MOST_ALIKE = 48
 """Most copies of one group that are rolled up: those that come first."""
 
@@ -55,7 +58,7 @@ def _rolled(nodes: Sequence[Node]) -> list[Node]:
     if len(nodes) < 2:
         return []
     seen = looks(nodes)
-    found: list[Node] = [Loop("translate", _values(len(run), *step), (nodes[run[0]],)) for run, step in runs(seen)]
+    found: list[Node] = [Loop("translate", _values(count, *step), (nodes[one],)) for one, count, step in runs(seen)]
     for axis in (SIDE, DEPTH):
         found += [Loop("mirror", _values(2, axis, plane), (nodes[one],)) for one, _, plane in mirrored(seen, axis)]
     for count in () if isinstance(nodes[0], Loop) else TURNS:  # turned pairs would be drawn twice
@@ -65,27 +68,51 @@ def _rolled(nodes: Sequence[Node]) -> list[Node]:
     return [found[place] for place in distinct(found, looks(found))]
 
 
+def mirrors(node: Node, axis: int) -> bool:
+    """Whether a loop mirrors along an axis."""
+    return isinstance(node, Loop) and node.name == "mirror" and node.values[1] == axis
+
+
 def _values(*numbers: float) -> tuple[float, ...]:
     return tuple(to_float32(number) + 0.0 for number in numbers)
 
 
-def runs(seen: Looks) -> Iterator[tuple[tuple[int, ...], tuple[float, float, float]]]:
-    """Indices of copies in equal steps, and the step; the longest first."""
+def runs(seen: Looks) -> Iterator[tuple[int, int, tuple[float, float, float]]]:
+    """The first of copies in equal steps, how many they are, and the step; the longest first.
+
+    One copy may be missing if four are there: what is drawn in its place is not supported, and pays for that.
+    """
     found: dict[tuple[int, ...], FloatArray] = {}
     for group in groups(seen):
         places = seen.middle[group]
         steps = places[None] - places[:, None]
         onwards = (np.abs(steps).max(-1) > LEAST_STEP) & ~_backwards(steps) & ~_overlap(seen.spread[group[0]], steps)
         first = onwards & (_nearest(places, places[:, None] - steps) < 0)
-        after = _nearest(places, places[None] + steps)
+        after, beyond = (_nearest(places, places[None] + times * steps) for times in (1, 2))
+        before = _nearest(places, places[:, None] - 2 * steps)
         for a, b in np.argwhere(first).tolist():
-            run = [a, b]
-            while (third := int(after[run[-2], run[-1]])) >= 0 and third not in run:
-                run.append(third)
-            found.setdefault(tuple(group[run].tolist()), (places[run[-1]] - places[a]) / (len(run) - 1))
+            run = _followed(after, [a, b])
+            whole = [run]
+            if (other := int(before[a, b])) >= 0 and other not in run and len(run) + 1 >= LEAST_PRESENT:
+                whole.append([other, MISSING, *run])
+            if (other := int(beyond[run[-2], run[-1]])) >= 0 and other not in run:
+                onward = int(_nearest(places, places[other] + steps[run[-2], run[-1]]))
+                rest = _followed(after, [other, onward]) if onward >= 0 and onward not in run else [other]
+                if len(run) + len(rest) >= LEAST_PRESENT:
+                    whole.append([*run, MISSING, *rest])
+            for each in whole:
+                members = tuple(int(group[one]) if one != MISSING else MISSING for one in each)
+                found.setdefault(members, (places[each[-1]] - places[each[0]]) / (len(each) - 1))
     for members in sorted(found, key=lambda members: (-len(members), members))[:MOST_RUNS]:
         step = np.where(np.abs(found[members]) * (len(members) - 1) < CENTRED, 0.0, found[members])
-        yield members, (float(step[0]), float(step[1]), float(step[2]))
+        yield members[0], len(members), (float(step[0]), float(step[1]), float(step[2]))
+
+
+def _followed(after: Array, run: list[int]) -> list[int]:
+    """Two copies and all that follow in steps like theirs."""
+    while (third := int(after[run[-2], run[-1]])) >= 0 and third not in run:
+        run = [*run, third]
+    return run
 
 
 def mirrored(seen: Looks, axis: int) -> Iterator[tuple[int, int, float]]:

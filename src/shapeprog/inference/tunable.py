@@ -23,8 +23,8 @@ from shapeprog.space import HALF
 ROW = SIZES + 3 + 9
 """Numbers that place one primitive: sizes, centre and rotation."""
 
-THINNEST = 0.2
-"""Least thickness in cells that is left of any part; below half of it the eye takes it for a sliver."""
+THINNEST = 0.1
+"""Least thickness in cells of any part; the eye takes thinner ones for slivers."""
 
 DEGREES, CELLS = 1, 2
 """Decimals that tidy numbers keep: tenths of degrees, hundredths of cells."""

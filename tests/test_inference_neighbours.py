@@ -1,0 +1,131 @@
+"""Neighbours of a program, and how parts that float are connected: planted programs whose answer is known."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from shapeprog.data.placement import shape_from_mesh
+from shapeprog.geometry.mesh import pieces, union_mesh
+from shapeprog.inference.adjustment import adjust, tidy
+from shapeprog.inference.choice import choose
+from shapeprog.inference.connecting import connected, floating
+from shapeprog.inference.coverage import Prices, covers
+from shapeprog.inference.evidence import Evidence, evidence_of
+from shapeprog.inference.neighbours import neighbours
+from shapeprog.language import Draw, Loop, Program
+from shapeprog.language.program import Node
+from shapeprog.language.text import parse
+from shapeprog.language.unroll import unroll
+
+SEAT = "box(at=(2, -8, -12), size=(1, 16, 24))\n"
+LEGS = "for i in mirror(side):\n    box(at=(-12, -1, 8), size=({height}, 2, 2))\n"
+TABLE = SEAT + LEGS.format(height=14)
+
+
+def evidence(text: str) -> Evidence:
+    vertices, faces = union_mesh(unroll(parse(text)))
+    return evidence_of(replace(shape_from_mesh(vertices, faces), vertices=vertices, faces=faces))  # where it is
+
+
+def best(start: str, target: str) -> Program:
+    """What is chosen of a program's own blocks and their neighbours."""
+    program = parse(start)
+    near: list[Node] = [*program.body, *neighbours(program)]
+    found = choose(covers([Program((node,)) for node in near], evidence(target), Prices()), 10)
+    return Program(tuple(near[place] for place in found.best.chosen))
+
+
+def same(found: Program, wanted: str) -> bool:
+    one, two = (unroll(each) for each in (found, parse(wanted)))
+    return len(one.centre) == len(two.centre) and bool(
+        ((one.centre[:, None] - two.centre).abs().amax(-1) < 0.1).any(1).all()
+    )
+
+
+def test_two_halves_of_one_board_become_one_board():
+    halves = "box(at=(2, -8, -12), size=(1, 16, 12.1))\nbox(at=(2, -8, 0), size=(1, 16, 12))\n"
+    found = best(halves, SEAT)
+    assert len(found.body) == 1
+    assert same(found, SEAT)
+
+
+def test_a_run_of_two_halves_becomes_one_board():
+    run = "for i in translate(2, by=(0, 0, 12)):\n    box(at=(2, -8, -12), size=(1, 16, 12))\n"
+    assert best(run, SEAT).body == parse(SEAT).body
+
+
+@pytest.mark.parametrize("first", [0, 1])
+@pytest.mark.parametrize("count", [4, 6])
+def test_a_run_with_a_copy_more_or_less_is_mended_at_either_end(first, count):
+    slats = "for i in translate({count}, by=(0, 0, 5)):\n    box(at=(-12, 0, {start}), size=(24, 1, 2))\n"
+    frame = "box(at=(-12, 1, -12), size=(2, 2, 24))\n"
+    start = -12 + 5 * first * (1 if count == 4 else -1)
+    found = best(frame + slats.format(count=count, start=start), frame + slats.format(count=5, start=-12))
+    assert same(found, frame + slats.format(count=5, start=-12))
+    assert [node.count for node in found.body if isinstance(node, Loop)] == [5]
+
+
+def test_a_missing_mirror_image_is_found():
+    found = best(SEAT + "box(at=(-12, -1, 8), size=(14, 2, 2))\n", TABLE)
+    assert same(found, TABLE)
+    assert found.blocks == 2
+
+
+def test_a_block_ends_where_the_next_begins():
+    found = best(SEAT + LEGS.format(height=12), TABLE)
+    assert sorted(unroll(found).size[:, 0].tolist()) == pytest.approx([0.5, 7, 7], abs=0.05)
+
+
+def test_neighbours_are_new_and_each_of_them_stands_once():
+    program = parse(TABLE)
+    near = neighbours(program)
+    assert len(set(near)) == len(near) > 10
+    assert not set(near) & set(program.body)
+    assert neighbours(Program()) == []
+
+
+@pytest.mark.parametrize("height", [10.5, 13.2])
+def test_a_floating_leg_reaches_the_seat(height):
+    program = parse(SEAT + LEGS.format(height=height))
+    assert floating(program) == [1]
+    found = connected(program, evidence(TABLE), Prices())
+    assert floating(found) == []
+    assert found.blocks == 2
+    assert pieces(*union_mesh(unroll(found))) == 1
+
+
+def test_a_leaning_leg_is_stretched_along_itself():
+    leg = "for i in mirror(side):\n    bar(start=(-12, 0, 11), end=({up}, 0, {side}), section=(1, 1))\n"
+    program = parse(SEAT + leg.format(up=0, side=8.43))
+    found = connected(program, evidence(SEAT + leg.format(up=2.2, side=7.96)), Prices())
+    assert floating(found) == []
+    ends = np.array(found.body[1].body[0].values)  # type: ignore[union-attr]
+    assert ends[3:6] == pytest.approx([2.1, 0, 8.0], abs=0.2)
+
+
+def test_a_crumb_that_floats_is_left_out_and_what_says_much_is_not():
+    crumb = "box(at=(-6, 0, 0), size=(0.5, 0.5, 0.5))\n"
+    found = connected(parse(TABLE + crumb), evidence(TABLE), Prices())
+    assert found == parse(TABLE)
+    shelf = "box(at=(-8, -8, -7), size=(1, 16, 14))\n"  # as far from both legs
+    assert connected(parse(TABLE + shelf), evidence(TABLE + shelf), Prices()).blocks == 3
+
+
+def test_what_is_one_piece_stays_as_it_is():
+    assert connected(parse(TABLE), evidence(TABLE), Prices()) == parse(TABLE)
+    assert connected(Program(), evidence(TABLE), Prices()) == Program()
+
+
+def test_closing_a_gap_does_not_move_what_the_target_holds():
+    apart = SEAT + "box(at=(3.25, -8, -12), size=(1, 16, 24))\nbox(at=(-12, -1, -1), size=(14, 2, 2))\n"
+    found = unroll(adjust(parse(apart), evidence(apart))).centre
+    assert (found - unroll(parse(apart)).centre).abs().max() < 0.1
+
+
+def test_tidy_numbers_have_two_decimals_and_angles_one():
+    node = Draw("board", (2.123456, -8.0, -12.0, 1.0004, 16.0, 24.0, 12.3456))
+    assert tidy(Program((node,))) == parse("board(at=(2.12, -8, -12), size=(1, 16, 24), tilt=12.3)")
+    assert tidy(Program()) == Program()

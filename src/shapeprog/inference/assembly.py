@@ -15,6 +15,7 @@ from shapeprog.data.shape import Shape
 from shapeprog.inference.adjustment import adjust
 from shapeprog.inference.budget import NEVER, Deadline
 from shapeprog.inference.candidates import distinct, looks, plain, single_candidates
+from shapeprog.inference.cell_coverage import choose_on_cells, cost_on_cells, covers_of_cells
 from shapeprog.inference.choice import Choice, choose
 from shapeprog.inference.coverage import Prices, covers
 from shapeprog.inference.evidence import evidence_of
@@ -49,7 +50,7 @@ class Assembly:
     program
         The blocks chosen.
     explained
-        Share of the visible surface that they explain.
+        Share of the visible surface that they explain, or of the cells of what is known by these alone.
     reason
         Why there are no more of them.
     trade_off
@@ -103,7 +104,11 @@ def assemble(
         return Assembly(Program(), 0.0, "there is no surface to speak of.", ())
     cost = prices or Prices()
     cost = replace(cost, **{name: getattr(cost, name) / detail for name in ("statement", "loop", "number")})
-    choice = choose(covers([Program((node,)) for node in candidates], evidence, cost, seed), blocks, seed=seed)
+    offered = [Program((node,)) for node in candidates]
+    if shape.points is not None:
+        choice = choose(covers(offered, evidence, cost, seed), blocks, seed=seed)
+    else:
+        choice = choose_on_cells(covers_of_cells(offered, shape.voxels, evidence, cost), blocks, seed=seed)
     chosen = [Program(tuple(candidates[place] for place in option.chosen)) for option in choice.options]
     seen = tuple(
         TradeOff(len(program.body), sum(numbers_written(node) for node in program.walk()), option.explained)
@@ -111,13 +116,17 @@ def assemble(
     )
     program = Program(tuple(candidates[place] for place in choice.best.chosen))
     told(1.0)
-    program = with_roles(adjust(program, evidence, seed=seed, deadline=deadline, progress=progress))
-    return Assembly(program, choice.best.explained, _reason(choice, seen, blocks), seen)
+    adjusted = adjust(program, evidence, seed=seed, deadline=deadline, progress=progress)
+    if shape.points is None:  # a surface is anywhere within its cells: where they fit worse, it was better as it was
+        found = [adjusted, adjust(program, evidence, steps=0)]
+        adjusted = min(found, key=lambda each: cost_on_cells(each, shape.voxels))
+    seen_as = "surface" if shape.points is not None else "cells"
+    return Assembly(with_roles(adjusted), choice.best.explained, _reason(choice, seen, blocks, seen_as), seen)
 
 
-def _reason(choice: Choice, seen: Sequence[TradeOff], allowed: int) -> str:
+def _reason(choice: Choice, seen: Sequence[TradeOff], allowed: int, seen_as: str) -> str:
     used, share = len(choice.best.chosen), choice.best.explained
-    told = f"{used} block{'s' if used != 1 else ''} explain{'s' if used == 1 else ''} {share:.0%} of the surface"
+    told = f"{used} block{'s' if used != 1 else ''} explain{'s' if used == 1 else ''} {share:.0%} of the {seen_as}"
     if used >= allowed:
         return f"{told} and every one of the {allowed} blocks is in use; allow more with --blocks."
     now = next(each for each in seen if each.blocks == used)

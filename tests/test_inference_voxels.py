@@ -90,3 +90,12 @@ def test_cells_are_described_no_longer_than_in_the_statements_of_the_paper():
     )
     written = [sum(numbers_written(node) for node in each.program.walk()) for each in (every, paper)]
     assert written[0] <= written[1]
+
+
+@pytest.mark.parametrize("kind", ["full", "cell", "sheet"])
+def test_full_grids_single_cells_and_flat_sheets_are_one_block(kind):
+    solid = np.zeros((32, 32, 32), bool)
+    solid[{"full": np.s_[:], "cell": np.s_[16, 16, 16], "sheet": np.s_[16, 4:28, 4:28]}[kind]] = True
+    found = sp.infer(Shape(kind, solid), blocks=1, generator=None)
+    assert found.scores["iou"] == 1
+    assert found.program.size == 1

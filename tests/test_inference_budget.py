@@ -47,7 +47,14 @@ def found() -> Callable[[float], Result]:
 
     def infer_within(budget: float) -> Result:
         return infer(
-            SHAPE, blocks=2, budget=budget, settings=SETTINGS, schedule=SCHEDULE, generator=writer, proposals=4
+            SHAPE,
+            blocks=2,
+            budget=budget,
+            settings=SETTINGS,
+            schedule=SCHEDULE,
+            generator=writer,
+            proposals=4,
+            statements="paper",
         )
 
     return infer_within

@@ -104,7 +104,7 @@ def test_inference_rebuilds_a_table_from_cells_and_from_points(with_points):
 def test_inference_survives_full_grids_single_cells_and_flat_sheets(kind):
     solid = np.zeros((32, 32, 32), np.bool_)
     solid[{"full": np.s_[:], "cell": np.s_[16, 16, 16], "sheet": np.s_[16, 4:28, 4:28]}[kind]] = True
-    result = infer(Shape(kind, solid), blocks=1, settings=QUICK, schedule=Schedule(steps=4))
+    result = infer(Shape(kind, solid), blocks=1, settings=QUICK, schedule=Schedule(steps=4), statements="paper")
     check(result, 1)
     assert result.scores["iou"] == 1
     assert "every one of the 1 blocks is in use" in result.reason

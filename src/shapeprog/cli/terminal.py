@@ -43,7 +43,10 @@ Changes = Annotated[
 ]
 
 Seed = Annotated[int, typer.Option(help="Seed of everything random.", min=0, max=2**63 - 1)]
-Up = Annotated[str | None, typer.Option(help="World axis that points up, such as +y; by default the format's.")]
+Up = Annotated[
+    str | None,
+    typer.Option(help="World axis that points up, such as +y; auto: how it stands best; by default the format's."),
+]
 Front = Annotated[str | None, typer.Option(help="World axis that the front faces, such as -z.")]
 
 

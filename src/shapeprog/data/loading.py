@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 from shapeprog.data.folders import Skipped, files_below
 from shapeprog.data.meshes import COMMON, mesh_formats, read_mesh
-from shapeprog.data.orientation import axes_of, in_shapenet_layout
+from shapeprog.data.orientation import AUTO, axes_of, default_axes, in_shapenet_layout
 from shapeprog.data.placement import shape_from_mesh, shape_from_points, shape_from_voxels
 from shapeprog.data.reading import BYTES, POINTS, check_count, check_file, in_words
 from shapeprog.data.shape import Shape
+from shapeprog.data.uprightness import find_up
 from shapeprog.errors import InputError, ShapeProgError
 from shapeprog.space import Array
 
@@ -36,7 +39,8 @@ def load(
         (P, 3)), or voxels (binvox, NPY or NPZ (R, R, R), HDF5, packs).  ``file.npz#12`` is the shape numbered 12, from
         0, of a file that holds many; ``file.npz#name`` the one of that name.
     up, front
-        World axes such as ``+y`` and ``-z``; by default those of the format (:mod:`shapeprog.data.orientation`).
+        World axes such as ``+y`` and ``-z``; by default those of the format (:mod:`shapeprog.data.orientation`).  With
+        ``auto`` up is what the shape seems to stand along (:mod:`shapeprog.data.uprightness`); its note says what.
     points
         How many points to draw from a mesh, or to keep of a cloud, at most.
     seed
@@ -136,32 +140,46 @@ def _open(path: Path, up: str | None, front: str | None, points: int, seed: int)
             known = ", ".join(sorted(readable_suffixes()))
             ending = f"that end in {suffix!r}" if suffix else "without a suffix"
             raise InputError(f"{path.name}: no shapes are read from files {ending}", f"known: {known}")
-        axes, name = axes_of(path, up, front), _name(path)
+        axes_of(path, up, front)  # what is wrong with them is said before anything is read
+        place, name = partial(_placed, path, up, front), _name(path)
         if suffix in ARRAY_SUFFIXES:
-            return _open_array(path, name, axes, points, seed)
+            return _open_array(path, name, place, points, seed)
         if suffix == ".binvox":
-            shape = _read_binvox(path, name, axes)
+            shape = _read_binvox(path, name, place)
         else:
-            shape = _shape_of(*read_mesh(path), path, name, axes, points, seed)
+            shape = _shape_of(*read_mesh(path), path, name, place, points, seed)
     return _Held(path, [name], lambda _: shape)
 
 
-def _read_binvox(path: Path, name: str, axes: Array) -> Shape:
+Place = Callable[[Callable[..., Shape]], Shape]
+"""Makes a shape with the axes that are wanted, from a function of its ``axes``."""
+
+
+def _placed(path: Path, up: str | None, front: str | None, make: Callable[..., Shape]) -> Shape:
+    if up != AUTO:
+        return make(axes=axes_of(path, up, front))
+    seen = make(axes=axes_of(path, None, front))
+    found = find_up(seen.voxels, seen.frame.axes, usual=default_axes(path)[0], front=front)
+    note = f"Up is taken to be {found.up} of the file, {found.probability:.0%} likely by how the shape would stand."
+    return replace(make(axes=axes_of(path, found.up, front)), note=note)
+
+
+def _read_binvox(path: Path, name: str, place: Place) -> Shape:
     from shapeprog.formats.binvox import read_binvox
 
     check_count(path.name, "bytes", path.stat().st_size, BYTES)
     cells, corner, cell = read_binvox(path)
-    return shape_from_voxels(cells, name=name, axes=axes, corner=corner, cell=cell, source=path)
+    return place(partial(shape_from_voxels, cells, name=name, corner=corner, cell=cell, source=path))
 
 
-def _shape_of(vertices: Array, faces: Array, path: Path, name: str, axes: Array, points: int, seed: int) -> Shape:
+def _shape_of(vertices: Array, faces: Array, path: Path, name: str, place: Place, points: int, seed: int) -> Shape:
     if len(faces):
-        return shape_from_mesh(vertices, faces, name=name, axes=axes, points=points, seed=seed, source=path)
+        return place(partial(shape_from_mesh, vertices, faces, name=name, points=points, seed=seed, source=path))
     check_count(path.name, "points", len(vertices), POINTS)
-    return shape_from_points(vertices, name=name, axes=axes, points=points, seed=seed, source=path)
+    return place(partial(shape_from_points, vertices, name=name, points=points, seed=seed, source=path))
 
 
-def _open_array(path: Path, name: str, axes: Array, points: int, seed: int) -> _Held:
+def _open_array(path: Path, name: str, place: Place, points: int, seed: int) -> _Held:
     from shapeprog.data.arrays import occupied, read_array
     from shapeprog.data.hdf5 import Hdf5Grids
     from shapeprog.data.packs import is_pack, read_pack
@@ -171,13 +189,13 @@ def _open_array(path: Path, name: str, axes: Array, points: int, seed: int) -> _
         return _Held(path, pack.ids.tolist(), pack.__getitem__)
     array = Hdf5Grids(path) if path.suffix.lower() in (".h5", ".hdf5") else read_array(path)
     if not isinstance(array, Hdf5Grids) and array.ndim == 2:
-        cloud = shape_from_points(array, name=name, axes=axes, points=points, seed=seed, source=path)
+        cloud = place(partial(shape_from_points, array, name=name, points=points, seed=seed, source=path))
         return _Held(path, [name], lambda _: cloud)
     names = [name] if len(array) == 1 else [f"{name}#{number}" for number in range(len(array))]
 
     def make(number: int) -> Shape:
         cells = occupied(array[number], names[number])
-        return shape_from_voxels(cells, name=names[number], axes=axes, source=path)
+        return place(partial(shape_from_voxels, cells, name=names[number], source=path))
 
     return _Held(path, names, make)
 

@@ -17,6 +17,9 @@ from shapeprog.space import Array, grid_axes
 SHAPENET: Axes = ("+y", "-z")
 """Axes of the files of ShapeNet, whatever their format."""
 
+AUTO = "auto"
+"""Given as up: the axis that the shape seems to stand along, see :mod:`shapeprog.data.uprightness`."""
+
 _SYNSET = re.compile(r"\d{8}")
 
 
@@ -38,7 +41,7 @@ def axes_of(path: Path, up: str | None, front: str | None) -> Array:
     """World directions of the grid axes, columns (3, 3), with the file's defaults for what is not given.
 
     Where one axis is given and lies on the line of the other's default, the shape is taken to be tipped over: the
-    default pair is turned together until the given axis fits.
+    default pair is turned together until the given axis fits.  ``auto`` counts as not given.
 
     Raises
     ------
@@ -46,6 +49,7 @@ def axes_of(path: Path, up: str | None, front: str | None) -> Array:
         If a name is not an axis or the two lie on one line.
     """
     usual_up, usual_front = default_axes(path)
+    up = None if up == AUTO else up
     rise, face = up or usual_up, front or usual_front
     if up and not front and up.strip()[-1:].lower() == usual_front[-1]:
         face = _opposite(usual_up) if _same(up, usual_front) else usual_up

@@ -34,6 +34,8 @@ class Shape:
         What the file held.
     split
         train, val or test, where its pack says so.
+    note
+        What was concluded in reading it, as a sentence.
     """
 
     name: str
@@ -45,3 +47,4 @@ class Shape:
     source: Path | None = None
     kind: Literal["mesh", "points", "voxels"] = "voxels"
     split: str = ""
+    note: str = ""

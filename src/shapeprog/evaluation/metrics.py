@@ -8,7 +8,7 @@ CD
 F1
     F-score of the same points at a distance of one grid cell.
 IoU
-    Cells of the program, see :func:`occupied`, against the touched cells of the target, at 32^3.
+    Cells of the program, see :mod:`shapeprog.data.touched`, against the touched cells of the target, at 32^3.
 Likeness
     F1@.5 %, F1@1 %, normals and silhouette: see :mod:`shapeprog.evaluation.likeness`.  Normals and silhouette need a
     mesh as target; F1 needs points at least.
@@ -30,11 +30,11 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 import numpy.typing as npt
 import torch
-from jaxtyping import Float, Int
+from jaxtyping import Float
 from torch import Tensor
 
 from shapeprog.data.sampling import sample_surface as sample_triangles
-from shapeprog.data.voxelise import voxelise_mesh
+from shapeprog.data.touched import occupied
 from shapeprog.errors import ShapeProgError
 from shapeprog.evaluation import likeness, structure
 from shapeprog.evaluation.likeness import Samples, Triangles
@@ -44,9 +44,7 @@ from shapeprog.geometry.nearest import squared_distance
 from shapeprog.geometry.scene import Scene
 from shapeprog.geometry.surface import sample_surface
 from shapeprog.language.program import Program
-from shapeprog.language.statement import language
 from shapeprog.language.unroll import unroll
-from shapeprog.space import RESOLUTION
 
 POINTS = 5000
 """Points drawn on each of the two surfaces."""
@@ -168,7 +166,8 @@ def evaluate_program(
     target
         The shape it should be.
     snapped
-        The whole-numbered program whose IoU is measured; by default see :func:`occupied`.
+        The whole-numbered program whose IoU is measured; by default see
+        :func:`shapeprog.data.touched.occupied`.
     points
         Points on each surface.
     seed
@@ -196,20 +195,6 @@ def evaluate_program(
     return replace(
         with_likeness(row, mesh, target, seed), one_piece=structure.one_piece(mesh), slivers=structure.slivers(scene)
     )
-
-
-def occupied(program: Program, scene: Scene, snapped: Program | None = None) -> Int[Tensor, "32 32"]:
-    """The packed cells whose share with those of a target is measured.
-
-    Those of the whole-numbered program, as published, if all statements are of the kind that generators are taught: by
-    default of the program rounded.  Of others, whose parts may be thinner than a cell, those that the solid touches.
-    """
-    if snapped is None and not all(language()[node.name].taught for node in program.walk()):
-        try:
-            return cells.pack(voxelise_mesh(*union_mesh(scene)))
-        except ShapeProgError:  # nothing in it has a volume
-            return cells.pack(np.zeros((RESOLUTION,) * 3, np.bool_))
-    return cells.rasterise(unroll(program.snap() if snapped is None else snapped))
 
 
 def with_likeness(row: Metrics, predicted: Triangles | None, target: Target, seed: int = 0) -> Metrics:
@@ -315,4 +300,5 @@ def _distances(scene: Scene, target: Target, points: int, seed: int) -> tuple[fl
 
 def _all_points(target: Target, points: int) -> Cloud:
     assert target.points is not None
-    return torch.from_numpy(np.asarray(target.points[:points], np.float64).copy())
+    mixed = np.random.default_rng(0).permutation(len(target.points))[:points]  # files list them place after place
+    return torch.from_numpy(np.asarray(target.points[np.sort(mixed)], np.float64))

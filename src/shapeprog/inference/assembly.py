@@ -11,10 +11,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
+import numpy as np
+import numpy.typing as npt
+
 from shapeprog.data.shape import Shape
 from shapeprog.inference.adjustment import adjust, tidy
 from shapeprog.inference.budget import NEVER, Deadline
 from shapeprog.inference.candidates import distinct, looks, plain, single_candidates
+from shapeprog.inference.cell_coverage import choose_on_cells, cost_on_cells, covers_of_cells
 from shapeprog.inference.choice import Choice, choose, explained, missed, value
 from shapeprog.inference.connecting import connected
 from shapeprog.inference.coverage import Covers, Prices, covers
@@ -25,6 +29,9 @@ from shapeprog.inference.repeating import repeated
 from shapeprog.inference.roles import with_roles
 from shapeprog.language.program import Node, Program
 from shapeprog.language.text import numbers_written
+
+Progress = Callable[[str, float], None]
+Flags = npt.NDArray[np.bool_]
 
 MOST_CANDIDATES = 1_500
 """Most candidates that are compared; loops come first, then the most important pieces."""
@@ -63,17 +70,20 @@ class Assembly:
     program
         The blocks chosen.
     explained
-        Share of the visible surface that they explain.
+        Share of the visible surface that they explain, or of the cells of what is known by these alone.
     reason
         Why there are no more of them.
     trade_off
         The best of every number of blocks.
+    evidence
+        What the blocks were to explain.
     """
 
     program: Program
     explained: float
     reason: str
     trade_off: tuple[TradeOff, ...]
+    evidence: Evidence
 
 
 def assemble(
@@ -85,7 +95,7 @@ def assemble(
     detail: float = 1.0,
     seed: int = 0,
     deadline: Deadline = NEVER,
-    progress: Callable[[str, float], None] | None = None,
+    progress: Progress | None = None,
 ) -> Assembly:
     """A program of at most ``blocks`` blocks for a shape; the same for the same seed.
 
@@ -114,18 +124,55 @@ def assemble(
     candidates = [*elsewhere, *singles[: MOST_CANDIDATES // 2], *repeated(singles)][:MOST_CANDIDATES]
     told(0.7)
     if not candidates or evidence.area <= 0:
-        return Assembly(Program(), 0.0, "there is no surface to speak of.", ())
+        return Assembly(Program(), 0.0, "there is no surface to speak of.", (), evidence)
     cost = prices or Prices()
     cost = replace(cost, **{name: getattr(cost, name) / detail for name in ("statement", "loop", "number")})
-    choice, candidates = _improved(candidates, evidence, cost, blocks, seed, deadline)
     told(1.0)
-    start = connected(_chosen(candidates, choice.best.chosen), evidence, cost, seed)
+    if shape.points is None:
+        return _of_cells(candidates, shape.voxels, evidence, cost, blocks, seed, deadline, progress)
+    return _of_surface(candidates, evidence, cost, blocks, seed, deadline, progress)
+
+
+def _of_surface(
+    candidates: list[Node],
+    evidence: Evidence,
+    prices: Prices,
+    blocks: int,
+    seed: int,
+    deadline: Deadline,
+    progress: Progress | None,
+) -> Assembly:
+    """What explains most points of a surface, chosen among neighbours too, adjusted, connected and named."""
+    choice, candidates = _improved(candidates, evidence, prices, blocks, seed, deadline)
+    start = connected(_chosen(candidates, choice.best.chosen), evidence, prices, seed)
     adjusted = adjust(start, evidence, seed=seed, deadline=deadline, progress=progress)
-    program = connected(_unharmed(adjusted, start, evidence, cost, seed), evidence, cost, seed)
+    program = connected(_unharmed(adjusted, start, evidence, prices, seed), evidence, prices, seed)
     program = with_roles(tidy(Program(tuple(plain(node) for node in program.body))))
-    seen = tuple(_trade_off(_chosen(candidates, option.chosen), option.explained) for option in choice.options)
-    share = explained(_covers(program.body, evidence, cost, seed), tuple(range(len(program.body))))
-    return Assembly(program, share, _reason(len(program.body), share, seen, blocks), seen)
+    seen = _seen(choice, candidates)
+    share = explained(_covers(program.body, evidence, prices, seed), tuple(range(len(program.body))))
+    reason = _reason(len(program.body), share, seen, blocks, "surface")
+    return Assembly(program, share, reason, seen, evidence)
+
+
+def _of_cells(
+    candidates: list[Node],
+    voxels: Flags,
+    evidence: Evidence,
+    prices: Prices,
+    blocks: int,
+    seed: int,
+    deadline: Deadline,
+    progress: Progress | None,
+) -> Assembly:
+    """What explains most cells, adjusted where that does not fit them worse: a surface is anywhere within its cells."""
+    offered = [Program((node,)) for node in candidates]
+    choice = choose_on_cells(covers_of_cells(offered, voxels, evidence, prices), blocks, seed=seed)
+    start = _chosen(candidates, choice.best.chosen)
+    found = [adjust(start, evidence, seed=seed, deadline=deadline, progress=progress), tidy(start)]
+    program = with_roles(min(found, key=lambda each: cost_on_cells(each, voxels)))
+    seen = _seen(choice, candidates)
+    reason = _reason(len(start.body), choice.best.explained, seen, blocks, "cells")
+    return Assembly(program, choice.best.explained, reason, seen, evidence)
 
 
 def _improved(
@@ -169,17 +216,22 @@ def _chosen(candidates: Sequence[Node], places: Sequence[int]) -> Program:
     return Program(tuple(candidates[place] for place in places))
 
 
-def _trade_off(program: Program, share: float) -> TradeOff:
-    return TradeOff(len(program.body), sum(numbers_written(node) for node in program.walk()), share)
+def _seen(choice: Choice, candidates: Sequence[Node]) -> tuple[TradeOff, ...]:
+    """The best of every number of blocks, as it was chosen."""
+    chosen = [(_chosen(candidates, option.chosen), option.explained) for option in choice.options]
+    return tuple(
+        TradeOff(len(program.body), sum(numbers_written(node) for node in program.walk()), share)
+        for program, share in chosen
+    )
 
 
-def _reason(used: int, share: float, seen: Sequence[TradeOff], allowed: int) -> str:
-    told = f"{used} block{'s' if used != 1 else ''} explain{'s' if used == 1 else ''} {share:.0%} of the surface"
+def _reason(used: int, share: float, seen: Sequence[TradeOff], allowed: int, of: str) -> str:
+    told = f"{used} block{'s' if used != 1 else ''} explain{'s' if used == 1 else ''} {share:.0%} of the {of}"
     if used >= allowed:
         return f"{told} and every one of the {allowed} blocks is in use; allow more with --blocks."
-    now = next(each for each in seen if each.blocks == used)
+    now = next((each for each in seen if each.blocks == used), None)
     more = next((each for each in seen if each.blocks == used + 1), None)
-    if more is None or more.explained - share < LEAST_GAIN:
+    if now is None or more is None or more.explained - share < LEAST_GAIN:
         return f"{told}, and no other block that was seen would explain more."
     gain, cost = more.explained - share, max(more.numbers - now.numbers, 0)
     return f"{told}; one more would explain {gain:.1%} for {cost} more numbers: raise --detail to have it."

@@ -23,7 +23,7 @@ from shapeprog.data.shape import Shape
 from shapeprog.data.voxelise_kernels import mark_triangles
 from shapeprog.geometry.arrays import over_threads
 from shapeprog.inference.evidence_kernels import look_out
-from shapeprog.inference.surface import INSET
+from shapeprog.inference.surface import INSET, exposed, exposed_faces
 from shapeprog.space import HALF, RESOLUTION, SPAN, Array, FloatArray
 
 POINTS, SURFACE = 6_000, 40_000
@@ -37,6 +37,9 @@ NOISE = 2.0
 
 CELL_TOLERANCE = 0.65
 """The same for cells: a surface is anywhere within the cells that it touches."""
+
+THIN = 0.4
+"""Thickness of what is one cell thick, on average."""
 
 AGREEMENT, SCANNED = 0.5, 0.6
 """Least cosine between normals that fit; and of scans, of which noise could pass for a surface otherwise.
@@ -152,24 +155,23 @@ def _of_points(surface: FloatArray, voxels: Flags, seed: int) -> Evidence:
 
 
 def _of_cells(voxels: Flags) -> Evidence:
-    """Of cells: one point for each exposed face, where the surface below it probably is; see ``INSET``."""
-    padded, occupied = np.pad(voxels, 1), np.argwhere(voxels)
-    low, high = occupied.min(0), occupied.max(0) + 1
-    points, normals = [], []
-    for axis in range(3):
-        for sign in (-1, 1):
-            cells = np.argwhere(voxels & ~np.roll(padded, -sign, axis)[1:-1, 1:-1, 1:-1])
-            middle = cells + 0.5
-            at_end = cells[:, axis] == (low[axis] if sign < 0 else high[axis] - 1)
-            exact = at_end & (high[axis] - low[axis] == SPAN)
-            middle[:, axis] += sign * (0.5 - np.where(exact, 0.0, INSET))
-            points.append(middle - HALF)
-            normals.append(np.tile(sign * np.eye(3)[axis], (len(cells), 1)))
-    surface, directions = np.concatenate(points), np.concatenate(normals)
+    """Of cells: one point for each exposed face, where the surface below it probably is; see ``INSET``.
+
+    What is one cell thick has a thickness all the same: its two sides do not pass each other.
+    """
+    faces, occupied = exposed_faces(voxels), np.argwhere(voxels)
+    cells, axis, sign = faces[:, :3], faces[:, 3], faces[:, 4]
+    low, high = occupied.min(0)[axis], occupied.max(0)[axis] + 1
+    place = cells[np.arange(len(faces)), axis]
+    exact = (high - low == SPAN) & (place == np.where(sign < 0, low, high - 1))
+    single = exposed(voxels, cells, axis, 1) & exposed(voxels, cells, axis, -1)
+    inset = np.where(exact, 0.0, np.where(single, (1 - THIN) / 2, INSET))
+    normals = sign[:, None] * np.eye(3)[axis]
+    surface = cells + 0.5 - HALF + (0.5 - inset)[:, None] * normals
     count = len(surface)
     return Evidence(
-        surface, directions, np.full(count, 1 / count), np.ones(count, np.bool_), CELL_TOLERANCE, AGREEMENT,
-        surface, directions, _reach(CELL_TOLERANCE, count, count), float(count), ~voxels,
+        surface, normals, np.full(count, 1 / count), np.ones(count, np.bool_), CELL_TOLERANCE, AGREEMENT,
+        surface, normals, _reach(CELL_TOLERANCE, count, count), float(count), ~voxels,
     )  # fmt: skip
 
 

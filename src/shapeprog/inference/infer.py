@@ -1,8 +1,8 @@
 """Inference: a shape in, a program out, with its scores and a sentence that says why the search stopped.
 
 A program of the paper's statements is searched on cells; where there are weights, a generator proposes programs and
-blocks, and the search keeps what helps.  For shapes whose surface is known its blocks then compete with those found on
-the surface, from every statement there is.
+blocks, and the search keeps what helps.  Its blocks then compete with those found on the surface of the shape, from
+every statement there is; cells have a surface as well, if a coarse one.
 """
 
 from __future__ import annotations
@@ -20,11 +20,13 @@ from jaxtyping import Float
 from torch import Tensor
 
 from shapeprog.data.shape import Shape
-from shapeprog.geometry.cells import iou, pack, rasterise
+from shapeprog.data.touched import occupied
+from shapeprog.geometry.cells import iou, pack
 from shapeprog.geometry.distance import nearest_primitive
 from shapeprog.inference.assembly import TradeOff, assemble
 from shapeprog.inference.blocks import to_program
 from shapeprog.inference.budget import BUDGET, Deadline
+from shapeprog.inference.cell_coverage import cost_on_cells
 from shapeprog.inference.refine import REACH, Schedule, refine
 from shapeprog.inference.structure import Settings, search_structure
 from shapeprog.inference.surface import points_of_cells
@@ -64,9 +66,9 @@ class Result:
         Of a program of the paper's statements, the same with whole numbers, each within one of the rounded parameter of
         ``program``; others have no such form.
     scores
-        ``blocks``, ``statements``, ``primitives``; ``explained``, the share of the surface, where it was looked at,
-        else ``iou`` of the snapped program at 32^3; with a generator ``proposed``: 1 if the program on cells is its own
-        or grew from it, else 0.
+        ``blocks``, ``statements``, ``primitives``; ``explained``, the share of the surface, where that was looked at;
+        ``iou`` at 32^3 of programs found on cells, and of all for targets that are cells; with a generator
+        ``proposed``: 1 if the program on cells is its own or grew from it, else 0.
     reason
         Why the search stopped, where the program came from, what the time budget cut short, and what to try next.
     cut
@@ -104,9 +106,10 @@ def infer(
     """A short program of at most ``blocks`` blocks that rebuilds a shape.
 
     Structure is searched on the touched cells, with whole numbers, with the help of a generator where there is one;
-    then all parameters are refined together on surface points through the renderer.  Where the shape came with a
-    surface, as a mesh or points, these blocks and those that the surface itself suggests are candidates of one choice,
-    whose parameters are adjusted and whose parts are named.  The result is the same for the same seed unless the time
+    then all parameters are refined together on surface points through the renderer.  These blocks and those that the
+    surface itself suggests are candidates of one choice, whose parameters are adjusted and whose parts are named.  Of
+    a shape that is known by its cells the shorter description is kept: share of cells wrong, and price of what is
+    written.  The result is the same for the same seed unless the time
     budget cuts in, which ``cut`` and ``reason`` tell.
 
     Parameters
@@ -187,21 +190,28 @@ def infer(
             schedule=schedule, reach=REACH, seed=seed, deadline=refining, progress=progress,
         )  # fmt: skip
     trade_off: tuple[TradeOff, ...] = ()
-    if search and statements == "all" and target.points is not None:
+    if search and statements == "all":
         found = assemble(
             target, blocks=blocks, more=program.flat().body, detail=detail, seed=seed, deadline=refining,
             progress=progress,
         )  # fmt: skip
-        if found.explained >= EXPLAINED:
+        if target.points is not None:
+            better = found.explained >= EXPLAINED
+        else:
+            before = cost_on_cells(program, target.voxels, detail, snapped)
+            better = cost_on_cells(found.program, target.voxels, detail) < before
+        if better:
             program, snapped, trade_off = found.program, None, found.trade_off
             scores["explained"] = found.explained
             reason = f"Stopped because {found.reason}"
+    if target.note:
+        reason += f" {target.note}"
     cut = tuple(each.cut for each in (proposing, searching, refining) if each.cut)
     if cut:
         reason += f" The time budget of {budget:g} s cut short {' and '.join(cut)}: "
         reason += "give it a larger --budget, and the seed alone decides."
-    if snapped is not None:
-        scores["iou"] = float(iou(rasterise(unroll(snapped)), pack(target.voxels)))
+    if snapped is not None or target.points is None:
+        scores["iou"] = float(iou(occupied(program, unroll(program), snapped), pack(target.voxels)))
     scores |= {
         "blocks": float(program.blocks),
         "statements": float(program.statements),

@@ -62,3 +62,12 @@ def exposed_faces(voxels: npt.NDArray[np.bool_]) -> npt.NDArray[np.int64]:
             cells = np.argwhere(voxels & ~beyond)
             found.append(np.column_stack([cells, np.full(len(cells), axis), np.full(len(cells), sign)]))
     return np.concatenate(found)
+
+
+def exposed(
+    voxels: npt.NDArray[np.bool_], cells: npt.NDArray[np.int64], axis: npt.NDArray[np.int64], sign: int
+) -> npt.NDArray[np.bool_]:
+    """Which cells (C, 3) have an empty one beside them, each along an axis of its own (C,)."""
+    beside = cells + 1 + sign * np.eye(3, dtype=np.int64)[axis]
+    empty: npt.NDArray[np.bool_] = ~np.pad(voxels, 1)[tuple(beside.T)]
+    return empty

@@ -26,7 +26,7 @@ from shapeprog.language.parameters import Parameter, Quantity, to_float32
 from shapeprog.language.program import Draw
 from shapeprog.language.statement import Statement, language
 from shapeprog.language.tensors import Code
-from shapeprog.language.unroll import unroll
+from shapeprog.language.unroll import Plan
 from shapeprog.space import HALF, FloatArray
 
 STARTS, BEST = 192, 3
@@ -116,23 +116,39 @@ class Linear(NamedTuple):
     slopes: Float[Tensor, "B R V"]
 
 
+class Renderer:
+    """What a statement draws for numbers (..., V); how it is unrolled is worked out once for each shape of them."""
+
+    def __init__(self, declared: Statement) -> None:
+        self.declared = declared
+        self._plans: dict[torch.Size, Plan] = {}
+
+    def __call__(self, values: Float[Tensor, "*batch V"]) -> Scene:
+        """A scene for each row of numbers, with gradient."""
+        shape, parameters = values.shape[:-1], values[..., None, None, :]
+        if shape not in self._plans:
+            self._plans[shape] = Plan(Code(torch.full((*shape, 1, 1), self.declared.id), parameters))
+        return self._plans[shape].scene(parameters)
+
+
 def fit(declared: Statement, boxes: Sequence[Box], target: Target, seed: int = 0) -> list[Draw]:
     """The statement fitted to each piece, from many starts in its box; the same for the same seed."""
     if not boxes:
         return []
+    render = Renderer(declared)
     random, generator = np.random.default_rng(seed), torch.Generator().manual_seed(seed)
     started = [_some(starts(declared, box), random) for box in boxes]
     owner = torch.from_numpy(np.repeat(np.arange(len(boxes)), [len(each) for each in started]))
     values = torch.from_numpy(np.concatenate(started))
 
     def best(count: int) -> Int[Tensor, " C"]:
-        off = _misfit(declared, values, target.take(owner), generator)
+        off = _misfit(render, values, target.take(owner), generator)
         mine = [(owner == number).nonzero()[:, 0] for number in range(len(boxes))]
         return torch.cat([here[off[here].argsort(stable=True)[:count]] for here in mine])
 
     chosen = best(BEST)
     values, owner = values[chosen], owner[chosen]
-    values = _descended(declared, values, target.take(owner), generator)
+    values = _descended(render, values, target.take(owner), generator)
     return _draws(declared, values[best(1)])
 
 
@@ -142,7 +158,7 @@ def improve(drawn: Sequence[Draw], target: Target, seed: int = 0) -> list[Draw]:
     for name in dict.fromkeys(draw.name for draw in drawn):
         mine = [place for place, draw in enumerate(drawn) if draw.name == name]
         values = torch.tensor([drawn[place].values for place in mine], dtype=torch.float64)
-        values = _descended(language()[name], values, target.take(torch.tensor(mine)), generator)
+        values = _descended(Renderer(language()[name]), values, target.take(torch.tensor(mine)), generator)
         for place, draw in zip(mine, _draws(language()[name], values), strict=True):
             found[place] = draw
     return found
@@ -202,10 +218,10 @@ def _some(rows: FloatArray, random: np.random.Generator) -> FloatArray:
 
 
 def _descended(
-    declared: Statement, values: Float[Tensor, "B V"], target: Target, generator: torch.Generator
+    render: Renderer, values: Float[Tensor, "B V"], target: Target, generator: torch.Generator
 ) -> Float[Tensor, "B V"]:
     """The numbers after some steps of Gauss and Newton, in which residuals of ever fewer cells count."""
-    quantities = declared.quantities
+    quantities = render.declared.quantities
     free = torch.tensor([not quantity.discrete for quantity in quantities])
     lengths = torch.tensor([quantity.kind == "length" for quantity in quantities])
     scale = torch.tensor([0.1 if quantity.kind == "angle" else 1.0 for quantity in quantities], dtype=values.dtype)
@@ -213,7 +229,7 @@ def _descended(
     damping = torch.diag(torch.where(free, DAMPING * scale**2, 1.0))
     for step in range(STEPS):
         width = WIDEST * (NARROWEST / WIDEST) ** (step / (STEPS - 1))
-        off, weights, slopes = _linear(declared, values, target, generator)
+        off, weights, slopes = _linear(render, values, target, generator)
         slopes = slopes * free
         weighted = (weights * (width**2 / (width**2 + off**2)) ** 2)[..., None] * slopes
         move = -torch.linalg.solve(weighted.mT @ slopes + damping, (weighted * off[..., None]).sum(1))
@@ -222,15 +238,15 @@ def _descended(
 
 
 def _misfit(
-    declared: Statement, values: Float[Tensor, "B V"], target: Target, generator: torch.Generator
+    render: Renderer, values: Float[Tensor, "B V"], target: Target, generator: torch.Generator
 ) -> Float[Tensor, " B"]:
     """What is wrong with each program: its robust residuals and normals; infinite where it draws nothing."""
-    scene = _scenes(declared, values)
+    scene = render(values)
     drawn = has_surface(scene)
     off = torch.full_like(values[:, 0], torch.inf)
     if drawn.any():
         here = target.take(drawn.nonzero()[:, 0])
-        scene = _scenes(declared, values[drawn])
+        scene = render(values[drawn])
         beside = here.beside.requires_grad_()
         found = _compared(
             here, beside, signed_distance(scene, beside), sample_surface(scene, SAMPLES, generator).points
@@ -240,19 +256,19 @@ def _misfit(
     return off
 
 
-def _linear(declared: Statement, values: Float[Tensor, "B V"], target: Target, generator: torch.Generator) -> Linear:
+def _linear(render: Renderer, values: Float[Tensor, "B V"], target: Target, generator: torch.Generator) -> Linear:
     """The residuals to first order; what draws nothing has none.
 
     Every residual has a copy of the program to itself, so one backward pass gives the slopes of all.
     """
-    drawn = has_surface(_scenes(declared, values)).nonzero()[:, 0]
+    drawn = has_surface(render(values)).nonzero()[:, 0]
     here, count, rows = target.take(drawn), len(values), target.points.shape[1] + SAMPLES
     off, weights, slopes = (values.new_zeros(count, rows, *rest) for rest in ((), (), values.shape[1:]))
     if len(drawn):
         inner = values[drawn][:, None].expand(-1, rows, -1).clone().requires_grad_()
         beside = here.beside.requires_grad_()
-        ahead = signed_distance(_scenes(declared, inner[:, :-SAMPLES]), beside[:, :, None])[..., 0]
-        sample = sample_surface(_scenes(declared, inner[:, -SAMPLES:]), 1, generator).points[:, :, 0]
+        ahead = signed_distance(render(inner[:, :-SAMPLES]), beside[:, :, None])[..., 0]
+        sample = sample_surface(render(inner[:, -SAMPLES:]), 1, generator).points[:, :, 0]
         found = _compared(here, beside, ahead, sample)
         slopes[drawn] = torch.autograd.grad(found.off.sum(), inner)[0].nan_to_num(0)
         off[drawn], weights[drawn] = found.off.detach(), found.weights
@@ -270,9 +286,3 @@ def _compared(
     back = (safe_norm((apart**2).sum(-1)) - 2 * target.spacing[:, None]).clamp(min=0)
     weights = [(UNSURE + (1 - UNSURE) * cosine) / cosine.shape[1], torch.full_like(back, BACK / SAMPLES)]
     return Residuals(torch.cat([ahead - BESIDE, back], 1), torch.cat(weights, 1).detach(), (1 - cosine).mean(1))
-
-
-def _scenes(declared: Statement, values: Float[Tensor, "*batch V"]) -> Scene:
-    """What the statement draws for such numbers."""
-    ids = torch.full((*values.shape[:-1], 1, 1), declared.id)
-    return unroll(Code(ids, values[..., None, None, :]))

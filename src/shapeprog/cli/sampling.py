@@ -18,7 +18,9 @@ SHEET = 24
 
 
 def sample_command(
-    prior_name: Annotated[str, typer.Argument(metavar="PRIOR", help="Where they come from: narrow or wide.")],
+    prior_name: Annotated[
+        str, typer.Argument(metavar="PRIOR", help="Where they come from: narrow, wide or furniture.")
+    ],
     count: Annotated[int, typer.Option(help="How many shapes.", min=1)] = SHEET,
     seed: terminal.Seed = 0,
     out: Annotated[Path | None, typer.Option(help="A contact sheet of them, such as sheet.png.")] = None,
@@ -36,12 +38,12 @@ def sample_command(
     """
     import torch
 
-    from shapeprog.data.synthetic import prior, write_programs
-    from shapeprog.language.tensors import decode
+    from shapeprog.data import synthetic
 
     terminal.load_modules(modules)
-    code = prior(prior_name)(count, torch.Generator().manual_seed(seed))
-    found = decode(code)
+    found = synthetic.programs(prior_name, count, seed)
+    if programs is not None:  # before anything is written: only what generators can learn from is kept as tensors
+        code = synthetic.prior(prior_name)(count, torch.Generator().manual_seed(seed))
     names = [f"{prior_name}_{number:0{len(str(count - 1))}d}" for number in range(count)]
     written: list[Path] = []
     if out is not None:
@@ -54,7 +56,7 @@ def sample_command(
         write_pack(pack, _shapes(names, found, points, seed))
         written.append(pack)
     if programs is not None:
-        write_programs(programs, code)
+        synthetic.write_programs(programs, code)
         written.append(programs)
     if not written:
         for name, program in zip(names, found, strict=True):

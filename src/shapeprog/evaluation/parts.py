@@ -71,12 +71,18 @@ def overlaps(parts: Sequence[Box], scene: Scene, seed: int = 0) -> npt.NDArray[n
     return found
 
 
+def best_pairs(table: npt.NDArray[np.float64]) -> list[tuple[int, int]]:
+    """Rows and columns of overlaps that belong together, best pairs first, each once; enough of them overlaps."""
+    rest, found = table.copy(), []
+    while rest.size and rest.max() >= ENOUGH:
+        row, column = (int(place) for place in np.unravel_index(rest.argmax(), rest.shape))
+        rest[row], rest[:, column] = -1, -1
+        found.append((row, column))
+    return found
+
+
 def part_scores(parts: Sequence[Triangles], scene: Scene, seed: int = 0) -> PartScores:
     """Recall and precision of the physical parts of an object, placed in the grid as the target is."""
     table = overlaps([oriented_box(part) for part in parts], scene, seed)
-    recovered, primitive_count = 0, table.shape[1]
-    while table.size and table.max() >= ENOUGH:
-        row, column = np.unravel_index(table.argmax(), table.shape)
-        table[row], table[:, column] = -1, -1
-        recovered += 1
-    return PartScores(recovered / max(len(parts), 1), recovered / max(primitive_count, 1))
+    recovered = len(best_pairs(table))
+    return PartScores(recovered / max(len(parts), 1), recovered / max(table.shape[1], 1))

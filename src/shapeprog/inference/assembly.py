@@ -117,7 +117,7 @@ def assemble(
 
     evidence = evidence_of(shape, seed)
     told(0.1)
-    singles = single_candidates(find_pieces(shape, seed))
+    singles = single_candidates(find_pieces(shape, seed), seed)
     singles = [singles[place] for place in distinct(singles, looks(singles))] if singles else []
     told(0.5)
     elsewhere = [plain(node) for node in more]

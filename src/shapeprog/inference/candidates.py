@@ -2,16 +2,18 @@
 
 Every statement that hints how it starts from an oriented box is tried on every piece.  What fits the points of its
 piece best is kept, and of several statements that draw the same solid the one that writes the fewest numbers.
+Statements without a hint are fitted to the most important pieces, and kept where they are as good.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from itertools import pairwise
+from itertools import chain, compress
 from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 import torch
 from jaxtyping import Float
 from torch import Tensor
@@ -20,12 +22,13 @@ from shapeprog.geometry.distance import signed_distance
 from shapeprog.geometry.primitive import SIZES, primitives
 from shapeprog.geometry.scene import Scene
 from shapeprog.geometry.surface import sample_surface
-from shapeprog.inference.pieces import Pieces
+from shapeprog.inference.fitting import BESIDE, Target, fit, improve
+from shapeprog.inference.pieces import Pieces, Source
 from shapeprog.inference.tunable import THINNEST, bounds
 from shapeprog.language.hints import Box
 from shapeprog.language.parameters import to_float32
 from shapeprog.language.program import Draw, Loop, Node, Program
-from shapeprog.language.statement import language
+from shapeprog.language.statement import END, language
 from shapeprog.language.tensors import encode
 from shapeprog.language.text import numbers_written
 from shapeprog.language.unroll import unroll
@@ -40,17 +43,23 @@ POINTS = 64
 SEEN = 5_000
 """Points of the surface among which they are looked for."""
 
+FITTED = 48
+"""Pieces to which statements are fitted, the most important but sheets, which do not tell of any solid."""
+
+GOOD, WORTH = 0.08, 0.3
+"""Misfit up to which a hint needs no fitting; and how much worse than the best one it may be to be worth it."""
+
 WRONG = 0.5
 """Distance in cells that counts as much as a normal at right angles."""
 
 SLACK = 0.05
 """How much worse than the best a statement may fit if it writes fewer numbers, see :func:`misfits`."""
 
-BESIDE = 0.01
-"""Cells off the surface at which the direction of a solid is asked for."""
-
 SAME = 0.02
 """Relative difference of moments, and distance in cells, below which two solids are the same."""
+
+
+Mask = npt.NDArray[np.bool_]
 
 
 class Looks(NamedTuple):
@@ -78,28 +87,51 @@ class Looks(NamedTuple):
         return np.sqrt(np.trace(self.spread, axis1=1, axis2=2))
 
 
-def single_candidates(pieces: Pieces) -> list[Node]:
-    """One drawing statement or a few for every piece."""
-    boxes = pieces.boxes
-    half = np.maximum(boxes.half, THINNEST / 2)  # a single sheet has no thickness of its own
-    drawn: list[Draw] = []
-    owner: list[int] = []
-    for piece in range(len(half)):
-        tried = drawings(Box(boxes.centre[piece], boxes.rotation[piece], half[piece]))
-        drawn += tried
-        owner += [piece] * len(tried)
-    if not drawn:
-        return []
-    misfit = misfits(drawn, np.array(owner), pieces)
-    found: list[Node] = []
-    begins = np.searchsorted(owner, np.arange(len(half) + 1))
-    for begin, end in pairwise(begins.tolist()):
-        if not (mine := range(begin, end)):
-            continue
-        least = min(misfit[k] for k in mine)
-        fitting = [k for k in mine if misfit[k] <= least + SLACK]
-        found.append(min((drawn[k] for k in fitting), key=numbers_written))
-    return found
+class Shells(NamedTuple):
+    """Points (N, P, 3) on the surface close to the faces of each piece, their normals, and which have none (N,)."""
+
+    points: FloatArray
+    normals: FloatArray
+    empty: Mask
+
+    def target(self, pieces: Array) -> Target:
+        """What statements for some pieces are fitted to."""
+        return Target.of(self.points[pieces], self.normals[pieces])
+
+
+def single_candidates(pieces: Pieces, seed: int = 0) -> list[Node]:
+    """One drawing statement for every piece, in the order of the pieces; none where no statement starts from its box.
+
+    Hints are improved where none of them fits yet; statements without one are fitted from many starts.
+    """
+    shells, half = shells_of(pieces), np.maximum(pieces.boxes.half, THINNEST / 2)
+    boxes = [Box(*each) for each in zip(pieces.boxes.centre, pieces.boxes.rotation, half, strict=True)]
+    hinted = [drawings(box) for box in boxes]
+    drawn, owner = list(chain(*hinted)), np.repeat(np.arange(len(boxes)), [len(each) for each in hinted])
+    misfit = misfits(drawn, owner, shells)
+    least = _least(misfit, owner, len(boxes))
+    some = np.flatnonzero(~shells.empty & (pieces.source != Source.SHEET.value))[:FITTED]
+    unsure = np.isin(owner, some) & (least[owner] > GOOD) & (misfit <= least[owner] + WORTH)
+    more = [(improve(list(compress(drawn, unsure)), shells.target(owner[unsure]), seed), owner[unsure])]
+    more += [
+        (fit(declared, [boxes[piece] for piece in some], shells.target(some), seed), some)
+        for declared in language()
+        if declared.hint is None and not declared.is_loop and declared.id > END
+    ]
+    for draws, whose in more:
+        drawn, owner = [*drawn, *draws], np.append(owner, whose)
+        misfit = np.append(misfit, misfits(draws, whose, shells))
+    fitting = np.flatnonzero(misfit <= _least(misfit, owner, len(boxes))[owner] + SLACK).tolist()
+    fitting.sort(key=lambda k: (numbers_written(drawn[k]), misfit[k]), reverse=True)
+    found = {int(owner[k]): drawn[k] for k in fitting}
+    return [found[piece] for piece in sorted(found)]
+
+
+def _least(misfit: FloatArray, owner: Array, count: int) -> FloatArray:
+    """The least misfit for each piece; infinite where there is none."""
+    least = np.full(count, np.inf)
+    np.minimum.at(least, owner, misfit)
+    return least
 
 
 def plain(node: Node) -> Node:
@@ -143,11 +175,8 @@ def solid_boxes(nodes: Sequence[Node]) -> list[list[Box]]:
     ]  # fmt: skip
 
 
-def misfits(drawn: Sequence[Draw], owner: Array, pieces: Pieces) -> FloatArray:
-    """How far statements are from the points of their pieces: mean distance over ``WRONG`` plus 1 - the mean cosine.
-
-    Zero for pieces without points.
-    """
+def shells_of(pieces: Pieces) -> Shells:
+    """Points of the surface close to the faces of each piece."""
     cloud = pieces.cloud
     step = max(1, len(cloud.points) // SEEN)
     points, normals = cloud.points[::step], cloud.normals[::step]
@@ -159,14 +188,25 @@ def misfits(drawn: Sequence[Draw], owner: Array, pieces: Pieces) -> FloatArray:
         if len(inside):
             chosen[piece] = inside[np.arange(POINTS) * len(inside) // POINTS]
             empty[piece] = False
-    beside = points + BESIDE * normals  # on a surface itself the distance has no slope
-    where = torch.from_numpy(beside[chosen[owner]]).requires_grad_()
+    return Shells(points[chosen], normals[chosen], empty)
+
+
+def misfits(drawn: Sequence[Draw], owner: Array, shells: Shells) -> FloatArray:
+    """How far statements are from the points of their pieces: mean distance over ``WRONG`` plus 1 - the mean cosine.
+
+    Zero for pieces without points.
+    """
+    if not drawn:
+        return np.zeros(0)
+    normals = shells.normals[owner]
+    beside = shells.points[owner] + BESIDE * normals  # on a surface itself the distance has no slope
+    where = torch.from_numpy(beside).requires_grad_()
     scene = unroll(encode([Program((node,)) for node in drawn], dtype=torch.float64))
     distance = signed_distance(scene, where)
     (slope,) = torch.autograd.grad(distance.sum(), where)
-    cosine = (slope.numpy() * normals[chosen[owner]]).sum(-1)
+    cosine = (slope.numpy() * normals).sum(-1)
     wrong = np.minimum(np.abs(distance.detach().numpy()) / WRONG, 1).mean(1) + 1 - np.abs(cosine).mean(1)
-    return np.where(empty[owner], 0.0, wrong)
+    return np.where(shells.empty[owner], 0.0, wrong)
 
 
 def looks(nodes: Sequence[Node]) -> Looks:

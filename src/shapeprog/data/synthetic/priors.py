@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import torch
+
 from shapeprog.data.synthetic import cases, compounds, lounging, narrow, seating, tables
+from shapeprog.data.synthetic.furniture import FURNITURE, furniture
 from shapeprog.data.synthetic.mixture import Prior
 from shapeprog.errors import InputError, did_you_mean
+from shapeprog.language.program import Program
+from shapeprog.language.tensors import decode
 
 WIDE = Prior(
     "wide",
@@ -54,17 +59,35 @@ NARROW = Prior(
 """Tables and chairs in the mix of the published synthetic data."""
 
 PRIORS: dict[str, Prior] = {each.name: each for each in (NARROW, WIDE)}
-"""All priors by name."""
+"""Priors that generators can learn from, by name."""
 
 
 def prior(name: str) -> Prior:
-    """The prior of a name.
+    """The prior of a name, that generators can learn from.
 
     Raises
     ------
     InputError
-        If there is none, with the nearest name.
+        If there is none, with the nearest name, or generators cannot learn from it.
     """
+    if name == FURNITURE:
+        raise InputError(
+            f"generators cannot learn from {name}: it draws statements that they are not taught",
+            f"use {' or '.join(PRIORS)}",
+        )
     if name not in PRIORS:
-        raise InputError(f"there is no prior {name!r}", did_you_mean(name, PRIORS, quoted=True))
+        raise InputError(f"there is no prior {name!r}", did_you_mean(name, [*PRIORS, FURNITURE], quoted=True))
     return PRIORS[name]
+
+
+def programs(name: str, count: int, seed: int = 0) -> list[Program]:
+    """Programs of a prior of any kind, the same for the same seed.
+
+    Raises
+    ------
+    InputError
+        If there is no prior of this name.
+    """
+    if name == FURNITURE:
+        return [furniture(number, seed) for number in range(count)]
+    return decode(prior(name)(count, torch.Generator().manual_seed(seed)))

@@ -1,0 +1,288 @@
+"""Fitting: drawing statements brought onto the points of pieces by a few steps of Gauss and Newton, all at once.
+
+What a statement draws is known from its declaration alone, so this fits any, one of a user's own too.  Where no hint
+says how to start from the box of a piece, it starts from many places: every position at a corner, a face or the middle,
+every length as one of the extents.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from itertools import product
+from math import prod
+from typing import NamedTuple
+
+import numpy as np
+import torch
+from jaxtyping import Float, Int
+from torch import Tensor
+
+from shapeprog.geometry.distance import signed_distance
+from shapeprog.geometry.primitive import safe_norm
+from shapeprog.geometry.scene import Scene
+from shapeprog.geometry.surface import has_surface, sample_surface
+from shapeprog.language.hints import Box
+from shapeprog.language.parameters import Parameter, Quantity, to_float32
+from shapeprog.language.program import Draw
+from shapeprog.language.statement import Statement, language
+from shapeprog.language.tensors import Code
+from shapeprog.language.unroll import Plan
+from shapeprog.space import HALF, FloatArray
+
+STARTS, BEST = 192, 3
+"""Starts of a statement on a piece, some of all at random where there are more; and those of them that are fitted."""
+
+STEPS = 8
+"""Steps of Gauss and Newton."""
+
+SAMPLES = 32
+"""Points of the surface of the statement that bring it back to its piece."""
+
+BACK = 0.3
+"""What all of these count, against all points of the piece."""
+
+WIDEST, NARROWEST = 1.0, 0.2
+"""Residuals in cells that count for a quarter, at the first step and at the last."""
+
+DAMPING = 1e-3
+"""What a squared move by a cell costs in one step."""
+
+FARTHEST = 2.0
+"""Farthest move of one number in one step, in cells; of angles in tens of degrees."""
+
+THIN = 0.3
+"""A length may start as this share of the least extent, too: the thickness of what has an inside."""
+
+THINNEST = 0.1
+"""Least length in cells."""
+
+UNSURE = 0.3
+"""Weight of a point where the normal of the surface is at a right angle to its own."""
+
+BESIDE = 0.01
+"""Cells off the surface at which the direction of a solid is asked for."""
+
+COUNTS = 6
+"""Most copies that a statement with a count starts from."""
+
+
+class Target(NamedTuple):
+    """Points and their normals (B, P, 3) that each of B programs is fitted to, and how far apart they are (B,)."""
+
+    points: Float[Tensor, "B P 3"]
+    normals: Float[Tensor, "B P 3"]
+    spacing: Float[Tensor, " B"]
+
+    @classmethod
+    def of(cls, points: FloatArray, normals: FloatArray) -> Target:
+        """The target of such points (B, P, 3)."""
+        places = torch.from_numpy(points)
+        apart = torch.cdist(places, places) + torch.diag(torch.full(places.shape[1:2], torch.inf).to(places))
+        return cls(places, torch.from_numpy(normals), apart.amin(-1).mean(-1))
+
+    @property
+    def beside(self) -> Float[Tensor, "B P 3"]:
+        """Just off the points: on a surface itself the distance has no slope."""
+        return self.points + BESIDE * self.normals
+
+    def take(self, rows: Int[Tensor, " C"]) -> Target:
+        """Those of some of the programs."""
+        return Target(*(part[rows] for part in self))
+
+
+class Residuals(NamedTuple):
+    """How far each of B programs is from its target, in R residuals.
+
+    Parameters
+    ----------
+    off
+        Distances in cells (B, R): of the points of the target, then of samples of the program's surface.
+    weights
+        What each counts (B, R): points more where the normals agree.
+    turned
+        Mean of 1 - the cosine between normals (B,).
+    """
+
+    off: Float[Tensor, "B R"]
+    weights: Float[Tensor, "B R"]
+    turned: Float[Tensor, " B"]
+
+
+class Linear(NamedTuple):
+    """Residuals and what each counts (B, R), as in :class:`Residuals`, and their slopes by the numbers (B, R, V)."""
+
+    off: Float[Tensor, "B R"]
+    weights: Float[Tensor, "B R"]
+    slopes: Float[Tensor, "B R V"]
+
+
+class Renderer:
+    """What a statement draws for numbers (..., V); how it is unrolled is worked out once for each shape of them."""
+
+    def __init__(self, declared: Statement) -> None:
+        self.declared = declared
+        self._plans: dict[torch.Size, Plan] = {}
+
+    def __call__(self, values: Float[Tensor, "*batch V"]) -> Scene:
+        """A scene for each row of numbers, with gradient."""
+        shape, parameters = values.shape[:-1], values[..., None, None, :]
+        if shape not in self._plans:
+            self._plans[shape] = Plan(Code(torch.full((*shape, 1, 1), self.declared.id), parameters))
+        return self._plans[shape].scene(parameters)
+
+
+def fit(declared: Statement, boxes: Sequence[Box], target: Target, seed: int = 0) -> list[Draw]:
+    """The statement fitted to each piece, from many starts in its box; the same for the same seed."""
+    if not boxes:
+        return []
+    render = Renderer(declared)
+    random, generator = np.random.default_rng(seed), torch.Generator().manual_seed(seed)
+    started = [_some(starts(declared, box), random) for box in boxes]
+    owner = torch.from_numpy(np.repeat(np.arange(len(boxes)), [len(each) for each in started]))
+    values = torch.from_numpy(np.concatenate(started))
+
+    def best(count: int) -> Int[Tensor, " C"]:
+        off = _misfit(render, values, target.take(owner), generator)
+        mine = [(owner == number).nonzero()[:, 0] for number in range(len(boxes))]
+        return torch.cat([here[off[here].argsort(stable=True)[:count]] for here in mine])
+
+    chosen = best(BEST)
+    values, owner = values[chosen], owner[chosen]
+    values = _descended(render, values, target.take(owner), generator)
+    return _draws(declared, values[best(1)])
+
+
+def improve(drawn: Sequence[Draw], target: Target, seed: int = 0) -> list[Draw]:
+    """Statements fitted each to its own points, from the numbers that they have."""
+    generator, found = torch.Generator().manual_seed(seed), list(drawn)
+    for name in dict.fromkeys(draw.name for draw in drawn):
+        mine = [place for place, draw in enumerate(drawn) if draw.name == name]
+        values = torch.tensor([drawn[place].values for place in mine], dtype=torch.float64)
+        values = _descended(Renderer(language()[name]), values, target.take(torch.tensor(mine)), generator)
+        for place, draw in zip(mine, _draws(language()[name], values), strict=True):
+            found[place] = draw
+    return found
+
+
+def _draws(declared: Statement, values: Float[Tensor, "B V"]) -> list[Draw]:
+    return [Draw(declared.name, tuple(map(to_float32, row))) for row in values.tolist()]
+
+
+def starts(declared: Statement, box: Box) -> FloatArray:
+    """All starts (S, slots) of a statement in a box: every combination of what each parameter may start as."""
+    options = [_options(parameter, box) for parameter in declared.parameters]
+    many = prod(map(len, options))
+    if many > STARTS**2:  # too many to list: those of each parameter in turn, out of step with each other
+        rows = [[each[(row // (k + 1)) % len(each)] for k, each in enumerate(options)] for row in range(STARTS**2)]
+        return np.array([np.concatenate(row) for row in rows])
+    return np.array([np.concatenate(row) for row in product(*options)])
+
+
+def _options(parameter: Parameter, box: Box) -> list[FloatArray]:
+    """What a parameter may start as."""
+    quantity = parameter.quantity
+    if parameter.default is not None:
+        return [np.array([parameter.default])]
+    found = np.array(list(_values(quantity, box)), np.float64).clip(quantity.low, quantity.high)
+    return list(np.unique(found.round(3), axis=0))
+
+
+def _values(quantity: Quantity, box: Box) -> Iterator[Sequence[float]]:
+    """What a quantity may start as: places of a box, its extents or half of them; shifts and angles at zero."""
+    reach = np.abs(box.rotation) @ box.half
+    width, half = quantity.width, 1.0 if quantity.high == HALF else 2.0
+    if quantity.kind == "position" and width == len(reach):
+        along = box.half.max() * box.rotation[:, box.half.argmax()]
+        below = np.array([reach[0], 0, 0])
+        for away in (np.zeros(3), -below, below, -reach, along, -along):
+            yield (box.centre + away).tolist()
+    elif quantity.kind == "length" and width == len(reach):
+        yield (half * reach).tolist()
+    elif quantity.kind in ("position", "length"):
+        known = (
+            box.centre
+            if quantity.kind == "position"
+            else half * np.concatenate([reach, box.half, [THIN * box.half.min()]])
+        )
+        yield from product(*[np.unique(known.round(3)).tolist()] * width)
+    elif quantity.discrete:
+        last = 3.0 if quantity.kind == "turn" else float(COUNTS)
+        for number in range(max(round(quantity.low), 0), round(min(quantity.high, last)) + 1):
+            yield [float(number)] * width
+    else:
+        yield [0.0] * width
+
+
+def _some(rows: FloatArray, random: np.random.Generator) -> FloatArray:
+    return rows if len(rows) <= STARTS else rows[np.sort(random.choice(len(rows), STARTS, replace=False))]
+
+
+def _descended(
+    render: Renderer, values: Float[Tensor, "B V"], target: Target, generator: torch.Generator
+) -> Float[Tensor, "B V"]:
+    """The numbers after some steps of Gauss and Newton, in which residuals of ever fewer cells count."""
+    quantities = render.declared.quantities
+    free = torch.tensor([not quantity.discrete for quantity in quantities])
+    lengths = torch.tensor([quantity.kind == "length" for quantity in quantities])
+    scale = torch.tensor([0.1 if quantity.kind == "angle" else 1.0 for quantity in quantities], dtype=values.dtype)
+    low = torch.where(lengths, THINNEST, -torch.inf).to(values)
+    damping = torch.diag(torch.where(free, DAMPING * scale**2, 1.0))
+    for step in range(STEPS):
+        width = WIDEST * (NARROWEST / WIDEST) ** (step / (STEPS - 1))
+        off, weights, slopes = _linear(render, values, target, generator)
+        slopes = slopes * free
+        weighted = (weights * (width**2 / (width**2 + off**2)) ** 2)[..., None] * slopes
+        move = -torch.linalg.solve(weighted.mT @ slopes + damping, (weighted * off[..., None]).sum(1))
+        values = torch.maximum(values + (move * scale).clamp(-FARTHEST, FARTHEST) / scale, low)
+    return values
+
+
+def _misfit(
+    render: Renderer, values: Float[Tensor, "B V"], target: Target, generator: torch.Generator
+) -> Float[Tensor, " B"]:
+    """What is wrong with each program: its robust residuals and normals; infinite where it draws nothing."""
+    scene = render(values)
+    drawn = has_surface(scene)
+    off = torch.full_like(values[:, 0], torch.inf)
+    if drawn.any():
+        here = target.take(drawn.nonzero()[:, 0])
+        scene = render(values[drawn])
+        beside = here.beside.requires_grad_()
+        found = _compared(
+            here, beside, signed_distance(scene, beside), sample_surface(scene, SAMPLES, generator).points
+        )
+        share = found.off**2 / (found.off**2 + WIDEST * NARROWEST)
+        off[drawn] = (found.weights * share).sum(1) + found.turned
+    return off
+
+
+def _linear(render: Renderer, values: Float[Tensor, "B V"], target: Target, generator: torch.Generator) -> Linear:
+    """The residuals to first order; what draws nothing has none.
+
+    Every residual has a copy of the program to itself, so one backward pass gives the slopes of all.
+    """
+    drawn = has_surface(render(values)).nonzero()[:, 0]
+    here, count, rows = target.take(drawn), len(values), target.points.shape[1] + SAMPLES
+    off, weights, slopes = (values.new_zeros(count, rows, *rest) for rest in ((), (), values.shape[1:]))
+    if len(drawn):
+        inner = values[drawn][:, None].expand(-1, rows, -1).clone().requires_grad_()
+        beside = here.beside.requires_grad_()
+        ahead = signed_distance(render(inner[:, :-SAMPLES]), beside[:, :, None])[..., 0]
+        sample = sample_surface(render(inner[:, -SAMPLES:]), 1, generator).points[:, :, 0]
+        found = _compared(here, beside, ahead, sample)
+        slopes[drawn] = torch.autograd.grad(found.off.sum(), inner)[0].nan_to_num(0)
+        off[drawn], weights[drawn] = found.off.detach(), found.weights
+    return Linear(off, weights, slopes)
+
+
+def _compared(
+    target: Target, beside: Float[Tensor, "B P 3"], ahead: Float[Tensor, "B P"], sample: Float[Tensor, "B S 3"]
+) -> Residuals:
+    """Residuals from the distances of the points beside a target, and samples of the surfaces."""
+    (facing,) = torch.autograd.grad(ahead.sum(), beside, retain_graph=True)
+    cosine = (facing * target.normals).sum(-1).abs()
+    nearest = torch.cdist(sample.detach(), target.points).argmin(-1)
+    apart = sample - target.points.gather(1, nearest[..., None].expand_as(sample))
+    back = (safe_norm((apart**2).sum(-1)) - 2 * target.spacing[:, None]).clamp(min=0)
+    weights = [(UNSURE + (1 - UNSURE) * cosine) / cosine.shape[1], torch.full_like(back, BACK / SAMPLES)]
+    return Residuals(torch.cat([ahead - BESIDE, back], 1), torch.cat(weights, 1).detach(), (1 - cosine).mean(1))

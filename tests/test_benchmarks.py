@@ -1,0 +1,72 @@
+"""What the benchmarks of planted programs and of labels count, on cases whose answer is known."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from declared import LANGUAGE
+
+import shapeprog as sp
+from benchmarks import labels, planted
+from shapeprog.language import standard, using
+from shapeprog.language.text import parse
+
+TABLE = """\
+box(at=(6, -9, -12), size=(2, 18, 24))
+for i in mirror(side):
+    leg(taper(start=(-8, 0, 10), end=(6, 0, 8), radius=(0.5, 1)))
+"""
+
+
+def compared(found: str) -> dict[str, float]:
+    one, two = parse(TABLE), parse(found)
+    return planted.solid_scores(one, sp.unroll(one), two, sp.unroll(two))
+
+
+def test_a_planted_program_that_is_found_as_it_is_scores_in_full() -> None:
+    scores = compared(TABLE)
+    assert (scores["solid_recall"], scores["solid_precision"], scores["statements"]) == (1, 1, 1)
+
+
+def test_parts_that_are_missed_split_or_called_otherwise_count_against_it() -> None:
+    found = """\
+top(box(at=(6, -9, -12), size=(2, 18, 24)))
+leg(taper(start=(-8, 0, 10), end=(6, 0, 8), radius=(0.5, 1)))
+brace(rod(start=(-8, 0, -10), end=(-2, 0, -9.1), radius=0.7))
+"""
+    scores = compared(found)
+    assert scores["solid_recall"] == pytest.approx(2 / 3)
+    assert scores["solid_precision"] == pytest.approx(2 / 3)
+    assert scores["roles"] == pytest.approx(1 / 2)
+
+
+def test_overlaps_of_solids_are_those_of_their_volumes() -> None:
+    one = sp.unroll(parse("box(at=(0, 0, 0), size=(4, 4, 4))"))
+    two = sp.unroll(parse("box(at=(0, 0, 2), size=(4, 4, 4))\nrod(start=(0, 2, 2), end=(4, 2, 2), radius=1)"))
+    np.testing.assert_allclose(planted.solid_overlaps(one, two), [[1 / 3, np.pi / 16]], atol=0.01)
+
+
+def test_a_user_finds_the_example_when_it_stands_for_every_leg() -> None:
+    with using(LANGUAGE):
+        text = planted.cone_table(np.random.default_rng(3))
+        one, legs = parse(text), text.count("cone_leg")
+        assert legs in (3, 4)
+        assert planted.solid_scores(one, sp.unroll(one), one, sp.unroll(one))["found"] == 1
+        fewer = parse("\n".join(text.splitlines()[:-1]))
+        assert planted.solid_scores(one, sp.unroll(one), fewer, sp.unroll(fewer))["found"] == 0
+
+
+def test_labels_are_counted_by_declared_words_fitted_words_and_blocks(tmp_path: Path) -> None:
+    chair = {
+        "method": "all", "labels": ["back", "seat", "leg", "arm"],
+        "counted": [("seat", [0, 50, 10, 0]), ("leg", [0, 0, 20, 0]), ("leg", [20, 0, 0, 0])],
+    }  # fmt: skip
+    with using(standard):
+        (tmp_path / "rows.jsonl").write_text(json.dumps(chair) + "\n")
+        row = labels.table(tmp_path / "rows.jsonl").splitlines()[-1]
+    back, seat, leg = 0, 50 / 60, 20 / 50
+    assert row.startswith(f"| all, 1 | 0.700 / {(back + seat + leg) / 3:.3f} |")
+    assert row.endswith(f"0.900 / {(1 + 50 / 60 + 20 / 30) / 3:.3f} |")

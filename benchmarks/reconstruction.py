@@ -37,7 +37,11 @@ BOTH, SHORT = "generator + search", "generator + search, 60 rounds"
 SHORT_ROUNDS = 60
 """Rounds of editing of the short search, which refinement and the generator outweigh."""
 
-COLUMNS = ("iou", "cd", "f1", "noise_floor", "blocks", "statements", "primitives", "seconds", "cpu_seconds")
+COLUMNS = (
+    "iou", "cd", "f1", "noise_floor", "f1_half_percent", "f1_percent", "one_piece", "slivers", "blocks", "statements",
+    "primitives", "numbers", "seconds", "cpu_seconds",
+)  # fmt: skip
+"""Measures in the order of the table; normals and outlines need a mesh, which packs do not hold."""
 
 
 def measure(task: Task) -> list[dict[str, Any]]:
@@ -61,7 +65,7 @@ def measure(task: Task) -> list[dict[str, Any]]:
 
     def keep(method: str, program: Any, snapped: Any, seconds: float, cpu_seconds: float = float("nan")) -> None:
         assert snapped_from(program, snapped), (pack, shape.name, method)
-        row = asdict(evaluate_program(program, shape, snapped, seed=seed))
+        row = asdict(evaluate_program(program, shape, snapped, seed=seed, looks=True))
         row |= {"pack": Path(pack).stem, "method": method, "allowed": blocks, "seconds": seconds, "seed": seed}
         row["cpu_seconds"] = cpu_seconds
         rows.append(row)
@@ -135,12 +139,12 @@ def table(paths: list[str]) -> str:
     for (pack, allowed, method), rows in sorted(groups.items()):
         cells = [f"{pack}, <= {allowed}", str(len(rows)), method]
         for column in COLUMNS:
-            values = np.array([row[column] for row in rows], np.float64)
+            values = np.array([row.get(column, np.nan) for row in rows], np.float64)
             values = values[np.isfinite(values)]
             if not len(values):
                 cells.append("-")
                 continue
-            digits = 5 if column in ("cd", "noise_floor") else 3 if column in ("iou", "f1") else 2
+            digits = 5 if column in ("cd", "noise_floor") else 3 if column.startswith(("iou", "f1")) else 2
             error = values.std(ddof=1) / np.sqrt(len(values)) if len(values) > 1 else 0.0
             cells.append(f"{values.mean():.{digits}f} ± {error:.{digits}f} ({np.median(values):.{digits}f})")
         lines.append("| " + " | ".join(cells) + " |")

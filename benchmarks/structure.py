@@ -2,6 +2,7 @@
 
     python -m benchmarks.structure DATA --split val --out structure_val.jsonl
     python -m benchmarks.structure --table structure_val.jsonl
+    python -m benchmarks.structure DATA --sets ikea --statements all paper --blocks 1 2 4 8 --out sweep.jsonl
 
 DATA holds ``shapenet_meshes/{bench,cabinet}_{val,test}/ID.ply`` (+Y up, front -Z) and
 ``ikea_parts/CLASS/OBJECT/NN.ply`` (+Y up; in the order of their names every second object is test, the others val).
@@ -18,7 +19,8 @@ noisy    20,000 points of that union, each coordinate with normal noise of .5 % 
 open     20,000 points of that union without the fifth that lies farthest to one side
 =======  ==============================================================================================================
 
-All are measured against the whole mesh, as ``shapeprog evaluate --parts`` does.
+All are measured against the whole mesh, as ``shapeprog evaluate --parts`` does.  ``--statements paper``: the search on
+cells, the baseline.
 """
 
 from __future__ import annotations
@@ -27,10 +29,10 @@ import argparse
 import json
 import multiprocessing
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -38,7 +40,7 @@ SETS = ("bench", "cabinet", "ikea", "fused", "noisy", "open")
 
 COLUMNS = (
     "f1_half_percent", "f1_percent", "normals", "silhouette", "one_piece", "slivers", "part_recall", "part_precision",
-    "iou", "cd", "blocks", "statements", "primitives", "numbers", "seconds",
+    "iou", "cd", "blocks", "statements", "primitives", "numbers", "seconds", "cpu_seconds",
 )  # fmt: skip
 
 FLOORS = {"f1_half_percent": "f1_half_percent_floor", "f1_percent": "f1_percent_floor", "normals": "normals_floor"}
@@ -63,8 +65,9 @@ class Task:
     set: str
     name: str
     files: tuple[Path, ...]
-    blocks: int
-    seed: int
+    blocks: int = 10
+    seed: int = 0
+    statements: Literal["all", "paper"] = "all"
 
 
 def objects(data: Path, which: str, split: str) -> Iterator[tuple[str, tuple[Path, ...]]]:
@@ -84,37 +87,53 @@ def measure(task: Task) -> dict[str, Any]:
     """The row of one object."""
     import torch
 
+    from shapeprog.evaluation.likeness import Triangles
+    from shapeprog.evaluation.metrics import evaluate_program
+    from shapeprog.evaluation.parts import part_scores
+    from shapeprog.inference import infer
+    from shapeprog.language.text import format_program
+    from shapeprog.language.unroll import unroll
+
+    torch.set_num_threads(1)
+    started, cpu = time.perf_counter(), time.process_time()
+    parts, shape = given(task)
+    result = infer(shape, blocks=task.blocks, seed=task.seed, statements=task.statements)
+    seconds, cpu_seconds = time.perf_counter() - started, time.process_time() - cpu
+    placed = [Triangles(shape.frame.to_grid(vertices), faces) for vertices, faces in parts]
+    row = evaluate_program(
+        result.program, replace(shape, points=None, **whole(placed)), result.snapped, seed=task.seed, looks=True
+    )
+    if len(parts) > 1:
+        row = replace(row, **part_scores(placed, unroll(result.program), task.seed)._asdict())
+    return asdict(row) | {
+        "set": task.set, "seconds": seconds, "cpu_seconds": cpu_seconds, "allowed": task.blocks, "seed": task.seed,
+        "method": task.statements, "program": format_program(result.program),
+    }  # fmt: skip
+
+
+def given(task: Task) -> tuple[list[Any], Any]:
+    """The meshes of the parts of an object in their own frame, and the shape that inference is given."""
     from shapeprog.data.orientation import axes_of
     from shapeprog.data.parts import read_parts
     from shapeprog.data.placement import shape_from_mesh, shape_from_points
     from shapeprog.data.sampling import sample_surface
     from shapeprog.evaluation.likeness import Triangles
-    from shapeprog.evaluation.metrics import evaluate_program
-    from shapeprog.evaluation.parts import part_scores
-    from shapeprog.inference import infer
-    from shapeprog.language.unroll import unroll
 
-    torch.set_num_threads(1)
-    started = time.perf_counter()
     parts = read_parts(list(task.files))
-    counts = np.cumsum([0, *(len(vertices) for vertices, _ in parts)])
-    vertices = np.concatenate([vertices for vertices, _ in parts])
-    faces = np.concatenate([faces + first for (_, faces), first in zip(parts, counts, strict=False)])
+    mesh = whole([Triangles(*part) for part in parts])
     axes = axes_of(task.files[0], "+y", "-z" if task.set in ("bench", "cabinet") else None)
     if task.set in ("noisy", "open"):
-        cloud = scanned(sample_surface(vertices, faces, SCANNED, task.seed).astype(np.float64), task)
-        shape = shape_from_points(cloud, name=task.name, axes=axes, seed=task.seed)
-    else:
-        given = fused(vertices, faces) if task.set == "fused" else (vertices, faces)
-        shape = shape_from_mesh(*given, name=task.name, axes=axes, seed=task.seed)
-    result = infer(shape, blocks=task.blocks, seed=task.seed)
-    seconds = time.perf_counter() - started
-    target = replace(shape, points=None, vertices=shape.frame.to_grid(vertices), faces=faces)
-    row = evaluate_program(result.program, target, result.snapped, seed=task.seed, looks=True)
-    if len(parts) > 1:
-        placed = [Triangles(shape.frame.to_grid(vertices), faces) for vertices, faces in parts]
-        row = replace(row, **part_scores(placed, unroll(result.program), task.seed)._asdict())
-    return asdict(row) | {"set": task.set, "seconds": seconds, "allowed": task.blocks, "seed": task.seed}
+        cloud = scanned(sample_surface(*mesh.values(), SCANNED, task.seed).astype(np.float64), task)
+        return parts, shape_from_points(cloud, name=task.name, axes=axes, seed=task.seed)
+    surface = fused(**mesh) if task.set == "fused" else mesh.values()
+    return parts, shape_from_mesh(*surface, name=task.name, axes=axes, seed=task.seed)
+
+
+def whole(parts: Sequence[Any]) -> dict[str, Any]:
+    """The vertices and faces of all parts as one mesh."""
+    counts = np.cumsum([0, *(len(part.vertices) for part in parts)])
+    faces = [part.faces + first for part, first in zip(parts, counts, strict=False)]
+    return {"vertices": np.concatenate([part.vertices for part in parts]), "faces": np.concatenate(faces)}
 
 
 def scanned(points: Any, task: Task) -> Any:
@@ -146,13 +165,14 @@ def run(args: argparse.Namespace) -> None:
     out = Path(args.out)
     out.parent.mkdir(parents=True, exist_ok=True)
     known = [json.loads(line) for line in out.read_text().splitlines()] if out.exists() else []
-    done = {(row["set"], row["name"], row["allowed"]) for row in known}
+    done = {(row["set"], row["name"], row["allowed"], row["method"]) for row in known}
     todo = [
-        Task(which, name, files, blocks, args.seed)
+        Task(which, name, files, blocks, args.seed, statements)
         for which in args.sets
         for name, files in list(objects(Path(args.data), which, args.split))[: args.objects]
         for blocks in args.blocks
-        if (which, name, blocks) not in done
+        for statements in args.statements
+        if (which, name, blocks, statements) not in done
     ]
     with multiprocessing.get_context("spawn").Pool(args.workers) as pool, out.open("a") as file:
         for number, row in enumerate(pool.imap_unordered(measure, todo), 1):
@@ -164,13 +184,15 @@ def run(args: argparse.Namespace) -> None:
 
 def table(path: Path) -> str:
     """Markdown: the mean of every measure, with the floor in brackets where there is one."""
-    groups: dict[tuple[int, str], list[dict[str, Any]]] = {}
+    groups: dict[tuple[int, str, str], list[dict[str, Any]]] = {}
     for line in path.read_text().splitlines():
         row = json.loads(line)
-        groups.setdefault((row["allowed"], row["set"]), []).append(row)
+        groups.setdefault((row["allowed"], row["set"], row["method"]), []).append(row)
     lines = ["| set, objects | " + " | ".join(COLUMNS) + " |", "|" + "---|" * (len(COLUMNS) + 1)]
-    for (allowed, name), rows in sorted(groups.items(), key=lambda item: (item[0][0], SETS.index(item[0][1]))):
-        cells = [f"{name}, {len(rows)}, <= {allowed} blocks"]
+    for (allowed, name, method), rows in sorted(
+        groups.items(), key=lambda item: (item[0][0], SETS.index(item[0][1]), item[0][2])
+    ):
+        cells = [f"{name}, {len(rows)}, {method} statements, <= {allowed} blocks"]
         for column in COLUMNS:
             mean, floor = (_mean(rows, each) for each in (column, FLOORS.get(column, "")))
             digits = 5 if column == "cd" else 1 if column in ("blocks", "statements", "primitives", "numbers") else 3
@@ -194,6 +216,7 @@ def main() -> None:
     parser.add_argument("--sets", nargs="*", default=list(SETS), choices=SETS)
     parser.add_argument("--objects", type=int, default=None, help="only the first so many of each set")
     parser.add_argument("--blocks", type=int, nargs="*", default=[10], help="most blocks, one run for each")
+    parser.add_argument("--statements", nargs="*", default=["all"], choices=("all", "paper"), help="one run for each")
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--out", default="structure.jsonl", help="rows, one line of JSON each; appended to")

@@ -241,7 +241,7 @@ def test_in_shapenet_layout_the_mesh_stands_for_its_voxels_and_is_named_by_its_i
 
 def test_all_examples_load_and_stand_in_the_grid():
     results = dict(load_all([EXAMPLES], points=500))
-    assert 20 <= len(results) <= 40
+    assert 40 <= len(results) <= 60
     for path, shape in results.items():
         assert not isinstance(shape, ShapeProgError), path
         assert np.ptp(shape.vertices, axis=0).max() == pytest.approx(24, abs=1e-4)

@@ -208,7 +208,7 @@ def searched(job: Job) -> Row:
 
 def _row(written: Written, snapped: Program, shape: Any) -> Row:
     """The measures of a program, with the IoU of its snapped form and that of what was drawn on the canvas."""
-    row = asdict(measures(written, shape))
+    row = asdict(measures(written, shape, looks=True))
     return row | {"drawn_iou": row["iou"], "iou": iou_of(snapped, shape)}
 
 

@@ -26,6 +26,15 @@ COLUMNS: dict[str, tuple[str, float, int]] = {
 }
 """Measures by name: heading, factor and decimals."""
 
+SEEN: dict[str, tuple[str, float, int]] = {
+    "f1_half_percent": ("F1@.5 %", 1, 3),
+    "f1_percent": ("F1@1 %", 1, 3),
+    "one_piece": ("one piece", 1, 2),
+    "slivers": ("slivers", 1, 2),
+    "numbers": ("numbers", 1, 1),
+}
+"""What a person sees of a program, as far as packs can tell it: normals and outlines need a mesh."""
+
 PUBLISHED = {
     "bench": {"no adaptation": 13.5, "guided": 7.8, "direct": 3.5},
     "cabinet": {"no adaptation": 10.4, "guided": 9.2, "direct": 4.3},
@@ -54,7 +63,7 @@ def cell(rows: Sequence[Row], measure: str) -> str:
     One seed gives mean ± standard error over shapes; several the mean of their means ± the standard deviation of these.
     The median over all shapes is in brackets.  A measure that no shape has is a dash.
     """
-    _, factor, digits = COLUMNS[measure]
+    _, factor, digits = (COLUMNS | SEEN)[measure]
     seeds: dict[int, list[float]] = {}
     for row in rows:
         value = row.get(measure, float("nan"))
@@ -72,7 +81,7 @@ def cell(rows: Sequence[Row], measure: str) -> str:
 
 
 def table(rows: Iterable[Row], pack: str) -> str:
-    """The table of one pack as markdown, with the noise floor and the paper's figures below it."""
+    """The tables of one pack as markdown, with noise floors and the paper's figures below them."""
     groups: dict[str, list[Row]] = {}
     for row in rows:
         if row["pack"] == pack:
@@ -80,17 +89,30 @@ def table(rows: Iterable[Row], pack: str) -> str:
     if not groups:
         return ""
     names = [name for name in ORDER if name in groups] + sorted(set(groups) - set(ORDER))
-    headings = [heading for heading, _, _ in COLUMNS.values()]
-    lines = ["| | " + " | ".join(headings) + " |", "|---|" + "---|" * len(headings)]
-    for name in names:
-        seeds = {row["seed"] for row in groups[name]}
-        told = f"{name}, {len(seeds)} seeds" if len(seeds) > 1 else name
-        lines.append(f"| {told} | " + " | ".join(cell(groups[name], each) for each in COLUMNS) + " |")
-    shapes = {row["name"]: row["noise_floor"] for row in groups[names[0]]}
-    floor = 1000 * np.mean([each for each in shapes.values() if np.isfinite(each)] or [np.nan])
+    ordered = {name: groups[name] for name in names}
+    shapes = {row["name"]: row for row in groups[names[0]]}
+    floor = 1000 * _mean_floor(shapes.values(), "noise_floor")
     paper = ", ".join(f"{name} {value}" for name, value in PUBLISHED.get(pack.split("_")[0], {}).items())
-    lines += ["", f"{len(shapes)} shapes; noise floor of CD x 1000: {floor:.2f}; the paper's CD x 1000: {paper}."]
+    below = f"{len(shapes)} shapes; noise floor of CD x 1000: {floor:.2f}; the paper's CD x 1000: {paper}."
+    lines = [*_grid(ordered, COLUMNS), "", below]
+    if any(SEEN.keys() & row.keys() for row in groups[names[0]]):
+        half, whole = (_mean_floor(shapes.values(), f"{each}_floor") for each in ("f1_half_percent", "f1_percent"))
+        lines += ["", *_grid(ordered, SEEN), "", f"Floors of F1: {half:.3f} at .5 %, {whole:.3f} at 1 %."]
     return "\n".join(lines)
+
+
+def _grid(groups: Mapping[str, Sequence[Row]], columns: Mapping[str, tuple[str, float, int]]) -> list[str]:
+    """The lines of a table: a row for each group."""
+    lines = ["| | " + " | ".join(heading for heading, _, _ in columns.values()) + " |", "|---|" + "---|" * len(columns)]
+    for name, rows in groups.items():
+        seeds = {row["seed"] for row in rows}
+        told = f"{name}, {len(seeds)} seeds" if len(seeds) > 1 else name
+        lines.append(f"| {told} | " + " | ".join(cell(rows, each) for each in columns) + " |")
+    return lines
+
+
+def _mean_floor(rows: Iterable[Row], floor: str) -> float:
+    return float(np.mean([row[floor] for row in rows if np.isfinite(row.get(floor, np.nan))] or [np.nan]))
 
 
 class Wanted(NamedTuple):

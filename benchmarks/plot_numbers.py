@@ -1,0 +1,51 @@
+"""Plot likeness against the numbers that programs write, from rows of ``benchmarks/structure.py``.
+
+    python -m benchmarks.structure DATA --sets bench cabinet ikea --objects 12 --statements paper all \\
+        --blocks 1 2 3 4 6 8 10 --out sweep.jsonl
+    python -m benchmarks.plot_numbers sweep.jsonl docs/silhouette_against_numbers.png
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections import defaultdict
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+
+matplotlib.use("Agg")
+from matplotlib import pyplot as plt
+
+STYLES = {"all": ("-o", "#1f4e79", "all statements"), "paper": ("--s", "#b0413e", "the paper's, on cells")}
+
+
+def main(rows_path: str, picture: str, measure: str = "silhouette") -> None:
+    """One panel for each set: the mean of the measure with its standard error against the mean of numbers written."""
+    groups: dict[tuple[str, str], dict[int, list[dict[str, float]]]] = defaultdict(lambda: defaultdict(list))
+    for line in Path(rows_path).read_text().splitlines():
+        row = json.loads(line)
+        groups[row["set"], row["method"]][row["allowed"]].append(row)
+    sets = sorted({which for which, _ in groups})
+    figure, axes = plt.subplots(1, len(sets), figsize=(3.4 * len(sets), 2.8), sharey=True, layout="constrained")
+    for axis, which in zip(np.atleast_1d(axes), sets, strict=True):
+        for method, (style, colour, label) in STYLES.items():
+            sizes = sorted(found := groups[which, method])
+            values = [np.array([row[measure] for row in found[size]]) for size in sizes]
+            numbers = [np.mean([row["numbers"] for row in found[size]]) for size in sizes]
+            errors = [each.std(ddof=1) / np.sqrt(len(each)) for each in values]
+            means = [each.mean() for each in values]
+            axis.errorbar(numbers, means, errors, fmt=style, color=colour, ms=3.5, lw=1.4, capsize=2, label=label)
+        axis.set_title(f"{which} ({len(values[0])} objects)", fontsize=9)
+        axis.set_xlabel("numbers written", fontsize=8)
+        axis.tick_params(labelsize=8)
+        axis.grid(alpha=0.3, lw=0.5)
+        axis.spines[["top", "right"]].set_visible(False)
+    np.atleast_1d(axes)[0].set_ylabel(f"{measure}, at most {', '.join(map(str, sizes))} blocks", fontsize=7)
+    np.atleast_1d(axes)[-1].legend(fontsize=8, frameon=False, loc="lower right")
+    figure.savefig(picture, dpi=200)
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

@@ -20,7 +20,7 @@ from shapeprog.errors import InputError, ProgramError, ShapeProgError, did_you_m
 from shapeprog.files import write_text
 from shapeprog.formats.frames import frame_dict, frame_from
 from shapeprog.formats.shape import LARGEST_FILE, read_text
-from shapeprog.language.parameters import LARGEST, Parameter
+from shapeprog.language.parameters import LARGEST
 from shapeprog.language.program import Draw, Loop, Node, Program
 from shapeprog.language.statement import SLOTS, Statement, language
 from shapeprog.language.syntax import DEEPEST, proper_text
@@ -201,10 +201,6 @@ def _node_to_json(node: Node, depth: int) -> dict[str, Any]:
     return found
 
 
-def _wanted(parameter: Parameter) -> str:
-    return parameter.quantity.range_text if parameter.quantity.kind == "axis" else "a number"
-
-
 def _document(text: str, name: str, wanted: str) -> dict[str, Any]:
     def refuse(constant: str) -> NoReturn:
         raise InputError(f"{name}: {constant} is not a number of a program", "write finite numbers")
@@ -297,8 +293,11 @@ def _values(declared: Statement, given: Any, name: str, place: str) -> tuple[flo
         if parameter.quantity.kind == "axis":
             numbers = [float(AXES.index(each)) if each in AXES else each for each in numbers]
         if any(type(number) not in (int, float) for number in numbers):
-            said = f"{parameter.name} of {declared.name} holds something that is not {_wanted(parameter)}"
-            raise InputError(f"{name}: {place}: {said}", "write plain numbers such as 4 or -2.5")
+            wanted, hint = "a number", "write plain numbers such as 4 or -2.5"
+            if parameter.quantity.kind == "axis":
+                wanted, hint = parameter.quantity.range_text, "write its word"
+            said = f"{parameter.name} of {declared.name} holds something that is not {wanted}"
+            raise InputError(f"{name}: {place}: {said}", hint)
         try:
             values += parameter.checked(declared.name, numbers)
         except ShapeProgError as mistake:

@@ -8,6 +8,7 @@ that reading them ends in a shape or in an error.  ``SLOW_BOMBS`` take seconds e
 from __future__ import annotations
 
 import os
+import re
 import struct
 import zlib
 from pathlib import Path
@@ -17,7 +18,12 @@ import trimesh
 from bad_arrays import CELLS, archive, binvox, npy, npy_that_announces, npz
 from bad_meshes import BAD, BOX, TRIANGLES, Builder, add, bad, glb, ply, written
 
-__all__ = ["BAD", "BOMBS", "BOX", "CELLS", "SLOW_BOMBS", "archive", "glb", "npy", "npz", "written"]
+__all__ = ["BAD", "BOMBS", "BOX", "CELLS", "PYTHON", "SLOW_BOMBS", "archive", "glb", "npy", "npz", "written"]
+
+PYTHON = re.compile(
+    r"[A-Z]\w+(Error|Exception)\b|Traceback|NoneType|codec|literal|object has no|<class|\bdtype\b|errno"
+)
+"""What Python and its libraries say, and no refusal repeats."""
 
 BOMBS: dict[str, Builder] = {}
 SLOW_BOMBS: dict[str, Builder] = {}

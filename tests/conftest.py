@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import hypothesis
 import pytest
+
+if TYPE_CHECKING:
+    from commands import Run
 
 SOURCE = Path(__file__).parents[1] / "src"
 
@@ -62,3 +66,22 @@ def same_random_state() -> None:
 
     torch.manual_seed(0)
     np.random.seed(0)  # noqa: NPY002
+
+
+@pytest.fixture
+def run(capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Run:
+    """Run the command in an empty folder, as a shell would."""
+    from commands import Ended
+
+    from shapeprog.cli import main
+
+    monkeypatch.chdir(tmp_path)
+
+    def call(*words: object) -> Ended:
+        with pytest.raises(SystemExit) as end:
+            main([str(word) for word in words])
+        told = capsys.readouterr()
+        code = end.value.code
+        return Ended(code if isinstance(code, int) else 0, told.out, told.err)
+
+    return call

@@ -5,56 +5,18 @@ from __future__ import annotations
 import csv
 import io
 import json
-import re
 import subprocess
 import sys
-from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import pytest
 import trimesh
-from bad_files import BAD
+from commands import FRAME, PROGRAM, Run, table
 
 from shapeprog import inference
 from shapeprog.cli import main, terminal
 from shapeprog.formats import export, load_with_frame
-from shapeprog.language.text import parse
-from shapeprog.space import Frame, grid_axes
-
-PROGRAM = parse(
-    "top_rectangle(at=(10, 0, 0), thickness=2, half=(9, 12))\n"
-    "for i in translate(2, by=(0, 0, 22)):\n"
-    "    for j in translate(2, by=(0, 16, 0)):\n"
-    "        leg(at=(-12, -9, -12), size=(22, 2, 2))\n"
-)
-FRAME = Frame.around([1, 2, 3], [3, 4, 4.5], grid_axes("+y", "+z"))
-
-
-@dataclass(frozen=True)
-class Ended:
-    code: int
-    out: str
-    err: str
-
-
-Run = Callable[..., Ended]
-
-
-@pytest.fixture
-def run(capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Run:
-    """Run the command in an empty folder, as a shell would."""
-    monkeypatch.chdir(tmp_path)
-
-    def call(*words: object) -> Ended:
-        with pytest.raises(SystemExit) as end:
-            main([str(word) for word in words])
-        told = capsys.readouterr()
-        code = end.value.code
-        return Ended(code if isinstance(code, int) else 0, told.out, told.err)
-
-    return call
 
 
 @pytest.fixture
@@ -66,11 +28,6 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
         return inference.Result(PROGRAM, PROGRAM.snap(), {"odd": float("nan")}, "Stopped at once.", (), seconds=0.1)
 
     monkeypatch.setattr(inference, "infer", infer)
-
-
-def table(path: Path) -> Path:
-    """A mesh of the table, as somebody would have it on the disk."""
-    return export(PROGRAM, path, FRAME)
 
 
 @pytest.mark.usefixtures("quick")
@@ -174,31 +131,6 @@ def test_an_interruption_says_what_was_kept(run: Run, tmp_path: Path, monkeypatc
     ended = run("infer", table(tmp_path / "table.obj"), "--out", "res")
     assert ended.code == 130
     assert "what was finished is kept: 0 programs in res" in ended.err
-
-
-@pytest.mark.usefixtures("quick")
-@pytest.mark.parametrize("kind", ["npz_encrypted", "glb_accessor_without_a_view", "ply_text_cut_between_faces", "fifo"])
-def test_a_bad_file_between_two_good_ones_is_told_at_the_end_by_every_command(run: Run, tmp_path: Path, kind: str):
-    folder = tmp_path / "in" / "tables"
-    folder.mkdir(parents=True)
-    for name in ("a", "z"):
-        table(folder / f"{name}.obj")
-    bad = BAD[kind](folder)
-    ended = run("infer", "in", "--out", "res", "--no-picture")
-    assert ended.code == 1
-    assert sorted(path.name for path in (tmp_path / "res").glob("*.json")) == ["a.json", "z.json"]
-    assert bad.name in ended.err
-    ended = run("prepare", "in", "packs")
-    assert ended.code == 1
-    assert bad.name in ended.err
-    assert sum(int(count) for count in re.findall(r": (\d) shapes", ended.out)) == 2
-    ended = run("evaluate", "res", "in", "--each", "--json")
-    assert ended.code == 1
-    assert bad.name in ended.err
-    assert [row["name"] for row in json.loads(ended.out)["rows"]] == ["a", "z"]
-    ended = run("evaluate", "in", "in", "--json")
-    assert ended.code == 1
-    assert [row["name"] for row in json.loads(ended.out)["rows"]] == ["a", "z"]
 
 
 def test_a_fault_of_ours_in_measuring_one_shape_stops_nothing(run: Run, tmp_path: Path, monkeypatch):

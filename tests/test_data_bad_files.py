@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from bad_arrays import binvox
-from bad_files import BAD, BOMBS, BOX, CELLS, archive, glb, npy, npz, written
+from bad_files import BAD, BOMBS, BOX, CELLS, PYTHON, archive, glb, npy, npz, written
 
 from shapeprog.data import Shape, load, load_all, loading, prepare, read_pack
 from shapeprog.data.folders import files_below
@@ -22,9 +22,6 @@ from shapeprog.data.reading import in_words
 from shapeprog.errors import InputError
 
 TESTS = Path(__file__).parent
-PYTHON = re.compile(
-    r"[A-Z]\w+(Error|Exception)\b|Traceback|NoneType|codec|literal|object has no|<class|\bdtype\b|errno"
-)
 
 
 def in_plain_words(error: InputError) -> bool:

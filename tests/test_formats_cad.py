@@ -6,6 +6,7 @@ import importlib.util
 import math
 import shutil
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +20,7 @@ from shapeprog.formats.build123d import script_text
 from shapeprog.formats.openscad import scad_text
 from shapeprog.formats.parts import parts, solid
 from shapeprog.formats.plan import plan
+from shapeprog.formats.symbolic import repeat
 from shapeprog.geometry.primitive import Primitive, primitives
 from shapeprog.geometry.primitives.cuboid import CUBOID
 from shapeprog.language import Draw, Language, Loop, Program, language, loop, statement, using
@@ -165,9 +167,9 @@ def own():
 
         @loop("spiral")
         def spiral(copy, quarter, count: Count, rise: Shift):
-            """Copies that rise ever faster while turning."""
+            """Copies that rise ever faster while turning, the slower the more there are."""
             zero = torch.zeros_like(copy)
-            return Motion(turn=copy / 9, shift=torch.stack([copy**2 * rise / 8, zero, zero], -1))
+            return Motion(turn=copy / 9, shift=torch.stack([copy**2 * rise / (2 * count), zero, zero], -1))
 
         yield parse(
             "puff(at=(3, 0, 0), half=(2, 5, 6))\n"
@@ -199,6 +201,19 @@ def test_statements_of_a_users_own_are_exported_too(own):
     assert fixed == {"spiral_1_rise", "posts_1_angle"}
     assert "polyhedron" in scad_text(own, Frame())
     compile(script_text(own, Frame()), "script", "exec")
+
+
+def test_loops_that_follow_a_rule_are_looked_at_for_few_copies_however_many_they_have():
+    seen = []
+
+    def move(copy, quarter, **values):
+        seen.append(len(copy))
+        return language()["translate"].move(copy, quarter, **values)
+
+    found, fixed = repeat(replace(language()["translate"], move=move), (2.0**24, 0, 0, 1), quarter=False)
+    assert [axis.text(["count", "up", "depth", "side"]) for axis in found.shift] == ["up", "depth", "side"]
+    assert fixed == frozenset()
+    assert max(seen) < 100
 
 
 def test_loops_are_loops_and_numbers_have_names():

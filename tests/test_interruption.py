@@ -23,8 +23,17 @@ class Moment:
             signal.raise_signal(signal.SIGINT)
 sys.meta_path.insert(0, Moment())
 sys.argv = {words!r}
-from shapeprog.cli import main
+from shapeprog.__main__ import main
 main()
+"""
+AT_THE_FIRST_LINES = """
+import signal, sys
+class Files:
+    def find_spec(self, name, *_):
+        print(name, signal.getsignal(signal.SIGINT) is signal.default_int_handler)
+sys.meta_path.insert(0, Files())
+sys.argv = ["shapeprog", "--version"]
+import shapeprog.__main__
 """
 AT_WORK = """
 import sys, time
@@ -54,12 +63,19 @@ def interrupted_while_importing(name: str, *words: str) -> subprocess.CompletedP
     return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
 
 
-@pytest.mark.parametrize("name", ["shapeprog.cli.app", "typer", "shapeprog.cli.writing", "rich.progress"])
+@pytest.mark.parametrize("name", ["shapeprog.cli", "typer", "shapeprog.cli.writing", "rich.progress"])
 def test_an_interruption_while_the_command_starts_is_told_in_a_line(name: str, tmp_path: Path):
     ended = interrupted_while_importing(name, "infer", "gone.obj", "--out", str(tmp_path))
     assert ended.returncode == 130
     assert ended.stderr.startswith("Interrupted")
     assert ended.stderr.count("\n") == 1
+
+
+def test_nothing_takes_time_before_interruptions_are_expected():
+    """Until then Python prints its own traceback, as for any program."""
+    ended = subprocess.run([sys.executable, "-c", AT_THE_FIRST_LINES], capture_output=True, text=True, check=True)
+    before = [line.removesuffix(" True") for line in ended.stdout.splitlines() if line.endswith(" True")]
+    assert before == ["shapeprog", "shapeprog.__main__"]
 
 
 def test_an_interruption_that_is_ignored_stays_so():

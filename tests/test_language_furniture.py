@@ -8,7 +8,9 @@ import pytest
 import torch
 
 import shapeprog as sp
-from shapeprog.errors import DeclarationError, ProgramError
+from shapeprog.errors import DeclarationError, InputError, ProgramError, ShapeProgError
+from shapeprog.formats.json_form import program_from_json, program_to_json
+from shapeprog.formats.notation import format_notation, parse_notation
 from shapeprog.geometry.primitive import primitives
 from shapeprog.language import Draw, Language, Loop, Program, decode, encode, language, using
 from shapeprog.language.hints import Box
@@ -115,6 +117,24 @@ def test_mistakes_with_roles_and_mirrors_are_told(text, said):
     with pytest.raises(ProgramError) as caught:
         parse(text)
     assert said in str(caught.value)
+
+
+@pytest.mark.parametrize("word", ["leg", "cushion"])
+def test_no_form_calls_a_part_what_it_is(word):
+    leg = Program((Draw(word, (1.0,) * language()[word].size, word),))
+    for write in (format_program, format_notation, program_to_json):
+        with pytest.raises(ShapeProgError, match="without being called one"):
+            write(leg)
+    numbers = "P=(1, 1, 1), G=(1, 1, 1)" if word == "leg" else "P=(1, 1, 1), G=(1, 1, 1, 1)"
+    with pytest.raises(ProgramError, match=f"no statement is called '{word}', '{word}'"):
+        parse_notation(f"draw('{word}', '{word}', {numbers})")
+
+
+def test_an_axis_that_is_none_is_told_with_the_words_there_are():
+    text = program_to_json(parse("for i in mirror(side):\n    leg(at=(0, 0, 0), size=(1, 1, 1))\n"))
+    with pytest.raises(InputError, match="not one of up, depth, side") as caught:
+        program_from_json(text.replace('"side"', '"left"'))
+    assert caught.value.hint == "write its word"
 
 
 def test_a_role_is_refused_that_is_there_or_no_word():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import json
 from pathlib import Path
 from typing import Any
@@ -9,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 import torch
+from bad_files import PYTHON
 
 from shapeprog.cli import main
 from shapeprog.data.packs import write_pack
@@ -183,6 +185,17 @@ def test_the_command_labels_and_goes_on(tmp_path: Path, capsys: pytest.CaptureFi
         main(["label", str(tmp_path / "few.npz"), "--out", str(out)])
     assert end.value.code == 2
     assert "is no label" in capsys.readouterr().err
+
+
+def test_a_fault_of_ours_costs_one_label_and_is_told_in_words(pack: Path, monkeypatch: pytest.MonkeyPatch):
+    def fail(*_: object, **__: object) -> None:
+        raise AttributeError("'NoneType' object has no attribute 'points'")
+
+    monkeypatch.setattr(importlib.import_module("shapeprog.inference.infer"), "infer", fail)
+    task = {"pack": str(pack), "place": 1, "blocks": 1, "budget": 1, "seed": 0, "modules": []}
+    told = json.loads(labelling._labelled(json.dumps(task)))
+    assert not PYTHON.search(told["error"])
+    assert f"{pack}#1" in told["hint"], "the shape that it was"
 
 
 def test_labels_that_are_cut_anywhere_are_gone_on_with(pack: Path, tmp_path: Path):

@@ -23,7 +23,7 @@ def crafted() -> Iterator[tuple[str, bytes]]:
 
     deep = 100_000
     for number, (count, step) in enumerate(COPIES):
-        yield f"copies-{number}.shape", _nest([f"translate({count}, by=({step}, 3, 0))"], LEG).encode()
+        yield f"copies-{number}.shape", nested([f"translate({count}, by=({step}, 3, 0))"], LEG).encode()
     for name, text in (
         ("deep-parentheses", f"leg(at={'(' * deep}1{')' * deep})"),
         ("deep-signs", f"leg(at={'-' * deep}1)"),
@@ -31,7 +31,7 @@ def crafted() -> Iterator[tuple[str, bytes]]:
         ("deep-attributes", "a" + ".a" * deep),
         ("deep-calls", "a" + "()" * deep),
         ("deep-loops", "".join(f"{' ' * n}for i in translate(2, by=(0, 0, 1)):\n" for n in range(99)) + " " * 99 + LEG),
-        ("deepest-loops", _nest(["translate(1, by=(0, 0, 1))"] * 64, LEG)),
+        ("deepest-loops", nested(["translate(1, by=(0, 0, 1))"] * 64, LEG)),
         ("many-lines", f"{LEG}\n" * 2000),
         ("deep-frame", f"# frame: {'[' * deep}\n{LEG}"),
         ("deep-frame-object", f'# frame: {{"scale": {"[" * 990}{"]" * 990}}}\n{LEG}'),
@@ -40,8 +40,8 @@ def crafted() -> Iterator[tuple[str, bytes]]:
         ("long-name", "a" * 900_000),
         ("long-text", "a\n" * 600_000),
         ("many-names", "a;" * 400_000),
-        ("many-copies", _nest(["translate(1048577, by=(0, 0, 1))"] * 60, LEG)),
-        ("many-and-none", _nest([*["translate(16777216, by=(0, 0, 1))"] * 62, "translate(0, by=(0, 0, 1))"], LEG)),
+        ("many-copies", nested(["translate(1048577, by=(0, 0, 1))"] * 60, LEG)),
+        ("many-and-none", nested([*["translate(16777216, by=(0, 0, 1))"] * 62, "translate(0, by=(0, 0, 1))"], LEG)),
         ("latin", "leg(at=(1, 2, 3), size=(1, 2, 3))  # \u00e9"),
     ):
         yield f"{name}.shape", text.encode("latin-1" if name == "latin" else "utf-8")
@@ -96,6 +96,7 @@ def crafted() -> Iterator[tuple[str, bytes]]:
         yield f"{name}.notation", text.encode()
 
 
-def _nest(loops: list[str], drawn: str) -> str:
+def nested(loops: list[str], drawn: str) -> str:
+    """The text of loops in each other around a statement."""
     lines = [f"{'    ' * depth}for i in {loop}:" for depth, loop in enumerate(loops)]
     return "\n".join([*lines, "    " * len(loops) + drawn])

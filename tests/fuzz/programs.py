@@ -8,14 +8,15 @@ import re
 from collections.abc import Iterator
 from random import Random
 
+from . import crafted_parts, crafted_programs
 from .containers import change_json
-from .crafted_programs import crafted
 from .mutations import BYTES, TEXT, Mutation, change_words, count_otherwise, mutants_of, replaced, write_number
 
 NAMES = (
     "leg", "legg", "translate", "rotate", "at", "size", "by", "count", "step", "pass", "end", "for", "draw",
     "import os", "__import__('os')", "lambda: 0", "\U0001f600", "e\u0301", "\u202e", "\x1b[2J", "\x00", "\ufeff",
     "'Leg', 'Cub'", "P", "G", "theta*i", "axis", "# frame:", "# frame: {", '# frame: {"scale": 0}', "statement", "body",
+    "box", "taper", "bent_rod", "cushion", "mirror", "seat", "seat(box", "leg(leg", "through", "edge", "side", "role",
     "null", "true", "\t", "\\", ";", ":", "(", ")", "[", "]", "{", "}", "'", '"', "\r", "\x0c", "\u2028", "=", "==",
     "*", "**", "...", "async ", "$",
 )  # fmt: skip
@@ -43,11 +44,23 @@ for i in translate(2, by=(0, 0, 18)):
 for i in rotate(4, step=0):
     line(start=(-6, -10, -8), end=(-6, 9, -8), radius=0.75)
 """
+CHAIR = """seat(cushion(at=(-2, -9, -9), size=(3, 18, 18), edge=1.2))
+back(board(at=(1, 7, -9), size=(11, 1.5, 18), tilt=12.5))
+for i in mirror(side):
+    for j in mirror(depth, at=-0.5):
+        leg(taper(start=(-12, -8, -8), end=(-2, -7, -7), radius=(0.6, 1.1)))
+    arm(bent_rod(start=(1, -8, 9), through=(5.5, -6, 10), end=(4, 8, 9), radius=0.5))
+    arm_post(rod(start=(1, -7, 9), end=(5, -6.5, 9.7), radius=0.4))
+    stretcher(bar(start=(-9, -7.5, 7.5), end=(-8, 7, 7.5), section=(1, 0.8), turn=30))
+    foot(cylinder(at=(-12, 8, 8), height=1, radius=1.3))
+for i in translate(4, by=(0, 0, 5)):
+    slat(box(at=(2, 9, -8), size=(9, 0.5, 1)))
+"""
 
 
 def cases(seed: int) -> Iterator[tuple[str, bytes]]:
     """Names and contents without an end: first those that are crafted, then broken ones."""
-    return itertools.chain(crafted(), mutants(seed))
+    return itertools.chain(crafted_programs.crafted(), crafted_parts.crafted(), mutants(seed))
 
 
 def mutants(seed: int) -> Iterator[tuple[str, bytes]]:
@@ -57,7 +70,7 @@ def mutants(seed: int) -> Iterator[tuple[str, bytes]]:
 
 @functools.cache
 def seeds() -> dict[str, bytes]:
-    """Valid programs by name: a table with all that text may hold, and one with every statement, in each form."""
+    """Valid programs by name: furniture with all that text may hold, every statement, and random ones; in each form."""
     import torch
 
     import shapeprog as sp
@@ -69,8 +82,9 @@ def seeds() -> dict[str, bytes]:
     found, frame = {}, sp.Frame(0.04, (0.0, 0.5, 0.0))
     random = torch.Generator().manual_seed(0)
     some = {f"drawn{number}": random_program(random, blocks=3) for number in range(6)}
-    every = {declared: each for number in range(40) for each in random_program(random).body for declared in [each.name]}
-    for name, program in {"table": sp.parse(TABLE), "every": Program(tuple(every.values())), **some}.items():
+    every = {part.name: part for part in random_program(random, blocks=300, depth=1).body}
+    furniture = {"table": sp.parse(TABLE), "chair": sp.parse(CHAIR), "every": Program(tuple(every.values()))}
+    for name, program in {**furniture, **some}.items():
         more = {"snapped": [], "scores": {"iou": 0.5}, "reason": "done", "source": "stool.obj"}
         found[f"{name}.json"] = result_json(program, frame, **more).encode()
         found[f"{name}.shape"] = (frame_comment(frame) + sp.format_program(program)).encode()

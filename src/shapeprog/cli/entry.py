@@ -1,7 +1,4 @@
-"""The command as a process: how it begins and how it ends.
-
-The commands are imported once interruptions are expected, for that takes a good part of a second.
-"""
+"""The command as a process: how it begins and how it ends."""
 
 from __future__ import annotations
 
@@ -22,7 +19,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     if arguments is not None:
         _run(arguments)
         return
-    interruption.expect()
+    interruption.adopt()
     gc.set_threshold(100_000, 50, 50)  # importing makes many objects that stay, which the collector would count often
     try:
         _run(sys.argv[1:])

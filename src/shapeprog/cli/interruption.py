@@ -1,40 +1,38 @@
 """Interruptions: Ctrl-C ends a command in a line at any moment, and in words of its own while it works.
 
-Python would print a traceback instead, so this is imported first, and imports next to nothing.  Where interruptions are
-ignored, as in the background of a script, they stay so.
+Python would print a traceback instead, so ``shapeprog.__main__`` sets what ends the process before it imports anything.
+Where interruptions are ignored, as in the background of a script, they stay so.
 """
 
 from __future__ import annotations
 
-import os
 import signal
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 
 INTERRUPTED = 130
 """The exit code of a command that was interrupted."""
 
+_ending: object = None
+"""What ends the process at once, where the command is the whole of it."""
 
-def expect() -> None:
-    """From here on an interruption ends the process at once: nothing has begun that would have to be tidied up."""
-    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
-        signal.signal(signal.SIGINT, _end)
+
+def adopt() -> None:
+    """Take what an interruption does now for what ends the process at once, unless that is what Python does."""
+    global _ending
+    now = signal.getsignal(signal.SIGINT)
+    _ending = now if callable(now) and now is not signal.default_int_handler else None
 
 
 @contextmanager
 def tidied() -> Iterator[None]:
     """What is inside is interrupted by an exception, so that it can tidy up."""
-    if signal.getsignal(signal.SIGINT) is not _end:
+    now = signal.getsignal(signal.SIGINT)
+    if now is None or now is not _ending:
         yield
         return
     signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, _end)
-
-
-def _end(number: int, frame: object) -> None:
-    with suppress(OSError):
-        os.write(2, b"Interrupted.\n")
-    os._exit(INTERRUPTED)
+        signal.signal(signal.SIGINT, now)

@@ -19,6 +19,8 @@ def random_program(
 ) -> Program:
     """A program whose statements, loops and numbers are drawn uniformly from the declarations in force.
 
+    Half of the parts play a role other than their own name.
+
     Parameters
     ----------
     generator
@@ -49,13 +51,13 @@ def random_program(
 
 
 def outside_published(program: Program) -> list[str]:
-    """Why a program leaves the published blocks [k], [19,k], [19,19,k], [20,10], [20,17]; empty if it stays."""
+    """Why a program leaves the published blocks [k], [19,k], [19,19,k], [20,10], [20,17], which have no roles."""
     reasons = []
     for number, chain in enumerate(program.chains, 1):
-        words = [node.name for node in chain]
-        ids = [language()[word].id for word in words]
+        ids = [language()[node.name].id for node in chain]
+        words = [word for node in chain for word in (getattr(node, "role", ""), node.name) if word]
         plain = 1 <= ids[-1] <= 18 and ids[:-1] in ([], [19], [19, 19])
-        if not plain and ids not in ([20, 10], [20, 17]):
+        if len(words) > len(chain) or not (plain or ids in ([20, 10], [20, 17])):
             reasons.append(f"block {number} ({' > '.join(words)}) is none of the published blocks")
     return reasons
 
@@ -78,4 +80,6 @@ def _step(generator: torch.Generator, declared: Statement, copies: int, whole: b
             values.append(float((low + (high - low) * part).clamp(low, high)))
     if declared.is_loop:
         return Loop(declared.name, tuple(values), ())
-    return Draw(declared.name, tuple(values))
+    roles = [role for role in language().roles if role != declared.name]
+    plays = bool(roles) and _pick(generator, 2)
+    return Draw(declared.name, tuple(values), roles[_pick(generator, len(roles))] if plays else "")

@@ -243,7 +243,8 @@ class _Reader:
         known = [declared for declared in language() if declared.is_loop == is_loop]
         fitting = next((declared for declared in known if _words(declared) == words), None)
         if fitting is None and not is_loop and len(words) > 1 and words[0] in language().roles:
-            fitting = next((declared for declared in known if [words[0], declared.name] == words), None)
+            solids = [declared for declared in known if declared.name != words[0]]  # a leg is not called one besides
+            fitting = next((declared for declared in solids if [words[0], declared.name] == words), None)
         try:
             if is_published(words, found):
                 name, numbers, note = restored(words, found)
@@ -278,7 +279,8 @@ class _Reader:
             numbers = given.get(symbol)
             if numbers is None or len(numbers) != width:
                 seen = "is missing" if numbers is None else f"has {len(numbers)} numbers"
-                raise ShapeProgError(f"{symbol} of {declared.name} {seen}", f"it takes {width} numbers")
+                cure = "write one number" if width == 1 else f"write {width} numbers"
+                raise ShapeProgError(f"{symbol} of {declared.name} {seen}", cure)
             for parameter in parameters:
                 slots[parameter.slots] = numbers[: parameter.quantity.width]
                 numbers = numbers[parameter.quantity.width :]

@@ -162,18 +162,23 @@ def repeat(declared: Statement, values: Sequence[float], quarter: bool) -> tuple
         return around
 
     slots = [slot for slot, quantity in enumerate(declared.quantities) if quantity.kind != "axis"]
-    here = torch.tensor(values, dtype=torch.float64).expand(8, declared.size).clone()
-    count = max(0, round(values[0]))
-    each = here[:1].expand(count, declared.size)
-    signs = motion_of(each, torch.arange(count, dtype=torch.float64)).signs
+    own = torch.tensor([values], dtype=torch.float64)
+
+    def each_copy() -> tuple[torch.Tensor, torch.Tensor]:
+        count = max(0, round(values[0]))
+        return own.expand(count, -1), torch.arange(count, dtype=torch.float64)
+
+    reflects = motion_of(own, torch.zeros(1, dtype=torch.float64)).signs is not None
+    signs = motion_of(*each_copy()).signs if reflects else None  # what follows a rule may have millions of copies
     reflected = None if signs is None or bool((signs == 1).all()) else signs.numpy()
+    here = own.repeat(8, 1)
     here[:, 0] = torch.arange(1, 9)
     copies = torch.tensor([0, 1, 1, 3, 4, 5, 2, 7], dtype=torch.float64)
     even = bool(np.abs(moved(here, copies)[:, 0] - 360 * (copies / here[:, 0]).numpy()).max() < TOLERANCE)
     turn = _Probe(declared, values, measure(slice(0, 0 if even else 1)), slots, 1.0)
     shift = _Probe(declared, values, measure(slice(1, 4)), slots, 1.0)
     if max(np.abs(probe.base[0].still[0]).max(initial=0) for probe in (turn, shift)) > TOLERANCE:
-        table = moved(each, torch.arange(count, dtype=torch.float64))
+        table = moved(*each_copy())
         return Repeat(table=table, signs=reflected), frozenset(slots) - {0}
     angle = None if even else _unless_zero((turn.affine(0),))
     by = _unless_zero(tuple(shift.affine(axis) for axis in range(3)))

@@ -152,9 +152,10 @@ def _labelled(task: str) -> str:
         found = infer(shape, **words, generator=None, statements="paper")
     except ShapeProgError as error:
         return json.dumps({"error": error.message, "hint": error.hint})
-    except Exception as error:  # a fault of ours with this shape costs its label, not those of the others
-        cause = f"the search failed: {type(error).__name__}: {error}"
-        return json.dumps({"error": cause, "hint": "please report it, with the pack"})
+    except Exception:  # a fault of ours with this shape costs its label, not those of the others
+        cause = "the search failed: a fault of shapeprog, not of the shape"
+        again = f"shapeprog infer {told['pack']}#{told['place']} --paper --weights none --debug"
+        return json.dumps({"error": cause, "hint": f"report it, with what this says: {again}"})
     assert found.snapped is not None
     texts = {"program": format_program(found.program), "snapped": format_program(found.snapped)}
     return json.dumps({"name": shape.name, **texts, **found.scores, "cut": found.cut}, allow_nan=False)

@@ -43,7 +43,8 @@ LEAST = 20
 
 def limbs(cloud: Cloud) -> list[npt.NDArray[np.int64]]:
     """The points of each limb, as indices of the evidence, largest first."""
-    which = np.arange(0, len(cloud.points), -(-len(cloud.points) // COUNT))
+    step = -(-len(cloud.points) // COUNT)
+    which: npt.NDArray[np.int64] = np.arange(0, len(cloud.points), step, dtype=np.int64)
     centre, radius = inner_balls(cloud, which)
     fine = (radius > 0) & (radius < LARGEST)
     which, centre, radius = which[fine], centre[fine], radius[fine]

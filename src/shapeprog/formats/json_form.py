@@ -21,9 +21,9 @@ from shapeprog.files import write_text
 from shapeprog.formats.frames import frame_dict, frame_from
 from shapeprog.formats.shape import LARGEST_FILE, read_text
 from shapeprog.language.parameters import LARGEST, Parameter
-from shapeprog.language.program import Draw, Loop, Node, Program
+from shapeprog.language.place import proper_text
+from shapeprog.language.program import DEEPEST, Draw, Loop, Node, Program
 from shapeprog.language.statement import SLOTS, Statement, language
-from shapeprog.language.syntax import DEEPEST, proper_text
 from shapeprog.language.tensors import Code
 from shapeprog.language.text import checked_role
 from shapeprog.space import AXES, Frame

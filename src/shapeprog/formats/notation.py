@@ -19,9 +19,9 @@ from shapeprog.formats.frames import frame_comment, frame_in
 from shapeprog.formats.published import COUNT, Groups, is_published, restored
 from shapeprog.formats.shape import LARGEST_FILE, read_text
 from shapeprog.language.parameters import Parameter
-from shapeprog.language.program import Draw, Loop, Node, Program
+from shapeprog.language.place import proper_text
+from shapeprog.language.program import DEEPEST, Draw, Loop, Node, Program
 from shapeprog.language.statement import Statement, language
-from shapeprog.language.syntax import DEEPEST, proper_text
 from shapeprog.language.text import INDENT, checked_role, variable
 from shapeprog.space import Frame
 

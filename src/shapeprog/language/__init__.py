@@ -2,6 +2,7 @@
 
 from shapeprog.language import builtin as builtin
 from shapeprog.language import furniture as furniture
+from shapeprog.language.evaluation import evaluated
 from shapeprog.language.program import Draw, Loop, Program
 from shapeprog.language.statement import Language, Role, Statement, language, loop, role, standard, statement, using
 from shapeprog.language.tensors import Code, decode, encode
@@ -9,5 +10,5 @@ from shapeprog.language.unroll import unroll
 
 __all__ = [
     "Code", "Draw", "Language", "Loop", "Program", "Role", "Statement",
-    "decode", "encode", "language", "loop", "role", "standard", "statement", "unroll", "using",
+    "decode", "encode", "evaluated", "language", "loop", "role", "standard", "statement", "unroll", "using",
 ]  # fmt: skip

@@ -6,8 +6,13 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from shapeprog.language.source import Source
+
 PUBLISHED_DEPTH = 3
 """Steps of one block in the published generator."""
+
+DEEPEST = 64
+"""Levels of loops, calls and parentheses in text; Python itself ends at 100 levels of indentation."""
 
 
 @dataclass(frozen=True)
@@ -48,9 +53,15 @@ Chain = tuple[Node, ...]
 
 @dataclass(frozen=True)
 class Program:
-    """A shape as a list of drawing statements and loops, in the order they are written."""
+    """A shape as a list of drawing statements and loops, in the order they are written.
+
+    Where its text has named numbers, expressions or functions, ``source`` is that text and ``body`` what it comes to:
+    see :func:`shapeprog.language.evaluation.evaluated`, which makes such programs.  What works on shapes looks at the
+    body alone; a program made from another body is plain.
+    """
 
     body: tuple[Node, ...] = ()
+    source: Source | None = None
 
     @property
     def chains(self) -> list[Chain]:

@@ -3,96 +3,120 @@
 from __future__ import annotations
 
 import ast
-import re
-import warnings
+import math
+from collections.abc import Mapping
 
-from shapeprog.errors import ProgramError, ShapeProgError, did_you_mean
-from shapeprog.language.parameters import Parameter, to_float32
-from shapeprog.language.program import Draw, Loop, Node, Program
-from shapeprog.language.statement import Statement, language
-from shapeprog.space import AXES
-
-DEEPEST = 64  # levels of loops in text; Python itself ends at 100 levels of indentation
-
-LONGEST = 500_000
-"""Letters of the longest text: a syntax tree takes a thousand times the memory of its text."""
-
-_FORBIDDEN = (
-    (r"^[^\S\t]*\t(?=.*\S)", "this line is indented with a tab", "indent with four spaces"),
-    (r"\0", "there is a null byte in this line", "is this a text file?"),
+from shapeprog.errors import ProgramError, did_you_mean
+from shapeprog.language.checking import Fault, misnamed
+from shapeprog.language.comments import Comments
+from shapeprog.language.evaluation import evaluated
+from shapeprog.language.expression import Name, Value
+from shapeprog.language.numbers import Numbers
+from shapeprog.language.place import Node, Text
+from shapeprog.language.program import DEEPEST, Program
+from shapeprog.language.source import (
+    Assignment,
+    Call,
+    Comment,
+    Function,
+    Line,
+    Source,
+    WrittenDraw,
+    WrittenLoop,
+    names_of,
+    tidy,
 )
-_WORDS_OF_PYTHON = {"positional argument": "a number without a name", "keyword argument": "one with a name"}
-_SHOWN = 60
+from shapeprog.language.statement import Statement, language
+
+_CALL = "name(parameter=number, ...)"
 
 
 def parse(text: str, name: str = "<program>") -> Program:
-    """The program of a text: calls of drawing statements with literal numbers, and ``for`` loops over calls of loops.
+    """The program of a text: drawing statements, ``for`` loops over calls of loops, named numbers and functions.
 
-    Comments are allowed and forgotten; numbers are rounded to float32.  A ``ProgramError`` says where in ``name``, such
-    as a path, the first mistake is, and the nearest name or the legal range.
+    Wherever a number may stand, an expression of numbers and names with + - * / may.  Numbers are rounded to float32.
+    Comments are kept where there are names, expressions or functions; any other program is its statements alone.  A
+    ``ProgramError`` says where in ``name``, such as a path, a mistake is, and the nearest name or the legal range.
     """
-    text = proper_text(text, name)
-    reader = _Reader(re.split(r"\r\n|\r|\n", text), name)
-    return Program(reader.body(reader.tree(text).body, 0))
-
-
-def proper_text(text: str, name: str) -> str:
-    """The text without its byte order mark; a ``ProgramError`` if it holds half characters, which no file can show."""
-    half = re.search("[\ud800-\udfff]", text)
-    if half:
-        line, hint = text.count("\n", 0, half.start()) + 1, "is this a text file in UTF-8?"
-        raise ProgramError("this line holds half a character", line=line, hint=hint, name=name)
-    return text.removeprefix("\ufeff")
+    whole = Text(text, name)
+    tree = whole.tree()
+    reader = _Reader(whole, tree, Comments())
+    source = Source(reader.body(tree.body))
+    if not source.plain:  # comments take time, and are looked for where they are kept
+        reader = _Reader(whole, tree, Comments(whole.lines))
+        source = Source(reader.body(tree.body))
+    try:
+        reader.check_variables(source)
+        return evaluated(source)
+    except Fault as fault:
+        raise reader.placed(fault) from None
 
 
 class _Reader:
-    """Turns syntax into nodes and knows the place of every mistake."""
+    """Turns syntax into lines and knows the place of every mistake."""
 
-    def __init__(self, lines: list[str], name: str) -> None:
-        self.lines = lines
-        self.name = name
+    def __init__(self, text: Text, tree: ast.Module, comments: Comments) -> None:
+        self.text = text
+        self.comments = comments
+        self.numbers = Numbers(text)
+        self.functions = {node.name: node for node in tree.body if isinstance(node, ast.FunctionDef)}
+        self.variables: dict[str, ast.expr] = {}
+        self.places: dict[tuple[int, int | str], Node] = {}
 
-    def tree(self, text: str) -> ast.Module:
-        if len(text) > LONGEST:
-            raise self._at(1, 1, f"this text has more than {LONGEST:,} letters", "keep such a program as .json")
-        for number, line in enumerate(self.lines, 1):
-            for pattern, message, hint in _FORBIDDEN:
-                found = re.search(pattern, line)
-                if found:
-                    raise self._at(number, found.end(), message, hint)
-        try:
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore")
-                return ast.parse(text)
-        except SyntaxError as error:
-            row = min(max(error.lineno or 1, 1), len(self.lines))
-            column = min(max(error.offset or 1, 1), len(self.lines[row - 1]) + 1)
-            said = (error.msg or "invalid syntax").split(";")[0]
-            for word, ours in _WORDS_OF_PYTHON.items():
-                said = said.replace(word, ours)
-            hint = "a line is name(parameter=number, ...) or a for loop"
-            raise self._at(row, column, f"this cannot be read: {said}", hint) from None
-        except (RecursionError, MemoryError):
-            raise self._at(1, 1, "this is nested too deeply to be a program", "write plain numbers") from None
+    def placed(self, fault: Fault) -> ProgramError:
+        """A fault in the lines that were read, at its place in the text."""
+        key = (id(fault.line), fault.key)
+        node = self.numbers.places.get(id(fault.expression)) or self.places.get(key) or self.places[key[0], ""]
+        if isinstance(fault.expression, Name) and fault.expression.name in self.variables:
+            said = f"{fault.expression.name} stands for the copies of a loop, and is no number"
+            return self.text.error(node, said, "how a loop moves its copies stands in its own parameters")
+        return self.text.error(node, fault.message, fault.hint)
 
-    def body(self, statements: list[ast.stmt], depth: int) -> tuple[Node, ...]:
-        if depth and len(statements) == 1 and isinstance(statements[0], ast.Pass):
-            return ()
-        return tuple(self._node(statement, depth) for statement in statements)
+    def check_variables(self, source: Source) -> None:
+        """Refuse variables of loops that are called like a number or function."""
+        for name in [*names_of(source), *source.functions]:
+            if name in self.variables:
+                said = f"the variable {name} of this loop is the name of something else"
+                raise self.text.error(self.variables[name], said, "give the variable another name, such as i")
 
-    def _node(self, statement: ast.stmt, depth: int) -> Node:
-        if isinstance(statement, ast.For):
-            return self._loop(statement, depth)
-        if not isinstance(statement, ast.Expr):
-            hint = "write name(parameter=number, ...) or for i in loop(count, ...):"
-            raise self._error(statement, "a program holds only drawing statements and for loops", hint)
-        role, solid = self._role(statement.value)
+    def body(self, statements: list[ast.stmt], depth: int = 0, end: float = math.inf) -> tuple[Line, ...]:
+        """The lines of a block that ends above the row ``end``; ``depth`` is how many loops and functions it is in."""
+        found: list[Line] = []
+        ends = [*(each.lineno for each in statements), end][1:]
+        for statement, following in zip(statements, ends, strict=True):
+            found += self.comments.before(statement.lineno)
+            if depth and len(statements) == 1 and isinstance(statement, ast.Pass):
+                found += [Comment(note)] if (note := self.comments.note(statement.lineno)) else []
+            else:
+                found.append(self._line(statement, depth, following))
+        column = statements[0].col_offset + 1 if depth else 1
+        return tidy((*found, *self.comments.ending(column, end)))
+
+    def _line(self, statement: ast.stmt, depth: int, end: float) -> Line:
+        match statement:
+            case ast.For():
+                return self._loop(statement, depth, end)
+            case ast.FunctionDef():
+                return self._function(statement, depth, end)
+            case ast.Assign():
+                return self._assignment(statement)
+            case ast.Expr(ast.Call(ast.Name(name)) as call) if name in self.functions and name not in language():
+                return self._function_call(statement, call, name)
+            case ast.Expr(call):
+                return self._draw(statement, call)
+        said = "a program holds only drawing statements, named numbers, for loops and functions"
+        raise self.text.error(statement, said, f"write {_CALL} or for i in loop(count, ...):")
+
+    def _draw(self, statement: ast.stmt, node: ast.expr) -> Line:
+        role, solid = self._role(node)
         declared, call = self._call(solid, "statement")
         if declared.is_loop:
-            raise self._misused(call, f"{declared.name} is a loop and draws nothing itself", declared)
+            raise self.numbers.misused(call, f"{declared.name} is a loop and draws nothing itself", declared)
         if declared.name == role:
-            raise self._error(call, f"{role} is a {role} without being called one", f"write {declared.signature}")
-        return Draw(declared.name, self._values(declared, call), role)
+            said = f"{role} is a {role} without being called one"
+            raise self.text.error(call, said, f"write {declared.signature}")
+        values, places = self.numbers.of_call(declared, call)
+        return self._kept(WrittenDraw(declared.name, values, role, self._note(statement)), statement, places)
 
     def _role(self, node: ast.expr) -> tuple[str, ast.expr]:
         """The role that is put around a call, and what it is put around; no role and the same if there is none."""
@@ -105,19 +129,24 @@ class _Reader:
         if role in language() and not any(isinstance(each, ast.Call) for each in node.args):
             return "", node
         said = f"{role} is what a part is for, and stands around one solid"
-        raise self._error(node, said, f"write {role}(box(at=(_, _, _), size=(_, _, _))), or another solid")
+        raise self.text.error(node, said, f"write {role}(box(at=(_, _, _), size=(_, _, _))), or another solid")
 
-    def _loop(self, statement: ast.For, depth: int) -> Loop:
+    def _loop(self, statement: ast.For, depth: int, end: float) -> Line:
         if depth >= DEEPEST:
-            raise self._error(statement, f"loops are nested more than {DEEPEST} deep", "put some of them side by side")
+            said = f"loops are nested more than {DEEPEST} deep"
+            raise self.text.error(statement, said, "put some of them side by side")
         if not isinstance(statement.target, ast.Name):
-            raise self._error(statement.target, "a loop has one variable", "write for i in loop(count, ...):")
+            raise self.text.error(statement.target, "a loop has one variable", "write for i in loop(count, ...):")
         if statement.orelse:
-            raise self._error(statement.orelse[0], "a loop of the language has no else", "leave it out")
+            raise self.text.error(statement.orelse[0], "a loop of the language has no else", "leave it out")
+        self.variables[statement.target.id] = statement.target
         declared, call = self._call(statement.iter, "loop")
         if not declared.is_loop:
-            raise self._misused(call, f"{declared.name} draws and repeats nothing", declared)
-        return Loop(declared.name, self._values(declared, call), self.body(statement.body, depth + 1))
+            raise self.numbers.misused(call, f"{declared.name} draws and repeats nothing", declared)
+        values, places = self.numbers.of_call(declared, call)
+        note = self._note(statement.iter)
+        body = self.body(statement.body, depth + 1, end)
+        return self._kept(WrittenLoop(declared.name, values, body, note), statement, places)
 
     def _call(self, node: ast.expr, wanted: str) -> tuple[Statement, ast.Call]:
         """The declaration that a call names; ``wanted`` is the kind of word that fits the place."""
@@ -125,86 +154,84 @@ class _Reader:
         function = node.func if isinstance(node, ast.Call) else node
         if not isinstance(function, ast.Name):
             hint = f"write the name of a {wanted} and its parameters"
-            raise self._error(node, f"{self._shown(node)} is no {wanted}", hint)
+            raise self.text.error(node, f"{self.text.shown(node)} is no {wanted}", hint)
         if function.id not in known:
             fitting = [declared.name for declared in known if declared.is_loop == (wanted == "loop")]
-            fitting += [] if wanted == "loop" else known.roles
-            raise self._error(function, f"no {wanted} is called {function.id!r}", did_you_mean(function.id, fitting))
+            fitting += [] if wanted == "loop" else [*known.roles, *self.functions]
+            hint = did_you_mean(function.id, fitting)
+            raise self.text.error(function, f"no {wanted} is called {function.id!r}", hint)
         declared = known[function.id]
         if not isinstance(node, ast.Call):
-            raise self._misused(node, f"{declared.name} lacks its parameters", declared)
+            raise self.numbers.misused(node, f"{declared.name} lacks its parameters", declared)
         return declared, node
 
-    def _values(self, declared: Statement, call: ast.Call) -> tuple[float, ...]:
-        parameters = {parameter.name: parameter for parameter in declared.parameters}
-        found: dict[str, list[float]] = {}
-        for argument in call.args:
-            if not declared.is_loop or found or isinstance(argument, ast.Starred):
-                allowed = f"only its {declared.first.name}" if declared.is_loop else "nothing"
-                raise self._misused(argument, f"{declared.name} takes {allowed} without a name", declared)
-            found[declared.first.name] = self._numbers(declared, declared.first, argument)
-        for word in call.keywords:
-            if word.arg is None or word.arg not in parameters:
-                what = f"parameter {word.arg!r}" if word.arg else "parameter **"
-                raise self._error(word, f"{declared.name} has no {what}", did_you_mean(word.arg or "", parameters))
-            if word.arg in found:
-                raise self._error(word, f"{word.arg} of {declared.name} is given twice", "leave one of them out")
-            found[word.arg] = self._numbers(declared, parameters[word.arg], word.value)
-        for name, parameter in parameters.items():
-            if name not in found and (silent := parameter.unsaid) is not None:
-                found[name] = [silent]
-            if name not in found:
-                raise self._misused(call, f"{declared.name} lacks {name}", declared)
-        return tuple(number for name in parameters for number in found[name])
+    def _assignment(self, statement: ast.Assign) -> Line:
+        target, value = statement.targets[0], statement.value
+        targets = target.elts if isinstance(target, ast.Tuple) else [target]
+        values = value.elts if isinstance(value, ast.Tuple) else [value]
+        if len(statement.targets) > 1:
+            raise self.text.error(
+                statement.targets[1], "there are two = on this line", "name one number, then the other"
+            )
+        for each in targets:
+            if not isinstance(each, ast.Name):
+                said = f"{self.text.shown(each)} is no name of a number"
+                raise self.text.error(each, said, "write name = number")
+        if len(targets) != len(values):
+            said = f"{_counted(len(targets), 'name')} for {_counted(len(values), 'number')}"
+            raise self.text.error(value, said, "write as many of the one as of the other")
+        words = {each.id: each for each in targets if isinstance(each, ast.Name)}
+        names = [each.id for each in targets if isinstance(each, ast.Name)]
+        pairs = [(name, self.numbers.one(name, each)) for name, each in zip(names, values, strict=True)]
+        return self._kept(Assignment(tuple(pairs), self._note(statement)), statement, words)
 
-    def _numbers(self, declared: Statement, parameter: Parameter, node: ast.expr) -> list[float]:
-        place = f"{parameter.name} of {declared.name}"
-        if isinstance(node, ast.Tuple) and parameter.quantity.width == 1:
-            raise self._error(node, f"{place} takes 1 number, not a group", f"write {parameter.blank}")
-        if parameter.quantity.kind == "axis":
-            numbers = [self._axis(place, node, parameter)]
-        else:
-            numbers = [self._number(place, each) for each in (node.elts if isinstance(node, ast.Tuple) else [node])]
-        try:
-            return parameter.checked(declared.name, numbers)
-        except ShapeProgError as mistake:
-            raise self._error(node, mistake.message, mistake.hint) from None
+    def _function(self, statement: ast.FunctionDef, depth: int, end: float) -> Line:
+        given, name = statement.args, statement.name
+        if wrong := misnamed(name):  # before its calls are taken for those of a statement
+            raise self.text.error(statement, *wrong)
+        others = (given.vararg, given.kwarg, *given.posonlyargs, *given.kwonlyargs)
+        marks = (statement.returns, *statement.decorator_list, *(each.annotation for each in given.args))
+        for odd in [*others, *marks]:
+            if odd is not None:
+                said = f"{name} has {self.text.shown(odd)}, which no function of the language has"
+                raise self.text.error(odd, said, f"write def {name}(parameter, parameter=number):")
+        words = [each.arg for each in given.args]
+        values: list[Value | None] = [None] * (len(words) - len(given.defaults))
+        for word, default in zip(words[len(values) :], given.defaults, strict=True):
+            values.append(self.numbers.one(f"{word} of {name}", default))
+        heads: list[Node] = [*given.args, *given.defaults]
+        note = self.comments.note(max([statement.lineno, *(each.end_lineno or 0 for each in heads)]))
+        body = self.body(statement.body, depth + 1, end)
+        line = Function(name, tuple(zip(words, values, strict=True)), body, note)
+        return self._kept(line, statement, {each.arg: each for each in given.args})
 
-    def _axis(self, place: str, node: ast.expr, parameter: Parameter) -> float:
-        if isinstance(node, ast.Name) and node.id in AXES:
-            return float(AXES.index(node.id))
-        said = f"{place} holds {self._shown(node)}, which is no axis"
-        hint = did_you_mean(node.id, AXES) if isinstance(node, ast.Name) else ""
-        raise self._error(node, said, hint or f"it is {parameter.quantity.range_text}")
+    def _function_call(self, statement: ast.stmt, call: ast.Call, name: str) -> Line:
+        words = [each.arg for each in self.functions[name].args.args]
+        places: dict[str, Node] = {}
+        pairs: list[tuple[str, Value]] = []
+        if len(call.args) > len(words):
+            said = f"{name} takes {_counted(len(words), 'number')}, not {len(call.args)}"
+            raise self.text.error(call.args[len(words)], said, "leave the others out")
+        for word, argument in zip(words, call.args, strict=False):
+            pairs.append((word, self.numbers.one(f"{word} of {name}", argument)))
+        for keyword in call.keywords:
+            if keyword.arg is None:
+                raise self.text.error(keyword, f"{name} has no parameter **", f"its parameters are {', '.join(words)}")
+            pairs.append((keyword.arg, self.numbers.one(f"{keyword.arg} of {name}", keyword.value)))
+            places[keyword.arg] = keyword
+        order = {word: place for place, word in enumerate(words)}
+        pairs.sort(key=lambda pair: order.get(pair[0], len(words)))
+        return self._kept(Call(name, tuple(pairs), self._note(statement)), statement, places)
 
-    def _number(self, place: str, node: ast.expr) -> float:
-        sign, bare = 1.0, node
-        if isinstance(node, ast.UnaryOp) and isinstance(node.op, (ast.USub, ast.UAdd)):
-            sign, bare = (-1.0 if isinstance(node.op, ast.USub) else 1.0), node.operand
-        if not isinstance(bare, ast.Constant) or type(bare.value) not in (int, float):
-            said = f"{place} holds {self._shown(node)}, which is not a number"
-            raise self._error(node, said, "write plain numbers such as 4 or -2.5")
-        try:
-            number = sign * float(bare.value)  # type: ignore[arg-type]
-            to_float32(number)
-        except (OverflowError, ShapeProgError):
-            said = f"{place} holds {self._shown(node)}, which is too large"
-            raise self._error(node, said, "numbers end at 3.4028235e+38") from None
-        return number
+    def _note(self, node: Node) -> str:
+        return self.comments.note(node.end_lineno or node.lineno)
 
-    def _shown(self, node: ast.expr) -> str:
-        """The source of an expression, on one line and cut where it is long."""
-        raw = self.lines[node.lineno - 1].encode()
-        end = node.end_col_offset if node.end_lineno == node.lineno else None
-        text = raw[node.col_offset : end].decode(errors="replace").strip()
-        return text if len(text) <= _SHOWN else text[:_SHOWN] + "..."
+    def _kept(self, line: Line, node: Node, places: Mapping[str, Node] | Mapping[int, Node]) -> Line:
+        """The line, with the places of its numbers and names."""
+        self.places |= {(id(line), key): place for key, place in places.items()}
+        self.places[id(line), ""] = node
+        return line
 
-    def _misused(self, node: ast.expr, message: str, declared: Statement) -> ProgramError:
-        return self._error(node, message, f"write {declared.signature}")
 
-    def _error(self, node: ast.stmt | ast.expr | ast.keyword, message: str, hint: str) -> ProgramError:
-        before = self.lines[node.lineno - 1].encode()[: node.col_offset]  # ast counts columns in bytes of UTF-8
-        return self._at(node.lineno, len(before.decode(errors="replace")) + 1, message, hint)
-
-    def _at(self, line: int, column: int, message: str, hint: str) -> ProgramError:
-        return ProgramError(message, line=line, column=column, source=self.lines[line - 1], hint=hint, name=self.name)
+def _counted(count: int, what: str) -> str:
+    return f"{count} {what}" if count == 1 else f"{count} {what}s"

@@ -6,12 +6,25 @@ negative lengths included (which draw nothing); counts and turns are whole.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 from shapeprog.errors import ShapeProgError, did_you_mean
-from shapeprog.language.program import Draw, Loop, Node, Program
-from shapeprog.language.statement import language
-from shapeprog.language.syntax import DEEPEST, LONGEST
+from shapeprog.language.expression import Expression, Value, text_of
+from shapeprog.language.parameters import Quantity
+from shapeprog.language.place import LONGEST
+from shapeprog.language.program import DEEPEST, Draw, Node, Program
+from shapeprog.language.source import (
+    Assignment,
+    Call,
+    Comment,
+    Function,
+    Line,
+    Source,
+    WrittenDraw,
+    WrittenLoop,
+    names_of,
+)
+from shapeprog.language.statement import Statement, language
 from shapeprog.language.syntax import parse as parse
 
 INDENT = "    "
@@ -21,25 +34,26 @@ INDENT = "    "
 def format_program(program: Program) -> str:
     """The canonical text of a program: parameters by name in declared order, the fewest digits, loops i, j, k...
 
-    A ``ShapeProgError`` if a number is not finite, a statement is not declared or has more or fewer, or the text would
-    be longer, or its loops deeper, than can be read back.
+    Names, expressions, functions and comments stand as they are written.  A ``ShapeProgError`` if a number is not
+    finite, a statement is not declared or has more or fewer, or the text would be longer, or its loops deeper, than can
+    be read back.
     """
-    text = "".join(f"{line}\n" for node in program.body for line in _lines(node, 0))
+    source = source_of(program)
+    text = "".join(f"{line}\n" for line in _lines(source.lines, 0, 0, names_of(source) | {*source.functions}))
     if len(text) > LONGEST:
         raise ShapeProgError(f"the text of this program has more than {LONGEST:,} letters", "keep it as .json")
     return text
 
 
-def _call(node: Node) -> str:
-    known = language()
-    if node.name not in known:
-        raise ShapeProgError(f"no statement is called {node.name!r}", "load the module that declares it")
-    declared = known[node.name]
-    if len(node.values) != declared.size:
-        said = f"{node.name} has {len(node.values)} numbers instead of {declared.size}"
-        raise ShapeProgError(said, "mend the program")
-    text = declared.call([each.written(value) for each, value in zip(declared.quantities, node.values, strict=True)])
-    return text if isinstance(node, Loop) or not node.role else f"{checked_role(node)}({text})"
+def source_of(program: Program) -> Source:
+    """A program as it is written; one without names as its statements and loops."""
+    return program.source or Source(tuple(map(_written, program.body)))
+
+
+def _written(node: Node) -> Line:
+    if isinstance(node, Draw):
+        return WrittenDraw(node.name, node.values, node.role)
+    return WrittenLoop(node.name, node.values, tuple(map(_written, node.body)))
 
 
 def numbers_written(node: Node) -> int:
@@ -47,7 +61,7 @@ def numbers_written(node: Node) -> int:
     return language()[node.name].written(node.values)
 
 
-def checked_role(node: Draw) -> str:
+def checked_role(node: Draw | WrittenDraw) -> str:
     """The role of a part; a ``ShapeProgError`` if it is not declared, or no other than the name of its statement."""
     if node.role and node.role not in language().roles:
         raise ShapeProgError(f"no role is called {node.role!r}", did_you_mean(node.role, language().roles))
@@ -56,19 +70,68 @@ def checked_role(node: Draw) -> str:
     return node.role
 
 
-def _lines(node: Node, depth: int) -> Iterator[str]:
-    if not isinstance(node, Loop):
-        yield f"{INDENT * depth}{_call(node)}"
-        return
-    if depth >= DEEPEST:
-        raise ShapeProgError(f"loops are nested more than {DEEPEST} deep", "put some of them side by side")
-    yield f"{INDENT * depth}for {variable(depth)} in {_call(node)}:"
-    if not node.body:
-        yield f"{INDENT * (depth + 1)}pass"
-    for inner in node.body:
-        yield from _lines(inner, depth + 1)
+def declared_of(node: Node | WrittenDraw | WrittenLoop) -> Statement:
+    """The declaration of a statement or loop; a ``ShapeProgError`` if there is none of its name and size."""
+    known = language()
+    if node.name not in known:
+        raise ShapeProgError(f"no statement is called {node.name!r}", "load the module that declares it")
+    declared = known[node.name]
+    if len(node.values) != declared.size:
+        said = f"{node.name} has {len(node.values)} numbers instead of {declared.size}"
+        raise ShapeProgError(said, "mend the program")
+    return declared
 
 
-def variable(depth: int) -> str:
-    """The name of the variable of a loop inside ``depth`` others: i, j, k and so on."""
-    return chr(ord("i") + depth) if depth <= ord("z") - ord("i") else f"i{depth}"
+def _lines(lines: Iterable[Line], depth: int, loops: int, taken: set[str]) -> Iterator[str]:
+    """The lines of a block; ``taken`` are names that no variable of a loop may have."""
+    indent, empty = INDENT * depth, True
+    for line in lines:
+        if isinstance(line, Comment):
+            yield f"{indent}# {_remark(line.text)}" if line.text else ""
+            continue
+        empty = False
+        note = f"  # {_remark(line.note)}" if line.note else ""
+        match line:
+            case WrittenDraw():
+                role, call = checked_role(line), _call(line)
+                yield f"{indent}{f'{role}({call})' if role else call}{note}"
+            case WrittenLoop():
+                if loops >= DEEPEST:
+                    raise ShapeProgError(f"loops are nested more than {DEEPEST} deep", "put some of them side by side")
+                yield f"{indent}for {variable(loops, taken)} in {_call(line)}:{note}"
+                yield from _lines(line.body, depth + 1, loops + 1, taken)
+            case Assignment():
+                names, values = zip(*line.numbers, strict=True)
+                yield f"{indent}{', '.join(names)} = {', '.join(map(text_of, values))}{note}"
+            case Call():
+                yield f"{indent}{line.name}({', '.join(_given(line.arguments))}){note}"
+            case Function():
+                yield f"{indent}def {line.name}({', '.join(_given(line.parameters))}):{note}"
+                yield from _lines(line.body, depth + 1, loops, taken)
+    if empty and depth:
+        yield f"{indent}pass"
+
+
+def _call(line: WrittenDraw | WrittenLoop) -> str:
+    declared = declared_of(line)
+    return declared.call([_number(each, value) for each, value in zip(declared.quantities, line.values, strict=True)])
+
+
+def _number(quantity: Quantity, value: Value) -> str:
+    return str(value) if isinstance(value, Expression) else quantity.written(value)
+
+
+def _given(pairs: Iterable[tuple[str, Value | None]]) -> Iterator[str]:
+    return (name if value is None else f"{name}={text_of(value)}" for name, value in pairs)
+
+
+def _remark(text: str) -> str:
+    if text != text.strip() or not text.isprintable():
+        raise ShapeProgError("a comment has blanks around it, or letters that cannot be printed", "leave them out")
+    return text
+
+
+def variable(depth: int, taken: Iterable[str] = ()) -> str:
+    """The name of the variable of a loop inside ``depth`` others: i, j, k and so on, past names that are taken."""
+    letters = [letter for letter in map(chr, range(ord("i"), ord("z") + 1)) if letter not in taken]
+    return letters[depth] if depth < len(letters) else f"i{depth}"

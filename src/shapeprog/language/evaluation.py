@@ -1,0 +1,154 @@
+"""What a written program comes to: the statements and loops that it draws, with the numbers of its expressions."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+from shapeprog.errors import ShapeProgError
+from shapeprog.language.checking import Fault, check
+from shapeprog.language.expression import Expression, ExpressionError, Value, value_at
+from shapeprog.language.parameters import to_float32
+from shapeprog.language.program import DEEPEST, Draw, Loop, Node, Program
+from shapeprog.language.source import (
+    Assignment,
+    Call,
+    Function,
+    Line,
+    Source,
+    WrittenDraw,
+    WrittenLoop,
+    tidy,
+)
+from shapeprog.language.statement import language
+
+MOST_STATEMENTS = 1 << 16
+"""Most statements, loops and calls that calls may come to: a function may call another twice, that one a third..."""
+
+
+def evaluated(source: Source) -> Program:
+    """The program that is written so; one without names, expressions and functions is its statements alone.
+
+    Raises
+    ------
+    Fault
+        If a name, function, argument or number in it is wrong.
+    """
+    if source.plain:
+        return Program(expanded(source))
+    source = Source(_tidied(source.lines))
+    check(source)
+    return Program(expanded(source), source)
+
+
+def expanded(source: Source, given: Mapping[str, Any] | None = None) -> tuple[Node, ...]:
+    """The statements and loops of a program, with the numbers of its expressions in place of them.
+
+    Parameters
+    ----------
+    given
+        Numbers of the names that stand for plain numbers, in place of those written.  They may be tensors or linear
+        forms: then so are the numbers of the nodes, and they are neither rounded nor checked.
+
+    Raises
+    ------
+    Fault
+        If an expression has no value, a number does not fit its place, or there are more than ``MOST_STATEMENTS``.
+    """
+    return tuple(_Run(source, given).block(source.lines, {}, 0, 0))
+
+
+class _Run:
+    """One evaluation of a program."""
+
+    def __init__(self, source: Source, given: Mapping[str, Any] | None) -> None:
+        self.given = given
+        self.functions = source.functions
+        self.outermost: dict[str, Any] = {}
+        self.made = 0
+
+    def block(self, lines: tuple[Line, ...], scope: dict[str, Any], loops: int, calls: int) -> list[Node]:
+        """What the lines of a program, function or loop come to; names are added to ``scope``."""
+        found: list[Node] = []
+        for line in lines:
+            match line:
+                case WrittenDraw():
+                    self._count(line, calls)
+                    found.append(Draw(line.name, self._values(line, scope), line.role))
+                case WrittenLoop():
+                    self._count(line, calls)
+                    if loops >= DEEPEST:
+                        cure = "put some of them side by side"
+                        raise Fault(line, f"loops are nested more than {DEEPEST} deep", cure)
+                    body = self.block(line.body, scope, loops + 1, calls)
+                    found.append(Loop(line.name, self._values(line, scope), tuple(body)))
+                case Call():
+                    self._count(line, calls + 1)
+                    if calls >= DEEPEST:
+                        raise Fault(
+                            line, f"functions call each other more than {DEEPEST} deep", "write some of them out"
+                        )
+                    found += self.block(self.functions[line.name].body, self._inner(line, scope), loops, calls + 1)
+                case Assignment():
+                    scope |= self._named(line, scope, calls)
+        return found
+
+    def _count(self, line: Line, calls: int) -> None:
+        """Calls alone make more of a program than its text holds."""
+        self.made += calls > 0
+        if self.made > MOST_STATEMENTS:
+            said = f"this program comes to more than {MOST_STATEMENTS} statements"
+            raise Fault(line, said, "use loops in place of calls")
+
+    def _named(self, line: Assignment, scope: dict[str, Any], calls: int) -> dict[str, Any]:
+        """The numbers that a line names, all found before any of them has its name."""
+        found = {name: _at(line, name, value, scope) for name, value in line.numbers}
+        if not calls:
+            found |= {name: number for name, number in (self.given or {}).items() if name in found}
+            self.outermost |= found
+        return found
+
+    def _inner(self, line: Call, scope: dict[str, Any]) -> dict[str, Any]:
+        """The names in a function that is called: those of the program, and its parameters."""
+        given = {name: _at(line, name, value, scope) for name, value in line.arguments}
+        function: Function = self.functions[line.name]
+        for name, default in function.parameters:
+            if name not in given:
+                assert default is not None
+                given[name] = _at(function, name, default, self.outermost)
+        return self.outermost | given
+
+    def _values(self, line: WrittenDraw | WrittenLoop, scope: dict[str, Any]) -> tuple[Any, ...]:
+        if not any(isinstance(value, Expression) for value in line.values):
+            return line.values
+        numbers = [_at(line, slot, value, scope) for slot, value in enumerate(line.values)]
+        if self.given is not None:
+            return tuple(numbers)
+        for parameter in language()[line.name].parameters:
+            slots = parameter.slots
+            written = [isinstance(value, Expression) for value in line.values[slots]]
+            if any(written):
+                try:
+                    numbers[slots] = parameter.checked(line.name, [to_float32(number) for number in numbers[slots]])
+                except ShapeProgError as mistake:
+                    key = slots.start + written.index(True)
+                    raise Fault(line, mistake.message, mistake.hint, key) from None
+        return tuple(numbers)
+
+
+def _at(line: Line, key: int | str, value: Value, scope: dict[str, Any]) -> Any:
+    try:
+        return value_at(value, scope)
+    except ExpressionError as mistake:
+        raise Fault(line, mistake.message, mistake.hint, key, mistake.expression) from None
+
+
+def _tidied(lines: tuple[Line, ...]) -> tuple[Line, ...]:
+    """The lines without superfluous empty ones, in loops and functions too; what has none is left as it is."""
+    found = []
+    for line in lines:
+        if isinstance(line, WrittenLoop | Function) and (body := _tidied(line.body)) != line.body:
+            line = replace(line, body=body)
+        found.append(line)
+    return tidy(tuple(found))

@@ -157,4 +157,4 @@ def _cost(factors: FloatArray, prices: FloatArray, height: int) -> float:
     if height >= 0:
         terms[np.abs(factors[:, height] + 0.5) < SAME, height] = FLOOR
     single = (used.sum(0) == 1) & (size.sum(0) < 1 + SAME)
-    return float(terms.sum() + prices[~single].sum())
+    return float(terms.sum() + prices[~single & used.any(0)].sum())

@@ -7,6 +7,7 @@ import torch
 
 from shapeprog.inference.adjustment import EXPLAINED, GENTLE, PLACE, of_target
 from shapeprog.inference.evidence import Evidence
+from shapeprog.inference.joints import Joints, moved, needs
 from shapeprog.inference.residuals import Target
 from shapeprog.inference.tunable import Tunable
 from shapeprog.space import Array, FloatArray
@@ -19,6 +20,9 @@ STEPS = 4
 
 HOLD = 1e-2
 """Weight of a squared change of an extent of the whole, in cells: the box of the target is known."""
+
+TOGETHER = 1.0
+"""Weight of a squared gap between parts that touched: they are brought together again."""
 
 FARTHEST = 0.5
 """Farthest that one step moves the surface by one number, in cells."""
@@ -44,9 +48,11 @@ class Misfit:
         gentle = np.array([GENTLE.get(kind, PLACE) for kind in tunable.kinds]) * tunable.scale.numpy() ** 2
         self._gentle = np.concatenate([gentle, np.full(3, HOLD)])
 
-    def at(self, numbers: FloatArray, draws: int = DRAWS) -> tuple[FloatArray, FloatArray]:
+    def at(
+        self, numbers: FloatArray, draws: int = DRAWS, joints: Joints | None = None
+    ) -> tuple[FloatArray, FloatArray]:
         """Half the slope (V,) and half the curvature (V, V) of the mean squared distance, with what holds numbers to
-        where they were at the start."""
+        where they were at the start, and open joints together."""
         count = len(self.tunable.values)
         poses = self.tunable.poses(torch.from_numpy(numbers[:count]))
         slope, curvature = np.zeros(len(numbers)), np.zeros((len(numbers), len(numbers)))
@@ -55,18 +61,23 @@ class Misfit:
             one, two = of_target(poses, pairs, self.width)
             slope[:count] += one.numpy() / draws
             curvature[:count, :count] += two.numpy() / draws
+        if joints is not None and len(joints.first):
+            gaps = needs(poses.scene, poses.slopes, moved(poses.scene, joints))
+            wide = TOGETHER * gaps.slopes
+            slope[:count] += (wide.T @ gaps.residual).numpy()
+            curvature[:count, :count] += (wide.T @ gaps.slopes).numpy()
         slope += self._gentle * (numbers - self.numbers)
         return slope, curvature + np.diag(self._gentle)
 
 
-def refitted(misfit: Misfit, numbers: FloatArray, rows: FloatArray, steps: int = STEPS) -> FloatArray:
-    """The numbers (V,) of the least misfit for which all relations (M, V) hold."""
+def refitted(misfit: Misfit, numbers: FloatArray, rows: FloatArray, joints: Joints | None) -> FloatArray:
+    """The numbers (V,) of the least misfit for which all relations (M, V) hold; parts that touched are kept together."""
     ways = ways_free(rows, len(numbers))
     numbers = ways @ (ways.T @ numbers)
     farthest = np.concatenate([FARTHEST / misfit.tunable.scale.numpy(), np.full(3, FARTHEST)])
     low = np.concatenate([misfit.tunable.low.numpy(), np.zeros(3)])
-    for _ in range(steps):
-        slope, curvature = misfit.at(numbers, draws=1)
+    for _ in range(STEPS):
+        slope, curvature = misfit.at(numbers, 1, joints)
         move = ways @ -np.linalg.solve(ways.T @ curvature @ ways, ways.T @ slope)
         too_far = float(np.max(np.abs(move) / farthest, initial=1.0))
         onwards = numbers + move / too_far

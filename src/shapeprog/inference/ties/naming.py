@@ -33,6 +33,9 @@ NOTES = {"top": "above the floor", "bottom": "above the floor", "inset": "from t
 SHARED = ("thickness", "radius", "edge", "spacing", "inset", "tilt")
 """What different parts may share and be called so without the name of a part."""
 
+WIDE = 96
+"""Letters of a line that names numbers, about."""
+
 LEVEL = 0.6
 """A part is thin along an axis where it measures less than this share of the next longer."""
 
@@ -42,11 +45,10 @@ def written(tunable: Tunable, basis: Basis) -> Program:
     names, order = _names(tunable, basis)
     count = len(tunable.moving)
     uses = np.abs(basis.factors[:count]) > SAME
-    literal = [
-        uses[:, z].sum() == 1 and abs(np.abs(basis.factors[:count, z]).sum() - 1) < SAME
+    alone = [  # used once, as it is; or, an extent that nothing follows from, not at all
+        not uses[:, z].any() or bool(uses[:, z].sum() == 1 and abs(np.abs(basis.factors[:count, z]).sum() - 1) < SAME)
         for z in range(len(basis.chosen))
     ]
-    alone = [bool(each) for each in literal]
     up = [z for z in range(len(basis.chosen)) if names[z] == EXTENTS[UP]]
     floors = bool(up) and not alone[up[0]] and int((basis.factors[:count, up[0]] == -0.5).sum()) > 1
     terms: dict[int, Value] = {
@@ -74,15 +76,23 @@ def written(tunable: Tunable, basis: Basis) -> Program:
 def _header(
     tunable: Tunable, basis: Basis, names: list[str], order: list[int], alone: list[bool]
 ) -> Iterator[Assignment]:
-    """The lines that name numbers, the extents of the whole together on the first."""
-    shown = [z for z in order if not alone[z]]
-    whole = [z for z in shown if names[z] in EXTENTS and basis.chosen[z][0].word == "extent"]
-    whole.sort(key=lambda z: -EXTENTS.index(names[z]))
-    if whole:
-        yield Assignment(tuple((names[z], to_float32(basis.values[z])) for z in whole))
-    for z in shown:
-        if z not in whole:
-            yield Assignment(((names[z], to_float32(basis.values[z])),), NOTES.get(basis.chosen[z][0].word, ""))
+    """The lines that name numbers: the extents of the whole, then what is measured from the same place together."""
+    groups: dict[str, list[int]] = {"whole": [], "": []}
+    for z in order:
+        if not alone[z]:
+            word = basis.chosen[z][0].word
+            groups.setdefault("whole" if word == "extent" else NOTES.get(word, ""), []).append(z)
+    groups["whole"].sort(key=lambda z: -EXTENTS.index(names[z]))
+    for note, members in groups.items():
+        line: list[tuple[str, Value]] = []
+        for z in members:
+            pair = names[z], to_float32(basis.values[z])
+            if line and sum(len(name) + 8 for name, _ in [*line, pair]) > WIDE:
+                yield Assignment(tuple(line), note if note != "whole" else "")
+                line = []
+            line.append(pair)
+        if line:
+            yield Assignment(tuple(line), note if note != "whole" else "")
 
 
 def _names(tunable: Tunable, basis: Basis) -> tuple[list[str], list[int]]:

@@ -15,14 +15,15 @@ import torch
 from shapeprog.errors import ShapeProgError
 from shapeprog.inference.adjustment import single_threaded
 from shapeprog.inference.evidence import Evidence
-from shapeprog.inference.joints import find_joints
-from shapeprog.inference.ties.basis import Basis, simplest
+from shapeprog.geometry.scene import Scene
+from shapeprog.inference.joints import Joints, find_joints
+from shapeprog.inference.ties.basis import SAME, Basis, simplest
 from shapeprog.inference.ties.features import Feature, features
 from shapeprog.inference.ties.fitting import Misfit, refitted, ways_free
 from shapeprog.inference.ties.naming import written
 from shapeprog.inference.ties.pricing import worthwhile
 from shapeprog.inference.ties.relations import relations
-from shapeprog.inference.tunable import CELLS, DEGREES, Poses, Tunable
+from shapeprog.inference.tunable import CELLS, DEGREES, Tunable
 from shapeprog.language.program import Draw, Program
 from shapeprog.space import FloatArray
 
@@ -68,31 +69,37 @@ def tie(
         misfit = Misfit(tunable, evidence, seed)
         numbers, rows = misfit.numbers, np.zeros((0, len(misfit.numbers)))
         known: list[Feature] = []
+        scene = tunable.poses(tunable.values).scene
+        joints = _joints(scene, seed)
+        pairs = touching(tunable, scene, joints) if joints else set()
         for round_ in range(ROUNDS):
             poses = tunable.poses(torch.from_numpy(numbers[: len(tunable.values)]))
             known = features(tunable, poses)
             before = ways_free(rows, len(numbers)).shape[1]
-            offered = relations(known, numbers, touching(tunable, poses, seed))
+            offered = relations(known, numbers, pairs)
             rows, _ = worthwhile(offered, numbers, misfit.at(numbers)[1], price, rows)
-            numbers = refitted(misfit, numbers, rows)
+            numbers = refitted(misfit, numbers, rows, joints)
             if progress:
                 progress("tying numbers", (round_ + 1) / ROUNDS)
             if ways_free(rows, len(numbers)).shape[1] == before:
                 break
         basis = _rounded(simplest(known, numbers, rows))
-        return Tied(written(tunable, basis), len(basis.chosen))
+        free = int((np.abs(basis.factors[: len(tunable.values)]) > SAME).any(0).sum())
+        return Tied(written(tunable, basis), free)
 
 
-def touching(tunable: Tunable, poses: Poses, seed: int = 0) -> set[tuple[int, int]]:
+def touching(tunable: Tunable, scene: Scene, joints: Joints) -> set[tuple[int, int]]:
     """Pairs of nodes whose parts touch or nearly do, the smaller number first."""
     drawn = [n for n, node in enumerate(tunable.nodes) if isinstance(node, Draw)]
-    block = poses.scene.block
-    try:
-        joints = find_joints(poses.scene, NOWHERE, torch.Generator().manual_seed(seed))
-    except ShapeProgError:  # a part without a surface touches nothing
-        return set()
-    pairs = zip(block[joints.first].tolist(), block[joints.second].tolist(), strict=True)
+    pairs = zip(scene.block[joints.first].tolist(), scene.block[joints.second].tolist(), strict=True)
     return {(min(drawn[a], drawn[b]), max(drawn[a], drawn[b])) for a, b in pairs}
+
+
+def _joints(scene: Scene, seed: int) -> Joints | None:
+    try:
+        return find_joints(scene, NOWHERE, torch.Generator().manual_seed(seed))
+    except ShapeProgError:  # a part without a surface touches nothing
+        return None
 
 
 def _rounded(basis: Basis) -> Basis:

@@ -254,6 +254,47 @@ def test_export_writes_every_file_it_is_given(run: Run, tmp_path: Path, program:
     assert all((tmp_path / name).exists() for name in ("a.glb", "b.scad", "c.py", "d.stl"))
 
 
+NAMED = (
+    "width, n = 8, 2\nspan = width - 2\n"
+    "for i in translate(n, by=(0, 0, span)):\n    leg(at=(0, 0, 0), size=(2, 2, 2))\n"
+)
+
+
+@pytest.mark.parametrize(
+    ("changes", "n", "span"),
+    [
+        (["--set", "width=11"], 2, 9),
+        (["--set", "width*=2", "n+=1"], 3, 14),
+        (["--set", "width/=2", "--set", "width -= 0.5", "n=1"], 1, 1.5),
+    ],
+)
+def test_export_sets_the_numbers_that_have_names(run: Run, tmp_path: Path, changes: list[str], n: int, span: float):
+    (tmp_path / "legs.shape").write_text(NAMED)
+    ended = run("export", "legs.shape", "other.shape", *changes, "-q")
+    assert (ended.code, ended.out) == (0, ""), ended.err
+    assert load_with_frame(tmp_path / "other.shape")[0].body[0].values == (n, 0, 0, span)
+    assert "span = width - 2" in (tmp_path / "other.shape").read_text()
+    assert run("export", "legs.shape", *changes, "--quiet", "again.shape").code == 0
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ("widht=3", "did you mean width?"),
+        ("span=3", "set width, or edit the text"),
+        ("width", "changes no number"),
+        ("width=x", "'x' is not a number"),
+        ("width/=0", "divides by zero"),
+        ("n=1.5", "must be whole"),
+    ],
+)
+def test_changes_that_cannot_be_made_are_told(run: Run, tmp_path: Path, change: str, words: str):
+    (tmp_path / "legs.shape").write_text(NAMED)
+    for command in (["export", "legs.shape", "a.stl"], ["render", "legs.shape", "a.png"], ["show", "legs.shape"]):
+        ended = run(*command, "--set", change)
+        assert (ended.code, words in ended.err) == (2, True), ended.err
+
+
 def test_render_makes_pictures_cells_and_points(run: Run, tmp_path: Path, program: Path):
     table(tmp_path / "input.obj")
     for words in (["a.png", "--shape", "input.obj"], ["b.npy", "--resolution", 16], ["c.xyz", "--points", 50]):

@@ -223,7 +223,7 @@ def test_places_in_the_notation(text: str, line: int, column: int, words: str) -
     ("content", "words"),
     [
         ([], "not in the form"),
-        ({"format": "shapeprog", "version": 2}, "version 2"),
+        ({"format": "shapeprog", "version": 3}, "version 3"),
         ({"program": 3}, "program is not a list"),
         ({"program": [3]}, r"program\[0\] is not a statement"),
         ({"program": [{"statement": "legg"}]}, "did you mean leg"),
@@ -236,6 +236,22 @@ def test_places_in_the_notation(text: str, line: int, column: int, words: str) -
         ({"program": [{"statement": "leg", "parameters": {}, "body": []}]}, "no entry 'body'"),
         ({"program": [{"statement": "rotate", "parameters": {"count": 1, "step": 1}}]}, r"program\[0\].body is not"),
         ({"program": [{"statement": "rotate", "parameters": {"count": 1.5, "step": 1}}]}, "must be whole"),
+        ({"program": [{"statement": "leg", "parameters": {"at": [1, 2, "w"], "size": [1, 2, 3]}}]}, "called 'w'"),
+        ({"program": [{"statement": "leg", "parameters": {"at": [1, 2, "w("], "size": [1, 2, 3]}}]}, "cannot be read"),
+        ({"program": [{"statement": "leg", "parameters": {"at": [1, 2, "a; b"], "size": [1, 2, 3]}}]}, "no number"),
+        ({"program": [{"numbers": {"w": 1}}]}, r"program\[0\]: w is used by nothing"),
+        ({"program": [{"numbers": {"w": 1e39}}]}, r"program\[0\]: this number is too large"),
+        ({"program": [{"numbers": {"w": None}}]}, r"program\[0\]: 'w' holds something that is not a number"),
+        ({"program": [{"numbers": 3}]}, r"program\[0\] is not a statement"),
+        ({"program": [{"comment": "a\nb", "note": ""}]}, "'note'"),
+        ({"program": [{"call": "legs", "arguments": {}}]}, "no function is called 'legs'"),
+        ({"program": [{"call": "legs"}]}, "no numbers by name"),
+        ({"program": [{"function": "legs", "parameters": {}, "body": {}}]}, "not a list"),
+        ({"program": [{"function": "legs", "parameters": 3, "body": []}]}, "no numbers by name"),
+        (
+            {"program": [{"function": "legs", "parameters": {}, "body": [], "role": "leg"}]},
+            "no entry 'role'",
+        ),
     ],
 )
 def test_wrong_json_is_refused_in_words(content: object, words: str) -> None:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import json
+from pathlib import Path
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -9,6 +12,8 @@ from written import written_program
 
 import shapeprog as sp
 from shapeprog.errors import ProgramError, ShapeProgError
+from shapeprog.formats.json_form import program_from_json, program_to_json
+from shapeprog.formats.notation import format_notation, parse_notation
 from shapeprog.language import Draw, Loop, Program, evaluated
 from shapeprog.language.expression import Binary, Expression, Linear, Name, Negative, combined
 from shapeprog.language.source import Assignment, Call, Comment, Function, Source, WrittenDraw
@@ -69,10 +74,25 @@ def test_what_a_text_says_is_kept_only_where_it_says_more_than_its_statements() 
     assert parse(LEG.replace("w", "2 + 2")).source is not None
 
 
+def test_json_keeps_what_a_program_says() -> None:
+    body = function(LEG.replace("2, w", "h, w"), head="def upright(w, h=2):")
+    program = parse(f"w = 4\n{body}upright(w=w / 2)  # short\n")
+    content = json.loads(program_to_json(program))
+    assert content == {"format": "shapeprog", "version": 2, "program": [
+        {"numbers": {"w": 4}},
+        {"function": "upright", "parameters": {"w": None, "h": 2}, "body": [
+            {"statement": "leg", "parameters": {"at": [1, 2, 3], "size": [1, "h", "w"]}}]},
+        {"call": "upright", "arguments": {"w": "w / 2"}, "note": "short"},
+    ]}  # fmt: skip
+    assert json.loads(program_to_json(sp.inline(program)))["version"] == 1
+
+
 @given(st.integers(0, 1 << 30))
-def test_written_programs_survive_as_text(seed: int) -> None:
+def test_written_programs_survive_as_text_and_as_json(seed: int) -> None:
     program = written_program(seed)
     assert repr(parse(format_program(program))) == repr(program)
+    assert repr(program_from_json(program_to_json(program))) == repr(program)
+    assert parse_notation(format_notation(program)) == sp.inline(program)
 
 
 @pytest.mark.nightly
@@ -229,3 +249,13 @@ def test_everything_that_works_on_shapes_takes_programs_with_names() -> None:
     assert sp.unroll(program).centre.tolist() == sp.unroll(plain).centre.tolist()
     assert (program.size, program.statements, program.blocks) == (plain.size, plain.statements, plain.blocks)
     assert program.snap() == plain.snap()
+
+
+@pytest.mark.parametrize("suffix", [".shape", ".json"])
+def test_files_keep_programs_as_they_are_written_and_their_frame(tmp_path: Path, suffix: str) -> None:
+    program, frame = parse(CHAIR), sp.Frame(0.25, (1.0, 2.0, 3.0))
+    sp.save(program, tmp_path / f"chair{suffix}", frame)
+    assert sp.load_with_frame(tmp_path / f"chair{suffix}") == (program, frame)
+    sp.save(*sp.load_with_frame(tmp_path / f"chair{suffix}")[:1], tmp_path / "again.shape", frame)
+    assert (tmp_path / "again.shape").read_text().count("frame:") == 1
+    assert sp.load(tmp_path / "again.shape") == program

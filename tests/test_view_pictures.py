@@ -173,3 +173,19 @@ def test_the_page_needs_nothing_else_and_escapes_what_it_is_told(tmp_path: Path)
     assert len(lines) == 12, "a box has twelve edges"
     assert data["input"] is not None
     assert [part["block"] for part in data["parts"]] == [0, 1, 1, 1, 1, 2, 2]
+
+
+def test_listing_shows_programs_as_they_are_written():
+    text = (
+        "# a table\nwidth = 10.004\n\ndef pair(far):  # of legs\n    for i in mirror(side):\n"
+        "        leg(at=(0, 0, far), size=(4, 1, 1))\n    # no more\n\n"
+        "top_square(at=(4, 0, 0), thickness=1, half=width / 2.001)\npair(far=width)\npair(far=1)\n"
+    )
+    lines = listing(parse(text), None)
+    assert "\n".join(line.text for line in lines) + "\n" == text
+    assert [(line.word, line.blocks) for line in lines if line.blocks] == [
+        ("pair", (1, 2)), ("mirror", (1, 2)), ("leg", (1, 2)), ("top_square", (0,)), ("pair", (1,)), ("pair", (2,)),
+    ]  # fmt: skip
+    assert ["".join(parted(line)) for line in lines] == [line.text for line in lines]
+    assert [line.text for line in listing(parse(text))][1] == "width = 10"
+    assert "half=width / 2)" in listing(parse(text))[8].text

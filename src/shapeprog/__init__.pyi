@@ -10,7 +10,12 @@ from .geometry.losses import chamfer
 from .geometry.scene import Scene
 from .inference.infer import infer
 from .inference.refine import refine
+from .language.evaluation import evaluated
+from .language.expression import Expression, Linear, Name
+from .language.named import Named, inline, names, set
+from .language.parametric import Parametric
 from .language.program import Draw, Loop, Program
+from .language.source import Source
 from .language.statement import loop, statement, using
 from .language.tensors import Code, decode, encode
 from .language.text import format_program, parse
@@ -20,9 +25,9 @@ from .space import Frame
 __version__: str
 
 __all__ = [
-    "Code", "Draw", "Frame", "InputError", "Loop", "OutputError", "Program", "ProgramError", "Scene", "Shape",
-    "ShapeProgError",
-    "chamfer", "decode", "encode", "export", "format_notation", "format_program", "infer", "load", "load_shape",
-    "load_statements", "load_with_frame", "loop", "parse", "parse_notation", "program_from_json", "program_to_json",
-    "random_program", "refine", "save", "statement", "unroll", "using",
+    "Code", "Draw", "Expression", "Frame", "InputError", "Linear", "Loop", "Name", "Named", "OutputError", "Parametric",
+    "Program", "ProgramError", "Scene", "Shape", "ShapeProgError", "Source",
+    "chamfer", "decode", "encode", "evaluated", "export", "format_notation", "format_program", "infer", "inline",
+    "load", "load_shape", "load_statements", "load_with_frame", "loop", "names", "parse", "parse_notation",
+    "program_from_json", "program_to_json", "random_program", "refine", "save", "set", "statement", "unroll", "using",
 ]  # fmt: skip

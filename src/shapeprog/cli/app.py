@@ -10,7 +10,7 @@ from typing import Annotated
 
 import typer
 
-from shapeprog.cli import adapting, inferring, measuring, modelling, sampling, terminal, training, writing
+from shapeprog.cli import adapting, changes, inferring, measuring, modelling, sampling, terminal, training, writing
 
 # Before torch is loaded: its idle workers would spin on the cores that the kernels of other threads want.
 os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
@@ -41,7 +41,7 @@ for name, command, help_line in (
     ("import-weights", modelling.import_weights_command, "Turn published weights into a file of this package."),
     ("evaluate", measuring.evaluate_command, "Measure predictions against targets."),
 ):
-    app.command(name, short_help=help_line)(terminal.guarded(command))
+    app.command(name, cls=changes.ChangingCommand, short_help=help_line)(terminal.guarded(command))
 
 
 def _version(wanted: bool) -> None:

@@ -7,7 +7,7 @@ import io
 import json
 import os
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
@@ -35,6 +35,11 @@ Command = TypeVar("Command", bound=Callable[..., None])
 With = Annotated[
     list[Path] | None,
     typer.Option("--with", help="A Python module that declares statements of your own; may be given again."),
+]
+
+Changes = Annotated[
+    list[str] | None,
+    typer.Option("--set", help="A name of the program and its number: seat=11 or 'width*=1.2'; several may follow."),
 ]
 
 Seed = Annotated[int, typer.Option(help="Seed of everything random.", min=0, max=2**63 - 1)]
@@ -152,18 +157,20 @@ def load_modules(modules: list[Path] | None) -> None:
         load_statements(module)
 
 
-def read_program_file(path: Path) -> tuple[Program, Any]:
-    """The program and frame of a file.
+def read_program_file(path: Path, changes: Sequence[str] | None = None) -> tuple[Program, Any]:
+    """The program and frame of a file, with other numbers for its names as ``--set`` has them.
 
     Raises
     ------
     InputError
         Where the file holds a shape instead, with the command that makes a program of it.
     """
+    from shapeprog.cli.changes import changed
     from shapeprog.formats import load_with_frame, program_suffixes
 
     try:
-        return load_with_frame(path)
+        program, frame = load_with_frame(path)
+        return changed(program, changes or ()), frame
     except InputError as error:
         if path.is_file() and path.suffix.lower() not in program_suffixes():
             raise InputError(error.message, f"make a program of it first: shapeprog infer {path}") from None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -30,6 +31,7 @@ Input = Annotated[
 def export_command(
     program: ProgramFile,
     outputs: Outputs,
+    changes: terminal.Changes = None,
     modules: terminal.With = None,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
 ) -> None:
@@ -42,7 +44,7 @@ def export_command(
     from shapeprog.formats import export
 
     terminal.load_modules(modules)
-    found, frame = terminal.read_program_file(program)
+    found, frame = terminal.read_program_file(program, changes)
     for path in outputs:
         export(found, path, frame)
         if not quiet:
@@ -56,6 +58,7 @@ def render_command(
     resolution: Annotated[int, typer.Option(help="Cells along each side, for .npy.", min=1, max=512)] = 32,
     points: Annotated[int, typer.Option(help="How many points, for .xyz.", min=1)] = 5000,
     seed: terminal.Seed = 0,
+    changes: terminal.Changes = None,
     modules: terminal.With = None,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
 ) -> None:
@@ -68,10 +71,10 @@ def render_command(
     from shapeprog.view.page import SUFFIXES, picture
 
     terminal.load_modules(modules)
-    found, frame = terminal.read_program_file(program)
+    found, frame = terminal.read_program_file(program, changes)
     suffix, chosen = output.suffix.lower(), format_of(output)
     if suffix in SUFFIXES:
-        result = _result(program)
+        result = _result(program, changes)
         beside = _input_of(result, shape)
         _tell_hidden([result], [beside], quiet)
         picture(beside, found, output, title=program.stem, scores=result.scores)
@@ -90,6 +93,7 @@ def show_command(
     output: Annotated[Path | None, typer.Argument(help="The page; by default NAME.html in this folder.")] = None,
     shape: Input = None,
     browse: Annotated[bool, typer.Option("--open", help="Open it in the browser.")] = False,
+    changes: terminal.Changes = None,
     modules: terminal.With = None,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
 ) -> None:
@@ -97,11 +101,11 @@ def show_command(
     from shapeprog.view import viewer
 
     terminal.load_modules(modules)
-    found, _ = terminal.read_program_file(program)
+    found, _ = terminal.read_program_file(program, changes)
     page = output or Path(f"{program.stem}.html")
     if page.suffix.lower() not in (".html", ".htm"):
         raise OutputError(f"{page} is no page", "pages end in .html; pictures are made by 'shapeprog render'")
-    result = _result(program)
+    result = _result(program, changes)
     beside = _input_of(result, shape)
     _tell_hidden([result], [beside], quiet)
     viewer(found, page, shape=beside, title=program.stem, scores=result.scores)
@@ -186,11 +190,11 @@ def program_files(folder: Path) -> list[Path]:
     return [found[key] for key in sorted(found)]
 
 
-def _result(path: Path) -> Result:
-    """What a .json file says beside its program; other programs say nothing."""
+def _result(path: Path, changes: Sequence[str] | None = None) -> Result:
+    """What a .json file says beside its program; other programs say nothing, nor do those that are changed."""
     from shapeprog.formats.json_form import Result, read_result
 
-    return read_result(path) if path.suffix.lower() == ".json" else Result(str(path), {})
+    return Result(str(path), {}) if changes or path.suffix.lower() != ".json" else read_result(path)
 
 
 def _input_of(result: Result, named: Path | None) -> Shape | None:

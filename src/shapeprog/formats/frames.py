@@ -70,6 +70,11 @@ def frame_comment(frame: Frame | None) -> str:
     return "" if frame is None else f"# frame: {json.dumps(frame_dict(frame))}\n"
 
 
+def without_frame(text: str) -> str:
+    """Program text without the comment that keeps its frame; the lines keep their numbers."""
+    return _HEADER.sub("", text)
+
+
 def frame_in(text: str, name: str = "<program>") -> Frame | None:
     """The frame kept in program text, or None.
 

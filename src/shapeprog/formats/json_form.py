@@ -3,6 +3,8 @@
 {"format": "shapeprog", "version": 1, "program": [
   {"statement": "translate", "parameters": {"count": 2, "by": [0, 0, 18]}, "body": [
     {"statement": "leg", "parameters": {"at": [-12, -8, -10], "size": [16, 2, 2]}}]}]}
+
+Programs with names, expressions or functions are of version 2.  The entries are in :mod:`shapeprog.formats.json_lines`.
 """
 
 from __future__ import annotations
@@ -16,20 +18,21 @@ from typing import Any, NoReturn
 
 import torch
 
-from shapeprog.errors import InputError, ProgramError, ShapeProgError, did_you_mean
+from shapeprog.errors import InputError, ProgramError, ShapeProgError
 from shapeprog.files import write_text
 from shapeprog.formats.frames import frame_dict, frame_from
+from shapeprog.formats.json_lines import entries_of, program_from_entries
 from shapeprog.formats.shape import LARGEST_FILE, read_text
-from shapeprog.language.parameters import LARGEST, Parameter
+from shapeprog.language.parameters import LARGEST
 from shapeprog.language.place import proper_text
-from shapeprog.language.program import DEEPEST, Draw, Loop, Node, Program
-from shapeprog.language.statement import SLOTS, Statement, language
+from shapeprog.language.program import Program
+from shapeprog.language.statement import SLOTS
 from shapeprog.language.tensors import Code
-from shapeprog.language.text import checked_role
-from shapeprog.space import AXES, Frame
+from shapeprog.space import Frame
 
 FORMAT, CODE_FORMAT = "shapeprog", "shapeprog-code"
-VERSION = 1
+VERSIONS = {FORMAT: (1, 2), CODE_FORMAT: (1,)}
+"""Those that can be read, by form."""
 
 
 @dataclass(frozen=True)
@@ -50,13 +53,13 @@ class Result:
     @property
     def program(self) -> Program:
         """The program; an ``InputError`` if it is none."""
-        return Program(_body(self.content.get("program"), self.name, "program", 0))
+        return program_from_entries(self.content.get("program"), self.name, "program")
 
     @property
     def snapped(self) -> Program | None:
         """Its whole-numbered form where the file holds one; an ``InputError`` if that is no program."""
         body = self.content.get("snapped")
-        return None if body is None else Program(_body(body, self.name, "snapped", 0))
+        return None if body is None else program_from_entries(body, self.name, "snapped")
 
     @property
     def frame(self) -> Frame | None:
@@ -116,8 +119,8 @@ def program_to_json(program: Program, indent: int | None = 2) -> str:
     ShapeProgError
         If a number is not finite, a statement is not declared, or loops nest too deeply to be read back.
     """
-    body = [_node_to_json(node, 0) for node in program.body]
-    return json.dumps({"format": FORMAT, "version": VERSION, "program": body}, indent=indent) + "\n"
+    version = 1 if program.source is None else 2
+    return json.dumps({"format": FORMAT, "version": version, "program": entries_of(program)}, indent=indent) + "\n"
 
 
 def program_from_json(text: str, name: str = "<json>") -> Program:
@@ -149,7 +152,7 @@ def code_to_json(code: Code) -> str:
     if code.roles is not None:
         content["roles"] = code.roles.tolist()
     shape = {"dtype": str(code.parameters.dtype).removeprefix("torch."), "shape": list(code.ids.shape)}
-    return json.dumps({"format": CODE_FORMAT, "version": VERSION, **shape, **content}) + "\n"
+    return json.dumps({"format": CODE_FORMAT, "version": 1, **shape, **content}) + "\n"
 
 
 def code_from_json(text: str, name: str = "<json>") -> Code:
@@ -180,31 +183,6 @@ def code_from_json(text: str, name: str = "<json>") -> Code:
     return Code(ids, parameters, roles)
 
 
-def _node_to_json(node: Node, depth: int) -> dict[str, Any]:
-    known = language()
-    if node.name not in known:
-        raise ShapeProgError(f"no statement is called {node.name!r}", "load the module that declares it")
-    if depth > DEEPEST:
-        raise ShapeProgError(f"loops are nested more than {DEEPEST} deep", "put some of them side by side")
-    parameters = {}
-    for parameter in known[node.name].parameters:
-        if not parameter.quantity.written_out:
-            continue
-        texts = [parameter.quantity.written(value) for value in node.values[parameter.slots]]
-        numbers = texts if parameter.quantity.kind == "axis" else [json.loads(text) for text in texts]
-        parameters[parameter.name] = numbers if parameter.quantity.width > 1 else numbers[0]
-    found: dict[str, Any] = {"statement": node.name, "parameters": parameters}
-    if isinstance(node, Draw) and node.role:
-        found["role"] = checked_role(node)
-    if isinstance(node, Loop):
-        found["body"] = [_node_to_json(inner, depth + 1) for inner in node.body]
-    return found
-
-
-def _wanted(parameter: Parameter) -> str:
-    return parameter.quantity.range_text if parameter.quantity.kind == "axis" else "a number"
-
-
 def _document(text: str, name: str, wanted: str) -> dict[str, Any]:
     def refuse(constant: str) -> NoReturn:
         raise InputError(f"{name}: {constant} is not a number of a program", "write finite numbers")
@@ -232,75 +210,9 @@ def _document(text: str, name: str, wanted: str) -> dict[str, Any]:
         raise InputError(f"{name}: a number has too many digits to be read", "write shorter numbers") from error
     if not isinstance(content, dict) or content.get("format") != wanted:
         raise InputError(f"{name}: this JSON is not in the form {wanted!r}", f'it begins {{"format": "{wanted}", ...')
-    if content.get("version") != VERSION:
+    if content.get("version") not in VERSIONS[wanted]:
         raise InputError(
             f"{name}: version {shortened(content.get('version'))} of the form {wanted!r} is not known",
-            f"this program reads version {VERSION}; a newer one may read it",
+            f"this program reads version {' and '.join(map(str, VERSIONS[wanted]))}; a newer one may read it",
         )
     return content
-
-
-def _body(body: Any, name: str, place: str, depth: int) -> tuple[Node, ...]:
-    if not isinstance(body, list):
-        raise InputError(f"{name}: {place} is not a list of statements", "write [ ... ], empty if there are none")
-    if depth > DEEPEST:
-        raise InputError(f"{name}: loops are nested more than {DEEPEST} deep", "put some of them side by side")
-    return tuple(_node(entry, name, f"{place}[{index}]", depth) for index, entry in enumerate(body))
-
-
-def _node(entry: Any, name: str, place: str, depth: int) -> Node:
-    if not isinstance(entry, dict) or not isinstance(entry.get("statement"), str):
-        raise InputError(f"{name}: {place} is not a statement", 'write {"statement": name, "parameters": {...}}')
-    known, word = language(), entry["statement"]
-    if word not in known:
-        raise InputError(f"{name}: {place}: no statement is called {shortened(word)}", did_you_mean(word, known.names))
-    declared = known[word]
-    allowed = {"statement", "parameters", "body" if declared.is_loop else "role"}
-    extra = sorted(set(entry) - allowed)
-    if extra:
-        raise InputError(
-            f"{name}: {place}: {word} has no entry {shortened(extra[0])}", f"it has {', '.join(sorted(allowed))}"
-        )
-    values = _values(declared, entry.get("parameters"), name, place)
-    if not declared.is_loop:
-        return Draw(word, values, _role(entry, word, name, place))
-    return Loop(word, values, _body(entry.get("body"), name, f"{place}.body", depth + 1))
-
-
-def _role(entry: dict[str, Any], word: str, name: str, place: str) -> str:
-    role, roles = entry.get("role", ""), language().roles
-    if not isinstance(role, str) or (role and role not in roles):
-        raise InputError(f"{name}: {place}: no role is called {shortened(role)}", did_you_mean(str(role), roles))
-    if role == word:
-        raise InputError(f"{name}: {place}: {word} is a {word} without being called one", "leave the role out")
-    return role
-
-
-def _values(declared: Statement, given: Any, name: str, place: str) -> tuple[float, ...]:
-    words = [parameter.name for parameter in declared.parameters]
-    if not isinstance(given, dict):
-        raise InputError(f"{name}: {place}: {declared.name} lacks its parameters", f"they are {', '.join(words)}")
-    for word in given:
-        if word not in words:
-            raise InputError(
-                f"{name}: {place}: {declared.name} has no parameter {shortened(word)}", did_you_mean(word, words)
-            )
-    values: list[float] = []
-    for parameter in declared.parameters:
-        if parameter.name not in given and parameter.unsaid is not None:
-            values.append(parameter.unsaid)
-            continue
-        if parameter.name not in given:
-            raise InputError(f"{name}: {place}: {declared.name} lacks {parameter.name}", f"it has {', '.join(words)}")
-        found = given[parameter.name]
-        numbers = found if isinstance(found, list) else [found]
-        if parameter.quantity.kind == "axis":
-            numbers = [float(AXES.index(each)) if each in AXES else each for each in numbers]
-        if any(type(number) not in (int, float) for number in numbers):
-            said = f"{parameter.name} of {declared.name} holds something that is not {_wanted(parameter)}"
-            raise InputError(f"{name}: {place}: {said}", "write plain numbers such as 4 or -2.5")
-        try:
-            values += parameter.checked(declared.name, numbers)
-        except ShapeProgError as mistake:
-            raise InputError(f"{name}: {place}: {mistake.message}", mistake.hint) from None
-    return tuple(values)

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from shapeprog.errors import InputError
 from shapeprog.files import write_text
-from shapeprog.formats.frames import frame_comment, frame_in
+from shapeprog.formats.frames import frame_comment, frame_in, without_frame
 from shapeprog.language.program import Program
 from shapeprog.language.text import format_program, parse
 from shapeprog.space import Frame
@@ -21,7 +21,7 @@ LARGEST_FILE = 16_000_000
 def read_shape(path: Path) -> tuple[Program, Frame | None]:
     """The program of a text file, and its frame where it keeps one."""
     text = read_text(path, LARGEST_FILE)
-    return parse(text, str(path)), frame_in(text, str(path))
+    return parse(without_frame(text), str(path)), frame_in(text, str(path))
 
 
 def write_shape(program: Program, path: Path, frame: Frame | None) -> None:

@@ -3,12 +3,15 @@
 from shapeprog.language import builtin as builtin
 from shapeprog.language import furniture as furniture
 from shapeprog.language.evaluation import evaluated
+from shapeprog.language.named import Named, inline, names, set
+from shapeprog.language.parametric import Parametric
 from shapeprog.language.program import Draw, Loop, Program
 from shapeprog.language.statement import Language, Role, Statement, language, loop, role, standard, statement, using
 from shapeprog.language.tensors import Code, decode, encode
 from shapeprog.language.unroll import unroll
 
 __all__ = [
-    "Code", "Draw", "Language", "Loop", "Program", "Role", "Statement",
-    "decode", "encode", "evaluated", "language", "loop", "role", "standard", "statement", "unroll", "using",
+    "Code", "Draw", "Language", "Loop", "Named", "Parametric", "Program", "Role", "Statement",
+    "decode", "encode", "evaluated", "inline", "language", "loop", "names", "role", "set", "standard", "statement",
+    "unroll", "using",
 ]  # fmt: skip

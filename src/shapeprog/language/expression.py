@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 import operator
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal, TypeAlias
 
@@ -170,6 +170,18 @@ def value_at(value: Value, numbers: Mapping[str, Any]) -> Any:
 def text_of(value: Value) -> str:
     """A number or expression as program text, with no more parentheses than it needs."""
     return str(value) if isinstance(value, Expression) else shortest(value)
+
+
+def with_numbers(value: Value, change: Callable[[float], float]) -> Value:
+    """The same number or expression with every plain number in it changed."""
+    match value:
+        case Binary(sign, left, right):
+            return Binary(sign, with_numbers(left, change), with_numbers(right, change))
+        case Negative(inner):
+            return -with_numbers(inner, change)
+        case Expression():
+            return value
+    return change(value)
 
 
 def _within(value: Value, level: int) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+from collections.abc import Sequence
 
 from shapeprog.errors import ProgramError, ShapeProgError, did_you_mean
 from shapeprog.language.expression import Binary, Expression, Name, Negative, Operator, Value
@@ -14,6 +15,22 @@ from shapeprog.space import AXES
 
 _OPERATORS: dict[type[ast.operator], Operator] = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/"}
 _PLAIN = "write numbers such as 4 or -2.5, or names of numbers, with + - * / between them"
+
+
+def checked_values(parameter: Parameter, owner: str, values: Sequence[Value]) -> list[Value]:
+    """The numbers of a parameter in a call of ``owner``, of which the plain ones are checked and rounded to float32."""
+    plain = [0.0 if isinstance(value, Expression) else value for value in values]
+    checked = parameter.checked(owner, plain)
+    return [old if isinstance(old, Expression) else new for old, new in zip(values, checked, strict=True)]
+
+
+def parse_number(text: str, name: str = "<number>") -> Value:
+    """A number or expression from its text; a ``ProgramError`` if it is none."""
+    whole = Text(text, name)
+    match whole.tree().body:
+        case [ast.Expr(value)]:
+            return Numbers(whole).one("this", value)
+    raise whole.at(1, 1, "this is no number", _PLAIN)
 
 
 class Numbers:
@@ -68,12 +85,10 @@ class Numbers:
             values = [self._axis(place, node, parameter)]
         else:
             values = [self._read(place, each, 0) for each in (node.elts if isinstance(node, ast.Tuple) else [node])]
-        plain = [0.0 if isinstance(value, Expression) else value for value in values]
         try:
-            checked = parameter.checked(declared.name, plain)
+            return checked_values(parameter, declared.name, values)
         except ShapeProgError as mistake:
             raise self.text.error(node, mistake.message, mistake.hint) from None
-        return [old if isinstance(old, Expression) else new for old, new in zip(values, checked, strict=True)]
 
     def _axis(self, place: str, node: ast.expr, parameter: Parameter) -> float:
         if isinstance(node, ast.Name) and node.id in AXES:

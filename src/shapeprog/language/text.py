@@ -38,7 +38,11 @@ def format_program(program: Program) -> str:
     finite, a statement is not declared or has more or fewer, or the text would be longer, or its loops deeper, than can
     be read back.
     """
-    source = source_of(program)
+    return format_source(source_of(program))
+
+
+def format_source(source: Source) -> str:
+    """The canonical text of a program as it is written, see :func:`format_program`."""
     text = "".join(f"{line}\n" for line in _lines(source.lines, 0, 0, names_of(source) | {*source.functions}))
     if len(text) > LONGEST:
         raise ShapeProgError(f"the text of this program has more than {LONGEST:,} letters", "keep it as .json")
@@ -114,10 +118,13 @@ def _lines(lines: Iterable[Line], depth: int, loops: int, taken: set[str]) -> It
 
 def _call(line: WrittenDraw | WrittenLoop) -> str:
     declared = declared_of(line)
-    return declared.call([_number(each, value) for each, value in zip(declared.quantities, line.values, strict=True)])
+    return declared.call(
+        [number_text(each, value) for each, value in zip(declared.quantities, line.values, strict=True)]
+    )
 
 
-def _number(quantity: Quantity, value: Value) -> str:
+def number_text(quantity: Quantity, value: Value) -> str:
+    """A number or expression of a statement as text."""
     return str(value) if isinstance(value, Expression) else quantity.written(value)
 
 

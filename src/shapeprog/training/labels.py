@@ -145,15 +145,14 @@ def _read(source: Path, form: Form) -> Iterator[tuple[str, Program]]:
 
 
 def _entry(line: str, form: Form, where: str) -> tuple[str, Program]:
-    from shapeprog.formats.json_form import FORMAT, VERSION, program_from_json
+    from shapeprog.formats.json_lines import program_from_entries
     from shapeprog.language.text import parse
 
     try:
         told: Mapping[str, Any] = json.loads(line)
         name, program = str(told["name"]), told.get(form, told["program"])
-        whole = json.dumps({"format": FORMAT, "version": VERSION, "program": program})
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise InputError(
             f"{where} is no label", "each line is a JSON object with a name and a program, as 'shapeprog label' writes"
         ) from error
-    return name, parse(program, where) if isinstance(program, str) else program_from_json(whole, where)
+    return name, parse(program, where) if isinstance(program, str) else program_from_entries(program, where, "program")

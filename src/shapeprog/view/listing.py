@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from shapeprog.language.program import Draw, Loop, Node, Program
+from shapeprog.language.expression import Value, with_numbers
+from shapeprog.language.program import Program
+from shapeprog.language.source import Assignment, Call, Comment, Function, Line, Source, WrittenDraw, WrittenLoop
 from shapeprog.language.statement import language
-from shapeprog.language.text import format_program
+from shapeprog.language.text import format_source, source_of
 
 DIGITS = 2
 """Decimals that are shown; files keep all of them."""
 
 
 @dataclass(frozen=True)
-class Line:
+class Shown:
     """One line of program text.
 
     Parameters
@@ -22,11 +25,11 @@ class Line:
     text
         As printed.
     word
-        The role, statement or loop on it.
+        The role, statement, loop or function on it; empty if there is none.
     statement
         The id of that role or statement if it draws, else None.
     blocks
-        The drawing statements, counted from 0 in the order of the text, that it draws or repeats.
+        The drawing statements of the program written out, counted from 0, that it draws or repeats.
     """
 
     text: str
@@ -35,43 +38,79 @@ class Line:
     blocks: tuple[int, ...]
 
 
-def listing(program: Program, digits: int | None = DIGITS) -> list[Line]:
-    """The lines of a program, with numbers rounded for reading unless ``digits`` is None."""
-    shown = program if digits is None else Program(tuple(_rounded(node, digits) for node in program.body))
-    texts = format_program(shown).splitlines()
-    found: list[Line] = []
-    places = iter(texts)
-    _collect(shown.body, places, found, 0)
-    return found
+def listing(program: Program, digits: int | None = DIGITS) -> list[Shown]:
+    """The lines of a program as it is written, with numbers rounded for reading unless ``digits`` is None."""
+    source = source_of(program)
+    if digits is not None:
+        source = Source(tuple(_rounded(line, digits) for line in source.lines))
+    drawn = _Drawn(source)
+    return list(_shown(source.lines, iter(format_source(source).splitlines()), drawn.blocks))
 
 
-def _collect(body: tuple[Node, ...], texts: Iterator[str], found: list[Line], first: int) -> int:
-    for node in body:
-        text = next(texts)
-        if isinstance(node, Draw):
-            found.append(Line(text, node.word, language().called(node.word).id, (first,)))
-            first += 1
-            continue
-        place = len(found)
-        start = first
-        if not node.body:
-            next(texts)
-            found.append(Line(f"{text} pass", node.name, None, ()))
-            continue
-        first = _collect(node.body, texts, found, first)
-        found.insert(place, Line(text, node.name, None, tuple(range(start, first))))
-    return first
-
-
-def _rounded(node: Node, digits: int) -> Node:
-    values = tuple(round(value, digits) + 0.0 for value in node.values)
-    if isinstance(node, Draw):
-        return Draw(node.name, values, node.role)
-    return Loop(node.name, values, tuple(_rounded(inner, digits) for inner in node.body))
-
-
-def parted(line: Line) -> tuple[str, str, str]:
+def parted(line: Shown) -> tuple[str, str, str]:
     """What stands before the word, the word, and what follows it."""
-    indent = line.text[: len(line.text) - len(line.text.lstrip(" "))]
-    start = line.text.index(line.word, len(indent) + (4 if line.statement is None else 0))
+    if not line.word:
+        return (line.text, "", "") if line.text.lstrip().startswith("#") else ("", "", line.text)
+    bare = line.text.lstrip(" ")
+    start = len(line.text) - len(bare) + (4 if bare.startswith(("for ", "def ")) else 0)
+    start = line.text.index(line.word, start)
     return line.text[:start], line.word, line.text[start + len(line.word) :]
+
+
+class _Drawn:
+    """The drawing statements of the program written out that each line makes, by the ``id`` of the line."""
+
+    def __init__(self, source: Source) -> None:
+        self.blocks: dict[int, list[int]] = defaultdict(list)
+        self.functions = source.functions
+        self._next = 0
+        self._draw(source.lines)
+
+    def _draw(self, lines: tuple[Line, ...]) -> None:
+        for line in lines:
+            start = self._next
+            match line:
+                case WrittenDraw():
+                    self._next += 1
+                case WrittenLoop():
+                    self._draw(line.body)
+                case Call():
+                    self._draw(self.functions[line.name].body)
+                    self.blocks[id(self.functions[line.name])] += range(start, self._next)
+            self.blocks[id(line)] += range(start, self._next)
+
+
+def _shown(lines: tuple[Line, ...], texts: Iterator[str], blocks: dict[int, list[int]]) -> Iterator[Shown]:
+    for line in lines:
+        word, statement = "" if isinstance(line, Comment | Assignment) else line.name, None
+        if isinstance(line, WrittenDraw):
+            word = line.role or line.name
+            statement = language().called(word).id
+        text, body = next(texts), line.body if isinstance(line, WrittenLoop | Function) else None
+        if body == ():
+            text += f" {next(texts).strip()}"
+        yield Shown(text, word, statement, tuple(blocks[id(line)]))
+        if body:
+            yield from _shown(body, texts, blocks)
+            if all(isinstance(inner, Comment) for inner in body):
+                yield Shown(next(texts), "", None, ())
+
+
+def _rounded(line: Line, digits: int) -> Line:
+    def short(value: Value) -> Value:
+        return with_numbers(value, lambda number: round(number, digits) + 0.0)
+
+    match line:
+        case WrittenDraw():
+            return replace(line, values=tuple(map(short, line.values)))
+        case WrittenLoop():
+            body = tuple(_rounded(inner, digits) for inner in line.body)
+            return replace(line, values=tuple(map(short, line.values)), body=body)
+        case Assignment():
+            return replace(line, numbers=tuple((name, short(value)) for name, value in line.numbers))
+        case Call():
+            return replace(line, arguments=tuple((name, short(value)) for name, value in line.arguments))
+        case Function():
+            given = tuple((name, None if value is None else short(value)) for name, value in line.parameters)
+            return replace(line, parameters=given, body=tuple(_rounded(inner, digits) for inner in line.body))
+    return line

@@ -20,7 +20,7 @@ from shapeprog.formats.colours import colour
 from shapeprog.formats.parts import parts
 from shapeprog.language.program import Program
 from shapeprog.language.statement import language
-from shapeprog.view.listing import Line, listing, parted
+from shapeprog.view.listing import Shown, listing, parted
 from shapeprog.view.model import Model, of_parts, of_shape
 from shapeprog.view.render import Image, camera_for, render
 
@@ -225,7 +225,7 @@ def _legend_rows(words: Sequence[int], width: int) -> list[list[tuple[int, int]]
     return rows
 
 
-def _line(draw: ImageDraw, place: tuple[float, float], line: Line, size: int, advance: float, most: int) -> None:
+def _line(draw: ImageDraw, place: tuple[float, float], line: Shown, size: int, advance: float, most: int) -> None:
     before, word, after = parted(line)
     x, y = place
     if len(line.text) > most:

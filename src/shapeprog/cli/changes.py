@@ -1,0 +1,63 @@
+"""Changes of named numbers on the command line: ``--set seat=11 'width*=1.2'``."""
+
+from __future__ import annotations
+
+import operator
+import re
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+from typer.core import TyperCommand
+
+from shapeprog.errors import InputError
+
+if TYPE_CHECKING:
+    from shapeprog.language.program import Program
+
+_CHANGE = re.compile(r"([^\W\d]\w*)\s*([-+*/]?)=\s*(.*)", re.DOTALL)
+_APPLY = {"+": operator.add, "-": operator.sub, "*": operator.mul, "/": operator.truediv}
+
+
+class ChangingCommand(TyperCommand):
+    """A command whose option ``--set`` takes all the changes that follow it."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Read the words of the command line, with the option before each change."""
+        words: list[str] = []
+        for word in args:
+            following = len(words) > 1 and words[-2] == "--set" and _CHANGE.fullmatch(word)
+            words += ["--set", word] if following else [word]
+        return super().parse_args(ctx, words)
+
+
+def changed(program: Program, changes: Sequence[str]) -> Program:
+    """The program with other numbers for some of its names, one change after another.
+
+    Raises
+    ------
+    InputError
+        If a change is none.
+    ShapeProgError
+        If the program has no such name, or cannot be drawn so.
+    """
+    if not changes:
+        return program
+    from shapeprog.language.named import names
+    from shapeprog.language.named import set as set_numbers
+
+    values = {named.name: named.value for named in names(program)}
+    wanted: dict[str, float] = {}
+    for change in changes:
+        found = _CHANGE.fullmatch(change.strip())
+        if found is None:
+            raise InputError(f"{change!r} changes no number", "write name=number, or name*=number with one of + - * /")
+        name, sign, text = found.groups()
+        try:
+            number = float(text)
+            before = wanted.get(name, values.get(name, number))
+            wanted[name] = _APPLY[sign](before, number) if sign else number
+        except ValueError:
+            raise InputError(f"{change!r}: {text!r} is not a number", "write a number such as 11 or 1.2") from None
+        except ZeroDivisionError:
+            raise InputError(f"{change!r} divides by zero", "divide by another number") from None
+    return set_numbers(program, wanted)

@@ -1,0 +1,91 @@
+"""A program as a function of its named numbers, for gradients and for least squares.
+
+chair = Parametric(program)
+numbers = chair.values.clone().requires_grad_()
+loss(unroll(chair.at(numbers))).backward()     # numbers.grad: one entry for each of chair.names
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import torch
+from jaxtyping import Float, Int
+from torch import Tensor
+
+from shapeprog.errors import ShapeProgError
+from shapeprog.language.evaluation import expanded
+from shapeprog.language.expression import Linear
+from shapeprog.language.named import names
+from shapeprog.language.program import Program
+from shapeprog.language.source import Source
+from shapeprog.language.statement import language
+from shapeprog.language.tensors import Code, encode
+
+
+class Parametric:
+    """The tensors of a program for any values of its free named numbers; counts, turns and axes stay as they are.
+
+    Attributes
+    ----------
+    names, values
+        The F free numbers that others follow from, and what they are in the program.
+    slots
+        Which M numbers of the flattened ``code.parameters`` depend on them.
+    matrix, offset
+        ``offset + matrix @ values`` are those numbers where all of them are linear in the names, as
+        :class:`~shapeprog.language.expression.Linear` has it; else ``None``.
+    code
+        The tensors of the program as it is, in float64.
+    """
+
+    names: tuple[str, ...]
+    values: Float[Tensor, " F"]
+    slots: Int[Tensor, " M"]
+    matrix: Float[Tensor, "M F"] | None
+    offset: Float[Tensor, " M"] | None
+    code: Code
+
+    def __init__(self, program: Program) -> None:
+        free = [named for named in names(program) if named.free]
+        self._source = program.source or Source()
+        self.names = tuple(named.name for named in free)
+        self.values = torch.tensor([named.value for named in free], dtype=torch.float64)
+        self.code = encode(program, dtype=torch.float64)
+        moving = self._moving(dict(zip(self.names, self.values, strict=True)))
+        self.slots = torch.tensor(list(moving), dtype=torch.long)
+        self.matrix = self.offset = None
+        try:
+            forms = list(self._moving({name: Linear.of(name) for name in self.names}).values()) if moving else []
+        except ShapeProgError:  # a product of names
+            return
+        factors = [dict(form.factors) for form in forms]
+        rows = [[each.get(name, 0.0) for name in self.names] for each in factors]
+        self.matrix = torch.tensor(rows, dtype=torch.float64).reshape(len(forms), len(free))
+        self.offset = torch.tensor([form.constant for form in forms], dtype=torch.float64)
+
+    def at(self, values: Float[Tensor, "*batch F"]) -> Code:
+        """The program for other values of its names, one for each entry of a batch, with gradient."""
+        if self.matrix is not None and self.offset is not None:
+            numbers = self.offset.to(values) + values @ self.matrix.to(values).T
+        else:
+            found = self._moving(dict(zip(self.names, values.unbind(-1), strict=True)))
+            numbers = torch.stack(list(found.values()), -1)
+        lead, kept = values.shape[:-1], self.code.parameters
+        flat = kept.to(values).flatten().expand(*lead, -1).index_copy(-1, self.slots.to(values.device), numbers)
+        ids, roles = self.code.ids.expand(*lead, *self.code.ids.shape), self.code.roles
+        return Code(ids, flat.reshape(*lead, *kept.shape), None if roles is None else roles.expand(*lead, *roles.shape))
+
+    def _moving(self, given: Mapping[str, Any]) -> dict[int, Any]:
+        """The continuous numbers that depend on names, by their place among all, for these values of the names."""
+        _, steps, slots = self.code.parameters.shape
+        found: dict[int, Any] = {}
+        for block, chain in enumerate(Program(expanded(self._source, given)).chains):
+            for step, node in enumerate(chain):
+                for slot, (quantity, number) in enumerate(
+                    zip(language()[node.name].quantities, node.values, strict=True)
+                ):
+                    if not isinstance(number, float) and not quantity.discrete:
+                        found[(block * steps + step) * slots + slot] = number
+        return found

@@ -1,0 +1,136 @@
+"""Named numbers: written out, changed, and as parameters with gradients."""
+
+from __future__ import annotations
+
+import pytest
+import torch
+from hypothesis import given
+from hypothesis import strategies as st
+from written import written_program
+
+import shapeprog as sp
+from shapeprog.language import Draw
+from shapeprog.language.text import format_program, parse
+
+CHAIR = """\
+width, thick = 10, 2
+span = width - thick
+slope = 3
+
+def legs(long, thick):
+    # thick is another one here
+    for i in translate(2, by=(0, 0, span)):
+        leg(at=(-long / 2, slope, -span / 2), size=(long, thick, width / 5))
+    for i in translate(3, by=(1, 0, 0)):
+        # nothing yet
+        pass
+
+legs(long=9, thick=1)
+legs(long=4 * thick, thick=thick)
+"""
+
+
+@given(st.integers(0, 1 << 30))
+def test_what_is_written_out_draws_the_same_and_has_no_names(seed: int) -> None:
+    program = written_program(seed)
+    plain = sp.inline(program)
+    assert plain.source is None
+    assert plain.body == program.body == parse(format_program(plain)).body
+    assert sp.inline(plain) == plain
+    assert sp.names(plain) == []
+
+
+def test_names_tell_their_values_and_where_they_stand() -> None:
+    found = {each.name: each for each in sp.names(parse(CHAIR))}
+    assert [*found] == ["width", "thick", "span", "slope"]
+    assert [each.value for each in found.values()] == [10, 2, 8, 3]
+    assert [each.free for each in found.values()] == [True, True, False, True]
+    assert found["span"].text == "width - thick"
+    lines = CHAIR.splitlines()
+    shown = {name: [lines[row - 1].strip() for row in each.lines] for name, each in found.items()}
+    assert shown["thick"] == ["span = width - thick", "legs(long=4 * thick, thick=thick)"]
+    assert shown["span"] == [lines[6].strip(), lines[7].strip()]
+    assert shown["width"] == ["span = width - thick", lines[7].strip()]
+
+
+def test_a_number_that_is_set_moves_all_that_follows_from_it() -> None:
+    program = parse(CHAIR)
+    changed = sp.set(program, width=12)
+    assert format_program(changed) == CHAIR.replace("= 10,", "= 12,")
+    assert changed == parse(format_program(changed))
+    assert changed.body[0].values == (2, 0, 0, 10)
+    assert sp.set(program, {"width": 12}) == changed
+    assert sp.set(program, {}) == program
+    assert sp.set(parse("w = 6 / 4\nleg(at=(0, 0, 0), size=(w, 1, 1))"), w=2).body == (Draw("leg", (0, 0, 0, 2, 1, 1)),)
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"widht": 3}, "no number called 'widht'\n  hint: did you mean width"),
+        ({"long": 3}, "no number called 'long'"),
+        ({"span": 3}, "span follows from other numbers: span = width - thick\n  hint: set width or thick"),
+        ({"width": float("inf")}, "too large"),
+    ],
+)
+def test_what_cannot_be_set_is_told(changes: dict[str, float], words: str) -> None:
+    with pytest.raises(sp.ShapeProgError) as caught:
+        sp.set(parse(CHAIR), changes)
+    assert words in str(caught.value)
+
+
+def test_a_plain_program_has_nothing_to_set() -> None:
+    with pytest.raises(sp.ShapeProgError, match="write name = number at its top"):
+        sp.set(parse("leg(at=(0, 0, 0), size=(1, 1, 1))"), width=3)
+
+
+def test_numbers_that_fit_no_more_are_told_when_they_are_set() -> None:
+    program = parse("n = 2\nw = 6 / n\nfor i in translate(n, by=(0, 0, w)):\n    leg(at=(0, 0, 0), size=(1, 1, w))")
+    assert sp.set(program, n=3).body[0].count == 3
+    with pytest.raises(sp.ShapeProgError, match="must be whole"):
+        sp.set(program, n=2.5)
+    with pytest.raises(sp.ShapeProgError, match="divides by zero"):
+        sp.set(program, n=0)
+
+
+BENT = "a, b = 2, 4\ntop_square(at=(a * b, a / b, -a), thickness=b - 1, half=2)\nleg(at=(1, 2, 3), size=(1, 2, a))"
+
+
+@pytest.mark.parametrize("text", [CHAIR, BENT])
+def test_gradients_reach_every_name_through_loops_and_functions(text: str) -> None:
+    program = parse(text)
+    chair = sp.Parametric(program)
+    assert (chair.matrix is None) == (text == BENT)
+    point = torch.tensor([[0.5, 1.5, 2.5]], dtype=torch.float64)
+
+    def distances(values: torch.Tensor) -> torch.Tensor:
+        scene = sp.unroll(chair.at(values))
+        return ((scene.centre - point) ** 2).sum() + (scene.size**3).sum()
+
+    values = chair.values.clone().requires_grad_()
+    assert torch.autograd.gradcheck(distances, values)
+    (slope,) = torch.autograd.grad(distances(values), values)
+    assert (slope != 0).all()
+    for name, value in zip(chair.names, chair.values.tolist(), strict=True):
+        other = chair.values.clone()
+        other[chair.names.index(name)] = value * 1.25
+        moved = sp.unroll(sp.encode(sp.set(program, {name: value * 1.25}), dtype=torch.float64))
+        assert torch.allclose(sp.unroll(chair.at(other)).centre, moved.centre, atol=1e-5)
+
+
+@given(st.integers(0, 1 << 30))
+def test_parametric_programs_begin_as_they_are_written(seed: int) -> None:
+    program = written_program(seed)
+    chair = sp.Parametric(program)
+    batch = chair.at(chair.values.expand(2, 1, -1))
+    plain = sp.encode(program, dtype=torch.float64)
+    assert torch.equal(batch.ids, plain.ids.expand(2, 1, -1, -1))
+    for code in (chair.at(chair.values), batch):
+        assert code.parameters.shape[-3:] == plain.parameters.shape
+        assert torch.allclose(code.parameters, plain.parameters.expand_as(code.parameters), rtol=1e-5, atol=1e-5)
+
+
+def test_a_plain_program_has_no_parameters() -> None:
+    chair = sp.Parametric(parse("leg(at=(0, 0, 0), size=(1, 1, 1))"))
+    assert chair.names == ()
+    assert torch.equal(chair.at(chair.values).parameters, chair.code.parameters)

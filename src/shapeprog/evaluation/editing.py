@@ -12,9 +12,7 @@ All are means over the edits; symmetry and one piece are not a number where the 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import replace
-from itertools import count
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -25,13 +23,8 @@ from shapeprog.geometry.distance import signed_distance
 from shapeprog.geometry.mesh import gaps, pieces, union_mesh
 from shapeprog.geometry.scene import Scene
 from shapeprog.geometry.surface import sample_surface
-from shapeprog.language.evaluation import evaluated
-from shapeprog.language.expression import Expression, Value
-from shapeprog.language.parameters import to_float32
+from shapeprog.language.free import free_numbers, multiplied
 from shapeprog.language.program import Program
-from shapeprog.language.source import Assignment, Call, Function, Line, Source, WrittenDraw, WrittenLoop
-from shapeprog.language.statement import language
-from shapeprog.language.text import source_of
 from shapeprog.language.unroll import unroll
 from shapeprog.space import SIDE
 
@@ -63,78 +56,21 @@ def edit_scores(program: Program) -> EditScores:
     touching = _contacts(before)
     symmetric, whole = _symmetric(before), _one_piece(before)
     kept: list[tuple[float, float, float]] = []
-    for edited in edits(program):
-        after = unroll(edited)
+    free = free_numbers(program)
+    for place, factor in product(range(free), FACTORS):
+        try:
+            after = unroll(multiplied(program, place, factor))
+        except ShapeProgError:  # such as a division by zero
+            kept.append((0.0, 0.0, 0.0))
+            continue
         kept.append((
             len(touching & _contacts(after)) / len(touching) if touching else np.nan,
             float(_symmetric(after)) if symmetric else np.nan,
             float(_one_piece(after)) if whole else np.nan,
         ))  # fmt: skip
     scores = np.array(kept).reshape(-1, 3)
-    known = [float(np.nanmean(column)) if np.isfinite(column).any() else float("nan") for column in scores.T]
-    return EditScores(*known, free=len(kept) // len(FACTORS))
-
-
-def free_numbers(program: Program) -> int:
-    """How many numbers of a program may be set, zeros aside: those named by a plain number, and all others written."""
-    return sum(1 for _ in _places(source_of(program).lines))
-
-
-def edits(program: Program) -> Iterator[Program]:
-    """The program with each free number a fifth larger and a fifth smaller; edits that are no program are left out."""
-    source = source_of(program)
-    for place in range(free_numbers(program)):
-        for factor in FACTORS:
-            counter = count()
-            lines = tuple(_changed(line, counter, place, factor) for line in source.lines)
-            try:
-                yield evaluated(Source(lines))
-            except ShapeProgError:
-                continue
-
-
-def _places(lines: tuple[Line, ...]) -> Iterator[Value]:
-    for line in lines:
-        yield from (value for value, free in _numbers(line) if free)
-        if isinstance(line, WrittenLoop | Function):
-            yield from _places(line.body)
-
-
-def _numbers(line: Line) -> Iterator[tuple[Value, bool]]:
-    """The numbers on a line, and whether each is free: plain, continuous and not zero."""
-    if isinstance(line, WrittenDraw | WrittenLoop):
-        declared = language()[line.name]
-        for value, quantity in zip(line.values, declared.quantities, strict=True):
-            yield value, _plain(value) and not quantity.discrete
-    elif isinstance(line, Assignment):
-        yield from ((value, _plain(value)) for _, value in line.numbers)
-    elif isinstance(line, Call):
-        yield from ((value, _plain(value)) for _, value in line.arguments)
-
-
-def _plain(value: Value) -> bool:
-    return not isinstance(value, Expression) and value != 0
-
-
-def _changed(line: Line, counter: Iterator[int], place: int, factor: float) -> Line:
-    """The line with one free number of the program multiplied."""
-    values = [
-        to_float32(value * factor) if free and next(counter) == place else value  # type: ignore[operator]
-        for value, free in _numbers(line)
-    ]
-    if isinstance(line, WrittenDraw):
-        return replace(line, values=tuple(values))
-    if isinstance(line, WrittenLoop):
-        body = tuple(_changed(inner, counter, place, factor) for inner in line.body)
-        return replace(line, values=tuple(values), body=body)
-    if isinstance(line, Assignment):
-        return replace(line, numbers=tuple((name, value) for (name, _), value in zip(line.numbers, values, strict=True)))
-    if isinstance(line, Call):
-        given = zip(line.arguments, values, strict=True)
-        return replace(line, arguments=tuple((name, value) for (name, _), value in given))
-    if isinstance(line, Function):
-        return replace(line, body=tuple(_changed(inner, counter, place, factor) for inner in line.body))
-    return line
+    one, two, three = (float(np.nanmean(column)) if np.isfinite(column).any() else float("nan") for column in scores.T)
+    return EditScores(one, two, three, free)
 
 
 def _contacts(scene: Scene) -> set[tuple[int, int]]:

@@ -104,6 +104,7 @@ System = tuple[Float[Tensor, " F"], Float[Tensor, "F F"]]
 
 
 def of_target(poses: Poses, pairs: Pairs, width: float) -> System:
+    """The part of the distances to the target, where residuals of ``width`` cells count for a quarter."""
     asked, by = pull(poses.scene, pairs, width), poses.slopes
     slope = (by * asked.slope[..., None]).sum((0, 1))
     return slope, (by.mT @ asked.curvature @ by).sum(0)

@@ -17,7 +17,7 @@ from shapeprog.inference.budget import NEVER, Deadline
 from shapeprog.inference.candidates import distinct, looks, plain, single_candidates
 from shapeprog.inference.choice import Choice, choose
 from shapeprog.inference.coverage import Prices, covers
-from shapeprog.inference.evidence import evidence_of
+from shapeprog.inference.evidence import Evidence, evidence_of
 from shapeprog.inference.pieces import find_pieces
 from shapeprog.inference.repeating import repeated
 from shapeprog.inference.roles import with_roles
@@ -54,12 +54,15 @@ class Assembly:
         Why there are no more of them.
     trade_off
         The best of every number of blocks.
+    evidence
+        What the blocks were to explain.
     """
 
     program: Program
     explained: float
     reason: str
     trade_off: tuple[TradeOff, ...]
+    evidence: Evidence
 
 
 def assemble(
@@ -100,7 +103,7 @@ def assemble(
     candidates = [*elsewhere, *singles[: MOST_CANDIDATES // 2], *repeated(singles)][:MOST_CANDIDATES]
     told(0.7)
     if not candidates or evidence.area <= 0:
-        return Assembly(Program(), 0.0, "there is no surface to speak of.", ())
+        return Assembly(Program(), 0.0, "there is no surface to speak of.", (), evidence)
     cost = prices or Prices()
     cost = replace(cost, **{name: getattr(cost, name) / detail for name in ("statement", "loop", "number")})
     choice = choose(covers([Program((node,)) for node in candidates], evidence, cost, seed), blocks, seed=seed)
@@ -112,7 +115,7 @@ def assemble(
     program = Program(tuple(candidates[place] for place in choice.best.chosen))
     told(1.0)
     program = with_roles(adjust(program, evidence, seed=seed, deadline=deadline, progress=progress))
-    return Assembly(program, choice.best.explained, _reason(choice, seen, blocks), seen)
+    return Assembly(program, choice.best.explained, _reason(choice, seen, blocks), seen, evidence)
 
 
 def _reason(choice: Choice, seen: Sequence[TradeOff], allowed: int) -> str:

@@ -28,6 +28,8 @@ from shapeprog.inference.budget import BUDGET, Deadline
 from shapeprog.inference.refine import REACH, Schedule, refine
 from shapeprog.inference.structure import Settings, search_structure
 from shapeprog.inference.surface import points_of_cells
+from shapeprog.inference.ties.tying import tie
+from shapeprog.language.free import numbers
 from shapeprog.language.program import Program
 from shapeprog.language.unroll import unroll
 
@@ -64,9 +66,9 @@ class Result:
         Of a program of the paper's statements, the same with whole numbers, each within one of the rounded parameter of
         ``program``; others have no such form.
     scores
-        ``blocks``, ``statements``, ``primitives``; ``explained``, the share of the surface, where it was looked at,
-        else ``iou`` of the snapped program at 32^3; with a generator ``proposed``: 1 if the program on cells is its own
-        or grew from it, else 0.
+        ``blocks``, ``statements``, ``primitives``; ``numbers``, those that are free; ``explained``, the share of the
+        surface, where it was looked at, else ``iou`` of the snapped program at 32^3; with a generator ``proposed``: 1
+        if the program on cells is its own or grew from it, else 0.
     reason
         Why the search stopped, where the program came from, what the time budget cut short, and what to try next.
     cut
@@ -99,6 +101,7 @@ def infer(
     search: bool = True,
     statements: Literal["all", "paper"] = "all",
     detail: float = 1.0,
+    ties: bool = True,
     progress: Progress | None = None,
 ) -> Result:
     """A short program of at most ``blocks`` blocks that rebuilds a shape.
@@ -133,6 +136,9 @@ def infer(
     detail
         How much finer than usual the program may be where the surface is known: prices of what is written are divided
         by it.
+    ties
+        Whether numbers that hold together are tied where the surface is known: the program then has names for the few
+        that are free, and expressions for all others.
     progress
         Called with what is being done and the share of it that is done.
 
@@ -196,6 +202,8 @@ def infer(
             program, snapped, trade_off = found.program, None, found.trade_off
             scores["explained"] = found.explained
             reason = f"Stopped because {found.reason}"
+            if ties:
+                program = tie(program, found.evidence, seed=seed, progress=progress).program
     cut = tuple(each.cut for each in (proposing, searching, refining) if each.cut)
     if cut:
         reason += f" The time budget of {budget:g} s cut short {' and '.join(cut)}: "
@@ -206,6 +214,7 @@ def infer(
         "blocks": float(program.blocks),
         "statements": float(program.statements),
         "primitives": float(program.size),
+        "numbers": float(numbers(program)),
     }
     return Result(program, snapped, scores, reason, cut, time.monotonic() - started, trade_off)
 

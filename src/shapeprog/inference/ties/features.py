@@ -82,7 +82,7 @@ def _all_features(tunable: Tunable, poses: Poses) -> Iterator[Feature]:
 
 def _sides(tunable: Tunable, poses: Poses) -> Iterator[Feature]:
     """Sides and middles of parts that lie along the axes, of the first copy and of all of them."""
-    scene, count = poses.scene, len(tunable.values)
+    scene = poses.scene
     value, slope = _ends(scene)
     rows = torch.einsum("enr,nrf->enf", slope, poses.slopes).numpy()
     aligned = (scene.rotation - scene.rotation.round()).abs().amax((-2, -1)) < ALIGNED

@@ -33,8 +33,8 @@ class Misfit:
 
     Attributes
     ----------
-    numbers
-        Where they are at the start.
+    numbers, low
+        Where they are at the start, and what they must not fall below.
     """
 
     def __init__(self, tunable: Tunable, evidence: Evidence, seed: int) -> None:
@@ -45,6 +45,7 @@ class Misfit:
         reach = np.maximum(np.abs(surface.min(0)), np.abs(surface.max(0))) if len(surface) else np.zeros(3)
         self.extents: FloatArray = 2 * reach
         self.numbers = np.concatenate([tunable.values.numpy(), self.extents])
+        self.low = np.concatenate([tunable.low.numpy(), np.zeros(3)])
         gentle = np.array([GENTLE.get(kind, PLACE) for kind in tunable.kinds]) * tunable.scale.numpy() ** 2
         self._gentle = np.concatenate([gentle, np.full(3, HOLD)])
 
@@ -71,11 +72,11 @@ class Misfit:
 
 
 def refitted(misfit: Misfit, numbers: FloatArray, rows: FloatArray, joints: Joints | None) -> FloatArray:
-    """The numbers (V,) of the least misfit for which all relations (M, V) hold; parts that touched are kept together."""
+    """The numbers (V,) of the least misfit for which relations (M, V) hold; parts that touched are kept together."""
     ways = ways_free(rows, len(numbers))
-    numbers = ways @ (ways.T @ numbers)
+    numbers = ways @ (ways.T @ numbers)  # all but rounding of what is there
     farthest = np.concatenate([FARTHEST / misfit.tunable.scale.numpy(), np.full(3, FARTHEST)])
-    low = np.concatenate([misfit.tunable.low.numpy(), np.zeros(3)])
+    low = np.minimum(misfit.low, numbers)
     for _ in range(STEPS):
         slope, curvature = misfit.at(numbers, 1, joints)
         move = ways @ -np.linalg.solve(ways.T @ curvature @ ways, ways.T @ slope)
@@ -88,9 +89,8 @@ def refitted(misfit: Misfit, numbers: FloatArray, rows: FloatArray, joints: Join
 
 
 def ways_free(rows: FloatArray, count: int) -> Array:
-    """An orthonormal basis (V, Z) of the numbers for which relations (M, V) hold."""
+    """An orthonormal basis (V, Z) of the numbers for which independent relations (M, V) hold."""
     if not len(rows):
         return np.eye(count)
-    _, sizes, axes = np.linalg.svd(rows / np.linalg.norm(rows, axis=1, keepdims=True))
-    rank = int((sizes > 1e-8).sum())
-    return axes[rank:].T
+    axes, _ = torch.linalg.qr(torch.from_numpy(rows.T.copy()), mode="complete")
+    return axes[:, len(rows) :].numpy()

@@ -117,17 +117,16 @@ def _roles(nodes: list[Node]) -> Iterator[str]:
 
 
 def _name(tunable: Tunable, group: list[Measure]) -> str:
-    """The name of measures that always agree: of the part that it is of, or of none if several kinds of parts share it."""
+    """The name of measures that always agree: of the part that it is of, or none if several kinds of parts share it."""
     first = group[0]
     if first.word == "extent":
         return EXTENTS[first.feature.axis]
     alike = [each for each in group if each.word == first.word]
-    words = {_part(tunable, each) for each in alike}
-    kinds = [_kind(tunable, each) for each in alike]
-    kind = max(sorted(set(kinds)), key=kinds.count)
-    if len(words) > 1 and kind in SHARED:
+    earliest = min(alike, key=lambda each: (each.feature.node, each.feature.all))
+    kind = _kind(tunable, earliest)
+    if kind in SHARED and len({_part(tunable, each) for each in alike}) > 1:
         return kind
-    return f"{_part(tunable, alike[kinds.index(kind)])}_{kind}"
+    return f"{_part(tunable, earliest)}_{kind}"
 
 
 def _part(tunable: Tunable, measure: Measure) -> str:
@@ -167,7 +166,7 @@ def _length(tunable: Tunable, measure: Measure) -> str:
     own = node.values[slot]
     if measure.feature.axis < 0:
         return "thickness" if own == sizes[0] else "breadth"
-    if len(sizes) < 2 or own <= LEVEL * sizes[1] and own == sizes[0]:
+    if len(sizes) < 2 or (own <= LEVEL * sizes[1] and own == sizes[0]):
         return "thickness"
     return EXTENTS[measure.feature.axis]
 
@@ -184,4 +183,3 @@ def _lines(
         else:
             found.append(WrittenLoop(node.name, values, _lines(node.body, counter, table)))
     return tuple(found)
-

@@ -17,9 +17,15 @@ HELD = 1e-9
 
 
 def worthwhile(
-    candidates: list[Relation], numbers: FloatArray, curvature: FloatArray, price: float, fixed: FloatArray
+    candidates: list[Relation],
+    numbers: FloatArray,
+    curvature: FloatArray,
+    price: float,
+    *,
+    fixed: FloatArray,
+    low: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:
-    """Relations (M, V) that are worth having, those that are fixed first; and where the numbers move to (V,).
+    """Relations (M, V) that are worth having, those that are fixed first; and the optimum (V,) where they hold.
 
     Parameters
     ----------
@@ -29,33 +35,31 @@ def worthwhile(
         What a number is worth, in the unit of the misfit.
     fixed
         Relations (M, V) that hold in any case.
+    low
+        What no number may fall below (V,) for the sake of a relation.
     """
-    free, moved = np.linalg.inv(curvature), numbers.copy()
-    kept = [row for row in fixed]
-    for row in kept:
-        free, moved = _imposed(free, moved, row)
-    if not candidates:
-        return np.array(kept).reshape(-1, len(numbers)), moved
-    rows = np.stack([each.row for each in candidates])
-    worth = price * np.array([each.trust for each in candidates])
-    first = np.einsum("kv,vw,kw->k", rows, np.linalg.inv(curvature), rows)
+    kept, free = list(fixed), np.linalg.inv(curvature)
+    rows = np.stack([*fixed, *(each.row for each in candidates)]) if len(fixed) or candidates else fixed
+    if not len(rows):
+        return fixed, numbers
+    low = np.minimum(low, numbers)
+    spread, off = np.einsum("kv,vw,kw->k", rows, free, rows, optimize=True), rows @ numbers
+    worth = price * np.array([np.inf] * len(fixed) + [each.trust for each in candidates])
+    least = HELD * spread
     while True:
-        spread = np.einsum("kv,kv->k", rows @ free, rows)
-        off = rows @ moved
-        open_ = spread > HELD * first
-        cost = np.where(open_, off**2 / np.where(open_, spread, 1.0), np.inf)
-        gain = worth - cost
+        gain = np.where(spread > least, worth - off**2 / np.maximum(spread, least), -np.inf)
         best = int(np.argmax(gain))
         if gain[best] <= 0:
-            return np.array(kept).reshape(-1, len(numbers)), moved
-        kept.append(rows[best])
-        free, moved = _imposed(free, moved, rows[best])
-
-
-def _imposed(free: FloatArray, numbers: FloatArray, row: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Freedom and optimum once a relation holds."""
-    along = free @ row
-    spread = float(row @ along)
-    if spread <= 0:
-        return free, numbers
-    return free - np.outer(along, along) / spread, numbers - along * float(row @ numbers) / spread
+            return np.array(kept).reshape(-1, len(numbers)), numbers
+        along = free @ rows[best]
+        moved = numbers - along * off[best] / spread[best]
+        if best >= len(fixed):
+            if (moved < low).any():
+                spread[best] = 0.0
+                continue
+            kept.append(rows[best])
+        across, numbers = rows @ along, moved
+        free = free - np.outer(along, along) / spread[best]
+        off = off - across * off[best] / spread[best]
+        spread = spread - across**2 / spread[best]
+        spread[best] = 0.0

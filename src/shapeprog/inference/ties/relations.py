@@ -12,8 +12,8 @@ from shapeprog.inference.ties.features import Feature
 from shapeprog.space import DEPTH, SIDE, UP, FloatArray
 
 WITHIN, JOINED = 0.3, 1.5
-"""Cells by which a relation may be off that is worth a thought; and one between the sides of parts that touch, which may
-end inside each other."""
+"""Cells by which a relation may be off that is worth a thought; and one between the sides of parts that touch, or about
+the middle: parts end inside each other, where nobody sees how far they reach."""
 
 DEGREES = 2.0
 """The same for angles, in degrees."""
@@ -25,6 +25,9 @@ CENTRED, HOLDING, SURE, LIKELY, POSSIBLE, CHANCE = 2.0, 1.2, 1.0, 0.6, 0.25, 0.0
 """What the number that a relation saves is worth to it: for parts that are their own mirror image, for relations that
 hold touching parts together when a number is changed, for such as furniture is built by, are common, are possible, and
 are mostly chance."""
+
+HIDDEN = {CENTRED: 1.3, HOLDING: CHANCE}
+"""What relations are worth that are off by so much that only hidden surfaces can be meant."""
 
 SIMPLE = 4
 """Factors of a relation beyond which it is worth less, in proportion: it takes a long sum to write."""
@@ -63,8 +66,8 @@ def relations(known: list[Feature], numbers: FloatArray, touching: set[tuple[int
             continue
         tidy = row / row[factors[0]]
         off, within = abs(tidy @ numbers) / np.abs(tidy).max(), DEGREES if angles[factors].any() else WITHIN
-        if trust == HOLDING and within <= off < JOINED:
-            trust = CHANCE
+        if trust >= HOLDING and within <= off < JOINED:
+            trust = HIDDEN[trust]
         elif off >= within:
             continue
         trust *= min(1.0, SIMPLE / len(factors))

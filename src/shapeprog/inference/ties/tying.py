@@ -13,13 +13,13 @@ import numpy as np
 import torch
 
 from shapeprog.errors import ShapeProgError
-from shapeprog.inference.adjustment import single_threaded
-from shapeprog.inference.evidence import Evidence
 from shapeprog.geometry.scene import Scene
+from shapeprog.inference.evidence import Evidence
 from shapeprog.inference.joints import Joints, find_joints
+from shapeprog.inference.refine import single_threaded
 from shapeprog.inference.ties.basis import SAME, Basis, simplest
 from shapeprog.inference.ties.features import Feature, features
-from shapeprog.inference.ties.fitting import Misfit, refitted, ways_free
+from shapeprog.inference.ties.fitting import Misfit, refitted
 from shapeprog.inference.ties.naming import written
 from shapeprog.inference.ties.pricing import worthwhile
 from shapeprog.inference.ties.relations import relations
@@ -75,15 +75,15 @@ def tie(
         for round_ in range(ROUNDS):
             poses = tunable.poses(torch.from_numpy(numbers[: len(tunable.values)]))
             known = features(tunable, poses)
-            before = ways_free(rows, len(numbers)).shape[1]
+            before = len(rows)
             offered = relations(known, numbers, pairs)
-            rows, _ = worthwhile(offered, numbers, misfit.at(numbers)[1], price, rows)
+            rows, numbers = worthwhile(offered, numbers, misfit.at(numbers)[1], price, fixed=rows, low=misfit.low)
             numbers = refitted(misfit, numbers, rows, joints)
             if progress:
                 progress("tying numbers", (round_ + 1) / ROUNDS)
-            if ways_free(rows, len(numbers)).shape[1] == before:
+            if len(rows) == before:
                 break
-        basis = _rounded(simplest(known, numbers, rows))
+        basis = _rounded(simplest(known, numbers, rows, np.append(tunable.are("length").numpy(), [False] * 3)))
         free = int((np.abs(basis.factors[: len(tunable.values)]) > SAME).any(0).sum())
         return Tied(written(tunable, basis), free)
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import torch
 
-from shapeprog.formats.plan import Repetition
+from shapeprog.formats.plan import Definition, Invocation, Repetition
 from shapeprog.geometry.primitive import primitives
 from shapeprog.language import unroll
 from shapeprog.language.tensors import encode
@@ -104,11 +104,24 @@ def evaluate(made, changed=None):
     """What the solids of a plan are by its expressions alone, see :func:`described`; numbers may be changed first."""
     names = {v.name: eval(v.text) for heading in made.headings for v in heading.variables}
     names |= {name: table.tolist() for name, table in made.tables.items()} | (changed or {})
+    for number in made.numbers:
+        if number.name not in names:
+            names[number.name] = eval(number.text, {}, names)
+    functions = {function.name: function for function in made.functions}
     references = {function.__name__: function for function in REFERENCES}
     found = []
 
     def run(steps, place, scope):
         for step in steps:
+            if isinstance(step, Definition):
+                scope = scope | {step.name: eval(step.text, {}, scope)}
+                continue
+            if isinstance(step, Invocation):
+                function = functions[step.name]
+                given = {name: eval(text, {}, names) for name, text in function.parameters if text is not None}
+                given |= {name: eval(text, {}, scope) for name, text in step.arguments}
+                run(function.body, place, names | given)
+                continue
             if isinstance(step, Repetition):
                 for copy in range(eval(step.count, {}, scope)):
                     inner = scope | {step.letter: copy}

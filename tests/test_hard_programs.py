@@ -26,7 +26,7 @@ from shapeprog.formats.notation import parse_notation
 from shapeprog.formats.parts import crease_normals, parts
 from shapeprog.formats.shape import LARGEST_FILE, read_text
 from shapeprog.language import Draw, Loop, Program, unroll
-from shapeprog.language.syntax import LONGEST
+from shapeprog.language.place import LONGEST
 from shapeprog.language.text import format_program, parse
 from shapeprog.language.unroll import MOST_COPIES
 from shapeprog.space import Frame

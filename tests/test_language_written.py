@@ -125,6 +125,10 @@ def test_expressions_are_built_with_operators() -> None:
     assert Binary("*", 0.1, width) == Binary("*", 0.10000000149011612, width)
     with pytest.raises(ShapeProgError, match="too large"):
         width + float("nan")
+
+
+@pytest.mark.wrong_types
+def test_numbers_have_signs_of_their_own() -> None:
     with pytest.raises(ShapeProgError, match="not an expression"):
         Negative(2.0)  # type: ignore[arg-type]
 

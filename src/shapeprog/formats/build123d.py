@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import ast
+import builtins
 import importlib.util
 from collections.abc import Iterator
 from pathlib import Path
@@ -13,8 +15,9 @@ from shapeprog.errors import OutputError
 from shapeprog.files import atomic_path, write_text
 from shapeprog.formats.colours import colour
 from shapeprog.formats.parts import drawn_parts
-from shapeprog.formats.plan import Repetition, Solid, Variable, plan
+from shapeprog.formats.plan import Definition, Invocation, Module, Repetition, Step, Variable
 from shapeprog.formats.symbolic import number
+from shapeprog.formats.written_plan import script_plan
 from shapeprog.language.program import Program
 from shapeprog.space import Frame
 
@@ -181,6 +184,10 @@ if __name__ == "__main__":
 '''
 
 
+_PLACE = "place"
+"""The parameter of functions that says where their parts go."""
+
+
 def write_script(program: Program, path: Path, frame: Frame) -> None:
     """Write a build123d script; run, it makes a compound of named, coloured solids and writes it as STEP."""
     write_text(path, script_text(program, frame, path.stem))
@@ -221,7 +228,7 @@ def script_text(program: Program, frame: Frame, stem: str = "model") -> str:
 
     Inside the model x is up, y is depth (positive = rear) and z is left-right, in cells, as in the program.
     """
-    made = plan(program)
+    made = script_plan(program, _reserved())
     stem = "".join(letter for letter in stem if letter.isprintable() and letter not in "\"'\\{}") or "model"
     axes = np.asarray(frame.axes)
     lines = [_HEAD.format(stem=stem)]
@@ -229,6 +236,9 @@ def script_text(program: Program, frame: Frame, stem: str = "model") -> str:
         lines += [f"# {heading.name}: {heading.doc}"]
         lines += [f"{each.name} = {each.text}{_note(each)}" for each in heading.variables]
         lines += [""]
+    for each in made.numbers:
+        lines += [f"{each.name} = {each.text}" + (f"  # {each.note}" if each.note else "")]
+    lines += [""] if made.numbers else []
     columns = [_tuple(axes[:, column]) for column in (0, 2)]
     lines += ["# From cells to the world of the input.", f"scale = {number(frame.scale)}"]
     lines += [f"world = Location(Plane(origin={_tuple(frame.centre)}, x_dir={columns[0]}, z_dir={columns[1]}))"]
@@ -237,8 +247,35 @@ def script_text(program: Program, frame: Frame, stem: str = "model") -> str:
         lines += [f"{name} = ([{points}], {[tuple(face) for face in faces.tolist()]})"]
     for name, table in made.tables.items():
         lines += [f"{name} = {table.tolist()}"]
+    functions = [line for function in made.functions for line in _function(function)]
     steps = [line for step in made.body for line in _step(step, 0, "")]
-    return "\n".join(lines) + _TOOLS + "\n".join([*steps, ""]) + _TAIL.format(stem=stem)
+    return "\n".join(lines) + _TOOLS + "\n".join([*functions, *steps, ""]) + _TAIL.format(stem=stem)
+
+
+def _function(function: Module) -> Iterator[str]:
+    given = [name if default is None else f"{name}={default}" for name, default in function.parameters]
+    yield f"def {function.name}({', '.join([*given, f'{_PLACE}=Place()'])}):"
+    if function.note:
+        yield f"    # {function.note}"
+    for step in function.body:
+        yield from _step(step, 1, _PLACE)
+    yield from () if function.body else ("    pass",)
+    yield from ("", "")
+
+
+def _reserved() -> set[str]:
+    """Words that mean something in these scripts."""
+    script = ast.parse(_HEAD + _TOOLS + _TAIL)
+    found = {*dir(builtins), "scale", "world", _PLACE}
+    for node in script.body:
+        match node:
+            case ast.ImportFrom(_, aliases):
+                found |= {alias.name for alias in aliases}
+            case ast.FunctionDef(name) | ast.ClassDef(name):
+                found.add(name)
+            case ast.Assign([ast.Name(name)]):
+                found.add(name)
+    return found
 
 
 def _note(each: Variable) -> str:
@@ -249,8 +286,15 @@ def _tuple(values: Any) -> str:
     return f"({', '.join(number(float(value)) for value in values)})"
 
 
-def _step(step: Solid | Repetition, depth: int, place: str) -> Iterator[str]:
+def _step(step: Step, depth: int, place: str) -> Iterator[str]:
     indent = "    " * depth
+    if isinstance(step, Definition):
+        yield f"{indent}{step.name} = {step.text}"
+        return
+    if isinstance(step, Invocation):
+        given = [f"{name}={text}" for name, text in step.arguments] + ([f"{_PLACE}={place}"] if place else [])
+        yield f"{indent}{step.name}({', '.join(given)})"
+        return
     if isinstance(step, Repetition):
         words = [place] if place else []
         words += [f"move({step.shift[0]}, {step.shift[1]})"] if step.shift else []

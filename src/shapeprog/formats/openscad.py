@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -9,8 +10,19 @@ import numpy as np
 
 from shapeprog.files import write_text
 from shapeprog.formats.colours import colour
-from shapeprog.formats.plan import Heading, Plan, Repetition, Solid, Variable, plan
+from shapeprog.formats.plan import (
+    Definition,
+    Heading,
+    Invocation,
+    Module,
+    Plan,
+    Repetition,
+    Solid,
+    Step,
+    Variable,
+)
 from shapeprog.formats.symbolic import number
+from shapeprog.formats.written_plan import script_plan
 from shapeprog.geometry.primitives.cylinder import SEGMENTS
 from shapeprog.language.program import Program
 from shapeprog.space import Frame
@@ -124,6 +136,16 @@ module turn(degrees, about = [0, 0, 0]) {
 """
 
 
+_KEYWORDS = """
+module function if else for let true false undef include use each assert echo PI segments world
+abs sign sin cos tan acos asin atan atan2 floor round ceil ln len log pow sqrt exp rands min max norm cross concat
+lookup str chr ord search version version_num parent_module is_undef is_bool is_num is_string is_list is_function
+cube sphere cylinder polyhedron square circle polygon text import projection surface render group
+union difference intersection hull minkowski translate rotate scale resize mirror multmatrix color offset
+linear_extrude rotate_extrude children intersection_for assign child echo roof
+"""
+
+
 def write_scad(program: Program, path: Path, frame: Frame) -> None:
     """Write an OpenSCAD model; the world of the input is a last transformation around it."""
     write_text(path, scad_text(program, frame))
@@ -134,14 +156,19 @@ def scad_text(program: Program, frame: Frame) -> str:
 
     Inside the model x is up, y is depth (positive = rear) and z is left-right, in cells, as in the program.
     """
-    made = plan(program)
+    made = script_plan(program, _reserved())
     lines = ["// Made by shapeprog. Change the numbers below, or use the customizer.", ""]
+    if made.numbers:
+        lines += ["/* [Numbers] */", *(line for each in made.numbers for line in _definition(each)), ""]
     for heading in made.headings:
         lines += [*_heading(heading), ""]
     lines += ["/* [Quality and place] */", f"segments = {SEGMENTS}; // [12:4:128]"]
     matrix = ", ".join(f"[{', '.join(number(value) for value in row)}]" for row in frame.matrix())
     lines += ["// From cells to the world of the input.", f"world = [{matrix}];", "", "/* [Hidden] */", *_tables(made)]
-    lines += [_MODULES.strip(), "", "multmatrix(world) union() {"]
+    lines += [_MODULES.strip(), ""]
+    for function in made.functions:
+        lines += [*_module(function), ""]
+    lines += ["multmatrix(world) union() {"]
     lines += [line for step in made.body for line in _step(step, 1)]
     return "\n".join([*lines, "}", ""])
 
@@ -151,6 +178,31 @@ def _heading(heading: Heading) -> Iterator[str]:
     yield f"// {heading.doc}"
     for each in heading.variables:
         yield f"{each.name} = {each.text}; // {_range(each)}"
+
+
+def _definition(each: Definition) -> Iterator[str]:
+    if each.note:
+        yield f"// {each.note}"
+    slider = ""
+    if each.value is not None:
+        low, high = sorted((0.0, np.copysign(np.ceil(2 * abs(each.value)), each.value)))
+        slider = f" // [{number(low)}:{1 if each.whole else 0.1}:{number(max(high, 1.0))}]"
+    yield f"{each.name} = {each.text};{slider}"
+
+
+def _module(function: Module) -> Iterator[str]:
+    if function.note:
+        yield f"// {function.note}"
+    given = [name if default is None else f"{name} = {default}" for name, default in function.parameters]
+    yield f"module {function.name}({', '.join(given)}) {{"
+    for step in function.body:
+        yield from _step(step, 1)
+    yield "}"
+
+
+def _reserved() -> set[str]:
+    """Words that mean something in OpenSCAD, or in these scripts."""
+    return {*_KEYWORDS.split(), *re.findall(r"(?:module|function) (\w+)", _MODULES)}
 
 
 def _range(each: Variable) -> str:
@@ -173,8 +225,14 @@ def _tables(made: Plan) -> Iterator[str]:
         yield f"{name} = [{', '.join(rows)}];"
 
 
-def _step(step: Solid | Repetition, depth: int) -> Iterator[str]:
+def _step(step: Step, depth: int) -> Iterator[str]:
     indent = "  " * depth
+    if isinstance(step, Definition):
+        yield f"{indent}{step.name} = {step.text};"
+        return
+    if isinstance(step, Invocation):
+        yield f"{indent}{step.name}({', '.join(f'{name} = {text}' for name, text in step.arguments)});"
+        return
     if isinstance(step, Repetition):
         words = [f"for ({step.letter} = [0 : 1 : {step.count} - 1])"]
         words += [f"move({step.shift[0]}, {step.shift[1]})"] if step.shift else []
@@ -194,6 +252,6 @@ def _call(step: Solid) -> str:
     if step.axes is not None:
         axes = ", ".join(f"[{', '.join(number(round(value, 12)) for value in row)}]" for row in step.axes)
         around = f"posed({arguments[0]}, [{axes}]) "
-        lean = f" - [0, {arguments[2]} / 2, 0]" if len(arguments) > 2 else ""
+        lean = f" - [0, ({arguments[2]}) / 2, 0]" if len(arguments) > 2 else ""
         arguments[0] = f"-{arguments[1]} / 2{lean}" if step.kind == "cuboid" else "[0, 0, 0]"
     return f"{around}{step.kind}({', '.join([*arguments, *([step.shell] if step.shell else [])])})"

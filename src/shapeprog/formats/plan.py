@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
-from shapeprog.formats.symbolic import Affine, Piece, Repeat, number, pieces, point, repeat
+from shapeprog.formats.symbolic import Affine, Piece, Repeat, Slot, number, pieces, point, repeat
 from shapeprog.language.parameters import Quantity
 from shapeprog.language.program import Draw, Loop, Node, Program
 from shapeprog.language.statement import Statement, language
@@ -58,51 +59,91 @@ class Repetition:
     shift: tuple[str, str] | None
     turn: tuple[str, str] | None
     signs: str | None
-    body: tuple[Solid | Repetition, ...]
+    body: tuple[Step, ...]
+
+
+@dataclass(frozen=True)
+class Definition:
+    """A named number: its expression, what is said of it, and its value and kind if it depends on no other."""
+
+    name: str
+    text: str
+    note: str = ""
+    value: float | None = None
+    whole: bool = False
+
+
+@dataclass(frozen=True)
+class Invocation:
+    """A call of a function with expressions for its parameters."""
+
+    name: str
+    arguments: tuple[tuple[str, str], ...]
+
+
+Step: TypeAlias = Solid | Repetition | Definition | Invocation
+
+
+@dataclass(frozen=True)
+class Module:
+    """A function: its parameters with their defaults, if they have any, and its body."""
+
+    name: str
+    parameters: tuple[tuple[str, str | None], ...]
+    body: tuple[Step, ...]
+    note: str
 
 
 @dataclass
 class Plan:
-    """Everything a script needs, in order."""
+    """Everything a script needs, in order.
+
+    Programs with names have ``numbers`` and ``functions``, others a heading for each statement.
+    """
 
     headings: list[Heading] = field(default_factory=list)
-    body: list[Solid | Repetition] = field(default_factory=list)
+    numbers: list[Definition] = field(default_factory=list)
+    functions: list[Module] = field(default_factory=list)
+    body: list[Step] = field(default_factory=list)
     shells: dict[str, tuple[FloatArray, npt.NDArray[np.int64]]] = field(default_factory=dict)
     tables: dict[str, FloatArray] = field(default_factory=dict)
 
-    def solids(self) -> Iterator[Solid]:
-        """Every solid in the order it is drawn."""
-        stack = list(reversed(self.body))
-        while stack:
-            step = stack.pop()
-            if isinstance(step, Solid):
-                yield step
-            else:
-                stack.extend(reversed(step.body))
-
 
 @dataclass(frozen=True)
-class _Named:
-    """A node of the program with the names of its slots and, if it draws, its solids and pivot."""
+class Planned:
+    """A statement or loop with the names of its slots and, if it draws, its steps and pivot; or a call, without a node.
 
-    node: Node
-    declared: Statement
+    ``pivoted`` tells of a call that what it draws has pivots of its own.
+    """
+
+    node: Node | None
     name: str
-    slots: tuple[str, ...]
-    body: tuple[_Named, ...] = ()
-    drawn: tuple[Solid, ...] = ()
+    slots: tuple[Slot, ...] = ()
+    body: tuple[Planned, ...] = ()
+    drawn: tuple[Step, ...] = ()
     pivot: str = "[0, 0, 0]"
+    pivoted: bool = False
 
     @property
-    def draws(self) -> list[_Named]:
-        return [self] if not self.declared.is_loop else [leaf for inner in self.body for leaf in inner.draws]
+    def quarter(self) -> bool:
+        """Whether rotations turn it by quarters."""
+        return self.node is not None and language()[self.node.name].quarter
 
-    def only(self, leaf: _Named) -> _Named:
+    @property
+    def draws(self) -> list[Planned]:
+        """The statements and calls in it."""
+        return [leaf for inner in self.body for leaf in inner.draws] if isinstance(self.node, Loop) else [self]
+
+    def only(self, leaf: Planned) -> Planned:
         """The same loop around one of its drawing statements."""
         if self is leaf:
             return self
         inner = next(each for each in self.body if any(found is leaf for found in each.draws))
-        return _Named(self.node, self.declared, self.name, self.slots, (inner.only(leaf),))
+        return replace(self, body=(inner.only(leaf),))
+
+
+class Inexpressible(Exception):
+    """A program with names that a script cannot say with its names."""
 
 
 def plan(program: Program) -> Plan:
@@ -111,15 +152,19 @@ def plan(program: Program) -> Plan:
     counter: Counter[str] = Counter()
     named = [_named(node, made, counter) for node in program.body]
     for each in named:
-        made.body.extend(_steps(each, 0, made))
+        made.body.extend(steps(each, 0, made))
     return made
 
 
-def _named(node: Node, made: Plan, counter: Counter[str]) -> _Named:
-    declared = language()[node.name]
+def numbered(node: Node, counter: Counter[str]) -> str:
+    """The name of a statement or loop in a script: its role or own name, and a number."""
     word = re.sub(r"[^A-Za-z0-9_]", "_", node.word if isinstance(node, Draw) else node.name)
     counter[word] += 1
-    name = f"{word}_{counter[word]}"
+    return f"{word}_{counter[word]}"
+
+
+def _named(node: Node, made: Plan, counter: Counter[str]) -> Planned:
+    declared, name = language()[node.name], numbered(node, counter)
     slots = tuple(
         f"{name}_{parameter.name}" + (f"[{place}]" if parameter.quantity.width > 1 else "")
         for parameter in declared.parameters
@@ -129,20 +174,30 @@ def _named(node: Node, made: Plan, counter: Counter[str]) -> _Named:
     if isinstance(node, Loop):
         if not declared.quantities[0].written_out:
             slots = (declared.quantities[0].written(node.values[0]), *slots[1:])
-        inner = tuple(_named(each, made, counter) for each in node.body)
-        each = _Named(node, declared, name, slots, inner)
-        used = [repeat(declared, node.values, flag)[1] for flag in {leaf.declared.quarter for leaf in each.draws}]
-        fixed = frozenset.intersection(*used) if used else frozenset(range(1, declared.size))
-        made.headings.insert(place, _heading(declared, name, node.values, fixed))
+        each = Planned(node, name, slots, tuple(_named(each, made, counter) for each in node.body))
+        made.headings.insert(place, _heading(declared, name, node.values, still_of(each)))
         return each
     found, fixed = pieces(declared, node.values)
-    pivot, _ = point(declared, node.values)
     made.headings.insert(place, _heading(declared, name, node.values, fixed))
+    return drawing(node, name, slots, found, made)
+
+
+def still_of(each: Planned) -> frozenset[int]:
+    """The slots of a loop that enter as the numbers they are."""
+    assert each.node is not None
+    declared = language()[each.node.name]
+    used = [repeat(declared, each.node.values, flag)[1] for flag in {leaf.quarter for leaf in each.draws}]
+    return frozenset.intersection(*used) if used else frozenset(range(1, declared.size))
+
+
+def drawing(node: Draw, name: str, slots: tuple[Slot, ...], found: Sequence[Piece], made: Plan) -> Planned:
+    """A drawing statement of the solids that were found, with these slots."""
+    pivot, _ = point(language()[node.name], node.values)
     drawn = tuple(
         _solid(piece, f"{name}_{index}" if len(found) > 1 else name, language().called(node.word).id, slots, made)
         for index, piece in enumerate(found, 1)
     )
-    return _Named(node, declared, name, slots, (), drawn, "[0, 0, 0]" if pivot is None else _vector(pivot, slots))
+    return Planned(node, name, slots, (), drawn, "[0, 0, 0]" if pivot is None else _vector(pivot, slots))
 
 
 def _heading(declared: Statement, name: str, values: Sequence[float], fixed: frozenset[int]) -> Heading:
@@ -157,7 +212,7 @@ def _heading(declared: Statement, name: str, values: Sequence[float], fixed: fro
     return Heading(name, declared.doc, tuple(variables))
 
 
-def _solid(piece: Piece, name: str, statement: int, slots: tuple[str, ...], made: Plan) -> Solid:
+def _solid(piece: Piece, name: str, statement: int, slots: tuple[Slot, ...], made: Plan) -> Solid:
     shell = None
     if piece.vertices is not None and piece.faces is not None:
         shell = f"{name}_shell"
@@ -168,35 +223,41 @@ def _solid(piece: Piece, name: str, statement: int, slots: tuple[str, ...], made
     return Solid(name, statement, piece.kind, arguments, piece.axes, shell)
 
 
-def _vector(group: tuple[Affine, ...], slots: tuple[str, ...]) -> str:
+def _vector(group: tuple[Affine, ...], slots: tuple[Slot, ...]) -> str:
     words = [one.text(slots) for one in group]
     stem = words[0].partition("[")[0]
-    whole = [slot for slot in slots if slot.startswith(f"{stem}[")]
+    whole = [slot for slot in slots if isinstance(slot, str) and slot.startswith(f"{stem}[")]
     return stem if words == whole else f"[{', '.join(words)}]"
 
 
-def _steps(each: _Named, depth: int, made: Plan) -> list[Solid | Repetition]:
-    """What a node becomes: a loop that turns statements about different axes is written once for each axis."""
-    if not each.declared.is_loop:
+def steps(each: Planned, depth: int, made: Plan, taken: frozenset[str] = frozenset()) -> list[Step]:
+    """What a node becomes: a loop that turns statements about different axes is written once for each axis.
+
+    ``taken`` are names that no variable of a loop may have.
+    """
+    if not isinstance(each.node, Loop):
         return list(each.drawn)
+    declared, values = language()[each.node.name], each.node.values
     motions: dict[tuple[str, bool], Repeat] = {}
     for leaf in each.draws:
-        key = (leaf.pivot, leaf.declared.quarter)
+        key = (leaf.pivot, leaf.quarter)
         if key not in motions:
-            motions[key] = repeat(each.declared, each.node.values, leaf.declared.quarter)[0]
+            motions[key] = repeat(declared, values, leaf.quarter)[0]
+        if leaf.pivoted and motions[key].turns:
+            raise Inexpressible
     if len(motions) > 1 and any(motion.turns for motion in motions.values()):
-        return [step for leaf in each.draws for step in _steps(each.only(leaf), depth, made)]
-    body = tuple(step for inner in each.body for step in _steps(inner, depth + 1, made))
+        return [step for leaf in each.draws for step in steps(each.only(leaf), depth, made, taken)]
+    body = tuple(step for inner in each.body for step in steps(inner, depth + 1, made, taken))
     if not motions or not body:
         return []
     (pivot, _), motion = next(iter(motions.items()))
-    return [_repetition(each, motion, pivot, variable(depth), body, made)]
+    return [_repetition(each, motion, pivot, variable(depth, taken), body, made)]
 
 
 def _repetition(
-    each: _Named, motion: Repeat, pivot: str, letter: str, body: tuple[Solid | Repetition, ...], made: Plan
+    each: Planned, motion: Repeat, pivot: str, letter: str, body: tuple[Step, ...], made: Plan
 ) -> Repetition:
-    count = each.slots[0]
+    count = str(each.slots[0])
     shift = turn = signs = None
     if motion.signs is not None:
         count, signs = number(len(motion.signs)), f"{each.name}_signs[{letter}]"

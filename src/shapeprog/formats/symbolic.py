@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -17,10 +17,14 @@ import torch
 
 from shapeprog.geometry.batch import Solids
 from shapeprog.geometry.primitive import primitives
+from shapeprog.language.parameters import shortest
 from shapeprog.language.statement import Motion, Statement
 from shapeprog.space import FloatArray
 
 Measure = Callable[[torch.Tensor], "list[_Measured]"]
+
+Slot: TypeAlias = str | float
+"""What stands for a number of a statement: a name or expression, in parentheses if it needs them, or a plain number."""
 
 STEP = 0.5
 """How far in cells parameters are moved to see what they do."""
@@ -36,14 +40,20 @@ class Affine:
     constant: float
     terms: tuple[tuple[int, float], ...] = ()
 
-    def text(self, slots: Sequence[str]) -> str:
-        """The expression, valid in Python and OpenSCAD alike."""
-        words = []
+    def text(self, slots: Sequence[Slot]) -> str:
+        """The expression, valid in Python and OpenSCAD alike; slots that are numbers count as constants."""
+        words, constant, plain = [], self.constant, False
         for slot, coefficient in self.terms:
-            sign = "-" if coefficient < 0 else "+"
-            words += [sign, _scaled(slots[slot], abs(coefficient))]
-        if self.constant or not words:
-            words += ["-" if self.constant < 0 else "+", number(abs(self.constant))]
+            word = slots[slot]
+            if isinstance(word, str):
+                words += ["-" if coefficient < 0 else "+", _scaled(word, abs(coefficient))]
+            else:
+                constant, plain = constant + coefficient * word, True
+        if constant or not words:
+            size = abs(constant)
+            words += ["-" if constant < 0 else "+", shortest(size) if plain else number(size)]
+        if words[0] == "+" and len(words) == 2:
+            return words[1].removeprefix("(").removesuffix(")") if _enclosed(words[1]) else words[1]
         lead = "-" if words[0] == "-" else ""
         return lead + " ".join(words[1:])
 
@@ -265,6 +275,16 @@ def _evaluate(measure: Measure, rows: FloatArray) -> tuple[list[_Measured], Floa
 
 def _continuous(declared: Statement) -> list[int]:
     return [slot for slot, quantity in enumerate(declared.quantities) if not quantity.discrete]
+
+
+def _enclosed(text: str) -> bool:
+    """Whether one pair of parentheses is around all of a text."""
+    depth = 0
+    for place, letter in enumerate(text):
+        depth += {"(": 1, ")": -1}.get(letter, 0)
+        if not depth:
+            return text[0] == "(" and place == len(text) - 1
+    return False
 
 
 def _scaled(name: str, coefficient: float) -> str:

@@ -43,6 +43,7 @@ class _Scope:
     function: str = ""
     outer: frozenset[str] = frozenset()
     own: dict[str, Line] = field(default_factory=dict)
+    borrowed: set[str] = field(default_factory=set)
     used: set[str] = field(default_factory=set)
 
 
@@ -107,7 +108,11 @@ class _Checker:
         for name in value.names() if isinstance(value, Expression) else ():
             if name.name not in scope.own and name.name not in scope.outer:
                 raise Fault(line, f"no number is called {name.name!r}", self._cure(name, line, scope), "", name)
-            (scope.used if name.name in scope.own else self.outermost.used).add(name.name)
+            if name.name in scope.own:
+                scope.used.add(name.name)
+            else:
+                scope.borrowed.add(name.name)
+                self.outermost.used.add(name.name)
 
     def _cure(self, name: Name, line: Line, scope: _Scope) -> str:
         if name.name in self.source.numbers and not (isinstance(line, Assignment) and name.name in dict(line.numbers)):
@@ -119,6 +124,9 @@ class _Checker:
             raise Fault(line, f"{name!r} is no name of a number", WORDS, name)
         if name in scope.own:
             raise Fault(line, f"{name} is named twice", "give one of them another name", name)
+        if name in scope.borrowed:
+            said = f"{name} is the number of the program above this line, and another one below"
+            raise Fault(line, said, "give one of them another name", name)
         if name in self.called:
             what = "function" if isinstance(self.called[name], Call | Function) else "statement, role or loop"
             raise Fault(line, f"{name} is a {what} of this program already", "give the number another name", name)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import replace
+from collections import defaultdict
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
 from typing import Any
 
 from shapeprog.errors import ShapeProgError
@@ -42,21 +43,46 @@ def evaluated(source: Source) -> Program:
     return Program(expanded(source), source)
 
 
-def expanded(source: Source, given: Mapping[str, Any] | None = None) -> tuple[Node, ...]:
+def expanded(source: Source) -> tuple[Node, ...]:
     """The statements and loops of a program, with the numbers of its expressions in place of them.
-
-    Parameters
-    ----------
-    given
-        Numbers of the names that stand for plain numbers, in place of those written.  They may be tensors or linear
-        forms: then so are the numbers of the nodes, and they are neither rounded nor checked.
 
     Raises
     ------
     Fault
         If an expression has no value, a number does not fit its place, or there are more than ``MOST_STATEMENTS``.
     """
+    return tuple(_Run(source, None).block(source.lines, {}, 0, 0))
+
+
+@dataclass(frozen=True)
+class Symbolic:
+    """A statement, or a loop with its body, whose numbers may be tensors or linear forms; see ``Draw`` and ``Loop``."""
+
+    name: str
+    values: tuple[Any, ...]
+    body: tuple[Symbolic, ...] | None = None
+
+    def chains(self, *around: Symbolic) -> Iterator[tuple[Symbolic, ...]]:
+        """The blocks in it, in the order of :attr:`Program.chains`."""
+        if self.body is None:
+            yield (*around, self)
+        for inner in self.body or ():
+            yield from inner.chains(*around, self)
+
+
+def symbolic(source: Source, given: Mapping[str, Any]) -> tuple[Symbolic, ...]:
+    """The statements and loops of a program for other numbers of the names that stand for plain ones.
+
+    They may be tensors or linear forms; what follows from them is neither rounded nor checked.
+    """
     return tuple(_Run(source, given).block(source.lines, {}, 0, 0))
+
+
+def occurrences(source: Source) -> dict[int, list[Node]]:
+    """What every statement and loop comes to, once for each time it is met, by the ``id`` of its line."""
+    run = _Run(source, None)
+    run.block(source.lines, {}, 0, 0)
+    return run.met
 
 
 class _Run:
@@ -67,22 +93,28 @@ class _Run:
         self.functions = source.functions
         self.outermost: dict[str, Any] = {}
         self.made = 0
+        self.met: dict[int, list[Any]] = defaultdict(list)
 
-    def block(self, lines: tuple[Line, ...], scope: dict[str, Any], loops: int, calls: int) -> list[Node]:
+    def block(self, lines: tuple[Line, ...], scope: dict[str, Any], loops: int, calls: int) -> list[Any]:
         """What the lines of a program, function or loop come to; names are added to ``scope``."""
-        found: list[Node] = []
+        found: list[Any] = []
         for line in lines:
             match line:
                 case WrittenDraw():
                     self._count(line, calls)
-                    found.append(Draw(line.name, self._values(line, scope), line.role))
+                    values = self._values(line, scope)
+                    exact = self.given is None
+                    found.append(Draw(line.name, values, line.role) if exact else Symbolic(line.name, values))
+                    self.met[id(line)].append(found[-1])
                 case WrittenLoop():
                     self._count(line, calls)
                     if loops >= DEEPEST:
                         cure = "put some of them side by side"
                         raise Fault(line, f"loops are nested more than {DEEPEST} deep", cure)
-                    body = self.block(line.body, scope, loops + 1, calls)
-                    found.append(Loop(line.name, self._values(line, scope), tuple(body)))
+                    body = tuple(self.block(line.body, scope, loops + 1, calls))
+                    kind = Loop if self.given is None else Symbolic
+                    found.append(kind(line.name, self._values(line, scope), body))
+                    self.met[id(line)].append(found[-1])
                 case Call():
                     self._count(line, calls + 1)
                     if calls >= DEEPEST:

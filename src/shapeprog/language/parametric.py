@@ -15,7 +15,7 @@ from jaxtyping import Float, Int
 from torch import Tensor
 
 from shapeprog.errors import ShapeProgError
-from shapeprog.language.evaluation import expanded
+from shapeprog.language.evaluation import symbolic
 from shapeprog.language.expression import Linear
 from shapeprog.language.named import names
 from shapeprog.language.program import Program
@@ -81,11 +81,11 @@ class Parametric:
         """The continuous numbers that depend on names, by their place among all, for these values of the names."""
         _, steps, slots = self.code.parameters.shape
         found: dict[int, Any] = {}
-        for block, chain in enumerate(Program(expanded(self._source, given)).chains):
+        chains = (chain for each in symbolic(self._source, given) for chain in each.chains())
+        for block, chain in enumerate(chains):
             for step, node in enumerate(chain):
-                for slot, (quantity, number) in enumerate(
-                    zip(language()[node.name].quantities, node.values, strict=True)
-                ):
-                    if not isinstance(number, float) and not quantity.discrete:
+                quantities = language()[node.name].quantities
+                for slot, (quantity, number) in enumerate(zip(quantities, node.values, strict=True)):
+                    if not isinstance(number, int | float) and not quantity.discrete:
                         found[(block * steps + step) * slots + slot] = number
         return found

@@ -190,7 +190,8 @@ class _Reader:
         if wrong := misnamed(name):  # before its calls are taken for those of a statement
             raise self.text.error(statement, *wrong)
         others = (given.vararg, given.kwarg, *given.posonlyargs, *given.kwonlyargs)
-        marks = (statement.returns, *statement.decorator_list, *(each.annotation for each in given.args))
+        marks = [statement.returns, *statement.decorator_list, *(each.annotation for each in given.args)]
+        marks += getattr(statement, "type_params", [])  # from Python 3.12
         for odd in [*others, *marks]:
             if odd is not None:
                 said = f"{name} has {self.text.shown(odd)}, which no function of the language has"

@@ -15,6 +15,15 @@ _UNITS = {
 }  # fmt: skip
 
 
+_NAMES = """\
+Names: numbers that others follow from, before their use and never twice
+  width, thick = 10.2, 2      two numbers; what stands behind # is kept
+  floor = -height / 2         numbers and names with + - * / and parentheses, wherever a number may stand
+  def legs(long, thick=2):    a function of statements, loops, names and calls; it does not call itself
+      leg(...)
+  legs(long=9.7)              its statements, with these numbers"""
+
+
 def manual(name: str | None = None) -> str:
     """The page of one statement or loop, or the list of all.
 
@@ -29,7 +38,8 @@ def manual(name: str | None = None) -> str:
         loops = [declared for declared in known if declared.is_loop]
         roles = [role for role in known.roles.values() if role.name not in known]
         title = "Roles: what a part is for, around its solid, as in seat(box(...))"
-        return "\n".join([*_index("Statements", drawing), "", *_index("Loops", loops), "", *_index(title, roles), ""])
+        parts = [_index("Statements", drawing), _index("Loops", loops), _index(title, roles), _NAMES.splitlines()]
+        return "\n".join(line for part in parts for line in (*part, ""))
     if name in known:
         return page(known[name])
     if name in known.roles:

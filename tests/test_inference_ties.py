@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 import torch
+from typer.testing import CliRunner
 
 import shapeprog as sp
+from shapeprog.cli.app import app
 from shapeprog.evaluation.editing import edit_scores
 from shapeprog.inference.evidence import evidence_of_program
 from shapeprog.inference.ties.features import features
@@ -64,6 +68,15 @@ def test_a_wider_table_keeps_its_contacts_its_symmetry_and_is_one_piece():
     assert scores.contacts >= 0.95
     assert scores.one_piece >= 0.95
     assert edit_scores(sp.parse(TABLE)).contacts < 0.9
+
+
+def test_tidy_writes_what_was_tied(tmp_path: Path):
+    given, out = tmp_path / "table.shape", tmp_path / "tidy.shape"
+    given.write_text(TABLE)
+    result = CliRunner().invoke(app, ["tidy", str(given), str(out)])
+    assert result.exit_code == 0, result.output
+    assert sp.load(out) == tied_table()
+    assert "numbers are free; 18 were" in result.stderr.replace("\n", " ")
 
 
 def test_tying_again_changes_no_number_of_the_table():

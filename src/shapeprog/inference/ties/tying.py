@@ -17,13 +17,14 @@ from shapeprog.geometry.scene import Scene
 from shapeprog.inference.evidence import Evidence
 from shapeprog.inference.joints import Joints, find_joints
 from shapeprog.inference.refine import single_threaded
-from shapeprog.inference.ties.basis import SAME, Basis, simplest
+from shapeprog.inference.ties.basis import Basis, simplest
 from shapeprog.inference.ties.features import Feature, features
 from shapeprog.inference.ties.fitting import Misfit, refitted
 from shapeprog.inference.ties.naming import written
 from shapeprog.inference.ties.pricing import worthwhile
 from shapeprog.inference.ties.relations import relations
 from shapeprog.inference.tunable import CELLS, DEGREES, Tunable
+from shapeprog.language.free import free_numbers
 from shapeprog.language.program import Draw, Program
 from shapeprog.space import FloatArray
 
@@ -84,8 +85,8 @@ def tie(
             if len(rows) == before:
                 break
         basis = _rounded(simplest(known, numbers, rows, np.append(tunable.are("length").numpy(), [False] * 3)))
-        free = int((np.abs(basis.factors[: len(tunable.values)]) > SAME).any(0).sum())
-        return Tied(written(tunable, basis), free)
+        named = written(tunable, basis)
+        return Tied(named, free_numbers(named))
 
 
 def touching(tunable: Tunable, scene: Scene, joints: Joints) -> set[tuple[int, int]]:

@@ -11,9 +11,10 @@ from shapeprog.data.shape import Shape
 from shapeprog.evaluation.likeness import Samples, Triangles, likeness, sampled, silhouette
 from shapeprog.evaluation.metrics import evaluate_program
 from shapeprog.evaluation.parts import oriented_box, overlaps, part_scores
-from shapeprog.evaluation.structure import numbers, one_piece, slivers
+from shapeprog.evaluation.structure import one_piece, slivers
 from shapeprog.geometry.mesh import part_meshes, union_mesh
 from shapeprog.language import unroll
+from shapeprog.language.free import numbers
 from shapeprog.language.syntax import parse
 
 TABLE = """

@@ -10,7 +10,18 @@ from typing import Annotated
 
 import typer
 
-from shapeprog.cli import adapting, changes, inferring, measuring, modelling, sampling, terminal, training, writing
+from shapeprog.cli import (
+    adapting,
+    changes,
+    inferring,
+    measuring,
+    modelling,
+    sampling,
+    terminal,
+    tidying,
+    training,
+    writing,
+)
 
 # Before torch is loaded: its idle workers would spin on the cores that the kernels of other threads want.
 os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
@@ -26,6 +37,7 @@ app = typer.Typer(
 
 for name, command, help_line in (
     ("infer", inferring.infer_command, "Infer a program from each mesh, point cloud or voxel grid."),
+    ("tidy", tidying.tidy_command, "Tie the numbers of a program: names for what is free."),
     ("render", writing.render_command, "Draw a program as a picture, cells or points."),
     ("export", writing.export_command, "Write a program for other tools: GLB, STL, OpenSCAD, STEP..."),
     ("show", writing.show_command, "Write a page to turn a program's shape in a browser."),

@@ -68,6 +68,9 @@ def infer_command(
     detail: Annotated[
         float, typer.Option(help="How fine: the price of what is written is divided by it.", min=0.01, max=100)
     ] = 1.0,
+    no_ties: Annotated[
+        bool, typer.Option("--no-ties", help="Plain numbers: no names for those that hold together.")
+    ] = False,
     baseline: Annotated[bool, typer.Option("--baseline", help="Greedy boxes instead of the search.")] = False,
 ) -> None:
     """Infer a program from each shape and write NAME.shape, NAME.json, NAME.glb and NAME.png.
@@ -85,7 +88,7 @@ def infer_command(
     terminal.check_axes(up, front)
     _prepare(picture=not no_picture, talk=not (quiet or as_json))
     terminal.load_modules(modules)
-    infer_one = _baseline if baseline else _chosen(weights, proposals, rounds, no_search, paper, detail)
+    infer_one = _baseline if baseline else _chosen(weights, proposals, rounds, no_search, paper, detail, not no_ties)
     folder = make_folder(out)
     failures: list[tuple[Path, ShapeProgError]] = []
     stopped: OutputError | None = None
@@ -161,7 +164,9 @@ def _prepare(picture: bool, talk: bool) -> None:
     prepare([*INFERENCE, *READING, *(PICTURES if picture else ())], tell if talk else None)
 
 
-def _chosen(weights: str, proposals: int, rounds: int | None, no_search: bool, paper: bool, detail: float) -> Inference:
+def _chosen(
+    weights: str, proposals: int, rounds: int | None, no_search: bool, paper: bool, detail: float, ties: bool
+) -> Inference:
     """Inference with what was asked for, which is looked at before any shape is."""
     from shapeprog.inference import Settings, infer
     from shapeprog.inference.proposing import ready_generator
@@ -173,7 +178,8 @@ def _chosen(weights: str, proposals: int, rounds: int | None, no_search: bool, p
     def one(shape: Shape, blocks: int, budget: float, seed: int, progress: Progress) -> Found:
         result = infer(
             shape, blocks=blocks, budget=budget, seed=seed, settings=settings, generator=asked, proposals=proposals,
-            search=not no_search, statements="paper" if paper else "all", detail=detail, progress=progress,
+            search=not no_search, statements="paper" if paper else "all", detail=detail, ties=ties,
+            progress=progress,
         )  # fmt: skip
         scores = _scores(result.program, result.snapped, shape, result.scores, seed)
         return Found(result.program, result.snapped, scores, result.reason, result.seconds)

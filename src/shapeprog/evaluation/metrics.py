@@ -15,7 +15,8 @@ Likeness
 Floors
     CD and likeness between two independent samplings of the target itself.
 Structure
-    Whether the union is one piece, slivers, continuous numbers: see :mod:`shapeprog.evaluation.structure`.
+    Whether the union is one piece, slivers: see :mod:`shapeprog.evaluation.structure`; and continuous numbers, those
+    that are free where others follow from names.
 Size
     Blocks, statements (loops count one each) and primitives after unrolling.
 """
@@ -43,6 +44,7 @@ from shapeprog.geometry.mesh import union_mesh
 from shapeprog.geometry.nearest import squared_distance
 from shapeprog.geometry.scene import Scene
 from shapeprog.geometry.surface import sample_surface
+from shapeprog.language.free import numbers
 from shapeprog.language.program import Program
 from shapeprog.language.unroll import unroll
 
@@ -100,7 +102,7 @@ class Metrics:
     blocks, statements, primitives
         Size of the program.
     numbers
-        How many continuous numbers are written.
+        How many continuous numbers are written, or free.
     f1_half_percent, f1_percent, normals, silhouette
         Likeness, between 0 and 1; these and all that follow are not a number where they were not measured.
     one_piece
@@ -184,7 +186,7 @@ def evaluate_program(
     row = Metrics(
         name=target.name, cd=to_target + from_target, to_target=to_target, from_target=from_target,
         noise_floor=floor, f1=f1, iou=iou, blocks=program.blocks, statements=program.statements,
-        primitives=int(scene.mask.sum()), numbers=structure.numbers(program),
+        primitives=int(scene.mask.sum()), numbers=numbers(program),
     )  # fmt: skip
     if not looks:
         return row

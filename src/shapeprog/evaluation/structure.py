@@ -1,4 +1,4 @@
-"""What a program is made of, as a person who edits it sees it: numbers, slivers, pieces."""
+"""What a program is made of, as a person who edits it sees it: slivers, pieces."""
 
 from __future__ import annotations
 
@@ -8,17 +8,10 @@ from shapeprog.evaluation.likeness import Triangles
 from shapeprog.geometry.mesh import pieces
 from shapeprog.geometry.primitive import primitives
 from shapeprog.geometry.scene import Scene
-from shapeprog.language.program import Program
-from shapeprog.language.text import numbers_written
 from shapeprog.space import SPAN
 
 SLIVER = 0.004
 """Share of the longest side of the target below which a primitive is too thin to be a part."""
-
-
-def numbers(program: Program) -> int:
-    """How many continuous numbers are written; counts and steps of loops are none."""
-    return sum(numbers_written(node) for node in program.walk())
 
 
 def slivers(scene: Scene) -> float:

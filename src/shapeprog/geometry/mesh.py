@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import combinations
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -38,6 +39,11 @@ PAIRS_AT_ONCE = 1 << 21
 
 Single = tuple[npt.NDArray[np.float32], npt.NDArray[np.int64]]
 """Vertices in single precision and triangles."""
+
+
+STEP = 1 / 16384
+"""Cells to whose whole multiples vertices are rounded before solids are joined: faces that meet but for the rounding of
+numbers meet then."""
 
 
 class PartMesh(NamedTuple):
@@ -119,9 +125,25 @@ def pieces(vertices: Array, faces: Array) -> int:
     return sum(piece.volume() > 0 for piece in solid.decompose())
 
 
+def gaps(scene: Batch, within: float) -> dict[tuple[int, int], float]:
+    """The distance between primitives of one scene, for pairs of slots nearer than ``within``; 0 where they overlap."""
+    from manifold3d import Manifold, Mesh
+
+    parts = part_meshes(scene)
+    solids = [Manifold(Mesh(part.vertices.astype(np.float32), part.faces.astype(np.uint32))) for part in parts]
+    low, high = (np.array([corner(part.vertices, 0) for part in parts]) for corner in (np.min, np.max))
+    found = {}
+    for one, two in combinations(range(len(parts)), 2):
+        if (low[one] <= high[two] + within).all() and (low[two] <= high[one] + within).all():
+            apart = solids[one].min_gap(solids[two], 2 * within)
+            if apart < within:
+                found[parts[one].slot, parts[two].slot] = float(apart)
+    return found
+
+
 def _touching(scene: Batch) -> list[list[Single]]:
     """The parts of a scene in single precision, those together whose boxes touch."""
-    parts = [(part.vertices.astype(np.float32), part.faces) for part in part_meshes(scene)]
+    parts = [((np.round(part.vertices / STEP) * STEP).astype(np.float32), part.faces) for part in part_meshes(scene)]
     if not parts:
         raise ShapeProgError("the scene holds no solid part", "draw something that has a thickness")
     return [[parts[number] for number in group] for group in _groups([vertices for vertices, _ in parts])]

@@ -89,8 +89,8 @@ def adjust(
             known = moved(poses.scene, known)
             pairs = target.pairs(poses.scene, generator)
             systems = [
-                _of_target(poses, pairs, wide ** (1 - done) * narrow**done),
-                _of_joints(poses, known, closing=done == 1),
+                of_target(poses, pairs, wide ** (1 - done) * narrow**done),
+                of_joints(poses, known, closing=done == 1),
             ]
             values = torch.maximum(values + _move(systems, tunable, values, held), tunable.low)
             poses = tunable.poses(values)
@@ -111,13 +111,14 @@ System = tuple[Float[Tensor, " F"], Float[Tensor, "F F"]]
 """Half the slope of a sum of squares, and half its curvature by Gauss and Newton."""
 
 
-def _of_target(poses: Poses, pairs: Pairs, width: float) -> System:
+def of_target(poses: Poses, pairs: Pairs, width: float) -> System:
+    """The part of the distances to the target, where residuals of ``width`` cells count for a quarter."""
     asked, by = pull(poses.scene, pairs, width), poses.slopes
     slope = (by * asked.slope[..., None]).sum((0, 1))
     return slope, (by.mT @ asked.curvature @ by).sum(0)
 
 
-def _of_joints(poses: Poses, known: Joints, *, closing: bool) -> System:
+def of_joints(poses: Poses, known: Joints, *, closing: bool) -> System:
     """Of gaps; one that the target insists on opens: its weight falls.  At the end all are closed that it takes to
     keep the program in one piece, and all feet are put on the floor."""
     gaps = needs(poses.scene, poses.slopes, known)

@@ -28,8 +28,8 @@ from shapeprog.geometry.scene import Scene
 from shapeprog.geometry.surface import face_areas, sample_surface
 from shapeprog.inference.coverage_kernels import LIFT, explain, hold, support
 from shapeprog.inference.evidence import Evidence
+from shapeprog.language.free import numbers
 from shapeprog.language.program import Loop, Program
-from shapeprog.language.text import numbers_written
 from shapeprog.language.unroll import unroll
 from shapeprog.space import HALF, RESOLUTION, FloatArray
 
@@ -77,10 +77,8 @@ class Prices:
 
     def of(self, program: Program) -> float:
         """The price of a program as it is written."""
-        total = 0.0
-        for node in program.walk():
-            total += (self.loop if isinstance(node, Loop) else self.statement) + self.number * numbers_written(node)
-        return total
+        lines = sum(self.loop if isinstance(node, Loop) else self.statement for node in program.walk())
+        return lines + self.number * numbers(program)
 
 
 class Covers(NamedTuple):

@@ -22,8 +22,11 @@ from shapeprog.data.sampling import sample_with_faces
 from shapeprog.data.shape import Shape
 from shapeprog.data.voxelise_kernels import mark_triangles
 from shapeprog.geometry.arrays import over_threads
+from shapeprog.geometry.mesh import union_mesh
 from shapeprog.inference.evidence_kernels import look_out
 from shapeprog.inference.surface import INSET, exposed, exposed_faces
+from shapeprog.language.program import Program
+from shapeprog.language.unroll import unroll
 from shapeprog.space import HALF, RESOLUTION, SPAN, Array, FloatArray
 
 POINTS, SURFACE = 6_000, 40_000
@@ -116,6 +119,15 @@ def evidence_of(shape: Shape, seed: int = 0) -> Evidence:
     if shape.points is not None and len(shape.points) > NEIGHBOURS:
         return _of_points(np.asarray(shape.points, np.float64), shape.voxels, seed)
     return _of_cells(shape.voxels)
+
+
+def evidence_of_program(program: Program, seed: int = 0) -> Evidence:
+    """The evidence of what a program draws, as if it had been given as a mesh.
+
+    A ``ShapeProgError`` if nothing in it has a volume.
+    """
+    vertices, faces = union_mesh(unroll(program))
+    return _of_mesh(vertices, faces, seed)
 
 
 def _of_mesh(vertices: FloatArray, faces: npt.NDArray[np.int64], seed: int) -> Evidence:

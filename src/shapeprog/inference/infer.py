@@ -10,7 +10,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -30,6 +30,8 @@ from shapeprog.inference.cell_coverage import cost_on_cells
 from shapeprog.inference.refine import REACH, Schedule, refine
 from shapeprog.inference.structure import Settings, search_structure
 from shapeprog.inference.surface import points_of_cells
+from shapeprog.inference.ties.tying import tie
+from shapeprog.language.free import numbers
 from shapeprog.language.program import Program
 from shapeprog.language.unroll import unroll
 
@@ -66,9 +68,9 @@ class Result:
         Of a program of the paper's statements, the same with whole numbers, each within one of the rounded parameter of
         ``program``; others have no such form.
     scores
-        ``blocks``, ``statements``, ``primitives``; ``explained``, the share of the surface, where that was looked at;
-        ``iou`` at 32^3 of programs found on cells, and of all for targets that are cells; with a generator
-        ``proposed``: 1 if the program on cells is its own or grew from it, else 0.
+        ``blocks``, ``statements``, ``primitives``; ``numbers``, those that are free; ``explained``, the share of the
+        surface, where that was looked at; ``iou`` at 32^3 of programs found on cells, and of all for targets that are
+        cells; with a generator ``proposed``: 1 if the program on cells is its own or grew from it, else 0.
     reason
         Why the search stopped, where the program came from, what the time budget cut short, and what to try next.
     cut
@@ -101,6 +103,7 @@ def infer(
     search: bool = True,
     statements: Literal["all", "paper"] = "all",
     detail: float = 1.0,
+    ties: bool = True,
     progress: Progress | None = None,
 ) -> Result:
     """A short program of at most ``blocks`` blocks that rebuilds a shape.
@@ -136,6 +139,9 @@ def infer(
     detail
         How much finer than usual the program may be where the surface is known: prices of what is written are divided
         by it.
+    ties
+        Whether numbers that hold together are tied where the surface is known: the program then has names for the few
+        that are free, and expressions for all others.
     progress
         Called with what is being done and the share of it that is done.
 
@@ -190,6 +196,7 @@ def infer(
             schedule=schedule, reach=REACH, seed=seed, deadline=refining, progress=progress,
         )  # fmt: skip
     trade_off: tuple[TradeOff, ...] = ()
+    costs = partial(cost_on_cells, voxels=target.voxels, detail=detail)
     if search and statements == "all":
         found = assemble(
             target, blocks=blocks, more=program.flat().body, detail=detail, seed=seed, deadline=refining,
@@ -198,12 +205,15 @@ def infer(
         if target.points is not None:
             better = found.explained >= EXPLAINED
         else:
-            before = cost_on_cells(program, target.voxels, detail, snapped)
-            better = cost_on_cells(found.program, target.voxels, detail) < before
+            better = costs(found.program) < costs(program, snapped=snapped)
         if better:
             program, snapped, trade_off = found.program, None, found.trade_off
             scores["explained"] = found.explained
             reason = f"Stopped because {found.reason}"
+            if ties:
+                tied = tie(program, found.evidence, seed=seed, progress=progress).program
+                fits = target.points is not None or costs(tied) <= costs(program)
+                program = tied if fits else program
     if target.note:
         reason += f" {target.note}"
     cut = tuple(each.cut for each in (proposing, searching, refining) if each.cut)
@@ -216,6 +226,7 @@ def infer(
         "blocks": float(program.blocks),
         "statements": float(program.statements),
         "primitives": float(program.size),
+        "numbers": float(numbers(program)),
     }
     return Result(program, snapped, scores, reason, cut, time.monotonic() - started, trade_off)
 

@@ -57,6 +57,8 @@ class Tunable:
         Where the numbers are at the start (F,), and of which kind each is.
     low
         What they must not fall below (F,): lengths a thickness of ``THINNEST``.
+    nodes, moving
+        The nodes in the order of the text, and for every number (F) which of them it is of, and its slot there.
     scale
         How many cells the surface moves for one unit of each (F,), at most: 1 for places and lengths, more for shifts
         of many copies, a lever for angles.
@@ -75,7 +77,7 @@ class Tunable:
                 for slot in range(len(nodes[n].values)):
                     index[block, step, slot] = number.get((n, slot), -1)
         self._index: Int[Tensor, "K J slots"] = index
-        self._moving = moving
+        self.moving, self.nodes = moving, nodes
         quantities = [language()[nodes[n].name].quantities[slot] for n, slot in moving]
         self.kinds: list[Kind] = [quantity.kind for quantity in quantities]
         self.values = torch.tensor([nodes[n].values[slot] for n, slot in moving], dtype=torch.float64)
@@ -104,14 +106,14 @@ class Tunable:
         block = scene.block[0]
         mine = found[self._row[:, None], which, block[:, None]].nan_to_num(0).flatten(2)  # (N, 16, J * slots)
         index = self._index[block].flatten(1)
-        slopes = mine.new_zeros(*mine.shape[:2], len(self._moving) + 1)
+        slopes = mine.new_zeros(*mine.shape[:2], len(self.moving) + 1)
         slopes.scatter_add_(2, (index % slopes.shape[2])[:, None].expand_as(mine), mine)
         return Poses(scene[0].detach(), slopes[..., :-1])
 
     def settled(self, values: Float[Tensor, " F"]) -> Program:
         """The program with these numbers, rounded."""
         tidy = self.rounded(values).tolist()
-        table = {place: to_float32(value) for place, value in zip(self._moving, tidy, strict=True)}
+        table = {place: to_float32(value) for place, value in zip(self.moving, tidy, strict=True)}
         return Program(_rebuilt(self.program.body, count(), table))
 
     def rounded(self, values: Float[Tensor, " F"]) -> Float[Tensor, " F"]:
@@ -135,8 +137,8 @@ class Tunable:
 
     def _scales(self, nodes: Sequence[Node], scene: Scene) -> Float[Tensor, " F"]:
         reach = bounds(scene).norm(dim=-1)
-        scale = torch.ones(len(self._moving), dtype=torch.float64)
-        for f, (n, _) in enumerate(self._moving):
+        scale = torch.ones(len(self.moving), dtype=torch.float64)
+        for f, (n, _) in enumerate(self.moving):
             node = nodes[n]
             if self.kinds[f] == "shift" and isinstance(node, Loop):
                 scale[f] = max(node.count - 1, 1)

@@ -1,0 +1,43 @@
+"""``shapeprog tidy``: names and expressions for the numbers of a program that somebody else wrote."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from shapeprog.cli import terminal
+from shapeprog.errors import InputError
+
+
+def tidy_command(
+    program: Annotated[Path, typer.Argument(help="A program: .shape, .json or .notation.")],
+    out: Annotated[
+        Path | None, typer.Argument(help="Where to write it, as .shape or .json; else it is printed.")
+    ] = None,
+    price: Annotated[
+        float, typer.Option(help="What a number is worth, times the usual: how far parts may move.", min=0, max=1000)
+    ] = 1.0,
+    seed: terminal.Seed = 0,
+    modules: terminal.With = None,
+) -> None:
+    """Tie the numbers of a program: lengths that are nearly equal, faces that are flush or meet, parts in the middle.
+
+    What is left free gets names, so that a change of one number moves all that belongs to it.
+    """
+    from shapeprog.formats import load_with_frame, save
+    from shapeprog.inference.evidence import evidence_of_program
+    from shapeprog.inference.ties.tying import PRICE, tie
+    from shapeprog.language.free import numbers
+
+    terminal.load_modules(modules)
+    given, frame = load_with_frame(program)
+    if not given.size:
+        raise InputError(f"{program} draws nothing", "name a program that draws something")
+    tied = tie(given, evidence_of_program(given, seed), price=price * PRICE, seed=seed)
+    if out is not None:
+        save(tied.program, out, frame)
+    terminal.print_program(terminal.output(), tied.program)
+    before = numbers(given)
+    terminal.errors().print(f"{tied.free} numbers are free; {before} were.", style="dim", markup=False)

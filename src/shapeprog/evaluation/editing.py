@@ -1,0 +1,98 @@
+"""Whether a program holds together when it is edited: each free number made a fifth larger, and a fifth smaller.
+
+Contacts
+    Share of the pairs of primitives that touch which still do.
+Symmetry
+    Whether a program that is its own mirror image, left for right, still is.
+One piece
+    Whether a program that is one connected solid still is.
+
+All are means over the edits; symmetry and one piece are not a number where the program did not have them to begin with.
+"""
+
+from __future__ import annotations
+
+from itertools import product
+from typing import NamedTuple
+
+import numpy as np
+import torch
+
+from shapeprog.errors import ShapeProgError
+from shapeprog.geometry.distance import signed_distance
+from shapeprog.geometry.mesh import gaps, pieces, union_mesh
+from shapeprog.geometry.scene import Scene
+from shapeprog.geometry.surface import sample_surface
+from shapeprog.language.free import free_numbers, multiplied
+from shapeprog.language.program import Program
+from shapeprog.language.unroll import unroll
+from shapeprog.space import SIDE
+
+FACTORS = (1.2, 0.8)
+"""What free numbers are multiplied by."""
+
+TOUCHING = 0.1
+"""Cells between two primitives that touch, at most."""
+
+SYMMETRIC = 0.1
+"""How far the mirror image of a point of the surface may be from the surface, in cells."""
+
+LOOKED = 1_000
+"""Points of the surface that are mirrored."""
+
+
+class EditScores(NamedTuple):
+    """What edits keep, each between 0 and 1; and the number of free numbers."""
+
+    contacts: float
+    symmetry: float
+    one_piece: float
+    free: int
+
+
+def edit_scores(program: Program) -> EditScores:
+    """What is kept of a program when its free numbers are changed, one at a time; see the module."""
+    before = unroll(program)
+    touching = _contacts(before)
+    symmetric, whole = _symmetric(before), _one_piece(before)
+    kept: list[tuple[float, float, float]] = []
+    free = free_numbers(program)
+    for place, factor in product(range(free), FACTORS):
+        try:
+            after = unroll(multiplied(program, place, factor))
+        except ShapeProgError:  # such as a division by zero
+            kept.append((0.0, 0.0, 0.0))
+            continue
+        kept.append((
+            len(touching & _contacts(after)) / len(touching) if touching else np.nan,
+            float(_symmetric(after)) if symmetric else np.nan,
+            float(_one_piece(after)) if whole else np.nan,
+        ))  # fmt: skip
+    scores = np.array(kept).reshape(-1, 3)
+    one, two, three = (float(np.nanmean(column)) if np.isfinite(column).any() else float("nan") for column in scores.T)
+    return EditScores(one, two, three, free)
+
+
+def _contacts(scene: Scene) -> set[tuple[int, int]]:
+    """Pairs of slots whose primitives touch."""
+    try:
+        return set(gaps(scene, TOUCHING))
+    except ShapeProgError:  # a part lies too far away to be measured
+        return set()
+
+
+def _symmetric(scene: Scene) -> bool:
+    try:
+        points = sample_surface(scene, LOOKED, torch.Generator().manual_seed(0)).points.detach()
+    except ShapeProgError:  # nothing is drawn
+        return False
+    image = points.clone()
+    image[:, SIDE] *= -1
+    return bool((signed_distance(scene, image).abs() <= SYMMETRIC).double().mean() >= 0.99)
+
+
+def _one_piece(scene: Scene) -> bool:
+    try:
+        return pieces(*union_mesh(scene)) == 1
+    except ShapeProgError:  # nothing has a volume
+        return False

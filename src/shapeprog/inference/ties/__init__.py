@@ -1,0 +1,1 @@
+"""Ties between the numbers of a program: relations found and priced, names for what stays free."""

@@ -1,0 +1,186 @@
+"""The few measures that all numbers of a program follow from, chosen so that what follows reads simply.
+
+Relations leave a space of numbers that is free.  Any independent measures of as many span it; of these the ones are
+chosen, by exchange of one for another, from which every number is the shortest sum.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from shapeprog.inference.ties.features import Feature
+from shapeprog.inference.ties.fitting import ways_free
+from shapeprog.space import DEPTH, SIDE, UP, Array, FloatArray
+
+SAME = 1e-6
+"""Difference below which factors are the same."""
+
+FACTORS = {1.0: 1.0, 0.5: 1.2, 2.0: 1.3, 0.25: 2.0, 1.5: 2.0, 3.0: 2.0, 4.0: 2.0}
+"""What a term of a sum costs a reader by its factor; others cost ``UGLY``."""
+
+UGLY = 4.0
+
+FLOOR = 0.4
+"""What half the height below the middle costs, which has a short name of its own."""
+
+SENSITIVE, DIFFERENCE = 3.0, 3.0
+"""A length that is the difference of numbers so many times as large is lost when one of them is changed; what each such
+number costs."""
+
+PLACED = 2.0
+"""Price of a name from which it measures a place."""
+
+Flags = npt.NDArray[np.bool_]
+Word = Literal["extent", "top", "bottom", "inset", "length", "radius", "shift", "angle", "side", "place"]
+
+NAMED: dict[Word, float] = {
+    "extent": -0.5, "length": 0.8, "radius": 0.8, "top": 0.9, "bottom": 1.2, "inset": 1.2, "shift": 1.0, "angle": 1.0,
+    "side": 6.0, "place": 5.0,
+}  # fmt: skip
+"""What a name costs its reader by what it measures, and by how much the extents of the whole are preferred.  A number
+that is used once needs no name; but a place, measured from the middle, stays behind when the whole is changed."""
+
+
+@dataclass(frozen=True)
+class Measure:
+    """What a name may stand for: a word for what is measured, along which axis and of which node, and its factors."""
+
+    word: Word
+    feature: Feature
+    row: FloatArray
+
+
+@dataclass(frozen=True)
+class Basis:
+    """Measures that all numbers follow from.
+
+    Parameters
+    ----------
+    chosen
+        The measures (Z), each with all others that always agree with it.
+    factors
+        Of every number of the program, and of the extents, by how much it follows from each (V, Z).
+    values
+        Where the measures are (Z,).
+    """
+
+    chosen: list[list[Measure]]
+    factors: FloatArray
+    values: FloatArray
+
+
+def measures(known: list[Feature], numbers: FloatArray) -> Iterator[Measure]:
+    """What names may stand for; heights are above the floor, and insets from the nearest side of the whole."""
+    whole = {each.axis: each.row for each in known if each.kind == "extent"}
+    for each in known:
+        if each.kind in ("extent", "length", "radius", "shift", "angle", "place"):
+            yield Measure(each.kind, each, each.row)
+        if each.kind in ("low", "high"):
+            yield Measure("side", each, each.row)
+        if each.axis == UP and each.kind in ("low", "high", "place"):
+            yield Measure("bottom" if each.kind == "low" else "top", each, each.row + whole[UP] / 2)
+        if each.axis in (DEPTH, SIDE) and each.kind in ("low", "high", "place"):
+            nearest = 1 if each.at(numbers) < 0 else -1
+            yield Measure("inset", each, whole[each.axis] / 2 + nearest * each.row)
+
+
+def simplest(known: list[Feature], numbers: FloatArray, rows: FloatArray, lengths: Flags) -> Basis:
+    """The measures from which every number of the program is the simplest sum.
+
+    Parameters
+    ----------
+    numbers
+        The numbers and extents (V,), for which the relations hold.
+    rows
+        The relations (M, V).
+    lengths
+        Which numbers are lengths (V,).
+    """
+    ways = ways_free(rows, len(numbers))
+    every = list(measures(known, numbers))
+    seen = np.stack([each.row for each in every]) @ ways
+    groups = _together(seen, every)
+    heads = [every[group[0]] for group in groups]
+    seen = seen[[group[0] for group in groups]]
+    reader = _Reader(heads, numbers, lengths)
+    chosen = _independent(seen, np.argsort(reader.prices, kind="stable"))
+    factors = ways @ np.linalg.inv(seen[chosen])
+    total = reader.cost(factors, chosen)
+    while True:
+        best, swap = total - 1e-9, None
+        inner = seen @ np.linalg.inv(seen[chosen])  # every measure by those chosen
+        for k, row in enumerate(inner):
+            if k in chosen:
+                continue
+            for place in np.flatnonzero(np.abs(row) > SAME).tolist():
+                change = row.copy()
+                change[place] -= 1
+                changed = factors - np.outer(factors[:, place], change / row[place])
+                cost = reader.cost(changed, [*chosen[:place], k, *chosen[place + 1 :]])
+                if cost < best:
+                    best, swap = cost, (place, k)
+        if swap is None:
+            break
+        chosen[swap[0]] = swap[1]
+        factors, total = ways @ np.linalg.inv(seen[chosen]), best
+    near = np.round(factors * 4) / 4
+    factors = np.where(np.abs(factors - near) < SAME, near, factors)
+    return Basis([[every[k] for k in groups[c]] for c in chosen], factors, reader.values[chosen])
+
+
+class _Reader:
+    """What it costs to read a program whose numbers are sums of some measures."""
+
+    def __init__(self, heads: list[Measure], numbers: FloatArray, lengths: Flags) -> None:
+        self.prices = np.array([NAMED[each.word] for each in heads])
+        self.values: FloatArray = np.array([each.row @ numbers for each in heads])
+        count = len(numbers) - 3
+        self.small: FloatArray = np.where(lengths[:count], SENSITIVE * np.abs(numbers[:count]), np.inf)
+        heights = (h for h, each in enumerate(heads) if each.word == "extent" and each.feature.axis == UP)
+        self.height = next(heights, -1)
+
+    def cost(self, factors: FloatArray, chosen: list[int]) -> float:
+        """The cost of the sums (V, Z) of some measures, and of the names of these."""
+        factors, prices = factors[: len(self.small)], self.prices[chosen]
+        size = np.abs(factors)
+        used = size > SAME
+        terms: FloatArray = np.where(used, UGLY, 0.0)
+        for factor, price in FACTORS.items():
+            terms[np.abs(size - factor) < SAME] = price
+        if self.height in chosen:
+            height = chosen.index(self.height)
+            terms[np.abs(factors[:, height] + 0.5) < SAME, height] = FLOOR
+        terms[size * np.abs(self.values[chosen]) > self.small[:, None]] += DIFFERENCE
+        literal = (used.sum(0) == 1) & (size.sum(0) < 1 + SAME) & (prices < PLACED)
+        return float(terms.sum() + prices[~literal & used.any(0)].sum())
+
+
+def _together(seen: FloatArray, every: list[Measure]) -> list[list[int]]:
+    """Measures that always agree, the one with the cheapest word first; those that are always zero are left out."""
+
+    def order(k: int) -> tuple[float, int]:
+        return NAMED[every[k].word], -every[k].feature.axis  # a square seat has a width
+
+    groups: dict[bytes, list[int]] = {}
+    for k, row in enumerate(seen):
+        if np.abs(row).max(initial=0) > SAME:
+            groups.setdefault((np.round(row, 6) + 0.0).tobytes(), []).append(k)
+    return [sorted(group, key=order) for group in groups.values()]
+
+
+def _independent(rows: FloatArray, order: Array) -> list[int]:
+    """As many rows as are independent, the first in an order."""
+    kept: list[int] = []
+    basis = np.zeros((0, rows.shape[1]))
+    for k in order.tolist():
+        rest = rows[k] - basis.T @ (basis @ rows[k])
+        rest = rest - basis.T @ (basis @ rest)
+        if np.linalg.norm(rest) > 1e-6 * float(np.linalg.norm(rows[k])):
+            kept.append(k)
+            basis = np.vstack([basis, rest / np.linalg.norm(rest)])
+    return kept

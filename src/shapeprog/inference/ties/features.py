@@ -1,0 +1,152 @@
+"""What can be measured of a program: numbers that are linear in those it writes, such as the top of a seat.
+
+Every feature is a row of factors for the numbers of the program (F) and three more, the extents of the whole along the
+axes of the grid, whose middle is the origin.  Only what is exactly linear is listed: a tilted part has the
+ends that its statement names, and no sides.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import torch
+
+from shapeprog.geometry.primitive import primitives
+from shapeprog.geometry.scene import Scene
+from shapeprog.inference.tunable import Poses, Tunable
+from shapeprog.language.program import Draw, Node
+from shapeprog.language.statement import language
+from shapeprog.space import HALF, FloatArray
+
+ALIGNED = 1e-9
+"""How far from whole the entries of a rotation may be for sides to lie along the axes of the grid."""
+
+WHOLE = 1e-6
+"""How far a factor may be from a quarter of a whole number."""
+
+Kind = Literal["low", "high", "middle", "place", "length", "radius", "shift", "angle", "extent"]
+
+
+@dataclass(frozen=True)
+class Feature:
+    """One measure.
+
+    Parameters
+    ----------
+    kind
+        What it is: a side or the middle of a part (or of all its copies together), a coordinate or a number that a
+        statement writes, or an extent of the whole.
+    axis
+        The axis of the grid that it is measured along; -1 where there is none.
+    node
+        The number of the node, in the order of the text, that it is of; -1 for extents.
+    all
+        Whether all copies are meant, or else the first.
+    row
+        Factors (F + 3,).
+    """
+
+    kind: Kind
+    axis: int
+    node: int
+    all: bool
+    row: FloatArray
+
+    def at(self, numbers: FloatArray) -> float:
+        """Its value where the numbers, extents included, are these (F + 3,)."""
+        return float(self.row @ numbers)
+
+
+def features(tunable: Tunable, poses: Poses) -> list[Feature]:
+    """All features of a program, none twice."""
+    found: dict[tuple[object, ...], Feature] = {}
+    for feature in _all_features(tunable, poses):
+        group = feature.kind if feature.kind in ("length", "radius", "shift", "angle") else "place"
+        key = group, feature.axis if group == "place" else -1, feature.row.tobytes()
+        found.setdefault(key, feature)
+    return list(found.values())
+
+
+def _all_features(tunable: Tunable, poses: Poses) -> Iterator[Feature]:
+    count = len(tunable.values)
+    for axis in range(3):
+        row = np.zeros(count + 3)
+        row[count + axis] = 1
+        yield Feature("extent", axis, -1, True, row)
+    yield from _sides(tunable, poses)
+    yield from _written(tunable)
+
+
+def _sides(tunable: Tunable, poses: Poses) -> Iterator[Feature]:
+    """Sides and middles of parts that lie along the axes, of the first copy and of all of them."""
+    scene = poses.scene
+    value, slope = _ends(scene)
+    rows = torch.einsum("enr,nrf->enf", slope, poses.slopes).numpy()
+    aligned = (scene.rotation - scene.rotation.round()).abs().amax((-2, -1)) < ALIGNED
+    drawn = [n for n, node in enumerate(tunable.nodes) if isinstance(node, Draw)]
+    for block, node in enumerate(drawn):
+        slots = (scene.block == block).nonzero()[:, 0].numpy()
+        if not len(slots) or not bool(aligned[slots].all()):
+            continue
+        for axis in range(3):
+            low, high = value[axis, slots].numpy(), value[3 + axis, slots].numpy()
+            for which in (False, True) if len(slots) > 1 else (False,):
+                one, two = (int(low.argmin()), int(high.argmax())) if which else (0, 0)
+                ends = rows[axis, slots[one]], rows[3 + axis, slots[two]]
+                for kind, row in (("low", ends[0]), ("high", ends[1]), ("middle", (ends[0] + ends[1]) / 2)):
+                    near = np.round(4 * row) / 4
+                    if np.abs(row - near).max(initial=0) < WHOLE and near.any():
+                        yield Feature(kind, axis, node, which, np.append(near, np.zeros(3)))  # type: ignore[arg-type]
+
+
+def _ends(scene: Scene) -> tuple[torch.Tensor, torch.Tensor]:
+    """Low and high ends of primitives along the axes (6, N), and their slopes (6, N, 16) by sizes, centre, rotation."""
+    leaves = [each.clone().requires_grad_() for each in (scene.size, scene.centre, scene.rotation)]
+    half = torch.zeros_like(scene.centre)
+    for kind in scene.kinds:
+        here = scene.mask & (scene.kind == kind)
+        half = torch.where(here[..., None], primitives[kind].bound(leaves[0]), half)
+    reach = (leaves[2].abs() @ half[..., None])[..., 0]
+    ends = torch.cat([leaves[1] - reach, leaves[1] + reach], -1).T
+    slopes = []
+    for end in ends:
+        parts = torch.autograd.grad(end.sum(), leaves, retain_graph=True, allow_unused=True)
+        filled = [torch.zeros_like(leaf) if part is None else part for part, leaf in zip(parts, leaves, strict=True)]
+        slopes.append(torch.cat([part.flatten(1) for part in filled], 1))
+    return ends.detach(), torch.stack(slopes)
+
+
+def _written(tunable: Tunable) -> Iterator[Feature]:
+    """The numbers themselves: coordinates, full lengths, radii, shifts, angles."""
+    count = len(tunable.values)
+    for f, (n, slot) in enumerate(tunable.moving):
+        node: Node = tunable.nodes[n]
+        quantity = language()[node.name].quantities[slot]
+        axis = axis_of(node, slot)
+        row = np.zeros(count + 3)
+        row[f] = 1
+        if quantity.kind == "length" and quantity.high == HALF and axis < 0:
+            yield Feature("radius", -1, n, False, row)
+        elif quantity.kind == "length":
+            yield Feature("length", axis, n, False, row * (2 if quantity.high == HALF else 1))
+        elif quantity.kind == "position":
+            yield Feature("place", axis, n, False, row)
+        elif quantity.kind == "shift":
+            yield Feature("shift", axis, n, False, row)
+        elif quantity.kind == "angle":
+            yield Feature("angle", -1, n, False, row)
+
+
+def axis_of(node: Node, slot: int) -> int:
+    """The axis of the grid that a number of a node is measured along; -1 where there is none."""
+    declared = language()[node.name]
+    parameter = next(each for each in declared.parameters if slot in range(declared.size)[each.slots])
+    if declared.is_loop and parameter.quantity.width == 1:  # the plane of a mirror lies across the axis of its loop
+        axes = [each.start for each in declared.parameters if each.quantity.kind == "axis"]
+        return int(node.values[axes[0]]) if axes else -1
+    words = parameter.quantity.each.split(", ")
+    word = words[slot - parameter.start] if len(words) > slot - parameter.start else ""
+    return {"up": 0, "depth": 1, "left-right": 2}.get(word, -1)

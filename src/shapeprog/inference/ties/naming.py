@@ -1,0 +1,185 @@
+"""Names for the measures that a program follows from, and the program written with them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from shapeprog.inference.ties.basis import SAME, Basis, Measure
+from shapeprog.inference.tunable import Tunable
+from shapeprog.language.evaluation import evaluated
+from shapeprog.language.expression import Name, Value, combined
+from shapeprog.language.parameters import to_float32
+from shapeprog.language.program import Draw, Node, Program
+from shapeprog.language.source import Assignment, Line, Source, WrittenDraw, WrittenLoop
+from shapeprog.language.statement import language
+from shapeprog.space import UP
+
+EXTENTS = ("height", "depth", "width")
+"""What the extents of the whole are called along the axes of the grid."""
+
+FLOOR = "floor"
+"""The name of half the height below the middle, where the program stands."""
+
+SIDES = {
+    ("low", 0): "bottom", ("high", 0): "top", ("low", 1): "front", ("high", 1): "rear", ("low", 2): "left",
+    ("high", 2): "right",
+}  # fmt: skip
+
+NOTES = {"top": "above the floor", "bottom": "above the floor", "inset": "from the side of the whole"}
+"""What is said behind names whose measure begins somewhere."""
+
+SHARED = ("thickness", "radius", "edge", "spacing", "inset", "tilt")
+"""What different parts may share and be called so without the name of a part."""
+
+WIDE = 96
+"""Letters of a line that names numbers, about."""
+
+LEVEL = 0.6
+"""A part is thin along an axis where it measures less than this share of the next longer."""
+
+
+def written(tunable: Tunable, basis: Basis) -> Program:
+    """The program whose numbers follow from named ones; those used once stay where they are used."""
+    names, order = _names(tunable, basis)
+    count = len(tunable.moving)
+    uses = np.abs(basis.factors[:count]) > SAME
+    alone = [  # used once, as it is; or, an extent that nothing follows from, not at all
+        not uses[:, z].any() or bool(uses[:, z].sum() == 1 and abs(np.abs(basis.factors[:count, z]).sum() - 1) < SAME)
+        for z in range(len(basis.chosen))
+    ]
+    up = [z for z in range(len(basis.chosen)) if names[z] == EXTENTS[UP]]
+    floors = bool(up) and not alone[up[0]] and int((basis.factors[:count, up[0]] == -0.5).sum()) > 1
+    terms: dict[int, Value] = {
+        z: to_float32(basis.values[z]) if alone[z] else Name(names[z]) for z in range(len(basis.chosen))
+    }
+    table: dict[tuple[int, int], Value] = {}
+    for place, row in zip(tunable.moving, basis.factors[:count], strict=True):
+        parts: list[tuple[Value, float]] = []
+        for z in order:
+            if not row[z]:
+                continue
+            if floors and z == up[0] and row[z] == -0.5:
+                parts.insert(0, (Name(FLOOR), 1.0))
+            else:
+                parts.append((terms[z], float(row[z])))
+        parts.sort(key=lambda part: part[1] < 0)  # sums begin with what is added
+        table[place] = combined(0.0, parts)
+    lines: list[Line] = list(_header(tunable, basis, names, order, alone))
+    if floors:
+        lines.append(Assignment(((FLOOR, -Name(EXTENTS[UP]) / 2),)))
+    body = _lines(tunable.program.body, iter(range(len(tunable.nodes))), table)
+    return evaluated(Source((*lines, *body)))
+
+
+def _header(
+    tunable: Tunable, basis: Basis, names: list[str], order: list[int], alone: list[bool]
+) -> Iterator[Assignment]:
+    """The lines that name numbers: the extents of the whole, then what is measured from the same place together."""
+    groups: dict[str, list[int]] = {"whole": [], "": []}
+    for z in order:
+        if not alone[z]:
+            word = basis.chosen[z][0].word
+            groups.setdefault("whole" if word == "extent" else NOTES.get(word, ""), []).append(z)
+    groups["whole"].sort(key=lambda z: -EXTENTS.index(names[z]))
+    for note, members in groups.items():
+        line: list[tuple[str, Value]] = []
+        for z in members:
+            pair = names[z], to_float32(basis.values[z])
+            if line and sum(len(name) + 8 for name, _ in [*line, pair]) > WIDE:
+                yield Assignment(tuple(line), note if note != "whole" else "")
+                line = []
+            line.append(pair)
+        if line:
+            yield Assignment(tuple(line), note if note != "whole" else "")
+
+
+def _names(tunable: Tunable, basis: Basis) -> tuple[list[str], list[int]]:
+    """A name for every measure, and the order in which they are met: the whole first, then by the order of the text."""
+    known, taken = language(), {FLOOR, *(node.name for node in tunable.nodes), *_roles(tunable.nodes)}
+    taken |= {*known.names, *known.roles}
+    first = [min(each.feature.node for each in group) for group in basis.chosen]
+    order = sorted(range(len(first)), key=lambda z: (basis.chosen[z][0].word != "extent", first[z], z))
+    names = [""] * len(first)
+    for z in order:
+        base = _name(tunable, basis.chosen[z])
+        name, number = base, 2
+        while name in taken:
+            name, number = f"{base}_{number}", number + 1
+        names[z] = name
+        taken.add(name)
+    return names, order
+
+
+def _roles(nodes: list[Node]) -> Iterator[str]:
+    return (node.role for node in nodes if isinstance(node, Draw) and node.role)
+
+
+def _name(tunable: Tunable, group: list[Measure]) -> str:
+    """The name of measures that always agree: of the part that it is of, or none if several kinds of parts share it."""
+    first = group[0]
+    if first.word == "extent":
+        return EXTENTS[first.feature.axis]
+    alike = [each for each in group if each.word == first.word]
+    earliest = min(alike, key=lambda each: (each.feature.node, each.feature.all))
+    kind = _kind(tunable, earliest)
+    if kind in SHARED and len({_part(tunable, each) for each in alike}) > 1:
+        return kind
+    return f"{_part(tunable, earliest)}_{kind}"
+
+
+def _part(tunable: Tunable, measure: Measure) -> str:
+    """What the part is called that a measure is of; of a loop the first part in it."""
+    rest = tunable.nodes[measure.feature.node :]
+    return next(node.word for node in rest if isinstance(node, Draw))
+
+
+def _kind(tunable: Tunable, measure: Measure) -> str:
+    """What is measured, as the end of a name."""
+    feature, word = measure.feature, measure.word
+    node = tunable.nodes[feature.node]
+    if word == "length":
+        return _length(tunable, measure)
+    if word == "shift":
+        return "spacing"
+    if word == "side":
+        return SIDES[feature.kind, feature.axis]
+    if word in ("angle", "place") or (word == "top" and feature.kind == "place"):
+        f = int(np.flatnonzero(feature.row)[0])
+        slot = tunable.moving[f][1]
+        declared = language()[node.name]
+        parameter = next(each for each in declared.parameters if slot in range(declared.size)[each.slots])
+        axis = ("up", "depth", "side")[feature.axis] if feature.axis >= 0 and parameter.quantity.width > 1 else ""
+        return "_".join(filter(None, (parameter.name, axis)))
+    return {"top": "top", "bottom": "bottom", "inset": "inset", "radius": "radius"}[word]
+
+
+def _length(tunable: Tunable, measure: Measure) -> str:
+    """Thickness where a part is thinnest, else what the axis says."""
+    node = tunable.nodes[measure.feature.node]
+    declared = language()[node.name]
+    f = int(np.flatnonzero(measure.feature.row)[0])
+    slot = tunable.moving[f][1]
+    lengths = [s for s, quantity in enumerate(declared.quantities) if quantity.kind == "length"]
+    sizes = sorted(node.values[s] for s in lengths)
+    own = node.values[slot]
+    if measure.feature.axis < 0:
+        return "thickness" if own == sizes[0] else "breadth"
+    if len(sizes) < 2 or (own <= LEVEL * sizes[1] and own == sizes[0]):
+        return "thickness"
+    return EXTENTS[measure.feature.axis]
+
+
+def _lines(
+    body: tuple[Node, ...], counter: Iterator[int], table: dict[tuple[int, int], Value]
+) -> tuple[WrittenDraw | WrittenLoop, ...]:
+    found: list[WrittenDraw | WrittenLoop] = []
+    for node in body:
+        n = next(counter)
+        values = tuple(table.get((n, slot), value) for slot, value in enumerate(node.values))
+        if isinstance(node, Draw):
+            found.append(WrittenDraw(node.name, values, node.role))
+        else:
+            found.append(WrittenLoop(node.name, values, _lines(node.body, counter, table)))
+    return tuple(found)

@@ -1,0 +1,65 @@
+"""Which relations are worth having: those whose price in fit is below that of the number they save.
+
+Near its optimum the misfit of a program is quadratic.  With H its curvature and p the numbers, imposing c p = 0 costs
+(c p)^2 / (c H^-1 c'), so thousands of relations are priced without a refit; the cheapest is imposed, H^-1 and p follow
+by one elimination, and so on.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from shapeprog.inference.ties.relations import Relation
+from shapeprog.space import FloatArray
+
+HELD = 1e-9
+"""Share of its freedom below which a relation holds already, or contradicts what does."""
+
+
+def worthwhile(
+    candidates: list[Relation],
+    numbers: FloatArray,
+    curvature: FloatArray,
+    price: float,
+    *,
+    fixed: FloatArray,
+    low: FloatArray,
+) -> tuple[FloatArray, FloatArray]:
+    """Relations (M, V) that are worth having, those that are fixed first; and the optimum (V,) where they hold.
+
+    Parameters
+    ----------
+    numbers, curvature
+        The optimum (V,), and half the curvature (V, V) of the misfit there.
+    price
+        What a number is worth, in the unit of the misfit.
+    fixed
+        Relations (M, V) that hold in any case.
+    low
+        What no number may fall below (V,) for the sake of a relation.
+    """
+    kept, free = list(fixed), np.linalg.inv(curvature)
+    rows = np.stack([*fixed, *(each.row for each in candidates)]) if len(fixed) or candidates else fixed
+    if not len(rows):
+        return fixed, numbers
+    low = np.minimum(low, numbers)
+    spread, off = np.einsum("kv,vw,kw->k", rows, free, rows, optimize=True), rows @ numbers
+    worth = price * np.array([np.inf] * len(fixed) + [each.trust for each in candidates])
+    least = HELD * spread
+    while True:
+        gain = np.where(spread > least, worth - off**2 / np.maximum(spread, least), -np.inf)
+        best = int(np.argmax(gain))
+        if gain[best] <= 0:
+            return np.array(kept).reshape(-1, len(numbers)), numbers
+        along = free @ rows[best]
+        moved = numbers - along * off[best] / spread[best]
+        if best >= len(fixed):
+            if (moved < low).any():
+                spread[best] = 0.0
+                continue
+            kept.append(rows[best])
+        across, numbers = rows @ along, moved
+        free = free - np.outer(along, along) / spread[best]
+        off = off - across * off[best] / spread[best]
+        spread = spread - across**2 / spread[best]
+        spread[best] = 0.0

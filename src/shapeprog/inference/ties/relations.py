@@ -1,0 +1,108 @@
+"""Relations that may hold between the measures of a program: equal, opposite, centred, in contact, part of a whole."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import combinations
+from typing import NamedTuple
+
+import numpy as np
+
+from shapeprog.inference.ties.features import Feature
+from shapeprog.space import DEPTH, SIDE, UP, FloatArray
+
+WITHIN, JOINED = 0.3, 1.5
+"""Cells by which a relation may be off that is worth a thought; and one between the sides of parts that touch, or about
+the middle: parts end inside each other, where nobody sees how far they reach."""
+
+DEGREES = 2.0
+"""The same for angles, in degrees."""
+
+THIN = 3.0
+"""Cells below which lengths along different axes may well be the two sides of one section."""
+
+CENTRED, HOLDING, SURE, LIKELY, POSSIBLE, CHANCE = 2.0, 1.2, 1.0, 0.6, 0.25, 0.03
+"""What the number that a relation saves is worth to it: for parts that are their own mirror image, for relations that
+hold touching parts together when a number is changed, for such as furniture is built by, are common, are possible, and
+are mostly chance."""
+
+HIDDEN = {CENTRED: 1.3, HOLDING: CHANCE}
+"""What relations are worth that are off by so much that only hidden surfaces can be meant."""
+
+SIMPLE = 4
+"""Factors of a relation beyond which it is worth less, in proportion: it takes a long sum to write."""
+
+
+class Relation(NamedTuple):
+    """That a row of factors (F + 3,) times the numbers of a program and the extents of the whole is zero.
+
+    Parameters
+    ----------
+    row
+        The factors, the first that is not zero being positive.
+    trust
+        What the number that it saves is worth to it, from 0 to 1.
+    """
+
+    row: FloatArray
+    trust: float
+
+
+def relations(known: list[Feature], numbers: FloatArray, touching: set[tuple[int, int]]) -> list[Relation]:
+    """Relations that nearly hold, each once, with the highest trust that any of its readings has.
+
+    Parameters
+    ----------
+    numbers
+        Where the numbers of the program and the extents are (F + 3,).
+    touching
+        Pairs of nodes, the smaller first, whose parts touch.
+    """
+    found: dict[bytes, Relation] = {}
+    angles = np.any([each.row != 0 for each in known if each.kind == "angle"] or [np.zeros(len(numbers), bool)], axis=0)
+    for row, trust in _candidates(known, numbers, touching):
+        factors = np.flatnonzero(row)
+        if not len(factors):
+            continue
+        tidy = row / row[factors[0]]
+        off, within = abs(tidy @ numbers) / np.abs(tidy).max(), DEGREES if angles[factors].any() else WITHIN
+        if trust >= HOLDING and within <= off < JOINED:
+            trust = HIDDEN[trust]
+        elif off >= within:
+            continue
+        trust *= min(1.0, SIMPLE / len(factors))
+        key = np.round(tidy, 6).tobytes()
+        if key not in found or found[key].trust < trust:
+            found[key] = Relation(tidy, trust)
+    return list(found.values())
+
+
+def _candidates(
+    known: list[Feature], numbers: FloatArray, touching: set[tuple[int, int]]
+) -> Iterator[tuple[FloatArray, float]]:
+    whole = {each.axis: each for each in known if each.kind == "extent"}
+    places = [each for each in known if each.kind in ("low", "high", "middle", "place")]
+    for axis in range(3):
+        here = [each for each in places if each.axis == axis]
+        for one in here:
+            level = one.kind == "middle"
+            if axis in (DEPTH, SIDE):
+                yield one.row, CENTRED if level else POSSIBLE
+            if not level:
+                yield one.row - whole[axis].row / 2, SURE
+                yield one.row + whole[axis].row / 2, HOLDING if axis == UP else SURE
+        for one, two in combinations(here, 2):
+            middles = (one.kind == "middle") + (two.kind == "middle")
+            if middles == 1 or (one.node == two.node and one.all == two.all):
+                continue
+            pair = (min(one.node, two.node), max(one.node, two.node))
+            yield one.row - two.row, HOLDING if pair in touching and not middles else LIKELY
+            if axis in (DEPTH, SIDE):
+                yield one.row + two.row, LIKELY if middles == 0 else POSSIBLE
+    for kind in ("length", "radius", "shift", "angle"):
+        alike = [each for each in known if each.kind == kind]
+        for one, two in combinations(alike, 2):
+            thin = kind == "length" and max(abs(one.at(numbers)), abs(two.at(numbers))) < THIN
+            yield one.row - two.row, LIKELY if one.axis == two.axis or thin else CHANCE
+            if kind in ("shift", "angle"):
+                yield one.row + two.row, POSSIBLE

@@ -1,0 +1,110 @@
+"""Ties: numbers of a program that hold together are written as expressions of few named ones.
+
+Relations that nearly hold are priced by what they cost in fit, those worth more than a number are imposed, the numbers
+that stay free are refitted, and so on until no further number is saved.  What is free is then named.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+import torch
+
+from shapeprog.errors import ShapeProgError
+from shapeprog.geometry.scene import Scene
+from shapeprog.inference.evidence import Evidence
+from shapeprog.inference.joints import Joints, find_joints
+from shapeprog.inference.refine import single_threaded
+from shapeprog.inference.ties.basis import Basis, simplest
+from shapeprog.inference.ties.features import Feature, features
+from shapeprog.inference.ties.fitting import Misfit, refitted
+from shapeprog.inference.ties.naming import written
+from shapeprog.inference.ties.pricing import worthwhile
+from shapeprog.inference.ties.relations import relations
+from shapeprog.inference.tunable import CELLS, DEGREES, Tunable
+from shapeprog.language.free import free_numbers
+from shapeprog.language.program import Draw, Program
+from shapeprog.space import FloatArray
+
+PRICE = 1e-4
+"""What a number is worth: mean squared distance in cells; chosen on val."""
+
+ROUNDS = 3
+"""Most times that relations are looked for."""
+
+NOWHERE = -1e6
+"""A floor that no part stands on: standing is found by its own relation."""
+
+
+class Tied(NamedTuple):
+    """A program whose numbers hold together, and how many of them are free."""
+
+    program: Program
+    free: int
+
+
+def tie(
+    program: Program,
+    evidence: Evidence,
+    *,
+    price: float = PRICE,
+    seed: int = 0,
+    progress: Callable[[str, float], None] | None = None,
+) -> Tied:
+    """The same program with names for its free numbers and expressions for all others; the same for the same seed.
+
+    Parameters
+    ----------
+    evidence
+        What it should fit: how far relations may move its parts.
+    price
+        What a number is worth, as mean squared distance in cells.
+    """
+    plain = Program(program.body)
+    if not plain.size:
+        return Tied(plain, 0)
+    with single_threaded():
+        tunable = Tunable(plain)
+        misfit = Misfit(tunable, evidence, seed)
+        numbers, rows = misfit.numbers, np.zeros((0, len(misfit.numbers)))
+        known: list[Feature] = []
+        scene = tunable.poses(tunable.values).scene
+        joints = _joints(scene, seed)
+        pairs = touching(tunable, scene, joints) if joints else set()
+        for round_ in range(ROUNDS):
+            poses = tunable.poses(torch.from_numpy(numbers[: len(tunable.values)]))
+            known = features(tunable, poses)
+            before = len(rows)
+            offered = relations(known, numbers, pairs)
+            rows, numbers = worthwhile(offered, numbers, misfit.at(numbers)[1], price, fixed=rows, low=misfit.low)
+            numbers = refitted(misfit, numbers, rows, joints)
+            if progress:
+                progress("tying numbers", (round_ + 1) / ROUNDS)
+            if len(rows) == before:
+                break
+        basis = _rounded(simplest(known, numbers, rows, np.append(tunable.are("length").numpy(), [False] * 3)))
+        named = written(tunable, basis)
+        return Tied(named, free_numbers(named))
+
+
+def touching(tunable: Tunable, scene: Scene, joints: Joints) -> set[tuple[int, int]]:
+    """Pairs of nodes whose parts touch or nearly do, the smaller number first."""
+    drawn = [n for n, node in enumerate(tunable.nodes) if isinstance(node, Draw)]
+    pairs = zip(scene.block[joints.first].tolist(), scene.block[joints.second].tolist(), strict=True)
+    return {(min(drawn[a], drawn[b]), max(drawn[a], drawn[b])) for a, b in pairs}
+
+
+def _joints(scene: Scene, seed: int) -> Joints | None:
+    try:
+        return find_joints(scene, NOWHERE, torch.Generator().manual_seed(seed))
+    except ShapeProgError:  # a part without a surface touches nothing
+        return None
+
+
+def _rounded(basis: Basis) -> Basis:
+    """The measures with as many decimals as numbers keep."""
+    digits = [DEGREES if group[0].word == "angle" else CELLS for group in basis.chosen]
+    values: FloatArray = np.array([round(value, places) for value, places in zip(basis.values, digits, strict=True)])
+    return Basis(basis.chosen, basis.factors, values)

@@ -1,0 +1,86 @@
+"""The free numbers of a program: those that may be set without another having to follow.
+
+They are the names that stand for plain numbers and all other plain numbers of statements, loops and calls, in the order
+of the text.  Counts, turns and axes are none; neither is a zero, which says that something is left as it is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import count
+
+from shapeprog.language.evaluation import evaluated
+from shapeprog.language.expression import Expression, Value
+from shapeprog.language.parameters import to_float32
+from shapeprog.language.program import Program
+from shapeprog.language.source import Assignment, Call, Function, Line, Source, WrittenDraw, WrittenLoop
+from shapeprog.language.statement import language
+from shapeprog.language.text import numbers_written, source_of
+
+
+def numbers(program: Program) -> int:
+    """How many continuous numbers make a program: all that are written, or those that are free where others follow from
+    names; counts and steps of loops are none."""
+    if program.source is not None:
+        return free_numbers(program)
+    return sum(numbers_written(node) for node in program.walk())
+
+
+def free_numbers(program: Program) -> int:
+    """How many numbers of a program are free."""
+    return sum(1 for _ in _places(source_of(program).lines))
+
+
+def multiplied(program: Program, place: int, factor: float) -> Program:
+    """The program with one of its free numbers multiplied; ``place`` counts them from 0.
+
+    A ``ShapeProgError`` if that is no program, as when an expression then divides by zero.
+    """
+    counter = count()
+    return evaluated(Source(tuple(_changed(line, counter, place, factor) for line in source_of(program).lines)))
+
+
+def _places(lines: tuple[Line, ...]) -> Iterator[Value]:
+    for line in lines:
+        yield from (value for value, free in _numbers(line) if free)
+        if isinstance(line, WrittenLoop | Function):
+            yield from _places(line.body)
+
+
+def _numbers(line: Line) -> Iterator[tuple[Value, bool]]:
+    """The numbers on a line, and whether each is free: plain, continuous and not zero."""
+    if isinstance(line, WrittenDraw | WrittenLoop):
+        declared = language()[line.name]
+        for value, quantity in zip(line.values, declared.quantities, strict=True):
+            yield value, _plain(value) and not quantity.discrete
+    elif isinstance(line, Assignment):
+        yield from ((value, _plain(value)) for _, value in line.numbers)
+    elif isinstance(line, Call):
+        yield from ((value, _plain(value)) for _, value in line.arguments)
+
+
+def _plain(value: Value) -> bool:
+    return not isinstance(value, Expression) and value != 0
+
+
+def _changed(line: Line, counter: Iterator[int], place: int, factor: float) -> Line:
+    """The line with one free number of the program multiplied."""
+    values = [
+        to_float32(value * factor) if free and not isinstance(value, Expression) and next(counter) == place else value
+        for value, free in _numbers(line)
+    ]
+    if isinstance(line, WrittenDraw):
+        return replace(line, values=tuple(values))
+    if isinstance(line, WrittenLoop):
+        body = tuple(_changed(inner, counter, place, factor) for inner in line.body)
+        return replace(line, values=tuple(values), body=body)
+    if isinstance(line, Assignment):
+        named = zip(line.numbers, values, strict=True)
+        return replace(line, numbers=tuple((name, value) for (name, _), value in named))
+    if isinstance(line, Call):
+        given = zip(line.arguments, values, strict=True)
+        return replace(line, arguments=tuple((name, value) for (name, _), value in given))
+    if isinstance(line, Function):
+        return replace(line, body=tuple(_changed(inner, counter, place, factor) for inner in line.body))
+    return line

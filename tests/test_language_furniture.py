@@ -132,9 +132,9 @@ def test_no_form_calls_a_part_what_it_is(word):
 
 def test_an_axis_that_is_none_is_told_with_the_words_there_are():
     text = program_to_json(parse("for i in mirror(side):\n    leg(at=(0, 0, 0), size=(1, 1, 1))\n"))
-    with pytest.raises(InputError, match="not one of up, depth, side") as caught:
+    with pytest.raises(InputError, match="holds what is no axis") as caught:
         program_from_json(text.replace('"side"', '"left"'))
-    assert caught.value.hint == "write its word"
+    assert caught.value.hint == "it is one of up, depth, side"
 
 
 def test_a_role_is_refused_that_is_there_or_no_word():

@@ -8,7 +8,7 @@ connected, and all are named by what they are for.  All of it works on program o
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -83,7 +83,7 @@ class Assembly:
     explained: float
     reason: str
     trade_off: tuple[TradeOff, ...]
-    evidence: Evidence
+    evidence: Evidence = field(compare=False, repr=False)
 
 
 def assemble(

@@ -78,7 +78,7 @@ class Prices:
     def of(self, program: Program) -> float:
         """The price of a program as it is written."""
         lines = sum(self.loop if isinstance(node, Loop) else self.statement for node in program.walk())
-        return lines + self.number * numbers(program)
+        return float(lines + self.number * numbers(program))
 
 
 class Covers(NamedTuple):

@@ -39,7 +39,7 @@ Flags = npt.NDArray[np.bool_]
 Word = Literal["extent", "top", "bottom", "inset", "length", "radius", "shift", "angle", "side", "place"]
 
 NAMED: dict[Word, float] = {
-    "extent": -0.5, "length": 0.8, "radius": 0.8, "top": 0.9, "bottom": 1.2, "inset": 1.2, "shift": 1.0, "angle": 1.0,
+    "extent": -6.0, "length": 0.8, "radius": 0.8, "top": 0.9, "bottom": 1.2, "inset": 1.2, "shift": 1.0, "angle": 1.0,
     "side": 6.0, "place": 5.0,
 }  # fmt: skip
 """What a name costs its reader by what it measures, and by how much the extents of the whole are preferred.  A number

@@ -122,11 +122,15 @@ def _name(tunable: Tunable, group: list[Measure]) -> str:
     if first.word == "extent":
         return EXTENTS[first.feature.axis]
     alike = [each for each in group if each.word == first.word]
-    earliest = min(alike, key=lambda each: (each.feature.node, each.feature.all))
-    kind = _kind(tunable, earliest)
-    if kind in SHARED and len({_part(tunable, each) for each in alike}) > 1:
+    parts = [_part(tunable, each) for each in alike]
+    part = max(dict.fromkeys(parts), key=parts.count)  # the one that has it most often, else the first
+    mine = [each for each, owner in zip(alike, parts, strict=True) if owner == part]
+    earliest = min(mine, key=lambda each: (each.feature.node, each.feature.all))
+    square = len({each.feature.node for each in mine}) < len(mine)  # two sides of one section
+    kind = "thickness" if first.word == "length" and square else _kind(tunable, earliest)
+    if kind in SHARED and not square and len(set(parts)) > 1:
         return kind
-    return f"{_part(tunable, earliest)}_{kind}"
+    return f"{part}_{kind}"
 
 
 def _part(tunable: Tunable, measure: Measure) -> str:

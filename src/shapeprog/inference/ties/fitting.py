@@ -21,8 +21,11 @@ STEPS = 4
 HOLD = 1e-2
 """Weight of a squared change of an extent of the whole, in cells: the box of the target is known."""
 
-TOGETHER = 1.0
-"""Weight of a squared gap between parts that touched: they are brought together again."""
+TOGETHER, CLOSED = 0.03, 0.2
+"""Weights of a squared gap between parts that touched, and of one that is still open at the end."""
+
+OPEN = 0.03
+"""How far in cells from closed a joint counts as open."""
 
 FARTHEST = 0.5
 """Farthest that one step moves the surface by one number, in cells."""
@@ -50,7 +53,7 @@ class Misfit:
         self._gentle = np.concatenate([gentle, np.full(3, HOLD)])
 
     def at(
-        self, numbers: FloatArray, draws: int = DRAWS, joints: Joints | None = None
+        self, numbers: FloatArray, draws: int = DRAWS, joints: Joints | None = None, together: float = TOGETHER
     ) -> tuple[FloatArray, FloatArray]:
         """Half the slope (V,) and half the curvature (V, V) of the mean squared distance, with what holds numbers to
         where they were at the start, and open joints together."""
@@ -64,21 +67,32 @@ class Misfit:
             curvature[:count, :count] += two.numpy() / draws
         if joints is not None and len(joints.first):
             gaps = needs(poses.scene, poses.slopes, moved(poses.scene, joints))
-            wide = TOGETHER * gaps.slopes
+            wide = together * gaps.slopes
             slope[:count] += (wide.T @ gaps.residual).numpy()
             curvature[:count, :count] += (wide.T @ gaps.slopes).numpy()
         slope += self._gentle * (numbers - self.numbers)
         return slope, curvature + np.diag(self._gentle)
 
 
-def refitted(misfit: Misfit, numbers: FloatArray, rows: FloatArray, joints: Joints | None) -> FloatArray:
+def is_open(misfit: Misfit, numbers: FloatArray, joints: Joints | None) -> bool:
+    """Whether parts that touched are apart."""
+    if joints is None or not len(joints.first):
+        return False
+    poses = misfit.tunable.poses(torch.from_numpy(numbers[: len(misfit.tunable.values)]))
+    gaps = needs(poses.scene, poses.slopes, moved(poses.scene, joints))
+    return bool((gaps.residual[: len(joints.first)] > OPEN).any())
+
+
+def refitted(
+    misfit: Misfit, numbers: FloatArray, rows: FloatArray, joints: Joints | None, together: float = TOGETHER
+) -> FloatArray:
     """The numbers (V,) of the least misfit for which relations (M, V) hold; parts that touched are kept together."""
     ways = ways_free(rows, len(numbers))
     numbers = ways @ (ways.T @ numbers)  # all but rounding of what is there
     farthest = np.concatenate([FARTHEST / misfit.tunable.scale.numpy(), np.full(3, FARTHEST)])
     low = np.minimum(misfit.low, numbers)
     for _ in range(STEPS):
-        slope, curvature = misfit.at(numbers, 1, joints)
+        slope, curvature = misfit.at(numbers, 1, joints, together)
         move = ways @ -np.linalg.solve(ways.T @ curvature @ ways, ways.T @ slope)
         too_far = float(np.max(np.abs(move) / farthest, initial=1.0))
         onwards = numbers + move / too_far

@@ -82,6 +82,7 @@ def _candidates(
 ) -> Iterator[tuple[FloatArray, float]]:
     whole = {each.axis: each for each in known if each.kind == "extent"}
     places = [each for each in known if each.kind in ("low", "high", "middle", "place")]
+    ends = {(each.node, each.all, each.axis, each.kind): each.at(numbers) for each in places}
     for axis in range(3):
         here = [each for each in places if each.axis == axis]
         for one in here:
@@ -96,8 +97,9 @@ def _candidates(
             if middles == 1 or (one.node == two.node and one.all == two.all):
                 continue
             pair = (min(one.node, two.node), max(one.node, two.node))
-            yield one.row - two.row, HOLDING if pair in touching and not middles else LIKELY
-            if axis in (DEPTH, SIDE):
+            if one.kind == two.kind or not _edge(one, two, ends, mirror=False):
+                yield one.row - two.row, HOLDING if pair in touching and not middles else LIKELY
+            if axis in (DEPTH, SIDE) and not (one.kind == two.kind and _edge(one, two, ends, mirror=True)):
                 yield one.row + two.row, LIKELY if middles == 0 else POSSIBLE
     for kind in ("length", "radius", "shift", "angle"):
         alike = [each for each in known if each.kind == kind]
@@ -106,3 +108,19 @@ def _candidates(
             yield one.row - two.row, LIKELY if one.axis == two.axis or thin else CHANCE
             if kind in ("shift", "angle"):
                 yield one.row + two.row, POSSIBLE
+
+
+def _edge(one: Feature, two: Feature, ends: dict[tuple[int, bool, int, str], float], *, mirror: bool) -> bool:
+    """Whether two parts, or one and the mirror image of the other, would meet along an edge at best if these sides met:
+    they hold together by others."""
+    overlaps = []
+    for axis in range(3):
+        sides = [ends.get((each.node, each.all, axis, kind)) for each in (one, two) for kind in ("low", "high")]
+        if any(side is None for side in sides):
+            return False
+        low1, high1, low2, high2 = (float(side) for side in sides if side is not None)
+        if mirror and axis == one.axis:
+            low2, high2 = -high2, -low2
+        overlaps.append(min(high1, high2) - max(low1, low2))
+    others = [overlap for axis, overlap in enumerate(overlaps) if axis != one.axis]
+    return min(others) < min(WITHIN, overlaps[one.axis])

@@ -19,7 +19,7 @@ from shapeprog.inference.joints import Joints, find_joints
 from shapeprog.inference.refine import single_threaded
 from shapeprog.inference.ties.basis import Basis, simplest
 from shapeprog.inference.ties.features import Feature, features
-from shapeprog.inference.ties.fitting import Misfit, refitted
+from shapeprog.inference.ties.fitting import CLOSED, Misfit, is_open, refitted
 from shapeprog.inference.ties.naming import written
 from shapeprog.inference.ties.pricing import worthwhile
 from shapeprog.inference.ties.relations import relations
@@ -84,6 +84,8 @@ def tie(
                 progress("tying numbers", (round_ + 1) / ROUNDS)
             if len(rows) == before:
                 break
+        if is_open(misfit, numbers, joints):
+            numbers = refitted(misfit, numbers, rows, joints, CLOSED)
         basis = _rounded(simplest(known, numbers, rows, np.append(tunable.are("length").numpy(), [False] * 3)))
         named = written(tunable, basis)
         return Tied(named, free_numbers(named))

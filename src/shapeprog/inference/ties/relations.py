@@ -33,6 +33,10 @@ SIMPLE = 4
 """Factors of a relation beyond which it is worth less, in proportion: it takes a long sum to write."""
 
 
+Ends = dict[tuple[int, bool, int, str], float]
+"""Where sides are, by node, whether all copies are meant, axis and kind."""
+
+
 class Relation(NamedTuple):
     """That a row of factors (F + 3,) times the numbers of a program and the extents of the whole is zero.
 
@@ -82,7 +86,7 @@ def _candidates(
 ) -> Iterator[tuple[FloatArray, float]]:
     whole = {each.axis: each for each in known if each.kind == "extent"}
     places = [each for each in known if each.kind in ("low", "high", "middle", "place")]
-    ends = {(each.node, each.all, each.axis, each.kind): each.at(numbers) for each in places}
+    ends: Ends = {(each.node, each.all, each.axis, each.kind): each.at(numbers) for each in places}
     for axis in range(3):
         here = [each for each in places if each.axis == axis]
         for one in here:
@@ -110,7 +114,7 @@ def _candidates(
                 yield one.row + two.row, POSSIBLE
 
 
-def _edge(one: Feature, two: Feature, ends: dict[tuple[int, bool, int, str], float], *, mirror: bool) -> bool:
+def _edge(one: Feature, two: Feature, ends: Ends, *, mirror: bool) -> bool:
     """Whether two parts, or one and the mirror image of the other, would meet along an edge at best if these sides met:
     they hold together by others."""
     overlaps = []

@@ -21,7 +21,7 @@ from shapeprog.language.program import Program
 from shapeprog.language.text import format_program, parse
 from shapeprog.view import Item, contact_sheet, picture, viewer
 from shapeprog.view import raster_kernels as kernels
-from shapeprog.view.listing import listing, parted
+from shapeprog.view.listing import listing, parted, wrapped
 from shapeprog.view.model import of_cells, of_mesh, of_parts, of_points, of_shape
 from shapeprog.view.render import camera_for, render
 
@@ -189,3 +189,17 @@ def test_listing_shows_programs_as_they_are_written():
     assert ["".join(parted(line)) for line in lines] == [line.text for line in lines]
     assert [line.text for line in listing(parse(text))][1] == "width = 10"
     assert "half=width / 2)" in listing(parse(text))[8].text
+
+
+def test_long_lines_are_broken_and_nothing_is_lost():
+    program = parse(
+        "width, leg_thickness = 10, 2\n"
+        "for i in mirror(side):\n"
+        "    leg(at=(-width / 2, leg_thickness - width / 2, 0), size=(width - 2 * leg_thickness, leg_thickness, 1))\n"
+    )
+    for line in listing(program):
+        for most in (40, 60, 200):
+            parts = wrapped(line, most)
+            assert all(len(part.text) <= most for part in parts)
+            assert "".join(part.text for part in parts).replace(" ", "") == line.text.replace(" ", "")
+            assert [part.word for part in parts] == [line.word] + [""] * (len(parts) - 1)

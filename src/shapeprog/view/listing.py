@@ -57,6 +57,23 @@ def parted(line: Shown) -> tuple[str, str, str]:
     return line.text[:start], line.word, line.text[start + len(line.word) :]
 
 
+def wrapped(line: Shown, most: int) -> list[Shown]:
+    """A line as several of at most so many letters, broken behind commas, else between words; those that follow have no
+    word and stand farther in.  What has no place to break is cut."""
+    indent = " " * (len(line.text) - len(line.text.lstrip(" ")) + 4)
+    found, rest, word = [], line.text, line.word
+    while len(rest) > most:
+        limit = max(most, len(indent) + 2)
+        cuts = (rest.rfind(end, len(indent), limit) + len(end) for end in ("), ", ", ", " "))
+        cut = next((cut for cut in cuts if cut > len(indent) + 2), 0)
+        if not cut:
+            rest = rest[: limit - 1] + "…"
+            break
+        found.append(replace(line, text=rest[:cut].rstrip(), word=word))
+        rest, word = indent + rest[cut:], ""
+    return [*found, replace(line, text=rest, word=word)]
+
+
 class _Drawn:
     """The drawing statements of the program written out that each line makes, by the ``id`` of the line."""
 

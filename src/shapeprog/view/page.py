@@ -20,7 +20,7 @@ from shapeprog.formats.colours import colour
 from shapeprog.formats.parts import parts
 from shapeprog.language.program import Program
 from shapeprog.language.statement import language
-from shapeprog.view.listing import Shown, listing, parted
+from shapeprog.view.listing import Shown, listing, parted, wrapped
 from shapeprog.view.model import Model, of_parts, of_shape
 from shapeprog.view.render import Image, camera_for, render
 
@@ -32,6 +32,9 @@ VIEW = 560
 
 SMALL = (216, 204)
 """Width and height of one view in a contact sheet."""
+
+LARGEST, SMALLEST = 17, 9
+"""Sizes of type for the lines of a program."""
 
 COLUMNS = 4
 SUFFIXES = (".png", ".jpg", ".jpeg", ".webp", ".tif", ".tiff", ".pdf")
@@ -161,21 +164,21 @@ class _Panel:
 
     def draw(self, draw: ImageDraw, x: int, y: int) -> None:
         room = self.height - 84
-        longest = max((len(line.text) for line in self.lines), default=1)
-        size = int(max(9, min(17, (self.width - 30) / longest / 0.602, room / max(len(self.lines), 1) / 1.5)))
-        step = int(size * 1.55)
+        for size in range(LARGEST, SMALLEST - 1, -1):  # the largest type in which all of it fits
+            step, advance = int(size * 1.55), _font(size, "Mono").getlength("m" * 10) / 10
+            lines = [part for line in self.lines for part in wrapped(line, int((self.width - 30) / advance))]
+            if len(lines) * step <= room:
+                break
         fits = max(1, room // step)
-        shown = self.lines if len(self.lines) <= fits else self.lines[: fits - 1]
-        top = y + max(0, (room - step * len(self.lines)) // 2)
-        advance = _font(size, "Mono").getlength("m" * 10) / 10
-        most = int((self.width - 30) / advance)
+        shown = lines if len(lines) <= fits else lines[: fits - 1]
+        top = y + max(0, (room - step * len(lines)) // 2)
         for number, line in enumerate(shown):
             place = (x + 24, top + number * step)
-            if line.statement is not None:
+            if line.statement is not None and line.word:
                 _swatch(draw, x, place[1] + size * 0.28, int(size * 0.72), line.statement)
-            _line(draw, place, line, size, advance, most)
-        if len(shown) < len(self.lines):
-            left = f"... and {len(self.lines) - len(shown)} more lines"
+            _line(draw, place, line, size, advance)
+        if len(shown) < len(lines):
+            left = f"... and {len(lines) - len(shown)} more lines"
             _text(draw, (x + 24, top + len(shown) * step), left, size, _FAINT, face="Mono")
         foot = y + self.height - 62
         draw.line([(x, foot), (x + self.width - 8, foot)], fill=_RULE, width=1)
@@ -225,11 +228,9 @@ def _legend_rows(words: Sequence[int], width: int) -> list[list[tuple[int, int]]
     return rows
 
 
-def _line(draw: ImageDraw, place: tuple[float, float], line: Shown, size: int, advance: float, most: int) -> None:
+def _line(draw: ImageDraw, place: tuple[float, float], line: Shown, size: int, advance: float) -> None:
     before, word, after = parted(line)
     x, y = place
-    if len(line.text) > most:
-        after = after[: max(0, most - len(before) - len(word) - 1)] + "…"
     shade = _FAINT if line.statement is None else readable(line.statement)
     _text(draw, (x, y), before, size, _FAINT, face="Mono")
     _text(draw, (x + advance * len(before), y), word, size, shade, face="Mono", bold=line.statement is not None)

@@ -29,7 +29,12 @@ def numbers(program: Program) -> int:
 
 def free_numbers(program: Program) -> int:
     """How many numbers of a program are free."""
-    return sum(1 for _ in _places(source_of(program).lines))
+    return len(free_values(program))
+
+
+def free_values(program: Program) -> list[float]:
+    """The free numbers of a program, in the order of its text."""
+    return list(_places(source_of(program).lines))
 
 
 def multiplied(program: Program, place: int, factor: float) -> Program:
@@ -41,9 +46,9 @@ def multiplied(program: Program, place: int, factor: float) -> Program:
     return evaluated(Source(tuple(_changed(line, counter, place, factor) for line in source_of(program).lines)))
 
 
-def _places(lines: tuple[Line, ...]) -> Iterator[Value]:
+def _places(lines: tuple[Line, ...]) -> Iterator[float]:
     for line in lines:
-        yield from (value for value, free in _numbers(line) if free)
+        yield from (value for value, free in _numbers(line) if free and not isinstance(value, Expression))
         if isinstance(line, WrittenLoop | Function):
             yield from _places(line.body)
 

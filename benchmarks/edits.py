@@ -29,6 +29,7 @@ def main(mesh: str, out: str, *changes: str) -> None:
     from shapeprog.language.free import free_values, multiplied
     from shapeprog.language.named import inline, names
     from shapeprog.view.model import of_parts
+    from shapeprog.view.page import typeface
     from shapeprog.view.render import camera_for, render
 
     named = infer(load(mesh)).program
@@ -52,16 +53,9 @@ def main(mesh: str, out: str, *changes: str) -> None:
             place_of = across * VIEW, down * (VIEW + CAPTION)
             page.paste(Image.fromarray(render(model, camera, VIEW, VIEW)), place_of)
             where = place_of[0] + VIEW / 2, place_of[1] + VIEW + 6
-            pen.text(where, caption, font=_font(16), fill=FAINT if across else INK, anchor="ma")
+            pen.text(where, caption, font=typeface(16), fill=FAINT if across else INK, anchor="ma")
     Path(out).parent.mkdir(parents=True, exist_ok=True)
     page.save(out, optimize=True)
-
-
-def _font(size: int) -> Any:
-    from matplotlib.font_manager import FontProperties, findfont
-    from PIL import ImageFont
-
-    return ImageFont.truetype(findfont(FontProperties(family="DejaVu Sans")), size)
 
 
 if __name__ == "__main__":

@@ -43,6 +43,7 @@ def draw(rows: list[dict[str, Any]], tasks: dict[tuple[str, str], Task], out: Pa
     from shapeprog.formats.parts import parts
     from shapeprog.language.syntax import parse
     from shapeprog.view.model import of_parts, of_shape
+    from shapeprog.view.page import typeface
     from shapeprog.view.render import camera_for, render
 
     wide, tall = len(HEADINGS) * VIEW + PAD, VIEW + CAPTION
@@ -52,7 +53,7 @@ def draw(rows: list[dict[str, Any]], tasks: dict[tuple[str, str], Task], out: Pa
     for column in range(min(columns, len(rows))):
         for place, heading in enumerate(HEADINGS):
             middle = PAD + column * wide + (place + 0.5) * VIEW
-            pen.text((middle, 10), heading, font=_font(15), fill=FAINT, anchor="ma")
+            pen.text((middle, 10), heading, font=typeface(15), fill=FAINT, anchor="ma")
     for number, methods in enumerate(rows):
         first = methods["all"]
         x, y = PAD + number % columns * wide, HEAD + number // columns * tall
@@ -67,17 +68,10 @@ def draw(rows: list[dict[str, Any]], tasks: dict[tuple[str, str], Task], out: Pa
             captions.append(f"{row['silhouette']:.2f} · {row['numbers']} numbers · {row['blocks']} blocks")
         for place, caption in enumerate(captions):
             ink = FAINT if place else INK
-            pen.text((x + (place + 0.5) * VIEW, y + VIEW + 4), caption, font=_font(15), fill=ink, anchor="ma")
+            pen.text((x + (place + 0.5) * VIEW, y + VIEW + 4), caption, font=typeface(15), fill=ink, anchor="ma")
         pen.line([(x, y + tall - 8), (x + wide - PAD, y + tall - 8)], fill=RULE)
     out.parent.mkdir(parents=True, exist_ok=True)
     page.save(out, optimize=True)
-
-
-def _font(size: int) -> Any:
-    from matplotlib.font_manager import FontProperties, findfont
-    from PIL import ImageFont
-
-    return ImageFont.truetype(findfont(FontProperties(family="DejaVu Sans")), size)
 
 
 def main() -> None:

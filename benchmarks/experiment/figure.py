@@ -48,20 +48,22 @@ def draw(experiment: Experiment, picture: Path) -> None:
     """Draw the figure: a row for each shape."""
     from PIL import Image, ImageDraw
 
+    from shapeprog.view.page import typeface
+
     rows = [row for category in CATEGORIES for row in chosen(experiment, category)]
     left = [0, VIEW + PAD, VIEW + TEXT + 2 * PAD, 2 * VIEW + TEXT + 2 * PAD]
     width = left[-1] + VIEW + PAD
     page = Image.new("RGB", (SCALE * width, SCALE * (HEAD + VIEW * len(rows) + PAD)), "white")
     pen = ImageDraw.Draw(page)
     for place, wide, heading in zip(left, (VIEW, TEXT, VIEW, VIEW), HEADINGS, strict=True):
-        pen.text((SCALE * (place + wide / 2), SCALE * 9), heading, font=_font(SCALE * 12), fill=FAINT, anchor="ma")
+        pen.text((SCALE * (place + wide / 2), SCALE * 9), heading, font=typeface(SCALE * 12), fill=FAINT, anchor="ma")
     for number, (shape, written, scores) in enumerate(rows):
         top = HEAD + number * VIEW
         pen.line([(SCALE * PAD, SCALE * top), (SCALE * (width - PAD), SCALE * top)], fill=RULE, width=SCALE)
         for place, view in zip((left[0], left[2], left[3]), views(shape, written), strict=True):
             page.paste(Image.fromarray(view), (SCALE * place, SCALE * (top + LINE)))
         told = f"IoU {scores.iou:.2f}, CD {scores.cd:.4f}"
-        pen.text((SCALE * PAD, SCALE * (top + 7)), told, font=_font(SCALE * 8), fill=FAINT)
+        pen.text((SCALE * PAD, SCALE * (top + 7)), told, font=typeface(SCALE * 8), fill=FAINT)
         _write(pen, written.program, left[1], top, VIEW)
     picture.parent.mkdir(parents=True, exist_ok=True)
     page.save(picture, optimize=True)
@@ -129,13 +131,13 @@ def _dots(points: np.ndarray, statements: Sequence[int], seen: np.ndarray, camer
 def _write(pen: Any, program: Any, left: int, top: int, height: int) -> None:
     """A program in a column, coloured as the views are, as large as it fits."""
     from shapeprog.view.listing import listing, parted
-    from shapeprog.view.page import readable
+    from shapeprog.view.page import readable, typeface
 
     lines = listing(program, 1)
     longest = max((len(line.text) for line in lines), default=1)
     most = min((height - 2 * PAD) / max(len(lines), 1) / 1.4, (TEXT - PAD) / longest / 0.602, LARGEST)
     size = max(SMALLEST, most)
-    font, bold = (_font(round(SCALE * size), mono=True, bold=each) for each in (False, True))
+    font, bold = (typeface(round(SCALE * size), "Mono", bold=each) for each in (False, True))
     advance, step = font.getlength("m"), SCALE * size * 1.4
     first = SCALE * (top + height / 2) - step * len(lines) / 2
     for number, line in enumerate(lines):
@@ -145,12 +147,3 @@ def _write(pen: Any, program: Any, left: int, top: int, height: int) -> None:
         for text, kind, ink in ((before, font, FAINT), (word, bold, shade), (after, font, INK)):
             pen.text((x, y), text, font=kind, fill=ink)
             x += advance * len(text)
-
-
-def _font(size: int, *, mono: bool = False, bold: bool = False) -> Any:
-    """A font that comes with matplotlib, so that it is there on every machine."""
-    from matplotlib import get_data_path
-    from PIL import ImageFont
-
-    name = f"DejaVuSans{'Mono' if mono else ''}{'-Bold' if bold else ''}.ttf"
-    return ImageFont.truetype(str(Path(get_data_path()) / "fonts" / "ttf" / name), size)

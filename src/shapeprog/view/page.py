@@ -165,7 +165,7 @@ class _Panel:
     def draw(self, draw: ImageDraw, x: int, y: int) -> None:
         room = self.height - 84
         for size in range(LARGEST, SMALLEST - 1, -1):  # the largest type in which all of it fits
-            step, advance = int(size * 1.55), _font(size, "Mono").getlength("m" * 10) / 10
+            step, advance = int(size * 1.55), typeface(size, "Mono").getlength("m" * 10) / 10
             lines = [part for line in self.lines for part in wrapped(line, int((self.width - 30) / advance))]
             if len(lines) * step <= room:
                 break
@@ -219,7 +219,7 @@ def _legend_rows(words: Sequence[int], width: int) -> list[list[tuple[int, int]]
     rows: list[list[tuple[int, int]]] = [[]]
     offset = 0
     for statement in words:
-        wide = int(_font(15).getlength(language().word(statement))) + 44
+        wide = int(typeface(15).getlength(language().word(statement))) + 44
         if offset and offset + wide > width:
             rows.append([])
             offset = 0
@@ -246,7 +246,8 @@ def readable(statement: int) -> tuple[int, int, int]:
 
 
 @lru_cache(maxsize=64)
-def _font(size: int, face: str = "", bold: bool = False) -> Any:
+def typeface(size: int, face: str = "", bold: bool = False) -> Any:
+    """A font that comes with matplotlib, so that it is there on every machine; ``face`` is Mono or nothing."""
     from PIL import ImageFont
 
     found = importlib.util.find_spec("matplotlib")
@@ -267,7 +268,7 @@ def _text(
     bold: bool = False,
     anchor: str = "la",
 ) -> None:
-    draw.text(place, text, font=_font(size, face, bold), fill=fill, anchor=anchor)
+    draw.text(place, text, font=typeface(size, face, bold), fill=fill, anchor=anchor)
 
 
 def _swatch(draw: ImageDraw, x: float, y: float, size: int, statement: int) -> None:

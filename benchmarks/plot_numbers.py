@@ -1,4 +1,4 @@
-"""Plot likeness against the numbers that programs write, from rows of ``benchmarks/structure.py``.
+"""Plot likeness against the free numbers of programs, from rows of ``benchmarks/structure.py``.
 
     python -m benchmarks.structure DATA --sets bench cabinet ikea --objects 12 --statements paper all \\
         --blocks 1 2 3 4 6 8 10 --out sweep.jsonl
@@ -22,7 +22,7 @@ STYLES = {"all": ("-o", "#1f4e79", "all statements"), "paper": ("--s", "#b0413e"
 
 
 def main(rows_path: str, picture: str, measure: str = "silhouette") -> None:
-    """One panel for each set: the mean of the measure with its standard error against the mean of numbers written."""
+    """One panel for each set: the mean of the measure with its standard error against the mean of free numbers."""
     groups: dict[tuple[str, str], dict[int, list[dict[str, float]]]] = defaultdict(lambda: defaultdict(list))
     for line in Path(rows_path).read_text().splitlines():
         row = json.loads(line)
@@ -38,7 +38,7 @@ def main(rows_path: str, picture: str, measure: str = "silhouette") -> None:
             means = [each.mean() for each in values]
             axis.errorbar(numbers, means, errors, fmt=style, color=colour, ms=3.5, lw=1.4, capsize=2, label=label)
         axis.set_title(f"{which} ({len(values[0])} objects)", fontsize=9)
-        axis.set_xlabel("numbers written", fontsize=8)
+        axis.set_xlabel("free numbers", fontsize=8)
         axis.tick_params(labelsize=8)
         axis.grid(alpha=0.3, lw=0.5)
         axis.spines[["top", "right"]].set_visible(False)

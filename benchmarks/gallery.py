@@ -11,10 +11,10 @@ how many numbers are written, and the blocks.
 from __future__ import annotations
 
 import argparse
-import json
 from pathlib import Path
 from typing import Any
 
+from benchmarks.rows import read_rows
 from benchmarks.structure import Task, given, objects
 
 VIEW, CAPTION, HEAD, PAD = 300, 46, 34, 14
@@ -28,8 +28,7 @@ METHODS = ("paper", "all")
 def read(path: Path) -> dict[tuple[str, str], dict[str, Any]]:
     """For each set and name the rows of the methods, of the most blocks that both have."""
     found: dict[tuple[str, str], dict[str, Any]] = {}
-    for line in path.read_text().splitlines():
-        row = json.loads(line)
+    for row in read_rows(path):
         known = found.setdefault((row["set"], row["name"]), {})
         if row["method"] not in known or known[row["method"]]["allowed"] < row["allowed"]:
             known[row["method"]] = row

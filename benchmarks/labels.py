@@ -18,13 +18,13 @@ Methods are ``all`` statements, and those of the ``paper`` alone.
 from __future__ import annotations
 
 import argparse
-import json
-import multiprocessing
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+
+from benchmarks.rows import measure_all, read_rows
 
 METHODS = ("all", "paper")
 
@@ -99,7 +99,7 @@ def ways(rows: Sequence[dict[str, Any]]) -> list[Way]:
 def table(path: Path) -> str:
     """Markdown: accuracy and mean part IoU of every method, by the three ways to label."""
     lines = ["| method, chairs | declared | fitted | ceiling |", "|---|---|---|---|"]
-    every = [json.loads(line) for line in path.read_text().splitlines()]
+    every = read_rows(path)
     for method in METHODS:
         if rows := [row for row in every if row["method"] == method]:
             cells = ["{:.3f} / {:.3f}".format(*scores(rows, way)) for way in ways(rows)]
@@ -110,21 +110,14 @@ def table(path: Path) -> str:
 def run(args: argparse.Namespace) -> None:
     """Measure what is not in the output yet, chair after chair, in several processes."""
     out = Path(args.out)
-    out.parent.mkdir(parents=True, exist_ok=True)
-    rows = [json.loads(line) for line in out.read_text().splitlines()] if out.exists() else []
-    done = {(row["number"], row["method"], row["seed"]) for row in rows}
+    done = {(row["number"], row["method"], row["seed"]) for row in read_rows(out)}
     todo = [
         (Path(args.pack), number, method, args.seed)
         for number in range(args.objects)
         for method in args.methods
         if (number, method, args.seed) not in done
     ]
-    with multiprocessing.get_context("spawn").Pool(args.workers) as pool, out.open("a") as file:
-        for number, row in enumerate(pool.imap_unordered(measure, todo), 1):
-            file.write(json.dumps(row) + "\n")
-            file.flush()
-            print(f"\r{number}/{len(todo)}", end="", flush=True)
-    print()
+    measure_all(out, todo, measure, args.workers)
 
 
 def main() -> None:

@@ -22,8 +22,6 @@ ceiling), and with the solid itself (``solid_recall``, ``solid_precision``).  Of
 from __future__ import annotations
 
 import argparse
-import json
-import multiprocessing
 import runpy
 import time
 from collections.abc import Iterator
@@ -33,6 +31,7 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.rows import measure_all, read_rows
 from benchmarks.structure import fused
 
 SETS = ("furniture", "cones", "hinted_cones")
@@ -201,23 +200,15 @@ def tasks(args: argparse.Namespace) -> Iterator[Task]:
 def run(args: argparse.Namespace) -> None:
     """Measure what is not in the output yet, program after program, in several processes."""
     out = Path(args.out)
-    out.parent.mkdir(parents=True, exist_ok=True)
-    rows = [json.loads(line) for line in out.read_text().splitlines()] if out.exists() else []
-    done = {Task(row["set"], row["kind"], row["number"], row["seed"]) for row in rows}
+    done = {Task(row["set"], row["kind"], row["number"], row["seed"]) for row in read_rows(out)}
     todo = [task for task in tasks(args) if task not in done]
-    with multiprocessing.get_context("spawn").Pool(args.workers) as pool, out.open("a") as file:
-        for number, row in enumerate(pool.imap_unordered(measure, todo), 1):
-            file.write(json.dumps(row) + "\n")
-            file.flush()
-            print(f"\r{number}/{len(todo)}", end="", flush=True)
-    print()
+    measure_all(out, todo, measure, args.workers)
 
 
 def table(path: Path) -> str:
     """Markdown: the mean of every measure."""
     groups: dict[tuple[str, str], list[dict[str, Any]]] = {}
-    for line in path.read_text().splitlines():
-        row = json.loads(line)
+    for row in read_rows(path):
         groups.setdefault((row["set"], row["kind"]), []).append(row)
     lines = ["| set, programs | " + " | ".join(COLUMNS) + " |", "|" + "---|" * (len(COLUMNS) + 1)]
     for (which, kind), rows in sorted(groups.items()):

@@ -7,13 +7,14 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from collections import defaultdict
 from pathlib import Path
 
 import matplotlib
 import numpy as np
+
+from benchmarks.rows import read_rows
 
 matplotlib.use("Agg")
 from matplotlib import pyplot as plt
@@ -24,8 +25,7 @@ STYLES = {"all": ("-o", "#1f4e79", "all statements"), "paper": ("--s", "#b0413e"
 def main(rows_path: str, picture: str, measure: str = "silhouette") -> None:
     """One panel for each set: the mean of the measure with its standard error against the mean of free numbers."""
     groups: dict[tuple[str, str], dict[int, list[dict[str, float]]]] = defaultdict(lambda: defaultdict(list))
-    for line in Path(rows_path).read_text().splitlines():
-        row = json.loads(line)
+    for row in read_rows(Path(rows_path)):
         groups[row["set"], row["method"]][row["allowed"]].append(row)
     sets = sorted({which for which, _ in groups})
     figure, axes = plt.subplots(1, len(sets), figsize=(3.4 * len(sets), 2.8), sharey=True, layout="constrained")

@@ -26,8 +26,6 @@ cells, the baseline.
 from __future__ import annotations
 
 import argparse
-import json
-import multiprocessing
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
@@ -35,6 +33,8 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
+
+from benchmarks.rows import measure_all, read_rows
 
 SETS = ("bench", "cabinet", "ikea", "fused", "noisy", "open")
 
@@ -163,9 +163,7 @@ def fused(vertices: Any, faces: Any) -> tuple[Any, Any]:
 def run(args: argparse.Namespace) -> None:
     """Measure what is not in the output yet, object after object, in several processes."""
     out = Path(args.out)
-    out.parent.mkdir(parents=True, exist_ok=True)
-    known = [json.loads(line) for line in out.read_text().splitlines()] if out.exists() else []
-    done = {(row["set"], row["name"], row["allowed"], row["method"]) for row in known}
+    done = {(row["set"], row["name"], row["allowed"], row["method"]) for row in read_rows(out)}
     todo = [
         Task(which, name, files, blocks, args.seed, statements)
         for which in args.sets
@@ -174,19 +172,13 @@ def run(args: argparse.Namespace) -> None:
         for statements in args.statements
         if (which, name, blocks, statements) not in done
     ]
-    with multiprocessing.get_context("spawn").Pool(args.workers) as pool, out.open("a") as file:
-        for number, row in enumerate(pool.imap_unordered(measure, todo), 1):
-            file.write(json.dumps(row) + "\n")
-            file.flush()
-            print(f"\r{number}/{len(todo)}", end="", flush=True)
-    print()
+    measure_all(out, todo, measure, args.workers)
 
 
 def table(path: Path) -> str:
     """Markdown: the mean of every measure, with the floor in brackets where there is one."""
     groups: dict[tuple[int, str, str], list[dict[str, Any]]] = {}
-    for line in path.read_text().splitlines():
-        row = json.loads(line)
+    for row in read_rows(path):
         groups.setdefault((row["allowed"], row["set"], row["method"]), []).append(row)
     lines = ["| set, objects | " + " | ".join(COLUMNS) + " |", "|" + "---|" * (len(COLUMNS) + 1)]
     for (allowed, name, method), rows in sorted(

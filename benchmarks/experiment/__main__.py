@@ -27,6 +27,7 @@ os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")  # before torch: its idle wo
 from benchmarks.experiment import document, efficiency, extrapolation, figure, measuring, tables
 from benchmarks.experiment.recipes import CATEGORIES, RECIPES, START
 from benchmarks.experiment.stages import Experiment, Run, runs
+from benchmarks.rows import read_rows
 from shapeprog.models.checkpoint import load_executor, load_generator, read_card, save_checkpoint
 
 EXECUTORS = {"executor-unwidened": "neural executor", "executor": "neural executor, trained on widened blocks"}
@@ -85,8 +86,8 @@ def _table(experiment: Experiment, args: argparse.Namespace) -> None:
     measuring.measure_baselines(experiment, args.workers)
     measuring.measure(experiment, args.workers)
     for category in CATEGORIES:
-        rows = measuring.read_rows(measuring.baselines_file(experiment))
-        rows += measuring.read_rows(measuring.rows_file(experiment))
+        rows = read_rows(measuring.baselines_file(experiment))
+        rows += read_rows(measuring.rows_file(experiment))
         print(f"\n### {category}\n\n{tables.table(rows, f'{category}_test')}")
         best = experiment.best(category)
         if best is not None:

@@ -7,9 +7,10 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from benchmarks.experiment import efficiency, tables
-from benchmarks.experiment.measuring import baselines_file, read_rows, rows_file
+from benchmarks.experiment.measuring import baselines_file, rows_file
 from benchmarks.experiment.recipes import CATEGORIES, DESIGNS
 from benchmarks.experiment.stages import Experiment, runs
+from benchmarks.rows import read_rows
 from shapeprog.models.checkpoint import read_card
 from shapeprog.training.folder import WEIGHTS
 

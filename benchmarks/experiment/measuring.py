@@ -26,6 +26,7 @@ from benchmarks import reconstruction
 from benchmarks.experiment.recipes import CATEGORIES
 from benchmarks.experiment.stages import RESULTS, Experiment, Run, runs
 from benchmarks.reconstruction import GREEDY, REFINED, SEARCH
+from benchmarks.rows import Row, read_rows
 from shapeprog.evaluation.generated import Written, generated
 from shapeprog.evaluation.generated import measured as measures
 from shapeprog.files import write_text
@@ -45,7 +46,6 @@ ARGMAX = ", arg-max"
 AS_DRAWN_UNKNOWN = {"drawn_iou": float("nan")}
 """What is searched or refined was not drawn on a canvas block by block."""
 
-Row = dict[str, Any]
 Job = tuple[str, int, Any, str, float, int]
 """Pack, index, program, row, seconds, seed."""
 
@@ -245,11 +245,6 @@ def rows_file(experiment: Experiment) -> Path:
 def baselines_file(experiment: Experiment) -> Path:
     """Where the rows of the baselines are."""
     return experiment.results / "baselines.jsonl"
-
-
-def read_rows(path: Path) -> list[Row]:
-    """All rows of a file; none where there is no file."""
-    return [json.loads(line) for line in path.read_text().splitlines()] if path.exists() else []
 
 
 def start_on_val(experiment: Experiment, run: Run) -> float:

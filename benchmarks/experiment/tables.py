@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from benchmarks.experiment.measuring import ARGMAX, REFINED_BEST, WIDE, WITH_GENERATOR
 from benchmarks.experiment.recipes import CATEGORIES, RECIPES
 from benchmarks.reconstruction import GREEDY, REFINED, SEARCH
-
-Row = dict[str, Any]
+from benchmarks.rows import Row
 
 COLUMNS: dict[str, tuple[str, float, int]] = {
     "cd": ("CD x 1000", 1000, 2),

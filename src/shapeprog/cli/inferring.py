@@ -14,7 +14,7 @@ import typer
 
 from shapeprog.cli import terminal
 from shapeprog.errors import InputError, OutputError, ShapeProgError
-from shapeprog.inference.budget import BUDGET
+from shapeprog.inference.budget import BUDGET, Progress
 
 if TYPE_CHECKING:
     from shapeprog.data.shape import Shape
@@ -24,8 +24,6 @@ FOLDER = Path("shapeprog-out")
 
 _SUFFIXES = (".json", ".shape", ".glb", ".png")
 _LONGEST = 120
-
-Progress = Callable[[str, float], None]
 
 
 @dataclass(frozen=True)

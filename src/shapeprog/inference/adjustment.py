@@ -7,13 +7,11 @@ thickness behind a sheet, stays as it was.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import torch
 from jaxtyping import Bool, Float
 from torch import Tensor
 
-from shapeprog.inference.budget import NEVER, Deadline
+from shapeprog.inference.budget import NEVER, Deadline, Progress
 from shapeprog.inference.evidence import TOLERANCE, Evidence
 from shapeprog.inference.joints import NEARLY, Joints, find_joints, joining, moved, needs
 from shapeprog.inference.refine import single_threaded
@@ -55,7 +53,7 @@ def adjust(
     steps: int = STEPS,
     seed: int = 0,
     deadline: Deadline = NEVER,
-    progress: Callable[[str, float], None] | None = None,
+    progress: Progress | None = None,
 ) -> Program:
     """The same program with numbers that fit the evidence, tidy: hundredths of cells, tenths of degrees.
 

@@ -7,7 +7,7 @@ connected, and all are named by what they are for.  All of it works on program o
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from shapeprog.data.shape import Shape
 from shapeprog.inference.adjustment import adjust, tidy
-from shapeprog.inference.budget import NEVER, Deadline
+from shapeprog.inference.budget import NEVER, Deadline, Progress
 from shapeprog.inference.candidates import distinct, looks, plain, single_candidates
 from shapeprog.inference.cell_coverage import choose_on_cells, cost_on_cells, covers_of_cells
 from shapeprog.inference.choice import Choice, choose, explained, missed, value
@@ -30,7 +30,6 @@ from shapeprog.inference.roles import with_roles
 from shapeprog.language.program import Node, Program
 from shapeprog.language.text import numbers_written
 
-Progress = Callable[[str, float], None]
 Flags = npt.NDArray[np.bool_]
 
 MOST_CANDIDATES = 1_500

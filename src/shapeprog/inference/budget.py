@@ -7,7 +7,11 @@ fast and how busy the machine is, and then the result says so.
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
+
+Progress = Callable[[str, float], None]
+"""Called with what is being done and the share of it that is done."""
 
 BUDGET = 60.0
 """Seconds for one shape: some twenty times what the slowest of 182 validation shapes takes on one core."""

@@ -21,6 +21,7 @@ from shapeprog.geometry.distance import signed_distance
 from shapeprog.geometry.primitive import safe_norm
 from shapeprog.geometry.scene import Scene
 from shapeprog.geometry.surface import has_surface, sample_surface
+from shapeprog.inference.tunable import THINNEST
 from shapeprog.language.hints import Box
 from shapeprog.language.parameters import Parameter, Quantity, to_float32
 from shapeprog.language.program import Draw
@@ -52,9 +53,6 @@ FARTHEST = 2.0
 
 THIN = 0.3
 """A length may start as this share of the least extent, too: the thickness of what has an inside."""
-
-THINNEST = 0.1
-"""Least length in cells."""
 
 UNSURE = 0.3
 """Weight of a point where the normal of the surface is at a right angle to its own."""

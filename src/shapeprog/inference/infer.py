@@ -8,7 +8,6 @@ every statement there is; cells have a surface as well, if a coarse one.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cache, partial
 from pathlib import Path
@@ -25,7 +24,7 @@ from shapeprog.geometry.cells import iou, pack
 from shapeprog.geometry.distance import nearest_primitive
 from shapeprog.inference.assembly import TradeOff, assemble
 from shapeprog.inference.blocks import to_program
-from shapeprog.inference.budget import BUDGET, Deadline
+from shapeprog.inference.budget import BUDGET, Deadline, Progress
 from shapeprog.inference.cell_coverage import cost_on_cells
 from shapeprog.inference.refine import REACH, Schedule, refine
 from shapeprog.inference.structure import Settings, search_structure
@@ -52,8 +51,6 @@ EXPLAINED = 0.5
 
 DEEP = 2.5
 """Depth in cells below the surface of the snapped program beyond which points are inner faces; chosen on val."""
-
-Progress = Callable[[str, float], None]
 
 
 @dataclass(frozen=True)

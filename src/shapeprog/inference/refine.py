@@ -8,7 +8,7 @@ grid are asked to keep touching, which no point can tell: contact faces are hidd
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 
@@ -25,7 +25,7 @@ from shapeprog.geometry.nearest import squared_distance
 from shapeprog.geometry.primitive import primitives
 from shapeprog.geometry.scene import Scene
 from shapeprog.geometry.surface import sample_surface
-from shapeprog.inference.budget import NEVER, Deadline
+from shapeprog.inference.budget import NEVER, Deadline, Progress
 from shapeprog.language.program import Program
 from shapeprog.language.statement import language
 from shapeprog.language.tensors import Code, decode, encode
@@ -90,7 +90,7 @@ def refine(
     reach: float | None = None,
     seed: int = 0,
     deadline: Deadline = NEVER,
-    progress: Callable[[str, float], None] | None = None,
+    progress: Progress | None = None,
 ) -> Program:
     """The same program with parameters that fit target points (P, 3) on a surface, in the grid frame.
 

@@ -7,7 +7,7 @@ and blocks that somebody else proposes, such as a generator, take part in both.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from shapeprog.geometry.cells import pack, words_of
 from shapeprog.inference.block_layout import WIDTH
-from shapeprog.inference.budget import NEVER, Deadline
+from shapeprog.inference.budget import NEVER, Deadline, Progress
 from shapeprog.inference.families import families
 from shapeprog.inference.reading import from_program
 from shapeprog.language.program import Program
@@ -125,7 +125,7 @@ def search_structure(
     proposals: Proposals | None = None,
     seed: int = 0,
     deadline: Deadline = NEVER,
-    progress: Callable[[str, float], None] | None = None,
+    progress: Progress | None = None,
 ) -> Structure:
     """Blocks for a solid of cells (32, 32, 32); the same for the same seed unless the deadline cuts it short.
 

@@ -131,6 +131,10 @@ class Statement:
         shown = [each for each in self.parameters if not each.quantity.discrete]
         return sum(each.quantity.width for each in shown if each.unsaid is None or values[each.start] != each.unsaid)
 
+    def parameter_at(self, slot: int) -> Parameter:
+        """The parameter that a tensor slot in use is of."""
+        return next(each for each in self.parameters if each.start <= slot < each.start + each.quantity.width)
+
     @property
     def first(self) -> Parameter:
         """The first parameter that is written."""

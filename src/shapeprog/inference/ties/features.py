@@ -8,15 +8,14 @@ ends that its statement names, and no sides.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 import torch
 
-from shapeprog.geometry.primitive import primitives
 from shapeprog.geometry.scene import Scene
-from shapeprog.inference.tunable import Poses, Tunable
+from shapeprog.inference.tunable import Poses, Tunable, bounds
 from shapeprog.language.program import Draw, Node
 from shapeprog.language.statement import language
 from shapeprog.space import HALF, FloatArray
@@ -105,10 +104,7 @@ def _sides(tunable: Tunable, poses: Poses) -> Iterator[Feature]:
 def _ends(scene: Scene) -> tuple[torch.Tensor, torch.Tensor]:
     """Low and high ends of primitives along the axes (6, N), and their slopes (6, N, 16) by sizes, centre, rotation."""
     leaves = [each.clone().requires_grad_() for each in (scene.size, scene.centre, scene.rotation)]
-    half = torch.zeros_like(scene.centre)
-    for kind in scene.kinds:
-        here = scene.mask & (scene.kind == kind)
-        half = torch.where(here[..., None], primitives[kind].bound(leaves[0]), half)
+    half = bounds(replace(scene, size=leaves[0]))
     reach = (leaves[2].abs() @ half[..., None])[..., 0]
     ends = torch.cat([leaves[1] - reach, leaves[1] + reach], -1).T
     slopes = []
@@ -143,7 +139,7 @@ def _written(tunable: Tunable) -> Iterator[Feature]:
 def axis_of(node: Node, slot: int) -> int:
     """The axis of the grid that a number of a node is measured along; -1 where there is none."""
     declared = language()[node.name]
-    parameter = next(each for each in declared.parameters if slot in range(declared.size)[each.slots])
+    parameter = declared.parameter_at(slot)
     if declared.is_loop and parameter.quantity.width == 1:  # the plane of a mirror lies across the axis of its loop
         axes = [each.start for each in declared.parameters if each.quantity.kind == "axis"]
         return int(node.values[axes[0]]) if axes else -1

@@ -150,24 +150,24 @@ def _kind(tunable: Tunable, measure: Measure) -> str:
     if word == "side":
         return SIDES[feature.kind, feature.axis]
     if word in ("angle", "place") or (word == "top" and feature.kind == "place"):
-        f = int(np.flatnonzero(feature.row)[0])
-        slot = tunable.moving[f][1]
-        declared = language()[node.name]
-        parameter = next(each for each in declared.parameters if slot in range(declared.size)[each.slots])
+        parameter = language()[node.name].parameter_at(_slot(tunable, measure))
         axis = ("up", "depth", "side")[feature.axis] if feature.axis >= 0 and parameter.quantity.width > 1 else ""
         return "_".join(filter(None, (parameter.name, axis)))
-    return {"top": "top", "bottom": "bottom", "inset": "inset", "radius": "radius"}[word]
+    return word
+
+
+def _slot(tunable: Tunable, measure: Measure) -> int:
+    """The slot of its node that a number is written in."""
+    return tunable.moving[int(np.flatnonzero(measure.feature.row)[0])][1]
 
 
 def _length(tunable: Tunable, measure: Measure) -> str:
     """Thickness where a part is thinnest, else what the axis says."""
     node = tunable.nodes[measure.feature.node]
     declared = language()[node.name]
-    f = int(np.flatnonzero(measure.feature.row)[0])
-    slot = tunable.moving[f][1]
     lengths = [s for s, quantity in enumerate(declared.quantities) if quantity.kind == "length"]
     sizes = sorted(node.values[s] for s in lengths)
-    own = node.values[slot]
+    own = node.values[_slot(tunable, measure)]
     if measure.feature.axis < 0:
         return "thickness" if own == sizes[0] else "breadth"
     if len(sizes) < 2 or (own <= LEVEL * sizes[1] and own == sizes[0]):

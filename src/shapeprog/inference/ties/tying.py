@@ -6,7 +6,6 @@ that stay free are refitted, and so on until no further number is saved.  What i
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -14,6 +13,7 @@ import torch
 
 from shapeprog.errors import ShapeProgError
 from shapeprog.geometry.scene import Scene
+from shapeprog.inference.budget import Progress
 from shapeprog.inference.evidence import Evidence
 from shapeprog.inference.joints import Joints, find_joints
 from shapeprog.inference.refine import single_threaded
@@ -51,7 +51,7 @@ def tie(
     *,
     price: float = PRICE,
     seed: int = 0,
-    progress: Callable[[str, float], None] | None = None,
+    progress: Progress | None = None,
 ) -> Tied:
     """The same program with names for its free numbers and expressions for all others; the same for the same seed.
 

@@ -22,6 +22,7 @@ from shapeprog.geometry.distance import signed_distance
 from shapeprog.geometry.primitive import SIZES, primitives
 from shapeprog.geometry.scene import Scene
 from shapeprog.geometry.surface import sample_surface
+from shapeprog.inference.cover_kernels import near_boxes
 from shapeprog.inference.fitting import BESIDE, Target, fit, improve
 from shapeprog.inference.pieces import Pieces, Source
 from shapeprog.inference.tunable import THINNEST, bounds
@@ -180,14 +181,13 @@ def shells_of(pieces: Pieces) -> Shells:
     cloud = pieces.cloud
     step = max(1, len(cloud.points) // SEEN)
     points, normals = cloud.points[::step], cloud.normals[::step]
-    chosen = np.zeros((len(pieces.boxes.half), POINTS), np.int64)
-    empty = np.ones(len(chosen), np.bool_)
-    for piece, (centre, rotation, half) in enumerate(zip(*pieces.boxes, strict=True)):
-        at = np.abs((points - centre) @ rotation)
-        inside = np.flatnonzero((at <= half + NEAR).all(1) & (at >= half - NEAR).any(1))
-        if len(inside):
-            chosen[piece] = inside[np.arange(POINTS) * len(inside) // POINTS]
-            empty[piece] = False
+    count = len(pieces.boxes.half)
+    near, chosen = np.zeros((count, len(points)), np.bool_), np.zeros((count, POINTS), np.int64)
+    near_boxes(np.ascontiguousarray(points), *map(np.ascontiguousarray, pieces.boxes), NEAR, near, np.zeros(count))
+    empty = near.sum(1) == 0
+    for piece in np.flatnonzero(~empty):
+        inside = np.flatnonzero(near[piece])
+        chosen[piece] = inside[np.arange(POINTS) * len(inside) // POINTS]
     return Shells(points[chosen], normals[chosen], empty)
 
 

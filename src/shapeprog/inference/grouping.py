@@ -7,6 +7,7 @@ from itertools import combinations
 import numpy as np
 import numpy.typing as npt
 
+from shapeprog.inference.grouping_kernels import grow
 from shapeprog.inference.oriented import Boxes, bounds, boxes_around
 
 GAP = 0.3
@@ -43,13 +44,9 @@ def groups(boxes: Boxes) -> Boxes:
 
 def grown(beside: npt.NDArray[np.bool_], fits: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
     """For each start (a row) all that is reached from neighbour to neighbour (N, N) through what fits it (N, N)."""
-    reached, fits = np.eye(len(beside), dtype=np.bool_), fits | np.eye(len(beside), dtype=np.bool_)
-    steps = beside.astype(np.float32)
-    while True:
-        further = reached | (fits & (reached.astype(np.float32) @ steps > 0))
-        if (further == reached).all():
-            return reached
-        reached = further
+    reached = np.zeros(fits.shape, np.bool_)
+    grow(np.ascontiguousarray(beside), np.ascontiguousarray(fits), reached)
+    return reached
 
 
 def touching(boxes: Boxes, gap: float) -> npt.NDArray[np.bool_]:

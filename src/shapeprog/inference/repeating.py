@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from shapeprog.inference.candidates import Looks, distinct, looks
+from shapeprog.inference.repeating_kernels import at_steps, copies
 from shapeprog.language.parameters import to_float32
 from shapeprog.language.program import Loop, Node
 from shapeprog.space import DEPTH, SIDE, Array, FloatArray
@@ -87,9 +88,8 @@ def runs(seen: Looks) -> Iterator[tuple[int, int, tuple[float, float, float]]]:
         places = seen.middle[group]
         steps = places[None] - places[:, None]
         onwards = (np.abs(steps).max(-1) > LEAST_STEP) & ~_backwards(steps) & ~_overlap(seen.spread[group[0]], steps)
-        first = onwards & (_nearest(places, places[:, None] - steps) < 0)
-        after, beyond = (_nearest(places, places[None] + times * steps) for times in (1, 2))
-        before = _nearest(places, places[:, None] - 2 * steps)
+        first = onwards & (_at_steps(places, -1) < 0)
+        before, after, beyond = (_at_steps(places, times) for times in (-2, 2, 3))
         for a, b in np.argwhere(first).tolist():
             run = _followed(after, [a, b])
             whole = [run]
@@ -120,18 +120,14 @@ def mirrored(seen: Looks, axis: int) -> Iterator[tuple[int, int, float]]:
     signs = np.ones(3)
     signs[axis] = -1
     across = [other for other in range(3) if other != axis]
-    scale = np.maximum(seen.size, 1e-3)
-    kind = np.array(seen.kind)
-    turned = seen.spread * signs[:, None] * signs
+    same = _copies(seen, seen.spread * signs[:, None] * signs, seen.skew * signs, seen.lean * signs)
     count = 0
-    for one in range(len(kind)):
-        off = np.abs(seen.middle[:, across] - seen.middle[one, across]).max(1)
-        same = (off < STRAY) & (kind == kind[one]) & (seen.middle[:, axis] < seen.middle[one, axis] - LEAST_STEP)
-        same &= np.abs(seen.spread - turned[one]).max((1, 2)) < ALIKE * scale[one] ** 2
-        same &= np.abs(seen.skew - signs * seen.skew[one]).max(1) < ALIKE * scale[one] ** 3
-        same &= np.abs(seen.lean - signs * seen.lean[one]).max(1) < LEANING
-        same &= ~_overlap(seen.spread[one], (seen.middle - seen.middle[one]) * (1 - signs) / 2)
-        for other in np.flatnonzero(same).tolist():
+    for one in np.flatnonzero(same.any(1)).tolist():
+        others = np.flatnonzero(same[one])
+        apart = seen.middle[others] - seen.middle[one]
+        opposite = (np.abs(apart[:, across]).max(1) < STRAY) & (apart[:, axis] < -LEAST_STEP)
+        opposite &= ~_overlap(seen.spread[one], apart * (1 - signs) / 2)
+        for other in others[opposite].tolist():
             plane = float(seen.middle[one, axis] + seen.middle[other, axis]) / 2
             yield one, other, 0.0 if abs(plane) < CENTRED else plane
             count += 1
@@ -143,21 +139,17 @@ def turned(seen: Looks, count: int) -> Iterator[int]:
     """The first of ``count`` copies spread evenly around the vertical axis of the grid."""
     angle = 2 * np.pi / count
     turn = np.array([[1, 0, 0], [0, np.cos(angle), -np.sin(angle)], [0, np.sin(angle), np.cos(angle)]])
-    middle, spread = seen.middle @ turn.T, turn @ seen.spread @ turn.T
-    skew, lean = seen.skew @ turn.T, seen.lean @ turn.T
-    scale, kind = np.maximum(seen.size, 1e-3), np.array(seen.kind)
-    after = np.full(len(kind), -1)
+    middle = seen.middle @ turn.T
+    same = _copies(seen, turn @ seen.spread @ turn.T, seen.skew @ turn.T, seen.lean @ turn.T)
+    after = np.full(len(middle), -1)
     for one in np.flatnonzero(np.abs(middle - seen.middle).max(1, initial=0) > LEAST_STEP).tolist():
-        off = np.abs(seen.middle - middle[one]).max(1)
-        same = (kind == kind[one]) & (off < STRAY)
-        same &= np.abs(seen.spread - spread[one]).max((1, 2)) < ALIKE * scale[one] ** 2
-        same &= np.abs(seen.skew - skew[one]).max(1) < ALIKE * scale[one] ** 3
-        same &= np.abs(seen.lean - lean[one]).max(1) < LEANING
-        if same.any():
-            after[one] = np.where(same, off, np.inf).argmin()
-    known = np.zeros(len(kind), np.bool_)
+        others = np.flatnonzero(same[one])
+        off = np.abs(seen.middle[others] - middle[one]).max(1)
+        if (off < STRAY).any():
+            after[one] = others[off.argmin()]
+    known = np.zeros(len(middle), np.bool_)
     opposite = _nearest(seen.middle, seen.middle * [1, 1, -1])
-    for one in range(len(kind)):
+    for one in range(len(middle)):
         circle = [one]
         while len(circle) < count and after[circle[-1]] >= 0:
             circle.append(int(after[circle[-1]]))
@@ -169,17 +161,30 @@ def turned(seen: Looks, count: int) -> Iterator[int]:
 
 def groups(seen: Looks) -> Iterator[Array]:
     """Indices of candidates that are copies of each other by translation, each group once."""
-    kind, scale = np.array(seen.kind), np.maximum(seen.size, 1e-3)
     known: set[tuple[int, ...]] = set()
-    for one in range(len(kind)):
-        same = kind == kind[one]
-        same &= np.abs(seen.spread - seen.spread[one]).max((1, 2)) < ALIKE * scale[one] ** 2
-        same &= np.abs(seen.skew - seen.skew[one]).max(1) < ALIKE * scale[one] ** 3
-        same &= np.abs(seen.lean - seen.lean[one]).max(1) < LEANING
-        group = np.flatnonzero(same)[:MOST_ALIKE]
+    for row in _copies(seen, seen.spread, seen.skew, seen.lean):
+        group = np.flatnonzero(row)[:MOST_ALIKE]
         if len(group) > 1 and (key := tuple(group.tolist())) not in known:
             known.add(key)
             yield group
+
+
+def _copies(seen: Looks, spread: FloatArray, skew: FloatArray, lean: FloatArray) -> npt.NDArray[np.bool_]:
+    """Which candidates (a column) look like each of them with these moments instead of its own (a row)."""
+    count = len(seen.kind)
+    kind = np.unique(np.array(seen.kind), return_inverse=True)[1]
+    now, then = (seen.spread, seen.skew, seen.lean), (spread, skew, lean)
+    rows = [np.ascontiguousarray(each).reshape(count, -1) for each in (*now, *then)]
+    out = np.zeros((count, count), np.bool_)
+    copies(kind, np.maximum(seen.size, 1e-3), *rows, ALIKE, LEANING, out)
+    return out
+
+
+def _at_steps(places: FloatArray, times: int) -> Array:
+    """Which place so many steps from one place (a row) to another (a column) lead to, from the first; -1 if none."""
+    out = np.zeros((len(places), len(places)), np.int64)
+    at_steps(np.ascontiguousarray(places), times, STRAY, out)
+    return out
 
 
 def _nearest(places: FloatArray, wanted: FloatArray) -> Array:

@@ -39,6 +39,16 @@ def on_rod(point, normal, centre, axis, radius, tolerance, cosine):
     return abs(distance - radius) < tolerance and abs(across) > cosine * distance
 
 
+@kernel("void(f8[:, ::1], f8[:, ::1], f8[::1], f8[::1], f8, f8, f8, f8, b1[::1])")
+def mark_rod(points, normals, centre, axis, radius, half, tolerance, cosine, inside):
+    """Write which points (N, 3) with normals (N, 3) lie on a cylinder and face across its axis (N,)."""
+    for k in range(len(points)):
+        along = 0.0
+        for row in range(3):
+            along += (points[k, row] - centre[row]) * axis[row]
+        inside[k] = abs(along) <= half and on_rod(points[k], normals[k], centre, axis, radius, tolerance, cosine)
+
+
 @kernel("void(f8[:, ::1], f8[:, ::1], i4[:, ::1], i8[:, ::1], f8, f8, f8, f8[:, ::1])")
 def try_rods(points, normals, neighbours, draws, tolerance, cosine, largest, rods):
     """Round rods through pairs of points, each with the number of points that speak for it.

@@ -8,7 +8,7 @@ import numpy.typing as npt
 from shapeprog.inference.cloud import NOISY, Cloud, tolerance
 from shapeprog.inference.oriented import Boxes, join
 from shapeprog.inference.patches import upright
-from shapeprog.inference.rod_kernels import try_rods
+from shapeprog.inference.rod_kernels import mark_rod, try_rods
 from shapeprog.space import Array, FloatArray
 
 TRIALS, STEPS = 1200, 8
@@ -66,13 +66,10 @@ def on_rod(
     cloud: Cloud, middle: Array, axis: Array, radius: float, half: float, off: float, facing: float
 ) -> npt.NDArray[np.int64]:
     """The points on a cylinder that face across its axis."""
-    offset = cloud.points - middle
-    along = offset @ axis
-    radial = offset - along[:, None] * axis
-    distance = np.linalg.norm(radial, axis=1)
-    across = np.abs(np.einsum("ni,ni->n", radial, cloud.normals))
-    on = (np.abs(distance - radius) < off) & (np.abs(along) <= half) & (across > facing * distance)
-    return np.flatnonzero(on)
+    inside = np.zeros(len(cloud.points), np.bool_)
+    place = np.ascontiguousarray(middle), np.ascontiguousarray(axis)
+    mark_rod(cloud.points, cloud.normals, *place, radius, half, off, facing, inside)
+    return np.flatnonzero(inside)
 
 
 def fitted(

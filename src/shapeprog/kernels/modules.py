@@ -27,8 +27,10 @@ CHOICE = (  # of blocks by the surface of the target
 )
 PIECES = (  # of the surface of the target
     "shapeprog.inference.cover_kernels",
+    "shapeprog.inference.grouping_kernels",
     "shapeprog.inference.oriented_kernels",
     "shapeprog.inference.patch_kernels",
+    "shapeprog.inference.repeating_kernels",
     "shapeprog.inference.rod_kernels",
 )
 INFERENCE = (*SEARCH, *GEOMETRY, *CHOICE, *PIECES)

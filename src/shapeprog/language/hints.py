@@ -9,9 +9,7 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
-import torch
 
-from shapeprog.language.shapes import leaned
 from shapeprog.space import DEPTH, SIDE, UP, FloatArray
 
 STRAIGHT = 0.9986
@@ -65,12 +63,11 @@ def straight_bar(box: Box) -> Iterator[list[float]]:
     along = (end - start) / max(float(np.linalg.norm(end - start)), 1e-9)
     main = int(np.abs(along).argmax())
     along = along * np.sign(along[main])
-    first, second = (axis for axis in range(3) if axis != main)
-    frame = leaned(torch.from_numpy(along), torch.tensor(main)).numpy()
+    first, second = (_leaned(along, main, axis) for axis in range(3) if axis != main)
     others = [axis for axis in range(3) if axis != long]
-    near = max(others, key=lambda axis: abs(box.rotation[:, axis] @ frame[:, first]))
+    near = max(others, key=lambda axis: abs(box.rotation[:, axis] @ first))
     far = others[0] if near == others[1] else others[1]
-    x, y = box.rotation[:, near] @ frame[:, first], box.rotation[:, near] @ frame[:, second]
+    x, y = box.rotation[:, near] @ first, box.rotation[:, near] @ second
     turn = np.degrees(np.arctan2(y * np.sign(x), abs(x))) * (-1 if main == DEPTH else 1)
     yield [*start, *end, 2 * box.half[near], 2 * box.half[far], float(turn)]
 
@@ -120,6 +117,12 @@ def rounded(box: Box) -> Iterator[list[float]]:
     """Low corner, extents and radius of the edges, of a box along the axes of the grid."""
     for values in upright_box(box):
         yield [*values, 0.5 * min(values[3:])]
+
+
+def _leaned(along: FloatArray, main: int, axis: int) -> FloatArray:
+    """A grid axis after the least rotation that brings the ``main`` one to a unit vector: as bars are leaned."""
+    found: FloatArray = np.eye(3)[axis] - along[axis] / (1 + along[main]) * (np.eye(3)[main] + along)
+    return found
 
 
 def _ends(box: Box, axis: int) -> tuple[FloatArray, FloatArray]:

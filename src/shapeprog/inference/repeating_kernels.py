@@ -1,0 +1,77 @@
+"""Kernels that compare candidates with each other, and look for copies at equal steps."""
+
+from __future__ import annotations
+
+from shapeprog.kernels.compile import helper, kernel
+
+
+@helper
+def far(one, other, most):
+    """Whether two arrays of numbers differ by ``most`` or more anywhere."""
+    for k in range(len(one)):  # noqa: SIM110 (numba has no any)
+        if not abs(one[k] - other[k]) < most:
+            return True
+    return False
+
+
+@kernel(
+    "void(i8[::1], f8[::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8, f8, b1[:, ::1])"
+)
+def copies(kind, scale, spread, skew, lean, moved_spread, moved_skew, moved_lean, alike, leaning, out):
+    """Write which candidates (a column) look like each of them after it was moved (a row).
+
+    Parameters
+    ----------
+    kind
+        Numbers (C,) that are equal for equal statements.
+    scale
+        How far each reaches from its middle (C,).
+    spread, skew, lean
+        Moments (C, 9) and (C, 3), and how sides differ (C, 3), as they are.
+    moved_spread, moved_skew, moved_lean
+        The same after a mirror image or a turn.
+    alike, leaning
+        Largest relative difference of moments, and largest difference between sides.
+    out
+        Output (C, C).
+    """
+    for a in range(len(kind)):
+        second, third = alike * scale[a] ** 2, alike * scale[a] ** 3
+        for b in range(len(kind)):
+            out[a, b] = not (
+                kind[a] != kind[b]
+                or far(spread[b], moved_spread[a], second)
+                or far(skew[b], moved_skew[a], third)
+                or far(lean[b], moved_lean[a], leaning)
+            )
+
+
+@kernel("void(f8[:, ::1], f8, f8, i8[:, ::1])")
+def at_steps(places, times, stray, out):
+    """Write which place is nearest to where so many steps from place a to place b lead, from a on; -1 if none.
+
+    Parameters
+    ----------
+    places
+        Places (M, 3).
+    times
+        Steps taken from the first of two places.
+    stray
+        Distance along each axis below which a place counts as being there.
+    out
+        Output (M, M), a row for each first place.
+    """
+    count = len(places)
+    for a in range(count):
+        for b in range(count):
+            nearest, least = -1, stray
+            up = places[a, 0] + times * (places[b, 0] - places[a, 0])
+            depth = places[a, 1] + times * (places[b, 1] - places[a, 1])
+            side = places[a, 2] + times * (places[b, 2] - places[a, 2])
+            for c in range(count):
+                off = abs(places[c, 0] - up)
+                if off < least:
+                    off = max(off, abs(places[c, 1] - depth), abs(places[c, 2] - side))
+                    if off < least:
+                        nearest, least = c, off
+            out[a, b] = nearest

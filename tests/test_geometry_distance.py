@@ -6,7 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from shapeprog.geometry import distance as room
-from shapeprog.geometry.distance import each_distance, nearest_primitive, signed_distance
+from shapeprog.geometry.batch import Batch
+from shapeprog.geometry.distance import each_distance, nearest_primitive, projected, signed_distance
 from shapeprog.geometry.primitive import primitives
 
 
@@ -128,3 +129,31 @@ def test_a_user_primitive_has_gradients_on_every_path():
     size = torch.autograd.grad(found.sum(), leaves)[0]
     torch.testing.assert_close(size[0, 1], torch.tensor(-1.0))
     assert len(primitives) > 2
+
+
+def test_points_end_between_two_primitives_where_the_gap_is_narrow():
+    scene = make_scene(["cuboid", "cuboid"], [[1, 1, 1], [1, 1, 1]], [[0, 0, 0], [0, 0, 5]], dtype=torch.float64)
+    points = torch.tensor([[0.5, 0.2, -3.0], [4.0, 0, 3], [0, 0, 0.5]], dtype=torch.float64)
+    pairs = pairs_of(scene, 3)
+    expected = torch.tensor([[0.5, 0.2, 1], [1, 0, 1], [0, 0, 1]], dtype=torch.float64)
+    torch.testing.assert_close(projected(pairs, points, 3), expected)
+
+
+def test_points_inside_both_primitives_stay():
+    scene = make_scene(["cuboid", "cylinder"], [[2, 2, 2], [2, 1]], [[0, 0, 0], [1, 0, 0]], dtype=torch.float64)
+    points = torch.tensor([[1.0, 0.5, 0.3]], dtype=torch.float64)
+    assert projected(pairs_of(scene, 1), points, 5).equal(points)
+
+
+@settings(max_examples=15, deadline=None)
+@given(st.integers(0, 10**6))
+def test_projections_are_the_same_by_kernel_and_by_declaration(seed):
+    scene, points = random_scene(seed, (40,), slots=3, dtype=torch.float64), cloud(seed, 40)
+    pairs = Batch(*(part[:, :2] for part in (scene.kind, scene.size, scene.centre, scene.rotation, scene.mask)))
+    torch.testing.assert_close(projected(pairs, points, 4), projected.twin(pairs, points, 4), rtol=0, atol=1e-9)
+
+
+def pairs_of(scene, count):
+    """The two primitives of a scene, so many times."""
+    parts = (scene.kind, scene.size, scene.centre, scene.rotation, scene.mask)
+    return Batch(*(part.expand(count, *part.shape) for part in parts))

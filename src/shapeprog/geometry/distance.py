@@ -18,7 +18,7 @@ from torch.autograd.function import once_differentiable
 
 from shapeprog.errors import ShapeProgError
 from shapeprog.geometry import distance_kernels as kernels
-from shapeprog.geometry.arrays import by_kernel, declared_kinds, gradients, numbers, over_threads, table_of
+from shapeprog.geometry.arrays import by_kernel, declared_kinds, gradients, numbers, over_threads, table_of, twin_of
 from shapeprog.geometry.batch import Batch
 from shapeprog.geometry.primitive import SIZES, primitives
 from shapeprog.kernels.table import WIDTH
@@ -149,3 +149,27 @@ def nearest(flat: Batch, points: Float[Tensor, "B P 3"]) -> Nearest:
     step = max(1, AT_ONCE // max(flat.mask.numel(), 1))
     found = [each_distance(flat, piece).min(-1) for piece in points.split(step, -2)]
     return torch.cat([each.indices for each in found], -1), torch.cat([each.values for each in found], -1)
+
+
+def _projected_by_kernel(pairs: Batch, points: Float[Tensor, "C 3"], rounds: int) -> Float[Tensor, "C 3"]:
+    moved = numbers(points).copy()
+    over_threads(partial(kernels.project, table_of(pairs), moved, rounds), len(moved))
+    return torch.from_numpy(moved).to(points.dtype)
+
+
+@twin_of(_projected_by_kernel)
+def projected(pairs: Batch, points: Float[Tensor, "C 3"], rounds: int) -> Float[Tensor, "C 3"]:
+    """Points moved onto the second of two primitives (C, 2) and back onto the first, so many times, without gradient.
+
+    Points inside a primitive stay where they are.  Where the two overlap the points end in both of them, else where the
+    gap between them is narrow (von Neumann 1933).
+    """
+    parts = pairs.kind, pairs.size, pairs.centre, pairs.rotation, pairs.mask
+    one, two = (Batch(*(part[:, place : place + 1] for part in parts)) for place in range(2))
+    for _ in range(rounds):
+        for batch in (two, one):
+            at = points[:, None].detach().requires_grad_()
+            value = signed_distance(batch, at)
+            (slope,) = torch.autograd.grad(value.sum(), at)
+            points = (at - value.clamp(min=0)[..., None] * slope)[:, 0].detach()
+    return points

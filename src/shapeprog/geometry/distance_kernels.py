@@ -8,7 +8,7 @@ import numpy as np
 
 from shapeprog.geometry.dispatch import bound, distance, slopes
 from shapeprog.kernels.compile import helper, kernel
-from shapeprog.kernels.table import CENTRE, KIND, ROTATION, SIZE, local
+from shapeprog.kernels.table import CENTRE, KIND, ROTATION, SIZE, local, turned
 
 ROUNDING = 2e-6  # error of a bound in single precision against the size of the coordinates, generously
 STRIDE = 2.0  # how far in cells from a point its list of possible nearest primitives is used
@@ -184,3 +184,27 @@ def pull(table, many, points, count, slots, slope, to_table, to_points, begin, e
                     to_table[row, ROTATION + 3 * axis + other] += weight * offset * part[other]
                 to_table[row, CENTRE + axis] -= weight * moved
                 to_points[item, axis] = weight * moved
+
+
+@kernel("void(f8[:, ::1], f8[:, ::1], i8, i8, i8)")
+def project(table, points, rounds, begin, end):
+    """Move the points ``begin`` to ``end`` onto the second and the first of two primitives in turn.
+
+    Point k belongs to rows 2 k and 2 k + 1 of the table.  Inside a primitive it stays where it is.
+    """
+    part = np.empty(7)
+    for item in range(begin, end):
+        still = 0
+        for step in range(2 * rounds):
+            row = 2 * item + 1 - step % 2
+            a, b, c = local(table, row, points[item, 0], points[item, 1], points[item, 2])
+            far = distance(table, row, a, b, c)
+            still = 0 if far > 0 else still + 1
+            if still == 2:
+                break
+            if far > 0:
+                slopes(table, row, a, b, c, part)
+                up, depth, side = turned(table, row, part[0], part[1], part[2])
+                points[item, 0] -= far * up
+                points[item, 1] -= far * depth
+                points[item, 2] -= far * side

@@ -1,7 +1,7 @@
 """Where the parts of a program touch each other and the floor, and what keeps them together.
 
 A joint is a point of one primitive that should be inside another: where they overlap, or else where the gap between
-them is narrowest, found by projecting onto the one and the other in turn (von Neumann 1933).
+them is narrowest, found by projecting onto the one and the other in turn.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
 from shapeprog.geometry.batch import Batch
-from shapeprog.geometry.distance import each_distance, signed_distance
+from shapeprog.geometry.distance import each_distance, projected, signed_distance
 from shapeprog.geometry.primitive import primitives
 from shapeprog.geometry.scene import Scene
 from shapeprog.geometry.surface import sample_surface
@@ -93,7 +93,7 @@ def gaps(scene: Scene, generator: torch.Generator) -> Gaps:
     area = bounds(scene).prod(-1)
     swap = area[first] > area[second]
     first, second = torch.where(swap, second, first), torch.where(swap, first, second)
-    points = projected(scene, first, second, places[first, second], FIRST)
+    points = _between(scene, first, second, places[first, second], FIRST)
     width = signed_distance(rows_of(scene, second)[0], points[:, None])[:, 0].detach()
     width = width + signed_distance(rows_of(scene, first)[0], points[:, None])[:, 0].detach().clamp(min=0)
     return Gaps(first, second, points, width)
@@ -119,7 +119,7 @@ def moved(scene: Scene, known: Joints) -> Joints:
         return known
     local = bounds(scene)[known.first] * known.places
     points = scene.centre[known.first] + (scene.rotation[known.first] @ local[..., None])[..., 0]
-    points = projected(scene, known.first, known.second, points, AGAIN)
+    points = _between(scene, known.first, known.second, points, AGAIN)
     inner = _inner(scene, known.first, points)
     return known._replace(places=inner)
 
@@ -144,18 +144,13 @@ def needs(scene: Scene, slopes: Float[Tensor, "N 16 F"], known: Joints) -> Needs
     return Needs(residual, torch.cat([joined, _by_number(standing, slopes[known.standing])]))
 
 
-def projected(
+def _between(
     scene: Scene, first: Int[Tensor, " C"], second: Int[Tensor, " C"], points: Float[Tensor, "C 3"], rounds: int
 ) -> Float[Tensor, "C 3"]:
-    """Points moved onto second primitives and back onto first ones, those inside staying where they are."""
-    one, two = rows_of(scene, first)[0], rows_of(scene, second)[0]
-    for _ in range(rounds):
-        for batch in (two, one):
-            at = points[:, None].detach().requires_grad_()
-            value = signed_distance(batch, at)
-            (slope,) = torch.autograd.grad(value.sum(), at)
-            points = (at - value.clamp(min=0)[..., None] * slope)[:, 0].detach()
-    return points
+    """Points moved between two primitives each of a scene."""
+    both = torch.stack([first, second], 1)
+    pairs = (each[both] for each in (scene.kind, scene.size, scene.centre, scene.rotation, scene.mask))
+    return projected(Batch(*pairs), points, rounds)
 
 
 def _samples(scene: Scene, generator: torch.Generator) -> tuple[Float[Tensor, "N N 3"], Float[Tensor, "N N"]]:

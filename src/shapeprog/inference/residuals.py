@@ -105,8 +105,10 @@ class Target:
         points, normals, sides = self._points[some], self._normals[some], self._sides[some]
         tree = cKDTree(_joint(places.numpy(), facing.numpy()))
         near = torch.from_numpy(tree.query(_joint(points.numpy(), normals.numpy()), NEAR)[1])
-        behind = torch.from_numpy(tree.query(_joint(points.numpy(), -normals.numpy()), NEAR)[1])
-        near = torch.cat([near, torch.where(sides[:, None], near, behind)], 1)
+        behind = near.clone()
+        unsure = ~sides
+        behind[unsure] = torch.from_numpy(tree.query(_joint(points[unsure].numpy(), -normals[unsure].numpy()), NEAR)[1])
+        near = torch.cat([near, behind], 1)
         offset, best = _closest(points[:, None], normals[:, None], sides[:, None], places[near], facing[near], spacing)
         partner = near.gather(1, best)[:, 0]
         back = torch.from_numpy(self._tree.query(_joint(places.numpy(), facing.numpy()), NEAR)[1])

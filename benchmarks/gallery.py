@@ -1,6 +1,6 @@
 """Sheets of objects as they were given, rebuilt in the paper's statements, and in all statements.
 
-    python -m benchmarks.structure DATA --split val --sets ikea --statements paper all --out ikea.jsonl
+    python -m benchmarks.structure DATA --split val --sets ikea --methods paper all --out ikea.jsonl
     python -m benchmarks.gallery ikea.jsonl DATA docs/ikea.png --objects 24
     python -m benchmarks.gallery ikea.jsonl DATA docs/failures.png --worst 8
 

@@ -1,6 +1,6 @@
 """Plot likeness against the free numbers of programs, from rows of ``benchmarks/structure.py``.
 
-    python -m benchmarks.structure DATA --sets bench cabinet ikea --objects 12 --statements paper all \\
+    python -m benchmarks.structure DATA --sets bench cabinet ikea --objects 12 --methods paper all \\
         --blocks 1 2 3 4 6 8 10 --out sweep.jsonl
     python -m benchmarks.plot_numbers sweep.jsonl docs/silhouette_against_numbers.png
 """

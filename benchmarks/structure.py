@@ -2,7 +2,7 @@
 
     python -m benchmarks.structure DATA --split val --out structure_val.jsonl
     python -m benchmarks.structure --table structure_val.jsonl
-    python -m benchmarks.structure DATA --sets ikea --statements all paper --blocks 1 2 4 8 --out sweep.jsonl
+    python -m benchmarks.structure DATA --sets ikea --methods all paper --blocks 1 2 4 8 --out sweep.jsonl
 
 DATA holds ``shapenet_meshes/{bench,cabinet}_{val,test}/ID.ply`` (+Y up, front -Z) and
 ``ikea_parts/CLASS/OBJECT/NN.ply`` (+Y up; in the order of their names every second object is test, the others val).
@@ -19,8 +19,17 @@ noisy    20,000 points of that union, each coordinate with normal noise of .5 % 
 open     20,000 points of that union without the fifth that lies farthest to one side
 =======  ==============================================================================================================
 
-All are measured against the whole mesh, as ``shapeprog evaluate --parts`` does.  ``--statements paper``: the search on
-cells, the baseline.
+======  ===============================================================================================================
+method  what infers
+======  ===============================================================================================================
+all     ``shapeprog infer``
+untied  the same without ties between numbers
+tied    the ties alone, on the programs that ``untied`` wrote into the same file: what ``all`` gives, in less time
+paper   the search on cells with the statements of the paper, the baseline
+======  ===============================================================================================================
+
+All are measured against the whole mesh, as ``shapeprog evaluate --parts`` does; ``all`` and ``tied`` also by what is
+left of contacts, symmetry and one piece when each free number is edited.
 """
 
 from __future__ import annotations
@@ -30,7 +39,7 @@ import time
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 
@@ -38,9 +47,12 @@ from benchmarks.rows import measure_all, read_rows
 
 SETS = ("bench", "cabinet", "ikea", "fused", "noisy", "open")
 
+Method = Literal["all", "untied", "tied", "paper"]
+
 COLUMNS = (
     "f1_half_percent", "f1_percent", "normals", "silhouette", "one_piece", "slivers", "part_recall", "part_precision",
-    "iou", "cd", "blocks", "statements", "primitives", "numbers", "seconds", "cpu_seconds",
+    "iou", "cd", "blocks", "statements", "primitives", "numbers", "lines", "edited_contacts",
+    "edited_symmetry", "edited_one_piece", "seconds", "cpu_seconds",
 )  # fmt: skip
 
 FLOORS = {"f1_half_percent": "f1_half_percent_floor", "f1_percent": "f1_percent_floor", "normals": "normals_floor"}
@@ -60,14 +72,15 @@ MISSING = 0.2
 
 @dataclass(frozen=True)
 class Task:
-    """One object of one set, as files, and how it is inferred."""
+    """One object of one set, as files, and how it is inferred; ``tied`` needs the program without ties."""
 
     set: str
     name: str
     files: tuple[Path, ...]
     blocks: int = 10
     seed: int = 0
-    statements: Literal["all", "paper"] = "all"
+    method: Method = "all"
+    program: str = ""
 
 
 def objects(data: Path, which: str, split: str) -> Iterator[tuple[str, tuple[Path, ...]]]:
@@ -87,28 +100,46 @@ def measure(task: Task) -> dict[str, Any]:
     """The row of one object."""
     import torch
 
+    from shapeprog.evaluation.editing import edit_scores
     from shapeprog.evaluation.likeness import Triangles
     from shapeprog.evaluation.metrics import evaluate_program
     from shapeprog.evaluation.parts import part_scores
-    from shapeprog.inference import infer
     from shapeprog.language.text import format_program
     from shapeprog.language.unroll import unroll
 
     torch.set_num_threads(1)
     started, cpu = time.perf_counter(), time.process_time()
     parts, shape = given(task)
-    result = infer(shape, blocks=task.blocks, seed=task.seed, statements=task.statements)
+    program, snapped = inferred(task, shape)
     seconds, cpu_seconds = time.perf_counter() - started, time.process_time() - cpu
     placed = [Triangles(shape.frame.to_grid(vertices), faces) for vertices, faces in parts]
     row = evaluate_program(
-        result.program, replace(shape, points=None, **whole(placed)), result.snapped, seed=task.seed, looks=True
-    )
+        program, replace(shape, points=None, **whole(placed)), snapped, seed=task.seed, looks=True
+    )  # fmt: skip
     if len(parts) > 1:
-        row = replace(row, **part_scores(placed, unroll(result.program), task.seed)._asdict())
+        row = replace(row, **part_scores(placed, unroll(program), task.seed)._asdict())
+    text = format_program(program)
+    edited = edit_scores(program)._asdict() if task.method in ("all", "tied") else {}
     return asdict(row) | {
         "set": task.set, "seconds": seconds, "cpu_seconds": cpu_seconds, "allowed": task.blocks, "seed": task.seed,
-        "method": task.statements, "program": format_program(result.program),
+        "method": task.method, "lines": len(text.splitlines()), "program": text,
+        **{f"edited_{name}": share for name, share in edited.items()},
     }  # fmt: skip
+
+
+def inferred(task: Task, shape: Any) -> tuple[Any, Any]:
+    """The program of an object, and its whole-numbered form where it has one."""
+    from shapeprog.inference import infer
+    from shapeprog.inference.evidence import evidence_of
+    from shapeprog.inference.ties.tying import tie
+    from shapeprog.language.text import parse
+
+    if task.method == "tied":
+        return tie(parse(task.program), evidence_of(shape, task.seed), seed=task.seed).program, None
+    statements: Literal["all", "paper"] = "paper" if task.method == "paper" else "all"
+    ties = task.method != "untied"
+    result = infer(shape, blocks=task.blocks, seed=task.seed, statements=statements, ties=ties)
+    return result.program, result.snapped
 
 
 def given(task: Task) -> tuple[list[Any], Any]:
@@ -163,15 +194,23 @@ def fused(vertices: Any, faces: Any) -> tuple[Any, Any]:
 def run(args: argparse.Namespace) -> None:
     """Measure what is not in the output yet, object after object, in several processes."""
     out = Path(args.out)
-    done = {(row["set"], row["name"], row["allowed"], row["method"]) for row in read_rows(out)}
+    done = {(row["set"], row["name"], row["allowed"], row["method"]): row for row in read_rows(out)}
     todo = [
-        Task(which, name, files, blocks, args.seed, statements)
+        Task(which, name, files, blocks, args.seed, method)
         for which in args.sets
         for name, files in list(objects(Path(args.data), which, args.split))[: args.objects]
         for blocks in args.blocks
-        for statements in args.statements
-        if (which, name, blocks, statements) not in done
+        for method in args.methods
+        if (which, name, blocks, method) not in done
     ]
+    if "tied" in args.methods:
+        before = {key[:3]: row["program"] for key, row in done.items() if key[3] == "untied"}
+        todo = [
+            replace(task, program=before.get((task.set, task.name, task.blocks), "")) if task.method == "tied" else task
+            for task in todo
+        ]
+        if any(task.method == "tied" and not task.program for task in todo):
+            raise SystemExit(f"{out} lacks programs to tie: measure --methods untied first")
     measure_all(out, todo, measure, args.workers)
 
 
@@ -184,7 +223,7 @@ def table(path: Path) -> str:
     for (allowed, name, method), rows in sorted(
         groups.items(), key=lambda item: (item[0][0], SETS.index(item[0][1]), item[0][2])
     ):
-        cells = [f"{name}, {len(rows)}, {method} statements, <= {allowed} blocks"]
+        cells = [f"{name}, {len(rows)}, {method}, <= {allowed} blocks"]
         for column in COLUMNS:
             mean, floor = (_mean(rows, each) for each in (column, FLOORS.get(column, "")))
             digits = 5 if column == "cd" else 1 if column in ("blocks", "statements", "primitives", "numbers") else 3
@@ -208,7 +247,7 @@ def main() -> None:
     parser.add_argument("--sets", nargs="*", default=list(SETS), choices=SETS)
     parser.add_argument("--objects", type=int, default=None, help="only the first so many of each set")
     parser.add_argument("--blocks", type=int, nargs="*", default=[10], help="most blocks, one run for each")
-    parser.add_argument("--statements", nargs="*", default=["all"], choices=("all", "paper"), help="one run for each")
+    parser.add_argument("--methods", nargs="*", default=["all"], choices=get_args(Method), help="one run for each")
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--out", default="structure.jsonl", help="rows, one line of JSON each; appended to")

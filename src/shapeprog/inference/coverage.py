@@ -73,7 +73,7 @@ class Prices:
     free: float = 0.5
     statement: float = 0.005
     loop: float = 0.002
-    number: float = 0.0008
+    number: float = 0.0005
 
     def of(self, program: Program) -> float:
         """The price of a program as it is written."""

@@ -21,6 +21,7 @@ for i in mirror(side):
     bar(start=(-8, -5, 4.6), end=(-8, 6, 4.6), section=(0.8, 0.8))  # stretcher
     box(at=(2, -6, 5), size=(0.8, 12.5, 1.4))  # arm
     box(at=(-2, -5, 5), size=(4, 1, 1))  # arm_post
+box(at=(-8.5, -1, -4.2), size=(1, 3, 8.4))  # stretcher
 box(at=(-2, -6.5, -6), size=(1.5, 13, 12))  # seat
 box(at=(8, 7, -4), size=(2, 0.8, 8))  # rail
 box(at=(-3.5, -5.8, -4), size=(1.5, 0.6, 8))  # apron

@@ -50,6 +50,7 @@ STANDING: tuple[Rule, ...] = (
     ("brace", lambda p: p.below & p.slender),
     ("leg", lambda p: p.below & p.facing_side & (p.aside > 0.25)),
     ("panel", lambda p: p.below & (p.facing_side | p.facing_front)),
+    ("stretcher", lambda p: p.below & ~p.grounded & p.lying),
     ("leg", lambda p: p.below),
 )
 

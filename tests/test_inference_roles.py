@@ -9,7 +9,7 @@ import torch
 import shapeprog as sp
 from shapeprog.geometry.primitive import primitives
 from shapeprog.inference import roles
-from shapeprog.inference.roles import with_roles
+from shapeprog.inference.roles import in_order, with_roles
 from shapeprog.language.hints import Box, straight_bar, upright_box
 from shapeprog.language.program import Draw, Program
 from shapeprog.language.statement import language
@@ -168,3 +168,13 @@ def test_a_box_that_is_a_leg_is_written_as_the_statement() -> None:
 
 def test_every_role_that_rules_give_is_declared() -> None:
     assert {role for role, _ in (*roles.SEATING, *roles.BED, *roles.CASE)} <= set(language().roles)
+
+
+def test_blocks_are_listed_from_the_main_surface_and_the_floor_up():
+    program = with_roles(sp.parse(TABLE))
+    ordered = in_order(Program(tuple(reversed(program.body))))
+    assert sorted(map(repr, ordered.body)) == sorted(map(repr, program.body))
+    assert [chain[-1].role or chain[-1].name for chain in ordered.chains] == [
+        "top", "leg", "apron", "brace", "stretcher", "shelf"
+    ]  # fmt: skip
+    assert in_order(ordered) == ordered

@@ -26,7 +26,7 @@ from shapeprog.inference.evidence import Evidence, evidence_of
 from shapeprog.inference.neighbours import neighbours
 from shapeprog.inference.pieces import find_pieces
 from shapeprog.inference.repeating import repeated
-from shapeprog.inference.roles import with_roles
+from shapeprog.inference.roles import in_order, with_roles
 from shapeprog.language.program import Node, Program
 from shapeprog.language.text import numbers_written
 
@@ -146,7 +146,7 @@ def _of_surface(
     start = connected(_chosen(candidates, choice.best.chosen), evidence, prices, seed)
     adjusted = adjust(start, evidence, seed=seed, deadline=deadline, progress=progress)
     program = connected(_unharmed(adjusted, start, evidence, prices, seed), evidence, prices, seed)
-    program = with_roles(tidy(Program(tuple(plain(node) for node in program.body))))
+    program = in_order(with_roles(tidy(Program(tuple(plain(node) for node in program.body)))))
     seen = _seen(choice, candidates)
     share = explained(_covers(program.body, evidence, prices, seed), tuple(range(len(program.body))))
     reason = _reason(len(program.body), share, seen, blocks, "surface")
@@ -168,7 +168,7 @@ def _of_cells(
     choice = choose_on_cells(covers_of_cells(offered, voxels, evidence, prices), blocks, seed=seed)
     start = _chosen(candidates, choice.best.chosen)
     found = [adjust(start, evidence, seed=seed, deadline=deadline, progress=progress), tidy(start)]
-    program = with_roles(min(found, key=lambda each: cost_on_cells(each, voxels)))
+    program = in_order(with_roles(min(found, key=lambda each: cost_on_cells(each, voxels))))
     seen = _seen(choice, candidates)
     reason = _reason(len(start.body), choice.best.explained, seen, blocks, "cells")
     return Assembly(program, choice.best.explained, reason, seen, evidence)

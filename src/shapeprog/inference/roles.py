@@ -136,6 +136,25 @@ def with_roles(program: Program) -> Program:
     return Program(tuple(_named(node, roles) for node in program.body))
 
 
+def in_order(program: Program) -> Program:
+    """The program with its blocks as a person would list them: the main surface, then from the floor up.
+
+    At one height the larger come first.
+    """
+    scene = unroll(program)
+    if not scene.mask.any():
+        return program
+    parts, last = Parts(scene), 0
+    ranks: list[tuple[int, int, float]] = []
+    for node in program.body:
+        first, last = last, last + Program((node,)).blocks
+        mine = (parts.block >= first) & (parts.block < last)
+        level = round(float((parts.bottom[mine] - parts.floor).min(initial=parts.size[UP])) / parts.near)
+        ranks.append((int(not parts.main[mine].any()), level, -float(parts.surface[mine].sum())))
+    order = sorted(range(len(ranks)), key=ranks.__getitem__)
+    return Program(tuple(program.body[place] for place in order))
+
+
 def roles_of(parts: Parts) -> Array:
     """The role of each part (N,)."""
     found = np.full(parts.count, "", object)

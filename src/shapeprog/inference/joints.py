@@ -93,7 +93,7 @@ def gaps(scene: Scene, generator: torch.Generator) -> Gaps:
     area = bounds(scene).prod(-1)
     swap = area[first] > area[second]
     first, second = torch.where(swap, second, first), torch.where(swap, first, second)
-    points = _between(scene, first, second, places[first, second], FIRST)
+    points = between(scene, first, second, places[first, second], FIRST)
     width = signed_distance(rows_of(scene, second)[0], points[:, None])[:, 0].detach()
     width = width + signed_distance(rows_of(scene, first)[0], points[:, None])[:, 0].detach().clamp(min=0)
     return Gaps(first, second, points, width)
@@ -119,7 +119,7 @@ def moved(scene: Scene, known: Joints) -> Joints:
         return known
     local = bounds(scene)[known.first] * known.places
     points = scene.centre[known.first] + (scene.rotation[known.first] @ local[..., None])[..., 0]
-    points = _between(scene, known.first, known.second, points, AGAIN)
+    points = between(scene, known.first, known.second, points, AGAIN)
     inner = _inner(scene, known.first, points)
     return known._replace(places=inner)
 
@@ -144,7 +144,7 @@ def needs(scene: Scene, slopes: Float[Tensor, "N 16 F"], known: Joints) -> Needs
     return Needs(residual, torch.cat([joined, _by_number(standing, slopes[known.standing])]))
 
 
-def _between(
+def between(
     scene: Scene, first: Int[Tensor, " C"], second: Int[Tensor, " C"], points: Float[Tensor, "C 3"], rounds: int
 ) -> Float[Tensor, "C 3"]:
     """Points moved between two primitives each of a scene."""

@@ -17,6 +17,7 @@ from shapeprog.errors import OutputError
 from shapeprog.formats.colours import colour
 from shapeprog.formats.parts import parts
 from shapeprog.geometry.primitives.cuboid import mesh as box_mesh
+from shapeprog.language.named import set as set_names
 from shapeprog.language.program import Program
 from shapeprog.language.text import format_program, parse
 from shapeprog.view import Item, contact_sheet, picture, viewer
@@ -24,6 +25,7 @@ from shapeprog.view import raster_kernels as kernels
 from shapeprog.view.listing import listing, parted, wrapped
 from shapeprog.view.model import of_cells, of_mesh, of_parts, of_points, of_shape
 from shapeprog.view.render import camera_for, render
+from shapeprog.view.sliders import corners_of, pieces, sliders
 
 TEXT = """
 top_rectangle(at=(4, 0, 0), thickness=2, half=(9, 11))
@@ -169,10 +171,64 @@ def test_the_page_needs_nothing_else_and_escapes_what_it_is_told(tmp_path: Path)
     triangles = np.frombuffer(base64.b64decode(data["parts"][0]["triangles"]), "<f4").reshape(-1, 6)
     assert triangles.shape == (36, 6)
     assert triangles[:, :3].max(0).tolist() == [11, 6, 9], "right, up, towards the viewer"
-    lines = np.frombuffer(base64.b64decode(data["parts"][0]["lines"]), "<f4").reshape(-1, 6)
-    assert len(lines) == 12, "a box has twelve edges"
+    creases = np.frombuffer(base64.b64decode(data["parts"][0]["creases"]), "<u4").reshape(-1, 2)
+    assert len(creases) == 12, "a box has twelve edges"
     assert data["input"] is not None
     assert [part["block"] for part in data["parts"]] == [0, 1, 1, 1, 1, 2, 2]
+
+
+DRAGGED = """
+width, height = 10, 8
+lean = 10  # degrees
+count = 3
+floor = -height / 2
+seat(box(at=(floor + 4, -3, -width / 2), size=(1, 6, width)))
+back(board(at=(floor + 4, 2, -width / 2), size=(6, 1, width), tilt=lean))
+for i in translate(count, by=(0, 0, width / 4)):
+    rod(start=(floor, 0, -3), end=(floor + 4, 1, -width / 3), radius=0.4)
+"""
+
+
+def test_corners_go_where_the_program_with_another_number_has_them():
+    program = parse(DRAGGED)
+    drawn = parts(program)
+    start, found = corners_of(drawn), {slider.name: slider for slider in sliders(program, drawn)}
+    assert list(found) == ["width", "height", "lean"], "a count changes how many parts there are"
+    assert len(found["lean"].places) > 1, "corners go round a hinge"
+    for name, slider in found.items():
+        for at, places in slider.places.items():
+            expected = corners_of(parts(set_names(program, {name: at})))
+            for before, there, wanted in zip(start, places, expected, strict=True):
+                np.testing.assert_allclose(before if there is None else there, wanted, atol=1e-3)
+    (far,) = found["height"].places
+    assert all(there is not None for there in found["height"].places[far])
+    half = corners_of(parts(set_names(program, height=(8 + far) / 2)))
+    for before, there, wanted in zip(start, found["height"].places[far], half, strict=True):
+        np.testing.assert_allclose((before + there) / 2, wanted, atol=1e-3)
+
+
+def test_plain_programs_and_programs_of_very_many_parts_have_nothing_to_drag():
+    assert sliders(PROGRAM, parts(PROGRAM)) == []
+    many = parse(
+        "far = 1\nfor i in translate(2000, by=(0.01, 0, 0)):\n    rod(start=(0, 0, 0), end=(1, 1, far), radius=1)"
+    )
+    assert sliders(many, parts(many)) == []
+
+
+def test_lines_tell_where_the_numbers_of_names_are_written():
+    names = ["width", "tall", "low"]
+    assert pieces("width, floor, tall = 10.5, -tall / 2, 24  # all", names) == [
+        ("width, floor, tall = ", ""), ("10.5", "width"), (", -tall / 2, ", ""), ("24", "tall"), ("  # all", ""),
+    ]  # fmt: skip
+    assert pieces("    low = -0.5", names) == [("    low = ", ""), ("-0.5", "low"), ("", "")]
+    for line in (
+        "floor = -tall / 2",
+        "for i in mirror(side):",
+        "leg(at=(0, 0, width))",
+        "# width = 2",
+        "def low(width=3):",
+    ):
+        assert pieces(line, names) is None
 
 
 def test_listing_shows_programs_as_they_are_written():

@@ -21,17 +21,23 @@ button.on { color: var(--ink); border-color: #9aa0a8; }
 h1 { font-size: 16px; margin: 0 22px 2px; overflow-wrap: anywhere; }
 #facts { color: var(--faint); margin: 0 22px 14px; font-size: 13px; }
 pre { margin: 0; font: 13px/1.6 ui-monospace, "DejaVu Sans Mono", Menlo, Consolas, monospace; }
-.line { padding: 0 22px 0 10px; cursor: default; white-space: pre; border-left: 3px solid transparent; }
+.line { padding: 0 22px 0 60px; text-indent: -50px; cursor: default; white-space: pre-wrap; border-left: 3px solid transparent; }
 .line.hot { background: #f2f4f7; border-left-color: #5b6472; }
 .dot { display: inline-block; width: 9px; height: 9px; border-radius: 2px; margin-right: 9px; }
 .loop { color: var(--faint); }
+.number { color: #1f5fb0; }
+#numbers { margin: 0 22px 14px; display: grid; grid-template-columns: max-content 1fr max-content; gap: 3px 12px; align-items: center;
+  font-size: 13px; }
+#numbers input { width: 100%; accent-color: #5b6472; }
+#numbers output { text-align: right; font-variant-numeric: tabular-nums; }
+#numbers .buttons { grid-column: 1 / -1; display: flex; gap: 6px; margin-top: 5px; }
 b { font-weight: 600; }
 @media (max-width: 760px) { body { flex-direction: column; } #side { width: 100%; height: 40%; border-left: 0;
   border-top: 1px solid var(--rule); } }
 </style></head>
 <body>
 <div id="view"><canvas></canvas><div id="bar"></div><div id="tip"></div></div>
-<div id="side"><h1></h1><div id="facts"></div><pre></pre></div>
+<div id="side"><h1></h1><div id="facts"></div><div id="numbers"></div><pre></pre></div>
 <script type="application/json" id="data">@DATA@</script>
 <script>
 "use strict";
@@ -44,6 +50,15 @@ if (!gl) tip.textContent = "This browser has no WebGL, so only the program is sh
 
 // The program: hovering a line lights its parts, hovering a part lights its line.
 let hot = new Set(), pinned = null, mode = "program";
+const written = {};  // Where the number of each name is written.
+function piece([text, name]) {
+  if (!name) return text;
+  const found = document.createElement("span");
+  found.className = "number";
+  found.textContent = text;
+  (written[name] = written[name] || []).push({ found, text });
+  return found;
+}
 const rows = data.lines.map((line) => {
   const row = document.createElement("div"), dot = document.createElement("span");
   row.className = "line" + (line.colour ? "" : " loop");
@@ -52,7 +67,7 @@ const rows = data.lines.map((line) => {
   const word = document.createElement(line.colour ? "b" : "span");
   word.textContent = line.word;
   if (line.ink) word.style.color = line.ink;
-  row.append(dot, line.before, word, line.after);
+  row.append(dot, ...(line.pieces ? line.pieces.map(piece) : [line.before, word, line.after]));
   row.onmouseenter = () => { if (!pinned) light(line.blocks); };
   row.onmouseleave = () => { if (!pinned) light([]); };
   row.onclick = () => { pinned = pinned === row ? null : row; light(line.blocks); };
@@ -65,28 +80,89 @@ function light(blocks) {
     || line.blocks.length === 1) && line.blocks.every((block) => hot.has(block))));
   draw();
 }
-for (const name of data.input ? ["program", "input", "both"] : []) {
-  const button = document.createElement("button");
-  button.textContent = name;
-  button.onclick = () => { mode = name; marks(); draw(); };
-  document.getElementById("bar").append(button);
-}
-function marks() { for (const b of document.querySelectorAll("button")) b.className = b.textContent === mode ? "on" : ""; }
-marks();
-
-function floats(text) {
-  const bytes = Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
-  return new Float32Array(bytes.buffer);
-}
-function buffer(values) {
-  const made = gl.createBuffer();
-  gl.bindBuffer(gl.ARRAY_BUFFER, made);
-  gl.bufferData(gl.ARRAY_BUFFER, values, gl.STATIC_DRAW);
+function button(name, where, act) {
+  const made = document.createElement("button");
+  made.textContent = name;
+  made.onclick = act;
+  where.append(made);
   return made;
 }
-function load(item) {  // Triangles as position + normal, lines as positions.
-  const triangles = floats(item.triangles), lines = floats(item.lines);
-  return { ...item, triangles: buffer(triangles), count: triangles.length / 6, lines: buffer(lines), ends: lines.length / 3 };
+const bar = document.getElementById("bar");
+for (const name of data.input ? ["program", "input", "both"] : []) button(name, bar, () => { mode = name; marks(); draw(); });
+function marks() { for (const b of bar.children) b.className = b.textContent === mode ? "on" : ""; }
+marks();
+
+// Numbers to drag: corners go straight between the places that the page was given for some values of each.
+const panel = document.getElementById("numbers"), short = (value) => String(Math.round(100 * value) / 100);
+data.sliders.forEach((slider) => {
+  const label = document.createElement("label"), input = document.createElement("input"), shown = document.createElement("output");
+  label.textContent = label.htmlFor = input.id = slider.name;
+  Object.assign(input, { type: "range", min: slider.low, max: slider.high, step: "any" });
+  const blocks = data.parts.filter((_, k) => slider.places.some((place) => place.parts[k])).map((part) => part.block);
+  slider.places = slider.places.map((place) => ({ ...place, parts: place.parts.map((part) => part && unpack(part, Float32Array)) }));
+  slider.show = () => {
+    input.value = slider.now;
+    shown.textContent = short(slider.now);
+    for (const { found, text } of written[slider.name] || []) found.textContent = slider.now === slider.value ? text : short(slider.now);
+  };
+  input.oninput = () => { slider.now = Number(input.value); slider.show(); move(); draw(); };
+  label.onmouseenter = input.onmouseenter = () => { if (!pinned) light(blocks); };
+  label.onmouseleave = input.onmouseleave = () => { if (!pinned) light([]); };
+  slider.now = slider.value;
+  panel.append(label, input, shown);
+});
+if (data.sliders.length) {
+  const buttons = document.createElement("div");
+  buttons.className = "buttons";
+  panel.append(buttons);
+  button("as it was", buttons, () => { data.sliders.forEach((slider) => { slider.now = slider.value; slider.show(); }); move(); draw(); });
+  const copy = button("copy the program", buttons, async () => {
+    await navigator.clipboard.writeText(rows.map((row) => row.textContent).join("\n") + "\n");
+    copy.textContent = "copied";
+    setTimeout(() => { copy.textContent = "copy the program"; }, 1500);
+  });
+  data.sliders.forEach((slider) => slider.show());
+}
+function along(slider, part, start) {  // What is between the known places on both sides of a value; beyond them straight on.
+  const known = [{ at: slider.value, corners: start }, ...slider.places.map((place) => ({ at: place.at, corners: place.parts[part] || start }))];
+  known.sort((a, b) => a.at - b.at);
+  let k = 0;
+  while (k < known.length - 2 && slider.now > known[k + 1].at) k++;
+  const [low, high] = [known[k], known[k + 1]];
+  return { low: low.corners, high: high.corners, share: (slider.now - low.at) / (high.at - low.at) };
+}
+function move() {
+  data.parts.forEach((part, k) => {
+    const moving = data.sliders.filter((slider) => slider.now !== slider.value && slider.places.some((place) => place.parts[k]));
+    if (!moving.length && !part.moved) return;
+    part.moved = moving.length > 0;
+    const start = part.start, now = Float32Array.from(start);
+    for (const slider of moving) {
+      const { low, high, share } = along(slider, k, start);
+      for (let i = 0; i < now.length; i++) now[i] += low[i] + share * (high[i] - low[i]) - start[i];
+    }
+    if (gl) fill(parts[k], now);
+  });
+}
+
+function unpack(text, kind) {
+  const bytes = Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
+  return new kind(bytes.buffer);
+}
+function fill(item, corners) {  // Triangles as position + normal, lines as positions.
+  const lines = new Float32Array(3 * item.creases.length);
+  item.creases.forEach((corner, k) => lines.set(corners.subarray(6 * corner, 6 * corner + 3), 3 * k));
+  for (const [buffer, values] of [[item.triangles, corners], [item.lines, lines]]) {
+    gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
+    gl.bufferData(gl.ARRAY_BUFFER, values, gl.STATIC_DRAW);
+  }
+}
+function load(item) {
+  item.start = unpack(item.triangles, Float32Array);
+  const creases = unpack(item.creases, Uint32Array);
+  const made = { ...item, creases, triangles: gl.createBuffer(), lines: gl.createBuffer(), count: item.start.length / 6, ends: creases.length };
+  fill(made, item.start);
+  return made;
 }
 const shader = (kind, source) => {
   const made = gl.createShader(kind);
@@ -172,11 +248,14 @@ function draw() {
   prepare(width, height);
   gl.disable(gl.BLEND);
   const grey = [0.83, 0.843, 0.863, 1];
-  if (mode !== "input") for (const part of parts) {
+  gl.enable(gl.POLYGON_OFFSET_FILL);  // Of faces that lie on each other the first part's is seen.
+  if (mode !== "input") parts.forEach((part, k) => {
+    gl.polygonOffset(0, 256 * k);
     const pale = hot.size && !hot.has(part.block);
     mesh(part, [...part.colour.map((c) => (pale ? 0.25 * c + 0.68 : c)), 1], 0);
     outline(part, pale ? [0.7, 0.7, 0.72, 1] : [...part.colour.map((c) => 0.35 * c), 1]);
-  }
+  });
+  gl.disable(gl.POLYGON_OFFSET_FILL);
   if (input && mode === "input") { mesh(input, grey, 0); outline(input, [0.35, 0.36, 0.38, 1]); }
   if (input && mode === "both") {
     gl.enable(gl.BLEND);

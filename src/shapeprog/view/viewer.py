@@ -1,4 +1,5 @@
-"""An interactive view as one self-contained HTML file: turn the shape, and see which line draws which part."""
+"""An interactive view as one self-contained HTML file: turn the shape, see which line draws which part, and drag its
+numbers."""
 
 from __future__ import annotations
 
@@ -14,12 +15,13 @@ from shapeprog.data.shape import Shape
 from shapeprog.errors import OutputError
 from shapeprog.files import write_text
 from shapeprog.formats.colours import colour
-from shapeprog.formats.parts import part_normals, parts
+from shapeprog.formats.parts import parts
 from shapeprog.language.program import Program
 from shapeprog.space import Array
 from shapeprog.view.listing import listing, parted
 from shapeprog.view.model import FINE, of_cells, of_shape
 from shapeprog.view.page import readable, scores_text
+from shapeprog.view.sliders import Slider, corners_of, pieces, sliders
 from shapeprog.view.template import HTML
 
 _TO_PAGE = np.array([[0.0, 0.0, -1.0], [1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
@@ -49,18 +51,20 @@ def viewer(
     points = np.concatenate([*places, np.zeros((0, 3))])
     points = points if len(points) else np.zeros((1, 3))
     low, high = points.min(0), points.max(0)
+    movable = sliders(program, drawn)
     content = {
         "title": title or (shape.name if shape is not None else Path(path).stem),
         "facts": " · ".join(scores_text(scores, program)),
         "middle": (_TO_PAGE @ ((low + high) / 2)).tolist(),
         "radius": max(1.0, float(np.linalg.norm(high - low)) / 2),
-        "lines": [_line(line) for line in listing(program, None)],
+        "lines": [_line(line, [slider.name for slider in movable]) for line in listing(program, None)],
         "parts": [
             {"name": part.name, "block": part.block, "colour": [channel / 255 for channel in colour(part.statement)]}
-            | _buffers(part.vertices, part.faces, normals)
-            for part, normals in zip(drawn, part_normals(drawn), strict=True)
+            | _buffers(corners)
+            for part, corners in zip(drawn, corners_of(drawn), strict=True)
         ],
-        "input": None if model is None else _buffers(model.vertices, model.faces, model.normals),
+        "sliders": [_slider(slider) for slider in movable],
+        "input": None if model is None else _buffers(np.concatenate([model.vertices[model.faces], model.normals], -1)),
     }
     text = json.dumps(content, separators=(",", ":")).replace("<", "\\u003c")
     target = Path(path)
@@ -68,24 +72,38 @@ def viewer(
     return target
 
 
-def _line(line: Any) -> dict[str, Any]:
+def _line(line: Any, movable: list[str]) -> dict[str, Any]:
     before, word, after = parted(line)
     found = {"before": before, "word": word, "after": after, "blocks": list(line.blocks), "colour": None, "ink": None}
     if line.statement is not None:
         found["colour"] = "rgb({}, {}, {})".format(*colour(line.statement))
         found["ink"] = "rgb({}, {}, {})".format(*readable(line.statement))
-    return found
+    return found | {"pieces": pieces(line.text, movable)}
 
 
-def _buffers(vertices: Array, faces: Array, normals: Array) -> dict[str, str]:
-    """Triangles as positions and normals, and the creases as lines, in the axes of the page."""
-    corners = np.asarray(vertices, np.float64)[faces]
-    triangles = np.concatenate([corners @ _TO_PAGE.T, np.asarray(normals) @ _TO_PAGE.T], -1)
-    return {"triangles": _packed(triangles), "lines": _packed(_creases(corners, normals) @ _TO_PAGE.T)}
+def _slider(slider: Slider) -> dict[str, Any]:
+    places = [
+        {"at": at, "parts": [None if part is None else _packed(_turned(part)) for part in found]}
+        for at, found in sorted(slider.places.items())
+    ]
+    return {"name": slider.name, "value": slider.value, "low": slider.low, "high": slider.high, "places": places}
+
+
+def _buffers(corners: Array) -> dict[str, str]:
+    """Triangles (F, 3, 6) as positions and normals in the axes of the page, and creases as pairs of their corners."""
+    return {
+        "triangles": _packed(_turned(corners)),
+        "creases": _packed(_creases(corners[..., :3], corners[..., 3:]), "<u4"),
+    }
+
+
+def _turned(corners: Array) -> Array:
+    """Positions and normals in the axes of the page."""
+    return np.concatenate([corners[..., :3] @ _TO_PAGE.T, corners[..., 3:] @ _TO_PAGE.T], -1)
 
 
 def _creases(corners: Array, normals: Array) -> Array:
-    """Ends (E, 2, 3) of the edges of triangles along which their normals part."""
+    """Corners (E, 2), counted through all triangles, at the ends of the edges along which normals part."""
     starts, ends = corners.reshape(-1, 3), np.roll(corners, -1, 1).reshape(-1, 3)
     tilt = np.asarray(normals).reshape(-1, 3) + np.roll(normals, -1, 1).reshape(-1, 3)
     extent = float(np.ptp(corners.reshape(-1, 3), axis=0).max()) if len(corners) else 1.0
@@ -100,8 +118,9 @@ def _creases(corners: Array, normals: Array) -> Array:
     np.add.at(total, place.reshape(-1), tilt / np.maximum(np.linalg.norm(tilt, axis=1, keepdims=True), 1e-12))
     sharp = (count == 1) | (np.linalg.norm(total, axis=1) < 0.94 * count)
     sharp &= (keys[first, 0] != keys[first, 1]).any(1)
-    return np.stack([starts[first[sharp]], ends[first[sharp]]], 1)
+    chosen = first[sharp]
+    return np.stack([chosen, chosen - chosen % 3 + (chosen % 3 + 1) % 3], 1)
 
 
-def _packed(values: Array) -> str:
-    return base64.b64encode(np.ascontiguousarray(values, "<f4").tobytes()).decode()
+def _packed(values: Array, kind: str = "<f4") -> str:
+    return base64.b64encode(np.ascontiguousarray(values, kind).tobytes()).decode()

@@ -1,0 +1,140 @@
+"""Numbers that can be dragged on a page: where every corner goes when a named number of a program changes.
+
+The page has no renderer of its own for statements, which may be anybody's.  It gets the meshes of a few values of each
+number and goes straight from one to the next, so it is exact wherever corners depend on a number linearly.
+"""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from shapeprog.errors import ShapeProgError
+from shapeprog.formats.parts import Part, part_normals, parts
+from shapeprog.language.named import names, set
+from shapeprog.language.program import Program
+from shapeprog.space import Array
+
+SHARES = (0.5, 0.75, 1.25, 1.5)
+"""Values that are drawn, as shares of what a number is."""
+
+LEAST = 1.0
+"""What stands for a number smaller than this, so that a zero can be dragged, too; in its own unit."""
+
+STRAIGHT = 1e-3
+"""Difference in cells below which corners count as going straight."""
+
+MOST = 400_000
+"""Corners of triangles in all meshes of all numbers beyond which a page has none to drag."""
+
+
+@dataclass(frozen=True)
+class Slider:
+    """A number to drag.
+
+    Parameters
+    ----------
+    name, value
+        What it is called, and what it is.
+    low, high
+        How far it may be dragged.
+    places
+        For some other values the corners (F, 3, 6) of the triangles of each part, positions and normals; ``None`` for
+        parts that stay where they are.  One value is enough where all corners go straight.
+    """
+
+    name: str
+    value: float
+    low: float
+    high: float
+    places: dict[float, list[Array | None]]
+
+
+def sliders(program: Program, drawn: Sequence[Part]) -> list[Slider]:
+    """The free numbers of a program, except for those that change how many parts there are or how they are divided.
+
+    Parameters
+    ----------
+    drawn
+        The parts of the program as it is.
+    """
+    free = [named for named in names(program) if named.free]
+    if len(free) * len(SHARES) * sum(3 * len(part.faces) for part in drawn) > MOST:
+        return []
+    found = (_slider(program, drawn, named.name, named.value) for named in free)
+    return [slider for slider in found if slider is not None]
+
+
+def pieces(text: str, movable: Sequence[str]) -> list[tuple[str, str]] | None:
+    """A line of text as what it says and, in turn, whose number this is: ``width = `` and nobody's, ``10`` and that of
+    ``width``.  ``None`` for lines that give no number to any of these names."""
+    try:
+        (line,) = ast.parse(text.strip()).body
+    except (SyntaxError, ValueError):  # the head of a loop
+        return None
+    if not isinstance(line, ast.Assign):
+        return None
+    (target,) = line.targets
+    named = target.elts if isinstance(target, ast.Tuple) else [target]
+    values = line.value.elts if isinstance(line.value, ast.Tuple) else [line.value]
+    start, last, found = len(text) - len(text.lstrip()), 0, list[tuple[str, str]]()
+    for name, value in zip(named, values, strict=True):
+        if isinstance(name, ast.Name) and name.id in movable:
+            first, end = start + value.col_offset, start + (value.end_col_offset or 0)
+            found += [(text[last:first], ""), (text[first:end], name.id)]
+            last = end
+    return [*found, (text[last:], "")] if found else None
+
+
+def corners_of(drawn: Sequence[Part]) -> list[Array]:
+    """The corners of the triangles of parts (F, 3, 6): positions and normals."""
+    return [
+        np.concatenate([part.vertices[part.faces], normals], -1)
+        for part, normals in zip(drawn, part_normals(drawn), strict=True)
+    ]
+
+
+def _slider(program: Program, drawn: Sequence[Part], name: str, value: float) -> Slider | None:
+    start = corners_of(drawn)
+    size = max(abs(value), LEAST) * (1.0 if value >= 0 else -1.0)
+    places = dict(_places(program, drawn, start, name, [value + (share - 1) * size for share in SHARES]))
+    if not places or all(part is None for found in places.values() for part in found):
+        return None
+    low, high = min(*places, value), max(*places, value)
+    far = max(places, key=lambda at: abs(at - value))
+    straight = all(
+        _straight(before, there, last, (at - value) / (far - value))
+        for at, found in places.items()
+        for before, there, last in zip(start, found, places[far], strict=True)
+    )
+    return Slider(name, value, low, high, {far: places[far]} if straight else places)
+
+
+def _places(
+    program: Program, drawn: Sequence[Part], start: list[Array], name: str, wanted: Sequence[float]
+) -> Iterator[tuple[float, list[Array | None]]]:
+    """For each value that can be drawn, with parts of as many triangles, the corners of those that move."""
+    for at in wanted:
+        try:
+            moved = parts(set(program, {name: at}))
+        except ShapeProgError:
+            continue
+        if [part.faces.shape for part in moved] != [part.faces.shape for part in drawn]:
+            continue
+        yield (
+            at,
+            [
+                None if np.abs(there - before).max(initial=0) < STRAIGHT / 10 else there
+                for before, there in zip(start, corners_of(moved), strict=True)
+            ],
+        )
+
+
+def _straight(before: Array, there: Array | None, last: Array | None, share: float) -> bool:
+    """Whether corners are where they would be if they went straight on to their last place."""
+    end = before if last is None else last
+    now = before if there is None else there
+    return bool(np.abs(before + share * (end - before) - now).max(initial=0) < STRAIGHT)

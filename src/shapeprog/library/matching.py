@@ -150,8 +150,7 @@ class Sums:
     def shortest(self, row: FloatArray) -> Value:
         """The shortest expression of a row (N + 1,): factors of the free names, and a constant."""
         options = [self._sum(row, ())]
-        for name, own in self.others.items():
-            options += [self._sum(row - factor * own, ((Name(name), factor),)) for factor in (1.0, -1.0)]
+        options += [self._sum(row - own, ((Name(name), 1.0),)) for name, own in self.others.items()]
         return min(options, key=terms)
 
     def _sum(self, row: FloatArray, first: tuple[tuple[Value, float], ...]) -> Value:

@@ -10,9 +10,9 @@ import pytest
 from declared import LANGUAGE
 
 import shapeprog as sp
-from benchmarks import labels, planted
+from benchmarks import labels, library, planted
 from shapeprog.language import standard, using
-from shapeprog.language.text import parse
+from shapeprog.language.text import parse, source_of
 
 TABLE = """\
 box(at=(6, -9, -12), size=(2, 18, 24))
@@ -70,3 +70,15 @@ def test_labels_are_counted_by_declared_words_fitted_words_and_blocks(tmp_path: 
     back, seat, leg = 0, 50 / 60, 20 / 50
     assert row.startswith(f"| all, 1 | 0.700 / {(back + seat + leg) / 3:.3f} |")
     assert row.endswith(f"0.900 / {(1 + 50 / 60 + 20 / 30) / 3:.3f} |")
+
+
+def test_what_stitch_calls_counts_as_a_statement_where_it_holds_any() -> None:
+    text = "a = 3\nfor i in mirror(side):\n    arm(box(at=(0, a / 2, 1 - a), size=(1, -a, 2)))\n"
+    text += "leg(at=(0, 0, 0), size=(1, 1, 1))\n"
+    lines = source_of(parse(text)).lines
+    arms = "(mirror 2 side 0 (arm_of (box 0 (/ a 2) (- 1 a) 1 (neg a) 2)))"
+    assert library.expression(lines, whole=False) == f"(seq {arms} (leg 0 0 0 1 1 1))"
+    assert library.expression(lines[2:], whole=True) == "(leg 0 0 0 1 1 1)"
+    assert library.statements_of_stitch(library.expression(lines, whole=False), ()) == 3
+    functions = (("fn_0", "(/ #0 2)"), ("fn_1", "(mirror 2 side 0 (arm_of #0))"), ("fn_2", "(fn_1 (box 0 #0 1 1 1 2))"))
+    assert library.statements_of_stitch("(seq (fn_2 (fn_0 a)) (leg 0 (fn_0 a) 0 1 1 1))", functions) == 2

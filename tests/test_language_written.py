@@ -50,6 +50,17 @@ def test_names_expressions_and_functions_come_to_plain_numbers() -> None:
     assert parse(CHAIR) != Program(plain)
 
 
+def test_a_role_around_a_call_is_that_of_all_parts_in_it_that_have_none() -> None:
+    inner = "def two(up):\n    leg(at=(up, 0, 0), size=(1, 1, 1))\n    box(at=(up, 2, 0), size=(1, 1, 1))\n\n"
+    outer = "def four():\n    two(up=1)\n    rail(two(up=2))\n    seat(box(at=(9, 0, 0), size=(1, 1, 1)))\n\n"
+    program = parse(f"{inner}{outer}arm(four())\ntwo(up=3)\n")
+    assert [node.word for node in program.walk()] == ["leg", "arm", "leg", "rail", "seat", "leg", "box"]
+    assert format_program(program).endswith("\narm(four())\ntwo(up=3)\n")
+    assert program_from_json(program_to_json(program)) == program
+    with pytest.raises(ShapeProgError, match="did you mean arm"):
+        evaluated(Source((Function("four", (), ()), Call("four", (), role="arms"))))
+
+
 def test_text_as_it_is_formatted_comes_back_letter_by_letter() -> None:
     assert format_program(parse(CHAIR)) == CHAIR
 

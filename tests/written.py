@@ -101,7 +101,8 @@ class Writer:
                 for name, default in called.parameters
                 if default is None or self.chance(0.5)
             ]
-            found.append(Call(called.name, tuple(arguments), self.note()))
+            roles = ["", *(role for role in ("leg", "handle", "rail") if role not in WORDS)]
+            found.append(Call(called.name, tuple(arguments), self.note(), self.choice.choice(roles)))
         return found
 
     def draw(self, scope: dict[str, float], value: Value) -> Line:

@@ -20,14 +20,16 @@ from .language.statement import loop, statement, using
 from .language.tensors import Code, decode, encode
 from .language.text import format_program, parse
 from .language.unroll import unroll
+from .library import Library, learn, load_library, save_library, with_library
 from .space import Frame
 
 __version__: str
 
 __all__ = [
-    "Code", "Draw", "Expression", "Frame", "InputError", "Linear", "Loop", "Name", "Named", "OutputError", "Parametric",
-    "Program", "ProgramError", "Scene", "Shape", "ShapeProgError", "Source",
+    "Code", "Draw", "Expression", "Frame", "InputError", "Library", "Linear", "Loop", "Name", "Named", "OutputError",
+    "Parametric", "Program", "ProgramError", "Scene", "Shape", "ShapeProgError", "Source",
     "chamfer", "decode", "encode", "evaluated", "export", "format_notation", "format_program", "infer", "inline",
-    "load", "load_shape", "load_statements", "load_with_frame", "loop", "names", "parse", "parse_notation",
-    "program_from_json", "program_to_json", "random_program", "refine", "save", "set", "statement", "unroll", "using",
+    "learn", "load", "load_library", "load_shape", "load_statements", "load_with_frame", "loop", "names", "parse",
+    "parse_notation", "program_from_json", "program_to_json", "random_program", "refine", "save", "save_library",
+    "set", "statement", "unroll", "using", "with_library",
 ]  # fmt: skip

@@ -14,6 +14,7 @@ from shapeprog.cli import (
     adapting,
     changes,
     inferring,
+    libraries,
     measuring,
     modelling,
     sampling,
@@ -54,6 +55,11 @@ for name, command, help_line in (
     ("evaluate", measuring.evaluate_command, "Measure predictions against targets."),
 ):
     app.command(name, cls=changes.ChangingCommand, short_help=help_line)(terminal.guarded(command))
+
+library = typer.Typer(no_args_is_help=True, rich_markup_mode=None)
+library.command("learn")(terminal.guarded(libraries.learn_command))
+library.command("show")(terminal.guarded(libraries.show_command))
+app.add_typer(library, name="library", help="Functions that programs may be written with.")
 
 
 def _version(wanted: bool) -> None:

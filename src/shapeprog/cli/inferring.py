@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,6 +19,7 @@ from shapeprog.inference.budget import BUDGET, Progress
 if TYPE_CHECKING:
     from shapeprog.data.shape import Shape
     from shapeprog.language.program import Program
+    from shapeprog.library import Library
 
 FOLDER = Path("shapeprog-out")
 
@@ -49,7 +50,8 @@ def infer_command(
     seed: terminal.Seed = 0,
     up: terminal.Up = None,
     front: terminal.Front = None,
-    modules: terminal.With = None,
+    library: terminal.WithLibrary = False,
+    modules: terminal.WithLibraries = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object per shape, one per line.")] = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
     no_picture: Annotated[bool, typer.Option("--no-picture", help="Write no PNG.")] = False,
@@ -85,8 +87,10 @@ def infer_command(
 
     terminal.check_axes(up, front)
     _prepare(picture=not no_picture, talk=not (quiet or as_json))
-    terminal.load_modules(modules)
-    infer_one = _baseline if baseline else _chosen(weights, proposals, rounds, no_search, paper, detail, not no_ties)
+    libraries = terminal.load_libraries(modules, library)
+    infer_one = (
+        _baseline if baseline else _chosen(weights, proposals, rounds, no_search, paper, detail, not no_ties, libraries)
+    )
     folder = make_folder(out)
     failures: list[tuple[Path, ShapeProgError]] = []
     stopped: OutputError | None = None
@@ -163,7 +167,14 @@ def _prepare(picture: bool, talk: bool) -> None:
 
 
 def _chosen(
-    weights: str, proposals: int, rounds: int | None, no_search: bool, paper: bool, detail: float, ties: bool
+    weights: str,
+    proposals: int,
+    rounds: int | None,
+    no_search: bool,
+    paper: bool,
+    detail: float,
+    ties: bool,
+    libraries: Sequence[Library],
 ) -> Inference:
     """Inference with what was asked for, which is looked at before any shape is."""
     from shapeprog.inference import Settings, infer
@@ -176,7 +187,7 @@ def _chosen(
     def one(shape: Shape, blocks: int, budget: float, seed: int, progress: Progress) -> Found:
         result = infer(
             shape, blocks=blocks, budget=budget, seed=seed, settings=settings, generator=asked, proposals=proposals,
-            search=not no_search, statements="paper" if paper else "all", detail=detail, ties=ties,
+            search=not no_search, statements="paper" if paper else "all", detail=detail, ties=ties, libraries=libraries,
             progress=progress,
         )  # fmt: skip
         scores = _scores(result.program, result.snapped, shape, result.scores, seed)

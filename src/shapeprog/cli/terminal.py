@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from shapeprog.language.program import Program
+    from shapeprog.library import Library
 
 debugging = False
 """Whether errors show their traceback."""
@@ -35,6 +36,19 @@ Command = TypeVar("Command", bound=Callable[..., None])
 With = Annotated[
     list[Path] | None,
     typer.Option("--with", help="A Python module that declares statements of your own; may be given again."),
+]
+
+WithLibraries = Annotated[
+    list[Path] | None,
+    typer.Option(
+        "--with",
+        help="A Python module that declares statements of your own, or a .shape file of functions to write programs "
+        "with; may be given again.",
+    ),
+]
+
+WithLibrary = Annotated[
+    bool, typer.Option("--library", help="Write the program with the functions that ship: see 'library show'.")
 ]
 
 Changes = Annotated[
@@ -158,6 +172,15 @@ def load_modules(modules: list[Path] | None) -> None:
 
     for module in modules:
         load_statements(module)
+
+
+def load_libraries(files: list[Path] | None, shipped: bool) -> list[Library]:
+    """The libraries among what was given with ``--with``, then the one that ships; modules are loaded as well."""
+    from shapeprog.library import load_library
+
+    given = files or []
+    load_modules([file for file in given if file.suffix.lower() != ".shape"])
+    return [*(load_library(f) for f in given if f.suffix.lower() == ".shape"), *([load_library()] if shipped else [])]
 
 
 def read_program_file(path: Path, changes: Sequence[str] | None = None) -> tuple[Program, Any]:

@@ -20,7 +20,8 @@ def tidy_command(
         float, typer.Option(help="What a number is worth, times the usual: how far parts may move.", min=0, max=1000)
     ] = 1.0,
     seed: terminal.Seed = 0,
-    modules: terminal.With = None,
+    library: terminal.WithLibrary = False,
+    modules: terminal.WithLibraries = None,
 ) -> None:
     """Tie the numbers of a program: lengths that are nearly equal, faces that are flush or meet, parts in the middle.
 
@@ -30,14 +31,18 @@ def tidy_command(
     from shapeprog.inference.evidence import evidence_of_program
     from shapeprog.inference.ties.tying import PRICE, tie
     from shapeprog.language.free import numbers
+    from shapeprog.library import with_library
 
-    terminal.load_modules(modules)
+    libraries = terminal.load_libraries(modules, library)
     given, frame = load_with_frame(program)
     if not given.size:
         raise InputError(f"{program} draws nothing", "name a program that draws something")
     tied = tie(given, evidence_of_program(given, seed), price=price * PRICE, seed=seed)
+    found = tied.program
+    for each in libraries:
+        found = with_library(found, each)
     if out is not None:
-        save(tied.program, out, frame)
-    terminal.print_program(terminal.output(), tied.program)
+        save(found, out, frame)
+    terminal.print_program(terminal.output(), found)
     before = numbers(given)
     terminal.errors().print(f"{tied.free} numbers are free; {before} were.", style="dim", markup=False)

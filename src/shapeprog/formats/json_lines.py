@@ -4,7 +4,7 @@
 {"statement": "translate", "parameters": {"count": 2, "by": [0, 0, 18]}, "body": [...]}
 {"numbers": {"width": 10.25, "floor": "-height / 2"}}
 {"function": "legs", "parameters": {"long": null, "thick": 2}, "body": [...]}
-{"call": "legs", "arguments": {"long": "seat_height"}}
+{"call": "posts", "arguments": {"long": "seat_height"}, "role": "leg"}
 {"comment": "four of them"}
 
 A number is a plain one, or an expression as its text.  All but comments may have a "note", the comment behind them.
@@ -32,7 +32,7 @@ _WORDS = {
     "statement": ("statement", "parameters", "role", "body", "note"),
     "numbers": ("numbers", "note"),
     "function": ("function", "parameters", "body", "note"),
-    "call": ("call", "arguments", "note"),
+    "call": ("call", "arguments", "role", "note"),
     "comment": ("comment",),
 }
 """What may be said of a line, by the word that tells what it is."""
@@ -75,8 +75,8 @@ def _entry(line: Line, depth: int) -> dict[str, Any]:
             found = {"function": name, "parameters": given}
         case _:
             found = {"statement": line.name, "parameters": _parameters(line)}
-    if isinstance(line, WrittenDraw) and line.role:
-        found["role"] = checked_role(line)
+    if isinstance(line, WrittenDraw | Call) and line.role:
+        found["role"] = line.role if isinstance(line, Call) else checked_role(line)
     if isinstance(line, WrittenLoop | Function):
         found["body"] = [_entry(inner, depth + 1) for inner in line.body]
     return found | ({"note": line.note} if line.note else {})
@@ -137,7 +137,8 @@ class _Reader:
             case "numbers":
                 line = Assignment(self._pairs(entry[kind], place), note)
             case "call":
-                line = Call(entry[kind], self._pairs(entry.get("arguments"), place), note)
+                role = self._role(entry, "", place)
+                line = Call(entry[kind], self._pairs(entry.get("arguments"), place), note, role)
             case "function":
                 given = entry.get("parameters")
                 blank = {name for name, value in given.items() if value is None} if isinstance(given, dict) else set()
@@ -167,7 +168,7 @@ class _Reader:
         if not isinstance(role, str) or (role and role not in roles):
             hint = did_you_mean(str(role), roles)
             raise self._error(f"{place}: no role is called {shortened(role)}", hint)
-        if role == word:
+        if role and role == word:
             raise self._error(f"{place}: {word} is a {word} without being called one", "leave the role out")
         return role
 

@@ -8,6 +8,7 @@ every statement there is; cells have a surface as well, if a coarse one.
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, partial
 from pathlib import Path
@@ -33,6 +34,7 @@ from shapeprog.inference.ties.tying import tie
 from shapeprog.language.free import numbers
 from shapeprog.language.program import Program
 from shapeprog.language.unroll import unroll
+from shapeprog.library import Library, with_library
 
 if TYPE_CHECKING:
     from shapeprog.models.generator import Generator
@@ -101,6 +103,7 @@ def infer(
     statements: Literal["all", "paper"] = "all",
     detail: float = 1.0,
     ties: bool = True,
+    libraries: Sequence[Library] = (),
     progress: Progress | None = None,
 ) -> Result:
     """A short program of at most ``blocks`` blocks that rebuilds a shape.
@@ -139,6 +142,8 @@ def infer(
     ties
         Whether numbers that hold together are tied where the surface is known: the program then has names for the few
         that are free, and expressions for all others.
+    libraries
+        Functions that the program is written with wherever that is shorter.
     progress
         Called with what is being done and the share of it that is done.
 
@@ -211,6 +216,8 @@ def infer(
                 tied = tie(program, found.evidence, seed=seed, progress=progress).program
                 fits = target.points is not None or costs(tied) <= costs(program)
                 program = tied if fits else program
+    for library in libraries:
+        program = with_library(program, library)
     if target.note:
         reason += f" {target.note}"
     cut = tuple(each.cut for each in (proposing, searching, refining) if each.cut)

@@ -162,6 +162,8 @@ class _Checker:
         self.functions[name] = line
 
     def _call(self, line: Call, scope: _Scope) -> None:
+        if line.role and line.role not in language().roles:
+            raise Fault(line, f"no role is called {line.role!r}", did_you_mean(line.role, language().roles))
         if line.name == scope.function:
             cure = "use a loop: functions call those above them alone"
             raise Fault(line, f"{line.name} calls itself", cure)
@@ -190,7 +192,7 @@ def _words(line: Line) -> Iterator[str]:
     """What is called on a line, or may be."""
     if not isinstance(line, Comment | Assignment):
         yield line.name
-    if isinstance(line, WrittenDraw) and line.role:
+    if isinstance(line, WrittenDraw | Call) and line.role:
         yield line.role
 
 

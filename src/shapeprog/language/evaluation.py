@@ -95,8 +95,13 @@ class _Run:
         self.made = 0
         self.met: dict[int, list[Any]] = defaultdict(list)
 
-    def block(self, lines: tuple[Line, ...], scope: dict[str, Any], loops: int, calls: int) -> list[Any]:
-        """What the lines of a program, function or loop come to; names are added to ``scope``."""
+    def block(
+        self, lines: tuple[Line, ...], scope: dict[str, Any], loops: int, calls: int, role: str = ""
+    ) -> list[Any]:
+        """What the lines of a program, function or loop come to; names are added to ``scope``.
+
+        ``role`` stands around the call that they are of.
+        """
         found: list[Any] = []
         for line in lines:
             match line:
@@ -104,14 +109,14 @@ class _Run:
                     self._count(line, calls)
                     values = self._values(line, scope)
                     exact = self.given is None
-                    found.append(Draw(line.name, values, line.role) if exact else Symbolic(line.name, values))
+                    found.append(Draw(line.name, values, _role(line, role)) if exact else Symbolic(line.name, values))
                     self.met[id(line)].append(found[-1])
                 case WrittenLoop():
                     self._count(line, calls)
                     if loops >= DEEPEST:
                         cure = "put some of them side by side"
                         raise Fault(line, f"loops are nested more than {DEEPEST} deep", cure)
-                    body = tuple(self.block(line.body, scope, loops + 1, calls))
+                    body = tuple(self.block(line.body, scope, loops + 1, calls, role))
                     kind = Loop if self.given is None else Symbolic
                     found.append(kind(line.name, self._values(line, scope), body))
                     self.met[id(line)].append(found[-1])
@@ -121,7 +126,8 @@ class _Run:
                         raise Fault(
                             line, f"functions call each other more than {DEEPEST} deep", "write some of them out"
                         )
-                    found += self.block(self.functions[line.name].body, self._inner(line, scope), loops, calls + 1)
+                    inner = self.functions[line.name].body
+                    found += self.block(inner, self._inner(line, scope), loops, calls + 1, line.role or role)
                 case Assignment():
                     scope |= self._named(line, scope, calls)
         return found
@@ -167,6 +173,11 @@ class _Run:
                     key = slots.start + written.index(True)
                     raise Fault(line, mistake.message, mistake.hint, key) from None
         return tuple(numbers)
+
+
+def _role(line: WrittenDraw, around: str) -> str:
+    """The role of a part: its own, that of its statement, which is not written, or else the one around the call."""
+    return line.role or ("" if line.name in language().roles else around)
 
 
 def _at(line: Line, key: int | str, value: Value, scope: dict[str, Any]) -> Any:

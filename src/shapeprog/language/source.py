@@ -49,11 +49,15 @@ class WrittenLoop:
 
 @dataclass(frozen=True)
 class Call:
-    """``legs(height=seat)``: the lines of a function, with a number for each of its parameters that has no default."""
+    """``leg(posts(height=seat))``: the lines of a function, with a number for each parameter that has no default.
+
+    A role around it is that of all parts in it that have none of their own.
+    """
 
     name: str
     arguments: tuple[tuple[str, Value], ...]
     note: str = ""
+    role: str = ""
 
 
 @dataclass(frozen=True)
@@ -105,7 +109,7 @@ def values(line: Line) -> tuple[Value, ...]:
     match line:
         case WrittenDraw() | WrittenLoop():
             return line.values
-        case Assignment(pairs) | Call(_, pairs):
+        case Assignment(pairs) | Call(arguments=pairs):
             return tuple(value for _, value in pairs)
         case Function():
             return tuple(default for _, default in line.parameters if default is not None)

@@ -100,15 +100,16 @@ class _Reader:
                 return self._function(statement, depth, end)
             case ast.Assign():
                 return self._assignment(statement)
-            case ast.Expr(ast.Call(ast.Name(name)) as call) if name in self.functions and name not in language():
-                return self._function_call(statement, call, name)
-            case ast.Expr(call):
-                return self._draw(statement, call)
+            case ast.Expr(value):
+                role, inner = self._role(value)
+                match inner:
+                    case ast.Call(ast.Name(name)) if name in self.functions and name not in language():
+                        return self._function_call(statement, inner, name, role)
+                return self._draw(statement, role, inner)
         said = "a program holds only drawing statements, named numbers, for loops and functions"
         raise self.text.error(statement, said, f"write {_CALL} or for i in loop(count, ...):")
 
-    def _draw(self, statement: ast.stmt, node: ast.expr) -> Line:
-        role, solid = self._role(node)
+    def _draw(self, statement: ast.stmt, role: str, solid: ast.expr) -> Line:
         declared, call = self._call(solid, "statement")
         if declared.is_loop:
             raise self.numbers.misused(call, f"{declared.name} is a loop and draws nothing itself", declared)
@@ -128,7 +129,7 @@ class _Reader:
             return role, node.args[0]
         if role in language() and not any(isinstance(each, ast.Call) for each in node.args):
             return "", node
-        said = f"{role} is what a part is for, and stands around one solid"
+        said = f"{role} is what a part is for, and stands around one solid or call of a function"
         raise self.text.error(node, said, f"write {role}(box(at=(_, _, _), size=(_, _, _))), or another solid")
 
     def _loop(self, statement: ast.For, depth: int, end: float) -> Line:
@@ -206,7 +207,7 @@ class _Reader:
         line = Function(name, tuple(zip(words, values, strict=True)), body, note)
         return self._kept(line, statement, {each.arg: each for each in given.args})
 
-    def _function_call(self, statement: ast.stmt, call: ast.Call, name: str) -> Line:
+    def _function_call(self, statement: ast.stmt, call: ast.Call, name: str, role: str) -> Line:
         words = [each.arg for each in self.functions[name].args.args]
         places: dict[str, Node] = {}
         pairs: list[tuple[str, Value]] = []
@@ -222,7 +223,7 @@ class _Reader:
             places[keyword.arg] = keyword
         order = {word: place for place, word in enumerate(words)}
         pairs.sort(key=lambda pair: order.get(pair[0], len(words)))
-        return self._kept(Call(name, tuple(pairs), self._note(statement)), statement, places)
+        return self._kept(Call(name, tuple(pairs), self._note(statement), role), statement, places)
 
     def _note(self, node: Node) -> str:
         return self.comments.note(node.end_lineno or node.lineno)

@@ -108,7 +108,8 @@ def _lines(lines: Iterable[Line], depth: int, loops: int, taken: set[str]) -> It
                 names, values = zip(*line.numbers, strict=True)
                 yield f"{indent}{', '.join(names)} = {', '.join(map(text_of, values))}{note}"
             case Call():
-                yield f"{indent}{line.name}({', '.join(_given(line.arguments))}){note}"
+                call = f"{line.name}({', '.join(_given(line.arguments))})"
+                yield f"{indent}{f'{line.role}({call})' if line.role else call}{note}"
             case Function():
                 yield f"{indent}def {line.name}({', '.join(_given(line.parameters))}):{note}"
                 yield from _lines(line.body, depth + 1, loops, taken)

@@ -100,7 +100,7 @@ class _Drawn:
 def _shown(lines: tuple[Line, ...], texts: Iterator[str], blocks: dict[int, list[int]]) -> Iterator[Shown]:
     for line in lines:
         word, statement = "" if isinstance(line, Comment | Assignment) else line.name, None
-        if isinstance(line, WrittenDraw):
+        if isinstance(line, WrittenDraw) or (isinstance(line, Call) and line.role):
             word = line.role or line.name
             statement = language().called(word).id
         text, body = next(texts), line.body if isinstance(line, WrittenLoop | Function) else None

@@ -1,0 +1,208 @@
+"""Blocks in a form that does not depend on how they are written, so that what is drawn alike is found alike.
+
+A solid that is symmetric along the axes is its low corner and extents, whatever statement draws it; two of them side
+by side are a pair, whether a mirror or a shift makes it; copies along an axis are told by the span of all of them.
+Every number of the form is linear in those of the text once counts are known, so expressions of names carry over.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cache
+from typing import Literal, NamedTuple
+
+import numpy as np
+import torch
+from jaxtyping import Float
+from torch import Tensor
+
+from shapeprog.geometry.batch import Solids
+from shapeprog.geometry.primitive import primitives
+from shapeprog.language.program import Chain, Draw, Loop
+from shapeprog.language.statement import Statement, language
+from shapeprog.space import FloatArray
+
+ZERO = 1e-6
+"""Shifts in cells below this are none."""
+
+Way = Literal["pair", "row", "mirror"]
+"""How copies lie along an axis: two, any number at equal steps, or one and its mirror image."""
+
+
+class Slot(NamedTuple):
+    """What one number of a block is: the word of its parameter, its quantity, and its axis of the grid, or -1."""
+
+    word: str
+    kind: str
+    axis: int
+
+
+class Solid(NamedTuple):
+    """How the numbers of a statement make those of a block: (M, S + 1) factors of its S slots and a constant.
+
+    The numbers of a ``boxed`` solid, its own mirror image along every axis of the grid, are its low corner, extents,
+    and what else shapes it; those of any other are as they are written.
+    """
+
+    shape: str
+    slots: tuple[Slot, ...]
+    rows: FloatArray
+    boxed: bool
+
+
+@dataclass(frozen=True)
+class Kind:
+    """What blocks have to share to be alike.
+
+    Parameters
+    ----------
+    word
+        The role of the part, or nothing.
+    shape, boxed
+        Its solid, and whether that is told by low corner and extents.
+    repeats
+        The axes along which it is repeated, and how.
+    others
+        Loops that are kept as they are written: turns, steps along no axis, two loops along one.
+    """
+
+    word: str
+    shape: str
+    boxed: bool
+    repeats: tuple[tuple[int, Way], ...] = ()
+    others: tuple[str, ...] = ()
+
+
+class Block(NamedTuple):
+    """A block in its form: its numbers (M,), what they are, their factors (M, V + 1) by the V of the text, its counts.
+
+    After the numbers of the solid come, for each axis along which it is repeated, the span of all copies, or the place
+    of the mirror.
+    """
+
+    kind: Kind
+    slots: tuple[Slot, ...]
+    values: FloatArray
+    rows: FloatArray
+    counts: tuple[int, ...]
+
+
+def blocks_of(chain: Chain) -> Iterator[Block]:
+    """The forms of a block: first the narrowest, then those where a pair is taken for a row of two."""
+    *outer, draw = chain
+    assert isinstance(draw, Draw)
+    loops = [node for node in outer if isinstance(node, Loop)]
+    word = draw.role or (draw.name if draw.name in language().roles else "")
+    solid = solid_of(draw.name)
+    numbers = np.array([*(value for node in chain for value in node.values), 1.0])
+    first = len(numbers) - 1 - len(draw.values)
+    base = np.zeros((len(solid.rows), len(numbers)))
+    base[:, first:] = solid.rows
+    found = _repeated(loops, base, solid, numbers)
+    if found is None:
+        names = tuple(node.name for node in loops)
+        more = [slot for node in loops for slot in _slots(language()[node.name])]
+        rows = np.vstack([base, np.eye(len(numbers))[:first]])
+        kind = Kind(word, solid.shape, solid.boxed, (), names)
+        yield Block(kind, (*solid.slots, *more), rows @ numbers, rows, tuple(node.count for node in loops))
+        return
+    ways, rows, counts = found
+    spans = tuple(Slot("plane" if way == "mirror" else "span", "length", axis) for axis, way in ways)
+    pairs = [place for place, (_, way) in enumerate(ways) if way == "pair"]
+    for chosen in (each for size in range(len(pairs) + 1) for each in itertools.combinations(pairs, size)):
+        repeats = tuple((axis, "row" if place in chosen else way) for place, (axis, way) in enumerate(ways))
+        kind = Kind(word, solid.shape, solid.boxed, repeats)
+        yield Block(kind, (*solid.slots, *spans), rows @ numbers, rows, counts)
+
+
+def _repeated(
+    loops: Sequence[Loop], base: FloatArray, solid: Solid, numbers: FloatArray
+) -> tuple[list[tuple[int, Way]], FloatArray, tuple[int, ...]] | None:
+    """How a block is repeated along each axis, its rows with those of the spans, and its counts; none if it is not."""
+    rows, start = base.copy(), 0
+    ways: dict[int, tuple[Way, FloatArray, int]] = {}
+    for loop in loops:
+        slots = np.eye(len(numbers))[start : start + len(loop.values)]
+        start += len(loop.values)
+        if loop.name == "mirror":
+            axis, plane = int(loop.values[1]), slots[2]
+        elif loop.name == "translate" and loop.count > 1:
+            along = [axis for axis in range(3) if abs(loop.values[1 + axis]) > ZERO]
+            axis = along[0] if len(along) == 1 else -1
+        else:
+            return None
+        if axis < 0 or axis in ways:
+            return None
+        if loop.name == "mirror" and not solid.boxed:
+            ways[axis] = "mirror", plane, 2
+            continue
+        if loop.name == "mirror":
+            other = 2 * plane - rows[axis] - rows[3 + axis]
+            reach = other - rows[axis]
+        else:
+            reach = (loop.count - 1) * slots[1 + axis]
+        if reach @ numbers < 0:  # the first copy becomes the lowest
+            for place, slot in enumerate(solid.slots):
+                if slot.axis == axis and slot.kind == "position":
+                    rows[place] = rows[place] + reach
+            reach = -reach
+        span = reach + rows[3 + axis] if solid.boxed else reach
+        ways[axis] = "pair" if loop.count == 2 and solid.boxed else "row", span, loop.count
+    order = sorted(ways)
+    whole = np.vstack([rows, *(ways[axis][1] for axis in order)])
+    return [(axis, ways[axis][0]) for axis in order], whole, tuple(ways[axis][2] for axis in order)
+
+
+def solid_of(name: str) -> Solid:
+    """How the numbers of a drawing statement make those of a block."""
+    return _solid(language()[name])
+
+
+def _slots(declared: Statement) -> Iterator[Slot]:
+    for parameter in declared.parameters:
+        words = parameter.quantity.each.split(", ")
+        for place in range(parameter.quantity.width):
+            axis = {"up": 0, "depth": 1, "left-right": 2}.get(words[place] if place < len(words) else "", -1)
+            yield Slot(parameter.name, parameter.quantity.kind, axis)
+
+
+@cache
+def _solid(declared: Statement) -> Solid:
+    width = declared.size
+    plain = Solid(declared.name, tuple(_slots(declared)), np.hstack([np.eye(width), np.zeros((width, 1))]), False)
+    start, other = 1 + torch.rand(2, width, dtype=torch.float64, generator=torch.Generator().manual_seed(0))
+    drawn = declared.solids(start)
+    if len(drawn) != 1 or not _symmetric(drawn[0]):
+        return plain
+
+    def form(values: Float[Tensor, " S"]) -> Float[Tensor, " M"]:
+        (solid,) = declared.solids(values)
+        half = primitives[solid.kind].bound(solid.size)
+        return torch.cat([solid.centre - half, 2 * half, solid.size])
+
+    slope = torch.autograd.functional.jacobian(form, start)
+    constant = form(start) - slope @ start
+    if not torch.allclose(form(other), slope @ other + constant):
+        return plain
+    rows = np.round(np.hstack([slope.numpy(), constant[:, None].numpy()]), 9) + 0.0
+    kept = list(range(6))
+    for place in range(6, len(rows)):
+        if np.linalg.matrix_rank(rows[[*kept, place]]) > np.linalg.matrix_rank(rows[kept]):
+            kept.append(place)
+    if np.linalg.matrix_rank(rows[kept, :-1]) < width:
+        return plain
+    corner = [Slot("at", "position", axis) for axis in range(3)] + [Slot("size", "length", axis) for axis in range(3)]
+    extra = [Slot(primitives[drawn[0].kind].sizes[place - 6], "length", -1) for place in kept[6:]]
+    return Solid(primitives[drawn[0].kind].name, (*corner, *extra), rows[kept], True)
+
+
+def _symmetric(solid: Solids) -> bool:
+    """Whether a solid lies along the axes of the grid, and is its own mirror image along each of them."""
+    if solid.rotation is not None:
+        return False
+    points = torch.rand(64, 3, dtype=solid.size.dtype, generator=torch.Generator().manual_seed(0)) * 4 - 2
+    away, size = primitives[solid.kind].distance, solid.size.expand(64, -1)
+    signs = 1 - 2 * torch.eye(3, dtype=points.dtype)
+    return all(torch.allclose(away(points, size), away(points * sign, size)) for sign in signs)

@@ -1,0 +1,201 @@
+"""Blocks of many programs that might be calls of one function: groups, and the relations that hold in most of them."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from shapeprog.language.program import Draw, Program, nest
+from shapeprog.language.statement import language
+from shapeprog.language.text import source_of
+from shapeprog.library.blocks import Block, Kind, Slot, blocks_of
+from shapeprog.library.length import STATEMENT, length
+from shapeprog.library.measures import Group, Measure, measures, relations
+from shapeprog.space import FloatArray
+
+NEAR = 0.03
+"""How far in cells a relation may be from holding."""
+
+LARGEST = 3
+"""Most blocks of a function."""
+
+OPEN = 0.6
+"""Share of the uses from which a measure that is zero need not be said."""
+
+
+class Unit(NamedTuple):
+    """A block of a program: its forms, its statement and role, and how long its lines are."""
+
+    forms: tuple[Block, ...]
+    draw: Draw
+    length: int
+
+
+Corpus = list[list[Unit | None]]
+"""The blocks of each program that no function draws yet."""
+
+
+class Use(NamedTuple):
+    """Blocks of one program, by their places, that are a group: their numbers (M,), and how much a call is shorter."""
+
+    program: int
+    blocks: tuple[int, ...]
+    values: FloatArray
+    gain: int
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A function that might be.
+
+    Parameters
+    ----------
+    group, rows, openings
+        Its blocks, the relations (R, M) that hold for them, and measures (U, M) that are mostly zero.
+    uses
+        Where it would be called; no two of them share a block.
+    gain
+        How much shorter the programs would be.
+    """
+
+    group: Group
+    rows: FloatArray
+    openings: FloatArray
+    uses: tuple[Use, ...]
+    gain: float
+
+
+def units_of(program: Program) -> list[Unit | None]:
+    """The blocks of a program that functions may draw, in the order of its text."""
+    found: list[Unit | None] = []
+    for chain in program.chains:
+        forms = tuple(form for form in blocks_of(chain) if not form.kind.others)
+        draw = chain[-1]
+        assert isinstance(draw, Draw)
+        found.append(Unit(forms, draw, length(source_of(Program((nest(chain),))).lines)) if forms else None)
+    return found
+
+
+def candidates(corpus: Corpus, least: int) -> Iterator[Candidate]:
+    """The best function for each group that is in at least so many programs."""
+    slots: dict[Kind, tuple[Slot, ...]] = {}
+    groups: dict[tuple[Kind, ...], list[Use]] = defaultdict(list)
+    for number, units in enumerate(corpus):
+        for place, unit in enumerate(units):
+            for form in unit.forms if unit is not None else ():
+                for kind in dict.fromkeys((form.kind, replace(form.kind, word=""))):
+                    slots[kind] = form.slots
+                    use = Use(number, (place,), form.values, unit.length - STATEMENT)  # type: ignore[union-attr]
+                    groups[(kind,)].append(use)
+    level = _frequent({kinds: uses for kinds, uses in groups.items() if kinds[0].word}, least)
+    for _ in range(1, LARGEST):
+        level = _frequent(_larger(level, corpus), least)
+        groups |= level
+    for kinds, uses in groups.items():
+        written = kinds[0].word or statement_of(kinds[0].shape)
+        if programs(uses) >= least and written and (len(kinds) > 1 or kinds[0].repeats):
+            yield from _best(Group(kinds, tuple(slots[kind] for kind in kinds)), uses, least)
+
+
+def programs(uses: Iterable[Use]) -> int:
+    """In how many programs something is used."""
+    return len({use.program for use in uses})
+
+
+def statement_of(shape: str) -> str:
+    """The statement that draws a solid and gives it no role; nothing if there is none."""
+    name = {"cuboid": "box"}.get(shape, shape)
+    known = language()
+    return name if name in known and name not in known.roles else ""
+
+
+def _frequent(level: dict[tuple[Kind, ...], list[Use]], least: int) -> dict[tuple[Kind, ...], list[Use]]:
+    return {kinds: uses for kinds, uses in level.items() if programs(uses) >= least}
+
+
+def _larger(level: dict[tuple[Kind, ...], list[Use]], corpus: Corpus) -> dict[tuple[Kind, ...], list[Use]]:
+    """Groups with one more block each, of another role, which comes behind the others in the order of kinds."""
+    found: dict[tuple[Kind, ...], list[Use]] = defaultdict(list)
+    for kinds, uses in level.items():
+        for use in uses:
+            for place, unit in enumerate(corpus[use.program]):
+                if unit is None or place in use.blocks:
+                    continue
+                form = unit.forms[0]
+                behind = repr(form.kind) > repr(kinds[-1])
+                other = form.kind.word and form.kind.word not in [kind.word for kind in kinds]
+                if other and behind:
+                    values = np.append(use.values, form.values)
+                    more = Use(use.program, (*use.blocks, place), values, use.gain + unit.length)
+                    found[(*kinds, form.kind)].append(more)
+    return found
+
+
+def _best(group: Group, uses: Sequence[Use], least: int) -> Iterator[Candidate]:
+    """The function for a group that shortens most: those relations that hold most often are asked for, one by one."""
+    values = np.array([use.values for use in uses])
+    known = list(measures(group, np.median(values, 0)))
+    openings = [each for each in known if each.opening and len(group.kinds) == 1]
+    offered = _offered(group, known, openings)
+    holds = np.abs(values @ offered.T) <= NEAR
+    owner = np.repeat(np.arange(len(group.slots)), [len(each) for each in group.slots])
+    alive, rows, joined = np.ones(len(uses), dtype=bool), np.zeros((0, group.size)), 0
+    best: Candidate | None = None
+    untried = np.arange(len(offered))
+    while True:
+        if joined >= len(group.kinds) - 1:
+            fitting = [use for use, fits in zip(uses, alive, strict=True) if fits]
+            found = _priced(group, rows, openings, fitting)
+            if programs(found.uses) >= least and found.gain > (best.gain if best else 0):
+                best = found
+        support = (holds[:, untried] & alive[:, None]).sum(0)
+        order = np.argsort(-support, kind="stable")
+        untried = untried[order][support[order] >= least]
+        following = next((k for k in untried if _independent(rows, offered[k])), None)
+        if following is None:
+            break
+        rows, alive = np.vstack([rows, offered[following]]), alive & holds[:, following]
+        joined += len(set(owner[np.flatnonzero(offered[following])].tolist())) > 1
+        untried = untried[untried != following]
+    if best is not None:
+        yield best
+
+
+def _offered(group: Group, known: Sequence[Measure], openings: Sequence[Measure]) -> FloatArray:
+    """Relations that may be asked for: not those by which an opening is zero."""
+    rows = [row for row in relations(known) if all(np.linalg.matrix_rank([row, each.row]) == 2 for each in openings)]
+    return np.array(rows).reshape(-1, group.size)
+
+
+def _priced(group: Group, rows: FloatArray, openings: Sequence[Measure], uses: Sequence[Use]) -> Candidate:
+    """The function of a group for which relations hold, and what it saves where it is used."""
+    chosen = np.zeros((0, group.size))
+    for each in openings:
+        zero = [bool(abs(use.values @ each.row) <= NEAR) for use in uses]
+        if sum(zero) < OPEN * len(uses) or not _independent(np.vstack([rows, chosen]), each.row):
+            continue
+        if all(zero):
+            rows = np.vstack([rows, each.row])
+        else:
+            chosen = np.vstack([chosen, each.row])
+    values = np.array([use.values for use in uses]).reshape(-1, group.size)
+    arguments = group.size - len(rows) - len(chosen) + group.counts
+    said = (np.abs(values @ chosen.T) > NEAR).sum(1).tolist()
+    taken: set[tuple[int, int]] = set()
+    kept: list[Use] = []
+    for use, more in zip(uses, said, strict=True):
+        own = {(use.program, place) for place in use.blocks}
+        if not own & taken:
+            taken |= own
+            kept.append(use._replace(gain=use.gain - arguments - more))
+    lines = 1 + sum(len(kind.repeats) + 1 for kind in group.kinds)
+    cost = STATEMENT * lines + arguments + len(chosen) + group.size
+    return Candidate(group, rows, chosen, tuple(kept), sum(use.gain for use in kept) - cost)
+
+
+def _independent(rows: FloatArray, row: FloatArray) -> bool:
+    return int(np.linalg.matrix_rank(np.vstack([rows, row]), tol=1e-6)) > len(rows)

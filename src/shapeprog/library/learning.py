@@ -1,0 +1,133 @@
+"""The functions that shorten many programs most, found by what their blocks have in common.
+
+Blocks of one program that occur together in many are a group; the relations that hold for it in most of these leave
+few measures open, which become the parameters of a function.  Of all groups, and all sets of relations of each, the one
+that shortens the programs most becomes a function; what it draws is taken out of them, and so on.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from shapeprog.language.evaluation import evaluated
+from shapeprog.language.program import Program
+from shapeprog.language.source import Call, Comment, Function, Line, Source
+from shapeprog.language.text import format_source, source_of
+from shapeprog.library.blocks import Kind
+from shapeprog.library.groups import NEAR, Candidate, Corpus, Unit, candidates, statement_of, units_of
+from shapeprog.library.length import statements
+from shapeprog.library.measures import Group
+from shapeprog.library.rewriting import with_library
+from shapeprog.library.store import Library
+from shapeprog.library.words import name_of
+from shapeprog.library.writing import basis, function
+
+MOST = 12
+"""Most functions of a library."""
+
+LEAST_PROGRAMS, LEAST_SHARE = 3, 0.02
+"""How many programs must use a function, and which share of all."""
+
+OWN = 0.9
+"""Share of the uses of a function from which parts of one role make it their own."""
+
+
+class Learned(NamedTuple):
+    """A function, and a call of it with typical arguments."""
+
+    function: Function
+    example: Call
+
+
+def learn(given: Sequence[Program], most: int = MOST) -> Library:
+    """The library of the functions that shorten programs most; empty if none does.  The same for the same programs.
+
+    Comments tell how often each is used by the programs, and a typical call.
+    """
+    found = list(_functions(given, most))
+    library = Library(Source(tuple(each.function for each in found)))
+    written = [with_library(program, library) for program in given]
+    calls = [Counter(line.name for line in source_of(each).walk() if isinstance(line, Call)) for each in written]
+    before, after = sum(map(statements, given)), sum(map(statements, written))
+    said = f"Learned from {len(given)} programs: {before} statements, {after} with these functions"
+    lines: list[Line] = [Comment(said), Comment()]
+    for each in found:
+        name = each.function.name
+        times = sum(count[name] for count in calls)
+        if times:
+            used = f"used {times} times, by {sum(count[name] > 0 for count in calls)} programs, such as"
+            call = format_source(Source((each.function, each.example))).splitlines()[-1]
+            lines += [Comment(used), Comment(call), each.function, Comment()]
+    return Library(evaluated(Source(tuple(lines))).source or Source())
+
+
+def _functions(given: Sequence[Program], most: int) -> Iterator[Learned]:
+    corpus: Corpus = [units_of(program) for program in given]
+    least = max(LEAST_PROGRAMS, round(LEAST_SHARE * len(given)))
+    taken: set[str] = set()
+    while len(taken) < most:
+        offered = sorted(candidates(corpus, least), key=lambda each: -each.gain)
+        pairs = ((best, _made(best, corpus, taken)) for best in (_owned(each, corpus) for each in offered))
+        best, made = next(((best, made) for best, made in pairs if made is not None), (None, None))
+        if best is None or made is None:
+            return
+        yield made
+        taken.add(made.function.name)
+        for use in best.uses:
+            for place in use.blocks:
+                corpus[use.program][place] = None
+
+
+def _owned(best: Candidate, corpus: Corpus) -> Candidate:
+    """The same for parts of one role alone where nearly all of its uses have it."""
+    kind = best.group.kinds[0]
+    if len(best.group.kinds) > 1 or kind.word:
+        return best
+    words = [_unit(corpus, use.program, use.blocks[0]).forms[0].kind.word for use in best.uses]
+    word, count = Counter(words).most_common(1)[0]
+    if not word or count < OWN * len(words):
+        return best
+    uses = tuple(use for use, own in zip(best.uses, words, strict=True) if own == word)
+    return replace(best, group=Group((replace(kind, word=word),), best.group.slots), uses=uses)
+
+
+def _unit(corpus: Corpus, program: int, place: int) -> Unit:
+    found = corpus[program][place]
+    assert found is not None
+    return found
+
+
+def _made(best: Candidate, corpus: Corpus, taken: set[str]) -> Learned | None:
+    """The function of a candidate, after the use that is nearest to all; none if its sums are no simple ones."""
+    values = np.array([use.values for use in best.uses])
+    typical = best.uses[int(np.abs(values - np.median(values, 0)).sum(1).argmin())]
+    made = basis(best.group, typical.values, best.rows, best.openings)
+    if made is None:
+        return None
+    kinds = best.group.kinds
+    units = [_unit(corpus, typical.program, place) for place in typical.blocks]
+    draws = [
+        (unit.draw.name, unit.draw.role) if kind.word else (statement_of(kind.shape), "")
+        for kind, unit in zip(kinds, units, strict=True)
+    ]
+    written = function(name_of(kinds, taken), best.group, made, draws)
+    counts = (count for kind, unit in zip(kinds, units, strict=True) for count in _counts(kind, unit))
+    numbers = {name: float(each.row @ typical.values) for name, each in zip(made.names, made.chosen, strict=True)}
+    arguments = [
+        (name, round(numbers[name], 2) + 0.0 if name in numbers else float(next(counts)))
+        for name, default in written.parameters
+        if default is None or abs(numbers[name]) > NEAR
+    ]
+    role = "" if kinds[0].word else units[0].forms[0].kind.word
+    return Learned(written, Call(written.name, tuple(arguments), role=role))
+
+
+def _counts(kind: Kind, unit: Unit) -> Iterator[int]:
+    """The counts of the rows of a block."""
+    form = next(form for form in unit.forms if replace(form.kind, word=kind.word) == kind)
+    return (count for (_, way), count in zip(kind.repeats, form.counts, strict=True) if way == "row")

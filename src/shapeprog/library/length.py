@@ -1,0 +1,66 @@
+"""How long a program is to read: its statements, and the numbers and names in them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+
+from shapeprog.language.expression import Binary, Expression, Negative, Value
+from shapeprog.language.program import Program
+from shapeprog.language.source import Call, Comment, Function, Line, WrittenDraw, WrittenLoop
+from shapeprog.language.statement import language
+from shapeprog.language.text import source_of
+
+STATEMENT = 8
+"""Numbers or names that a statement, loop or call is worth: a line of its own, and a thing to keep in mind."""
+
+
+def statements(program: Program) -> int:
+    """How many statements, loops and calls are written, apart from those in functions."""
+    return sum(isinstance(line, WrittenDraw | WrittenLoop | Call) for line in _outside(source_of(program).lines))
+
+
+def length(lines: Iterable[Line]) -> int:
+    """Statements, loops, calls and functions of some lines, and every number and name that is read in them."""
+    found = 0
+    for line in lines:
+        match line:
+            case WrittenDraw():
+                found += STATEMENT + _written(line)
+            case WrittenLoop():
+                found += STATEMENT + _written(line) + length(line.body)
+            case Call():
+                found += STATEMENT + sum(terms(value) for _, value in line.arguments)
+            case Function():
+                found += STATEMENT + len(line.parameters) + length(line.body)
+            case Comment():
+                pass
+            case _:
+                found += sum(terms(value) for _, value in line.numbers)
+    return found
+
+
+def terms(value: Value) -> int:
+    """How many numbers and names are in a number or expression."""
+    match value:
+        case Binary(_, left, right):
+            return terms(left) + terms(right)
+        case Negative(inner):
+            return terms(inner)
+    return 1
+
+
+def _written(line: WrittenDraw | WrittenLoop) -> int:
+    found = 0
+    for parameter in language()[line.name].parameters:
+        values = line.values[parameter.slots]
+        silent = parameter.unsaid is not None and values == (parameter.unsaid,)
+        if parameter.quantity.written_out and not silent:
+            found += sum(terms(value) if isinstance(value, Expression) else 1 for value in values)
+    return found
+
+
+def _outside(lines: Iterable[Line]) -> Iterator[Line]:
+    for line in lines:
+        yield line
+        if isinstance(line, WrittenLoop):
+            yield from _outside(line.body)

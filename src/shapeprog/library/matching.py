@@ -1,0 +1,285 @@
+"""Where a program draws what a function would draw, and with which arguments.
+
+The blocks of a function are linear in its parameters once its counts are known.  So a least-squares solution tells the
+arguments for some blocks of a program, and its residual whether they fit; what the arguments are in the names of the
+program follows from as many of its numbers as there are parameters, those with the shortest expressions.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from shapeprog.errors import ShapeProgError
+from shapeprog.language.evaluation import expanded, symbolic
+from shapeprog.language.expression import Linear, Name, Value, combined, value_at
+from shapeprog.language.program import Program
+from shapeprog.language.source import Assignment, Call, Function, Source, WrittenLoop
+from shapeprog.library.blocks import Block, blocks_of
+from shapeprog.library.length import terms
+from shapeprog.space import FloatArray
+
+TOLERANCE = 0.05
+"""How far in cells a number may be from what a function makes of its arguments."""
+
+GENERIC = 7.0
+"""What a parameter without an example is tried with."""
+
+EXACT = 0.01
+"""How far in cells a default may be from what is drawn to stand for it."""
+
+TRIES = 12
+"""Ways in which arguments are expressed, of which the shortest is kept."""
+
+
+class Form(NamedTuple):
+    """A block whose numbers are linear in names: (M, N) factors and (M,) constants."""
+
+    block: Block
+    factors: FloatArray
+    constants: FloatArray
+
+
+@dataclass(frozen=True)
+class Pattern:
+    """A function as what it draws.
+
+    Parameters
+    ----------
+    function, others
+        The function, and those above it in its library, which it may call.
+    example
+        A typical call, if one is known.
+    """
+
+    function: Function
+    others: tuple[Function, ...] = ()
+    example: Call | None = None
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """Names of its parameters."""
+        return tuple(name for name, _ in self.function.parameters)
+
+    @cached_property
+    def counts(self) -> tuple[str, ...]:
+        """Parameters that say how often something is repeated."""
+        lines = Source(self.function.body).walk()
+        first = (line.values[0] for line in lines if isinstance(line, WrittenLoop))
+        words = {value.name for value in first if isinstance(value, Name)}
+        return tuple(name for name in self.parameters if name in words)
+
+    @property
+    def measures(self) -> tuple[str, ...]:
+        """Its other parameters, which are continuous."""
+        return tuple(name for name in self.parameters if name not in self.counts)
+
+    @cached_property
+    def arguments(self) -> dict[str, float]:
+        """A number for each parameter: that of the example, a default, or any."""
+        shown = self.function.parameters + (self.example.arguments if self.example else ())
+        known = {name: value for name, value in shown if isinstance(value, float)}
+        spare = {name: 3.0 if name in self.counts else GENERIC / (1 + n) for n, name in enumerate(self.parameters)}
+        return spare | known
+
+    def forms(self, counts: Mapping[str, float]) -> tuple[Form, ...]:
+        """What it draws for these counts; nothing if that is not linear in its other parameters."""
+        key = tuple(counts.values())
+        if key not in self._known:
+            self._known[key] = self._forms(counts)
+        return self._known[key]
+
+    @cached_property
+    def _known(self) -> dict[tuple[float, ...], tuple[Form, ...]]:
+        return {}
+
+    def _forms(self, counts: Mapping[str, float]) -> tuple[Form, ...]:
+        numbers = tuple(({**self.arguments, **counts}).items())
+        source = Source((*self.others, Assignment(numbers), *self.function.body))
+        try:
+            return tuple(forms(source, {**counts, **{name: Linear.of(name) for name in self.measures}}, self.measures))
+        except (ShapeProgError, ZeroDivisionError):
+            return ()
+
+
+class Match(NamedTuple):
+    """Blocks of a program, by their places, that are a call of a function with these arguments."""
+
+    blocks: tuple[int, ...]
+    role: str
+    arguments: tuple[tuple[str, Value], ...]
+    error: float
+
+
+def forms(source: Source, given: Mapping[str, Any], names: Sequence[str]) -> Iterator[Form]:
+    """The blocks of a program as it is written, linear in ``names``; ``given`` is what its names stand for."""
+    chains = Program(expanded(source)).chains
+    parts = [part for node in symbolic(source, given) for part in node.chains()]
+    for chain, part in zip(chains, parts, strict=True):
+        block = next(blocks_of(chain))
+        numbers = [_linear(value) for node in part for value in node.values]
+        factors = np.array([[dict(each.factors).get(name, 0.0) for name in names] for each in numbers])
+        constants = np.array([each.constant for each in numbers])
+        rows = block.rows[:, :-1]
+        yield Form(block, rows @ factors.reshape(len(numbers), len(names)), rows @ constants + block.rows[:, -1])
+
+
+def _linear(value: Any) -> Linear:
+    return value if isinstance(value, Linear) else Linear(float(value))
+
+
+class Sums:
+    """Values that are linear in the names of a program, written as short as can be.
+
+    Parameters
+    ----------
+    names
+        The names that are free.
+    others
+        Names that follow from them, with their factors and constant (N + 1,).
+    """
+
+    def __init__(self, names: Sequence[str], others: Mapping[str, FloatArray]) -> None:
+        self.names, self.others = names, others
+
+    def shortest(self, row: FloatArray) -> Value:
+        """The shortest expression of a row (N + 1,): factors of the free names, and a constant."""
+        options = [self._sum(row, ())]
+        options += [self._sum(row - own, ((Name(name), 1.0),)) for name, own in self.others.items()]
+        return min(options, key=terms)
+
+    def _sum(self, row: FloatArray, first: tuple[tuple[Value, float], ...]) -> Value:
+        row = np.round(row, 5) + 0.0
+        parts = [*first, *((Name(name), float(factor)) for name, factor in zip(self.names, row, strict=False))]
+        parts = sorted((part for part in parts if part[1]), key=lambda part: part[1] < 0)
+        return combined(round(float(row[-1]), 4) + 0.0, parts)
+
+
+class Matcher:
+    """The blocks of one program, and where functions fit them.
+
+    Parameters
+    ----------
+    forms
+        Its blocks, linear in its free names.
+    units
+        For each block the line that it is of: a call takes all blocks of a line or none.
+    values
+        The numbers that the free names stand for (N,).
+    sums
+        How values are written in its names.
+    """
+
+    def __init__(self, forms: Sequence[Form], units: Sequence[int], values: FloatArray, sums: Sums) -> None:
+        self.forms, self.units, self.values, self.sums = forms, units, values, sums
+
+    def matches(self, pattern: Pattern) -> Iterator[Match]:
+        """All ways in which blocks of the program are a call of a function."""
+        seen = sorted({float(count) for form in self.forms for count in form.block.counts})
+        found: set[tuple[int, ...]] = set()
+        for counts in itertools.product(seen, repeat=len(pattern.counts)):
+            given = dict(zip(pattern.counts, counts, strict=True))
+            wanted = pattern.forms(given)
+            for blocks in self._alike(wanted) if wanted else ():
+                key = tuple(sorted(blocks))
+                match = None if key in found else self._solved(pattern, given, wanted, blocks)
+                if match is not None:
+                    found.add(key)
+                    yield match
+
+    def _alike(self, wanted: Sequence[Form]) -> Iterator[tuple[int, ...]]:
+        """Blocks of the kinds wanted, in their order, that make whole lines and share a role where one is open."""
+
+        def extended(chosen: tuple[int, ...]) -> Iterator[tuple[int, ...]]:
+            if len(chosen) == len(wanted):
+                lines = {self.units[k] for k in chosen}
+                if all(k in chosen for k, line in enumerate(self.units) if line in lines):
+                    yield chosen
+                return
+            kind = wanted[len(chosen)].block.kind
+            open_roles = {
+                self.forms[k].block.kind.word
+                for k, form in zip(chosen, wanted, strict=False) if not form.block.kind.word
+            }  # fmt: skip
+            for k, form in enumerate(self.forms):
+                own = form.block.kind
+                alike = replace(own, word=kind.word) == kind and form.block.counts == wanted[len(chosen)].block.counts
+                role = own.word == kind.word or (not kind.word and open_roles <= {own.word})
+                if k not in chosen and alike and role:
+                    yield from extended((*chosen, k))
+
+        yield from extended(())
+
+    def _solved(
+        self, pattern: Pattern, counts: Mapping[str, float], wanted: Sequence[Form], blocks: tuple[int, ...]
+    ) -> Match | None:
+        """The arguments for which a function draws some blocks, if there are such."""
+        mine = [self.forms[k] for k in blocks]
+        factors = np.vstack([form.factors for form in wanted])
+        constants = np.concatenate([form.constants for form in wanted])
+        values = np.concatenate([form.block.values for form in mine])
+        count = factors.shape[1]
+        if np.linalg.matrix_rank(factors) < count:
+            return None
+        found = np.linalg.lstsq(factors, values - constants, rcond=None)[0]
+        if np.abs(factors @ found + constants - values).max(initial=0) > TOLERANCE:
+            return None
+        rows = np.vstack([np.column_stack([form.factors, form.constants]) for form in mine])
+        rows[:, -1] -= constants
+        written = self._written(factors, rows, found)
+        defaults = [dict(pattern.function.parameters)[name] for name in pattern.measures]
+        for place, default in enumerate(defaults):
+            if isinstance(default, float) and abs(found[place] - default) <= EXACT:
+                written[place] = default
+        exact = np.array([value_at(value, self._numbers) for value in written])
+        error = float(np.abs(factors @ exact + constants - values).max(initial=0))
+        if error > TOLERANCE:
+            return None
+        table: dict[str, Value] = {**dict(zip(pattern.measures, written, strict=True)), **counts}
+        roles = (form.block.kind.word for form, want in zip(mine, wanted, strict=True) if not want.block.kind.word)
+        said = tuple((name, table[name]) for name, default in pattern.function.parameters if table[name] != default)
+        return Match(blocks, next(roles, ""), said, error)
+
+    @property
+    def _numbers(self) -> dict[str, float]:
+        free = dict(zip(self.sums.names, self.values.tolist(), strict=True))
+        return free | {name: float(row[:-1] @ self.values + row[-1]) for name, row in self.sums.others.items()}
+
+    def _written(self, factors: FloatArray, rows: FloatArray, near: FloatArray) -> list[Value]:
+        """The shortest expressions for parameters (P) whose factors (M, P) come to rows (M, N + 1) of the program.
+
+        Of equally short ones that nearest to ``near`` (P) is taken.
+        """
+        sizes = (np.abs(rows) > 1e-9).sum(1)
+        random = np.random.default_rng(0)
+        offered: list[dict[bytes, FloatArray]] = [{} for _ in near]
+        for attempt in range(TRIES):
+            order = np.argsort(sizes + random.random(len(rows)) * attempt, kind="stable")
+            chosen = order[_independent(factors[order])]
+            for options, row in zip(offered, np.linalg.inv(factors[chosen]) @ rows[chosen], strict=True):
+                options.setdefault((np.round(row, 5) + 0.0).tobytes(), row)
+        found: list[Value] = []
+        for options, wanted in zip(offered, near, strict=True):
+            values = [self.sums.shortest(row) for row in options.values()]
+            away = [abs(float(row[:-1] @ self.values + row[-1] - wanted)) for row in options.values()]
+            best = min(range(len(values)), key=lambda k: (terms(values[k]), away[k]))
+            found.append(values[best])
+        return found
+
+
+def _independent(rows: FloatArray) -> list[int]:
+    """The first rows (M, P) that are independent of those before them."""
+    kept: list[int] = []
+    basis = np.zeros((0, rows.shape[1]))
+    for place, row in enumerate(rows):
+        rest = row - (basis @ row) @ basis
+        size = float(np.linalg.norm(rest))
+        if size > 1e-6 and len(kept) < rows.shape[1]:
+            kept.append(place)
+            basis = np.vstack([basis, rest / size])
+    return kept

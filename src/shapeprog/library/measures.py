@@ -1,0 +1,170 @@
+"""What can be measured of some blocks together, the relations between it, and words for it."""
+
+from __future__ import annotations
+
+import itertools
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from shapeprog.library.blocks import Kind, Slot
+from shapeprog.space import DEPTH, SIDE, UP, FloatArray
+
+EXTENTS = ("height", "depth", "width")
+LOW = ("bottom", "front", "left")
+AXIS = ("up", "depth", "side")
+
+THIN = 0.6
+"""A solid is thin along an axis where it measures less than this share of the next longer."""
+
+CHOSEN = 2.5
+"""Price up to which a place is a side of a whole block; dearer ones are of single copies, or ends of rods."""
+
+Sort = Literal["length", "place", "middle", "angle"]
+
+
+class Group(NamedTuple):
+    """Blocks that may be a function: their kinds and the slots of each, one block after another."""
+
+    kinds: tuple[Kind, ...]
+    slots: tuple[tuple[Slot, ...], ...]
+
+    @property
+    def size(self) -> int:
+        """How many numbers they have."""
+        return sum(map(len, self.slots))
+
+    @property
+    def counts(self) -> int:
+        """How many of their repetitions have a count that is open."""
+        return sum(way == "row" for kind in self.kinds for _, way in kind.repeats)
+
+
+class Measure(NamedTuple):
+    """A measure of a group: the block that it is of, its row of factors, and what it costs a reader as an argument.
+
+    An ``opening`` is zero in most programs: a middle that lies in that of the whole, an angle of what stands straight.
+    """
+
+    block: int
+    word: str
+    sort: Sort
+    axis: int
+    row: FloatArray
+    price: float
+
+    @property
+    def opening(self) -> bool:
+        """Whether it may be an argument that need not be said."""
+        return self.sort == "angle" or (self.sort == "middle" and self.axis != UP)
+
+
+def measures(group: Group, typical: FloatArray) -> Iterator[Measure]:
+    """All measures of a group; ``typical`` are its numbers (M,) in one program, which tell what is thin."""
+    start = 0
+    unit = np.eye(group.size)
+    for block, (kind, slots) in enumerate(zip(group.kinds, group.slots, strict=True)):
+        own, values = unit[start : start + len(slots)], typical[start : start + len(slots)]
+        start += len(slots)
+        for word, sort, axis, row, price in (
+            _boxed(kind, slots, own, values) if kind.boxed else _pointed(kind, slots, own, values)
+        ):
+            yield Measure(block, word, sort, axis, row, price)
+
+
+def relations(known: Sequence[Measure]) -> list[FloatArray]:
+    """Relations that may hold: equal lengths, faces flush or in contact, what lies in the middle, what is straight."""
+    found = [each.row for each in known if each.opening]
+    for one, two in itertools.combinations(known, 2):
+        if one.sort == two.sort == "length":
+            found.append(one.row - two.row)
+        if one.axis != two.axis or not {one.sort, two.sort} <= {"place", "middle"}:
+            continue
+        ends = one.sort == two.sort == "place" and one.price >= CHOSEN
+        if one.block != two.block or ends:
+            found.append(one.row - two.row)
+        if one.block == two.block and ends and one.axis != UP:
+            found.append(one.row + two.row)
+    unique: dict[bytes, FloatArray] = {}
+    for row in found:
+        if row.any():
+            sign = np.sign(row[np.flatnonzero(row)[0]])
+            unique.setdefault((np.round(row * sign, 6) + 0.0).tobytes(), row)
+    return list(unique.values())
+
+
+Found = tuple[str, Sort, int, FloatArray, float]
+
+
+def _boxed(kind: Kind, slots: Sequence[Slot], own: FloatArray, values: FloatArray) -> Iterator[Found]:
+    """Measures of solids that are told by low corner, extents and what else shapes them."""
+    repeats = {axis: place for place, (axis, _) in enumerate(kind.repeats, len(slots) - len(kind.repeats))}
+    sizes = values[3:6]
+    thin = int(np.argmin(sizes))
+    flat = bool(sizes[thin] < THIN * np.sort(sizes)[1])
+    for axis in range(3):
+        low, size, word = own[axis], own[3 + axis], EXTENTS[axis]
+        span = own[repeats[axis]] if axis in repeats else size
+        if axis in repeats:
+            yield word, "length", axis, span, 0.0
+            word = f"each_{word}"
+        if kind.shape == "cylinder" and axis != UP:
+            word = "diameter"
+        elif flat and axis == thin:
+            word = "thickness"
+        yield word, "length", axis, size, 1.0 + 0.1 * axis
+        yield LOW[axis], "place", axis, low, 2.0
+        yield f"middle_{AXIS[axis]}", "middle", axis, low + span / 2, 4.0
+        yield f"{LOW[axis]}_end", "place", axis, low + span, 5.0
+        if axis in repeats:
+            yield f"inner_{LOW[axis]}", "place", axis, low + size, 6.0
+            yield f"outer_{LOW[axis]}", "place", axis, low + span - size, 6.0
+    for place in range(6, len(slots) - len(kind.repeats)):
+        yield slots[place].word, "length", -1, own[place], 1.3
+
+
+def _pointed(kind: Kind, slots: Sequence[Slot], own: FloatArray, values: FloatArray) -> Iterator[Found]:
+    """Measures of solids that are told by points, such as the two ends of a rod."""
+    first = len(slots) - len(kind.repeats)
+    planes = {axis: own[place] for place, (axis, way) in enumerate(kind.repeats, first) if way == "mirror"}
+    rising = _rises(slots, values)
+    heights: dict[str, FloatArray] = {}
+    numbered: Counter[str] = Counter()
+    for row, slot in zip(own, slots[:first], strict=False):
+        end = {"start": "bottom", "end": "upper"}.get(slot.word, slot.word) if rising else slot.word
+        if slot.kind == "position":
+            if slot.axis in planes:
+                yield f"{end}_{EXTENTS[slot.axis]}", "length", slot.axis, 2 * (row - planes[slot.axis]), 0.2
+            if slot.axis == UP:
+                heights[slot.word] = row
+                yield "bottom" if slot.word in ("start", "at") else f"{slot.word}_up", "place", UP, row, 2.0
+            else:
+                yield f"{end}_at_{AXIS[slot.axis]}", "place", slot.axis, row, 3.0
+        elif slot.kind == "length":
+            numbered[slot.word] += 1
+            word = {"size": EXTENTS[slot.axis]}.get(slot.word, slot.word)
+            if slot.word == "section":
+                word = "thickness" if numbered[slot.word] == 1 else "breadth"
+            elif sum(each.word == slot.word for each in slots) == 2:
+                word = f"{'bottom' if numbered[slot.word] == 1 else 'upper'}_{slot.word}"
+            yield word, "length", slot.axis, row, 1.0
+        else:
+            yield slot.word, "angle", -1, row, 1.0
+    if heights.keys() >= {"start", "end"}:
+        yield "height" if rising else "rise", "length", UP, heights["end"] - heights["start"], 1.5
+    for place, (axis, way) in enumerate(kind.repeats, first):
+        if way == "mirror":
+            yield f"middle_{AXIS[axis]}", "middle", axis, own[place], 4.0
+        else:
+            yield EXTENTS[axis], "length", axis, own[place], 0.5
+
+
+def _rises(slots: Sequence[Slot], values: FloatArray) -> bool:
+    """Whether what runs from a start to an end runs upwards more than along the floor."""
+    ends = {(slot.word, slot.axis): value for slot, value in zip(slots, values, strict=False)}
+    if ("start", UP) not in ends or ("end", UP) not in ends:
+        return False
+    along = [ends["end", axis] - ends["start", axis] for axis in range(3)]
+    return along[UP] > max(abs(along[DEPTH]), abs(along[SIDE]))

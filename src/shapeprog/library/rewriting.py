@@ -1,0 +1,179 @@
+"""Programs written with the functions of a library."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from shapeprog.errors import ShapeProgError
+from shapeprog.language.evaluation import evaluated
+from shapeprog.language.expression import Expression, Linear
+from shapeprog.language.program import Program
+from shapeprog.language.source import (
+    Assignment,
+    Call,
+    Comment,
+    Function,
+    Line,
+    Source,
+    WrittenDraw,
+    WrittenLoop,
+    names_of,
+    values,
+)
+from shapeprog.language.text import source_of
+from shapeprog.library.length import length
+from shapeprog.library.matching import TOLERANCE, Form, Matcher, Pattern, Sums, forms
+from shapeprog.library.store import Library
+from shapeprog.space import FloatArray
+
+
+def with_library(program: Program, library: Library) -> Program:
+    """The same program with calls of functions of a library wherever that is shorter; itself if that is nowhere.
+
+    It draws the same within ``TOLERANCE`` cells.  The functions that it calls stand in it, below the numbers that it
+    names; ties are kept, as arguments are expressions of its names.
+    """
+    source = source_of(program)
+    words = {*names_of(source), *source.functions}
+    usable = [
+        pattern
+        for pattern in library.patterns
+        if words.isdisjoint([pattern.function.name, *(each.name for each in pattern.others)])
+        and source.functions.keys().isdisjoint(pattern.parameters)
+    ]
+    chosen = _chosen(source, usable)
+    return _rewritten(source, chosen, library.functions) if chosen else program
+
+
+class Offer(NamedTuple):
+    """A call that could stand in a program: in the place of some lines, in the loops around the first of them."""
+
+    fewer: int
+    gain: float
+    call: Call
+    lines: tuple[int, ...]
+    around: tuple[WrittenLoop, ...]
+
+
+def matchers_of(source: Source) -> Iterator[tuple[Matcher, tuple[WrittenLoop, ...]]]:
+    """The blocks of a program that calls may replace: of all its lines, then what single loops have inside of them.
+
+    With each come the loops that stay around.  None if its numbers are not linear in its names.
+    """
+    named = tuple(line for line in source.lines if isinstance(line, Assignment | Function))
+    free = [name for name, value in source.numbers.items() if not isinstance(value, Expression)]
+    given = {name: Linear.of(name) for name in free}
+    numbers = np.array([float(source.numbers[name]) for name in free])  # type: ignore[arg-type]
+    try:
+        sums = Sums(free, _others(source, free))
+        found: list[Form] = []
+        units: list[int] = []
+        for number, line in enumerate(source.lines):
+            if isinstance(line, WrittenDraw | WrittenLoop):
+                new = list(forms(Source((*named, line)), given, free))
+                found += new
+                units += [number] * len(new)
+        yield Matcher(found, units, numbers, sums), ()
+        for number, line in enumerate(source.lines):
+            around: tuple[WrittenLoop, ...] = ()
+            while isinstance(line, WrittenLoop) and len(line.body) == 1 and isinstance(line.body[0], WrittenLoop):
+                around, line = (*around, line), line.body[0]
+                new = list(forms(Source((*named, line)), given, free))
+                yield Matcher(new, [number] * len(new), numbers, sums), around
+    except ShapeProgError:  # a product of names
+        return
+
+
+def _others(source: Source, free: Sequence[str]) -> dict[str, FloatArray]:
+    """The names that follow from those that are free, as rows of factors and a constant."""
+    known = {name: Linear.of(name) for name in free}
+    found: dict[str, FloatArray] = {}
+    for name, value in source.numbers.items():
+        if isinstance(value, Expression):
+            form = value.at(known)
+            form = form if isinstance(form, Linear) else Linear(form)
+            known[name] = form
+            factors = dict(form.factors)
+            found[name] = np.array([*(factors.get(each, 0.0) for each in free), form.constant])
+    return found
+
+
+def _chosen(source: Source, patterns: Sequence[Pattern]) -> list[Offer]:
+    """The calls that shorten a program most, one after another, none of which shares a line with another."""
+    offered: list[Offer] = []
+    for matcher, around in matchers_of(source):
+        for pattern in patterns:
+            for match in matcher.matches(pattern):
+                lines = tuple(sorted({matcher.units[k] for k in match.blocks}))
+                call = Call(pattern.function.name, match.arguments, role=match.role)
+                before = [source.lines[k] for k in lines]
+                fewer = sum(map(_statements, before)) - 1 - len(around)
+                gain = length(before) - length([_within(around, call)]) - match.error / TOLERANCE
+                if fewer > 0 and gain > 0:
+                    offered.append(Offer(fewer, gain, call, lines, around))
+    taken: set[int] = set()
+    chosen = []
+    for offer in sorted(offered, key=lambda each: (-each.fewer, -each.gain)):
+        if not taken & {*offer.lines}:
+            taken |= {*offer.lines}
+            chosen.append(offer)
+    return chosen
+
+
+def _within(around: Sequence[WrittenLoop], line: Line) -> Line:
+    for loop in reversed(around):
+        line = replace(loop, body=(line,))
+    return line
+
+
+def _statements(line: Line) -> int:
+    return 1 + sum(map(_statements, line.body)) if isinstance(line, WrittenLoop) else 1
+
+
+def _rewritten(source: Source, chosen: Sequence[Offer], functions: Sequence[Function]) -> Program:
+    calls = {offer.lines[0]: _within(offer.around, offer.call) for offer in chosen}
+    gone = {number for offer in chosen for number in offer.lines[1:]}
+    body = [calls.get(number, line) for number, line in enumerate(source.lines) if number not in gone]
+    wanted = {offer.call.name for offer in chosen}
+    for function in reversed(functions):  # those that they call
+        if function.name in wanted:
+            wanted |= {line.name for line in Source(function.body).walk() if isinstance(line, Call)}
+    first = next(n for n, line in enumerate(body) if not isinstance(line, Assignment | Comment | Function))
+    added: list[Line] = []
+    for function in functions:
+        if function.name in wanted:
+            added += [Comment(), function]
+    added += [Comment()]
+    return evaluated(Source(tuple(_used([*body[:first], *added, *body[first:]]))))
+
+
+def _used(lines: list[Line]) -> list[Line]:
+    """The lines without names that nothing uses any more."""
+    while True:
+        used = {
+            name.name for line in _outside(lines) for value in values(line) if isinstance(value, Expression)
+            for name in value.names()
+        }  # fmt: skip
+        kept: list[Line] = []
+        for line in lines:
+            if isinstance(line, Assignment):
+                pairs = tuple(pair for pair in line.numbers if pair[0] in used)
+                if pairs:
+                    kept.append(line if len(pairs) == len(line.numbers) else Assignment(pairs, line.note))
+            else:
+                kept.append(line)
+        if kept == lines:
+            return kept
+        lines = kept
+
+
+def _outside(lines: Sequence[Line]) -> Iterator[Line]:
+    for line in lines:
+        if not isinstance(line, Function):
+            yield line
+            if isinstance(line, WrittenLoop):
+                yield from _outside(line.body)

@@ -1,0 +1,76 @@
+"""What functions of a library are called: by their parts and what these look like, or by how they lie."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Sequence
+
+from shapeprog.language.statement import language
+from shapeprog.library.blocks import Kind
+
+LOOKS = {
+    "cylinder": "round", "rod": "round", "taper": "tapered", "bent_rod": "bent", "rounded_box": "soft",
+    "board": "leaning", "bar": "slanting",
+}  # fmt: skip
+"""Adjectives for solids; a box goes without."""
+
+SOLIDS = {
+    "cuboid": "", "cylinder": "cylinders", "rod": "rods", "taper": "tapers", "bent_rod": "bent_rods",
+    "board": "boards", "bar": "bars",
+}  # fmt: skip
+
+PLACES = {
+    ((2, "pair"),): "left_and_right", ((1, "pair"),): "front_and_rear", ((0, "pair"),): "below_and_above",
+    ((2, "row"),): "left_to_right", ((1, "row"),): "front_to_rear", ((0, "row"),): "stack",
+    ((1, "pair"), (2, "pair")): "four",
+}  # fmt: skip
+"""How copies lie, by the axes along which they are repeated."""
+
+WHOLES = {
+    frozenset(parts.split()): whole
+    for parts, whole in {
+        "arm back base": "sofa", "arm base cushion": "sofa", "base panel top": "case_without_sides",
+        "side top base": "case",
+        "side top panel": "case", "leg apron": "leg_frame", "leg stretcher": "leg_frame", "post rail": "back_frame",
+        "post slat": "slatted_back", "arm arm_post": "arm_rests", "door handle": "doors_with_handles",
+        "drawer handle": "drawers_with_handles", "leg post": "side_frame", "seat leg": "stool", "top leg": "table",
+        "base pedestal": "column", "back seat": "seat_with_back",
+    }.items()
+}  # fmt: skip
+"""What parts make together."""
+
+
+def name_of(kinds: Sequence[Kind], taken: Collection[str]) -> str:
+    """A name for the function of some blocks that is not taken, and is no word of the language."""
+    known = language()
+    blocked = {*taken, *known.names, *known.roles}
+    options = list(_one(kinds[0]) if len(kinds) == 1 else _several(kinds))
+    numbered = (f"{options[0]}_{number}" for number in range(2, len(blocked) + 3))
+    return next(option for option in [*options, *numbered] if option not in blocked)
+
+
+def _one(kind: Kind) -> Iterator[str]:
+    ways = tuple((axis, "pair" if way == "mirror" else way) for axis, way in kind.repeats)
+    place = PLACES.get(ways, "several")
+    if kind.word:
+        look = LOOKS.get(kind.shape, "")
+        yield _joined(look, plural(kind.word))
+        yield _joined(place, look, plural(kind.word))
+    else:
+        solids = SOLIDS.get(kind.shape, plural(kind.shape))
+        yield _joined(place, solids or ("boxes" if place == "four" else ""))
+
+
+def _several(kinds: Sequence[Kind]) -> Iterator[str]:
+    whole = WHOLES.get(frozenset(kind.word for kind in kinds))
+    if whole:
+        yield whole
+    yield "_with_".join(dict.fromkeys(plural(kind.word) if kind.repeats else kind.word for kind in kinds))
+
+
+def _joined(*words: str) -> str:
+    return "_".join(filter(None, words))
+
+
+def plural(word: str) -> str:
+    """Several of something."""
+    return "shelves" if word == "shelf" else f"{word}es" if word.endswith(("s", "x", "ch", "sh")) else f"{word}s"

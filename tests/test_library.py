@@ -1,0 +1,250 @@
+"""Libraries of functions: what is learned from programs, and programs written with them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+import torch
+from commands import Run
+
+from shapeprog import inference
+from shapeprog.data.synthetic.furniture import furniture
+from shapeprog.errors import InputError, OutputError
+from shapeprog.language.named import inline, names
+from shapeprog.language.named import set as set_numbers
+from shapeprog.language.program import Draw, Loop, Program
+from shapeprog.language.source import Call, Source
+from shapeprog.language.text import format_program, format_source, parse, source_of
+from shapeprog.language.unroll import unroll
+from shapeprog.library import Library, learn, library_of, load_library, save_library, with_library
+from shapeprog.library.blocks import blocks_of
+from shapeprog.library.length import statements
+from shapeprog.library.matching import TOLERANCE
+
+SHELVES = """\
+# such as shelves(count=4, bottom=-8, height=16, width=12, thick=1)
+def shelves(count, bottom, height, width, thick, front=-4):
+    for i in translate(count, by=((height - thick) / (count - 1), 0, 0)):
+        shelf(box(at=(bottom, front, -width / 2), size=(thick, 8, width)))
+"""
+
+POSTS = """\
+def posts(floor, height, width, depth, thick):
+    for i in mirror(side):
+        for j in mirror(depth):
+            box(at=(floor, depth / 2 - thick, width / 2 - thick), size=(height, thick, thick))
+"""
+
+TABLE = """\
+width, depth, height = 20, 12, 9
+thick = 1.5
+floor = -height / 2
+for i in translate(2, by=(0, 0, thick - width)):
+    for j in mirror(depth):
+        leg(at=(floor, -depth / 2, width / 2 - thick), size=(height - thick, thick, thick))
+top(box(at=(height / 2 - thick, -depth / 2, -width / 2), size=(thick, depth, width)))
+"""
+
+
+def away(one: Program, two: Program) -> float:
+    """The largest difference between the distances of points to two programs."""
+    points = (torch.rand(2000, 3, generator=torch.Generator().manual_seed(0), dtype=torch.float64) - 0.5) * 26
+    return float((unroll(one).distance(points) - unroll(two).distance(points)).abs().max())
+
+
+def calls(program: Program) -> list[Call]:
+    return [line for line in source_of(program).walk() if isinstance(line, Call)]
+
+
+def library(*texts: str) -> Library:
+    return library_of(parse("\n".join(texts)))
+
+
+@pytest.mark.parametrize("number", range(0, 48, 4))
+def test_a_program_written_with_a_library_draws_the_same_in_fewer_statements(number: int) -> None:
+    program = furniture(number, seed=5)
+    written = with_library(program, load_library())
+    assert away(program, written) <= 3**0.5 * TOLERANCE
+    assert sorted(chain[-1].word for chain in program.chains) == sorted(chain[-1].word for chain in written.chains)
+    assert (statements(written) < statements(program)) == bool(calls(written))
+    assert parse(format_program(written)) == written
+    assert with_library(written, load_library()) == written
+
+
+def test_what_is_drawn_alike_is_alike_however_it_is_written() -> None:
+    size = "size=(8, 1, 1)"
+    texts = [
+        f"for i in mirror(side):\n    for j in mirror(depth):\n        leg(at=(0, 3, 9), {size})",
+        f"for i in translate(2, by=(0, -7, 0)):\n    for j in mirror(side):\n        leg(box(at=(0, 3, -10), {size}))",
+        f"for i in mirror(depth):\n    for j in translate(2, by=(0, 0, 19)):\n        leg(at=(0, -4, -10), {size})",
+    ]
+    found = [next(blocks_of(parse(text.replace("leg(box", "leg(box")).chains[0])) for text in texts]
+    assert {each.kind for each in found} == {found[0].kind}
+    assert all(each.values == pytest.approx(found[0].values) for each in found)
+
+
+def test_arguments_are_expressions_of_the_names_of_the_program() -> None:
+    program = parse(TABLE)
+    written = with_library(program, library(POSTS))
+    (call,) = calls(written)
+    assert call.role == "leg"
+    assert {name: str(value) for name, value in call.arguments} == {
+        "floor": "floor", "height": "height - thick", "width": "width", "depth": "depth", "thick": "thick",
+    }  # fmt: skip
+    assert [each.name for each in names(written)] == [each.name for each in names(program)]
+    for name in ("width", "depth", "height", "thick"):
+        assert away(set_numbers(program, {name: 7.0}), set_numbers(written, {name: 7.0})) < 1e-6
+
+
+def test_names_that_nothing_uses_any_more_are_left_out() -> None:
+    text = "gap = 18\nfor i in translate(2, by=(0, 0, gap)):\n    shelf(box(at=(0, 0, 0), size=(1, 8, gap / 9)))\n"
+    two = "def two(wide, thick):\n    for i in translate(2, by=(0, 0, wide)):\n"
+    two += "        shelf(box(at=(0, 0, 0), size=(thick, 8, wide / 9)))\n"
+    assert "gap" in format_program(with_library(parse(text), library(two)))
+    plain = "a, b = 2, 3\nfor i in mirror(side):\n    arm(box(at=(0, 0, 5), size=(a, 1, b - 2)))\n"
+    arms = "def arms(tall):\n    for i in mirror(side):\n        arm(box(at=(0, 0, 5), size=(tall, 1, 1)))\n"
+    assert format_program(with_library(parse(plain), library(arms))).startswith("a = 2\n")
+
+
+@pytest.mark.parametrize("count", [2, 3, 7])
+def test_one_function_serves_any_count_and_says_defaults_only_where_they_differ(count: int) -> None:
+    step = 15 / (count - 1)
+    text = f"for i in translate({count}, by=({step}, 0, 0)):\n    shelf(box(at=(-8, -4, -6), size=(1, 8, 12)))\n"
+    (call,) = calls(with_library(parse(text), library(SHELVES)))
+    assert dict(call.arguments) == {"count": count, "bottom": -8, "height": 16, "width": 12, "thick": 1}
+    (call,) = calls(with_library(parse(text.replace("-4", "-3")), library(SHELVES)))
+    assert dict(call.arguments)["front"] == pytest.approx(-3)
+
+
+def test_a_loop_of_what_a_function_draws_stays_around_its_call() -> None:
+    text = "for i in mirror(depth, at=9):\n    for j in mirror(side):\n        for k in mirror(depth):\n"
+    text += "            leg(at=(0, 3, 9), size=(8, 1, 1))\n"
+    written = with_library(parse(text), library(POSTS))
+    assert format_program(written).endswith(
+        "for i in mirror(depth, at=9):\n    leg(posts(floor=0, height=8, width=20, depth=8, thick=1))\n"
+    )
+
+
+def test_parts_of_another_role_and_those_that_are_off_are_left_alone() -> None:
+    text = "for i in translate(3, by=(7.5, 0, 0)):\n    shelf(box(at=(-8, -4, -6), size=(1, 8, 12)))\n"
+    assert calls(with_library(parse(text), library(SHELVES)))
+    for other in (text.replace("shelf", "drawer"), text.replace("-6", "-5.8"), text.replace("box", "cushion")):
+        program = parse(other.replace("12))", "12), edge=0.1)") if "cushion" in other else other)
+        assert with_library(program, library(SHELVES)) == program
+    assert calls(with_library(parse(text.replace("-6", "-5.97")), library(SHELVES))), "within the tolerance"
+
+
+def test_words_that_a_program_has_already_are_not_taken_for_functions() -> None:
+    program = parse(TABLE.replace("thick", "posts"))
+    assert with_library(program, library(POSTS)) == program
+
+
+OTHERS = ("top", "seat", "shelf", "drawer", "door")
+
+
+def planted(number: int) -> Program:
+    """Two braces and a rail between them, which are told by five numbers, and a part that only this program has."""
+    random = torch.rand(8, generator=torch.Generator().manual_seed(number)).tolist()
+    low, tall, wide, deep, thick = (round(1 + 6 * each, 2) for each in random[:5])
+    bar = Draw("bar", (-low, -deep, wide, tall, deep, wide, thick, thick, 0.0), "brace")
+    body = Draw("box", (-low, -deep, -wide, thick, thick, 2 * wide), "rail")
+    other = Draw("box", (tall, *(round(-9 * each, 2) for each in random[5:7]), 2.0, 5.0, 5 * random[7]), OTHERS[number])
+    braces = Loop("mirror", (2.0, 2.0, 0.0), (bar,))
+    return Program((other, braces, body) if number % 2 else (body, other, braces))
+
+
+def test_a_function_that_is_planted_in_five_programs_is_found_with_its_relations() -> None:
+    programs = [planted(number) for number in range(5)]
+    found = learn(programs)
+    (function,) = found.functions
+    assert {line.name for line in Source(function.body).walk()} == {"mirror", "bar", "box"}
+    assert len(function.parameters) == 5, "as many numbers as it was drawn from"
+    for program in programs:
+        written = with_library(program, found)
+        assert len(calls(written)) == 1
+        assert statements(written) == 2
+        assert away(program, written) < 3**0.5 * TOLERANCE
+    assert found.comments[function.name][0] == "used 5 times, by 5 programs, such as"
+    assert found.examples[function.name].name == function.name
+
+
+def test_the_same_programs_give_the_same_library_and_it_comes_back_from_its_file(tmp_path: Path) -> None:
+    programs = [furniture(number) for number in range(6)]
+    found = learn(programs)
+    assert found.functions
+    assert learn(programs) == found
+    assert load_library(save_library(found, tmp_path / "a.shape")) == found
+    with pytest.raises(OutputError, match="no place for a library"):
+        save_library(found, tmp_path / "a.json")
+
+
+def test_programs_that_share_nothing_give_an_empty_library() -> None:
+    assert learn([]).functions == ()
+    alone = [parse("leg(at=(0, 0, 0), size=(8, 1, 1))"), parse("seat(box(at=(0, 0, 0), size=(1, 9, 9)))"), planted(1)]
+    assert learn(alone).functions == ()
+    assert with_library(alone[2], learn(alone)) == alone[2]
+
+
+def test_the_library_that_ships_holds_at_most_twelve_functions_each_with_a_call_that_draws() -> None:
+    shipped = load_library()
+    assert 1 <= len(shipped.functions) <= 12
+    for pattern in shipped.patterns:
+        assert pattern.example is not None
+        program = parse(format_source(Source((*pattern.others, pattern.function, pattern.example))))
+        assert unroll(program).mask.all()
+        (call,) = calls(with_library(inline(program), shipped)) or [None]
+        assert call is not None, pattern.function.name
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("leg(at=(0, 0, 0), size=(1, 1, 1))", "statements outside of functions"),
+        (f"wide = 3\n{SHELVES}shelves(count=2, bottom=0, height=wide, width=2, thick=1)", "numbers of its own"),
+        ("# nothing", "holds no functions"),
+    ],
+)
+def test_a_file_that_is_no_library_is_told_apart(text: str, said: str, tmp_path: Path) -> None:
+    (tmp_path / "mine.shape").write_text(text)
+    with pytest.raises(InputError, match=said):
+        load_library(tmp_path / "mine.shape")
+
+
+def test_commands_learn_show_and_draw_libraries(run: Run, tmp_path: Path) -> None:
+    folder = tmp_path / "programs"
+    folder.mkdir()
+    for number in range(5):
+        (folder / f"{number}.shape").write_text(format_program(planted(number)))
+    ended = run("library", "learn", "programs", "--out", "mine.shape", "--sheet", "mine.png")
+    assert ended.code == 0, ended.err
+    assert "wrote mine.shape: 1 functions from 5 programs" in ended.out
+    assert (tmp_path / "mine.png").stat().st_size > 5000
+    shown = run("library", "show", "mine.shape")
+    assert "# shapeprog library learn programs --out mine.shape" in shown.out
+    assert shown.out == (tmp_path / "mine.shape").read_text()
+    assert "def left_and_right(" in run("library", "show").out
+    ended = run("library", "learn", "programs/0.shape")
+    assert ended.code == 2
+    assert "no function is worth its lines in 1 program" in ended.err
+
+
+def test_tidy_and_infer_write_programs_with_a_library(
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "posts.shape").write_text(POSTS)
+    (tmp_path / "table.shape").write_text(TABLE)
+    ended = run("tidy", "table.shape", "--with", "posts.shape", "--library")
+    assert ended.code == 0, ended.err
+    assert "leg(posts(" in ended.out, "one's own come first"
+    given = []
+
+    def infer(shape, *, libraries, **other):
+        given.extend(each.functions[0].name for each in libraries)
+        return inference.Result(parse(TABLE), None, {}, "Stopped.", (), seconds=0.1)
+
+    monkeypatch.setattr(inference, "infer", infer)
+    run("export", "table.shape", "table.obj")
+    ended = run("infer", "table.obj", "--no-picture", "--with", "posts.shape", "--library")
+    assert ended.code == 0, ended.err
+    assert given == ["posts", "left_and_right"]

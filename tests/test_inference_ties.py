@@ -13,6 +13,8 @@ import shapeprog as sp
 from shapeprog.cli.app import app
 from shapeprog.evaluation.editing import edit_scores
 from shapeprog.inference.evidence import evidence_of_program
+from shapeprog.inference.joints import Joints
+from shapeprog.inference.ties.contacts import Contacts, holding
 from shapeprog.inference.ties.features import features
 from shapeprog.inference.ties.fitting import ways_free
 from shapeprog.inference.ties.pricing import worthwhile
@@ -139,6 +141,55 @@ def test_no_relation_moves_a_number_below_its_least():
         [same], np.array([1.0, 1.2]), np.eye(2), 1.0, fixed=np.zeros((0, 2)), low=np.array([0.9, 1.15])
     )
     assert not len(rows)
+
+
+@pytest.mark.parametrize(
+    ("second", "holds"),
+    [
+        ("box(at=(2, -1, -1), size=(2, 2, 2))", True),  # a whole face
+        ("box(at=(1.9, -1, 0.9), size=(2, 2, 2))", True),  # inside each other
+        ("box(at=(2, -1, 0.9), size=(2, 2, 2))", True),  # a strip of a face
+        ("box(at=(2, -1, 1), size=(2, 2, 2))", False),  # an edge
+        ("box(at=(2, 1, 1), size=(2, 2, 2))", False),  # a corner
+        ("box(at=(2.05, -1, -1), size=(2, 2, 2))", False),  # a gap
+    ],
+)
+def test_parts_hold_together_by_faces_and_not_by_edges(second: str, holds: bool):
+    scene = unroll(sp.parse(f"box(at=(0, -1, -1), size=(2, 2, 2))\n{second}\n"))
+    joints = joint_of(scene)
+    assert holding(scene, joints).tolist() == [holds]
+
+
+def joint_of(scene) -> Joints:
+    """The joint of two boxes, at the place of the first that is nearest to the middle of the second."""
+    half = scene.size[:1, :3]
+    near = (scene.centre[1] - scene.centre[0]).clamp(-half[0], half[0]) / half[0]
+    one, two = torch.tensor([0]), torch.tensor([1])
+    return Joints(one, two, near[None], torch.zeros(0, dtype=torch.long), -1e6)
+
+
+def test_a_relation_that_parts_what_holds_together_is_left_out():
+    tunable = Tunable(sp.parse("box(at=(0, -1, -1), size=(2, 2, 2))\nbox(at=(2, -1, 0.8), size=(2, 2, 2))\n"))
+    contacts = Contacts(tunable, joint_of(tunable.poses(tunable.values).scene))
+    numbers = np.append(tunable.values.numpy(), np.zeros(3))
+    rows = np.zeros((3, len(numbers)))
+    rows[0, [1, 7]] = 1, -1  # both begin at one depth
+    rows[1, [2, 5, 8]] = 1, 1, -1  # the second begins where the first ends: an edge, as it stands on it
+    rows[2, [4, 10]] = 1, -1  # both are equally deep
+    kept, at = contacts.kept(rows, 0, numbers, np.eye(len(numbers)))
+    np.testing.assert_array_equal(kept, rows[[0, 2]])
+    np.testing.assert_allclose(kept @ at, 0, atol=1e-12)
+
+
+def test_tilted_parts_have_middles_and_the_sides_across_which_they_do_not_tilt():
+    tunable = Tunable(
+        sp.parse("rod(start=(-5, 1, 10), end=(4, 3, 11), radius=0.5)\nboard(at=(1, 2, -3), size=(4, 1, 6), tilt=10)\n")
+    )
+    known = {(each.node, each.kind, each.axis): each for each in features(tunable, tunable.poses(tunable.values))}
+    numbers = np.append(tunable.values.numpy(), np.zeros(3))
+    assert [known[0, "middle", axis].at(numbers) for axis in range(3)] == [-0.5, 2, 10.5]
+    assert [known[1, kind, 2].at(numbers) for kind in ("low", "middle", "high")] == [-3, 0, 3]
+    assert not {(0, "low", 2), (1, "low", 1), (1, "middle", 1)} & set(known)
 
 
 def test_relations_hold_for_the_ways_that_are_free():

@@ -98,6 +98,11 @@ def _candidates(
                 yield one.row + whole[axis].row / 2, HOLDING if axis == UP else SURE
         for one, two in combinations(here, 2):
             middles = (one.kind == "middle") + (two.kind == "middle")
+            if one.kind == two.kind == "place" and one.node == two.node:  # the ends of one part
+                yield one.row - two.row, SURE
+                if axis in (DEPTH, SIDE):
+                    yield one.row + two.row, LIKELY
+                continue
             if middles == 1 or (one.node == two.node and one.all == two.all):
                 continue
             pair = (min(one.node, two.node), max(one.node, two.node))

@@ -192,6 +192,28 @@ def test_tilted_parts_have_middles_and_the_sides_across_which_they_do_not_tilt()
     assert not {(0, "low", 2), (1, "low", 1), (1, "middle", 1)} & set(known)
 
 
+CASE = """
+for i in mirror(side):
+    side(box(at=(-12, -4, 8), size=(24, 8, 1)))
+base(box(at=(-12, -4, -8), size=(1, 8, 16)))
+top(box(at=(11, -4, -8), size=(1, 8, 16)))
+for i in translate(3, by=({step}, 0, 0)):
+    shelf(box(at=({first}, -4, -8), size=(1, 8, 16)))
+"""
+
+
+def test_gaps_beside_a_run_are_those_between_its_copies():
+    even = sp.parse(CASE.format(step=5.75, first=-6.25))
+    tied = tie(even, evidence_of_program(even)).program
+    tall = unroll(sp.set(tied, height=30))
+    boards = sorted((tall.centre[2:, 0] - tall.size[2:, 0]).tolist())  # base, shelves and top from below
+    np.testing.assert_allclose(np.diff(boards), (30 - 1) / 4, atol=0.05)
+    uneven = sp.parse(CASE.format(step=5, first=-5))
+    tied = tie(uneven, evidence_of_program(uneven)).program
+    boards = sorted((unroll(tied).centre[2:, 0] - unroll(tied).size[2:, 0]).tolist())
+    np.testing.assert_allclose(boards, [-12, -5, 0, 5, 11], atol=0.1)
+
+
 def test_relations_hold_for_the_ways_that_are_free():
     rows = np.array([[1.0, -1, 0, 0], [0, 0, 1, -2]])
     ways = ways_free(rows, 4)

@@ -27,7 +27,7 @@ ALIGNED = 1e-9
 WHOLE = 1e-6
 """How far a factor may be from a quarter of a whole number."""
 
-Kind = Literal["low", "high", "middle", "place", "length", "radius", "shift", "angle", "extent"]
+Kind = Literal["low", "high", "middle", "before", "behind", "place", "length", "radius", "shift", "angle", "extent"]
 
 
 @dataclass(frozen=True)
@@ -37,8 +37,9 @@ class Feature:
     Parameters
     ----------
     kind
-        What it is: a side or the middle of a part (or of all its copies together), a coordinate or a number that a
-        statement writes, or an extent of the whole.
+        What it is: a side or the middle of a part (or of all its copies together), the high side of a copy before the
+        first of a run or the low side of one behind the last, a coordinate or a number that a statement writes, or an
+        extent of the whole.
     axis
         The axis of the grid that it is measured along; -1 where there is none.
     node
@@ -65,7 +66,7 @@ def features(tunable: Tunable, poses: Poses) -> list[Feature]:
     found: dict[tuple[object, ...], Feature] = {}
     for feature in _all_features(tunable, poses):
         group = "place" if feature.kind in ("low", "high") else feature.kind
-        key = group, feature.axis if group in ("place", "middle") else -1, feature.row.tobytes()
+        key = group, feature.axis if group in ("place", "middle", "before", "behind") else -1, feature.row.tobytes()
         found.setdefault(key, feature)
     return list(found.values())
 
@@ -102,10 +103,21 @@ def _sides(tunable: Tunable, poses: Poses) -> Iterator[Feature]:
                 one, two = (int(low.argmin()), int(high.argmax())) if which else (0, 0)
                 ends = rows[axis, slots[one]], rows[3 + axis, slots[two]]
                 known = {"low": ends[0], "high": ends[1], "middle": (ends[0] + ends[1]) / 2}
+                if flat and which and (step := _step(tunable, rows[axis, slots], low)) is not None:
+                    known |= {"before": rows[3 + axis, slots[one]] - step, "behind": rows[axis, slots[two]] + step}
                 for kind, row in (known if flat else {"middle": (centre[one] + centre[two]) / 2}).items():
                     near = np.round(4 * row) / 4
                     if np.abs(row - near).max(initial=0) < WHOLE and near.any():
                         yield Feature(kind, axis, node, which, np.append(near, np.zeros(3)))  # type: ignore[arg-type]
+
+
+def _step(tunable: Tunable, rows: FloatArray, low: FloatArray) -> FloatArray | None:
+    """The factors (F,) of the step between the copies of a run, whose low sides are these; none where no loop shifts
+    them."""
+    steps = len(np.unique(low.round(6))) - 1
+    step: FloatArray = (rows[low.argmax()] - rows[low.argmin()]) / max(steps, 1)
+    shifts = (tunable.are("shift").numpy() & (np.abs(step) > WHOLE)).sum()
+    return step if steps and shifts == 1 and (np.abs(step) > WHOLE).sum() == 1 else None
 
 
 def _ends(scene: Scene) -> tuple[torch.Tensor, torch.Tensor]:

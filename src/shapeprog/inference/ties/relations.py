@@ -110,6 +110,11 @@ def _candidates(
                 yield one.row - two.row, HOLDING if pair in touching and not middles else LIKELY
             if axis in (DEPTH, SIDE) and not (one.kind == two.kind and _edge(one, two, ends, mirror=True)):
                 yield one.row + two.row, LIKELY if middles == 0 else POSSIBLE
+    for run in known:  # the gap between the run and a part is that between its copies
+        facing = {"before": "high", "behind": "low"}.get(run.kind)
+        for side in places:
+            if side.kind == facing and side.axis == run.axis and side.node != run.node:
+                yield run.row - side.row, LIKELY
     for kind in ("length", "radius", "shift", "angle"):
         alike = [each for each in known if each.kind == kind]
         for one, two in combinations(alike, 2):

@@ -81,6 +81,13 @@ def test_tidy_writes_what_was_tied(tmp_path: Path):
     assert "numbers are free; 18 were" in result.stderr.replace("\n", " ")
 
 
+def test_no_minus_zero_is_written():
+    program = sp.parse(
+        TABLE + "for i in translate(2, by=(-3, -0.0, 0)):\n    shelf(box(at=(1, -6, -9), size=(0.5, 12, 18)))\n"
+    )
+    assert "-0.0" not in format_program(tie(program, evidence_of_program(program)).program)
+
+
 def test_tying_again_changes_no_number_of_the_table():
     tied = tied_table()
     again = tie(tied, evidence_of_program(tied)).program

@@ -10,7 +10,7 @@ import pytest
 from declared import LANGUAGE
 
 import shapeprog as sp
-from benchmarks import labels, library, planted
+from benchmarks import labels, library, planted, ties
 from shapeprog.language import standard, using
 from shapeprog.language.text import parse, source_of
 
@@ -82,3 +82,65 @@ def test_what_stitch_calls_counts_as_a_statement_where_it_holds_any() -> None:
     assert library.statements_of_stitch(library.expression(lines, whole=False), ()) == 3
     functions = (("fn_0", "(/ #0 2)"), ("fn_1", "(mirror 2 side 0 (arm_of #0))"), ("fn_2", "(fn_1 (box 0 #0 1 1 1 2))"))
     assert library.statements_of_stitch("(seq (fn_2 (fn_0 a)) (leg 0 (fn_0 a) 0 1 1 1))", functions) == 2
+
+
+NAMED = """\
+width, thick = 10, 1
+box(at=(0, -width / 2, 2), size=(thick, width, 3))
+box(at=(thick + 4, -width / 2, 0), size=(thick, width, 3.5))
+"""
+
+
+def test_numbers_of_a_program_follow_from_its_names_and_its_plain_numbers() -> None:
+    program = parse(NAMED)
+    ways = ties.ways_of(program, program)  # the first up and the second side are zero: nothing is free there
+    assert ways.shape == (12, 2 + 4)
+    assert ties.rank(ways) == 6
+    rows = ties.relations_written(sp.inline(program))
+    held = rows[np.abs(rows @ ways).max(1) < 1e-9]
+    assert ties.rank(held) == 6  # two zeros, two parts in the middle, equal thickness and equal width
+
+
+def test_a_number_that_has_become_zero_follows_from_nothing() -> None:
+    mirrored = "for i in mirror(side, at={}):\n    box(at=(0, 0, 2), size=(1, 2, 3))\n"
+    ways = ties.ways_of(parse(mirrored.format(0)), parse(mirrored.format(0.02)))
+    assert ways.shape == (7, 4)
+    assert not ways[0].any()
+
+
+def test_furniture_that_is_drawn_again_is_designed_alike() -> None:
+    numbers = ties.redrawn(1004, 0)
+    assert len(numbers) > ties.VARIANTS / 2
+    assert np.ptp(numbers, axis=0).max() > 1
+    rows = ties.relations_written(planted_furniture(1004))
+    always = rows[np.abs(rows @ numbers.T).max(1) <= ties.ROUNDED]
+    assert 0 < ties.rank(always) < numbers.shape[1]
+
+
+def planted_furniture(number: int) -> sp.Program:
+    from shapeprog.data.synthetic.furniture import furniture
+
+    return furniture(number)
+
+
+def test_noise_moves_every_number_and_no_count() -> None:
+    program = parse("for i in translate(3, by=(0, 0, 4)):\n    box(at=(0, 1, 2), size=(1, 2, 3))\n")
+    noisy = ties.with_noise(program, np.random.default_rng(0))
+    (loop,), (before,) = noisy.body, program.body
+    assert loop.values[:3] == before.values[:3]
+    moved = np.array(loop.body[0].values) - before.body[0].values
+    assert (moved != 0).all()
+    assert np.abs(moved).max() < 5 * ties.NOISE
+
+
+@pytest.mark.parametrize(
+    ("text", "same"),
+    [
+        ("for i in translate(2, by=(0, 0, 5)):\n    box(at=(0, 0, 0), size=(1, 2, 3))\n", True),
+        ("a = 2\nbox(at=(0, 0, 0), size=(1, a, 3))\nbox(at=(0, 0, 5), size=(1, a, 3))\n", False),
+        ("a, b, c = 1, 2, 3\nbox(at=(0, 0, 0), size=(a, b, c))\nbox(at=(0, 0, 5), size=(c, a, b))\n", True),
+    ],
+)
+def test_parts_share_their_numbers_where_no_edit_tells_them_apart(text: str, same: bool) -> None:
+    _, sizes = ties.shaken(parse(text))
+    assert np.allclose(sizes[:, 0], sizes[:, 1]) == same

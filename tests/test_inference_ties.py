@@ -13,6 +13,8 @@ import shapeprog as sp
 from shapeprog.cli.app import app
 from shapeprog.evaluation.editing import edit_scores
 from shapeprog.inference.evidence import evidence_of_program
+from shapeprog.inference.joints import Joints
+from shapeprog.inference.ties.contacts import Contacts, holding
 from shapeprog.inference.ties.features import features
 from shapeprog.inference.ties.fitting import ways_free
 from shapeprog.inference.ties.pricing import worthwhile
@@ -79,6 +81,13 @@ def test_tidy_writes_what_was_tied(tmp_path: Path):
     assert "numbers are free; 18 were" in result.stderr.replace("\n", " ")
 
 
+def test_no_minus_zero_is_written():
+    program = sp.parse(
+        TABLE + "for i in translate(2, by=(-3, -0.0, 0)):\n    shelf(box(at=(1, -6, -9), size=(0.5, 12, 18)))\n"
+    )
+    assert "-0.0" not in format_program(tie(program, evidence_of_program(program)).program)
+
+
 def test_tying_again_changes_no_number_of_the_table():
     tied = tied_table()
     again = tie(tied, evidence_of_program(tied)).program
@@ -139,6 +148,77 @@ def test_no_relation_moves_a_number_below_its_least():
         [same], np.array([1.0, 1.2]), np.eye(2), 1.0, fixed=np.zeros((0, 2)), low=np.array([0.9, 1.15])
     )
     assert not len(rows)
+
+
+@pytest.mark.parametrize(
+    ("second", "holds"),
+    [
+        ("box(at=(2, -1, -1), size=(2, 2, 2))", True),  # a whole face
+        ("box(at=(1.9, -1, 0.9), size=(2, 2, 2))", True),  # inside each other
+        ("box(at=(2, -1, 0.9), size=(2, 2, 2))", True),  # a strip of a face
+        ("box(at=(2, -1, 1), size=(2, 2, 2))", False),  # an edge
+        ("box(at=(2, 1, 1), size=(2, 2, 2))", False),  # a corner
+        ("box(at=(2.05, -1, -1), size=(2, 2, 2))", False),  # a gap
+    ],
+)
+def test_parts_hold_together_by_faces_and_not_by_edges(second: str, holds: bool):
+    scene = unroll(sp.parse(f"box(at=(0, -1, -1), size=(2, 2, 2))\n{second}\n"))
+    joints = joint_of(scene)
+    assert holding(scene, joints).tolist() == [holds]
+
+
+def joint_of(scene) -> Joints:
+    """The joint of two boxes, at the place of the first that is nearest to the middle of the second."""
+    half = scene.size[:1, :3]
+    near = (scene.centre[1] - scene.centre[0]).clamp(-half[0], half[0]) / half[0]
+    one, two = torch.tensor([0]), torch.tensor([1])
+    return Joints(one, two, near[None], torch.zeros(0, dtype=torch.long), -1e6)
+
+
+def test_a_relation_that_parts_what_holds_together_is_left_out():
+    tunable = Tunable(sp.parse("box(at=(0, -1, -1), size=(2, 2, 2))\nbox(at=(2, -1, 0.8), size=(2, 2, 2))\n"))
+    contacts = Contacts(tunable, joint_of(tunable.poses(tunable.values).scene))
+    numbers = np.append(tunable.values.numpy(), np.zeros(3))
+    rows = np.zeros((3, len(numbers)))
+    rows[0, [1, 7]] = 1, -1  # both begin at one depth
+    rows[1, [2, 5, 8]] = 1, 1, -1  # the second begins where the first ends: an edge, as it stands on it
+    rows[2, [4, 10]] = 1, -1  # both are equally deep
+    kept, at = contacts.kept(rows, 0, numbers, np.eye(len(numbers)))
+    np.testing.assert_array_equal(kept, rows[[0, 2]])
+    np.testing.assert_allclose(kept @ at, 0, atol=1e-12)
+
+
+def test_tilted_parts_have_middles_and_the_sides_across_which_they_do_not_tilt():
+    tunable = Tunable(
+        sp.parse("rod(start=(-5, 1, 10), end=(4, 3, 11), radius=0.5)\nboard(at=(1, 2, -3), size=(4, 1, 6), tilt=10)\n")
+    )
+    known = {(each.node, each.kind, each.axis): each for each in features(tunable, tunable.poses(tunable.values))}
+    numbers = np.append(tunable.values.numpy(), np.zeros(3))
+    assert [known[0, "middle", axis].at(numbers) for axis in range(3)] == [-0.5, 2, 10.5]
+    assert [known[1, kind, 2].at(numbers) for kind in ("low", "middle", "high")] == [-3, 0, 3]
+    assert not {(0, "low", 2), (1, "low", 1), (1, "middle", 1)} & set(known)
+
+
+CASE = """
+for i in mirror(side):
+    side(box(at=(-12, -4, 8), size=(24, 8, 1)))
+base(box(at=(-12, -4, -8), size=(1, 8, 16)))
+top(box(at=(11, -4, -8), size=(1, 8, 16)))
+for i in translate(3, by=({step}, 0, 0)):
+    shelf(box(at=({first}, -4, -8), size=(1, 8, 16)))
+"""
+
+
+def test_gaps_beside_a_run_are_those_between_its_copies():
+    even = sp.parse(CASE.format(step=5.75, first=-6.25))
+    tied = tie(even, evidence_of_program(even)).program
+    tall = unroll(sp.set(tied, height=30))
+    boards = sorted((tall.centre[2:, 0] - tall.size[2:, 0]).tolist())  # base, shelves and top from below
+    np.testing.assert_allclose(np.diff(boards), (30 - 1) / 4, atol=0.05)
+    uneven = sp.parse(CASE.format(step=5, first=-5))
+    tied = tie(uneven, evidence_of_program(uneven)).program
+    boards = sorted((unroll(tied).centre[2:, 0] - unroll(tied).size[2:, 0]).tolist())
+    np.testing.assert_allclose(boards, [-12, -5, 0, 5, 11], atol=0.1)
 
 
 def test_relations_hold_for_the_ways_that_are_free():

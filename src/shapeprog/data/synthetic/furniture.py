@@ -39,21 +39,27 @@ SKETCHES: tuple[tuple[Callable[[Sketch], None], float], ...] = (
 """What it is mixed from, and the weight of each."""
 
 
-def furniture(number: int, seed: int = 0) -> Program:
+def furniture(number: int, seed: int = 0, measures: int | None = None) -> Program:
     """A piece of furniture in the grid, as large as real ones are scaled; it depends on its number and seed alone.
 
     It is sketched twice: before the second time it is known how large it is.
+
+    Parameters
+    ----------
+    measures
+        The number of a variant that is designed alike and has other measures; where something depends on a measure,
+        such as whether there is room for two pillows, it may have other parts too.
     """
     weights = np.array([weight for _, weight in SKETCHES])
 
-    def sketched(scale: float) -> Program:
+    def sketched(scale: float, measures: int | None = None) -> Program:
         random = np.random.default_rng((seed, number))
-        sketch = Sketch(random, scale)
+        sketch = Sketch(random, scale, None if measures is None else np.random.default_rng((seed, number, measures)))
         SKETCHES[int(random.choice(len(weights), p=weights / weights.sum()))][0](sketch)
         return sketch.program
 
     low, high = _bounds(sketched(1.0))
-    program = sketched(SPAN / float((high - low).max()))
+    program = sketched(SPAN / float((high - low).max()), measures)
     low, high = _bounds(program)
     shift = -(low + high) / 2
     if any(isinstance(node, Loop) and node.name == "rotate" for node in program.walk()):

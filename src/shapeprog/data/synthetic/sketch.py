@@ -40,10 +40,12 @@ class Sketch:
         Where its choices come from.
     scale
         Cells in a centimetre.
+    measures
+        Where measures come from, if not from ``random``, so that all else is chosen as it would be without.
     """
 
-    def __init__(self, random: np.random.Generator, scale: float) -> None:
-        self._random, self._scale = random, scale
+    def __init__(self, random: np.random.Generator, scale: float, measures: np.random.Generator | None = None) -> None:
+        self._random, self._scale, self._measures = random, scale, measures
         self._body: list[Node] = []
 
     @property
@@ -57,7 +59,8 @@ class Sketch:
 
     def any(self, low: float, high: float) -> float:
         """A number between two."""
-        return float(self._random.uniform(low, high))
+        drawn = self._random.uniform(low, high)
+        return float(drawn if self._measures is None else self._measures.uniform(low, high))
 
     def whole(self, low: int, high: int) -> int:
         """A whole number between two, both included."""

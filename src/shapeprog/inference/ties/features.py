@@ -1,8 +1,8 @@
 """What can be measured of a program: numbers that are linear in those it writes, such as the top of a seat.
 
 Every feature is a row of factors for the numbers of the program (F) and three more, the extents of the whole along the
-axes of the grid, whose middle is the origin.  Only what is exactly linear is listed: a tilted part has the
-ends that its statement names, and no sides.
+axes of the grid, whose middle is the origin.  Only what is exactly linear is listed: a tilted part has the ends that
+its statement names, and sides only across the axes that it lies along.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from typing import Literal
 import numpy as np
 import torch
 
+from shapeprog.geometry.primitive import SIZES
 from shapeprog.geometry.scene import Scene
 from shapeprog.inference.tunable import Poses, Tunable, bounds
 from shapeprog.language.program import Draw, Node
@@ -26,7 +27,7 @@ ALIGNED = 1e-9
 WHOLE = 1e-6
 """How far a factor may be from a quarter of a whole number."""
 
-Kind = Literal["low", "high", "middle", "place", "length", "radius", "shift", "angle", "extent"]
+Kind = Literal["low", "high", "middle", "before", "behind", "place", "length", "radius", "shift", "angle", "extent"]
 
 
 @dataclass(frozen=True)
@@ -36,8 +37,9 @@ class Feature:
     Parameters
     ----------
     kind
-        What it is: a side or the middle of a part (or of all its copies together), a coordinate or a number that a
-        statement writes, or an extent of the whole.
+        What it is: a side or the middle of a part (or of all its copies together), the high side of a copy before the
+        first of a run or the low side of one behind the last, a coordinate or a number that a statement writes, or an
+        extent of the whole.
     axis
         The axis of the grid that it is measured along; -1 where there is none.
     node
@@ -63,8 +65,8 @@ def features(tunable: Tunable, poses: Poses) -> list[Feature]:
     """All features of a program, none twice."""
     found: dict[tuple[object, ...], Feature] = {}
     for feature in _all_features(tunable, poses):
-        group = feature.kind if feature.kind in ("length", "radius", "shift", "angle") else "place"
-        key = group, feature.axis if group == "place" else -1, feature.row.tobytes()
+        group = "place" if feature.kind in ("low", "high") else feature.kind
+        key = group, feature.axis if group in ("place", "middle", "before", "behind") else -1, feature.row.tobytes()
         found.setdefault(key, feature)
     return list(found.values())
 
@@ -80,25 +82,42 @@ def _all_features(tunable: Tunable, poses: Poses) -> Iterator[Feature]:
 
 
 def _sides(tunable: Tunable, poses: Poses) -> Iterator[Feature]:
-    """Sides and middles of parts that lie along the axes, of the first copy and of all of them."""
+    """Sides and middles of parts, of the first copy and of all of them; sides only where they lie across an axis.
+
+    A board that leans back still has a left and a right side, and a rod between two points its middle.
+    """
     scene = poses.scene
     value, slope = _ends(scene)
     rows = torch.einsum("enr,nrf->enf", slope, poses.slopes).numpy()
-    aligned = (scene.rotation - scene.rotation.round()).abs().amax((-2, -1)) < ALIGNED
+    aligned = ((scene.rotation - scene.rotation.round()).abs().amax(-1) < ALIGNED).numpy()
     drawn = [n for n, node in enumerate(tunable.nodes) if isinstance(node, Draw)]
     for block, node in enumerate(drawn):
         slots = (scene.block == block).nonzero()[:, 0].numpy()
-        if not len(slots) or not bool(aligned[slots].all()):
+        if not len(slots):
             continue
         for axis in range(3):
             low, high = value[axis, slots].numpy(), value[3 + axis, slots].numpy()
+            flat = bool(aligned[slots, axis].all())
+            centre = poses.slopes[slots, SIZES + axis].numpy()
             for which in (False, True) if len(slots) > 1 else (False,):
                 one, two = (int(low.argmin()), int(high.argmax())) if which else (0, 0)
                 ends = rows[axis, slots[one]], rows[3 + axis, slots[two]]
-                for kind, row in (("low", ends[0]), ("high", ends[1]), ("middle", (ends[0] + ends[1]) / 2)):
+                known = {"low": ends[0], "high": ends[1], "middle": (ends[0] + ends[1]) / 2}
+                if flat and which and (step := _step(tunable, rows[axis, slots], low)) is not None:
+                    known |= {"before": rows[3 + axis, slots[one]] - step, "behind": rows[axis, slots[two]] + step}
+                for kind, row in (known if flat else {"middle": (centre[one] + centre[two]) / 2}).items():
                     near = np.round(4 * row) / 4
                     if np.abs(row - near).max(initial=0) < WHOLE and near.any():
                         yield Feature(kind, axis, node, which, np.append(near, np.zeros(3)))  # type: ignore[arg-type]
+
+
+def _step(tunable: Tunable, rows: FloatArray, low: FloatArray) -> FloatArray | None:
+    """The factors (F,) of the step between the copies of a run, whose low sides are these; none where no loop shifts
+    them."""
+    steps = len(np.unique(low.round(6))) - 1
+    step: FloatArray = (rows[low.argmax()] - rows[low.argmin()]) / max(steps, 1)
+    shifts = (tunable.are("shift").numpy() & (np.abs(step) > WHOLE)).sum()
+    return step if steps and shifts == 1 and (np.abs(step) > WHOLE).sum() == 1 else None
 
 
 def _ends(scene: Scene) -> tuple[torch.Tensor, torch.Tensor]:

@@ -24,9 +24,6 @@ HOLD = 1e-2
 TOGETHER, CLOSED = 0.03, 0.2
 """Weights of a squared gap between parts that touched, and of one that is still open at the end."""
 
-OPEN = 0.03
-"""How far in cells from closed a joint counts as open."""
-
 FARTHEST = 0.5
 """Farthest that one step moves the surface by one number, in cells."""
 
@@ -72,15 +69,6 @@ class Misfit:
             curvature[:count, :count] += (wide.T @ gaps.slopes).numpy()
         slope += self._gentle * (numbers - self.numbers)
         return slope, curvature + np.diag(self._gentle)
-
-
-def is_open(misfit: Misfit, numbers: FloatArray, joints: Joints | None) -> bool:
-    """Whether parts that touched are apart."""
-    if joints is None or not len(joints.first):
-        return False
-    poses = misfit.tunable.poses(torch.from_numpy(numbers[: len(misfit.tunable.values)]))
-    gaps = needs(poses.scene, poses.slopes, moved(poses.scene, joints))
-    return bool((gaps.residual[: len(joints.first)] > OPEN).any())
 
 
 def refitted(

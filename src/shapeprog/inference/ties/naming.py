@@ -181,7 +181,7 @@ def _lines(
     found: list[WrittenDraw | WrittenLoop] = []
     for node in body:
         n = next(counter)
-        values = tuple(table.get((n, slot), value) for slot, value in enumerate(node.values))
+        values = tuple(table.get((n, slot), value + 0.0) for slot, value in enumerate(node.values))  # no minus zero
         if isinstance(node, Draw):
             found.append(WrittenDraw(node.name, values, node.role))
         else:

@@ -98,6 +98,11 @@ def _candidates(
                 yield one.row + whole[axis].row / 2, HOLDING if axis == UP else SURE
         for one, two in combinations(here, 2):
             middles = (one.kind == "middle") + (two.kind == "middle")
+            if one.kind == two.kind == "place" and one.node == two.node:  # the ends of one part
+                yield one.row - two.row, SURE
+                if axis in (DEPTH, SIDE):
+                    yield one.row + two.row, LIKELY
+                continue
             if middles == 1 or (one.node == two.node and one.all == two.all):
                 continue
             pair = (min(one.node, two.node), max(one.node, two.node))
@@ -105,6 +110,11 @@ def _candidates(
                 yield one.row - two.row, HOLDING if pair in touching and not middles else LIKELY
             if axis in (DEPTH, SIDE) and not (one.kind == two.kind and _edge(one, two, ends, mirror=True)):
                 yield one.row + two.row, LIKELY if middles == 0 else POSSIBLE
+    for run in known:  # the gap between the run and a part is that between its copies
+        facing = {"before": "high", "behind": "low"}.get(run.kind)
+        for side in places:
+            if side.kind == facing and side.axis == run.axis and side.node != run.node:
+                yield run.row - side.row, LIKELY
     for kind in ("length", "radius", "shift", "angle"):
         alike = [each for each in known if each.kind == kind]
         for one, two in combinations(alike, 2):

@@ -18,8 +18,9 @@ from shapeprog.inference.evidence import Evidence
 from shapeprog.inference.joints import Joints, find_joints
 from shapeprog.inference.refine import single_threaded
 from shapeprog.inference.ties.basis import Basis, simplest
+from shapeprog.inference.ties.contacts import Contacts
 from shapeprog.inference.ties.features import Feature, features
-from shapeprog.inference.ties.fitting import CLOSED, Misfit, is_open, refitted
+from shapeprog.inference.ties.fitting import CLOSED, Misfit, refitted
 from shapeprog.inference.ties.naming import written
 from shapeprog.inference.ties.pricing import worthwhile
 from shapeprog.inference.ties.relations import relations
@@ -73,22 +74,36 @@ def tie(
         scene = tunable.poses(tunable.values).scene
         joints = _joints(scene, seed)
         pairs = touching(tunable, scene, joints) if joints else set()
+        contacts = Contacts(tunable, joints) if joints else None
         for round_ in range(ROUNDS):
             poses = tunable.poses(torch.from_numpy(numbers[: len(tunable.values)]))
             known = features(tunable, poses)
             before = len(rows)
             offered = relations(known, numbers, pairs)
-            rows, numbers = worthwhile(offered, numbers, misfit.at(numbers)[1], price, fixed=rows, low=misfit.low)
-            numbers = refitted(misfit, numbers, rows, joints)
+            curvature = misfit.at(numbers)[1]
+            rows, optimum = worthwhile(offered, numbers, curvature, price, fixed=rows, low=misfit.low)
+            if contacts:
+                rows, optimum = contacts.kept(rows, before, numbers, curvature)
+            numbers = _together(misfit, optimum, rows, joints, contacts)
             if progress:
                 progress("tying numbers", (round_ + 1) / ROUNDS)
             if len(rows) == before:
                 break
-        if is_open(misfit, numbers, joints):
-            numbers = refitted(misfit, numbers, rows, joints, CLOSED)
         basis = _rounded(simplest(known, numbers, rows, np.append(tunable.are("length").numpy(), [False] * 3)))
         named = written(tunable, basis)
         return Tied(named, free_numbers(named))
+
+
+def _together(
+    misfit: Misfit, numbers: FloatArray, rows: FloatArray, joints: Joints | None, contacts: Contacts | None
+) -> FloatArray:
+    """The numbers (V,) refitted as they best fit; where parts come apart so, with what holds them weighing more; and
+    where even that parts them, as they are."""
+    fitting = refitted(misfit, numbers, rows, joints)
+    if contacts is None or contacts.hold(fitting, numbers):
+        return fitting
+    closer = refitted(misfit, numbers, rows, joints, CLOSED)
+    return closer if contacts.hold(closer, numbers) else numbers
 
 
 def touching(tunable: Tunable, scene: Scene, joints: Joints) -> set[tuple[int, int]]:

@@ -1,0 +1,97 @@
+"""Parts that hold together must not fall apart for the sake of a relation.
+
+Two parts hold together where they overlap or share a face, or some of one; parts that meet along an edge or at a point
+are one piece to the eye, but two to a printer and to every edit.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import torch
+from jaxtyping import Bool
+from torch import Tensor
+
+from shapeprog.geometry.distance import signed_distance
+from shapeprog.geometry.scene import Scene
+from shapeprog.inference.joints import AGAIN, Joints, between
+from shapeprog.inference.residuals import rows_of
+from shapeprog.inference.tunable import Tunable, bounds
+from shapeprog.space import Array, FloatArray
+
+LOOKED, AROUND = 16, 0.15
+"""Places around a joint that are looked at, and how far away in cells they are at most."""
+
+APART, NARROW = 0.01, 0.006
+"""Cells between parts that are apart; and the standard deviation, across its length, of the places of a contact that is
+but an edge."""
+
+
+def holding(scene: Scene, joints: Joints) -> Bool[Tensor, " C"]:
+    """Which joints hold: places around them are drawn onto both parts, and should then fill some of a plane."""
+    if not len(joints.first):
+        return torch.zeros(0, dtype=torch.bool)
+    drawn = AROUND * (2 * torch.rand(LOOKED, 3, generator=torch.Generator().manual_seed(0), dtype=torch.float64) - 1)
+    local = bounds(scene)[joints.first] * joints.places
+    places = scene.centre[joints.first] + (scene.rotation[joints.first] @ local[..., None])[..., 0]
+    points = (places[:, None] + drawn).flatten(0, 1)
+    first, second = (slots.repeat_interleave(LOOKED) for slots in (joints.first, joints.second))
+    points = between(scene, first, second, points, AGAIN)
+    gap = signed_distance(rows_of(scene, second)[0], points[:, None])[:, 0].detach().clamp(min=0)
+    spread = points.unflatten(0, (-1, LOOKED))
+    wide = torch.linalg.svdvals(spread - spread.mean(1, keepdim=True))[:, 1] / np.sqrt(LOOKED)
+    return (gap.unflatten(0, (-1, LOOKED)).amin(1) <= APART) & (wide >= NARROW)
+
+
+class Contacts:
+    """The joints of a program, and which of them hold for which numbers."""
+
+    def __init__(self, tunable: Tunable, joints: Joints) -> None:
+        self.tunable, self.joints = tunable, joints
+
+    def hold(self, numbers: FloatArray, before: FloatArray) -> bool:
+        """Whether all joints hold that did where the numbers were others."""
+        return bool((self.at(numbers) | ~self.at(before)).all())
+
+    def at(self, numbers: FloatArray) -> Array:
+        """Which joints hold (C,) where the numbers and extents of the whole are these (V,)."""
+        poses = self.tunable.poses(torch.from_numpy(numbers[: len(self.tunable.values)]))
+        return holding(poses.scene, self.joints).numpy()
+
+    def kept(
+        self, rows: FloatArray, fixed: int, numbers: FloatArray, curvature: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """The relations (M, V), in the order in which they were found to be worth having, without those that part what
+        holds together; and the optimum (V,) where they hold.
+
+        Parameters
+        ----------
+        fixed
+            How many of them, the first, are not in question.
+        numbers, curvature
+            The optimum without relations, and half the curvature of the misfit there.
+        """
+        free, left = np.linalg.inv(curvature), list(rows)
+        needed = self.at(_optimum(left[:fixed], numbers, free))
+        sure = fixed
+        while not self.at(_optimum(left, numbers, free))[needed].all():
+            low, high = (
+                sure,
+                len(left),
+            )  # with the first low relations all hold together, with the first high they do not
+            while high - low > 1:
+                middle = (low + high) // 2
+                holds = self.at(_optimum(left[:middle], numbers, free))[needed].all()
+                low, high = (middle, high) if holds else (low, middle)
+            if low == len(left):
+                break
+            del left[low]
+            sure = low
+        return np.array(left).reshape(-1, len(numbers)), _optimum(left, numbers, free)
+
+
+def _optimum(rows: list[FloatArray], numbers: FloatArray, free: Array) -> FloatArray:
+    """The numbers (V,) of the least misfit for which relations hold; ``free`` is the inverse of its curvature."""
+    if not rows:
+        return numbers
+    along = free @ np.array(rows).T
+    return numbers - along @ np.linalg.solve(np.array(rows) @ along, np.array(rows) @ numbers)

@@ -21,7 +21,7 @@ from shapeprog.inference.ties.pricing import worthwhile
 from shapeprog.inference.ties.relations import Relation
 from shapeprog.inference.ties.tying import tie
 from shapeprog.inference.tunable import Tunable
-from shapeprog.language.free import free_numbers, multiplied, numbers
+from shapeprog.language.free import free_numbers, free_values, multiplied, numbers
 from shapeprog.language.program import Draw, Program
 from shapeprog.language.text import format_program
 from shapeprog.language.unroll import unroll
@@ -226,6 +226,15 @@ def test_relations_hold_for_the_ways_that_are_free():
     ways = ways_free(rows, 4)
     assert ways.shape == (4, 2)
     np.testing.assert_allclose(rows @ ways, 0, atol=1e-12)
+
+
+def test_what_says_how_often_something_is_repeated_is_no_free_number():
+    text = "pairs, wide = 2, 7\n\ndef row(n, gap):\n    for i in translate(n, by=(0, gap, 0)):\n"
+    text += "        leg(at=(0, 0, 0), size=(3, 1, 1))\n\ndef rows(n, gap):\n    row(n=n, gap=gap)\n\n"
+    text += "rows(n=3, gap=2)\nrow(n=pairs, gap=wide)\n"
+    program = sp.parse(text)
+    assert free_values(program) == [7, 3, 1, 1, 2]
+    assert multiplied(program, 4, 1.5).body[0].values == (3, 0, 3, 0)
 
 
 def test_free_numbers_are_those_that_nothing_else_gives():

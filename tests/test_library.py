@@ -117,6 +117,15 @@ def test_one_function_serves_any_count_and_says_defaults_only_where_they_differ(
     assert dict(call.arguments)["front"] == pytest.approx(-3)
 
 
+@pytest.mark.parametrize("order", ["wide, thick", "thick, wide"])
+def test_a_function_without_an_example_is_found_whatever_the_order_of_its_parameters(order: str) -> None:
+    arms = f"def arms({order}):\n    for i in mirror(side):\n"
+    arms += "        arm(box(at=(0, 0, wide / 2 - 3 * thick), size=(3, 8, thick)))\n"
+    text = "for i in translate(2, by=(0, 0, 17)):\n    arm(box(at=(0, 0, -9), size=(3, 8, 1)))\n"
+    (call,) = calls(with_library(parse(text), library(arms)))
+    assert dict(call.arguments) == {"wide": 22, "thick": 1}
+
+
 def test_a_loop_of_what_a_function_draws_stays_around_its_call() -> None:
     text = "for i in mirror(depth, at=9):\n    for j in mirror(side):\n        for k in mirror(depth):\n"
     text += "            leg(at=(0, 3, 9), size=(8, 1, 1))\n"

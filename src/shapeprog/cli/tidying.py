@@ -45,4 +45,4 @@ def tidy_command(
         save(found, out, frame)
     terminal.print_program(terminal.output(), found)
     before = numbers(given)
-    terminal.errors().print(f"{tied.free} numbers are free; {before} were.", style="dim", markup=False)
+    terminal.errors().print(f"{numbers(found)} numbers are free; {before} were.", style="dim", markup=False)

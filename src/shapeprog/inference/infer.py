@@ -143,7 +143,7 @@ def infer(
         Whether numbers that hold together are tied where the surface is known: the program then has names for the few
         that are free, and expressions for all others.
     libraries
-        Functions that the program is written with wherever that is shorter.
+        Functions that the program is written with wherever that is shorter, unless it has the paper's statements alone.
     progress
         Called with what is being done and the share of it that is done.
 
@@ -216,7 +216,7 @@ def infer(
                 tied = tie(program, found.evidence, seed=seed, progress=progress).program
                 fits = target.points is not None or costs(tied) <= costs(program)
                 program = tied if fits else program
-    for library in libraries:
+    for library in libraries if snapped is None else ():
         program = with_library(program, library)
     if target.note:
         reason += f" {target.note}"

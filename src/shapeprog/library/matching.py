@@ -8,7 +8,7 @@ program follows from as many of its numbers as there are parameters, those with 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -20,7 +20,7 @@ from shapeprog.language.evaluation import expanded, symbolic
 from shapeprog.language.expression import Linear, Name, Value, combined, value_at
 from shapeprog.language.program import Program
 from shapeprog.language.source import Assignment, Call, Function, Source, WrittenLoop
-from shapeprog.library.blocks import Block, blocks_of
+from shapeprog.library.blocks import Block, Kind, blocks_of
 from shapeprog.library.length import terms
 from shapeprog.space import FloatArray
 
@@ -29,6 +29,9 @@ TOLERANCE = 0.05
 
 GENERIC = 7.0
 """What a parameter without an example is tried with."""
+
+STEEP = 8.0
+"""How much smaller than another such parameter the next is: thin parts are."""
 
 EXACT = 0.01
 """How far in cells a default may be from what is drawn to stand for it."""
@@ -79,32 +82,48 @@ class Pattern:
         """Its other parameters, which are continuous."""
         return tuple(name for name in self.parameters if name not in self.counts)
 
-    @cached_property
+    @property
     def arguments(self) -> dict[str, float]:
         """A number for each parameter: that of the example, a default, or any."""
-        shown = self.function.parameters + (self.example.arguments if self.example else ())
-        known = {name: value for name, value in shown if isinstance(value, float)}
-        spare = {name: 3.0 if name in self.counts else GENERIC / (1 + n) for n, name in enumerate(self.parameters)}
-        return spare | known
+        return self._assumed(lambda place: GENERIC / STEEP**place)
 
-    def forms(self, counts: Mapping[str, float]) -> tuple[Form, ...]:
-        """What it draws for these counts; nothing if that is not linear in its other parameters."""
+    def forms(self, counts: Mapping[str, float]) -> tuple[tuple[Form, ...], ...]:
+        """What it draws for these counts; nothing if that is not linear in its other parameters.
+
+        Which of two copies lies below the other may depend on its arguments: where no example tells, several are tried.
+        """
         key = tuple(counts.values())
         if key not in self._known:
-            self._known[key] = self._forms(counts)
+            last = len(self.parameters)
+            assumed = [self.arguments]
+            if self.example is None:
+                assumed += [
+                    self._assumed(lambda place: GENERIC / STEEP ** (last - 1 - place)),
+                    self._assumed(lambda _: GENERIC),
+                ]
+            found = {_key(each): each for each in (self._forms({**one, **counts}, counts) for one in assumed) if each}
+            self._known[key] = tuple(found.values())
         return self._known[key]
 
     @cached_property
-    def _known(self) -> dict[tuple[float, ...], tuple[Form, ...]]:
+    def _known(self) -> dict[tuple[float, ...], tuple[tuple[Form, ...], ...]]:
         return {}
 
-    def _forms(self, counts: Mapping[str, float]) -> tuple[Form, ...]:
-        numbers = tuple(({**self.arguments, **counts}).items())
-        source = Source((*self.others, Assignment(numbers), *self.function.body))
+    def _assumed(self, any_: Callable[[int], float]) -> dict[str, float]:
+        shown = self.function.parameters + (self.example.arguments if self.example else ())
+        known = {name: value for name, value in shown if isinstance(value, float)}
+        return {name: 3.0 if name in self.counts else any_(n) for n, name in enumerate(self.parameters)} | known
+
+    def _forms(self, numbers: Mapping[str, float], counts: Mapping[str, float]) -> tuple[Form, ...]:
+        source = Source((*self.others, Assignment(tuple(numbers.items())), *self.function.body))
         try:
             return tuple(forms(source, {**counts, **{name: Linear.of(name) for name in self.measures}}, self.measures))
         except (ShapeProgError, ZeroDivisionError):
             return ()
+
+
+def _key(found: Sequence[Form]) -> tuple[tuple[Kind, bytes, bytes], ...]:
+    return tuple((form.block.kind, form.factors.tobytes(), form.constants.tobytes()) for form in found)
 
 
 class Match(NamedTuple):
@@ -181,16 +200,16 @@ class Matcher:
     def matches(self, pattern: Pattern) -> Iterator[Match]:
         """All ways in which blocks of the program are a call of a function."""
         seen = sorted({float(count) for form in self.forms for count in form.block.counts})
-        found: set[tuple[int, ...]] = set()
+        found: dict[tuple[int, ...], tuple[int, Match]] = {}
         for counts in itertools.product(seen, repeat=len(pattern.counts)):
             given = dict(zip(pattern.counts, counts, strict=True))
-            wanted = pattern.forms(given)
-            for blocks in self._alike(wanted) if wanted else ():
-                key = tuple(sorted(blocks))
-                match = None if key in found else self._solved(pattern, given, wanted, blocks)
-                if match is not None:
-                    found.add(key)
-                    yield match
+            for wanted in pattern.forms(given):
+                for blocks in self._alike(wanted):
+                    solved = self._solved(pattern, given, wanted, blocks)
+                    key = tuple(sorted(blocks))
+                    if solved is not None and (key not in found or solved[0] < found[key][0]):
+                        found[key] = solved
+        return (match for _, match in found.values())
 
     def _alike(self, wanted: Sequence[Form]) -> Iterator[tuple[int, ...]]:
         """Blocks of the kinds wanted, in their order, that make whole lines and share a role where one is open."""
@@ -217,8 +236,8 @@ class Matcher:
 
     def _solved(
         self, pattern: Pattern, counts: Mapping[str, float], wanted: Sequence[Form], blocks: tuple[int, ...]
-    ) -> Match | None:
-        """The arguments for which a function draws some blocks, if there are such."""
+    ) -> tuple[int, Match] | None:
+        """The call of a function that draws some blocks, if there is one, and how many arguments are negative."""
         mine = [self.forms[k] for k in blocks]
         factors = np.vstack([form.factors for form in wanted])
         constants = np.concatenate([form.constants for form in wanted])
@@ -243,7 +262,7 @@ class Matcher:
         table: dict[str, Value] = {**dict(zip(pattern.measures, written, strict=True)), **counts}
         roles = (form.block.kind.word for form, want in zip(mine, wanted, strict=True) if not want.block.kind.word)
         said = tuple((name, table[name]) for name, default in pattern.function.parameters if table[name] != default)
-        return Match(blocks, next(roles, ""), said, error)
+        return int((exact < -TOLERANCE).sum()), Match(blocks, next(roles, ""), said, error)
 
     @property
     def _numbers(self) -> dict[str, float]:

@@ -167,6 +167,23 @@ def test_parts_hold_together_by_faces_and_not_by_edges(second: str, holds: bool)
     assert holding(scene, joints).tolist() == [holds]
 
 
+@pytest.mark.parametrize("corner", [(1, 1), (1, -1), (-1, 1), (-1, -1)])
+def test_a_leaning_leg_that_ends_at_the_face_above_it_holds(corner: tuple[int, int]):
+    # The middle of its end lies in the face, so one edge of it is .03 inside and the other as far below: from there the
+    # others must be found.
+    program = sp.parse(
+        "bar(start=(-8, 0, 0), end=(8, -0.7, 0), section=(1.3, 1.3))\nbox(at=(8, -8, -8), size=(1, 16, 16))\n"
+    )
+    tunable = Tunable(program)
+    scene = tunable.poses(tunable.values).scene
+    long = int(scene.size[0, :3].argmax())
+    place = torch.ones(3, dtype=torch.float64)
+    place[[axis for axis in range(3) if axis != long]] = torch.tensor(corner, dtype=torch.float64)
+    place[long] = 1 if float(scene.rotation[0, 0, long]) > 0 else -1
+    joint = Joints(torch.tensor([0]), torch.tensor([1]), place[None], torch.zeros(0, dtype=torch.long), -1e6)
+    assert holding(scene, joint).tolist() == [True]
+
+
 def joint_of(scene) -> Joints:
     """The joint of two boxes, at the place of the first that is nearest to the middle of the second."""
     half = scene.size[:1, :3]

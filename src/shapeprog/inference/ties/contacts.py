@@ -13,15 +13,15 @@ from torch import Tensor
 
 from shapeprog.geometry.distance import signed_distance
 from shapeprog.geometry.scene import Scene
-from shapeprog.inference.joints import AGAIN, Joints, between
+from shapeprog.inference.joints import FIRST, Joints, between
 from shapeprog.inference.residuals import rows_of
 from shapeprog.inference.tunable import Tunable, bounds
 from shapeprog.space import Array, FloatArray
 
-LOOKED, AROUND = 16, 0.15
+LOOKED, AROUND = 32, 0.6
 """Places around a joint that are looked at, and how far away in cells they are at most."""
 
-APART, NARROW = 0.01, 0.006
+APART, NARROW = 0.02, 0.006
 """Cells between parts that are apart; and the standard deviation, across its length, of the places of a contact that is
 but an edge."""
 
@@ -35,7 +35,7 @@ def holding(scene: Scene, joints: Joints) -> Bool[Tensor, " C"]:
     places = scene.centre[joints.first] + (scene.rotation[joints.first] @ local[..., None])[..., 0]
     points = (places[:, None] + drawn).flatten(0, 1)
     first, second = (slots.repeat_interleave(LOOKED) for slots in (joints.first, joints.second))
-    points = between(scene, first, second, points, AGAIN)
+    points = between(scene, first, second, points, FIRST)
     gap = signed_distance(rows_of(scene, second)[0], points[:, None])[:, 0].detach().clamp(min=0)
     spread = points.unflatten(0, (-1, LOOKED))
     wide = torch.linalg.svdvals(spread - spread.mean(1, keepdim=True))[:, 1] / np.sqrt(LOOKED)

@@ -117,11 +117,16 @@ def moved(scene: Scene, known: Joints) -> Joints:
     """The same joints where their parts have moved: the places that are deepest in both, or nearest to both."""
     if not len(known.first):
         return known
-    local = bounds(scene)[known.first] * known.places
-    points = scene.centre[known.first] + (scene.rotation[known.first] @ local[..., None])[..., 0]
-    points = between(scene, known.first, known.second, points, AGAIN)
+    points = between(scene, known.first, known.second, places_of(scene, known), AGAIN)
     inner = _inner(scene, known.first, points)
     return known._replace(places=inner)
+
+
+def places_of(scene: Scene, known: Joints) -> Float[Tensor, "C 3"]:
+    """Where joints are while their first parts are where the scene has them."""
+    local = bounds(scene)[known.first] * known.places
+    found: Tensor = scene.centre[known.first] + (scene.rotation[known.first] @ local[..., None])[..., 0]
+    return found
 
 
 def needs(scene: Scene, slopes: Float[Tensor, "N 16 F"], known: Joints) -> Needs:

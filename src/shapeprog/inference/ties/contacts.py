@@ -13,9 +13,9 @@ from torch import Tensor
 
 from shapeprog.geometry.distance import signed_distance
 from shapeprog.geometry.scene import Scene
-from shapeprog.inference.joints import FIRST, Joints, between
+from shapeprog.inference.joints import FIRST, Joints, between, places_of
 from shapeprog.inference.residuals import rows_of
-from shapeprog.inference.tunable import Tunable, bounds
+from shapeprog.inference.tunable import Tunable
 from shapeprog.space import Array, FloatArray
 
 LOOKED, AROUND = 32, 0.6
@@ -31,9 +31,7 @@ def holding(scene: Scene, joints: Joints) -> Bool[Tensor, " C"]:
     if not len(joints.first):
         return torch.zeros(0, dtype=torch.bool)
     drawn = AROUND * (2 * torch.rand(LOOKED, 3, generator=torch.Generator().manual_seed(0), dtype=torch.float64) - 1)
-    local = bounds(scene)[joints.first] * joints.places
-    places = scene.centre[joints.first] + (scene.rotation[joints.first] @ local[..., None])[..., 0]
-    points = (places[:, None] + drawn).flatten(0, 1)
+    points = (places_of(scene, joints)[:, None] + drawn).flatten(0, 1)
     first, second = (slots.repeat_interleave(LOOKED) for slots in (joints.first, joints.second))
     points = between(scene, first, second, points, FIRST)
     gap = signed_distance(rows_of(scene, second)[0], points[:, None])[:, 0].detach().clamp(min=0)
@@ -74,10 +72,8 @@ class Contacts:
         needed = self.at(_optimum(left[:fixed], numbers, free))
         sure = fixed
         while not self.at(_optimum(left, numbers, free))[needed].all():
-            low, high = (
-                sure,
-                len(left),
-            )  # with the first low relations all hold together, with the first high they do not
+            # With the first ``low`` relations all hold together, with the first ``high`` they do not.
+            low, high = sure, len(left)
             while high - low > 1:
                 middle = (low + high) // 2
                 holds = self.at(_optimum(left[:middle], numbers, free))[needed].all()

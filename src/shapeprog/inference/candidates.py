@@ -256,7 +256,8 @@ def _kind(node: Node) -> str:
 def distinct(nodes: list[Node], seen: Looks) -> list[int]:
     """Of candidates that draw the same, the first; in their order."""
     kept: list[int] = []
-    middle, spread = np.zeros((0, 3)), np.zeros((0, 3, 3))
+    middle: FloatArray = np.zeros((0, 3))
+    spread: FloatArray = np.zeros((0, 3, 3))
     for place in range(len(nodes)):
         scale = max(float(np.sqrt(np.trace(seen.spread[place]))), 1e-3)
         near = np.abs(middle - seen.middle[place]).max(1, initial=0) < SAME * scale if len(kept) else np.zeros(0, bool)

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from shapeprog.language.program import Draw, Program, nest
 from shapeprog.language.statement import language
@@ -143,7 +144,9 @@ def _best(group: Group, uses: Sequence[Use], least: int) -> Iterator[Candidate]:
     offered = _offered(group, known, openings)
     holds = np.abs(values @ offered.T) <= NEAR
     owner = np.repeat(np.arange(len(group.slots)), [len(each) for each in group.slots])
-    alive, rows, joined = np.ones(len(uses), dtype=bool), np.zeros((0, group.size)), 0
+    alive: npt.NDArray[np.bool_] = np.ones(len(uses), np.bool_)
+    rows: FloatArray = np.zeros((0, group.size))
+    joined = 0
     best: Candidate | None = None
     untried = np.arange(len(offered))
     while True:
@@ -173,7 +176,7 @@ def _offered(group: Group, known: Sequence[Measure], openings: Sequence[Measure]
 
 def _priced(group: Group, rows: FloatArray, openings: Sequence[Measure], uses: Sequence[Use]) -> Candidate:
     """The function of a group for which relations hold, and what it saves where it is used."""
-    chosen = np.zeros((0, group.size))
+    chosen: FloatArray = np.zeros((0, group.size))
     for each in openings:
         zero = [bool(abs(use.values @ each.row) <= NEAR) for use in uses]
         if sum(zero) < OPEN * len(uses) or not _independent(np.vstack([rows, chosen]), each.row):

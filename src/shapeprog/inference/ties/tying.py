@@ -69,7 +69,8 @@ def tie(
     with single_threaded():
         tunable = Tunable(plain)
         misfit = Misfit(tunable, evidence, seed)
-        numbers, rows = misfit.numbers, np.zeros((0, len(misfit.numbers)))
+        numbers = misfit.numbers
+        rows: FloatArray = np.zeros((0, len(numbers)))
         known: list[Feature] = []
         scene = tunable.poses(tunable.values).scene
         joints = _joints(scene, seed)

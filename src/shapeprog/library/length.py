@@ -16,7 +16,7 @@ STATEMENT = 8
 
 def statements(program: Program) -> int:
     """How many statements, loops and calls are written, apart from those in functions."""
-    return sum(isinstance(line, WrittenDraw | WrittenLoop | Call) for line in _outside(source_of(program).lines))
+    return sum(isinstance(line, WrittenDraw | WrittenLoop | Call) for line in outside(source_of(program).lines))
 
 
 def length(lines: Iterable[Line]) -> int:
@@ -59,8 +59,10 @@ def _written(line: WrittenDraw | WrittenLoop) -> int:
     return found
 
 
-def _outside(lines: Iterable[Line]) -> Iterator[Line]:
+def outside(lines: Iterable[Line]) -> Iterator[Line]:
+    """Every line apart from functions and what is in them, the lines in loops included."""
     for line in lines:
-        yield line
-        if isinstance(line, WrittenLoop):
-            yield from _outside(line.body)
+        if not isinstance(line, Function):
+            yield line
+            if isinstance(line, WrittenLoop):
+                yield from outside(line.body)

@@ -25,7 +25,7 @@ from shapeprog.language.source import (
     values,
 )
 from shapeprog.language.text import source_of
-from shapeprog.library.length import length
+from shapeprog.library.length import length, outside
 from shapeprog.library.matching import TOLERANCE, Form, Matcher, Pattern, Sums, forms
 from shapeprog.library.store import Library
 from shapeprog.space import FloatArray
@@ -155,7 +155,7 @@ def _used(lines: list[Line]) -> list[Line]:
     """The lines without names that nothing uses any more."""
     while True:
         used = {
-            name.name for line in _outside(lines) for value in values(line) if isinstance(value, Expression)
+            name.name for line in outside(lines) for value in values(line) if isinstance(value, Expression)
             for name in value.names()
         }  # fmt: skip
         kept: list[Line] = []
@@ -169,11 +169,3 @@ def _used(lines: list[Line]) -> list[Line]:
         if kept == lines:
             return kept
         lines = kept
-
-
-def _outside(lines: Sequence[Line]) -> Iterator[Line]:
-    for line in lines:
-        if not isinstance(line, Function):
-            yield line
-            if isinstance(line, WrittenLoop):
-                yield from _outside(line.body)

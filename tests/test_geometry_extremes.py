@@ -17,6 +17,7 @@ from shapeprog.formats.format import suffixes
 from shapeprog.geometry import surface
 from shapeprog.geometry.cells import rasterise
 from shapeprog.geometry.distance import each_distance, nearest_primitive, signed_distance
+from shapeprog.geometry.mesh import part_meshes
 from shapeprog.geometry.nearest import nearest, squared_distance
 from shapeprog.geometry.surface import sample_surface
 from shapeprog.space import Frame
@@ -101,6 +102,14 @@ def test_points_that_leave_single_precision_are_refused(monkeypatch, far, by_ker
 def test_a_surface_without_end_is_named_as_such():
     with pytest.raises(ShapeProgError, match="no finite number"):
         sample_surface(make_scene(["cuboid"], [[3e38] * 3], [[0.0, 0, 0]]), 50)
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("size", [3e38, float("inf")])
+def test_solids_without_end_have_no_mesh(name, size):
+    scene = make_scene([name], [[size, size, 0 if name == "arc" else size]], [[0.0, 0, 0]])
+    with pytest.raises(ShapeProgError, match="reach farther than"):
+        part_meshes(scene)
 
 
 PLACES = {

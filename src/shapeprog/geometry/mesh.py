@@ -73,8 +73,8 @@ def part_meshes(scene: Batch) -> list[PartMesh]:
         here, declared = array(scene.kind) == kind, primitives[kind]
         of_kind = torch.tensor(size[here])
         reach[here] = array(declared.bound(of_kind))
-        filled = array(declared.volume(of_kind)) / (2 * reach[here].clip(FLAT)).prod(-1)
-        solid[here] &= (reach[here] > FLAT).all(-1) & (filled > FLAT)
+        filled = array(declared.volume(of_kind)) / (2 * reach[here].clip(FLAT, FARTHEST)).prod(-1)  # refused beyond
+        solid[here] &= ~((reach[here] <= FLAT).any(-1) | (filled <= FLAT))
     far = solid & ~((np.abs(centre) + np.linalg.norm(reach, axis=-1, keepdims=True)).max(-1, initial=0) <= FARTHEST)
     if far.any():
         raise ShapeProgError(

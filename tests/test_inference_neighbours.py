@@ -114,6 +114,30 @@ def test_a_crumb_that_floats_is_left_out_and_what_says_much_is_not():
     assert connected(parse(TABLE + shelf), evidence(TABLE + shelf), Prices()).blocks == 3
 
 
+FRONT = "for i in mirror(depth):\n    box(at=(-12, {at}, -8), size=(20, {thick}, 16))\n"
+CASE = "box(at=(-12, -9.5, -8), size=(20, {depth}, 16))\n"
+
+
+@pytest.mark.parametrize("gap", [0.05, 0.2])
+def test_only_a_copy_floats_and_either_side_closes_the_gap(gap):
+    program = parse(CASE.format(depth=19 - gap) + FRONT.format(at=9.5, thick=0.5))
+    assert floating(program) == [1]  # the rear board touches the case, its image in front does not
+    found = connected(program, evidence(CASE.format(depth=19) + FRONT.format(at=9.5, thick=0.5)), Prices())
+    assert floating(found) == []
+    assert found.blocks == 2
+    assert pieces(*union_mesh(unroll(found))) == 1
+
+
+def test_parts_of_one_run_are_joined_by_what_crosses_them():
+    slats = "for i in translate(5, by=(0, 4, 0)):\n    box(at=(0, -8.5, -10), size=(0.5, 1, 20))\n"
+    beam = "box(at=({low}, -9, -1), size=({height}, 18, 2))\n"
+    program = parse(slats + beam.format(low=-1.02, height=1))
+    assert floating(program) == [0]  # no two slats touch, and the beam is the largest part
+    found = connected(program, evidence(slats + beam.format(low=-1, height=1)), Prices())
+    assert floating(found) == []
+    assert found.blocks == 2
+
+
 def test_what_is_one_piece_stays_as_it_is():
     assert connected(parse(TABLE), evidence(TABLE), Prices()) == parse(TABLE)
     assert connected(Program(), evidence(TABLE), Prices()) == Program()

@@ -13,9 +13,11 @@ from shapeprog.data.placement import shape_from_mesh, shape_from_points
 from shapeprog.data.sampling import sample_surface
 from shapeprog.data.shape import Shape
 from shapeprog.geometry.mesh import union_mesh
+from shapeprog.inference.cloud import cloud_of
 from shapeprog.inference.components import align_copies, components
 from shapeprog.inference.oriented import Boxes, bounds, boxes_around
 from shapeprog.inference.pieces import Pieces, Source, find_pieces
+from shapeprog.inference.strands import REACHES, strands
 from shapeprog.space import Array, FloatArray, Frame
 
 Mesh = tuple[FloatArray, Array]
@@ -284,3 +286,36 @@ def test_few_points_give_few_pieces_but_no_error(count):
 
 def test_runs_are_bounded_by_the_sums_of_their_lengths():
     assert bounds(["ab", "", "c"]).tolist() == [0, 2, 2, 3]
+
+
+def noisy(mesh: Mesh) -> FloatArray:
+    points: FloatArray = sample_surface(*mesh, 5_000, 0) + np.random.default_rng(0).normal(0, 0.17, (5_000, 3))
+    return points
+
+
+def ends_of(points: FloatArray) -> FloatArray:
+    """The two ends of points that lie along a line, the lower one first."""
+    found = boxes_around(points, np.array([0, len(points)]))
+    along = found.half[0].argmax()
+    half = found.half[0, along] * found.rotation[0, :, along]
+    ends = np.stack([found.centre[0] - half, found.centre[0] + half])
+    return ends[np.argsort(ends[:, 0])]
+
+
+def test_thin_legs_of_a_noisy_scan_are_strands():
+    legs = [(np.array([-11.0, 7 * y, 7 * z]), np.array([3.0, 4 * y, 4 * z])) for y in (-1, 1) for z in (-1, 1)]
+    rods = [cylinder((low + high) / 2, high - low, 0.4, float(np.linalg.norm(high - low)) / 2) for low, high in legs]
+    points = noisy(together(box(np.array([4.5, 0, 0]), np.array([1.5, 7, 7])), *rods))
+    found = [ends_of(points[each]) for each in strands(cloud_of(points))]
+    for low, high in legs:  # as far as what is around a point is the leg alone
+        assert min(np.abs(ends - [low, high]).max() for ends in found) < REACHES[-1] + 0.3
+    assert not strands(cloud_of(noisy(box(np.zeros(3), np.array([6.0, 8, 8])))))
+
+
+def test_strands_that_continue_each_other_are_offered_as_one_too():
+    halves = [cylinder(np.array([x, 0, 0]), np.array([1.0, 0, 0]), 0.4, 4) for x in (-6.0, 6.0)]
+    plate = box(np.array([0.0, 8, 0]), np.array([10, 1, 8]))
+    points = noisy(together(*halves, plate))
+    lengths = [np.ptp(ends_of(points[each])[:, 0]) for each in strands(cloud_of(points))]
+    assert min(abs(length - 20) for length in lengths) < 1
+    assert min(abs(length - 8) for length in lengths) < 1

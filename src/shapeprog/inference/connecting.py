@@ -5,6 +5,8 @@ Furniture is one piece.  A choice by what is explained does not see a gap of a c
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 import torch
 
@@ -15,15 +17,19 @@ from shapeprog.inference.evidence import Evidence
 from shapeprog.inference.joints import gaps
 from shapeprog.inference.neighbours import alike, met, with_drawing
 from shapeprog.inference.tunable import bounds
+from shapeprog.language.hints import Box
 from shapeprog.language.program import Node, Program
 from shapeprog.language.tensors import encode
 from shapeprog.language.unroll import unroll
 
-FLOATING = 0.01
+FLOATING = 0.02
 """What it may cost to connect a part, or to leave it out, as a share of the target."""
 
-TRIED = 8
+TRIED = 24
 """Most ways to connect a part that are looked at, the most valuable first."""
+
+LINES = (0.8, 0.98)
+"""Shares of a face within which lines say what it reaches when it is extended: boards may meet at their rims."""
 
 FLUSH = 1e-4
 """Gap in cells up to which parts touch: faces that lie on each other do."""
@@ -38,24 +44,31 @@ def connected(program: Program, evidence: Evidence, prices: Prices, seed: int = 
 
 
 def _less_apart(program: Program, evidence: Evidence, prices: Prices, seed: int) -> Program | None:
-    """The most valuable program with one block changed or left out and fewer that float, if there is one worth it."""
-    apart = floating(program, seed)
-    if not apart:
+    """The most valuable program with one block changed or left out and fewer parts afloat, if there is one worth it."""
+    apart = _apart(program, seed)
+    if not any(map(any, apart)):
         return None
-    every = [program, *(option for place in apart for option in _options(program, place, apart))]
+    every = [program, *_options(program, apart)]
     nodes = list(dict.fromkeys(node for each in every for node in each.body))
     place = {node: number for number, node in enumerate(nodes)}
     made = covers([Program((node,)) for node in nodes], evidence, prices, seed)
     start, *worth = (value(made, tuple(place[node] for node in each.body)) for each in every)
     order = np.argsort(np.negative(worth), kind="stable")[:TRIED].tolist()
     likely = (every[1 + number] for number in order if worth[number] >= start - FLOATING)
-    return next((each for each in likely if len(floating(each, seed)) < len(apart)), None)
+    many = sum(map(sum, apart))
+    return next((each for each in likely if sum(map(sum, _apart(each, seed))) < many), None)
 
 
 def floating(program: Program, seed: int = 0) -> list[int]:
     """Which blocks have a part that no chain of touching parts joins to the largest such group."""
+    return [place for place, parts in enumerate(_apart(program, seed)) if any(parts)]
+
+
+def _apart(program: Program, seed: int) -> list[list[bool]]:
+    """For every part of every block, whether it is outside of the largest group."""
+    found: list[list[bool]] = [[] for _ in program.body]
     if not program.size:
-        return []
+        return found
     scene = unroll(encode(program, dtype=torch.float64))
     group = list(range(len(scene.mask)))
     near = gaps(scene, torch.Generator().manual_seed(seed))
@@ -63,17 +76,44 @@ def floating(program: Program, seed: int = 0) -> list[int]:
         group = [group[one] if each == group[other] else each for each in group]
     half = bounds(scene)
     sizes = np.bincount(group, weights=(half * half.roll(1, -1)).sum(-1).numpy())
-    return sorted({int(block) for block, each in zip(scene.block, group, strict=True) if each != sizes.argmax()})
+    for block, each in zip(scene.block.tolist(), group, strict=True):
+        found[block].append(each != int(sizes.argmax()))
+    return found
 
 
-def _options(program: Program, place: int, apart: list[int]) -> list[Program]:
-    """The program without a block, and with one that reaches others that do not float."""
-    body, chain = program.body, program.chains[place]
+def _options(program: Program, apart: list[list[bool]]) -> list[Program]:
+    """The program without one of the blocks that float, and with one that reaches others, or one that others reach."""
+    body, found = program.body, list[Program]()
+    boxes = solid_boxes(body)
+    for place, (copies, floats) in enumerate(zip(boxes, apart, strict=True)):
+        ways: list[tuple[Node, ...]] = [()] if any(floats) else []
+        for side in (True, False):
+            mine = [copy for copy, lone in zip(copies, floats, strict=True) if lone is side]
+            parts = [
+                part
+                for other in range(len(body))
+                for part, lone in zip(boxes[other], apart[other], strict=True)
+                if other != place and lone is not side
+            ]
+            ways += [(node,) for node in _reaching(program, place, mine, parts)] if mine and parts else []
+        found += [Program((*body[:place], *way, *body[place + 1 :])) for way in dict.fromkeys(ways)]
+    return found
+
+
+def _reaching(program: Program, place: int, copies: list[Box], parts: list[Box]) -> list[Node]:
+    """A block extended so that one of its copies reaches one of some parts."""
+    chain = program.chains[place]
     (own,) = solid_boxes([chain[-1]])
-    others = solid_boxes([node for other, node in enumerate(body) if other not in apart])
-    instead: list[Node] = []
-    if len(own) == 1:
-        parts = [part for each in others for part in each]
-        instead = [with_drawing(chain, drawn) for box in met(own[0], parts) for drawn in alike(chain, box)]
-    ways = [(), *((node,) for node in instead if node not in body)]
-    return [Program((*body[:place], *way, *body[place + 1 :])) for way in ways]
+    if len(own) != 1:
+        return []
+    longer = ((copy, each) for copy in copies for each in met(copy, parts, LINES, longer=True))
+    boxes = (box for copy, each in longer for box in _as_copied(own[0], copy, each))
+    found = dict.fromkeys(with_drawing(chain, drawn) for box in boxes for drawn in alike(chain, box))
+    return [node for node in found if node not in program.body]
+
+
+def _as_copied(own: Box, copy: Box, longer: Box) -> Iterator[Box]:
+    """A box extended as one of its copies is; a mirrored copy may have the other end in its place."""
+    along = (longer.centre - copy.centre) @ copy.rotation
+    for moved in (along, -along):
+        yield Box(own.centre + own.rotation @ moved, own.rotation, longer.half)

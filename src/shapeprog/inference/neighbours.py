@@ -152,14 +152,20 @@ def _around(frame: Box, parts: Sequence[Box]) -> Box:
     return Box(frame.rotation @ ((low + high) / 2), frame.rotation, (high - low) / 2)
 
 
-def met(box: Box, parts: Sequence[Box]) -> Iterator[Box]:
-    """A box with one face moved to where a line across the face, at its middle or near a corner, enters a part."""
+def met(box: Box, parts: Sequence[Box], within: Sequence[float] = (WITHIN,), *, longer: bool = False) -> Iterator[Box]:
+    """A box with one face moved to where a line across the face, at its middle or near a corner, enters a part.
+
+    ``within`` says how near a corner, as shares of the face; ``longer`` that the face moves outwards only.
+    """
     for axis in range(3):
-        across = WITHIN * box.half * (np.arange(3) != axis)
-        starts = box.centre + np.concatenate([np.zeros((1, 3)), CORNERS * across]) @ box.rotation.T
+        corners = CORNERS * box.half * (np.arange(3) != axis)
+        starts = (
+            box.centre + np.concatenate([np.zeros((1, 3)), *(share * corners for share in within)]) @ box.rotation.T
+        )
+        least = box.half[axis] if longer else -np.inf
         for sign in (-1.0, 1.0):
             along = sign * box.rotation[:, axis]
-            ends = {end for part in parts for end in _crossed(starts, along, part)}
+            ends = {end for part in parts for end in _crossed(starts, along, part) if end > least}
             for end in sorted(ends, key=lambda end: abs(end - box.half[axis]))[:4]:
                 length = (box.half[axis] + end) / 2
                 if abs(end - box.half[axis]) <= REACH and length >= SHORTEST / 2:

@@ -33,6 +33,7 @@ from shapeprog.inference.oriented import Boxes, bounds, boxes_around, distinct, 
 from shapeprog.inference.patches import planar_patches
 from shapeprog.inference.rods import rods
 from shapeprog.inference.slabs import sheets, slabs
+from shapeprog.inference.strands import strands
 from shapeprog.inference.surface import faces_of_cells
 from shapeprog.space import FloatArray
 
@@ -115,7 +116,7 @@ def find_pieces(shape: Shape, seed: int = 0) -> Pieces:
     if mesh is not None and len(mesh.area):
         return _of_mesh(mesh, seed)
     if shape.points is not None:
-        return _of_points(cloud_of(shape.points), seed)
+        return _of_points(cloud_of(shape.points), seed, scanned=True)
     found = _of_points(cloud_of(*faces_of_cells(shape.voxels, POINTS, seed=seed)), seed)
     return found._replace(boxes=shrunk(found.boxes, TOO_FAT))
 
@@ -139,12 +140,12 @@ def _of_mesh(mesh: Components, seed: int) -> Pieces:
     return _ranked(cloud, listed, boxes, mesh.component_of(face))
 
 
-def _of_points(cloud: Cloud, seed: int) -> Pieces:
-    """Pieces of points alone."""
-    return _ranked(cloud, _told(cloud, seed), join([]), np.full(len(cloud.points), -1))
+def _of_points(cloud: Cloud, seed: int, *, scanned: bool = False) -> Pieces:
+    """Pieces of points alone, which may be those of a scan."""
+    return _ranked(cloud, _told(cloud, seed, scanned=scanned), join([]), np.full(len(cloud.points), -1))
 
 
-def _told(cloud: Cloud, seed: int) -> list[tuple[Source, Boxes]]:
+def _told(cloud: Cloud, seed: int, *, scanned: bool = False) -> list[tuple[Source, Boxes]]:
     """Pieces that points with normals tell of, by source, and groups of those that explain the points together."""
     if len(cloud.points) < LEAST:
         return [(Source.GROUP, boxes_around(cloud.points, np.array([0, len(cloud.points)])))]
@@ -154,7 +155,7 @@ def _told(cloud: Cloud, seed: int) -> list[tuple[Source, Boxes]]:
     support = Support(cloud, between)
     kept = np.flatnonzero(support.filled)
     kept = kept[np.argsort(-support.near[kept].sum(1), kind="stable")[:SLABS]]
-    along = limbs(cloud)[:LIMBS]
+    along = [*(strands(cloud) if scanned else []), *limbs(cloud)][:LIMBS]
     members = cloud.points[np.concatenate(along)] if along else np.zeros((0, 3))
     found = [
         (Source.ROD, rods(cloud, seed)),

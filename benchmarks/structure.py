@@ -29,7 +29,8 @@ paper   the search on cells with the statements of the paper, the baseline
 ======  ===============================================================================================================
 
 All are measured against the whole mesh, as ``shapeprog evaluate --parts`` does; ``all`` and ``tied`` also by what is
-left of contacts, symmetry and one piece when each free number is edited.
+left of contacts, symmetry and one piece when each free number is edited.  The table tells how many programs are one
+piece among objects that are one themselves: gaps of up to 1 % of the longest side are none.
 """
 
 from __future__ import annotations
@@ -65,6 +66,9 @@ NOISE = 0.005
 
 CELLS, MARGIN, SMOOTHING = 256, 4, 1.0
 """Of a fused mesh: cells along the longest side, free cells around, standard deviation in cells of the smoothing."""
+
+PIECES = 4
+"""Cells of a grid for each of the usual ones, in which an object in one piece is connected."""
 
 MISSING = 0.2
 """Share of the points of a scan that its missing side held."""
@@ -113,9 +117,8 @@ def measure(task: Task) -> dict[str, Any]:
     program, snapped = inferred(task, shape)
     seconds, cpu_seconds = time.perf_counter() - started, time.process_time() - cpu
     placed = [Triangles(shape.frame.to_grid(vertices), faces) for vertices, faces in parts]
-    row = evaluate_program(
-        program, replace(shape, points=None, **whole(placed)), snapped, seed=task.seed, looks=True
-    )  # fmt: skip
+    target = replace(shape, points=None, **whole(placed))
+    row = evaluate_program(program, target, snapped, seed=task.seed, looks=True)
     if len(parts) > 1:
         row = replace(row, **part_scores(placed, unroll(program), task.seed)._asdict())
     text = format_program(program)
@@ -123,6 +126,7 @@ def measure(task: Task) -> dict[str, Any]:
     return asdict(row) | {
         "set": task.set, "seconds": seconds, "cpu_seconds": cpu_seconds, "allowed": task.blocks, "seed": task.seed,
         "method": task.method, "lines": len(text.splitlines()), "program": text,
+        "object_in_one_piece": joined(target.vertices, target.faces),
         **{f"edited_{name}": share for name, share in edited.items()},
     }  # fmt: skip
 
@@ -191,6 +195,16 @@ def fused(vertices: Any, faces: Any) -> tuple[Any, Any]:
     return (corners + 0.5 - CELLS / 2 - MARGIN) / scale + middle, triangles.astype(np.int64)
 
 
+def joined(vertices: Any, faces: Any) -> bool:
+    """Whether a mesh in the grid frame is one piece, but for gaps that are narrower than 1 % of its longest side."""
+    from scipy.ndimage import label
+
+    from shapeprog.data.voxelise import voxelise_mesh
+
+    cells = voxelise_mesh(np.asarray(vertices, np.float64) * PIECES, faces, resolution=32 * PIECES)
+    return bool(label(cells, np.ones((3, 3, 3)))[1] == 1)
+
+
 def run(args: argparse.Namespace) -> None:
     """Measure what is not in the output yet, object after object, in several processes."""
     out = Path(args.out)
@@ -225,7 +239,8 @@ def table(path: Path) -> str:
     ):
         cells = [f"{name}, {len(rows)}, {method}, <= {allowed} blocks"]
         for column in COLUMNS:
-            mean, floor = (_mean(rows, each) for each in (column, FLOORS.get(column, "")))
+            known = [row for row in rows if row.get("object_in_one_piece", True)] if column == "one_piece" else rows
+            mean, floor = (_mean(known, each) for each in (column, FLOORS.get(column, "")))
             digits = 5 if column == "cd" else 1 if column in ("blocks", "statements", "primitives", "numbers") else 3
             floored = "" if np.isnan(floor) else f" ({floor:.3f})"
             cells.append("-" if np.isnan(mean) else f"{mean:.{digits}f}{floored}")

@@ -17,6 +17,7 @@ from shapeprog.inference.cloud import cloud_of
 from shapeprog.inference.components import align_copies, components
 from shapeprog.inference.oriented import Boxes, bounds, boxes_around
 from shapeprog.inference.pieces import Pieces, Source, find_pieces
+from shapeprog.inference.scans import points_of_scan
 from shapeprog.inference.strands import REACHES, strands
 from shapeprog.space import Array, FloatArray, Frame
 
@@ -319,3 +320,14 @@ def test_strands_that_continue_each_other_are_offered_as_one_too():
     lengths = [np.ptp(ends_of(points[each])[:, 0]) for each in strands(cloud_of(points))]
     assert min(abs(length - 20) for length in lengths) < 1
     assert min(abs(length - 8) for length in lengths) < 1
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.003, 0.12])
+def test_all_points_of_a_clean_scan_are_looked_at_and_few_of_a_noisy_one(noise):
+    mesh, _ = splayed_stool()
+    points = sample_surface(*mesh, 20_000, 0) + np.random.default_rng(0).normal(0, noise, (20_000, 3))
+    shape = shape_from_points(points)
+    assert shape.points is not None
+    assert len(shape.points) == 5_000
+    assert len(points_of_scan(shape)) == (5_000 if noise > 0.1 else 20_000)
+    assert len(points_of_scan(shape_from_points(points[:3_000]))) == 3_000

@@ -5,10 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import numpy.typing as npt
 
 from shapeprog.data.shape import Shape
 from shapeprog.errors import InputError
 from shapeprog.space import HALF, LEAST_SIDE, MOST_SIDE, RESOLUTION, SPAN, Array, Frame
+
+SCAN = 20_000
+"""Most points of a cloud that inference may look at."""
 
 _NEAREST = 1e-12
 """Least longest side of a shape as a part of its distance from the origin: below, float64 tells no cells apart."""
@@ -74,10 +78,18 @@ def shape_from_points(
 
     frame = _frame(cloud, name, axes)
     placed = frame.to_grid(cloud)
-    kept = placed
-    if len(placed) > points:
-        kept = placed[np.sort(np.random.default_rng(seed).choice(len(placed), points, replace=False))]
-    return Shape(name, voxelise_points(placed), kept.astype(np.float32), frame, source=source, kind="points")
+    kept, scan = _some(placed, points, seed), _some(placed, SCAN, seed)
+    return Shape(
+        name, voxelise_points(placed), kept, frame, source=source, kind="points",
+        scan=scan if len(scan) > len(kept) else None,
+    )  # fmt: skip
+
+
+def _some(cloud: Array, count: int, seed: int) -> npt.NDArray[np.float32]:
+    """So many of the points of a cloud, in their order."""
+    if len(cloud) > count:
+        cloud = cloud[np.sort(np.random.default_rng(seed).choice(len(cloud), count, replace=False))]
+    return cloud.astype(np.float32)
 
 
 def shape_from_voxels(

@@ -24,6 +24,8 @@ class Shape:
         Cells (32, 32, 32) that its surface touches or its solid contains.
     points
         Points (P, 3) in cells, float32, uniform by area on its surface; None when it came as voxels.
+    scan
+        More of the points that a cloud came as, up to 20,000 of them in any order, where it had more than ``points``.
     frame
         The map from the grid to the world of the file.
     vertices, faces
@@ -41,6 +43,7 @@ class Shape:
     name: str
     voxels: npt.NDArray[np.bool_]
     points: npt.NDArray[np.float32] | None = None
+    scan: npt.NDArray[np.float32] | None = field(default=None, kw_only=True)
     frame: Frame = field(default_factory=Frame)
     vertices: npt.NDArray[np.float32] | None = None
     faces: npt.NDArray[np.int32] | None = None

@@ -24,6 +24,7 @@ from shapeprog.data.voxelise_kernels import mark_triangles
 from shapeprog.geometry.arrays import over_threads
 from shapeprog.geometry.mesh import union_mesh
 from shapeprog.inference.evidence_kernels import look_out
+from shapeprog.inference.scans import points_of_scan
 from shapeprog.inference.surface import INSET, exposed, exposed_faces
 from shapeprog.language.program import Program
 from shapeprog.language.unroll import unroll
@@ -117,7 +118,7 @@ def evidence_of(shape: Shape, seed: int = 0) -> Evidence:
     if shape.vertices is not None and shape.faces is not None and len(shape.faces):
         return _of_mesh(np.asarray(shape.vertices, np.float64), np.asarray(shape.faces, np.int64), seed)
     if shape.points is not None and len(shape.points) > NEIGHBOURS:
-        return _of_points(np.asarray(shape.points, np.float64), shape.voxels, seed)
+        return _of_points(points_of_scan(shape), shape.voxels, seed)
     return _of_cells(shape.voxels)
 
 

@@ -32,6 +32,7 @@ from shapeprog.inference.limbs import limbs
 from shapeprog.inference.oriented import Boxes, bounds, boxes_around, distinct, join
 from shapeprog.inference.patches import planar_patches
 from shapeprog.inference.rods import rods
+from shapeprog.inference.scans import points_of_scan
 from shapeprog.inference.slabs import sheets, slabs
 from shapeprog.inference.strands import strands
 from shapeprog.inference.surface import faces_of_cells
@@ -116,7 +117,7 @@ def find_pieces(shape: Shape, seed: int = 0) -> Pieces:
     if mesh is not None and len(mesh.area):
         return _of_mesh(mesh, seed)
     if shape.points is not None:
-        return _of_points(cloud_of(shape.points), seed, scanned=True)
+        return _of_points(cloud_of(points_of_scan(shape)), seed, scanned=True)
     found = _of_points(cloud_of(*faces_of_cells(shape.voxels, POINTS, seed=seed)), seed)
     return found._replace(boxes=shrunk(found.boxes, TOO_FAT))
 

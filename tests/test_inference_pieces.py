@@ -18,6 +18,7 @@ from shapeprog.inference.components import align_copies, components
 from shapeprog.inference.oriented import Boxes, bounds, boxes_around
 from shapeprog.inference.pieces import Pieces, Source, find_pieces
 from shapeprog.inference.scans import points_of_scan
+from shapeprog.inference.stacks import stacks
 from shapeprog.inference.strands import REACHES, strands
 from shapeprog.space import Array, FloatArray, Frame
 
@@ -331,3 +332,37 @@ def test_all_points_of_a_clean_scan_are_looked_at_and_few_of_a_noisy_one(noise):
     assert len(shape.points) == 5_000
     assert len(points_of_scan(shape)) == (5_000 if noise > 0.1 else 20_000)
     assert len(points_of_scan(shape_from_points(points[:3_000]))) == 3_000
+
+
+@pytest.mark.parametrize("lean", [0.0, 1.5, 4.0])
+def test_a_leg_that_leans_is_one_stack_of_cells(lean):
+    low, high = np.array([-11.5, lean, lean]), np.array([2.5, 0.0, 0.0])
+    offsets = [np.array([0.0, 6 * y, 6 * z]) for y in (-1, 1) for z in (-1, 1)]
+    signs = [np.array([1.0, y, z]) for y in (-1, 1) for z in (-1, 1)]
+    rods = []
+    for offset, sign in zip(offsets, signs, strict=True):
+        foot, head = low * sign + offset, high * sign + offset
+        rods.append(cylinder((foot + head) / 2, head - foot, 0.6, float(np.linalg.norm(head - foot)) / 2))
+    shape = shape_of(together(box(np.array([3.5, 0, 0]), np.array([1.0, 12, 12])), *rods))
+    found = stacks(shape.voxels)
+    along = found.rotation[:, :, 0] * found.half[:, :1]
+    ends = np.stack([found.centre - along, found.centre + along], 1) - [3.5, 0, 0]  # cells are centred
+    ends = np.take_along_axis(ends, ends[:, :, :1].argsort(1), 1)
+    assert len(ends) == 4
+    for offset, sign in zip(offsets, signs, strict=True):
+        wanted = np.stack([low * sign + offset, high * sign + offset])
+        best = np.abs(ends - wanted).max((1, 2)).argmin()
+        np.testing.assert_allclose(ends[best, :, 1:], wanted[:, 1:], atol=0.5)
+        np.testing.assert_allclose(ends[best, :, 0], wanted[:, 0], atol=1.1)  # cells of the top hide the last of it
+
+
+def test_large_patches_and_crowded_cells_are_no_stacks():
+    cells = np.zeros((32, 32, 32), np.bool_)
+    cells[4:28, 4:28, 4:28] = True
+    assert len(stacks(cells).half) == 0
+    cells[:] = False
+    cells[4:20, 10, 10] = True
+    cells[4:20, 20, 20] = True
+    assert np.round(2 * stacks(cells).half[:, 0]).tolist() == [16, 16]
+    cells[12, 10, 10:21] = cells[12, 10:21, 20] = True  # where both are joined, each ends
+    assert (2 * stacks(cells).half[:, 0] < 10).all()

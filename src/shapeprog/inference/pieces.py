@@ -6,7 +6,8 @@ source    box around
 component a connected component of the mesh
 group     boxes that touch, such as the frame of a back
 rod       points on a cylinder
-limb      points whose inner balls run on in one direction: bent bars and curved boards too
+limb      points whose inner balls run on in one direction: bent bars and curved boards too;
+          thin stretches of scans and of cells
 slab      the space between two planar patches that face each other
 sheet     one planar patch; how thick it is, is not known
 ========= ==========================================================================================
@@ -16,6 +17,7 @@ They overlap, and most are wrong: what explains the target best is for others to
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from enum import Enum
 from typing import NamedTuple
 
@@ -34,6 +36,7 @@ from shapeprog.inference.patches import planar_patches
 from shapeprog.inference.rods import rods
 from shapeprog.inference.scans import points_of_scan
 from shapeprog.inference.slabs import sheets, slabs
+from shapeprog.inference.stacks import stacks
 from shapeprog.inference.strands import strands
 from shapeprog.inference.surface import faces_of_cells
 from shapeprog.space import FloatArray
@@ -117,8 +120,10 @@ def find_pieces(shape: Shape, seed: int = 0) -> Pieces:
     if mesh is not None and len(mesh.area):
         return _of_mesh(mesh, seed)
     if shape.points is not None:
-        return _of_points(cloud_of(points_of_scan(shape)), seed, scanned=True)
-    found = _of_points(cloud_of(*faces_of_cells(shape.voxels, POINTS, seed=seed)), seed)
+        cloud = cloud_of(points_of_scan(shape))
+        return _of_points(cloud, _told(cloud, seed, strands(cloud)))
+    cloud = cloud_of(*faces_of_cells(shape.voxels, POINTS, seed=seed))
+    found = _of_points(cloud, [(Source.LIMB, stacks(shape.voxels)), *_told(cloud, seed)])
     return found._replace(boxes=shrunk(found.boxes, TOO_FAT))
 
 
@@ -141,12 +146,12 @@ def _of_mesh(mesh: Components, seed: int) -> Pieces:
     return _ranked(cloud, listed, boxes, mesh.component_of(face))
 
 
-def _of_points(cloud: Cloud, seed: int, *, scanned: bool = False) -> Pieces:
-    """Pieces of points alone, which may be those of a scan."""
-    return _ranked(cloud, _told(cloud, seed, scanned=scanned), join([]), np.full(len(cloud.points), -1))
+def _of_points(cloud: Cloud, listed: list[tuple[Source, Boxes]]) -> Pieces:
+    """Pieces of points alone."""
+    return _ranked(cloud, listed, join([]), np.full(len(cloud.points), -1))
 
 
-def _told(cloud: Cloud, seed: int, *, scanned: bool = False) -> list[tuple[Source, Boxes]]:
+def _told(cloud: Cloud, seed: int, thin: Sequence[npt.NDArray[np.int64]] = ()) -> list[tuple[Source, Boxes]]:
     """Pieces that points with normals tell of, by source, and groups of those that explain the points together."""
     if len(cloud.points) < LEAST:
         return [(Source.GROUP, boxes_around(cloud.points, np.array([0, len(cloud.points)])))]
@@ -156,7 +161,7 @@ def _told(cloud: Cloud, seed: int, *, scanned: bool = False) -> list[tuple[Sourc
     support = Support(cloud, between)
     kept = np.flatnonzero(support.filled)
     kept = kept[np.argsort(-support.near[kept].sum(1), kind="stable")[:SLABS]]
-    along = [*(strands(cloud) if scanned else []), *limbs(cloud)][:LIMBS]
+    along = [*thin, *limbs(cloud)][:LIMBS]
     members = cloud.points[np.concatenate(along)] if along else np.zeros((0, 3))
     found = [
         (Source.ROD, rods(cloud, seed)),

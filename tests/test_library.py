@@ -249,6 +249,8 @@ def test_a_program_in_a_unit_is_written_with_a_library_and_stays_in_it() -> None
     assert away(written, program) < TOLERANCE
     assert [each.value for each in names(written)] == [each.value for each in names(program)]
     assert with_library(program, library(SHELVES)) is program
+    mixed = parse("# unit: cm, 4 per cell\n" + TABLE + "board(at=(0, 0, 0), size=(1, 1, 1), tilt=thick)\n")
+    assert with_library(mixed, library(POSTS)) is mixed
 
 
 def test_a_library_is_in_no_unit() -> None:

@@ -37,14 +37,12 @@ def with_library(program: Program, library: Library) -> Program:
 
     It draws the same within ``TOLERANCE`` cells.  The functions that it calls stand in it, below the numbers that it
     names; ties are kept, as arguments are expressions of its names.  Its lengths stay in their unit.
-
-    Raises
-    ------
-    ShapeProgError
-        If its lengths are not in cells, and one of its names is a length in one place only.
     """
     if program.unit is not None:
-        plain = in_unit(program, None)
+        try:
+            plain = in_unit(program, None)
+        except ShapeProgError:  # one of its names is a length in one place only
+            return program
         found = with_library(plain, library)
         return program if found is plain else in_unit(found, program.unit)
     source = source_of(program)

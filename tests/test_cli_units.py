@@ -12,6 +12,7 @@ from commands import FRAME, PROGRAM, Run, table
 
 from shapeprog import inference
 from shapeprog.formats import export, load, load_with_frame
+from shapeprog.inference.readable import in_readable_unit
 from shapeprog.language.converting import in_unit
 from shapeprog.language.free import numbers
 from shapeprog.language.named import names
@@ -53,7 +54,7 @@ def test_infer_writes_programs_in_the_unit_of_the_object(
     assert "IoU 1.000" in ended.out
     program, frame = load_with_frame(tmp_path / "res" / "table.shape")
     assert program.unit == Unit("cm", per_cell)
-    assert program == load(tmp_path / "res" / "table.json") == in_unit(PROGRAM, program.unit, rounded=True)
+    assert program == load(tmp_path / "res" / "table.json") == in_readable_unit(PROGRAM, program.unit)
     assert json.loads((tmp_path / "res" / "table.json").read_text())["scores"]["statements"] == 4
     assert numbers(program) == numbers(PROGRAM)
     source = trimesh.load(tmp_path / "table.obj", force="mesh").bounds
@@ -78,7 +79,7 @@ def test_export_writes_programs_in_another_unit(run: Run, tmp_path: Path) -> Non
     export(parse(NAMED), tmp_path / "legs.shape", FRAME)
     assert run("export", "legs.shape", "cm.shape", "--unit", "cm").code == 0
     there, frame = load_with_frame(tmp_path / "cm.shape")
-    assert there == in_unit(parse(NAMED), Unit("cm", 100 / 12), rounded=True)
+    assert there == in_readable_unit(parse(NAMED), Unit("cm", 100 / 12))
     assert "width, n = 66.7, 2" in (tmp_path / "cm.shape").read_text()
     assert run("export", "cm.shape", "mm.json", "--unit", "mm", "--set", "width=80").code == 0
     other, kept = load_with_frame(tmp_path / "mm.json")

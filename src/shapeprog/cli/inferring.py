@@ -176,10 +176,11 @@ def _prepare(picture: bool, talk: bool) -> None:
 
 
 def _in_unit(program: Program, shape: Shape, unit: str | None, file_unit: str | None) -> Program:
-    from shapeprog.language.converting import in_unit
+    if unit is None:
+        return program
+    from shapeprog.inference.readable import in_readable_unit
 
-    wanted = asked_unit(None, shape.frame, shape.name, unit, file_unit)
-    return in_unit(program, wanted, rounded=True)
+    return in_readable_unit(program, asked_unit(None, shape.frame, shape.name, unit, file_unit))
 
 
 def _chosen(

@@ -32,8 +32,8 @@ def tidy_command(
     """
     from shapeprog.formats import load_with_frame, save
     from shapeprog.inference.evidence import evidence_of_program
+    from shapeprog.inference.readable import in_readable_unit
     from shapeprog.inference.ties.tying import PRICE, tie
-    from shapeprog.language.converting import in_unit
     from shapeprog.language.free import numbers
     from shapeprog.library import with_library
 
@@ -47,7 +47,7 @@ def tidy_command(
     found = tied.program
     for each in libraries:
         found = with_library(found, each)
-    found = in_unit(found, wanted, rounded=True)
+    found = in_readable_unit(found, wanted, seed)
     if out is not None:
         save(found, out, frame)
     terminal.print_program(terminal.output(), found)

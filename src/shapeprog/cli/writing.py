@@ -46,12 +46,14 @@ def export_command(
     input per cell. --unit is for .shape, .json, .scad and .py; --set counts in the unit of the program as it was.
     """
     from shapeprog.formats import export
-    from shapeprog.language.converting import in_unit
 
     check_units(unit, file_unit)
     terminal.load_modules(modules)
     found, frame = terminal.read_program_file(program, changes)
-    found = in_unit(found, asked_unit(found.unit, frame, program, unit, file_unit), rounded=True)
+    if unit is not None:
+        from shapeprog.inference.readable import in_readable_unit
+
+        found = in_readable_unit(found, asked_unit(found.unit, frame, program, unit, file_unit))
     for path in outputs:
         export(found, path, frame)
         if not quiet:

@@ -15,7 +15,7 @@ from shapeprog.errors import ShapeProgError
 from shapeprog.language.evaluation import evaluated
 from shapeprog.language.expression import Binary, Expression, Linear, Name, Negative, Value, text_of
 from shapeprog.language.parameters import to_float32
-from shapeprog.language.program import Loop, Program
+from shapeprog.language.program import Program
 from shapeprog.language.source import (
     Assignment,
     Call,
@@ -30,11 +30,11 @@ from shapeprog.language.statement import language
 from shapeprog.language.text import source_of
 from shapeprog.language.unit import Unit
 
-COARSE, DRIFT = 0.03, 0.2
-"""What the last decimal of a rounded length is worth at most, in cells; times the copies of a loop that it moves."""
-
 DIGITS = 6
-"""Digits of a length that is converted and not rounded: float32 has two more, which would show the conversion."""
+"""Digits of a length that is converted: float32 has two more, which would show that it was."""
+
+FEWEST = 2
+"""Digits that lengths have at least where they are rounded, so that thin parts keep their thickness."""
 
 _NOTHING = 1e-9
 
@@ -43,14 +43,13 @@ Scope: TypeAlias = Callable[[str], str]
 """What a name is called among those of the whole program."""
 
 
-def in_unit(program: Program, unit: Unit | None, *, rounded: bool = False) -> Program:
-    """The same program with its lengths written in a unit, or in cells.
+def in_unit(program: Program, unit: Unit | None, *, digits: int | None = None) -> Program:
+    """The same program with its lengths written in a unit, or in cells; one in this unit is left as it is.
 
     Parameters
     ----------
-    rounded
-        Whether lengths get no more decimals than a person expects, as in ``45.2`` for ``45.187``: as many as keep every
-        number within .015 cells, and the copies of a loop within .1.  Else they keep six digits.
+    digits
+        Decimals to which lengths are rounded; else they keep six digits.
 
     Raises
     ------
@@ -61,15 +60,14 @@ def in_unit(program: Program, unit: Unit | None, *, rounded: bool = False) -> Pr
     if source.unit == unit:
         return program
     before, after = (1.0 if each is None else each.per_cell for each in (source.unit, unit))
-    decimals = _decimals(program, after) if rounded else None
 
     def change(number: float, power: float) -> float:
         if not power or not number:
             return number
         found = number * (after / before) ** power
-        if decimals is None or power != 1:
+        if digits is None or power != 1:
             return to_float32(float(f"{found:.{DIGITS}g}"))
-        return to_float32(round(found, decimals) or float(f"{found:.1g}"))  # what is there stays there
+        return to_float32(round(found, max(digits, FEWEST - 1 - math.floor(math.log10(abs(found))))))
 
     return evaluated(Source(_Powers(source).changed(source.lines, str, change), unit))
 
@@ -82,13 +80,6 @@ def lengths(program: Program) -> frozenset[str]:
     except ShapeProgError:
         return frozenset()
     return frozenset(name for name in source.numbers if powers.of(Linear.of(name)) == 1)
-
-
-def _decimals(program: Program, per_cell: float) -> int:
-    """How many decimals lengths keep that are rounded for a person."""
-    loops = (node for node in program.walk() if isinstance(node, Loop))
-    moved = (loop.count - 1 for loop in loops if any(q.kind == "shift" for q in language()[loop.name].quantities))
-    return max(0, math.ceil(-math.log10(per_cell * min(COARSE, DRIFT / max(1, *moved, 1)))))
 
 
 class _Powers:

@@ -90,18 +90,23 @@ REFERENCES = (cuboid, tilted_box, bar_between, cylinder_between, arc_through, ro
 
 
 def described(points, radius=None, along=None, place=None):
-    """Bounding box and second moments: of points that are corners, or of discs across ``along`` or balls about them."""
+    """Bounding box and second moments: of points that are corners, or of discs across ``along`` or balls about them.
+
+    The place is a rigid motion, or a reflection, and a change of scale.
+    """
     place = np.eye(4) if place is None else place
     world = points @ place[:3, :3].T + place[:3, 3]
     spread = np.zeros_like(world)
     if radius is not None:
-        spread = np.array(radius)[:, None] * np.sqrt(np.maximum(0, 1 - (along @ place[:3, :3].T) ** 2))
+        scale = np.linalg.norm(place[0, :3])
+        spread = scale * np.array(radius)[:, None] * np.sqrt(np.maximum(0, 1 - (along @ place[:3, :3].T / scale) ** 2))
     bounds = [(world - spread).min(0), (world + spread).max(0)]
     return (np.round(np.concatenate([*bounds, (world.T @ world / len(world)).ravel()]), 5) + 0.0).tolist()
 
 
 def evaluate(made, changed=None):
-    """What the solids of a plan are by its expressions alone, see :func:`described`; numbers may be changed first."""
+    """What the solids of a plan are in cells, by its expressions alone, see :func:`described`; numbers may be changed
+    first."""
     names = {v.name: eval(v.text) for heading in made.headings for v in heading.variables}
     names |= {name: table.tolist() for name, table in made.tables.items()} | (changed or {})
     for number in made.numbers:
@@ -147,7 +152,7 @@ def evaluate(made, changed=None):
             drawn = references[step.kind](*arguments)
             found.append(described(*(drawn if isinstance(drawn, tuple) else (drawn,)), place=here))
 
-    run(made.body, np.eye(4), names)
+    run(made.body, np.diag([*np.full(3, 1 / made.cell), 1]), names)
     return sorted(found)
 
 

@@ -24,11 +24,13 @@ from shapeprog.formats.symbolic import repeat
 from shapeprog.geometry.primitive import Primitive, primitives
 from shapeprog.geometry.primitives.cuboid import CUBOID
 from shapeprog.language import Draw, Language, Loop, Program, language, loop, statement, using
+from shapeprog.language.converting import in_unit
 from shapeprog.language.parameters import Count, Extent, Length, Position, Radius, Shift
 from shapeprog.language.shapes import disc
 from shapeprog.language.shapes import solid as draw_solid
 from shapeprog.language.statement import Motion
 from shapeprog.language.text import parse
+from shapeprog.language.unit import Unit
 from shapeprog.space import Frame, grid_axes
 
 CHAIR = """
@@ -104,9 +106,15 @@ def changed_program(program, generator):
 
 
 @pytest.mark.parametrize("text", [CHAIR, SPIN, LOUNGE])
-def test_expressions_draw_what_unrolling_draws(text):
-    program = parse(text)
-    same(evaluate(plan(program)), expected(program))
+@pytest.mark.parametrize("unit", [None, Unit("cm", 3.75), Unit("m", 0.0375)])
+def test_expressions_draw_what_unrolling_draws(text, unit):
+    program = in_unit(parse(text), unit)
+    made = plan(program)
+    same(evaluate(made), expected(program))
+    shown = [v for heading in made.headings for v in heading.variables if v.quantity.kind == "length"]
+    written = [eval(each.text) for each in shown]
+    cells = [eval(v.text) for h in plan(parse(text)).headings for v in h.variables if v.quantity.kind == "length"]
+    np.testing.assert_allclose(np.hstack(written), np.hstack(cells) * made.cell, rtol=1e-5)
 
 
 @pytest.mark.parametrize("text", [CHAIR, SPIN, LOUNGE])

@@ -19,7 +19,8 @@ from shapeprog.formats.openscad import scad_text
 from shapeprog.formats.parts import parts, solid
 from shapeprog.formats.plan import plan
 from shapeprog.formats.written_plan import script_plan
-from shapeprog.language.text import parse
+from shapeprog.language.text import format_program, parse
+from shapeprog.language.unit import Unit
 from shapeprog.space import Frame, grid_axes
 
 CHAIR = """
@@ -58,16 +59,39 @@ for j in rotate(n + 2, step=1):
 CHANGES = {"width": 14.5, "depth": 9, "height": 30, "seat_height": 12, "thick": 1.5, "n": 4}
 
 
-def test_scripts_draw_what_unrolling_draws():
-    program = parse(CHAIR)
+UNITS = ["", "# unit: cm, 0.5 per cell\n", "# unit: m, 2 per cell\n"]
+
+
+@pytest.mark.parametrize("head", UNITS)
+def test_scripts_draw_what_unrolling_draws(head):
+    program = parse(head + CHAIR)
     made = script_plan(program, ())
     assert made.numbers
     same(evaluate(made), expected(program))
 
 
+def test_scripts_say_lengths_in_the_unit_of_the_program():
+    cells = parse(
+        "seat = 9\nbox(at=(0, 0, 0), size=(seat, 4, seat - 2))\nboard(at=(0, 0, 0), size=(1, 2, 3), tilt=seat)"
+    )
+    program = parse("# unit: cm, 4 per cell\n" + format_program(cells).replace("9", "36").replace("4,", "16,"))
+    frame = Frame(0.04, (1, 2, 3))
+    for text in (scad_text(program, frame), script_text(program, frame)):
+        assert "Lengths are in cm." in text
+        assert "seat = 36" in text
+        assert "seat - 2" in text
+        assert "tilted_box" in text
+    assert "world = [[0.01, 0, 0, 1]" in scad_text(program, frame)
+    assert "scale = 0.01\n" in script_text(program, frame)
+    plain = scad_text(sp.in_unit(sp.inline(cells), Unit("mm", 40)), frame)
+    assert "box_1_size = [360, 160, 280]; // [0:5:1280]" in plain
+    assert "board_1_tilt = 9; // [-45:0.5:45]" in plain
+
+
+@pytest.mark.parametrize("head", UNITS)
 @pytest.mark.parametrize("name", CHANGES)
-def test_names_stay_live(name):
-    program = parse(CHAIR)
+def test_names_stay_live(name, head):
+    program = parse(head + CHAIR)
     changed = {name: CHANGES[name]}
     same(evaluate(script_plan(program, ()), changed), expected(sp.set(program, changed)))
 

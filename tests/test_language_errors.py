@@ -223,7 +223,7 @@ def test_places_in_the_notation(text: str, line: int, column: int, words: str) -
     ("content", "words"),
     [
         ([], "not in the form"),
-        ({"format": "shapeprog", "version": 3}, "version 3"),
+        ({"format": "shapeprog", "version": 4}, "version 4"),
         ({"program": 3}, "program is not a list"),
         ({"program": [3]}, r"program\[0\] is not a statement"),
         ({"program": [{"statement": "legg"}]}, "did you mean leg"),

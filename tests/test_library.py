@@ -11,11 +11,13 @@ from commands import Run
 from shapeprog import inference
 from shapeprog.data.synthetic.furniture import furniture
 from shapeprog.errors import InputError, OutputError
+from shapeprog.language.converting import in_unit
 from shapeprog.language.named import inline, names
 from shapeprog.language.named import set as set_numbers
 from shapeprog.language.program import Draw, Loop, Program
 from shapeprog.language.source import Call, Source
 from shapeprog.language.text import format_program, format_source, parse, source_of
+from shapeprog.language.unit import Unit
 from shapeprog.language.unroll import unroll
 from shapeprog.library import Library, learn, library_of, load_library, save_library, with_library
 from shapeprog.library.blocks import blocks_of
@@ -236,6 +238,24 @@ def test_commands_learn_show_and_draw_libraries(run: Run, tmp_path: Path) -> Non
     ended = run("library", "learn", "programs/0.shape")
     assert ended.code == 2
     assert "no function is worth its lines in 1 program" in ended.err
+
+
+def test_a_program_in_a_unit_is_written_with_a_library_and_stays_in_it() -> None:
+    plain, unit = parse(TABLE), Unit("cm", 3.75)
+    program = in_unit(plain, unit)
+    written = with_library(program, library(POSTS))
+    assert written.unit == unit
+    assert written == in_unit(with_library(plain, library(POSTS)), unit)
+    assert away(written, program) < TOLERANCE
+    assert [each.value for each in names(written)] == [each.value for each in names(program)]
+    assert with_library(program, library(SHELVES)) is program
+    mixed = parse("# unit: cm, 4 per cell\n" + TABLE + "board(at=(0, 0, 0), size=(1, 1, 1), tilt=thick)\n")
+    assert with_library(mixed, library(POSTS)) is mixed
+
+
+def test_a_library_is_in_no_unit() -> None:
+    with pytest.raises(InputError, match="lengths are in cm of one object"):
+        library("# unit: cm, 4 per cell", POSTS)
 
 
 def test_tidy_and_infer_write_programs_with_a_library(

@@ -21,7 +21,9 @@ from shapeprog.geometry.losses import chamfer
 from shapeprog.geometry.surface import sample_surface
 from shapeprog.inference import labelling
 from shapeprog.inference.labelling import label
+from shapeprog.language.converting import in_unit
 from shapeprog.language.text import parse
+from shapeprog.language.unit import Unit
 from shapeprog.language.unroll import unroll
 from shapeprog.models.vocabulary import Vocabulary
 from shapeprog.training.labels import perturbed, read_labels, rendered
@@ -94,6 +96,16 @@ def test_labels_are_read_from_lines_and_folders(pack: Path, tmp_path: Path):
         path.write_text(f"{line}\n")
         with pytest.raises(InputError, match=r"line 1 of labels\.jsonl(: \S+)? is no(t a)? (label|list|statement)"):
             read_labels([path], names, vocabulary, 4)
+
+
+def test_labels_in_a_unit_are_those_in_cells(tmp_path: Path):
+    unit, path = Unit("cm", 4), tmp_path / "labels.jsonl"
+    told = json.loads(program_to_json(in_unit(parse(TEXTS[1]), unit)))
+    whole = {"snapped": json.loads(program_to_json(parse(TEXTS[0])))["program"]}
+    for form, more, text in (("program", whole, TEXTS[1]), ("snapped", whole, TEXTS[0]), ("snapped", {}, TEXTS[1])):
+        path.write_text(json.dumps({"name": "s", **told, **more}) + "\n")
+        found = read_labels([path], ["s"], Vocabulary.current(), 4, form)
+        assert torch.equal(rendered(found.code)[0], unroll(parse(text)).voxels())
 
 
 def test_blocks_that_cannot_be_said_are_left_out(tmp_path: Path):

@@ -17,9 +17,11 @@ from shapeprog.errors import OutputError
 from shapeprog.formats.colours import colour
 from shapeprog.formats.parts import parts
 from shapeprog.geometry.primitives.cuboid import mesh as box_mesh
+from shapeprog.language.converting import in_unit
 from shapeprog.language.named import set as set_names
 from shapeprog.language.program import Program
 from shapeprog.language.text import format_program, parse
+from shapeprog.language.unit import Unit
 from shapeprog.view import Item, contact_sheet, picture, viewer
 from shapeprog.view import raster_kernels as kernels
 from shapeprog.view.listing import listing, parted, wrapped
@@ -205,6 +207,31 @@ def test_corners_go_where_the_program_with_another_number_has_them():
     half = corners_of(parts(set_names(program, height=(8 + far) / 2)))
     for before, there, wanted in zip(start, found["height"].places[far], half, strict=True):
         np.testing.assert_allclose((before + there) / 2, wanted, atol=1e-3)
+
+
+def test_numbers_of_a_program_in_a_unit_are_dragged_in_it(tmp_path: Path):
+    program = in_unit(parse(DRAGGED), Unit("m", 0.04))
+    cells = parse(DRAGGED)
+    drawn = parts(program)
+    found = {slider.name: slider for slider in sliders(program, drawn)}
+    plain = {slider.name: slider for slider in sliders(cells, parts(cells))}
+    assert {name: slider.unit for name, slider in found.items()} == {"width": "m", "height": "m", "lean": ""}
+    for name, slider in found.items():
+        by = 0.04 if slider.unit else 1.0
+        np.testing.assert_allclose([slider.low, slider.high], [plain[name].low * by, plain[name].high * by], rtol=1e-5)
+    page = viewer(program, tmp_path / "page.html").read_text()
+    content = json.loads(re.search(r'id="data">(.*?)</script>', page)[1])
+    assert [slider["unit"] for slider in content["sliders"]] == ["m", "m", ""]
+    assert content["digits"] == 4
+    assert content["lines"][0]["before"] == "# unit: m, 0.04 per cell"
+
+
+def test_listing_shows_the_unit_and_as_many_decimals_as_it_needs():
+    text = "box(at=(0.123456, 0, 0), size=(1, 1, 2.00004))"
+    for head, number in (("", "0.12"), ("cm, 3.75", "0.12"), ("mm, 37.5", "0.1"), ("m, 0.0375", "0.1235")):
+        found = [line.text for line in listing(parse(f"# unit: {head} per cell\n{text}" if head else text))]
+        assert found[:-1] == ([f"# unit: {head} per cell"] if head else [])
+        assert found[-1] == f"box(at=({number}, 0, 0), size=(1, 1, 2))"
 
 
 def test_plain_programs_and_programs_of_very_many_parts_have_nothing_to_drag():

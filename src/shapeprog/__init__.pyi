@@ -10,6 +10,7 @@ from .geometry.losses import chamfer
 from .geometry.scene import Scene
 from .inference.infer import infer
 from .inference.refine import refine
+from .language.converting import in_unit
 from .language.evaluation import evaluated
 from .language.expression import Expression, Linear, Name
 from .language.named import Named, inline, names, set
@@ -19,6 +20,7 @@ from .language.source import Source
 from .language.statement import loop, statement, using
 from .language.tensors import Code, decode, encode
 from .language.text import format_program, parse
+from .language.unit import Unit
 from .language.unroll import unroll
 from .library import Library, learn, load_library, save_library, with_library
 from .space import Frame
@@ -27,9 +29,9 @@ __version__: str
 
 __all__ = [
     "Code", "Draw", "Expression", "Frame", "InputError", "Library", "Linear", "Loop", "Name", "Named", "OutputError",
-    "Parametric", "Program", "ProgramError", "Scene", "Shape", "ShapeProgError", "Source",
-    "chamfer", "decode", "encode", "evaluated", "export", "format_notation", "format_program", "infer", "inline",
-    "learn", "load", "load_library", "load_shape", "load_statements", "load_with_frame", "loop", "names", "parse",
-    "parse_notation", "program_from_json", "program_to_json", "random_program", "refine", "save", "save_library",
-    "set", "statement", "unroll", "using", "with_library",
+    "Parametric", "Program", "ProgramError", "Scene", "Shape", "ShapeProgError", "Source", "Unit",
+    "chamfer", "decode", "encode", "evaluated", "export", "format_notation", "format_program", "in_unit", "infer",
+    "inline", "learn", "load", "load_library", "load_shape", "load_statements", "load_with_frame", "loop", "names",
+    "parse", "parse_notation", "program_from_json", "program_to_json", "random_program", "refine", "save",
+    "save_library", "set", "statement", "unroll", "using", "with_library",
 ]  # fmt: skip

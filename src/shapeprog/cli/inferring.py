@@ -7,12 +7,14 @@ import re
 from collections.abc import Callable, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from shapeprog.cli import terminal
+from shapeprog.cli.units import AsUnit, FileUnit, asked_unit, check_units
 from shapeprog.errors import InputError, OutputError, ShapeProgError
 from shapeprog.inference.budget import BUDGET, Progress
 
@@ -39,6 +41,7 @@ class Found:
 
 
 Inference = Callable[["Shape", int, float, int, Progress], Found]
+Finish = Callable[["Program", "Shape"], "Program"]
 
 
 def infer_command(
@@ -50,6 +53,8 @@ def infer_command(
     seed: terminal.Seed = 0,
     up: terminal.Up = None,
     front: terminal.Front = None,
+    unit: AsUnit = None,
+    file_unit: FileUnit = None,
     library: terminal.WithLibrary = False,
     modules: terminal.WithLibraries = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object per shape, one per line.")] = False,
@@ -86,10 +91,14 @@ def infer_command(
     from shapeprog.files import make_folder
 
     terminal.check_axes(up, front)
+    check_units(unit, file_unit)
     _prepare(picture=not no_picture, talk=not (quiet or as_json))
     libraries = terminal.load_libraries(modules, library)
+    finished = partial(_in_unit, unit=unit, file_unit=file_unit)
     infer_one = (
-        _baseline if baseline else _chosen(weights, proposals, rounds, no_search, paper, detail, not no_ties, libraries)
+        partial(_baseline, finished)
+        if baseline
+        else _chosen(finished, weights, proposals, rounds, no_search, paper, detail, not no_ties, libraries)
     )
     folder = make_folder(out)
     failures: list[tuple[Path, ShapeProgError]] = []
@@ -137,7 +146,7 @@ def infer_command(
                     told = {"name": shape.name, "folder": str(folder), "seconds": found.seconds}
                     terminal.print_json(told | json.loads(_document(found, shape)))
                 elif talk:
-                    _report(console, found, shape, folder, names)
+                    _report(console, found, shape, folder, names, file_unit)
         except KeyboardInterrupt:
             raise terminal.Interrupted(_kept(written, folder)) from None
     for path, problem in failures:
@@ -166,7 +175,16 @@ def _prepare(picture: bool, talk: bool) -> None:
     prepare([*INFERENCE, *READING, *(PICTURES if picture else ())], tell if talk else None)
 
 
+def _in_unit(program: Program, shape: Shape, unit: str | None, file_unit: str | None) -> Program:
+    if unit is None:
+        return program
+    from shapeprog.inference.readable import in_readable_unit
+
+    return in_readable_unit(program, asked_unit(None, shape.frame, shape.name, unit, file_unit))
+
+
 def _chosen(
+    finished: Finish,
     weights: str,
     proposals: int,
     rounds: int | None,
@@ -176,7 +194,7 @@ def _chosen(
     ties: bool,
     libraries: Sequence[Library],
 ) -> Inference:
-    """Inference with what was asked for, which is looked at before any shape is."""
+    """Inference with what was asked for, which is looked at before any shape is; programs are ``finished`` last."""
     from shapeprog.inference import Settings, infer
     from shapeprog.inference.proposing import ready_generator
 
@@ -190,22 +208,24 @@ def _chosen(
             search=not no_search, statements="paper" if paper else "all", detail=detail, ties=ties, libraries=libraries,
             progress=progress,
         )  # fmt: skip
-        scores = _scores(result.program, result.snapped, shape, result.scores, seed)
-        return Found(result.program, result.snapped, scores, result.reason, result.seconds)
+        program = finished(result.program, shape)
+        scores = _scores(program, result.snapped, shape, result.scores, seed)
+        return Found(program, result.snapped, scores, result.reason, result.seconds)
 
     return one
 
 
-def _baseline(shape: Shape, blocks: int, budget: float, seed: int, progress: Progress) -> Found:
+def _baseline(finished: Finish, shape: Shape, blocks: int, budget: float, seed: int, progress: Progress) -> Found:
     import time
 
     from shapeprog.inference import greedy_boxes
 
     started = time.monotonic()
-    program: Program = greedy_boxes(shape.voxels, blocks)
+    snapped: Program = greedy_boxes(shape.voxels, blocks).snap()
     seconds = time.monotonic() - started
     reason = "Stopped because greedy boxes place one box per block and never go back."
-    return Found(program, program.snap(), _scores(program, program.snap(), shape, {}, seed), reason, seconds)
+    program = finished(snapped, shape)
+    return Found(program, snapped, _scores(program, snapped, shape, {}, seed), reason, seconds)
 
 
 def _scores(
@@ -291,7 +311,7 @@ def _source(shape: Shape) -> str | None:
     return f"{place}#{shape.name.removeprefix(f'{shape.source.stem}#')}"
 
 
-def _report(console: Any, found: Found, shape: Shape, folder: Path, names: list[str]) -> None:
+def _report(console: Any, found: Found, shape: Shape, folder: Path, names: list[str], file_unit: str | None) -> None:
     from shapeprog.view.page import scores_text
 
     console.print(shape.name, style="bold")
@@ -299,6 +319,9 @@ def _report(console: Any, found: Found, shape: Shape, folder: Path, names: list[
         held = f"a cloud of {len(shape.points)} points" if shape.points is not None else "voxels"
         console.print(f"Read as {held}.", style="dim")
     terminal.print_program(console, found.program)
+    if found.program.unit and file_unit is None:
+        said = "One unit of the file is taken for a metre; where it is another, say so with --file-unit."
+        console.print(said, style="dim")
     for line in scores_text(found.scores | {"seconds": found.seconds}, found.program):
         console.print(line, style="dim")
     console.print(found.reason, style="dim")

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from shapeprog.cli import terminal
+from shapeprog.cli.units import AsUnit, FileUnit, asked_unit, check_units
 from shapeprog.errors import InputError
 
 
@@ -22,6 +23,8 @@ def tidy_command(
     seed: terminal.Seed = 0,
     library: terminal.WithLibrary = False,
     modules: terminal.WithLibraries = None,
+    unit: AsUnit = None,
+    file_unit: FileUnit = None,
 ) -> None:
     """Tie the numbers of a program: lengths that are nearly equal, faces that are flush or meet, parts in the middle.
 
@@ -29,18 +32,22 @@ def tidy_command(
     """
     from shapeprog.formats import load_with_frame, save
     from shapeprog.inference.evidence import evidence_of_program
+    from shapeprog.inference.readable import in_readable_unit
     from shapeprog.inference.ties.tying import PRICE, tie
     from shapeprog.language.free import numbers
     from shapeprog.library import with_library
 
+    check_units(unit, file_unit)
     libraries = terminal.load_libraries(modules, library)
     given, frame = load_with_frame(program)
     if not given.size:
         raise InputError(f"{program} draws nothing", "name a program that draws something")
+    wanted = asked_unit(given.unit, frame, program, unit, file_unit)
     tied = tie(given, evidence_of_program(given, seed), price=price * PRICE, seed=seed)
     found = tied.program
     for each in libraries:
         found = with_library(found, each)
+    found = in_readable_unit(found, wanted, seed)
     if out is not None:
         save(found, out, frame)
     terminal.print_program(terminal.output(), found)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from shapeprog.cli import terminal
+from shapeprog.cli.units import AsUnit, FileUnit, asked_unit, check_units
 from shapeprog.errors import InputError, OutputError, ShapeProgError
 from shapeprog.formats.format import format_of, program_suffixes, suffixes
 
@@ -33,18 +34,26 @@ def export_command(
     outputs: Outputs,
     changes: terminal.Changes = None,
     modules: terminal.With = None,
+    unit: AsUnit = None,
+    file_unit: FileUnit = None,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
 ) -> None:
     """Write a program for other tools: as a mesh, for CAD, as cells or points, or in another form of program.
 
     Where the program file keeps its frame (every .json and .shape written by infer does), the export lies on the
     input. A .shape file without one is exported upright, one cell one unit; to place it, put the comment
-    '# frame: {"scale": ..., "centre": [...], "axes": [[...], [...], [...]]}' at its top.
+    '# frame: {"scale": ..., "centre": [...], "axes": [[...], [...], [...]]}' at its top, with the scale in units of the
+    input per cell. --unit is for .shape, .json, .scad and .py; --set counts in the unit of the program as it was.
     """
     from shapeprog.formats import export
 
+    check_units(unit, file_unit)
     terminal.load_modules(modules)
     found, frame = terminal.read_program_file(program, changes)
+    if unit is not None:
+        from shapeprog.inference.readable import in_readable_unit
+
+        found = in_readable_unit(found, asked_unit(found.unit, frame, program, unit, file_unit))
     for path in outputs:
         export(found, path, frame)
         if not quiet:

@@ -34,7 +34,7 @@ numbers = {}
 
 
 def scaled(values):
-    """Cells as units of the world."""
+    """Numbers of the program as units of the world."""
     return tuple(scale * value for value in values)
 
 
@@ -226,12 +226,12 @@ def write_step(program: Program, path: Path, frame: Frame) -> None:
 def script_text(program: Program, frame: Frame, stem: str = "model") -> str:
     """The build123d script of a program.
 
-    Inside the model x is up, y is depth (positive = rear) and z is left-right, in cells, as in the program.
+    Inside the model x is up, y is depth (positive = rear) and z is left-right, in the unit of the program.
     """
     made = script_plan(program, _reserved())
     stem = "".join(letter for letter in stem if letter.isprintable() and letter not in "\"'\\{}") or "model"
     axes = np.asarray(frame.axes)
-    lines = [_HEAD.format(stem=stem)]
+    lines = [_HEAD.format(stem=stem), f"# Lengths are in {made.word}."]
     for heading in made.headings:
         lines += [f"# {heading.name}: {heading.doc}"]
         lines += [f"{each.name} = {each.text}{_note(each)}" for each in heading.variables]
@@ -240,7 +240,7 @@ def script_text(program: Program, frame: Frame, stem: str = "model") -> str:
         lines += [f"{each.name} = {each.text}" + (f"  # {each.note}" if each.note else "")]
     lines += [""] if made.numbers else []
     columns = [_tuple(axes[:, column]) for column in (0, 2)]
-    lines += ["# From cells to the world of the input.", f"scale = {number(frame.scale)}"]
+    lines += [f"# From {made.word} to the world of the input.", f"scale = {number(frame.scale / made.cell)}"]
     lines += [f"world = Location(Plane(origin={_tuple(frame.centre)}, x_dir={columns[0]}, z_dir={columns[1]}))"]
     for name, (vertices, faces) in made.shells.items():
         points = ", ".join(_tuple(np.round(vertex, 9)) for vertex in vertices)

@@ -80,7 +80,7 @@ def export(program: Program, path: str | os.PathLike[str], frame: Frame | None =
         Where to; the folder must exist.
     frame
         The way from the grid to the world of the input, so that the export lies on it; without it the shape stands
-        upright as the format wants it, one cell one unit (:mod:`shapeprog.formats.frames`).
+        upright as the format wants it, one unit of the program one of the file (:mod:`shapeprog.formats.frames`).
     options
         For .npy the ``resolution`` in cells along each side (32), for .xyz how many ``points`` (5000) and their
         ``seed`` (0).
@@ -98,7 +98,7 @@ def export(program: Program, path: str | os.PathLike[str], frame: Frame | None =
     for name in options:
         if name not in chosen.options:
             raise OutputError(f"{suffix} takes no {name}", f"it takes {', '.join(chosen.options) or 'no options'}")
-    placed = upright(chosen) if frame is None else frame
+    placed = upright(chosen, program.unit) if frame is None else frame
     try:
         chosen.write(program, target, placed, **options)
     except OSError as error:

@@ -5,7 +5,8 @@ A ``.shape`` file may carry its frame as a comment in its first lines, which the
     # frame: {"scale": 0.0417, "centre": [0, 0.5, 0], "axes": [[0, 0, 1], [1, 0, 0], [0, 1, 0]]}
 
 ``shapeprog infer`` writes it there, so that ``shapeprog export chair.shape chair.glb`` lies on the mesh it was
-inferred from.  Without it one cell is one unit, the grid's centre is the origin, and up is what the format calls up.
+inferred from.  Without it one unit of the file is one of the program, which is a cell if it tells no other, the grid's
+centre is the origin, and up is what the format calls up.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ import numpy as np
 
 from shapeprog.errors import InputError
 from shapeprog.formats.format import Format
+from shapeprog.language.unit import Unit
 from shapeprog.space import Frame, grid_axes
 
 _HEADER = re.compile(r"^#[ \t]*frame:(.*)$", re.MULTILINE)
@@ -28,14 +30,16 @@ _CURE = (
 )
 
 
-def upright(chosen: Format) -> Frame | None:
-    """The frame for files of a format when none is known: one cell is one unit, up and front as the format says.
+def upright(chosen: Format, unit: Unit | None = None) -> Frame | None:
+    """The frame for files of a format when none is known: lengths as they are in the unit of a program, which is one
+    unit of the file; up and front as the format says.
 
     Program files go without.
     """
     if chosen.axes is None:
         return None
-    return Frame(axes=tuple((float(a), float(b), float(c)) for a, b, c in grid_axes(*chosen.axes)))
+    axes = tuple((float(a), float(b), float(c)) for a, b, c in grid_axes(*chosen.axes))
+    return Frame(1.0 if unit is None else unit.per_cell, axes=axes)
 
 
 def frame_dict(frame: Frame) -> dict[str, Any]:

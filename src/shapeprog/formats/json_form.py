@@ -4,7 +4,8 @@
   {"statement": "translate", "parameters": {"count": 2, "by": [0, 0, 18]}, "body": [
     {"statement": "leg", "parameters": {"at": [-12, -8, -10], "size": [16, 2, 2]}}]}]}
 
-Programs with names, expressions or functions are of version 2.  The entries are in :mod:`shapeprog.formats.json_lines`.
+Programs with names, expressions or functions are of version 2, those whose lengths are not in cells of version 3; these
+have "unit": {"name": "cm", "per_cell": 3.75} beside "program".  The entries are in :mod:`shapeprog.formats.json_lines`.
 """
 
 from __future__ import annotations
@@ -23,15 +24,16 @@ from shapeprog.files import write_text
 from shapeprog.formats.frames import frame_dict, frame_from
 from shapeprog.formats.json_lines import entries_of, program_from_entries
 from shapeprog.formats.shape import LARGEST_FILE, read_text
-from shapeprog.language.parameters import LARGEST
+from shapeprog.language.parameters import LARGEST, shortest
 from shapeprog.language.place import proper_text
 from shapeprog.language.program import Program
 from shapeprog.language.statement import SLOTS
 from shapeprog.language.tensors import Code
+from shapeprog.language.unit import Unit
 from shapeprog.space import Frame
 
 FORMAT, CODE_FORMAT = "shapeprog", "shapeprog-code"
-VERSIONS = {FORMAT: (1, 2), CODE_FORMAT: (1,)}
+VERSIONS = {FORMAT: (1, 2, 3), CODE_FORMAT: (1,)}
 """Those that can be read, by form."""
 
 
@@ -53,11 +55,25 @@ class Result:
     @property
     def program(self) -> Program:
         """The program; an ``InputError`` if it is none."""
-        return program_from_entries(self.content.get("program"), self.name, "program")
+        return program_from_entries(self.content.get("program"), self.name, "program", self.unit)
+
+    @property
+    def unit(self) -> Unit | None:
+        """The unit of the program where the file tells one; an ``InputError`` if it is none."""
+        kept = self.content.get("unit")
+        if kept is None:
+            return None
+        cure = 'write {"name": "cm", "per_cell": 3.75}, or leave it out'
+        if not isinstance(kept, dict) or {*kept} != {"name", "per_cell"} or type(kept["per_cell"]) not in (int, float):
+            raise InputError(f"{self.name}: unit: {shortened(kept)} is no name and number per cell", cure)
+        try:
+            return Unit(str(kept["name"]), kept["per_cell"])
+        except ShapeProgError as mistake:
+            raise InputError(f"{self.name}: unit: {mistake.message}", mistake.hint) from None
 
     @property
     def snapped(self) -> Program | None:
-        """Its whole-numbered form where the file holds one; an ``InputError`` if that is no program."""
+        """Its whole-numbered form, in cells, where the file holds one; an ``InputError`` if that is no program."""
         body = self.content.get("snapped")
         return None if body is None else program_from_entries(body, self.name, "snapped")
 
@@ -119,8 +135,11 @@ def program_to_json(program: Program, indent: int | None = 2) -> str:
     ShapeProgError
         If a number is not finite, a statement is not declared, or loops nest too deeply to be read back.
     """
-    version = 1 if program.source is None else 2
-    return json.dumps({"format": FORMAT, "version": version, "program": entries_of(program)}, indent=indent) + "\n"
+    unit = program.unit
+    content: dict[str, Any] = {"format": FORMAT, "version": 1 if program.source is None else 2 if unit is None else 3}
+    if unit is not None:
+        content["unit"] = {"name": unit.name, "per_cell": json.loads(shortest(unit.per_cell))}
+    return json.dumps({**content, "program": entries_of(program)}, indent=indent) + "\n"
 
 
 def program_from_json(text: str, name: str = "<json>") -> Program:

@@ -26,6 +26,7 @@ from shapeprog.language.program import DEEPEST, Program
 from shapeprog.language.source import Assignment, Call, Comment, Function, Line, Source, WrittenDraw, WrittenLoop
 from shapeprog.language.statement import Statement, language
 from shapeprog.language.text import checked_role, declared_of, number_text, source_of
+from shapeprog.language.unit import Unit
 from shapeprog.space import AXES
 
 _WORDS = {
@@ -43,8 +44,8 @@ def entries_of(program: Program) -> list[dict[str, Any]]:
     return [_entry(line, 0) for line in source_of(program).lines]
 
 
-def program_from_entries(entries: Any, name: str, place: str) -> Program:
-    """The program of its entries, which stand at ``place`` of the file ``name``.
+def program_from_entries(entries: Any, name: str, place: str, unit: Unit | None = None) -> Program:
+    """The program of its entries, which stand at ``place`` of the file ``name``, with lengths in a unit or in cells.
 
     Raises
     ------
@@ -52,7 +53,7 @@ def program_from_entries(entries: Any, name: str, place: str) -> Program:
         If they are none, naming the entry.
     """
     reader = _Reader(name)
-    source = Source(reader.body(entries, place, 0))
+    source = Source(reader.body(entries, place, 0), unit)
     try:
         return evaluated(source)
     except Fault as fault:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -154,17 +155,20 @@ def write_scad(program: Program, path: Path, frame: Frame) -> None:
 def scad_text(program: Program, frame: Frame) -> str:
     """The OpenSCAD model of a program.
 
-    Inside the model x is up, y is depth (positive = rear) and z is left-right, in cells, as in the program.
+    Inside the model x is up, y is depth (positive = rear) and z is left-right, in the unit of the program.
     """
     made = script_plan(program, _reserved())
-    lines = ["// Made by shapeprog. Change the numbers below, or use the customizer.", ""]
+    lines = ["// Made by shapeprog. Change the numbers below, or use the customizer."]
+    lines += [f"// Lengths are in {made.word}.", ""]
     if made.numbers:
-        lines += ["/* [Numbers] */", *(line for each in made.numbers for line in _definition(each)), ""]
+        lines += ["/* [Numbers] */", *(line for each in made.numbers for line in _definition(each, made.step)), ""]
     for heading in made.headings:
-        lines += [*_heading(heading), ""]
+        lines += [*_heading(heading, made), ""]
     lines += ["/* [Quality and place] */", f"segments = {SEGMENTS}; // [12:4:128]"]
-    matrix = ", ".join(f"[{', '.join(number(value) for value in row)}]" for row in frame.matrix())
-    lines += ["// From cells to the world of the input.", f"world = [{matrix}];", "", "/* [Hidden] */", *_tables(made)]
+    placed = replace(frame, scale=frame.scale / made.cell).matrix()
+    matrix = ", ".join(f"[{', '.join(number(value) for value in row)}]" for row in placed)
+    lines += [f"// From {made.word} to the world of the input.", f"world = [{matrix}];", ""]
+    lines += ["/* [Hidden] */", *_tables(made)]
     lines += [_MODULES.strip(), ""]
     for function in made.functions:
         lines += [*_module(function), ""]
@@ -173,20 +177,21 @@ def scad_text(program: Program, frame: Frame) -> str:
     return "\n".join([*lines, "}", ""])
 
 
-def _heading(heading: Heading) -> Iterator[str]:
+def _heading(heading: Heading, made: Plan) -> Iterator[str]:
     yield f"/* [{heading.name}] */"
     yield f"// {heading.doc}"
     for each in heading.variables:
-        yield f"{each.name} = {each.text}; // {_range(each)}"
+        yield f"{each.name} = {each.text}; // {_range(each, made)}"
 
 
-def _definition(each: Definition) -> Iterator[str]:
+def _definition(each: Definition, step: float) -> Iterator[str]:
     if each.note:
         yield f"// {each.note}"
     slider = ""
     if each.value is not None:
-        low, high = sorted((0.0, np.copysign(np.ceil(2 * abs(each.value)), each.value)))
-        slider = f" // [{number(low)}:{1 if each.whole else 0.1}:{number(max(high, 1.0))}]"
+        far = 10 * step * np.ceil(abs(each.value) / (5 * step))
+        low, high = sorted((0.0, np.copysign(far, each.value)))
+        slider = f" // [{number(low)}:{1 if each.whole else number(step)}:{number(max(high, 10 * step))}]"
     yield f"{each.name} = {each.text};{slider}"
 
 
@@ -205,13 +210,14 @@ def _reserved() -> set[str]:
     return {*_KEYWORDS.split(), *re.findall(r"(?:module|function) (\w+)", _MODULES)}
 
 
-def _range(each: Variable) -> str:
+def _range(each: Variable, made: Plan) -> str:
     if each.fixed:
         return "not used below: another value here changes nothing"
-    step = 1 if each.quantity.discrete else 0.5
+    cell, whole = (made.cell, 10 * made.step) if each.quantity.spatial else (1.0, 1.0)
+    step = 1 if each.quantity.discrete else whole / 2
     values = [float(word) for word in each.text.strip("[]").split(",")]
-    low, high = min(each.quantity.low, *values, 0), max(each.quantity.high, *values)
-    return f"[{number(np.floor(low))}:{number(step)}:{number(np.ceil(high))}]"
+    low, high = min(each.quantity.low * cell, *values, 0), max(each.quantity.high * cell, *values)
+    return f"[{number(whole * np.floor(low / whole))}:{number(step)}:{number(whole * np.ceil(high / whole))}]"
 
 
 def _tables(made: Plan) -> Iterator[str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections import Counter
 from collections.abc import Sequence
@@ -12,10 +13,12 @@ import numpy as np
 import numpy.typing as npt
 
 from shapeprog.formats.symbolic import Affine, Piece, Repeat, Slot, number, pieces, point, repeat
+from shapeprog.language.evaluation import in_own_unit
 from shapeprog.language.parameters import Quantity
 from shapeprog.language.program import Draw, Loop, Node, Program
 from shapeprog.language.statement import Statement, language
 from shapeprog.language.text import variable
+from shapeprog.language.unit import Unit
 from shapeprog.space import FloatArray
 
 
@@ -98,15 +101,32 @@ class Module:
 class Plan:
     """Everything a script needs, in order.
 
-    Programs with names have ``numbers`` and ``functions``, others a heading for each statement.
+    Programs with names have ``numbers`` and ``functions``, others a heading for each statement.  Lengths are in the
+    ``unit`` of the program.
     """
 
+    unit: Unit | None = None
     headings: list[Heading] = field(default_factory=list)
     numbers: list[Definition] = field(default_factory=list)
     functions: list[Module] = field(default_factory=list)
     body: list[Step] = field(default_factory=list)
     shells: dict[str, tuple[FloatArray, npt.NDArray[np.int64]]] = field(default_factory=dict)
     tables: dict[str, FloatArray] = field(default_factory=dict)
+
+    @property
+    def cell(self) -> float:
+        """How many of its units a cell has."""
+        return 1.0 if self.unit is None else self.unit.per_cell
+
+    @property
+    def word(self) -> str:
+        """What lengths are in."""
+        return "cells" if self.unit is None else self.unit.name
+
+    @property
+    def step(self) -> float:
+        """A power of ten by which lengths may well be changed: a tenth of a cell or less."""
+        return float(10.0 ** math.floor(math.log10(self.cell / 10) + 1e-9))
 
 
 @dataclass(frozen=True)
@@ -148,9 +168,10 @@ class Inexpressible(Exception):
 
 def plan(program: Program) -> Plan:
     """The plan of a program: loops stay loops, and numbers stay parameters wherever a solid is linear in them."""
-    made = Plan()
+    made = Plan(program.unit)
+    shown = program.body if program.source is None else in_own_unit(program.source)
     counter: Counter[str] = Counter()
-    named = [_named(node, made, counter) for node in program.body]
+    named = [_named(node, own, made, counter) for node, own in zip(program.body, shown, strict=True)]
     for each in named:
         made.body.extend(steps(each, 0, made))
     return made
@@ -163,7 +184,8 @@ def numbered(node: Node, counter: Counter[str]) -> str:
     return f"{word}_{counter[word]}"
 
 
-def _named(node: Node, made: Plan, counter: Counter[str]) -> Planned:
+def _named(node: Node, shown: Node, made: Plan, counter: Counter[str]) -> Planned:
+    """What a node becomes; ``shown`` is the same in the unit of the program."""
     declared, name = language()[node.name], numbered(node, counter)
     slots = tuple(
         f"{name}_{parameter.name}" + (f"[{place}]" if parameter.quantity.width > 1 else "")
@@ -174,11 +196,13 @@ def _named(node: Node, made: Plan, counter: Counter[str]) -> Planned:
     if isinstance(node, Loop):
         if not declared.quantities[0].written_out:
             slots = (declared.quantities[0].written(node.values[0]), *slots[1:])
-        each = Planned(node, name, slots, tuple(_named(each, made, counter) for each in node.body))
-        made.headings.insert(place, _heading(declared, name, node.values, still_of(each)))
+        assert isinstance(shown, Loop)
+        inside = zip(node.body, shown.body, strict=True)
+        each = Planned(node, name, slots, tuple(_named(inner, own, made, counter) for inner, own in inside))
+        made.headings.insert(place, _heading(declared, name, shown.values, still_of(each)))
         return each
-    found, fixed = pieces(declared, node.values)
-    made.headings.insert(place, _heading(declared, name, node.values, fixed))
+    found, fixed = pieces(declared, node.values, made.cell)
+    made.headings.insert(place, _heading(declared, name, shown.values, fixed))
     return drawing(node, name, slots, found, made)
 
 
@@ -192,7 +216,7 @@ def still_of(each: Planned) -> frozenset[int]:
 
 def drawing(node: Draw, name: str, slots: tuple[Slot, ...], found: Sequence[Piece], made: Plan) -> Planned:
     """A drawing statement of the solids that were found, with these slots."""
-    pivot, _ = point(language()[node.name], node.values)
+    pivot, _ = point(language()[node.name], node.values, made.cell)
     drawn = tuple(
         _solid(piece, f"{name}_{index}" if len(found) > 1 else name, language().called(node.word).id, slots, made)
         for index, piece in enumerate(found, 1)
@@ -242,7 +266,7 @@ def steps(each: Planned, depth: int, made: Plan, taken: frozenset[str] = frozens
     for leaf in each.draws:
         key = (leaf.pivot, leaf.quarter)
         if key not in motions:
-            motions[key] = repeat(declared, values, leaf.quarter)[0]
+            motions[key] = repeat(declared, values, leaf.quarter, made.cell)[0]
         if leaf.pivoted and motions[key].turns:
             raise Inexpressible
     if len(motions) > 1 and any(motion.turns for motion in motions.values()):

@@ -3,6 +3,8 @@
 Nothing here knows any statement.  A declaration is evaluated in float64 at its parameters and at points around them;
 a number that moves in proportion becomes an expression such as ``leg_1_at[1] + leg_1_size[1] / 2``.  A parameter on
 which something depends in another way is *fixed*: it enters as the number it is, and exports say so.
+
+Values are in cells; expressions are in the unit of the program, of which ``cell`` is how many a cell has.
 """
 
 from __future__ import annotations
@@ -90,7 +92,7 @@ def number(value: float | np.number[Any]) -> str:
     return f"{value + 0.0:.12g}"
 
 
-def pieces(declared: Statement, values: Sequence[float]) -> tuple[list[Piece], frozenset[int]]:
+def pieces(declared: Statement, values: Sequence[float], cell: float = 1.0) -> tuple[list[Piece], frozenset[int]]:
     """The solids of a drawing statement as expressions in its slots, and the slots that are fixed."""
     probe = _Probe(
         declared, values, lambda rows: [_measured(s) for s in declared.solids(rows)], _continuous(declared), STEP
@@ -99,14 +101,17 @@ def pieces(declared: Statement, values: Sequence[float]) -> tuple[list[Piece], f
     start = 0
     for part in probe.base:
         groups = []
-        for width in part.widths:
-            groups.append(tuple(probe.affine(start + place) for place in range(width)))
+        for number, width in enumerate(part.widths, 1):
+            power = 0 if number > len(part.widths) - part.angles else 1
+            groups.append(tuple(probe.affine(start + place, cell, power) for place in range(width)))
             start += width
         found.append(Piece(part.kind, tuple(groups), part.axes, part.vertices, part.faces))
     return found, probe.fixed
 
 
-def point(declared: Statement, values: Sequence[float]) -> tuple[tuple[Affine, ...] | None, frozenset[int]]:
+def point(
+    declared: Statement, values: Sequence[float], cell: float = 1.0
+) -> tuple[tuple[Affine, ...] | None, frozenset[int]]:
     """The pivot of a statement as expressions in its slots, or None for the axis of the grid."""
     pivot = declared.pivot
     if pivot is None:
@@ -117,7 +122,7 @@ def point(declared: Statement, values: Sequence[float]) -> tuple[tuple[Affine, .
         return [_Measured("point", (3,), place, np.zeros((len(place), 0)))]
 
     probe = _Probe(declared, values, measure, _continuous(declared), STEP)
-    return tuple(probe.affine(axis) for axis in range(3)), probe.fixed
+    return tuple(probe.affine(axis, cell) for axis in range(3)), probe.fixed
 
 
 @dataclass(frozen=True)
@@ -140,7 +145,9 @@ class Repeat:
         return self.even or self.turn is not None or (self.table is not None and bool(self.table[:, 0].any()))
 
 
-def repeat(declared: Statement, values: Sequence[float], quarter: bool) -> tuple[Repeat, frozenset[int]]:
+def repeat(
+    declared: Statement, values: Sequence[float], quarter: bool, cell: float = 1.0
+) -> tuple[Repeat, frozenset[int]]:
     """The motion of a loop as expressions in its slots, and the slots that are fixed (the count is never)."""
 
     def motion_of(rows: torch.Tensor, copy: torch.Tensor) -> Motion:
@@ -178,10 +185,10 @@ def repeat(declared: Statement, values: Sequence[float], quarter: bool) -> tuple
     turn = _Probe(declared, values, measure(slice(0, 0 if even else 1)), slots, 1.0)
     shift = _Probe(declared, values, measure(slice(1, 4)), slots, 1.0)
     if max(np.abs(probe.base[0].still[0]).max(initial=0) for probe in (turn, shift)) > TOLERANCE:
-        table = moved(*each_copy())
+        table = moved(*each_copy()) * [1, cell, cell, cell]
         return Repeat(table=table, signs=reflected), frozenset(slots) - {0}
-    angle = None if even else _unless_zero((turn.affine(0),))
-    by = _unless_zero(tuple(shift.affine(axis) for axis in range(3)))
+    angle = None if even else _unless_zero((turn.affine(0, cell, 0),))
+    by = _unless_zero(tuple(shift.affine(axis, cell) for axis in range(3)))
     found = Repeat(None if angle is None else angle[0], even, by, signs=reflected)
     return found, (turn.fixed & shift.fixed) - {0}
 
@@ -192,7 +199,10 @@ def _unless_zero(each: tuple[Affine, ...]) -> tuple[Affine, ...] | None:
 
 @dataclass(frozen=True)
 class _Measured:
-    """A solid at every row of parameters: ``linear`` (B, m) may follow them, ``still`` (B, c) must not move."""
+    """A solid at every row of parameters: ``linear`` (B, m) may follow them, ``still`` (B, c) must not move.
+
+    The last ``angles`` of its groups are in degrees.
+    """
 
     kind: str
     widths: tuple[int, ...]
@@ -201,15 +211,17 @@ class _Measured:
     axes: FloatArray | None = None
     vertices: FloatArray | None = None
     faces: npt.NDArray[np.int64] | None = None
+    angles: int = 0
 
 
 def _measured(solids: Solids) -> _Measured:
     size, centre = solids.size.numpy(), solids.centre.numpy()
     rows = len(size)
     if solids.form is not None:
-        groups = [argument.numpy().reshape(rows, -1) for argument in solids.form.arguments]
-        widths = tuple(group.shape[1] for group in groups)
-        return _Measured(solids.form.name, widths, np.concatenate(groups, 1), np.zeros((rows, 0)))
+        form = solids.form
+        groups = [argument.numpy().reshape(rows, -1) for argument in (*form.arguments, *form.angles)]
+        widths, linear = tuple(group.shape[1] for group in groups), np.concatenate(groups, 1)
+        return _Measured(form.name, widths, linear, np.zeros((rows, 0)), angles=len(form.angles))
     rotation = np.tile(np.eye(3), (rows, 1, 1)) if solids.rotation is None else solids.rotation.numpy()
     turned = bool(np.abs(rotation - np.eye(3)).max() > 0)
     name = primitives[solids.kind].name
@@ -258,17 +270,18 @@ class _Probe:
         used = {slot for slot in live if np.abs(slope[slot]).max(initial=0) > TOLERANCE}
         self.fixed = frozenset(range(declared.size)) - used
         self._here, self._value, self._slope, self._live = here, linear[0], slope, live
+        self._quantities = declared.quantities
 
-    def affine(self, column: int) -> Affine:
-        """One number as an expression."""
+    def affine(self, column: int, cell: float = 1.0, power: int = 1) -> Affine:
+        """One number as an expression; a length where ``power`` is 1, an angle where it is 0."""
         terms, constant = [], float(self._value[column])
         for slot in self._live:
             coefficient = round(float(self._slope[slot][column]), 9)
             if coefficient:
-                terms.append((slot, coefficient))
+                terms.append((slot, coefficient * cell ** (power - self._quantities[slot].spatial)))
                 constant -= coefficient * self._here[slot]
         constant = round(constant, 9) if terms else constant
-        return Affine(constant if abs(constant) > 1e-9 else 0.0, tuple(terms))
+        return Affine(constant * cell**power if abs(constant) > 1e-9 else 0.0, tuple(terms))
 
 
 def _evaluate(measure: Measure, rows: FloatArray) -> tuple[list[_Measured], FloatArray, FloatArray]:

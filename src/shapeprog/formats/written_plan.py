@@ -48,7 +48,7 @@ _OWN = re.compile(r"\w+_\d+_(signs|turns|shifts|shell)|at_[a-z]\d*")
 
 def script_plan(program: Program, reserved: Collection[str]) -> Plan:
     """The plan of a program for a script whose words are ``reserved``: numbers and functions called so get others."""
-    if program.source is None:
+    if program.source is None or program.source.plain:
         return plan(program)
     try:
         return _Planner(program, program.source, reserved).made
@@ -60,7 +60,7 @@ class _Planner:
     """Plans the lines of one program."""
 
     def __init__(self, program: Program, source: Source, reserved: Collection[str]) -> None:
-        self.made = Plan()
+        self.made = Plan(source.unit)
         self.functions = source.functions
         self.met = occurrences(source)
         self.counter: Counter[str] = Counter()
@@ -126,9 +126,9 @@ class _Planner:
     def _pieces(self, line: Line, node: Draw) -> tuple[list[Piece], frozenset[int]]:
         """The solids of a statement, which must be the same expressions of its numbers in every call around it."""
         declared = language()[node.name]
-        found, fixed = pieces(declared, node.values)
+        found, fixed = pieces(declared, node.values, self.made.cell)
         for other in {each.values for each in self.met[id(line)]} - {node.values}:
-            if not _same(found, pieces(declared, other)[0]):
+            if not _same(found, pieces(declared, other, self.made.cell)[0]):
                 raise Inexpressible
         return found, fixed
 
@@ -152,10 +152,10 @@ class _Planner:
 
     def _slots(self, line: WrittenDraw | WrittenLoop, node: Node) -> tuple[Slot, ...]:
         slots: list[Slot] = []
-        for value, number in zip(line.values, node.values, strict=True):
+        for value in line.values:
             text = self._text(value)
             loose = isinstance(value, Expression) and (value.level == 1 or text.startswith("-"))
-            slots.append((f"({text})" if loose else text) if isinstance(value, Expression) else number)
+            slots.append((f"({text})" if loose else text) if isinstance(value, Expression) else value)
         if isinstance(node, Loop):
             count = slots[0]
             slots[0] = f"round({self._text(line.values[0])})" if isinstance(count, str) else f"{count:.0f}"

@@ -17,10 +17,11 @@ Some = TypeVar("Some", bound="Batch")
 
 class Form(NamedTuple):
     """How a solid was constructed: the name of the construction, a function of scripts that are exported, and its
-    arguments (...) or (..., width) in order."""
+    arguments (...) or (..., width) in order, first coordinates and lengths, then angles."""
 
     name: str
     arguments: tuple[Tensor, ...]
+    angles: tuple[Tensor, ...] = ()
 
 
 @dataclass(frozen=True)

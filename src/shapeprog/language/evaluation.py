@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -29,22 +29,22 @@ MOST_STATEMENTS = 1 << 16
 
 
 def evaluated(source: Source) -> Program:
-    """The program that is written so; one without names, expressions and functions is its statements alone.
+    """The program that is written so; one in cells without names, expressions and functions is its statements alone.
 
     Raises
     ------
     Fault
         If a name, function, argument or number in it is wrong.
     """
-    if source.plain:
+    if source.plain and source.unit is None:
         return Program(expanded(source))
-    source = Source(_tidied(source.lines))
+    source = replace(source, lines=_tidied(source.lines))
     check(source)
     return Program(expanded(source), source)
 
 
 def expanded(source: Source) -> tuple[Node, ...]:
-    """The statements and loops of a program, with the numbers of its expressions in place of them.
+    """The statements and loops of a program, with the numbers of its expressions in place of them, in cells.
 
     Raises
     ------
@@ -52,6 +52,11 @@ def expanded(source: Source) -> tuple[Node, ...]:
         If an expression has no value, a number does not fit its place, or there are more than ``MOST_STATEMENTS``.
     """
     return tuple(_Run(source, None).block(source.lines, {}, 0, 0))
+
+
+def in_own_unit(source: Source) -> tuple[Node, ...]:
+    """The statements and loops of a program with the numbers that its text comes to, in its unit instead of cells."""
+    return expanded(replace(source, unit=None))
 
 
 @dataclass(frozen=True)
@@ -90,6 +95,7 @@ class _Run:
 
     def __init__(self, source: Source, given: Mapping[str, Any] | None) -> None:
         self.given = given
+        self.unit = source.unit
         self.functions = source.functions
         self.outermost: dict[str, Any] = {}
         self.made = 0
@@ -159,10 +165,10 @@ class _Run:
 
     def _values(self, line: WrittenDraw | WrittenLoop, scope: dict[str, Any]) -> tuple[Any, ...]:
         if not any(isinstance(value, Expression) for value in line.values):
-            return line.values
+            return self._in_cells(line, line.values)
         numbers = [_at(line, slot, value, scope) for slot, value in enumerate(line.values)]
         if self.given is not None:
-            return tuple(numbers)
+            return self._in_cells(line, numbers)
         for parameter in language()[line.name].parameters:
             slots = parameter.slots
             written = [isinstance(value, Expression) for value in line.values[slots]]
@@ -172,7 +178,22 @@ class _Run:
                 except ShapeProgError as mistake:
                     key = slots.start + written.index(True)
                     raise Fault(line, mistake.message, mistake.hint, key) from None
-        return tuple(numbers)
+        return self._in_cells(line, numbers)
+
+    def _in_cells(self, line: WrittenDraw | WrittenLoop, numbers: Sequence[Any]) -> tuple[Any, ...]:
+        """The numbers of a statement or loop, of which coordinates and lengths are in the unit of the text."""
+        if self.unit is None:
+            return tuple(numbers)
+        found = list(numbers)
+        for slot, quantity in enumerate(language()[line.name].quantities):
+            if quantity.spatial:
+                found[slot] = numbers[slot] / self.unit.per_cell
+                if self.given is None:
+                    try:
+                        found[slot] = to_float32(found[slot])
+                    except ShapeProgError as mistake:
+                        raise Fault(line, "in cells this number is too large", mistake.hint, slot) from None
+        return tuple(found)
 
 
 def _role(line: WrittenDraw, around: str) -> str:

@@ -14,7 +14,16 @@ from shapeprog.language.evaluation import evaluated
 from shapeprog.language.expression import Expression, Name, Value
 from shapeprog.language.parameters import to_float32
 from shapeprog.language.program import Program
-from shapeprog.language.source import Assignment, Call, Function, Line, Source, WrittenDraw, WrittenLoop
+from shapeprog.language.source import (
+    Assignment,
+    Call,
+    Function,
+    Line,
+    Source,
+    WrittenDraw,
+    WrittenLoop,
+    with_values,
+)
 from shapeprog.language.statement import language
 from shapeprog.language.text import numbers_written, source_of
 
@@ -22,7 +31,7 @@ from shapeprog.language.text import numbers_written, source_of
 def numbers(program: Program) -> int:
     """How many continuous numbers make a program: all that are written, or those that are free where others follow from
     names; counts and steps of loops are none."""
-    if program.source is not None:
+    if program.source is not None and not program.source.plain:
         return free_numbers(program)
     return sum(numbers_written(node) for node in program.walk())
 
@@ -45,7 +54,8 @@ def multiplied(program: Program, place: int, factor: float) -> Program:
     """
     source, counter = source_of(program), count()
     counts = _Counts(source)
-    return evaluated(Source(tuple(_changed(line, counts, counter, place, factor) for line in source.lines)))
+    lines = tuple(_changed(line, counts, counter, place, factor) for line in source.lines)
+    return evaluated(replace(source, lines=lines))
 
 
 class _Counts:
@@ -103,17 +113,8 @@ def _changed(line: Line, counts: _Counts, counter: Iterator[int], place: int, fa
         to_float32(value * factor) if free and not isinstance(value, Expression) and next(counter) == place else value
         for value, free in _numbers(line, counts)
     ]
-    if isinstance(line, WrittenDraw):
-        return replace(line, values=tuple(values))
-    if isinstance(line, WrittenLoop):
-        body = tuple(_changed(inner, counts, counter, place, factor) for inner in line.body)
-        return replace(line, values=tuple(values), body=body)
-    if isinstance(line, Assignment):
-        named = zip(line.numbers, values, strict=True)
-        return replace(line, numbers=tuple((name, value) for (name, _), value in named))
-    if isinstance(line, Call):
-        given = zip(line.arguments, values, strict=True)
-        return replace(line, arguments=tuple((name, value) for (name, _), value in given))
-    if isinstance(line, Function):
-        return replace(line, body=tuple(_changed(inner, counts, counter, place, factor) for inner in line.body))
-    return line
+    found = line if isinstance(line, Function) else with_values(line, values)
+    if isinstance(found, WrittenLoop | Function):
+        body = tuple(_changed(inner, counts, counter, place, factor) for inner in found.body)
+        return replace(found, body=body)
+    return found

@@ -6,11 +6,12 @@ from collections.abc import Generator, Mapping
 from dataclasses import dataclass, replace
 
 from shapeprog.errors import ShapeProgError, did_you_mean
-from shapeprog.language.evaluation import evaluated
+from shapeprog.language.evaluation import evaluated, in_own_unit
 from shapeprog.language.expression import Expression, Value, text_of, value_at
 from shapeprog.language.parameters import to_float32
 from shapeprog.language.program import Program
 from shapeprog.language.source import Assignment, Comment, Function, Line, Source, WrittenLoop, values
+from shapeprog.language.text import line_of
 
 
 @dataclass(frozen=True)
@@ -20,7 +21,7 @@ class Named:
     Parameters
     ----------
     name, value
-        What it is called, and the number that it stands for.
+        What it is called, and the number that it stands for; lengths are in the unit of the text.
     text
         How it is written: a number, or an expression of others.
     free
@@ -37,8 +38,10 @@ class Named:
 
 
 def inline(program: Program) -> Program:
-    """The program written out: statements and loops with plain numbers."""
-    return Program(program.body)
+    """The program written out: statements and loops with plain numbers, in the unit of its text."""
+    if program.source is None or program.unit is None:
+        return Program(program.body)
+    return evaluated(Source(tuple(map(line_of, in_own_unit(program.source))), program.unit))
 
 
 def names(program: Program) -> list[Named]:
@@ -50,7 +53,8 @@ def names(program: Program) -> list[Named]:
         return []
     known: dict[str, float] = {}
     rows: dict[str, list[int]] = {name: [] for name in program.source.numbers}
-    for row, line, local in _rows(program.source.lines, 1, frozenset()):
+    first = 1 if program.unit is None else 2
+    for row, line, local in _rows(program.source.lines, first, frozenset()):
         used = {name.name for value in values(line) if isinstance(value, Expression) for name in value.names()}
         for name in used - local:
             rows[name].append(row)
@@ -62,7 +66,7 @@ def names(program: Program) -> list[Named]:
 
 
 def set(program: Program, changes: Mapping[str, float] | None = None, /, **numbers: float) -> Program:
-    """The program with other numbers for some of its names: ``set(program, seat=11)``.
+    """The program with other numbers for some of its names, in the unit of its text: ``set(program, seat=11)``.
 
     Raises
     ------
@@ -83,7 +87,7 @@ def set(program: Program, changes: Mapping[str, float] | None = None, /, **numbe
             others = dict.fromkeys(each.name for each in value.names())
             cure = f"set {' or '.join(others)}, or edit the text"
             raise ShapeProgError(f"{name} follows from other numbers: {name} = {value}", cure)
-    return evaluated(Source(tuple(_set(line, wanted) for line in source.lines)))
+    return evaluated(replace(source, lines=tuple(_set(line, wanted) for line in source.lines)))
 
 
 def _set(line: Line, wanted: Mapping[str, float]) -> Line:

@@ -62,6 +62,11 @@ class Quantity:
     each: str = ""
 
     @property
+    def spatial(self) -> bool:
+        """Whether the numbers are coordinates or lengths, which text may write in another unit than cells."""
+        return self.kind in ("position", "length", "shift")
+
+    @property
     def discrete(self) -> bool:
         """Whether the numbers are whole and carry no gradient."""
         return self.kind in ("count", "turn", "axis")
@@ -120,7 +125,7 @@ Place = Annotated[Tensor, Quantity("position", 1, -HALF, HALF)]
 class Parameter:
     """One named parameter of a statement and the first of the tensor slots it takes.
 
-    A parameter of one number may have a default, which goes without saying in program text.
+    A parameter of one number may have a default, which goes without saying in program text and is in its unit.
     """
 
     name: str

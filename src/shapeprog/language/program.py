@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from shapeprog.language.source import Source
+from shapeprog.language.unit import Unit
 
 PUBLISHED_DEPTH = 3
 """Steps of one block in the published generator."""
@@ -62,6 +63,11 @@ class Program:
 
     body: tuple[Node, ...] = ()
     source: Source | None = None
+
+    @property
+    def unit(self) -> Unit | None:
+        """The unit of the lengths in its text; ``None`` for cells, which those of ``body`` are in always."""
+        return None if self.source is None else self.source.unit
 
     @property
     def chains(self) -> list[Chain]:

@@ -71,7 +71,7 @@ def cone_between(start: Vector, end: Vector, radii: Pair) -> Solids:
 
 def tilted_box(at: Vector, size: Vector, tilt: Scalar) -> Solids:
     """A cuboid from its low, front, left corner, turned to the rear by ``tilt`` degrees about its bottom front edge."""
-    form = Form("tilted_box", (at, size, tilt))
+    form = Form("tilted_box", (at, size), (tilt,))
     rotation = about_axis(torch.full_like(tilt, SIDE, dtype=torch.long), tilt)
     half = size / 2
     return solid(CUBOID, at + (rotation @ half[..., None])[..., 0], *half.unbind(-1), rotation=rotation, form=form)
@@ -80,7 +80,7 @@ def tilted_box(at: Vector, size: Vector, tilt: Scalar) -> Solids:
 def bar_between(start: Vector, end: Vector, section: Pair, turn: Scalar) -> Solids:
     """A cuboid between two points, turned about them by ``turn`` degrees: the sides of its section lie along the grid
     axes that it runs along least, in their order, and are leaned with it."""
-    form = Form("bar_between", (start, end, section, turn))
+    form = Form("bar_between", (start, end, section), (turn,))
     along = end - start
     length = safe_norm((along**2).sum(-1))
     main = along.detach().abs().argmax(-1)

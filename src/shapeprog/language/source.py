@@ -5,11 +5,12 @@ What it means is found in :mod:`shapeprog.language.evaluation`, its text in :mod
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
 from typing import TypeAlias
 
 from shapeprog.language.expression import Expression, Value
+from shapeprog.language.unit import Unit
 
 
 @dataclass(frozen=True)
@@ -75,9 +76,10 @@ Line: TypeAlias = Comment | Assignment | WrittenDraw | WrittenLoop | Call | Func
 
 @dataclass(frozen=True)
 class Source:
-    """A program as its lines, in the order of the text."""
+    """A program as its lines, in the order of the text, and the unit of its lengths, cells where there is none."""
 
     lines: tuple[Line, ...] = ()
+    unit: Unit | None = None
 
     @property
     def plain(self) -> bool:
@@ -115,6 +117,22 @@ def values(line: Line) -> tuple[Value, ...]:
             return tuple(default for _, default in line.parameters if default is not None)
         case _:
             return ()
+
+
+def with_values(line: Line, found: Iterable[Value]) -> Line:
+    """The line with other numbers and expressions, as many as :func:`values` gives."""
+    new = iter(found)
+    match line:
+        case WrittenDraw() | WrittenLoop():
+            return replace(line, values=tuple(new))
+        case Assignment(pairs):
+            return replace(line, numbers=tuple((name, next(new)) for name, _ in pairs))
+        case Call(arguments=pairs):
+            return replace(line, arguments=tuple((name, next(new)) for name, _ in pairs))
+        case Function(parameters=given):
+            return replace(line, parameters=tuple((name, None if v is None else next(new)) for name, v in given))
+        case _:
+            return line
 
 
 def names_of(source: Source) -> set[str]:

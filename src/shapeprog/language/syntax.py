@@ -27,6 +27,7 @@ from shapeprog.language.source import (
     tidy,
 )
 from shapeprog.language.statement import Statement, language
+from shapeprog.language.unit import read_unit
 
 _CALL = "name(parameter=number, ...)"
 
@@ -35,16 +36,18 @@ def parse(text: str, name: str = "<program>") -> Program:
     """The program of a text: drawing statements, ``for`` loops over calls of loops, named numbers and functions.
 
     Wherever a number may stand, an expression of numbers and names with + - * / may.  Numbers are rounded to float32.
-    Comments are kept where there are names, expressions or functions; any other program is its statements alone.  A
-    ``ProgramError`` says where in ``name``, such as a path, a mistake is, and the nearest name or the legal range.
+    Comments are kept where there are names, expressions, functions or a unit; any other program is its statements
+    alone.  A ``ProgramError`` says where in ``name``, such as a path, a mistake is, and the nearest name or the legal
+    range.
     """
     whole = Text(text, name)
     tree = whole.tree()
+    unit, lines = read_unit(whole, tree.body[0].lineno if tree.body else math.inf)
     reader = _Reader(whole, tree, Comments())
-    source = Source(reader.body(tree.body))
-    if not source.plain:  # comments take time, and are looked for where they are kept
-        reader = _Reader(whole, tree, Comments(whole.lines))
-        source = Source(reader.body(tree.body))
+    source = Source(reader.body(tree.body), unit)
+    if not source.plain or unit is not None:  # comments take time, and are looked for where they are kept
+        reader = _Reader(whole, tree, Comments(lines))
+        source = Source(reader.body(tree.body), unit)
     try:
         reader.check_variables(source)
         return evaluated(source)

@@ -26,6 +26,7 @@ from shapeprog.language.source import (
 )
 from shapeprog.language.statement import Statement, language
 from shapeprog.language.syntax import parse as parse
+from shapeprog.language.unit import HEAD
 
 INDENT = "    "
 """One level of indentation."""
@@ -43,7 +44,9 @@ def format_program(program: Program) -> str:
 
 def format_source(source: Source) -> str:
     """The canonical text of a program as it is written, see :func:`format_program`."""
-    text = "".join(f"{line}\n" for line in _lines(source.lines, 0, 0, names_of(source) | {*source.functions}))
+    head = [] if source.unit is None else [source.unit.header]
+    lines = _lines(source.lines, 0, 0, names_of(source) | {*source.functions})
+    text = "".join(f"{line}\n" for line in [*head, *lines])
     if len(text) > LONGEST:
         raise ShapeProgError(f"the text of this program has more than {LONGEST:,} letters", "keep it as .json")
     return text
@@ -51,13 +54,14 @@ def format_source(source: Source) -> str:
 
 def source_of(program: Program) -> Source:
     """A program as it is written; one without names as its statements and loops."""
-    return program.source or Source(tuple(map(_written, program.body)))
+    return program.source or Source(tuple(map(line_of, program.body)))
 
 
-def _written(node: Node) -> Line:
+def line_of(node: Node) -> WrittenDraw | WrittenLoop:
+    """A statement or loop as it is written."""
     if isinstance(node, Draw):
         return WrittenDraw(node.name, node.values, node.role)
-    return WrittenLoop(node.name, node.values, tuple(map(_written, node.body)))
+    return WrittenLoop(node.name, node.values, tuple(map(line_of, node.body)))
 
 
 def numbers_written(node: Node) -> int:
@@ -91,6 +95,8 @@ def _lines(lines: Iterable[Line], depth: int, loops: int, taken: set[str]) -> It
     indent, empty = INDENT * depth, True
     for line in lines:
         if isinstance(line, Comment):
+            if not depth and line.text.startswith(HEAD):
+                raise ShapeProgError(f"the comment {line.text!r} would be read as the unit of the text", "reword it")
             yield f"{indent}# {_remark(line.text)}" if line.text else ""
             continue
         empty = False

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from shapeprog.errors import ShapeProgError
+from shapeprog.language.converting import in_unit
 from shapeprog.language.evaluation import evaluated
 from shapeprog.language.expression import Expression, Linear
 from shapeprog.language.program import Program
@@ -35,8 +36,15 @@ def with_library(program: Program, library: Library) -> Program:
     """The same program with calls of functions of a library wherever that is shorter; itself if that is nowhere.
 
     It draws the same within ``TOLERANCE`` cells.  The functions that it calls stand in it, below the numbers that it
-    names; ties are kept, as arguments are expressions of its names.
+    names; ties are kept, as arguments are expressions of its names.  Its lengths stay in their unit.
     """
+    if program.unit is not None:
+        try:
+            plain = in_unit(program, None)
+        except ShapeProgError:  # one of its names is a length in one place only
+            return program
+        found = with_library(plain, library)
+        return program if found is plain else in_unit(found, program.unit)
     source = source_of(program)
     words = {*names_of(source), *source.functions}
     usable = [

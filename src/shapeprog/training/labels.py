@@ -7,7 +7,7 @@ perhaps a ``snapped`` one, each as text or in the JSON form; or as a folder of N
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -145,14 +145,18 @@ def _read(source: Path, form: Form) -> Iterator[tuple[str, Program]]:
 
 
 def _entry(line: str, form: Form, where: str) -> tuple[str, Program]:
+    from shapeprog.formats.json_form import Result
     from shapeprog.formats.json_lines import program_from_entries
     from shapeprog.language.text import parse
 
     try:
-        told: Mapping[str, Any] = json.loads(line)
+        told: dict[str, Any] = json.loads(line)
         name, program = str(told["name"]), told.get(form, told["program"])
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise InputError(
             f"{where} is no label", "each line is a JSON object with a name and a program, as 'shapeprog label' writes"
         ) from error
-    return name, parse(program, where) if isinstance(program, str) else program_from_entries(program, where, "program")
+    if isinstance(program, str):
+        return name, parse(program, where)
+    unit = None if form == "snapped" and form in told else Result(where, told).unit
+    return name, program_from_entries(program, where, "program", unit)

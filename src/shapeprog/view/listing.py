@@ -2,18 +2,31 @@
 
 from __future__ import annotations
 
+import math
 from collections import defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 from shapeprog.language.expression import Value, with_numbers
 from shapeprog.language.program import Program
-from shapeprog.language.source import Assignment, Call, Comment, Function, Line, Source, WrittenDraw, WrittenLoop
+from shapeprog.language.source import (
+    Assignment,
+    Call,
+    Comment,
+    Function,
+    Line,
+    Source,
+    WrittenDraw,
+    WrittenLoop,
+    values,
+    with_values,
+)
 from shapeprog.language.statement import language
 from shapeprog.language.text import format_source, source_of
+from shapeprog.language.unit import Unit
 
 DIGITS = 2
-"""Decimals that are shown; files keep all of them."""
+"""Decimals that are shown of numbers in cells; files keep all of them."""
 
 
 @dataclass(frozen=True)
@@ -42,9 +55,17 @@ def listing(program: Program, digits: int | None = DIGITS) -> list[Shown]:
     """The lines of a program as it is written, with numbers rounded for reading unless ``digits`` is None."""
     source = source_of(program)
     if digits is not None:
-        source = Source(tuple(_rounded(line, digits) for line in source.lines))
+        kept = digits_in(source.unit, digits)
+        source = replace(source, lines=tuple(_rounded(line, kept) for line in source.lines))
     drawn = _Drawn(source)
-    return list(_shown(source.lines, iter(format_source(source).splitlines()), drawn.blocks))
+    texts = iter(format_source(source).splitlines())
+    head = [] if source.unit is None else [Shown(next(texts), "", None, ())]
+    return [*head, *_shown(source.lines, texts, drawn.blocks)]
+
+
+def digits_in(unit: Unit | None, digits: int = DIGITS) -> int:
+    """Decimals in a unit that are worth as much as so many in cells."""
+    return digits if unit is None else max(0, digits - math.floor(math.log10(unit.per_cell)))
 
 
 def parted(line: Shown) -> tuple[str, str, str]:
@@ -117,17 +138,7 @@ def _rounded(line: Line, digits: int) -> Line:
     def short(value: Value) -> Value:
         return with_numbers(value, lambda number: round(number, digits) + 0.0)
 
-    match line:
-        case WrittenDraw():
-            return replace(line, values=tuple(map(short, line.values)))
-        case WrittenLoop():
-            body = tuple(_rounded(inner, digits) for inner in line.body)
-            return replace(line, values=tuple(map(short, line.values)), body=body)
-        case Assignment():
-            return replace(line, numbers=tuple((name, short(value)) for name, value in line.numbers))
-        case Call():
-            return replace(line, arguments=tuple((name, short(value)) for name, value in line.arguments))
-        case Function():
-            given = tuple((name, None if value is None else short(value)) for name, value in line.parameters)
-            return replace(line, parameters=given, body=tuple(_rounded(inner, digits) for inner in line.body))
-    return line
+    found = with_values(line, map(short, values(line)))
+    if isinstance(found, WrittenLoop | Function):
+        return replace(found, body=tuple(_rounded(inner, digits) for inner in found.body))
+    return found

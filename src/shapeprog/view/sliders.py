@@ -14,15 +14,17 @@ import numpy as np
 
 from shapeprog.errors import ShapeProgError
 from shapeprog.formats.parts import Part, part_normals, parts
-from shapeprog.language.named import names, set
+from shapeprog.language.converting import lengths
+from shapeprog.language.named import Named, names, set
 from shapeprog.language.program import Program
+from shapeprog.language.unit import Unit
 from shapeprog.space import Array
 
 SHARES = (0.5, 0.75, 1.25, 1.5)
 """Values that are drawn, as shares of what a number is."""
 
 LEAST = 1.0
-"""What stands for a number smaller than this, so that a zero can be dragged, too; in its own unit."""
+"""What stands for a number smaller than this, so that a zero can be dragged, too; of lengths, in cells."""
 
 STRAIGHT = 1e-3
 """Difference in cells below which corners count as going straight."""
@@ -41,6 +43,8 @@ class Slider:
         What it is called, and what it is.
     low, high
         How far it may be dragged.
+    unit
+        What it is in if it is a length in another unit than cells, else nothing.
     places
         For some other values the corners (F, 3, 6) of the triangles of each part, positions and normals; ``None`` for
         parts that stay where they are.  One value is enough where all corners go straight.
@@ -50,6 +54,7 @@ class Slider:
     value: float
     low: float
     high: float
+    unit: str
     places: dict[float, list[Array | None]]
 
 
@@ -64,7 +69,8 @@ def sliders(program: Program, drawn: Sequence[Part]) -> list[Slider]:
     free = [named for named in names(program) if named.free]
     if len(free) * len(SHARES) * sum(3 * len(part.faces) for part in drawn) > MOST:
         return []
-    found = (_slider(program, drawn, named.name, named.value) for named in free)
+    unit, measured = program.unit, lengths(program)
+    found = (_slider(program, drawn, named, unit if named.name in measured else None) for named in free)
     return [slider for slider in found if slider is not None]
 
 
@@ -97,9 +103,10 @@ def corners_of(drawn: Sequence[Part]) -> list[Array]:
     ]
 
 
-def _slider(program: Program, drawn: Sequence[Part], name: str, value: float) -> Slider | None:
-    start = corners_of(drawn)
-    size = max(abs(value), LEAST) * (1.0 if value >= 0 else -1.0)
+def _slider(program: Program, drawn: Sequence[Part], named: Named, unit: Unit | None) -> Slider | None:
+    start, name, value = corners_of(drawn), named.name, named.value
+    least = LEAST if unit is None else LEAST * unit.per_cell
+    size = max(abs(value), least) * (1.0 if value >= 0 else -1.0)
     places = dict(_places(program, drawn, start, name, [value + (share - 1) * size for share in SHARES]))
     if not places or all(part is None for found in places.values() for part in found):
         return None
@@ -110,7 +117,7 @@ def _slider(program: Program, drawn: Sequence[Part], name: str, value: float) ->
         for at, found in places.items()
         for before, there, last in zip(start, found, places[far], strict=True)
     )
-    return Slider(name, value, low, high, {far: places[far]} if straight else places)
+    return Slider(name, value, low, high, unit.name if unit else "", {far: places[far]} if straight else places)
 
 
 def _places(

@@ -93,7 +93,7 @@ function marks() { for (const b of bar.children) b.className = b.textContent ===
 marks();
 
 // Numbers to drag: corners go straight between the places that the page was given for some values of each.
-const panel = document.getElementById("numbers"), short = (value) => String(Math.round(100 * value) / 100);
+const panel = document.getElementById("numbers"), fine = 10 ** data.digits, short = (value) => String(Math.round(fine * value) / fine);
 data.sliders.forEach((slider) => {
   const label = document.createElement("label"), input = document.createElement("input"), shown = document.createElement("output");
   label.textContent = label.htmlFor = input.id = slider.name;
@@ -102,7 +102,7 @@ data.sliders.forEach((slider) => {
   slider.places = slider.places.map((place) => ({ ...place, parts: place.parts.map((part) => part && unpack(part, Float32Array)) }));
   slider.show = () => {
     input.value = slider.now;
-    shown.textContent = short(slider.now);
+    shown.textContent = slider.unit ? `${short(slider.now)} ${slider.unit}` : short(slider.now);
     for (const { found, text } of written[slider.name] || []) found.textContent = slider.now === slider.value ? text : short(slider.now);
   };
   input.oninput = () => { slider.now = Number(input.value); slider.show(); move(); draw(); };

@@ -18,7 +18,7 @@ from shapeprog.formats.colours import colour
 from shapeprog.formats.parts import parts
 from shapeprog.language.program import Program
 from shapeprog.space import Array
-from shapeprog.view.listing import listing, parted
+from shapeprog.view.listing import digits_in, listing, parted
 from shapeprog.view.model import FINE, of_cells, of_shape
 from shapeprog.view.page import readable, scores_text
 from shapeprog.view.sliders import Slider, corners_of, pieces, sliders
@@ -64,6 +64,7 @@ def viewer(
             for part, corners in zip(drawn, corners_of(drawn), strict=True)
         ],
         "sliders": [_slider(slider) for slider in movable],
+        "digits": digits_in(program.unit),
         "input": None if model is None else _buffers(np.concatenate([model.vertices[model.faces], model.normals], -1)),
     }
     text = json.dumps(content, separators=(",", ":")).replace("<", "\\u003c")
@@ -86,7 +87,8 @@ def _slider(slider: Slider) -> dict[str, Any]:
         {"at": at, "parts": [None if part is None else _packed(_turned(part)) for part in found]}
         for at, found in sorted(slider.places.items())
     ]
-    return {"name": slider.name, "value": slider.value, "low": slider.low, "high": slider.high, "places": places}
+    ends = {"low": slider.low, "high": slider.high, "unit": slider.unit}
+    return {"name": slider.name, "value": slider.value, **ends, "places": places}
 
 
 def _buffers(corners: Array) -> dict[str, str]:

@@ -1,0 +1,135 @@
+"""Commands that are asked for lengths in a unit of the object."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from commands import FRAME, PROGRAM, Run, table
+
+from shapeprog import inference
+from shapeprog.formats import export, load, load_with_frame
+from shapeprog.inference.readable import in_readable_unit
+from shapeprog.language.converting import in_unit
+from shapeprog.language.free import numbers
+from shapeprog.language.named import names
+from shapeprog.language.text import parse
+from shapeprog.language.unit import Unit
+
+NAMED = """\
+width, n = 8, 2
+span = width - 2
+top_square(at=(4, 0, 0), thickness=1.5, half=width / 2)
+for i in translate(n, by=(0, 0, span)):
+    leg(at=(-12, -4, -4), size=(16, 2, 2))
+"""
+
+
+@pytest.fixture(autouse=True)
+def quick(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Inference that always finds the same table, at once."""
+
+    def infer(shape, **_):
+        return inference.Result(PROGRAM, PROGRAM.snap(), {}, "Stopped at once.", (), seconds=0.1)
+
+    monkeypatch.setattr(inference, "infer", infer)
+
+
+def wide(program: Path) -> np.ndarray:
+    """The sides of what a program draws in the world, from its exported mesh."""
+    return np.ptp(trimesh.load(program, force="mesh").bounds, axis=0)
+
+
+@pytest.mark.parametrize(("options", "per_cell"), [((), 100 / 12), (("--file-unit", "mm"), 0.1 / 12)])
+def test_infer_writes_programs_in_the_unit_of_the_object(
+    run: Run, tmp_path: Path, options: tuple[str, ...], per_cell: float
+) -> None:
+    ended = run("infer", table(tmp_path / "table.obj"), "--unit", "cm", *options, "--out", "res", "--no-picture")
+    assert ended.code == 0, ended.err
+    assert "# unit: cm, " in ended.out
+    assert ("taken for a metre" in ended.out) == (not options)
+    assert "IoU 1.000" in ended.out
+    program, frame = load_with_frame(tmp_path / "res" / "table.shape")
+    assert program.unit == Unit("cm", per_cell)
+    assert program == load(tmp_path / "res" / "table.json") == in_readable_unit(PROGRAM, program.unit)
+    assert json.loads((tmp_path / "res" / "table.json").read_text())["scores"]["statements"] == 4
+    assert numbers(program) == numbers(PROGRAM)
+    source = trimesh.load(tmp_path / "table.obj", force="mesh").bounds
+    assert run("export", "res/table.shape", "again.glb").code == 0
+    for made in ("res/table.glb", "again.glb"):
+        np.testing.assert_allclose(trimesh.load(tmp_path / made).bounds, source, atol=0.002)
+    assert frame is not None
+    for name in ("table.shape", "table.json"):
+        ended = run("evaluate", f"res/{name}", "table.obj", "--json")
+        assert json.loads(ended.out)["rows"][0]["iou"] == 1, ended.err
+
+
+def test_baselines_are_in_the_unit_too(run: Run, tmp_path: Path) -> None:
+    ended = run("infer", table(tmp_path / "table.obj"), "--baseline", "--unit", "in", "--no-picture", "--out", "res")
+    assert ended.code == 0, ended.err
+    unit = load(tmp_path / "res" / "table.shape").unit
+    assert unit is not None
+    assert unit.name == "in"
+
+
+def test_export_writes_programs_in_another_unit(run: Run, tmp_path: Path) -> None:
+    export(parse(NAMED), tmp_path / "legs.shape", FRAME)
+    assert run("export", "legs.shape", "cm.shape", "--unit", "cm").code == 0
+    there, frame = load_with_frame(tmp_path / "cm.shape")
+    assert there == in_readable_unit(parse(NAMED), Unit("cm", 100 / 12))
+    assert "width, n = 66.7, 2" in (tmp_path / "cm.shape").read_text()
+    assert run("export", "cm.shape", "mm.json", "--unit", "mm", "--set", "width=80").code == 0
+    other, kept = load_with_frame(tmp_path / "mm.json")
+    assert kept == frame
+    assert [each.value for each in names(other)] == [800, 2, 633]
+    assert run("export", "mm.json", "back.shape", "--unit", "cells").code == 0
+    assert (tmp_path / "back.shape").read_text().splitlines()[1] == "width, n = 9.6, 2"
+
+
+def test_without_a_frame_files_count_in_the_unit_of_the_program(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "cells.shape").write_text(NAMED)
+    export(in_unit(parse(NAMED), Unit("cm", 4)), tmp_path / "cm.shape")
+    for name in ("cells", "cm"):
+        assert run("export", f"{name}.shape", f"{name}.stl", f"{name}.glb").code == 0
+    for suffix in (".stl", ".glb"):
+        np.testing.assert_allclose(wide(tmp_path / f"cm{suffix}"), 4 * wide(tmp_path / f"cells{suffix}"), rtol=1e-4)
+
+
+def test_tidy_keeps_the_unit_or_takes_another(run: Run, tmp_path: Path) -> None:
+    there = in_unit(parse(NAMED), Unit("cm", 4))
+    export(there, tmp_path / "table.shape", FRAME)
+    for options, name in (((), "cm"), (("--unit", "mm"), "mm"), (("--unit", "cells"), "cells")):
+        ended = run("tidy", "table.shape", "out.shape", *options)
+        assert ended.code == 0, ended.err
+        found = load(tmp_path / "out.shape")
+        assert (found.unit.name if found.unit else "cells") == name
+        for one, two in zip(found.walk(), there.walk(), strict=True):
+            np.testing.assert_allclose(one.values, two.values, atol=0.2)
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["infer", "table.obj", "--unit", "furlong"], "--unit: no unit is called 'furlong'"),
+        (["infer", "table.obj", "--unit", "cm", "--file-unit", "CM"], "did you mean cm?"),
+        (["infer", "table.obj", "--file-unit", "mm"], "say --unit cm as well"),
+        (["tidy", "legs.shape", "--unit", "cm"], "legs.shape does not say how large its cells are"),
+        (["export", "legs.shape", "a.scad", "--unit", "cm"], "put its frame at its top"),
+        (["export", "mixed.shape", "a.shape", "--unit", "cm"], "n stands for a length in one place"),
+        (["export", "bad.shape", "a.stl"], "bad.shape, line 2, column 9: no unit is called 'c'"),
+    ],
+)
+def test_units_that_cannot_be_are_told(run: Run, tmp_path: Path, words: list[str], told: str) -> None:
+    table(tmp_path / "table.obj")
+    (tmp_path / "legs.shape").write_text(NAMED)
+    export(parse(NAMED.replace("by=(0, 0, span)", "by=(0, span, n)")), tmp_path / "mixed.shape", FRAME)
+    (tmp_path / "bad.shape").write_text(
+        '# frame: {"scale": 1, "centre": [0, 0, 0], "axes": [[1, 0, 0], [0, 1, 0], [0, 0, 1]]}\n# unit: c, 3 per cell\n'
+    )
+    ended = run(*words)
+    assert ended.code == 2
+    assert told in " ".join(ended.err.split())
+    assert "Traceback" not in ended.err

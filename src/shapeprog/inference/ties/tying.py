@@ -24,6 +24,7 @@ from shapeprog.inference.ties.fitting import CLOSED, Misfit, refitted
 from shapeprog.inference.ties.naming import written
 from shapeprog.inference.ties.pricing import worthwhile
 from shapeprog.inference.ties.relations import relations
+from shapeprog.inference.ties.runs import runs
 from shapeprog.inference.tunable import CELLS, DEGREES, Tunable
 from shapeprog.language.free import free_numbers
 from shapeprog.language.program import Draw, Program
@@ -90,8 +91,10 @@ def tie(
                 progress("tying numbers", (round_ + 1) / ROUNDS)
             if len(rows) == before:
                 break
-        basis = _rounded(simplest(known, numbers, rows, np.append(tunable.are("length").numpy(), [False] * 3)))
-        named = written(tunable, basis)
+        repeated = list(runs(tunable))
+        lengths = np.append(tunable.are("length").numpy(), [False] * 3)
+        basis = _rounded(simplest(known, numbers, rows, lengths, repeated))
+        named = written(tunable, basis, repeated)
         return Tied(named, free_numbers(named))
 
 

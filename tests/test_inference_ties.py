@@ -242,7 +242,7 @@ def test_gaps_beside_a_run_are_those_between_its_copies():
 STACK = """
 for i in mirror(side):
     side(box(at=(-12, -4, 8), size=(24, 8, 1)))
-for i in translate(4, by=(7.67, 0, 0)):
+for i in translate(4, by=(7.67, 0.01, 0)):
     shelf(box(at=(-12, -4, -8), size=(1, 8, 16)))
 """
 

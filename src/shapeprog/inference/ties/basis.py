@@ -13,7 +13,6 @@ from typing import Literal
 import numpy as np
 
 from shapeprog.inference.ties.features import Feature
-from shapeprog.inference.ties.fitting import ways_free
 from shapeprog.inference.ties.runs import Run
 from shapeprog.inference.ties.sums import SAME, Flags, cost_of_terms, nearest_quarter
 from shapeprog.space import DEPTH, SIDE, UP, Array, FloatArray
@@ -92,23 +91,20 @@ def measures(known: list[Feature], numbers: FloatArray, runs: Sequence[Run]) -> 
             yield Measure("inset", each, whole[each.axis] / 2 + nearest * each.row)
 
 
-def simplest(
-    known: list[Feature], numbers: FloatArray, rows: FloatArray, lengths: Flags, runs: Sequence[Run] = ()
-) -> Basis:
+def simplest(known: list[Feature], numbers: FloatArray, ways: FloatArray, lengths: Flags, runs: Sequence[Run]) -> Basis:
     """The measures from which every number of the program is the simplest sum.
 
     Parameters
     ----------
     numbers
         The numbers and extents (V,), for which the relations hold.
-    rows
-        The relations (M, V).
+    ways
+        A basis (V, Z) of the numbers for which they hold.
     lengths
         Which numbers are lengths (V,).
     runs
         The steps that may be written as a share of a span.
     """
-    ways = ways_free(rows, len(numbers))
     every = list(measures(known, numbers, runs))
     seen = np.stack([each.row for each in every]) @ ways
     groups = _together(seen, every)

@@ -52,8 +52,8 @@ class Contacts:
 
     def at(self, numbers: FloatArray) -> Array:
         """Which joints hold (C,) where the numbers and extents of the whole are these (V,)."""
-        poses = self.tunable.poses(torch.from_numpy(numbers[: len(self.tunable.values)]))
-        return holding(poses.scene, self.joints).numpy()
+        scene = self.tunable.scene(torch.from_numpy(numbers[: len(self.tunable.values)]))
+        return holding(scene, self.joints).numpy()
 
     def kept(
         self, rows: FloatArray, fixed: int, numbers: FloatArray, curvature: FloatArray

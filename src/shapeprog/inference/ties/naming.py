@@ -42,7 +42,7 @@ LEVEL = 0.6
 """A part is thin along an axis where it measures less than this share of the next longer."""
 
 
-def written(tunable: Tunable, basis: Basis, runs: Sequence[Run] = ()) -> Program:
+def written(tunable: Tunable, basis: Basis, runs: Sequence[Run]) -> Program:
     """The program whose numbers follow from named ones; those used once stay where they are used.
 
     Runs are written by their counts where their steps follow from a span.

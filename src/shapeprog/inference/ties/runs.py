@@ -45,12 +45,15 @@ class Run(NamedTuple):
     starts: tuple[int, ...]
 
 
-def runs(tunable: Tunable) -> Iterator[Run]:
-    """The runs of a program."""
+def runs(tunable: Tunable, ways: FloatArray) -> Iterator[Run]:
+    """The runs of a program; ``ways`` (V, Z) are those in which its numbers may move: steps tied to zero do not."""
+    free = np.abs(ways).max(1, initial=0) > SAME
     for n, node in enumerate(tunable.nodes):
         if not isinstance(node, Loop) or node.count < FEWEST or not _even(node):
             continue
-        steps = [f for f, (owner, _) in enumerate(tunable.moving) if owner == n and tunable.kinds[f] == "shift"]
+        steps = [
+            f for f, (owner, _) in enumerate(tunable.moving) if owner == n and tunable.kinds[f] == "shift" and free[f]
+        ]
         if len(steps) != 1:
             continue
         inside = range(n + 1, n + 1 + Program(node.body).statements)

@@ -20,7 +20,7 @@ from shapeprog.inference.refine import single_threaded
 from shapeprog.inference.ties.basis import Basis, simplest
 from shapeprog.inference.ties.contacts import Contacts
 from shapeprog.inference.ties.features import Feature, features
-from shapeprog.inference.ties.fitting import CLOSED, Misfit, refitted
+from shapeprog.inference.ties.fitting import CLOSED, Misfit, refitted, ways_free
 from shapeprog.inference.ties.naming import written
 from shapeprog.inference.ties.pricing import worthwhile
 from shapeprog.inference.ties.relations import relations
@@ -73,7 +73,7 @@ def tie(
         numbers = misfit.numbers
         rows: FloatArray = np.zeros((0, len(numbers)))
         known: list[Feature] = []
-        scene = tunable.poses(tunable.values).scene
+        scene = tunable.scene(tunable.values)
         joints = _joints(scene, seed)
         pairs = touching(tunable, scene, joints) if joints else set()
         contacts = Contacts(tunable, joints) if joints else None
@@ -91,9 +91,10 @@ def tie(
                 progress("tying numbers", (round_ + 1) / ROUNDS)
             if len(rows) == before:
                 break
-        repeated = list(runs(tunable))
+        ways = ways_free(rows, len(numbers))
+        repeated = list(runs(tunable, ways))
         lengths = np.append(tunable.are("length").numpy(), [False] * 3)
-        basis = _rounded(simplest(known, numbers, rows, lengths, repeated))
+        basis = _rounded(simplest(known, numbers, ways, lengths, repeated))
         named = written(tunable, basis, repeated)
         return Tied(named, free_numbers(named))
 

@@ -201,9 +201,22 @@ def test_a_relation_that_parts_what_holds_together_is_left_out():
     rows[0, [1, 7]] = 1, -1  # both begin at one depth
     rows[1, [2, 5, 8]] = 1, 1, -1  # the second begins where the first ends: an edge, as it stands on it
     rows[2, [4, 10]] = 1, -1  # both are equally deep
-    kept, at = contacts.kept(rows, 0, numbers, np.eye(len(numbers)))
+    kept, at = contacts.kept(rows, 0, numbers, np.eye(len(numbers)), 0.01)
     np.testing.assert_array_equal(kept, rows[[0, 2]])
     np.testing.assert_allclose(kept @ at, 0, atol=1e-12)
+
+
+def test_what_a_relation_parts_is_moved_together_where_nothing_else_minds():
+    tunable = Tunable(sp.parse("box(at=(0, -1, -1), size=(2, 2, 2))\nbox(at=(2, -1, -1), size=(2, 2, 2))\n"))
+    contacts = Contacts(tunable, joint_of(tunable.poses(tunable.values).scene))
+    numbers = np.append(tunable.values.numpy(), np.zeros(3))
+    lower = np.zeros((1, len(numbers)))
+    lower[0, [3, 4]] = 1, -0.9  # the lower box is .9 times as high as it is wide, so that it ends below the upper one
+    for curvature, price, moves in ((1e-4, 1e-3, True), (1e-4, 1e-9, False), (1.0, 1e-3, False)):
+        kept, at = contacts.kept(lower, 0, numbers, curvature * np.eye(len(numbers)), price)
+        assert len(kept) == moves, "closing may cost less than a number"
+        np.testing.assert_allclose(kept @ at, 0, atol=1e-12)
+        assert contacts.hold(at, numbers)
 
 
 def test_tilted_parts_have_middles_and_the_sides_across_which_they_do_not_tilt():

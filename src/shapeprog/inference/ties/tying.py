@@ -85,7 +85,7 @@ def tie(
             curvature = misfit.at(numbers)[1]
             rows, optimum = worthwhile(offered, numbers, curvature, price, fixed=rows, low=misfit.low)
             if contacts:
-                rows, optimum = contacts.kept(rows, before, numbers, curvature)
+                rows, optimum = contacts.kept(rows, before, numbers, curvature, price)
             numbers = _together(misfit, optimum, rows, joints, contacts)
             if progress:
                 progress("tying numbers", (round_ + 1) / ROUNDS)

@@ -32,7 +32,7 @@ paper   the search on cells with the statements of the paper, the baseline
 
 All are measured against the whole mesh, as ``shapeprog evaluate --parts`` does; ``all`` and ``tied`` also by what is
 left of contacts, symmetry and one piece when each free number is edited.  A price is what a number is worth to
-``tied``, times the usual.
+``tied``, times the usual; at others than 1 nothing is edited.
 """
 
 from __future__ import annotations
@@ -123,7 +123,7 @@ def measure(task: Task) -> dict[str, Any]:
     if len(parts) > 1:
         row = replace(row, **part_scores(placed, unroll(program), task.seed)._asdict())
     text = format_program(program)
-    edited = edit_scores(program)._asdict() if task.method in ("all", "tied") else {}
+    edited = edit_scores(program)._asdict() if task.method in ("all", "tied") and task.price == 1 else {}
     return asdict(row) | {
         "set": task.set, "seconds": seconds, "cpu_seconds": cpu_seconds, "allowed": task.blocks, "seed": task.seed,
         "method": task.method, "price": task.price, "lines": len(text.splitlines()), "program": text,

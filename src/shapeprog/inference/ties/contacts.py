@@ -77,16 +77,15 @@ class Contacts:
         price
             By how much moving parts together may raise the misfit at most.
         """
-        free, left = np.linalg.inv(curvature), list(rows)
+        free, left = np.linalg.inv(curvature), rows
         needed = self.at(_optimum(left[:fixed], numbers, free))
 
         def placed(first: int) -> tuple[FloatArray, bool]:
             """The optimum where the first relations hold, and whether all does that should hold together."""
-            given = np.array(left[:first]).reshape(-1, len(numbers))
             best = _optimum(left[:first], numbers, free)
             if self.at(best)[needed].all():
                 return best, True
-            closed = self._closed(best, given, curvature)
+            closed = self._closed(best, left[:first], curvature)
             dear = (closed - best) @ curvature @ (closed - best) > price
             return (best, False) if dear or not self.at(closed)[needed].all() else (closed, True)
 
@@ -100,10 +99,10 @@ class Contacts:
                 low, high = (middle, high) if placed(middle)[1] else (low, middle)
             if low == len(left):
                 break
-            del left[low]
+            left = np.delete(left, low, axis=0)
             sure = low
             best, holds = placed(len(left))
-        return np.array(left).reshape(-1, len(numbers)), best
+        return left, best
 
     def _closed(self, numbers: FloatArray, rows: FloatArray, curvature: FloatArray) -> FloatArray:
         """The numbers (V,) with gaps between parts closed while relations (M, V) hold, and the misfit rises least."""
@@ -118,9 +117,8 @@ class Contacts:
         return numbers
 
 
-def _optimum(rows: list[FloatArray], numbers: FloatArray, free: Array) -> FloatArray:
+def _optimum(rows: FloatArray, numbers: FloatArray, free: Array) -> FloatArray:
     """The numbers (V,) of the least misfit for which relations hold; ``free`` is the inverse of its curvature."""
-    if not rows:
-        return numbers
-    along = free @ np.array(rows).T
-    return numbers - along @ np.linalg.solve(np.array(rows) @ along, np.array(rows) @ numbers)
+    along = free @ rows.T
+    found: FloatArray = numbers - along @ np.linalg.solve(rows @ along, rows @ numbers)
+    return found

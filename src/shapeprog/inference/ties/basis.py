@@ -74,7 +74,7 @@ def measures(known: list[Feature], numbers: FloatArray, runs: Sequence[Run]) -> 
     """What names may stand for; heights are above the floor, insets from the nearest side of the whole, and the span of
     a run from its first copy to the last."""
     whole = {each.axis: each.row for each in known if each.kind == "extent"}
-    between = {run.step: run.count - 1 for run in runs}
+    between = {run.step: run.copies - 1 for run in runs}
     for each in known:
         step = int(np.argmax(each.row != 0)) if each.kind == "shift" else -1
         if step in between:
@@ -155,7 +155,7 @@ class _Reader:
         used = size > SAME
         terms = cost_of_terms(factors)
         for run in self.runs:
-            for shares in (run.count - 1, run.count, run.count + 1):
+            for shares in (run.copies - 1, run.copies, run.copies + 1):
                 shared = cost_of_terms(shares * factors[run.step])
                 if SHARED + shared.sum() < terms[run.step].sum():
                     terms[run.step] = shared

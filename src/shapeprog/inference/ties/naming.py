@@ -82,9 +82,9 @@ def written(tunable: Tunable, basis: Basis, runs: Sequence[Run]) -> Program:
             continue
         part = _part(tunable, run.node)
         name = Name(_unused(plural(part), taken))
-        counts.append((name.name, float(run.count)))
+        counts.append((name.name, float(run.copies)))
         step = basis.factors[run.step]
-        each: Value = sum_of(nearest_quarter((run.count + way.more) * step)) / combined(way.more, [(name, 1.0)])
+        each: Value = sum_of(nearest_quarter((run.copies + way.more) * step)) / combined(way.more, [(name, 1.0)])
         if way.before:
             spacings.append(Assignment((((spacing := _unused(f"{part}_spacing", taken)), each),)))
             each = Name(spacing)

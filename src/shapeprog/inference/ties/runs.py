@@ -30,8 +30,8 @@ class Run(NamedTuple):
     ----------
     node, slot
         The number of its node, and which of its numbers says how many copies there are.
-    count
-        How many copies there are.
+    copies
+        How many there are.
     step
         Which number of the program the step is.
     starts
@@ -40,7 +40,7 @@ class Run(NamedTuple):
 
     node: int
     slot: int
-    count: int
+    copies: int
     step: int
     starts: tuple[int, ...]
 
@@ -81,8 +81,8 @@ def _even(node: Loop) -> bool:
 
 
 class Shares(NamedTuple):
-    """How a run is written: its step is a sum divided by ``count + more``, and ``before`` steps lie between a limit and
-    its first copy."""
+    """How a run is written: its step is a sum divided by ``copies + more``, and ``before`` steps lie before its first
+    copy."""
 
     more: int
     before: int
@@ -107,7 +107,7 @@ def shares(run: Run, factors: FloatArray, steps: Flags) -> Shares | None:
         return None
 
     def cost(way: Shares) -> float:
-        divided, placed = (run.count + way.more) * step, starts - way.before * step
+        divided, placed = (run.copies + way.more) * step, starts - way.before * step
         whole = np.vstack([divided, placed]) if way.before else divided
         if np.abs(whole - nearest_quarter(whole)).max() > SAME:
             return np.inf

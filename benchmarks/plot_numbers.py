@@ -4,9 +4,9 @@
         --blocks 1 2 3 4 6 8 10 --out sweep.jsonl
     python -m benchmarks.plot_numbers sweep.jsonl docs/silhouette_against_numbers.png
 
-    python -m benchmarks.structure DATA --sets bench cabinet ikea --objects 8 --methods untied --out prices.jsonl
-    python -m benchmarks.structure DATA --sets bench cabinet ikea --objects 8 --methods tied \\
-        --prices 0.01 0.1 0.3 1 3 10 --out prices.jsonl
+    python -m benchmarks.structure DATA --sets bench cabinet ikea --objects 6 --methods untied --out prices.jsonl
+    python -m benchmarks.structure DATA --sets bench cabinet ikea --objects 6 --methods tied \\
+        --prices 0.03 0.3 1 3 10 --out prices.jsonl
     python -m benchmarks.plot_numbers prices.jsonl docs/accuracy_against_numbers.png f1_percent price
 """
 
@@ -15,6 +15,7 @@ from __future__ import annotations
 import sys
 from collections import defaultdict
 from pathlib import Path
+from typing import Any
 
 import matplotlib
 import numpy as np
@@ -39,7 +40,9 @@ def main(rows_path: str, picture: str, measure: str = "silhouette", over: str = 
     for row in read_rows(Path(rows_path)):
         groups[row["set"], row["method"]][row[over]].append(row)
     sets = sorted({which for which, _ in groups})
-    figure, axes = plt.subplots(1, len(sets), figsize=(3.4 * len(sets), 2.8), sharey=True, layout="constrained")
+    figure, axes = plt.subplots(
+        1, len(sets), figsize=(3.4 * len(sets), 2.8), sharey=over == "allowed", layout="constrained"
+    )
     for axis, which in zip(np.atleast_1d(axes), sets, strict=True):
         for method, (style, colour, label) in STYLES.items():
             if (which, method) not in groups:
@@ -49,10 +52,24 @@ def main(rows_path: str, picture: str, measure: str = "silhouette", over: str = 
             numbers = [np.mean([row["numbers"] for row in found[size]]) for size in sizes]
             errors = [each.std(ddof=1) / np.sqrt(len(each)) for each in values]
             means = [each.mean() for each in values]
-            axis.errorbar(numbers, means, errors, fmt=style, color=colour, ms=3.5, lw=1.4, capsize=2, label=label)
+            bars: dict[str, Any] = {
+                "fmt": style,
+                "color": colour,
+                "ms": 3.5,
+                "lw": 1.4,
+                "elinewidth": 0.6,
+                "capsize": 2,
+            }
+            axis.errorbar(numbers, means, errors, label=label, **bars)
             for size, number, mean in zip(sizes, numbers, means, strict=True):
                 if over == "price" and len(sizes) > 1:
-                    axis.annotate(f"{size:g}", (number, mean), (0, -11), textcoords="offset points", fontsize=6)
+                    axis.annotate(
+                        f"{size:g}", (number, mean), (1, 4), textcoords="offset points", fontsize=6, rotation=60
+                    )
+        if over == "price":  # a few points lie close together, the plain numbers far away
+            axis.set_xscale("log")
+            axis.set_xticks([10, 15, 20, 30, 50], ["10", "15", "20", "30", "50"])
+            axis.minorticks_off()
         axis.set_title(f"{which} ({len(values[0])} objects)", fontsize=9)
         axis.set_xlabel("free numbers", fontsize=8)
         axis.tick_params(labelsize=8)

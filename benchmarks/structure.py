@@ -3,6 +3,8 @@
     python -m benchmarks.structure DATA --split val --out structure_val.jsonl
     python -m benchmarks.structure --table structure_val.jsonl
     python -m benchmarks.structure DATA --sets ikea --methods all paper --blocks 1 2 4 8 --out sweep.jsonl
+    python -m benchmarks.structure DATA --sets ikea --methods untied --out prices.jsonl
+    python -m benchmarks.structure DATA --sets ikea --methods tied --prices 0.1 1 10 --out prices.jsonl
 
 DATA holds ``shapenet_meshes/{bench,cabinet}_{val,test}/ID.ply`` (+Y up, front -Z) and
 ``ikea_parts/CLASS/OBJECT/NN.ply`` (+Y up; in the order of their names every second object is test, the others val).
@@ -30,7 +32,8 @@ paper   the search on cells with the statements of the paper, the baseline
 
 All are measured against the whole mesh, as ``shapeprog evaluate --parts`` does; ``all`` and ``tied`` also by what is
 left of contacts, symmetry and one piece when each free number is edited.  The table tells how many programs are one
-piece among objects that are one themselves: gaps of up to 1 % of the longest side are none.
+piece among objects that are one themselves: gaps of up to 1 % of the longest side are none.  A price is what a number
+is worth to ``tied``, times the usual; at others than 1 nothing is edited.
 """
 
 from __future__ import annotations
@@ -76,7 +79,7 @@ MISSING = 0.2
 
 @dataclass(frozen=True)
 class Task:
-    """One object of one set, as files, and how it is inferred; ``tied`` needs the program without ties."""
+    """One object of one set, as files, and how it is inferred; ``tied`` needs the program without ties, and a price."""
 
     set: str
     name: str
@@ -85,6 +88,7 @@ class Task:
     seed: int = 0
     method: Method = "all"
     program: str = ""
+    price: float = 1.0
 
 
 def objects(data: Path, which: str, split: str) -> Iterator[tuple[str, tuple[Path, ...]]]:
@@ -122,10 +126,10 @@ def measure(task: Task) -> dict[str, Any]:
     if len(parts) > 1:
         row = replace(row, **part_scores(placed, unroll(program), task.seed)._asdict())
     text = format_program(program)
-    edited = edit_scores(program)._asdict() if task.method in ("all", "tied") else {}
+    edited = edit_scores(program)._asdict() if task.method in ("all", "tied") and task.price == 1 else {}
     return asdict(row) | {
         "set": task.set, "seconds": seconds, "cpu_seconds": cpu_seconds, "allowed": task.blocks, "seed": task.seed,
-        "method": task.method, "lines": len(text.splitlines()), "program": text,
+        "method": task.method, "price": task.price, "lines": len(text.splitlines()), "program": text,
         "object_in_one_piece": joined(target.vertices, target.faces),
         **{f"edited_{name}": share for name, share in edited.items()},
     }  # fmt: skip
@@ -135,11 +139,12 @@ def inferred(task: Task, shape: Any) -> tuple[Any, Any]:
     """The program of an object, and its whole-numbered form where it has one."""
     from shapeprog.inference import infer
     from shapeprog.inference.evidence import evidence_of
-    from shapeprog.inference.ties.tying import tie
+    from shapeprog.inference.ties.tying import PRICE, tie
     from shapeprog.language.text import parse
 
     if task.method == "tied":
-        return tie(parse(task.program), evidence_of(shape, task.seed), seed=task.seed).program, None
+        evidence = evidence_of(shape, task.seed)
+        return tie(parse(task.program), evidence, price=task.price * PRICE, seed=task.seed).program, None
     statements: Literal["all", "paper"] = "paper" if task.method == "paper" else "all"
     ties = task.method != "untied"
     result = infer(shape, blocks=task.blocks, seed=task.seed, statements=statements, ties=ties)
@@ -208,14 +213,15 @@ def joined(vertices: Any, faces: Any) -> bool:
 def run(args: argparse.Namespace) -> None:
     """Measure what is not in the output yet, object after object, in several processes."""
     out = Path(args.out)
-    done = {(row["set"], row["name"], row["allowed"], row["method"]): row for row in read_rows(out)}
+    done = {(row["set"], row["name"], row["allowed"], row["method"], row["price"]): row for row in read_rows(out)}
     todo = [
-        Task(which, name, files, blocks, args.seed, method)
+        Task(which, name, files, blocks, args.seed, method, price=price)
         for which in args.sets
         for name, files in list(objects(Path(args.data), which, args.split))[: args.objects]
         for blocks in args.blocks
         for method in args.methods
-        if (which, name, blocks, method) not in done
+        for price in (args.prices if method == "tied" else [1.0])
+        if (which, name, blocks, method, price) not in done
     ]
     if "tied" in args.methods:
         before = {key[:3]: row["program"] for key, row in done.items() if key[3] == "untied"}
@@ -230,14 +236,15 @@ def run(args: argparse.Namespace) -> None:
 
 def table(path: Path) -> str:
     """Markdown: the mean of every measure, with the floor in brackets where there is one."""
-    groups: dict[tuple[int, str, str], list[dict[str, Any]]] = {}
+    groups: dict[tuple[int, str, str, float], list[dict[str, Any]]] = {}
     for row in read_rows(path):
-        groups.setdefault((row["allowed"], row["set"], row["method"]), []).append(row)
+        groups.setdefault((row["allowed"], row["set"], row["method"], row["price"]), []).append(row)
     lines = ["| set, objects | " + " | ".join(COLUMNS) + " |", "|" + "---|" * (len(COLUMNS) + 1)]
-    for (allowed, name, method), rows in sorted(
-        groups.items(), key=lambda item: (item[0][0], SETS.index(item[0][1]), item[0][2])
+    for (allowed, name, method, price), rows in sorted(
+        groups.items(), key=lambda item: (item[0][0], SETS.index(item[0][1]), *item[0][2:])
     ):
-        cells = [f"{name}, {len(rows)}, {method}, <= {allowed} blocks"]
+        at = f" at {price:g}" if price != 1 else ""
+        cells = [f"{name}, {len(rows)}, {method}{at}, <= {allowed} blocks"]
         for column in COLUMNS:
             known = [row for row in rows if row.get("object_in_one_piece", True)] if column == "one_piece" else rows
             mean, floor = (_mean(known, each) for each in (column, FLOORS.get(column, "")))
@@ -263,6 +270,7 @@ def main() -> None:
     parser.add_argument("--objects", type=int, default=None, help="only the first so many of each set")
     parser.add_argument("--blocks", type=int, nargs="*", default=[10], help="most blocks, one run for each")
     parser.add_argument("--methods", nargs="*", default=["all"], choices=get_args(Method), help="one run for each")
+    parser.add_argument("--prices", type=float, nargs="*", default=[1.0], help="of tied, one run for each")
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--out", default="structure.jsonl", help="rows, one line of JSON each; appended to")

@@ -174,7 +174,7 @@ def ways_of(program: Any, planted: Any) -> Any:
     from shapeprog.language.named import names
     from shapeprog.language.text import source_of
 
-    free = {each.name: Linear.of(each.name) for each in names(program) if each.free}
+    free = {each.name: Linear.of(each.name) for each in names(program) if each.free and not each.whole}
     nodes = [node for each in symbolic(source_of(program), free) for node in walked(each)]
     rows = []
     for number, (n, slot) in enumerate(Tunable(planted).moving):

@@ -19,6 +19,7 @@ from shapeprog.inference.ties.features import features
 from shapeprog.inference.ties.fitting import ways_free
 from shapeprog.inference.ties.pricing import worthwhile
 from shapeprog.inference.ties.relations import Relation
+from shapeprog.inference.ties.runs import plural
 from shapeprog.inference.ties.tying import tie
 from shapeprog.inference.tunable import Tunable
 from shapeprog.language.free import free_numbers, free_values, multiplied, numbers
@@ -200,9 +201,22 @@ def test_a_relation_that_parts_what_holds_together_is_left_out():
     rows[0, [1, 7]] = 1, -1  # both begin at one depth
     rows[1, [2, 5, 8]] = 1, 1, -1  # the second begins where the first ends: an edge, as it stands on it
     rows[2, [4, 10]] = 1, -1  # both are equally deep
-    kept, at = contacts.kept(rows, 0, numbers, np.eye(len(numbers)))
+    kept, at = contacts.kept(rows, 0, numbers, np.eye(len(numbers)), 0.01)
     np.testing.assert_array_equal(kept, rows[[0, 2]])
     np.testing.assert_allclose(kept @ at, 0, atol=1e-12)
+
+
+def test_what_a_relation_parts_is_moved_together_where_nothing_else_minds():
+    tunable = Tunable(sp.parse("box(at=(0, -1, -1), size=(2, 2, 2))\nbox(at=(2, -1, -1), size=(2, 2, 2))\n"))
+    contacts = Contacts(tunable, joint_of(tunable.poses(tunable.values).scene))
+    numbers = np.append(tunable.values.numpy(), np.zeros(3))
+    lower = np.zeros((1, len(numbers)))
+    lower[0, [3, 4]] = 1, -0.9  # the lower box is .9 times as high as it is wide, so that it ends below the upper one
+    for curvature, price, moves in ((1e-4, 1e-3, True), (1e-4, 1e-9, False), (1.0, 1e-3, False)):
+        kept, at = contacts.kept(lower, 0, numbers, curvature * np.eye(len(numbers)), price)
+        assert len(kept) == moves, "closing may cost less than a number"
+        np.testing.assert_allclose(kept @ at, 0, atol=1e-12)
+        assert contacts.hold(at, numbers)
 
 
 def test_tilted_parts_have_middles_and_the_sides_across_which_they_do_not_tilt():
@@ -236,6 +250,62 @@ def test_gaps_beside_a_run_are_those_between_its_copies():
     tied = tie(uneven, evidence_of_program(uneven)).program
     boards = sorted((unroll(tied).centre[2:, 0] - unroll(tied).size[2:, 0]).tolist())
     np.testing.assert_allclose(boards, [-12, -5, 0, 5, 11], atol=0.1)
+
+
+STACK = """
+for i in mirror(side):
+    side(box(at=(-12, -4, 8), size=(24, 8, 1)))
+for i in translate(4, by=(7.67, 0.01, 0)):
+    shelf(box(at=(-12, -4, -8), size=(1, 8, 16)))
+"""
+
+SLATS = """
+seat(box(at=(-12, -6, -9), size=(1, 12, 18)))
+for i in mirror(side):
+    post(box(at=(-12, 5, 8), size=(24, 1, 1)))
+for i in translate(6, by=(0, 0, 2.4)):
+    slat(box(at=(-11, 5.2, -6.3), size=(20, 0.5, 0.6)))
+rail(box(at=(9, 5, -8), size=(1, 1, 16)))
+"""
+
+
+@pytest.mark.parametrize(
+    ("text", "name", "axis", "part", "divided"),
+    [
+        (STACK, "shelves", 0, 1, " / (shelves - 1)"),  # from one end of the case to the other
+        (CASE.format(step=5.75, first=-6.25), "shelves", 0, 3, " / (shelves + 1)"),  # gaps below and above
+        (SLATS, "slats", 2, 2, " / (slats - 1)"),  # a span of their own
+    ],
+)
+def test_more_copies_share_the_span_of_the_others(text: str, name: str, axis: int, part: int, divided: str):
+    program = sp.parse(text)
+    tied = tie(program, evidence_of_program(program)).program
+    assert divided in format_program(tied)
+    (count,) = (each for each in sp.names(tied) if each.whole)
+    assert (count.name, count.free) == (name, True)
+
+    def places(copies: float) -> np.ndarray:
+        scene = unroll(sp.set(tied, {name: copies}))
+        others = scene.centre[scene.block != part]
+        torch.testing.assert_close(others, unroll(tied).centre[unroll(tied).block != part])
+        return np.sort(scene.centre[scene.block == part, axis].numpy())
+
+    was = places(count.value)
+    gap = was[1] - was[0] if "+ 1" in divided else 0  # this is kept free at both ends, however wide
+    for copies in (count.value + 2, count.value - 1):
+        new = places(copies)
+        assert len(new) == copies
+        np.testing.assert_allclose(np.diff(new), new[1] - new[0], atol=1e-5)
+        beside = new[1] - new[0] if gap else 0
+        np.testing.assert_allclose([new[0] - beside, new[-1] + beside], [was[0] - gap, was[-1] + gap], atol=1e-5)
+    assert free_numbers(tied) == free_numbers(sp.set(tied, {name: 7})), "a count is no free number"
+
+
+def test_names_of_counts_are_plurals():
+    words = ("shelf", "leg", "foot", "box", "bench", "body", "tray", "cross")
+    assert [plural(word) for word in words] == [
+        "shelves", "legs", "feet", "boxes", "benches", "bodies", "trays", "crosses",
+    ]  # fmt: skip
 
 
 def test_relations_hold_for_the_ways_that_are_free():

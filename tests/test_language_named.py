@@ -118,6 +118,21 @@ def test_gradients_reach_every_name_through_loops_and_functions(text: str) -> No
         assert torch.allclose(sp.unroll(chair.at(other)).centre, moved.centre, atol=1e-5)
 
 
+def test_counts_are_whole_and_what_is_divided_by_them_stays_linear() -> None:
+    program = parse(
+        "span, shelves, thick = 12, 4, 1\n"
+        "for i in translate(shelves, by=(span / (shelves - 1), 0, 0)):\n    box(at=(0, 0, 0), size=(thick, 8, 9))\n"
+    )
+    assert [each.name for each in sp.names(program) if each.whole] == ["shelves"]
+    shelf = sp.Parametric(program)
+    assert shelf.names == ("span", "thick")
+    assert shelf.matrix is not None
+    moved = sp.unroll(shelf.at(torch.tensor([18.0, 1.0], dtype=torch.float64)))
+    assert moved.centre[:, 0].tolist() == [0.5, 6.5, 12.5, 18.5]
+    more = sp.unroll(sp.set(program, shelves=5))
+    assert more.centre[:, 0].tolist() == [0.5, 3.5, 6.5, 9.5, 12.5]
+
+
 @given(st.integers(0, 1 << 30))
 def test_parametric_programs_begin_as_they_are_written(seed: int) -> None:
     program = written_program(seed)

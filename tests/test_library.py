@@ -119,6 +119,18 @@ def test_one_function_serves_any_count_and_says_defaults_only_where_they_differ(
     assert dict(call.arguments)["front"] == pytest.approx(-3)
 
 
+def test_a_count_keeps_its_name_in_a_call() -> None:
+    text = "boards, high = 4, 16\nfor i in translate(boards, by=((high - 1) / (boards - 1), 0, 0)):\n"
+    text += "    shelf(box(at=(-high / 2, -4, -6), size=(1, 8, 12)))\n"
+    written = with_library(parse(text), library(SHELVES))
+    (call,) = calls(written)
+    assert {name: str(value) for name, value in call.arguments if not isinstance(value, float)} == {
+        "count": "boards", "bottom": "-high / 2", "height": "high",
+    }  # fmt: skip
+    for changes in ({"boards": 5.0}, {"high": 20.0}):
+        assert away(set_numbers(parse(text), changes), set_numbers(written, changes)) < 1e-6
+
+
 @pytest.mark.parametrize("order", ["wide, thick", "thick, wide"])
 def test_a_function_without_an_example_is_found_whatever_the_order_of_its_parameters(order: str) -> None:
     arms = f"def arms({order}):\n    for i in mirror(side):\n"

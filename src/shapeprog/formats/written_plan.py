@@ -85,16 +85,11 @@ class _Planner:
     def _numbers(self, program: Program, source: Source) -> None:
         """The named numbers of the program itself."""
         found = {named.name: named for named in names(program)}
-        counts = {
-            value.name
-            for line in source.walk()
-            if isinstance(line, WrittenLoop) and isinstance(value := line.values[0], Name)
-        }
         for line in source.lines:
             if isinstance(line, Assignment):
                 for name, value in line.numbers:
                     free = found[name].value if found[name].free else None
-                    definition = Definition(self.words[name], self._text(value), line.note, free, name in counts)
+                    definition = Definition(self.words[name], self._text(value), line.note, free, found[name].whole)
                     self.made.numbers.append(definition)
 
     def _planned(self, line: Line) -> list[Planned]:

@@ -83,12 +83,18 @@ class Tunable:
         self.values = torch.tensor([nodes[n].values[slot] for n, slot in moving], dtype=torch.float64)
         thinnest = [THINNEST / 2 if quantity.high == HALF else THINNEST for quantity in quantities]
         self.low = torch.tensor(thinnest, dtype=torch.float64).where(self.are("length"), torch.tensor(-torch.inf))
-        first = Plan(code).scene(code.parameters)
+        self._once = Plan(code)
+        first = self._once.scene(code.parameters)
         self._row = _rank(first.block)
         self._copies = int(self._row.max()) + 1
         many = (part.expand(self._copies * ROW, *part.shape) for part in (code.ids, code.parameters))
         self._plan = Plan(Code(*many))
         self.scale = self._scales(nodes, first)
+
+    def scene(self, values: Float[Tensor, " F"]) -> Scene:
+        """The primitives (N,) where the numbers are these, without gradient."""
+        with torch.no_grad():
+            return self._once.scene(self._filled(values))
 
     def poses(self, values: Float[Tensor, " F"]) -> Poses:
         """Primitives and slopes where the numbers are these.

@@ -10,8 +10,9 @@ from collections.abc import Iterator
 from dataclasses import replace
 from itertools import count
 
+from shapeprog.language.counts import Counts
 from shapeprog.language.evaluation import evaluated
-from shapeprog.language.expression import Expression, Name, Value
+from shapeprog.language.expression import Expression, Value
 from shapeprog.language.parameters import to_float32
 from shapeprog.language.program import Program
 from shapeprog.language.source import (
@@ -19,7 +20,6 @@ from shapeprog.language.source import (
     Call,
     Function,
     Line,
-    Source,
     WrittenDraw,
     WrittenLoop,
     with_values,
@@ -44,7 +44,7 @@ def free_numbers(program: Program) -> int:
 def free_values(program: Program) -> list[float]:
     """The free numbers of a program, in the order of its text."""
     source = source_of(program)
-    return list(_places(source.lines, _Counts(source)))
+    return list(_places(source.lines, Counts(source)))
 
 
 def multiplied(program: Program, place: int, factor: float) -> Program:
@@ -53,44 +53,19 @@ def multiplied(program: Program, place: int, factor: float) -> Program:
     A ``ShapeProgError`` if that is no program, as when an expression then divides by zero.
     """
     source, counter = source_of(program), count()
-    counts = _Counts(source)
+    counts = Counts(source)
     lines = tuple(_changed(line, counts, counter, place, factor) for line in source.lines)
     return evaluated(replace(source, lines=lines))
 
 
-class _Counts:
-    """Names and parameters that say how often a loop repeats something, for the program and each of its functions."""
-
-    def __init__(self, source: Source) -> None:
-        self.of: dict[str, set[str]] = {}
-        for function in source.functions.values():  # each calls those above it
-            self.of[function.name] = self._within(function.body)
-        self.outside = self._within(tuple(line for line in source.lines if not isinstance(line, Function)))
-        for function in source.functions.values():
-            local = {name for name, _ in function.parameters}
-            self.outside |= self.of[function.name] - local
-
-    def _within(self, lines: tuple[Line, ...]) -> set[str]:
-        found: set[str] = set()
-        for line in Source(lines).walk():
-            counted: list[Value] = []
-            if isinstance(line, WrittenLoop):
-                quantities = language()[line.name].quantities
-                counted = [value for value, each in zip(line.values, quantities, strict=True) if each.discrete]
-            elif isinstance(line, Call):
-                counted = [value for name, value in line.arguments if name in self.of.get(line.name, ())]
-            found |= {value.name for value in counted if isinstance(value, Name)}
-        return found
-
-
-def _places(lines: tuple[Line, ...], counts: _Counts) -> Iterator[float]:
+def _places(lines: tuple[Line, ...], counts: Counts) -> Iterator[float]:
     for line in lines:
         yield from (value for value, free in _numbers(line, counts) if free and not isinstance(value, Expression))
         if isinstance(line, WrittenLoop | Function):
             yield from _places(line.body, counts)
 
 
-def _numbers(line: Line, counts: _Counts) -> Iterator[tuple[Value, bool]]:
+def _numbers(line: Line, counts: Counts) -> Iterator[tuple[Value, bool]]:
     """The numbers on a line, and whether each is free: plain, continuous and not zero."""
     if isinstance(line, WrittenDraw | WrittenLoop):
         declared = language()[line.name]
@@ -107,7 +82,7 @@ def _plain(value: Value) -> bool:
     return not isinstance(value, Expression) and value != 0
 
 
-def _changed(line: Line, counts: _Counts, counter: Iterator[int], place: int, factor: float) -> Line:
+def _changed(line: Line, counts: Counts, counter: Iterator[int], place: int, factor: float) -> Line:
     """The line with one free number of the program multiplied."""
     values = [
         to_float32(value * factor) if free and not isinstance(value, Expression) and next(counter) == place else value

@@ -6,6 +6,7 @@ from collections.abc import Generator, Mapping
 from dataclasses import dataclass, replace
 
 from shapeprog.errors import ShapeProgError, did_you_mean
+from shapeprog.language.counts import Counts
 from shapeprog.language.evaluation import evaluated, in_own_unit
 from shapeprog.language.expression import Expression, Value, text_of, value_at
 from shapeprog.language.parameters import to_float32
@@ -26,6 +27,8 @@ class Named:
         How it is written: a number, or an expression of others.
     free
         Whether it depends on no other name, so that it can be set.
+    whole
+        Whether it says how often something is repeated, or how far by quarters.
     lines
         The lines of :func:`~shapeprog.language.text.format_program`, from 1, that use it.
     """
@@ -34,6 +37,7 @@ class Named:
     value: float
     text: str
     free: bool
+    whole: bool
     lines: tuple[int, ...]
 
 
@@ -58,10 +62,10 @@ def names(program: Program) -> list[Named]:
         used = {name.name for value in values(line) if isinstance(value, Expression) for name in value.names()}
         for name in used - local:
             rows[name].append(row)
-    found = []
+    found, whole = [], Counts(program.source).outside
     for name, value in program.source.numbers.items():
         known[name] = value_at(value, known)
-        found.append(Named(name, known[name], text_of(value), _is_free(value), tuple(rows[name])))
+        found.append(Named(name, known[name], text_of(value), _is_free(value), name in whole, tuple(rows[name])))
     return found
 
 

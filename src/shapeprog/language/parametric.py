@@ -30,7 +30,7 @@ class Parametric:
     Attributes
     ----------
     names, values
-        The F free numbers that others follow from, and what they are in the program.
+        The F free numbers that others follow from, without those that are whole, and what they are in the program.
     slots
         Which M numbers of the flattened ``code.parameters`` depend on them.
     matrix, offset
@@ -48,7 +48,7 @@ class Parametric:
     code: Code
 
     def __init__(self, program: Program) -> None:
-        free = [named for named in names(program) if named.free]
+        free = [named for named in names(program) if named.free and not named.whole]
         self._source = program.source or Source()
         self.names = tuple(named.name for named in free)
         self.values = torch.tensor([named.value for named in free], dtype=torch.float64)

@@ -16,10 +16,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from shapeprog.errors import ShapeProgError
+from shapeprog.language.counts import Counts
 from shapeprog.language.evaluation import expanded, symbolic
 from shapeprog.language.expression import Linear, Name, Value, combined, value_at
 from shapeprog.language.program import Program
-from shapeprog.language.source import Assignment, Call, Function, Source, WrittenLoop
+from shapeprog.language.source import Assignment, Call, Function, Source
 from shapeprog.library.blocks import Block, Kind, blocks_of
 from shapeprog.library.length import terms
 from shapeprog.space import FloatArray
@@ -72,10 +73,8 @@ class Pattern:
     @cached_property
     def counts(self) -> tuple[str, ...]:
         """Parameters that say how often something is repeated."""
-        lines = Source(self.function.body).walk()
-        first = (line.values[0] for line in lines if isinstance(line, WrittenLoop))
-        words = {value.name for value in first if isinstance(value, Name)}
-        return tuple(name for name in self.parameters if name in words)
+        whole = Counts(Source((*self.others, self.function))).of[self.function.name]
+        return tuple(name for name in self.parameters if name in whole)
 
     @property
     def measures(self) -> tuple[str, ...]:

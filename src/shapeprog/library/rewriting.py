@@ -10,8 +10,9 @@ import numpy as np
 
 from shapeprog.errors import ShapeProgError
 from shapeprog.language.converting import in_unit
+from shapeprog.language.counts import Counts
 from shapeprog.language.evaluation import evaluated
-from shapeprog.language.expression import Expression, Linear
+from shapeprog.language.expression import Expression, Linear, Name, Value
 from shapeprog.language.program import Program
 from shapeprog.language.source import (
     Assignment,
@@ -73,9 +74,10 @@ def matchers_of(source: Source) -> Iterator[tuple[Matcher, tuple[WrittenLoop, ..
     With each come the loops that stay around.  None if its numbers are not linear in its names.
     """
     named = tuple(line for line in source.lines if isinstance(line, Assignment | Function))
-    free = [name for name, value in source.numbers.items() if not isinstance(value, Expression)]
+    whole, plain = Counts(source).outside, _plain(source)
+    free = [name for name in plain if name not in whole]
     given = {name: Linear.of(name) for name in free}
-    numbers = np.array([float(source.numbers[name]) for name in free])  # type: ignore[arg-type]
+    numbers = np.array([plain[name] for name in free])
     try:
         sums = Sums(free, _others(source, free))
         found: list[Form] = []
@@ -98,7 +100,7 @@ def matchers_of(source: Source) -> Iterator[tuple[Matcher, tuple[WrittenLoop, ..
 
 def _others(source: Source, free: Sequence[str]) -> dict[str, FloatArray]:
     """The names that follow from those that are free, as rows of factors and a constant."""
-    known = {name: Linear.of(name) for name in free}
+    known: dict[str, Linear | float] = {**_plain(source), **{name: Linear.of(name) for name in free}}
     found: dict[str, FloatArray] = {}
     for name, value in source.numbers.items():
         if isinstance(value, Expression):
@@ -110,6 +112,11 @@ def _others(source: Source, free: Sequence[str]) -> dict[str, FloatArray]:
     return found
 
 
+def _plain(source: Source) -> dict[str, float]:
+    """The names that stand for plain numbers."""
+    return {name: value for name, value in source.numbers.items() if not isinstance(value, Expression)}
+
+
 def _chosen(source: Source, patterns: Sequence[Pattern]) -> list[Offer]:
     """The calls that shorten a program most, one after another, none of which shares a line with another."""
     offered: list[Offer] = []
@@ -117,8 +124,13 @@ def _chosen(source: Source, patterns: Sequence[Pattern]) -> list[Offer]:
         for pattern in patterns:
             for match in matcher.matches(pattern):
                 lines = tuple(sorted({matcher.units[k] for k in match.blocks}))
-                call = Call(pattern.function.name, match.arguments, role=match.role)
                 before = [source.lines[k] for k in lines]
+                counts = _counts(source, before)
+                arguments = tuple(
+                    (word, counts.get(value, value) if word in pattern.counts and isinstance(value, float) else value)
+                    for word, value in match.arguments
+                )
+                call = Call(pattern.function.name, arguments, role=match.role)
                 fewer = sum(map(_statements, before)) - 1 - len(around)
                 gain = length(before) - length([_within(around, call)]) - match.error / TOLERANCE
                 if fewer > 0 and gain > 0:
@@ -130,6 +142,13 @@ def _chosen(source: Source, patterns: Sequence[Pattern]) -> list[Offer]:
             taken |= {*offer.lines}
             chosen.append(offer)
     return chosen
+
+
+def _counts(source: Source, lines: Sequence[Line]) -> dict[float, Value]:
+    """The names that loops among some lines have for their counts, by what these are."""
+    plain = _plain(source)
+    given = (line.values[0] for line in Source(tuple(lines)).walk() if isinstance(line, WrittenLoop))
+    return {plain[count.name]: count for count in given if isinstance(count, Name) and count.name in plain}
 
 
 def _within(around: Sequence[WrittenLoop], line: Line) -> Line:

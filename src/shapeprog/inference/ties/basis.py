@@ -6,24 +6,16 @@ chosen, by exchange of one for another, from which every number is the shortest 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-import numpy.typing as npt
 
 from shapeprog.inference.ties.features import Feature
-from shapeprog.inference.ties.fitting import ways_free
+from shapeprog.inference.ties.runs import Run
+from shapeprog.inference.ties.sums import SAME, Flags, cost_of_terms, nearest_quarter
 from shapeprog.space import DEPTH, SIDE, UP, Array, FloatArray
-
-SAME = 1e-6
-"""Difference below which factors are the same."""
-
-FACTORS = {1.0: 1.0, 0.5: 1.2, 2.0: 1.3, 0.25: 2.0, 1.5: 2.0, 3.0: 2.0, 4.0: 2.0}
-"""What a term of a sum costs a reader by its factor; others cost ``UGLY``."""
-
-UGLY = 4.0
 
 FLOOR = 0.4
 """What half the height below the middle costs, which has a short name of its own."""
@@ -32,15 +24,19 @@ SENSITIVE, DIFFERENCE = 3.0, 3.0
 """A length that is the difference of numbers so many times as large is lost when one of them is changed; what each such
 number costs."""
 
+SHARED = 0.3
+"""What dividing by the number of copies costs."""
+
 PLACED = 2.0
 """Price of a name from which it measures a place."""
 
-Flags = npt.NDArray[np.bool_]
-Word = Literal["extent", "top", "bottom", "inset", "length", "radius", "shift", "angle", "side", "place"]
+Word = Literal[
+    "extent", "top", "bottom", "inset", "length", "radius", "span", "shift", "step", "angle", "side", "place"
+]
 
 NAMED: dict[Word, float] = {
-    "extent": -6.0, "length": 0.8, "radius": 0.8, "top": 0.9, "bottom": 1.2, "inset": 1.2, "shift": 1.0, "angle": 1.0,
-    "side": 6.0, "place": 5.0,
+    "extent": -6.0, "length": 0.8, "radius": 0.8, "top": 0.9, "bottom": 1.2, "inset": 1.2, "span": 1.0, "shift": 1.0,
+    "step": 3.0, "angle": 1.0, "side": 6.0, "place": 5.0,
 }  # fmt: skip
 """What a name costs its reader by what it measures, and by how much the extents of the whole are preferred.  A number
 that is used once needs no name; but a place, measured from the middle, stays behind when the whole is changed."""
@@ -74,11 +70,17 @@ class Basis:
     values: FloatArray
 
 
-def measures(known: list[Feature], numbers: FloatArray) -> Iterator[Measure]:
-    """What names may stand for; heights are above the floor, and insets from the nearest side of the whole."""
+def measures(known: list[Feature], numbers: FloatArray, runs: Sequence[Run]) -> Iterator[Measure]:
+    """What names may stand for; heights are above the floor, insets from the nearest side of the whole, and the span of
+    a run from its first copy to the last."""
     whole = {each.axis: each.row for each in known if each.kind == "extent"}
+    between = {run.step: run.copies - 1 for run in runs}
     for each in known:
-        if each.kind in ("extent", "length", "radius", "shift", "angle", "place"):
+        step = int(np.argmax(each.row != 0)) if each.kind == "shift" else -1
+        if step in between:
+            yield Measure("span", each, between[step] * each.row)
+            yield Measure("step", each, each.row)
+        elif each.kind in ("extent", "length", "radius", "shift", "angle", "place"):
             yield Measure(each.kind, each, each.row)
         if each.kind in ("low", "high"):
             yield Measure("side", each, each.row)
@@ -89,25 +91,26 @@ def measures(known: list[Feature], numbers: FloatArray) -> Iterator[Measure]:
             yield Measure("inset", each, whole[each.axis] / 2 + nearest * each.row)
 
 
-def simplest(known: list[Feature], numbers: FloatArray, rows: FloatArray, lengths: Flags) -> Basis:
+def simplest(known: list[Feature], numbers: FloatArray, ways: FloatArray, lengths: Flags, runs: Sequence[Run]) -> Basis:
     """The measures from which every number of the program is the simplest sum.
 
     Parameters
     ----------
     numbers
         The numbers and extents (V,), for which the relations hold.
-    rows
-        The relations (M, V).
+    ways
+        A basis (V, Z) of the numbers for which they hold.
     lengths
         Which numbers are lengths (V,).
+    runs
+        The steps that may be written as a share of a span.
     """
-    ways = ways_free(rows, len(numbers))
-    every = list(measures(known, numbers))
+    every = list(measures(known, numbers, runs))
     seen = np.stack([each.row for each in every]) @ ways
     groups = _together(seen, every)
     heads = [every[group[0]] for group in groups]
     seen = seen[[group[0] for group in groups]]
-    reader = _Reader(heads, numbers, lengths)
+    reader = _Reader(heads, numbers, lengths, runs)
     chosen = _independent(seen, np.argsort(reader.prices, kind="stable"))
     factors = ways @ np.linalg.inv(seen[chosen])
     total = reader.cost(factors, chosen)
@@ -128,7 +131,7 @@ def simplest(known: list[Feature], numbers: FloatArray, rows: FloatArray, length
             break
         chosen[swap[0]] = swap[1]
         factors, total = ways @ np.linalg.inv(seen[chosen]), best
-    near = np.round(factors * 4) / 4
+    near = nearest_quarter(factors)
     factors = np.where(np.abs(factors - near) < SAME, near, factors)
     return Basis([[every[k] for k in groups[c]] for c in chosen], factors, reader.values[chosen])
 
@@ -136,7 +139,8 @@ def simplest(known: list[Feature], numbers: FloatArray, rows: FloatArray, length
 class _Reader:
     """What it costs to read a program whose numbers are sums of some measures."""
 
-    def __init__(self, heads: list[Measure], numbers: FloatArray, lengths: Flags) -> None:
+    def __init__(self, heads: list[Measure], numbers: FloatArray, lengths: Flags, runs: Sequence[Run]) -> None:
+        self.runs = runs
         self.prices = np.array([NAMED[each.word] for each in heads])
         self.values: FloatArray = np.array([each.row @ numbers for each in heads])
         count = len(numbers) - 3
@@ -149,9 +153,13 @@ class _Reader:
         factors, prices = factors[: len(self.small)], self.prices[chosen]
         size = np.abs(factors)
         used = size > SAME
-        terms: FloatArray = np.where(used, UGLY, 0.0)
-        for factor, price in FACTORS.items():
-            terms[np.abs(size - factor) < SAME] = price
+        terms = cost_of_terms(factors)
+        for run in self.runs:
+            for shares in (run.copies - 1, run.copies, run.copies + 1):
+                shared = cost_of_terms(shares * factors[run.step])
+                if SHARED + shared.sum() < terms[run.step].sum():
+                    terms[run.step] = shared
+                    terms[run.step, 0] += SHARED
         if self.height in chosen:
             height = chosen.index(self.height)
             terms[np.abs(factors[:, height] + 0.5) < SAME, height] = FLOOR

@@ -13,13 +13,17 @@ from torch import Tensor
 
 from shapeprog.geometry.distance import signed_distance
 from shapeprog.geometry.scene import Scene
-from shapeprog.inference.joints import FIRST, Joints, between, places_of
+from shapeprog.inference.joints import FIRST, Joints, between, moved, needs, places_of
 from shapeprog.inference.residuals import rows_of
+from shapeprog.inference.ties.fitting import CLOSED, ways_free
 from shapeprog.inference.tunable import Tunable
 from shapeprog.space import Array, FloatArray
 
 LOOKED, AROUND = 32, 0.6
 """Places around a joint that are looked at, and how far away in cells they are at most."""
+
+CLOSING = 2
+"""Steps in which gaps are closed."""
 
 APART, NARROW = 0.02, 0.006
 """Cells between parts that are apart; and the standard deviation, across its length, of the places of a contact that is
@@ -52,14 +56,17 @@ class Contacts:
 
     def at(self, numbers: FloatArray) -> Array:
         """Which joints hold (C,) where the numbers and extents of the whole are these (V,)."""
-        poses = self.tunable.poses(torch.from_numpy(numbers[: len(self.tunable.values)]))
-        return holding(poses.scene, self.joints).numpy()
+        scene = self.tunable.scene(torch.from_numpy(numbers[: len(self.tunable.values)]))
+        return holding(scene, self.joints).numpy()
 
     def kept(
-        self, rows: FloatArray, fixed: int, numbers: FloatArray, curvature: FloatArray
+        self, rows: FloatArray, fixed: int, numbers: FloatArray, curvature: FloatArray, price: float
     ) -> tuple[FloatArray, FloatArray]:
         """The relations (M, V), in the order in which they were found to be worth having, without those that part what
         holds together; and the optimum (V,) where they hold.
+
+        Parts are moved together again as far as relations allow and evidence does not mind: the end of a part that is
+        hidden inside another may well lie elsewhere.
 
         Parameters
         ----------
@@ -67,27 +74,51 @@ class Contacts:
             How many of them, the first, are not in question.
         numbers, curvature
             The optimum without relations, and half the curvature of the misfit there.
+        price
+            By how much moving parts together may raise the misfit at most.
         """
-        free, left = np.linalg.inv(curvature), list(rows)
+        free, left = np.linalg.inv(curvature), rows
         needed = self.at(_optimum(left[:fixed], numbers, free))
+
+        def placed(first: int) -> tuple[FloatArray, bool]:
+            """The optimum where the first relations hold, and whether all does that should hold together."""
+            best = _optimum(left[:first], numbers, free)
+            if self.at(best)[needed].all():
+                return best, True
+            closed = self._closed(best, left[:first], curvature)
+            dear = (closed - best) @ curvature @ (closed - best) > price
+            return (best, False) if dear or not self.at(closed)[needed].all() else (closed, True)
+
         sure = fixed
-        while not self.at(_optimum(left, numbers, free))[needed].all():
+        best, holds = placed(len(left))
+        while not holds:
             # With the first ``low`` relations all hold together, with the first ``high`` they do not.
             low, high = sure, len(left)
             while high - low > 1:
                 middle = (low + high) // 2
-                holds = self.at(_optimum(left[:middle], numbers, free))[needed].all()
-                low, high = (middle, high) if holds else (low, middle)
+                low, high = (middle, high) if placed(middle)[1] else (low, middle)
             if low == len(left):
                 break
-            del left[low]
+            left = np.delete(left, low, axis=0)
             sure = low
-        return np.array(left).reshape(-1, len(numbers)), _optimum(left, numbers, free)
+            best, holds = placed(len(left))
+        return left, best
 
-
-def _optimum(rows: list[FloatArray], numbers: FloatArray, free: Array) -> FloatArray:
-    """The numbers (V,) of the least misfit for which relations hold; ``free`` is the inverse of its curvature."""
-    if not rows:
+    def _closed(self, numbers: FloatArray, rows: FloatArray, curvature: FloatArray) -> FloatArray:
+        """The numbers (V,) with gaps between parts closed while relations (M, V) hold, and the misfit rises least."""
+        count, ways, start = len(self.tunable.values), ways_free(rows, len(numbers)), numbers
+        for _ in range(CLOSING):
+            poses = self.tunable.poses(torch.from_numpy(numbers[:count]))
+            gaps = needs(poses.scene, poses.slopes, moved(poses.scene, self.joints))
+            wide = np.pad(gaps.slopes.numpy(), [(0, 0), (0, len(numbers) - count)])
+            slope = curvature @ (numbers - start) + CLOSED * wide.T @ gaps.residual.numpy()
+            inner = ways.T @ (curvature + CLOSED * wide.T @ wide) @ ways
+            numbers = numbers - ways @ np.linalg.solve(inner, ways.T @ slope)
         return numbers
-    along = free @ np.array(rows).T
-    return numbers - along @ np.linalg.solve(np.array(rows) @ along, np.array(rows) @ numbers)
+
+
+def _optimum(rows: FloatArray, numbers: FloatArray, free: Array) -> FloatArray:
+    """The numbers (V,) of the least misfit for which relations hold; ``free`` is the inverse of its curvature."""
+    along = free @ rows.T
+    found: FloatArray = numbers - along @ np.linalg.solve(rows @ along, rows @ numbers)
+    return found

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from shapeprog.inference.ties.basis import SAME, Basis, Measure
+from shapeprog.inference.ties.basis import Basis, Measure
+from shapeprog.inference.ties.runs import Run, plural, shares
+from shapeprog.inference.ties.sums import SAME, nearest_quarter
 from shapeprog.inference.tunable import Tunable
 from shapeprog.language.evaluation import evaluated
 from shapeprog.language.expression import Name, Value, combined
@@ -14,7 +16,7 @@ from shapeprog.language.parameters import to_float32
 from shapeprog.language.program import Draw, Node, Program
 from shapeprog.language.source import Assignment, Line, Source, WrittenDraw, WrittenLoop
 from shapeprog.language.statement import language
-from shapeprog.space import UP
+from shapeprog.space import UP, FloatArray
 
 EXTENTS = ("height", "depth", "width")
 """What the extents of the whole are called along the axes of the grid."""
@@ -40,9 +42,12 @@ LEVEL = 0.6
 """A part is thin along an axis where it measures less than this share of the next longer."""
 
 
-def written(tunable: Tunable, basis: Basis) -> Program:
-    """The program whose numbers follow from named ones; those used once stay where they are used."""
-    names, order = _names(tunable, basis)
+def written(tunable: Tunable, basis: Basis, runs: Sequence[Run]) -> Program:
+    """The program whose numbers follow from named ones; those used once stay where they are used.
+
+    Runs are written by their counts where their steps follow from a span.
+    """
+    names, order, taken = _names(tunable, basis)
     count = len(tunable.moving)
     uses = np.abs(basis.factors[:count]) > SAME
     alone = [  # used once, as it is; or, an extent that nothing follows from, not at all
@@ -54,8 +59,8 @@ def written(tunable: Tunable, basis: Basis) -> Program:
     terms: dict[int, Value] = {
         z: to_float32(basis.values[z]) if alone[z] else Name(names[z]) for z in range(len(basis.chosen))
     }
-    table: dict[tuple[int, int], Value] = {}
-    for place, row in zip(tunable.moving, basis.factors[:count], strict=True):
+
+    def sum_of(row: FloatArray, *others: tuple[Value, float]) -> Value:
         parts: list[tuple[Value, float]] = []
         for z in order:
             if not row[z]:
@@ -65,28 +70,50 @@ def written(tunable: Tunable, basis: Basis) -> Program:
             else:
                 parts.append((terms[z], float(row[z])))
         parts.sort(key=lambda part: part[1] < 0)  # sums begin with what is added
-        table[place] = combined(0.0, parts)
-    lines: list[Line] = list(_header(tunable, basis, names, order, alone))
+        return combined(0.0, [*parts, *others])
+
+    table = {place: sum_of(row) for place, row in zip(tunable.moving, basis.factors[:count], strict=True)}
+    counts: list[tuple[str, Value]] = []
+    spacings: list[Line] = []
+    steps = np.array([group[0].word == "step" for group in basis.chosen])
+    for run in runs:
+        way = shares(run, basis.factors, steps)
+        if way is None:
+            continue
+        part = _part(tunable, run.node)
+        name = Name(_unused(plural(part), taken))
+        counts.append((name.name, float(run.copies)))
+        step = basis.factors[run.step]
+        each: Value = sum_of(nearest_quarter((run.copies + way.more) * step)) / combined(way.more, [(name, 1.0)])
+        if way.before:
+            spacings.append(Assignment((((spacing := _unused(f"{part}_spacing", taken)), each),)))
+            each = Name(spacing)
+            for start in run.starts:
+                row = nearest_quarter(basis.factors[start] - way.before * step)
+                table[tunable.moving[start]] = sum_of(row, (each, way.before))
+        table[tunable.moving[run.step]] = each
+        table[run.node, run.slot] = name
+    lines: list[Line] = list(_header(basis, names, order, alone, counts))
     if floors:
         lines.append(Assignment(((FLOOR, -Name(EXTENTS[UP]) / 2),)))
     body = _lines(tunable.program.body, iter(range(len(tunable.nodes))), table)
-    return evaluated(Source((*lines, *body)))
+    return evaluated(Source((*lines, *spacings, *body)))
 
 
 def _header(
-    tunable: Tunable, basis: Basis, names: list[str], order: list[int], alone: list[bool]
+    basis: Basis, names: list[str], order: list[int], alone: list[bool], counts: list[tuple[str, Value]]
 ) -> Iterator[Assignment]:
     """The lines that name numbers: the extents of the whole, then what is measured from the same place together."""
-    groups: dict[str, list[int]] = {"whole": [], "": []}
+    groups: dict[str, list[tuple[str, Value]]] = {"whole": [], "": [*counts]}
     for z in order:
         if not alone[z]:
             word = basis.chosen[z][0].word
-            groups.setdefault("whole" if word == "extent" else NOTES.get(word, ""), []).append(z)
-    groups["whole"].sort(key=lambda z: -EXTENTS.index(names[z]))
-    for note, members in groups.items():
+            note = "whole" if word == "extent" else NOTES.get(word, "")
+            groups.setdefault(note, []).append((names[z], to_float32(basis.values[z])))
+    groups["whole"].sort(key=lambda pair: -EXTENTS.index(pair[0]))
+    for note, pairs in groups.items():
         line: list[tuple[str, Value]] = []
-        for z in members:
-            pair = names[z], to_float32(basis.values[z])
+        for pair in pairs:
             if line and sum(len(name) + 8 for name, _ in [*line, pair]) > WIDE:
                 yield Assignment(tuple(line), note if note != "whole" else "")
                 line = []
@@ -95,21 +122,26 @@ def _header(
             yield Assignment(tuple(line), note if note != "whole" else "")
 
 
-def _names(tunable: Tunable, basis: Basis) -> tuple[list[str], list[int]]:
-    """A name for every measure, and the order in which they are met: the whole first, then by the order of the text."""
+def _names(tunable: Tunable, basis: Basis) -> tuple[list[str], list[int], set[str]]:
+    """A name for every measure; the order in which they are met, the whole first, then by the order of the text; and
+    all words that are taken."""
     known, taken = language(), {FLOOR, *(node.name for node in tunable.nodes), *_roles(tunable.nodes)}
     taken |= {*known.names, *known.roles}
     first = [min(each.feature.node for each in group) for group in basis.chosen]
     order = sorted(range(len(first)), key=lambda z: (basis.chosen[z][0].word != "extent", first[z], z))
     names = [""] * len(first)
     for z in order:
-        base = _name(tunable, basis.chosen[z])
-        name, number = base, 2
-        while name in taken:
-            name, number = f"{base}_{number}", number + 1
-        names[z] = name
-        taken.add(name)
-    return names, order
+        names[z] = _unused(_name(tunable, basis.chosen[z]), taken)
+    return names, order, taken
+
+
+def _unused(base: str, taken: set[str]) -> str:
+    """A name that is not taken, which it is then."""
+    name, number = base, 2
+    while name in taken:
+        name, number = f"{base}_{number}", number + 1
+    taken.add(name)
+    return name
 
 
 def _roles(nodes: list[Node]) -> Iterator[str]:
@@ -122,7 +154,7 @@ def _name(tunable: Tunable, group: list[Measure]) -> str:
     if first.word == "extent":
         return EXTENTS[first.feature.axis]
     alike = [each for each in group if each.word == first.word]
-    parts = [_part(tunable, each) for each in alike]
+    parts = [_part(tunable, each.feature.node) for each in alike]
     part = max(dict.fromkeys(parts), key=parts.count)  # the one that has it most often, else the first
     mine = [each for each, owner in zip(alike, parts, strict=True) if owner == part]
     earliest = min(mine, key=lambda each: (each.feature.node, each.feature.all))
@@ -133,9 +165,9 @@ def _name(tunable: Tunable, group: list[Measure]) -> str:
     return f"{part}_{kind}"
 
 
-def _part(tunable: Tunable, measure: Measure) -> str:
-    """What the part is called that a measure is of; of a loop the first part in it."""
-    rest = tunable.nodes[measure.feature.node :]
+def _part(tunable: Tunable, node: int) -> str:
+    """What the part is called that a node is; of a loop the first part in it."""
+    rest = tunable.nodes[node:]
     return next(node.word for node in rest if isinstance(node, Draw))
 
 
@@ -145,7 +177,7 @@ def _kind(tunable: Tunable, measure: Measure) -> str:
     node = tunable.nodes[feature.node]
     if word == "length":
         return _length(tunable, measure)
-    if word == "shift":
+    if word in ("shift", "step"):
         return "spacing"
     if word == "side":
         return SIDES[feature.kind, feature.axis]

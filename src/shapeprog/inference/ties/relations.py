@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import combinations
 from typing import NamedTuple
 
@@ -62,22 +62,25 @@ def relations(known: list[Feature], numbers: FloatArray, touching: set[tuple[int
     touching
         Pairs of nodes, the smaller first, whose parts touch.
     """
+    offered = [(row, trust) for row, trust in _candidates(known, numbers, touching) if row.any()]
+    if not offered:
+        return []
+    rows, trust = np.stack([row for row, _ in offered]), np.array([trust for _, trust in offered])
+    used = rows != 0
+    tidy = rows / np.take_along_axis(rows, used.argmax(1)[:, None], 1)
+    off = np.abs(tidy @ numbers) / np.abs(tidy).max(1)
+    angles = np.any([each.row != 0 for each in known if each.kind == "angle"] or np.zeros((1, len(numbers)), bool), 0)
+    near = off < np.where(used[:, angles].any(1), DEGREES, WITHIN)
+    hidden = ~near & ~used[:, angles].any(1) & (off < JOINED)
+    for visible, worth in HIDDEN.items():
+        here = hidden & (trust == visible)
+        trust[here], near[here] = worth, True
+    trust *= np.minimum(1.0, SIMPLE / used.sum(1))
     found: dict[bytes, Relation] = {}
-    angles = np.any([each.row != 0 for each in known if each.kind == "angle"] or [np.zeros(len(numbers), bool)], axis=0)
-    for row, trust in _candidates(known, numbers, touching):
-        factors = np.flatnonzero(row)
-        if not len(factors):
-            continue
-        tidy = row / row[factors[0]]
-        off, within = abs(tidy @ numbers) / np.abs(tidy).max(), DEGREES if angles[factors].any() else WITHIN
-        if trust >= HOLDING and within <= off < JOINED:
-            trust = HIDDEN[trust]
-        elif off >= within:
-            continue
-        trust *= min(1.0, SIMPLE / len(factors))
-        key = np.round(tidy, 6).tobytes()
-        if key not in found or found[key].trust < trust:
-            found[key] = Relation(tidy, trust)
+    for k in np.flatnonzero(near).tolist():
+        key = np.round(tidy[k], 6).tobytes()
+        if key not in found or found[key].trust < trust[k]:
+            found[key] = Relation(tidy[k], float(trust[k]))
     return list(found.values())
 
 
@@ -96,19 +99,20 @@ def _candidates(
             if not level:
                 yield one.row - whole[axis].row / 2, SURE
                 yield one.row + whole[axis].row / 2, HOLDING if axis == UP else SURE
-        for one, two in combinations(here, 2):
+        for one, two, flush, mirrored in _near(here, numbers):
             middles = (one.kind == "middle") + (two.kind == "middle")
             if one.kind == two.kind == "place" and one.node == two.node:  # the ends of one part
-                yield one.row - two.row, SURE
-                if axis in (DEPTH, SIDE):
+                if flush:
+                    yield one.row - two.row, SURE
+                if mirrored and axis in (DEPTH, SIDE):
                     yield one.row + two.row, LIKELY
                 continue
             if middles == 1 or (one.node == two.node and one.all == two.all):
                 continue
             pair = (min(one.node, two.node), max(one.node, two.node))
-            if one.kind == two.kind or not _edge(one, two, ends, mirror=False):
+            if flush and (one.kind == two.kind or not _edge(one, two, ends, mirror=False)):
                 yield one.row - two.row, HOLDING if pair in touching and not middles else LIKELY
-            if axis in (DEPTH, SIDE) and not (one.kind == two.kind and _edge(one, two, ends, mirror=True)):
+            if mirrored and axis in (DEPTH, SIDE) and not (one.kind == two.kind and _edge(one, two, ends, mirror=True)):
                 yield one.row + two.row, LIKELY if middles == 0 else POSSIBLE
     for run in known:  # the gap between the run and a part is that between its copies
         facing = {"before": "high", "behind": "low"}.get(run.kind)
@@ -117,11 +121,23 @@ def _candidates(
                 yield run.row - side.row, LIKELY
     for kind in ("length", "radius", "shift", "angle"):
         alike = [each for each in known if each.kind == kind]
-        for one, two in combinations(alike, 2):
+        for one, two, same, opposite in _near(alike, numbers):
             thin = kind == "length" and max(abs(one.at(numbers)), abs(two.at(numbers))) < THIN
-            yield one.row - two.row, LIKELY if one.axis == two.axis or thin else CHANCE
-            if kind in ("shift", "angle"):
+            if same:
+                yield one.row - two.row, LIKELY if one.axis == two.axis or thin else CHANCE
+            if opposite and kind in ("shift", "angle"):
                 yield one.row + two.row, POSSIBLE
+
+
+def _near(alike: Sequence[Feature], numbers: FloatArray) -> Iterator[tuple[Feature, Feature, bool, bool]]:
+    """Pairs of features that may be related, and whether they may be equal, and opposite: others are too far apart."""
+    at = [each.at(numbers) for each in alike]
+    reach = [max(JOINED, DEGREES) * float(np.abs(each.row).max()) for each in alike]
+    for one, two in combinations(range(len(alike)), 2):
+        far = reach[one] + reach[two]
+        equal, opposite = abs(at[one] - at[two]) < far, abs(at[one] + at[two]) < far
+        if equal or opposite:
+            yield alike[one], alike[two], equal, opposite
 
 
 def _edge(one: Feature, two: Feature, ends: Ends, *, mirror: bool) -> bool:

@@ -20,10 +20,11 @@ from shapeprog.inference.refine import single_threaded
 from shapeprog.inference.ties.basis import Basis, simplest
 from shapeprog.inference.ties.contacts import Contacts
 from shapeprog.inference.ties.features import Feature, features
-from shapeprog.inference.ties.fitting import CLOSED, Misfit, refitted
+from shapeprog.inference.ties.fitting import CLOSED, Misfit, refitted, ways_free
 from shapeprog.inference.ties.naming import written
 from shapeprog.inference.ties.pricing import worthwhile
 from shapeprog.inference.ties.relations import relations
+from shapeprog.inference.ties.runs import runs
 from shapeprog.inference.tunable import CELLS, DEGREES, Tunable
 from shapeprog.language.free import free_numbers
 from shapeprog.language.program import Draw, Program
@@ -72,7 +73,7 @@ def tie(
         numbers = misfit.numbers
         rows: FloatArray = np.zeros((0, len(numbers)))
         known: list[Feature] = []
-        scene = tunable.poses(tunable.values).scene
+        scene = tunable.scene(tunable.values)
         joints = _joints(scene, seed)
         pairs = touching(tunable, scene, joints) if joints else set()
         contacts = Contacts(tunable, joints) if joints else None
@@ -84,14 +85,17 @@ def tie(
             curvature = misfit.at(numbers)[1]
             rows, optimum = worthwhile(offered, numbers, curvature, price, fixed=rows, low=misfit.low)
             if contacts:
-                rows, optimum = contacts.kept(rows, before, numbers, curvature)
+                rows, optimum = contacts.kept(rows, before, numbers, curvature, price)
             numbers = _together(misfit, optimum, rows, joints, contacts)
             if progress:
                 progress("tying numbers", (round_ + 1) / ROUNDS)
             if len(rows) == before:
                 break
-        basis = _rounded(simplest(known, numbers, rows, np.append(tunable.are("length").numpy(), [False] * 3)))
-        named = written(tunable, basis)
+        ways = ways_free(rows, len(numbers))
+        repeated = list(runs(tunable, ways))
+        lengths = np.append(tunable.are("length").numpy(), [False] * 3)
+        basis = _rounded(simplest(known, numbers, ways, lengths, repeated))
+        named = written(tunable, basis, repeated)
         return Tied(named, free_numbers(named))
 
 

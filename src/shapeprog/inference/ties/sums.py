@@ -1,0 +1,32 @@
+"""What sums of named numbers cost their reader, by the factors of their terms."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from shapeprog.space import FloatArray
+
+Flags = npt.NDArray[np.bool_]
+
+SAME = 1e-6
+"""Difference below which factors are the same."""
+
+FACTORS = {1.0: 1.0, 0.5: 1.2, 2.0: 1.3, 0.25: 2.0, 1.5: 2.0, 3.0: 2.0, 4.0: 2.0}
+"""What a term of a sum costs a reader by its factor; others cost ``UGLY``."""
+
+UGLY = 4.0
+
+
+def nearest_quarter(factors: FloatArray) -> FloatArray:
+    """The quarters of whole numbers that are nearest to factors."""
+    return np.round(factors * 4) / 4
+
+
+def cost_of_terms(factors: FloatArray) -> FloatArray:
+    """What the terms of sums cost a reader, by their factors."""
+    size = np.abs(factors)
+    terms: FloatArray = np.where(size > SAME, UGLY, 0.0)
+    for factor, price in FACTORS.items():
+        terms[np.abs(size - factor) < SAME] = price
+    return terms

@@ -5,6 +5,8 @@ Furniture is one piece.  A choice by what is explained does not see a gap of a c
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 import numpy as np
 import torch
 
@@ -29,20 +31,25 @@ FLUSH = 1e-4
 """Gap in cells up to which parts touch: faces that lie on each other do."""
 
 
-def connected(program: Program, evidence: Evidence, prices: Prices, seed: int = 0) -> Program:
+def connected(
+    program: Program, evidence: Evidence, prices: Prices, seed: int = 0, fixed: Collection[Node] = ()
+) -> Program:
     """The program with parts that float extended to others, as far as that costs little of its value; each of its nodes
-    is one block."""
-    while (better := _less_apart(program, evidence, prices, seed)) is not None:
+    is one block, and those that are ``fixed`` stay as they are."""
+    while (better := _less_apart(program, evidence, prices, seed, fixed)) is not None:
         program = better
     return program
 
 
-def _less_apart(program: Program, evidence: Evidence, prices: Prices, seed: int) -> Program | None:
+def _less_apart(
+    program: Program, evidence: Evidence, prices: Prices, seed: int, fixed: Collection[Node]
+) -> Program | None:
     """The most valuable program with one block changed or left out and fewer that float, if there is one worth it."""
     apart = floating(program, seed)
     if not apart:
         return None
-    every = [program, *(option for place in apart for option in _options(program, place, apart))]
+    places = [place for place in apart if program.body[place] not in fixed]
+    every = [program, *(option for place in places for option in _options(program, place, apart))]
     nodes = list(dict.fromkeys(node for each in every for node in each.body))
     place = {node: number for number, node in enumerate(nodes)}
     made = covers([Program((node,)) for node in nodes], evidence, prices, seed)

@@ -23,6 +23,7 @@ from shapeprog.library import Library, learn, library_of, load_library, save_lib
 from shapeprog.library.blocks import blocks_of
 from shapeprog.library.length import statements
 from shapeprog.library.matching import TOLERANCE
+from shapeprog.library.rewriting import offers
 
 SHELVES = """\
 # such as shelves(count=4, bottom=-8, height=16, width=12, thick=1)
@@ -147,6 +148,28 @@ def test_a_loop_of_what_a_function_draws_stays_around_its_call() -> None:
     assert format_program(written).endswith(
         "for i in mirror(depth, at=9):\n    leg(posts(floor=0, height=8, width=20, depth=8, thick=1))\n"
     )
+
+
+def test_equal_loops_around_what_a_function_draws_become_one_loop_around_its_call() -> None:
+    desk = "def desk(high, wide, thick):\n    top(box(at=(high, 0, 0), size=(thick, 6, wide)))\n"
+    desk += "    side(box(at=(0, 0, 0), size=(high, 6, thick)))\n"
+    text = "step, wide, thick = 8, 6, 1\nfor i in translate(3, by=(0, 0, step)):\n    {}\n"
+    top, side = "top(box(at=(9, 0, 0), size=(thick, 6, wide)))", "side(box(at=(0, 0, 0), size=(9, 6, thick)))"
+    program = parse(text.format(top) + text.split("\n", 1)[1].format(side))
+    written = with_library(program, library(desk))
+    assert format_program(written).endswith(
+        "for i in translate(3, by=(0, 0, step)):\n    desk(high=9, wide=wide, thick=thick)\n"
+    )
+    assert away(program, written) < 1e-6
+    other = parse(text.format(top) + text.split("\n", 1)[1].replace("step", "8.2").format(side))
+    assert with_library(other, library(desk)) == other
+
+
+def test_a_comment_in_a_loop_is_no_statement() -> None:
+    text = "for i in mirror(depth, at=9):\n    # legs\n    leg(at=(0, 3, 9), size=(8, 1, 1))\n"
+    one = "def one(low):\n    for i in mirror(depth, at=9):\n        leg(at=(low, 3, 9), size=(8, 1, 1))\n"
+    (offer,) = offers(parse(text), library(one))
+    assert offer.fewer == 1
 
 
 def test_parts_of_another_role_and_those_that_are_off_are_left_alone() -> None:

@@ -18,6 +18,7 @@ from shapeprog.inference.refine import single_threaded
 from shapeprog.inference.residuals import Pairs, Target, pull
 from shapeprog.inference.tunable import Poses, Tunable
 from shapeprog.language.program import Program
+from shapeprog.space import FloatArray
 
 STEPS, LAST = 12, 5
 """Steps, of which the last ones keep angles as they are written and close what is still open."""
@@ -45,12 +46,16 @@ OPEN = 0.15
 UPRIGHT = 0.7
 """Degrees below which an angle is none."""
 
+SAME = 1e-6
+"""Singular value of relations below which one follows from others."""
+
 
 def adjust(
     program: Program,
     evidence: Evidence,
     *,
     steps: int = STEPS,
+    relations: FloatArray | None = None,
     seed: int = 0,
     deadline: Deadline = NEVER,
     progress: Progress | None = None,
@@ -61,6 +66,8 @@ def adjust(
     ----------
     steps
         Steps of Gauss and Newton, at least ``LAST`` of them with fixed angles.
+    relations
+        Rows (R, F) of factors: these sums of the numbers that move stay what they are.
     seed
         Of the samples that each step draws.
     deadline
@@ -72,6 +79,7 @@ def adjust(
     values, held = tunable.values, torch.zeros(len(tunable.values), dtype=torch.bool)
     generator, target, angles = torch.Generator().manual_seed(seed), Target(evidence), tunable.are("angle")
     narrow = EXPLAINED * evidence.tolerance
+    ways = _ways(relations, held)
     wide = max(CAPTURE, narrow)
     with single_threaded():
         poses = tunable.poses(values)
@@ -82,6 +90,7 @@ def adjust(
             done = min(step / max(steps - LAST, 1), 1.0)
             if done == 1 and not held.any():
                 held = angles
+                ways = _ways(relations, held)
                 values = torch.where(held, tunable.rounded(values * (values.abs() >= UPRIGHT)), values)
                 poses = tunable.poses(values)
             known = moved(poses.scene, known)
@@ -90,7 +99,8 @@ def adjust(
                 of_target(poses, pairs, wide ** (1 - done) * narrow**done),
                 of_joints(poses, known, closing=done == 1),
             ]
-            values = torch.maximum(values + _move(systems, tunable, values, held), tunable.low)
+            onwards = torch.maximum(values + _move(systems, tunable, values, ways), tunable.low)
+            values = onwards if relations is None else values + ways @ (ways.T @ (onwards - values))
             poses = tunable.poses(values)
             if progress:
                 progress("adjusting", (step + 1) / steps)
@@ -130,17 +140,24 @@ def of_joints(poses: Poses, known: Joints, *, closing: bool) -> System:
     return weighted.T @ gaps.residual, weighted.T @ gaps.slopes
 
 
+def _ways(relations: FloatArray | None, held: Bool[Tensor, " F"]) -> Float[Tensor, "F Z"]:
+    """Orthonormal directions in which numbers may move: not those that are held, nor against relations."""
+    single = torch.eye(len(held), dtype=torch.float64)
+    if relations is None:
+        return single[:, ~held]
+    _, sizes, directions = torch.linalg.svd(torch.cat([torch.from_numpy(relations), single[held]]))
+    return directions[int((sizes > SAME).sum()) :].T
+
+
 def _move(
-    systems: list[System], tunable: Tunable, values: Float[Tensor, " F"], held: Bool[Tensor, " F"]
+    systems: list[System], tunable: Tunable, values: Float[Tensor, " F"], ways: Float[Tensor, "F Z"]
 ) -> Float[Tensor, " F"]:
     """The step to the least of the sum of squares, with what draws every number to its start."""
     slope, curvature = (sum(parts) for parts in zip(*systems, strict=True))
     gentle = torch.tensor([GENTLE.get(kind, PLACE) for kind in tunable.kinds]).double() * tunable.scale**2
-    free = ~held
-    slope = (slope + gentle * (values - tunable.values))[free]
-    curvature = (curvature + torch.diag(gentle))[free][:, free]
-    move = torch.zeros_like(values)
-    move[free] = -torch.linalg.solve(curvature, slope)
+    slope = slope + gentle * (values - tunable.values)
+    curvature = curvature + torch.diag(gentle)
+    move = ways @ -torch.linalg.solve(ways.T @ curvature @ ways, ways.T @ slope)
     farthest = FARTHEST / tunable.scale
     return torch.minimum(torch.maximum(move, -farthest), farthest)
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -17,6 +17,7 @@ import numpy.typing as npt
 from shapeprog.data.shape import Shape
 from shapeprog.inference.adjustment import adjust, tidy
 from shapeprog.inference.budget import NEVER, Deadline, Progress
+from shapeprog.inference.calls import Called, Part, drawn, moved, named, placed, program_of, regrouped, relations
 from shapeprog.inference.candidates import distinct, looks, plain, single_candidates
 from shapeprog.inference.cell_coverage import choose_on_cells, cost_on_cells, covers_of_cells
 from shapeprog.inference.choice import Choice, choose, explained, missed, value
@@ -25,10 +26,12 @@ from shapeprog.inference.coverage import Covers, Prices, covers
 from shapeprog.inference.evidence import Evidence, evidence_of
 from shapeprog.inference.neighbours import neighbours
 from shapeprog.inference.pieces import find_pieces
+from shapeprog.inference.recognition import proposed
 from shapeprog.inference.repeating import repeated
-from shapeprog.inference.roles import in_order, with_roles
+from shapeprog.inference.roles import in_order
+from shapeprog.language.free import numbers_outside
 from shapeprog.language.program import Node, Program
-from shapeprog.language.text import numbers_written
+from shapeprog.library.matching import Pattern
 
 Flags = npt.NDArray[np.bool_]
 
@@ -90,6 +93,7 @@ def assemble(
     *,
     blocks: int = 10,
     more: Sequence[Node] = (),
+    functions: Sequence[Pattern] = (),
     prices: Prices | None = None,
     detail: float = 1.0,
     seed: int = 0,
@@ -104,6 +108,8 @@ def assemble(
         Most blocks of the program.
     more
         Blocks from elsewhere that compete with those found here.
+    functions
+        Functions whose calls compete with blocks; each call counts as one.
     prices, detail
         What counts against a program; the prices of what is written are divided by ``detail``.
     deadline, progress
@@ -120,7 +126,9 @@ def assemble(
     singles = [singles[place] for place in distinct(singles, looks(singles))] if singles else []
     told(0.5)
     elsewhere = [plain(node) for node in more]
-    candidates = [*elsewhere, *singles[: MOST_CANDIDATES // 2], *repeated(singles)][:MOST_CANDIDATES]
+    found = [*elsewhere, *singles[: MOST_CANDIDATES // 2], *repeated(singles)][:MOST_CANDIDATES]
+    several = [function for function in functions if function.blocks > 1]
+    candidates = [*found, *proposed(several, [*found[len(elsewhere) :], *elsewhere], deadline)]
     told(0.7)
     if not candidates or evidence.area <= 0:
         return Assembly(Program(), 0.0, "there is no surface to speak of.", (), evidence)
@@ -129,11 +137,12 @@ def assemble(
     told(1.0)
     if shape.points is None:
         return _of_cells(candidates, shape.voxels, evidence, cost, blocks, seed, deadline, progress)
-    return _of_surface(candidates, evidence, cost, blocks, seed, deadline, progress)
+    return _of_surface(candidates, functions, evidence, cost, blocks, seed, deadline, progress)
 
 
 def _of_surface(
-    candidates: list[Node],
+    candidates: Sequence[Part],
+    functions: Sequence[Pattern],
     evidence: Evidence,
     prices: Prices,
     blocks: int,
@@ -142,19 +151,19 @@ def _of_surface(
     progress: Progress | None,
 ) -> Assembly:
     """What explains most points of a surface, chosen among neighbours too, adjusted, connected and named."""
-    choice, candidates = _improved(candidates, evidence, prices, blocks, seed, deadline)
-    start = connected(_chosen(candidates, choice.best.chosen), evidence, prices, seed)
-    adjusted = adjust(start, evidence, seed=seed, deadline=deadline, progress=progress)
-    program = connected(_unharmed(adjusted, start, evidence, prices, seed), evidence, prices, seed)
-    program = in_order(with_roles(tidy(Program(tuple(plain(node) for node in program.body)))))
+    choice, candidates = _improved(candidates, functions, evidence, prices, blocks, seed, deadline)
+    start = _connected(_chosen(candidates, choice.best.chosen), evidence, prices, seed)
+    adjusted = _adjusted(start, evidence, seed=seed, deadline=deadline, progress=progress)
+    parts = _connected(_unharmed(adjusted, start, evidence, prices, seed), evidence, prices, seed)
+    program = in_order(named(parts, tidy(Program(tuple(plain(node) for node in drawn(parts).body)))))
     seen = _seen(choice, candidates)
     share = explained(_covers(program.body, evidence, prices, seed), tuple(range(len(program.body))))
-    reason = _reason(len(program.body), share, seen, blocks, "surface")
+    reason = _reason(len(parts), share, seen, blocks, "surface")
     return Assembly(program, share, reason, seen, evidence)
 
 
 def _of_cells(
-    candidates: list[Node],
+    candidates: Sequence[Part],
     voxels: Flags,
     evidence: Evidence,
     prices: Prices,
@@ -164,29 +173,38 @@ def _of_cells(
     progress: Progress | None,
 ) -> Assembly:
     """What explains most cells, adjusted where that does not fit them worse: a surface is anywhere within its cells."""
-    offered = [Program((node,)) for node in candidates]
+    offered = [program_of(part) for part in candidates]
     choice = choose_on_cells(covers_of_cells(offered, voxels, evidence, prices), blocks, seed=seed)
     start = _chosen(candidates, choice.best.chosen)
-    found = [adjust(start, evidence, seed=seed, deadline=deadline, progress=progress), tidy(start)]
-    program = in_order(with_roles(min(found, key=lambda each: cost_on_cells(each, voxels))))
+    adjusted = _adjusted(start, evidence, seed=seed, deadline=deadline, progress=progress)
+    found = [drawn(adjusted), tidy(drawn(start))]
+    program = in_order(named(start, min(found, key=lambda each: cost_on_cells(each, voxels))))
     seen = _seen(choice, candidates)
-    reason = _reason(len(start.body), choice.best.explained, seen, blocks, "cells")
+    reason = _reason(len(start), choice.best.explained, seen, blocks, "cells")
     return Assembly(program, choice.best.explained, reason, seen, evidence)
 
 
 def _improved(
-    candidates: list[Node], evidence: Evidence, prices: Prices, blocks: int, seed: int, deadline: Deadline
-) -> tuple[Choice, list[Node]]:
+    candidates: Sequence[Part],
+    functions: Sequence[Pattern],
+    evidence: Evidence,
+    prices: Prices,
+    blocks: int,
+    seed: int,
+    deadline: Deadline,
+) -> tuple[Choice, Sequence[Part]]:
     """What is chosen, and from which candidates: also from neighbours of what was chosen before, while that pays."""
     made = _covers(candidates, evidence, prices, seed)
     choice = choose(made, blocks, seed=seed)
     for _ in range(ROUNDS):
-        program = _chosen(candidates, choice.best.chosen)
-        if not program.body or deadline.passed("another choice among neighbours"):
+        parts = _chosen(candidates, choice.best.chosen)
+        if not parts or deadline.passed("another choice among neighbours"):
             break
         rest = [candidates[place] for place in missed(made, choice.best.chosen)[:REST]]
-        adjusted = adjust(program, evidence, steps=ROUGH, seed=seed, deadline=deadline)
-        near = list(dict.fromkeys([*program.body, *adjusted.body, *neighbours(adjusted), *rest]))
+        adjusted = _adjusted(parts, evidence, steps=ROUGH, seed=seed, deadline=deadline)
+        nodes = [*drawn(parts).body, *drawn(adjusted).body, *neighbours(drawn(adjusted))]
+        near = list(dict.fromkeys([*parts, *adjusted, *nodes, *rest]))
+        near += proposed(functions, [part for part in near if not isinstance(part, Called)], deadline)
         more = _covers(near, evidence, prices, seed)
         better = choose(more, blocks, seed=seed)
         if better.best.value <= choice.best.value + LEAST_GAIN:
@@ -195,32 +213,53 @@ def _improved(
     return choice, candidates
 
 
-def _unharmed(adjusted: Program, start: Program, evidence: Evidence, prices: Prices, seed: int) -> Program:
-    """The adjusted program, with blocks as they were at the start where adjustment has clearly done harm."""
-    both, count = (*adjusted.body, *start.body), len(start.body)
+def _adjusted(parts: Sequence[Part], evidence: Evidence, **options: Any) -> list[Part]:
+    """The parts as they fit the evidence together; what a call draws moves as its function lets it."""
+    program, calls = drawn(parts), placed(parts)
+    held = relations(program, calls) if calls else None
+    return moved(parts, adjust(program, evidence, relations=held, **options))
+
+
+def _connected(parts: Sequence[Part], evidence: Evidence, prices: Prices, seed: int) -> list[Part]:
+    """The parts with single blocks that float extended to others."""
+    fixed = {node for part in parts if isinstance(part, Called) for node in part.nodes}
+    return regrouped(parts, connected(drawn(parts), evidence, prices, seed, fixed))
+
+
+def _unharmed(
+    adjusted: Sequence[Part], start: Sequence[Part], evidence: Evidence, prices: Prices, seed: int
+) -> list[Part]:
+    """The adjusted parts, with those as they were at the start where adjustment has clearly done harm.
+
+    Calls that no longer pay are left out: what one drew may be drawn by another since all have moved.
+    """
+    both, count = (*adjusted, *start), len(start)
     made = _covers(both, evidence, prices, seed)
     kept = tuple(range(count))
     for place in range(count):
         other = (*kept[:place], count + place, *kept[place + 1 :])
         if value(made, other) > value(made, kept) + HARM:
             kept = other
+    for place in [place for place in kept if isinstance(both[place], Called)]:
+        other = tuple(each for each in kept if each != place)
+        if value(made, other) > value(made, kept):
+            kept = other
     return _chosen(both, kept)
 
 
-def _covers(nodes: Sequence[Node], evidence: Evidence, prices: Prices, seed: int) -> Covers:
-    return covers([Program((node,)) for node in nodes], evidence, prices, seed)
+def _covers(parts: Sequence[Part], evidence: Evidence, prices: Prices, seed: int) -> Covers:
+    return covers([program_of(part) for part in parts], evidence, prices, seed)
 
 
-def _chosen(candidates: Sequence[Node], places: Sequence[int]) -> Program:
-    return Program(tuple(candidates[place] for place in places))
+def _chosen(candidates: Sequence[Part], places: Sequence[int]) -> list[Part]:
+    return [candidates[place] for place in places]
 
 
-def _seen(choice: Choice, candidates: Sequence[Node]) -> tuple[TradeOff, ...]:
+def _seen(choice: Choice, candidates: Sequence[Part]) -> tuple[TradeOff, ...]:
     """The best of every number of blocks, as it was chosen."""
     chosen = [(_chosen(candidates, option.chosen), option.explained) for option in choice.options]
     return tuple(
-        TradeOff(len(program.body), sum(numbers_written(node) for node in program.walk()), share)
-        for program, share in chosen
+        TradeOff(len(parts), sum(numbers_outside(program_of(part)) for part in parts), share) for parts, share in chosen
     )
 
 

@@ -211,7 +211,12 @@ def misfits(drawn: Sequence[Draw], owner: Array, shells: Shells) -> FloatArray:
 
 def looks(nodes: Sequence[Node]) -> Looks:
     """What tells whether blocks are copies of each other."""
-    scene = unroll(encode([Program((node,)) for node in nodes], dtype=torch.float64))
+    return looks_of([Program((node,)) for node in nodes])
+
+
+def looks_of(programs: Sequence[Program]) -> Looks:
+    """What tells whether all that programs draw are copies of each other."""
+    scene = unroll(encode(programs, dtype=torch.float64))
     share = scene.mask.double()
     share = share / share.sum(-1, keepdim=True).clamp(min=1)
     own, lean = _own_looks(scene)
@@ -222,7 +227,8 @@ def looks(nodes: Sequence[Node]) -> Looks:
     skew = squared[..., None] * away + 2 * (own @ away[..., None])[..., 0]
     vectors = ((share[..., None] * each).sum(1) for each in (skew, lean))
     found = (share[..., None, None] * spread).sum(1), *vectors
-    return Looks(tuple(_kind(node) for node in nodes), middle.numpy(), *(each.numpy() for each in found))
+    kinds = tuple(" ".join(map(_kind, program.body)) for program in programs)
+    return Looks(kinds, middle.numpy(), *(each.numpy() for each in found))
 
 
 def _own_looks(scene: Scene) -> tuple[Float[Tensor, "C N 3 3"], Float[Tensor, "C N 3"]]:

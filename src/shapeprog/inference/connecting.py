@@ -5,7 +5,7 @@ Furniture is one piece.  A choice by what is explained does not see a gap of a c
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 
 import numpy as np
 import torch
@@ -35,20 +35,24 @@ FLUSH = 1e-4
 """Gap in cells up to which parts touch: faces that lie on each other do."""
 
 
-def connected(program: Program, evidence: Evidence, prices: Prices, seed: int = 0) -> Program:
+def connected(
+    program: Program, evidence: Evidence, prices: Prices, seed: int = 0, fixed: Collection[Node] = ()
+) -> Program:
     """The program with parts that float extended to others, as far as that costs little of its value; each of its nodes
-    is one block."""
-    while (better := _less_apart(program, evidence, prices, seed)) is not None:
+    is one block, and those that are ``fixed`` stay as they are."""
+    while (better := _less_apart(program, evidence, prices, seed, fixed)) is not None:
         program = better
     return program
 
 
-def _less_apart(program: Program, evidence: Evidence, prices: Prices, seed: int) -> Program | None:
+def _less_apart(
+    program: Program, evidence: Evidence, prices: Prices, seed: int, fixed: Collection[Node]
+) -> Program | None:
     """The most valuable program with one block changed or left out and fewer parts afloat, if there is one worth it."""
     apart = _apart(program, seed)
     if not any(map(any, apart)):
         return None
-    every = [program, *_options(program, apart)]
+    every = [program, *_options(program, apart, fixed)]
     nodes = list(dict.fromkeys(node for each in every for node in each.body))
     place = {node: number for number, node in enumerate(nodes)}
     made = covers([Program((node,)) for node in nodes], evidence, prices, seed)
@@ -81,11 +85,13 @@ def _apart(program: Program, seed: int) -> list[list[bool]]:
     return found
 
 
-def _options(program: Program, apart: list[list[bool]]) -> list[Program]:
+def _options(program: Program, apart: list[list[bool]], fixed: Collection[Node]) -> list[Program]:
     """The program without one of the blocks that float, and with one that reaches others, or one that others reach."""
     body, found = program.body, list[Program]()
     boxes = solid_boxes(body)
     for place, (copies, floats) in enumerate(zip(boxes, apart, strict=True)):
+        if body[place] in fixed:
+            continue
         ways: list[tuple[Node, ...]] = [()] if any(floats) else []
         for side in (True, False):
             mine = [copy for copy, lone in zip(copies, floats, strict=True) if lone is side]

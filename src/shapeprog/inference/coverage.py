@@ -28,9 +28,11 @@ from shapeprog.geometry.scene import Scene
 from shapeprog.geometry.surface import face_areas, sample_surface
 from shapeprog.inference.coverage_kernels import LIFT, explain, hold, support
 from shapeprog.inference.evidence import Evidence
-from shapeprog.language.free import numbers
+from shapeprog.language.free import numbers_outside
 from shapeprog.language.program import Loop, Program
+from shapeprog.language.source import Assignment, Comment, WrittenLoop
 from shapeprog.language.unroll import unroll
+from shapeprog.library.length import outside
 from shapeprog.space import HALF, RESOLUTION, FloatArray
 
 WORD = 64
@@ -66,7 +68,8 @@ class Prices:
     free
         Of free space filled, in cells, over the same area.
     statement, loop, number
-        Of a drawing statement, of a loop, and of every continuous number written in either.
+        Of a drawing statement or call, of a loop, and of every continuous number written in any; what a call draws
+        beside its first block costs as much as a loop, or a box would be said as a drawer whose handle nobody sees.
     """
 
     unsupported: float = 0.4
@@ -76,9 +79,13 @@ class Prices:
     number: float = 0.0005
 
     def of(self, program: Program) -> float:
-        """The price of a program as it is written."""
-        lines = sum(self.loop if isinstance(node, Loop) else self.statement for node in program.walk())
-        return float(lines + self.number * numbers(program))
+        """The price of a program as it is written; functions are known, and cost nothing."""
+        written = program.walk() if program.source is None else outside(program.source.lines)
+        lines = [line for line in written if not isinstance(line, Comment | Assignment)]
+        loops = [isinstance(line, Loop | WrittenLoop) for line in lines]
+        price = sum(self.loop if each else self.statement for each in loops)
+        called = program.blocks - loops.count(False)
+        return float(price + self.loop * called + self.number * numbers_outside(program))
 
 
 class Covers(NamedTuple):

@@ -26,6 +26,7 @@ from shapeprog.geometry.distance import nearest_primitive
 from shapeprog.inference.assembly import TradeOff, assemble
 from shapeprog.inference.blocks import to_program
 from shapeprog.inference.budget import BUDGET, Deadline, Progress
+from shapeprog.inference.calls import recognised, relations
 from shapeprog.inference.cell_coverage import cost_on_cells
 from shapeprog.inference.refine import REACH, Schedule, refine
 from shapeprog.inference.structure import Settings, search_structure
@@ -144,6 +145,7 @@ def infer(
         that are free, and expressions for all others.
     libraries
         Functions that the program is written with wherever that is shorter, unless it has the paper's statements alone.
+        What they draw competes with single blocks, at the price of a call, and a call counts as one block.
     progress
         Called with what is being done and the share of it that is done.
 
@@ -200,9 +202,10 @@ def infer(
     trade_off: tuple[TradeOff, ...] = ()
     costs = partial(cost_on_cells, voxels=target.voxels, detail=detail)
     if search and statements == "all":
+        functions = [pattern for library in libraries for pattern in library.patterns if pattern.shortens]
         found = assemble(
-            target, blocks=blocks, more=program.flat().body, detail=detail, seed=seed, deadline=refining,
-            progress=progress,
+            target, blocks=blocks, more=program.flat().body, functions=functions, detail=detail, seed=seed,
+            deadline=refining, progress=progress,
         )  # fmt: skip
         if target.points is not None:
             better = found.explained >= EXPLAINED
@@ -213,7 +216,8 @@ def infer(
             scores["explained"] = found.explained
             reason = f"Stopped because {found.reason}"
             if ties:
-                tied = tie(program, found.evidence, seed=seed, progress=progress).program
+                held = relations(program, calls) if (calls := recognised(program, libraries)) else None
+                tied = tie(program, found.evidence, held=held, seed=seed, progress=progress).program
                 fits = target.points is not None or costs(tied) <= costs(program)
                 program = tied if fits else program
     for library in libraries if snapped is None else ():

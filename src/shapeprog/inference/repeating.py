@@ -7,6 +7,7 @@ user's own too, is rolled up the same way.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
@@ -59,14 +60,21 @@ def _rolled(nodes: Sequence[Node]) -> list[Node]:
     if len(nodes) < 2:
         return []
     seen = looks(nodes)
-    found: list[Node] = [Loop("translate", _values(count, *step), (nodes[one],)) for one, count, step in runs(seen)]
-    for axis in (SIDE, DEPTH):
-        found += [Loop("mirror", _values(2, axis, plane), (nodes[one],)) for one, _, plane in mirrored(seen, axis)]
+    found: list[Node] = [replace(loop, body=(nodes[one],)) for one, loop in rows_and_pairs(seen)]
     for count in () if isinstance(nodes[0], Loop) else TURNS:  # turned pairs would be drawn twice
         found += [Loop("rotate", _values(count, 1), (nodes[one],)) for one in turned(seen, count)]
     if not found:
         return []
     return [found[place] for place in distinct(found, looks(found))]
+
+
+def rows_and_pairs(seen: Looks) -> Iterator[tuple[int, Loop]]:
+    """The first of candidates that are runs or mirror images, and the loop, without a body, that repeats it."""
+    for one, count, step in runs(seen):
+        yield one, Loop("translate", _values(count, *step), ())
+    for axis in (SIDE, DEPTH):
+        for one, _, plane in mirrored(seen, axis):
+            yield one, Loop("mirror", _values(2, axis, plane), ())
 
 
 def mirrors(node: Node, axis: int) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from itertools import count
 from typing import NamedTuple
@@ -13,7 +14,7 @@ from torch import Tensor
 
 from shapeprog.geometry.primitive import SIZES, primitives
 from shapeprog.geometry.scene import Scene
-from shapeprog.language.parameters import Kind, to_float32
+from shapeprog.language.parameters import Kind, Quantity, to_float32
 from shapeprog.language.program import Draw, Loop, Node, Program
 from shapeprog.language.statement import language
 from shapeprog.language.tensors import Code, encode
@@ -81,8 +82,7 @@ class Tunable:
         quantities = [language()[nodes[n].name].quantities[slot] for n, slot in moving]
         self.kinds: list[Kind] = [quantity.kind for quantity in quantities]
         self.values = torch.tensor([nodes[n].values[slot] for n, slot in moving], dtype=torch.float64)
-        thinnest = [THINNEST / 2 if quantity.high == HALF else THINNEST for quantity in quantities]
-        self.low = torch.tensor(thinnest, dtype=torch.float64).where(self.are("length"), torch.tensor(-torch.inf))
+        self.low = torch.tensor([least(quantity) for quantity in quantities], dtype=torch.float64)
         self._once = Plan(code)
         first = self._once.scene(code.parameters)
         self._row = _rank(first.block)
@@ -152,6 +152,13 @@ class Tunable:
                 touched = (self._index == f).flatten(1).any(1)
                 scale[f] = float(reach[touched[scene.block]].max()) * np.pi / 180
         return scale
+
+
+def least(quantity: Quantity) -> float:
+    """What numbers of a quantity must not fall below: lengths a thickness of ``THINNEST``."""
+    if quantity.kind != "length":
+        return -math.inf
+    return THINNEST / 2 if quantity.high == HALF else THINNEST
 
 
 def bounds(scene: Scene) -> Float[Tensor, "N 3"]:

@@ -36,6 +36,14 @@ def numbers(program: Program) -> int:
     return sum(numbers_written(node) for node in program.walk())
 
 
+def numbers_outside(program: Program) -> int:
+    """The same without those inside of functions: what is said by a program whose functions are known."""
+    if program.source is None:
+        return numbers(program)
+    lines = tuple(line for line in program.source.lines if not isinstance(line, Function))
+    return len(list(_places(lines, Counts(program.source))))
+
+
 def free_numbers(program: Program) -> int:
     """How many numbers of a program are free."""
     return len(free_values(program))

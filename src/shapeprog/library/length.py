@@ -16,7 +16,12 @@ STATEMENT = 8
 
 def statements(program: Program) -> int:
     """How many statements, loops and calls are written, apart from those in functions."""
-    return sum(isinstance(line, WrittenDraw | WrittenLoop | Call) for line in outside(source_of(program).lines))
+    return written(source_of(program).lines)
+
+
+def written(lines: Iterable[Line]) -> int:
+    """How many statements, loops and calls are among some lines and in their loops, apart from those in functions."""
+    return sum(isinstance(line, WrittenDraw | WrittenLoop | Call) for line in outside(lines))
 
 
 def length(lines: Iterable[Line]) -> int:

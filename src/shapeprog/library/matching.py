@@ -22,7 +22,7 @@ from shapeprog.language.expression import Linear, Name, Value, combined, value_a
 from shapeprog.language.program import Program
 from shapeprog.language.source import Assignment, Call, Function, Source
 from shapeprog.library.blocks import Block, Kind, blocks_of
-from shapeprog.library.length import terms
+from shapeprog.library.length import terms, written
 from shapeprog.space import FloatArray
 
 TOLERANCE = 0.05
@@ -81,6 +81,16 @@ class Pattern:
         """Its other parameters, which are continuous."""
         return tuple(name for name in self.parameters if name not in self.counts)
 
+    @cached_property
+    def blocks(self) -> int:
+        """How many blocks it draws; none if they are not linear in its measures."""
+        return len(self.forms_at(self.arguments))
+
+    @property
+    def shortens(self) -> bool:
+        """Whether a call is less to write than what it draws."""
+        return written(self.function.body) > 1
+
     @property
     def arguments(self) -> dict[str, float]:
         """A number for each parameter: that of the example, a default, or any."""
@@ -100,7 +110,7 @@ class Pattern:
                     self._assumed(lambda place: GENERIC / STEEP ** (last - 1 - place)),
                     self._assumed(lambda _: GENERIC),
                 ]
-            found = {_key(each): each for each in (self._forms({**one, **counts}, counts) for one in assumed) if each}
+            found = {_key(each): each for each in (self.forms_at({**one, **counts}) for one in assumed) if each}
             self._known[key] = tuple(found.values())
         return self._known[key]
 
@@ -113,10 +123,12 @@ class Pattern:
         known = {name: value for name, value in shown if isinstance(value, float)}
         return {name: 3.0 if name in self.counts else any_(n) for n, name in enumerate(self.parameters)} | known
 
-    def _forms(self, numbers: Mapping[str, float], counts: Mapping[str, float]) -> tuple[Form, ...]:
+    def forms_at(self, numbers: Mapping[str, float]) -> tuple[Form, ...]:
+        """What it draws about these numbers, one for each parameter; nothing if that is not linear in its measures."""
         source = Source((*self.others, Assignment(tuple(numbers.items())), *self.function.body))
+        given = {name: Linear.of(name) if name in self.measures else numbers[name] for name in numbers}
         try:
-            return tuple(forms(source, {**counts, **{name: Linear.of(name) for name in self.measures}}, self.measures))
+            return tuple(forms(source, given, self.measures))
         except (ShapeProgError, ZeroDivisionError):
             return ()
 

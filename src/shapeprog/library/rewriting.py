@@ -27,7 +27,7 @@ from shapeprog.language.source import (
     values,
 )
 from shapeprog.language.text import source_of
-from shapeprog.library.length import length, outside
+from shapeprog.library.length import length, outside, written
 from shapeprog.library.matching import TOLERANCE, Form, Matcher, Pattern, Sums, forms
 from shapeprog.library.store import Library
 from shapeprog.space import FloatArray
@@ -46,20 +46,15 @@ def with_library(program: Program, library: Library) -> Program:
             return program
         found = with_library(plain, library)
         return program if found is plain else in_unit(found, program.unit)
-    source = source_of(program)
-    words = {*names_of(source), *source.functions}
-    usable = [
-        pattern
-        for pattern in library.patterns
-        if words.isdisjoint([pattern.function.name, *(each.name for each in pattern.others)])
-        and source.functions.keys().isdisjoint(pattern.parameters)
-    ]
-    chosen = _chosen(source, usable)
-    return _rewritten(source, chosen, library.functions) if chosen else program
+    chosen = offers(program, library)
+    return _rewritten(source_of(program), chosen, library.functions) if chosen else program
 
 
 class Offer(NamedTuple):
-    """A call that could stand in a program: in the place of some lines, in the loops around the first of them."""
+    """A call that could stand in a program: in the place of some lines, in the loops around the first of them.
+
+    ``lines`` tells for each block of its function on which line it is.
+    """
 
     fewer: int
     gain: float
@@ -68,32 +63,51 @@ class Offer(NamedTuple):
     around: tuple[WrittenLoop, ...]
 
 
-def matchers_of(source: Source) -> Iterator[tuple[Matcher, tuple[WrittenLoop, ...]]]:
-    """The blocks of a program that calls may replace: of all its lines, then what single loops have inside of them.
+def offers(program: Program, library: Library) -> list[Offer]:
+    """The calls of functions of a library that shorten a program most, none of which shares a line with another."""
+    source = source_of(program)
+    words = {*names_of(source), *source.functions}
+    usable = [
+        pattern
+        for pattern in library.patterns
+        if words.isdisjoint([pattern.function.name, *(each.name for each in pattern.others)])
+        and source.functions.keys().isdisjoint(pattern.parameters)
+    ]
+    return _chosen(source, usable)
 
-    With each come the loops that stay around.  None if its numbers are not linear in its names.
+
+def matchers_of(source: Source) -> Iterator[tuple[Matcher, tuple[WrittenLoop, ...]]]:
+    """The blocks of a program that calls may replace: of all its lines, then of what equal loops have inside of them.
+
+    With each come the loops that stay around, without bodies.  None if its numbers are not linear in its names.
     """
     named = tuple(line for line in source.lines if isinstance(line, Assignment | Function))
     whole, plain = Counts(source).outside, _plain(source)
     free = [name for name in plain if name not in whole]
     given = {name: Linear.of(name) for name in free}
     numbers = np.array([plain[name] for name in free])
-    try:
-        sums = Sums(free, _others(source, free))
+
+    def of(
+        lines: Sequence[tuple[int, Line]], *around: WrittenLoop
+    ) -> Iterator[tuple[Matcher, tuple[WrittenLoop, ...]]]:
         found: list[Form] = []
         units: list[int] = []
-        for number, line in enumerate(source.lines):
+        inner: dict[WrittenLoop, list[tuple[int, Line]]] = {}
+        for number, line in lines:
             if isinstance(line, WrittenDraw | WrittenLoop):
                 new = list(forms(Source((*named, line)), given, free))
                 found += new
                 units += [number] * len(new)
-        yield Matcher(found, units, numbers, sums), ()
-        for number, line in enumerate(source.lines):
-            around: tuple[WrittenLoop, ...] = ()
-            while isinstance(line, WrittenLoop) and len(line.body) == 1 and isinstance(line.body[0], WrittenLoop):
-                around, line = (*around, line), line.body[0]
-                new = list(forms(Source((*named, line)), given, free))
-                yield Matcher(new, [number] * len(new), numbers, sums), around
+            if isinstance(line, WrittenLoop) and len(line.body) == 1:
+                inner.setdefault(replace(line, body=(), note=""), []).append((number, line.body[0]))
+        yield Matcher(found, units, numbers, sums), around
+        for loop, within_it in inner.items():
+            if len(within_it) > 1 or isinstance(within_it[0][1], WrittenLoop):
+                yield from of(within_it, *around, loop)
+
+    try:
+        sums = Sums(free, _others(source, free))
+        yield from of(list(enumerate(source.lines)))
     except ShapeProgError:  # a product of names
         return
 
@@ -123,16 +137,16 @@ def _chosen(source: Source, patterns: Sequence[Pattern]) -> list[Offer]:
     for matcher, around in matchers_of(source):
         for pattern in patterns:
             for match in matcher.matches(pattern):
-                lines = tuple(sorted({matcher.units[k] for k in match.blocks}))
-                before = [source.lines[k] for k in lines]
+                lines = tuple(matcher.units[k] for k in match.blocks)
+                before = [source.lines[k] for k in sorted({*lines})]
                 counts = _counts(source, before)
                 arguments = tuple(
                     (word, counts.get(value, value) if word in pattern.counts and isinstance(value, float) else value)
                     for word, value in match.arguments
                 )
                 call = Call(pattern.function.name, arguments, role=match.role)
-                fewer = sum(map(_statements, before)) - 1 - len(around)
-                gain = length(before) - length([_within(around, call)]) - match.error / TOLERANCE
+                fewer = written(before) - written([within(around, call)])
+                gain = length(before) - length([within(around, call)]) - match.error / TOLERANCE
                 if fewer > 0 and gain > 0:
                     offered.append(Offer(fewer, gain, call, lines, around))
     taken: set[int] = set()
@@ -151,19 +165,16 @@ def _counts(source: Source, lines: Sequence[Line]) -> dict[float, Value]:
     return {plain[count.name]: count for count in given if isinstance(count, Name) and count.name in plain}
 
 
-def _within(around: Sequence[WrittenLoop], line: Line) -> Line:
+def within(around: Sequence[WrittenLoop], line: Line) -> Line:
+    """A line in some loops, the outermost of which comes first."""
     for loop in reversed(around):
         line = replace(loop, body=(line,))
     return line
 
 
-def _statements(line: Line) -> int:
-    return 1 + sum(map(_statements, line.body)) if isinstance(line, WrittenLoop) else 1
-
-
 def _rewritten(source: Source, chosen: Sequence[Offer], functions: Sequence[Function]) -> Program:
-    calls = {offer.lines[0]: _within(offer.around, offer.call) for offer in chosen}
-    gone = {number for offer in chosen for number in offer.lines[1:]}
+    calls = {min(offer.lines): within(offer.around, offer.call) for offer in chosen}
+    gone = {number for offer in chosen for number in offer.lines} - calls.keys()
     body = [calls.get(number, line) for number, line in enumerate(source.lines) if number not in gone]
     wanted = {offer.call.name for offer in chosen}
     for function in reversed(functions):  # those that they call

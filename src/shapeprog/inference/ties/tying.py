@@ -52,6 +52,7 @@ def tie(
     evidence: Evidence,
     *,
     price: float = PRICE,
+    held: FloatArray | None = None,
     seed: int = 0,
     progress: Progress | None = None,
 ) -> Tied:
@@ -63,6 +64,8 @@ def tie(
         What it should fit: how far relations may move its parts.
     price
         What a number is worth, as mean squared distance in cells.
+    held
+        Relations that hold in any case, as rows (R, F) of factors of the numbers that move.
     """
     plain = Program(program.body)
     if not plain.size:
@@ -71,7 +74,7 @@ def tie(
         tunable = Tunable(plain)
         misfit = Misfit(tunable, evidence, seed)
         numbers = misfit.numbers
-        rows: FloatArray = np.zeros((0, len(numbers)))
+        rows = np.zeros((0, len(numbers))) if held is None else np.pad(held, ((0, 0), (0, 3)))
         known: list[Feature] = []
         scene = tunable.scene(tunable.values)
         joints = _joints(scene, seed)

@@ -1,0 +1,248 @@
+"""Functions of libraries among what inference chooses from: what that finds, against recognising them afterwards alone.
+
+    python -m benchmarks.calls --out calls.jsonl
+    python -m benchmarks.calls --data DATA --sets bench cabinet ikea --objects 4 --out calls.jsonl
+    python -m benchmarks.calls --table calls.jsonl
+
+The set ``planted`` needs no data: chests of drawers, chairs and tables with calls of three functions that a user might
+have written.  Each is given as its parts.  A call is found where the program calls the same function, and all that it
+draws has IoU >= .5 with what is drawn there.  The other sets are those of :mod:`benchmarks.structure`, val, written
+with the library that ships.
+
+==========  ============================================================================================================
+method      how a program is written with a library
+==========  ============================================================================================================
+recognised  once it is inferred
+proposed    the functions compete with single blocks, too
+==========  ============================================================================================================
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.planted import solid_overlaps
+from benchmarks.rows import measure_all, read_rows
+from benchmarks.structure import Task as Object
+from benchmarks.structure import given, objects
+
+METHODS = ("recognised", "proposed")
+
+COLUMNS = (
+    "planted", "found", "statements", "parts", "f1_half_percent", "f1_percent", "silhouette", "one_piece", "numbers",
+    "cpu_seconds",
+)  # fmt: skip
+
+BUDGET = 3600.0
+"""Seconds that no program takes, however busy the machine: nothing is cut short."""
+
+LIBRARY = """\
+def pull_out(bottom, height, front, width, thickness, grip):
+    drawer(box(at=(bottom, front, -width / 2), size=(height, thickness, width)))
+    handle(box(at=(bottom + height / 2 - grip / 2, front - grip, -width / 4), size=(grip, grip, width / 2)))
+
+def ladder(count, bottom, height, front, width, thickness, rung):
+    for i in mirror(side):
+        post(box(at=(bottom, front, width / 2 - thickness), size=(height, thickness, thickness)))
+    for i in translate(count, by=((height - rung) / count, 0, 0)):
+        rail(box(
+            at=(bottom + (height - rung) / count, front, thickness - width / 2),
+            size=(rung, thickness / 2, width - 2 * thickness)))
+
+def trumpet(bottom, height, width, thickness):
+    base(cylinder(at=(bottom, 0, 0), height=thickness, radius=width / 2))
+    pedestal(taper(start=(bottom + thickness, 0, 0), end=(bottom + height, 0, 0), radius=(width / 4, thickness)))
+"""
+"""What a user might have written: a drawer with a handle, the back of a chair, the foot of a table."""
+
+
+@dataclass(frozen=True)
+class Task:
+    """A planted program, or an object of val; and how it is written."""
+
+    set: str
+    name: str
+    files: tuple[Path, ...]
+    method: str
+    seed: int = 0
+
+
+def planted(number: int) -> str:
+    """The text of a chest of drawers, a chair or a table that calls the function it is for."""
+    random = np.random.default_rng(number)
+
+    def some(low: float, high: float) -> float:
+        return round(float(random.uniform(low, high)), 2)
+
+    wide, deep, thick = some(14, 22), some(10, 14), some(0.6, 1.4)
+    if number % 3 == 0:
+        count, high = int(random.integers(2, 5)), some(16, 22)
+        lines = [f"body(box(at=(0, 0, {-wide / 2}), size=({high}, {deep}, {wide})))"]
+        front, grip, step = some(0.6, 1.2), some(0.5, 0.9), high / count
+        lines += [
+            f"pull_out(bottom={step * k + 0.4:.2f}, height={step - 0.8:.2f}, front={-front}, width={wide - 1:.2f}, "
+            f"thickness={front}, grip={grip})"
+            for k in range(count)
+        ]
+    elif number % 3 == 1:
+        seat, tall, wide = some(8, 11), some(8, 12), some(10, 14)
+        lines = [
+            f"seat(box(at=({seat}, {-deep / 2}, {-wide / 2}), size=({thick}, {deep}, {wide})))",
+            "for i in mirror(depth):", "    for j in mirror(side):",
+            f"        leg(at=(0, {deep / 2 - 1.2}, {wide / 2 - 1.2}), size=({seat}, {some(0.8, 1.2)}, 1.2))",
+            f"ladder(count={int(random.integers(3, 6))}, bottom={seat + thick:.2f}, height={tall}, "
+            f"front={deep / 2 - 1.2}, width={wide}, thickness=1.2, rung={some(0.7, 1.3)})",
+        ]  # fmt: skip
+    else:
+        tall, foot = some(10, 16), some(7, 12)
+        lines = [
+            f"trumpet(bottom=0, height={tall}, width={foot}, thickness={thick})",
+            f"top(box(at=({tall}, {-deep / 2}, {-wide / 2}), size=({thick}, {deep}, {wide})))",
+        ]
+    return LIBRARY + "\n" + "\n".join(lines) + "\n"
+
+
+def measure(task: Task) -> dict[str, Any]:
+    """The row of one program."""
+    import torch
+
+    from shapeprog.evaluation.likeness import Triangles
+    from shapeprog.evaluation.metrics import evaluate_program
+    from shapeprog.inference import infer
+    from shapeprog.language.text import format_program, parse
+    from shapeprog.library import library_of, load_library, with_library
+    from shapeprog.library.length import statements
+
+    torch.set_num_threads(1)
+    own = task.set == "planted"
+    text = planted(int(task.name)) if own else ""
+    library = library_of(parse(LIBRARY)) if own else load_library()
+    parts, shape = _apart(text) if own else given(Object(task.set, task.name, task.files, seed=task.seed))
+    cpu = time.process_time()
+    if task.method == "proposed":
+        program = infer(shape, libraries=[library], seed=task.seed, budget=BUDGET).program
+    else:
+        program = with_library(infer(shape, seed=task.seed, budget=BUDGET).program, library)
+    seconds = time.process_time() - cpu
+    placed = [Triangles(shape.frame.to_grid(vertices), faces) for vertices, faces in parts]
+    vertices = np.concatenate([each.vertices for each in placed])
+    starts = np.cumsum([0, *(len(each.vertices) for each in placed)])
+    faces = np.concatenate([each.faces + first for each, first in zip(placed, starts, strict=False)])
+    target = replace(shape, points=None, vertices=vertices, faces=faces)
+    row = evaluate_program(program, target, seed=task.seed, looks=True)
+    there = [each for each in called(parse(text)) if each[0]] if own else []
+    found = sum(_found(each, called(program), shape.frame) for each in there)
+    return vars(row) | {
+        "set": task.set, "name": task.name, "method": task.method, "seed": task.seed, "cpu_seconds": seconds,
+        "planted": len(there), "found": found, "statements": statements(program), "parts": len(called(program)),
+        "program": format_program(program),
+    }  # fmt: skip
+
+
+def _apart(text: str) -> tuple[list[Any], Any]:
+    """The parts of a program, and the shape that they make together."""
+    from shapeprog.data.placement import shape_from_mesh
+    from shapeprog.formats.parts import parts
+    from shapeprog.language.text import parse
+
+    drawn = [(part.vertices, part.faces) for part in parts(parse(text))]
+    starts = np.cumsum([0, *(len(vertices) for vertices, _ in drawn)])
+    faces = np.concatenate([each + first for (_, each), first in zip(drawn, starts, strict=False)])
+    return drawn, shape_from_mesh(np.concatenate([each for each, _ in drawn]), faces, name="planted", axes=np.eye(3))
+
+
+def called(program: Any) -> list[tuple[str, Any]]:
+    """The parts of a program as it is written: which function is called, if any, and the scene of what is drawn."""
+    from shapeprog.language.evaluation import expanded
+    from shapeprog.language.program import Program
+    from shapeprog.language.source import Assignment, Call, Comment, Function, Source, WrittenLoop
+    from shapeprog.language.text import source_of
+    from shapeprog.language.unroll import unroll
+
+    lines = source_of(program).lines
+    named = tuple(line for line in lines if isinstance(line, Assignment | Function))
+    found = []
+    for line in lines:
+        if not isinstance(line, Assignment | Function | Comment):
+            inner = line
+            while isinstance(inner, WrittenLoop) and len(inner.body) == 1:
+                inner = inner.body[0]
+            found.append(
+                (inner.name if isinstance(inner, Call) else "", unroll(Program(expanded(Source((*named, line))))))
+            )
+    return found
+
+
+def _found(planted: tuple[str, Any], parts: list[tuple[str, Any]], frame: Any) -> bool:
+    """Whether a planted call is among the parts of a program in the frame of the grid."""
+    import torch
+
+    name, scene = planted
+    centre = torch.from_numpy(frame.to_grid(scene.centre.numpy())).to(scene.centre)
+    scene = replace(scene, size=scene.size / frame.scale, centre=centre)
+    overlaps = (solid_overlaps(scene, other) for word, other in parts if word == name)
+    return any((each.max(1) >= 0.5).all() for each in overlaps)
+
+
+def tasks(args: argparse.Namespace) -> Iterator[Task]:
+    """All that is asked for."""
+    for method in args.methods:
+        for number in range(args.programs):
+            yield Task("planted", str(number), (), method)
+        for which in args.sets if args.data else ():
+            for name, files in list(objects(args.data, which, "val"))[: args.objects]:
+                yield Task(which, name, files, method)
+
+
+def table(path: Path) -> str:
+    """Markdown: sums of calls, means of all else."""
+    groups: dict[tuple[str, str], list[dict[str, Any]]] = {}
+    for row in read_rows(path):
+        groups.setdefault((row["set"], row["method"]), []).append(row)
+    lines = ["| set, method, programs | " + " | ".join(COLUMNS) + " |", "|" + "---|" * (len(COLUMNS) + 1)]
+    for (which, method), rows in sorted(groups.items()):
+        figures = [
+            (np.sum if column in ("planted", "found") else np.mean)([row[column] for row in rows]) for column in COLUMNS
+        ]
+        lines.append(
+            "| " + " | ".join([f"{which}, {method}, {len(rows)}", *(f"{each:.4g}" for each in figures)]) + " |"
+        )
+    return "\n".join(lines)
+
+
+def main() -> None:
+    """Run, or print the table of a run."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument(
+        "--data", type=Path, default=None, help="see benchmarks.structure; without it planted ones alone"
+    )
+    parser.add_argument("--sets", nargs="*", default=["bench", "cabinet", "ikea"])
+    parser.add_argument("--objects", type=int, default=4, help="so many of each set")
+    parser.add_argument("--programs", type=int, default=20, help="so many planted ones")
+    parser.add_argument("--methods", nargs="*", default=list(METHODS), choices=METHODS)
+    parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument(
+        "--out", type=Path, default=Path("calls.jsonl"), help="rows, one line of JSON each; appended to"
+    )
+    parser.add_argument("--table", type=Path, default=None, help="print the table of these rows and do nothing else")
+    args = parser.parse_args()
+    if args.table is None:
+        done = {(row["set"], row["name"], row["method"]) for row in read_rows(args.out)}
+        measure_all(
+            args.out,
+            [each for each in tasks(args) if (each.set, each.name, each.method) not in done],
+            measure,
+            args.workers,
+        )
+    print(table(args.table or args.out))
+
+
+if __name__ == "__main__":
+    main()

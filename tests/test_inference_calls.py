@@ -1,0 +1,256 @@
+"""Calls of functions as what inference chooses from: started, priced, moved and tied as one."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import shapeprog as sp
+from shapeprog.data.placement import shape_from_mesh
+from shapeprog.data.shape import Shape
+from shapeprog.formats.parts import parts
+from shapeprog.inference.adjustment import adjust
+from shapeprog.inference.budget import Deadline
+from shapeprog.inference.calls import (
+    Called,
+    drawn,
+    moved,
+    named,
+    placed,
+    recognised,
+    regrouped,
+    relations,
+)
+from shapeprog.inference.connecting import connected
+from shapeprog.inference.coverage import Prices
+from shapeprog.inference.evidence import evidence_of_program
+from shapeprog.inference.recognition import proposed
+from shapeprog.inference.ties.tying import tie
+from shapeprog.inference.tunable import Tunable
+from shapeprog.language.free import numbers, numbers_outside
+from shapeprog.language.program import Draw, Loop, Program
+from shapeprog.language.source import Call
+from shapeprog.language.text import format_program, parse, source_of
+from shapeprog.library import library_of, with_library
+from shapeprog.library.matching import Pattern
+
+PULL_OUT = """\
+def pull_out(bottom, height, front, width, thickness, grip=0.8):
+    drawer(box(at=(bottom, front, -width / 2), size=(height, thickness, width)))
+    handle(box(at=(bottom + height / 2 - grip / 2, front - grip, -width / 4), size=(grip, grip, width / 2)))
+"""
+
+TRUMPET = """\
+def trumpet(bottom, height, width, thickness):
+    cylinder(at=(bottom, 0, 0), height=thickness, radius=width / 2)
+    taper(start=(bottom + thickness, 0, 0), end=(bottom + height, 0, 0), radius=(width / 4, thickness))
+"""
+
+LADDER = """\
+def ladder(count, bottom, height, width):
+    for i in mirror(side):
+        box(at=(bottom, 0, width / 2 - 1), size=(height, 1, 1))
+    for i in translate(count, by=((height - 1) / (count - 1), 0, 0)):
+        box(at=(bottom, 0, 1 - width / 2), size=(1, 0.5, width - 2))
+"""
+
+DRAWER = {"bottom": -4.0, "height": 5.0, "front": -3.0, "width": 16.0, "thickness": 1.0, "grip": 0.7}
+
+
+def pattern(text: str) -> Pattern:
+    return library_of(parse(text)).patterns[-1]
+
+
+def called(text: str, numbers: dict[str, float], *around: Loop) -> Called:
+    found = Called.of(pattern(text), numbers, around)
+    assert found is not None
+    return found
+
+
+def table(call: Called) -> dict[str, float]:
+    return dict(zip(call.pattern.parameters, call.numbers, strict=True))
+
+
+def test_a_function_is_found_from_its_blocks_among_others_whatever_their_roles() -> None:
+    call = called(PULL_OUT, DRAWER)
+    others = [Draw("box", (-9.0, 2.0, -3.0 + k, 2.0, 1.0, 4.0 + k)) for k in range(6)]
+    plain = [Draw(node.name, node.values) for node in call.nodes if isinstance(node, Draw)]
+    first = proposed([call.pattern], [*others, *plain])[0]
+    assert table(first) == pytest.approx(DRAWER, abs=0.01)
+
+
+def test_blocks_that_are_a_little_off_give_the_call_that_is_nearest_to_them() -> None:
+    random = np.random.default_rng(0)
+    call = called(PULL_OUT, DRAWER)
+    nodes = [Draw(node.name, tuple(np.add(node.values, random.uniform(-0.1, 0.1, 6)).tolist())) for node in call.nodes]
+    assert table(proposed([call.pattern], nodes)[0]) == pytest.approx(DRAWER, abs=0.25)
+
+
+def test_a_block_that_nobody_found_is_guessed_from_the_others() -> None:
+    wanted = {"bottom": -9.0, "height": 14.0, "width": 10.0, "thickness": 1.2}
+    base = called(TRUMPET, wanted).nodes[0]
+    offered = [table(each) for each in proposed([pattern(TRUMPET)], [base])]
+    for known in ("bottom", "width", "thickness"):
+        assert all(each[known] == pytest.approx(wanted[known]) for each in offered)
+    assert min(abs(each["height"] - wanted["height"]) for each in offered) <= 1, "within reach of the adjustment"
+
+
+@pytest.mark.parametrize("count", [2, 4])
+def test_how_often_something_is_repeated_is_told_by_the_blocks(count: int) -> None:
+    wanted = {"count": count, "bottom": -5.0, "height": 12.0, "width": 9.0}
+    call = called(LADDER, wanted)
+    assert table(proposed([call.pattern], call.nodes)[0]) == pytest.approx(wanted, abs=0.01)
+
+
+def test_equal_calls_at_equal_steps_are_offered_as_one_in_a_loop() -> None:
+    copies = [called(PULL_OUT, DRAWER | {"bottom": -10.0 + 6 * k}) for k in range(3)]
+    found = proposed([copies[0].pattern], [node for copy in copies for node in copy.nodes])
+    loops = [each for each in found if each.around == (Loop("translate", (3.0, 6.0, 0.0, 0.0), ()),)]
+    assert any(table(each)["bottom"] == pytest.approx(-10) for each in loops)
+    assert all(each.program.size == 6 for each in loops)
+
+
+NOTHING = """\
+def nothing(wide):
+    cushion(at=(0, 0, 0), size=(1, wide, wide), edge=0.3)
+    cylinder(at=(0, 0, 0), height=wide, radius=wide)
+"""
+
+AREA = """\
+def area(wide, deep):
+    box(at=(0, 0, 0), size=(wide * deep, 1, 1))
+    box(at=(0, 0, 5), size=(wide, deep, 1))
+"""
+
+
+@pytest.mark.parametrize("text", [NOTHING, AREA])
+def test_a_function_that_fits_nothing_or_is_not_linear_offers_nothing(text: str) -> None:
+    assert proposed([pattern(text)], called(PULL_OUT, DRAWER).nodes) == []
+
+
+def test_no_call_is_looked_for_after_the_time_budget_and_the_result_says_so() -> None:
+    late = Deadline(at=0.0)
+    assert proposed([pattern(PULL_OUT)], called(PULL_OUT, DRAWER).nodes, late) == []
+    assert late.cut == "the search for calls of functions"
+
+
+def test_a_call_costs_less_than_what_it_draws_and_more_than_its_first_block() -> None:
+    prices = Prices()
+    call = called(PULL_OUT, DRAWER)
+    assert prices.of(call.program) == pytest.approx(prices.statement + prices.loop + 6 * prices.number)
+    assert prices.of(Program(call.nodes[:1])) < prices.of(call.program) < prices.of(drawn([call]))
+    usual = called(PULL_OUT, DRAWER | {"grip": 0.8})
+    assert prices.of(call.program) - prices.of(usual.program) == pytest.approx(prices.number)
+    looped = called(PULL_OUT, DRAWER, Loop("translate", (3.0, 6.0, 0.0, 0.0), ()))
+    assert prices.of(looped.program) - prices.of(call.program) == pytest.approx(prices.loop + prices.number)
+
+
+def test_numbers_of_functions_are_not_said_by_their_calls_and_counts_are_none() -> None:
+    ladder = called(LADDER, {"count": 3, "bottom": -5.0, "height": 12.0, "width": 9.0}).program
+    assert numbers_outside(ladder) == 3
+    assert numbers(ladder) > 3
+    plain = parse(PULL_OUT + "pull_out(bottom=1, height=2, front=3, width=4, thickness=1)\n")
+    assert numbers_outside(Program(plain.body)) == numbers(Program(plain.body)) == 12
+
+
+@pytest.mark.parametrize(
+    ("text", "one", "other"),
+    [
+        (PULL_OUT, DRAWER, {"bottom": 2.0, "height": 7.0, "front": 1.0, "width": 5.0, "thickness": 2.0, "grip": 0.5}),
+        (
+            TRUMPET,
+            {"bottom": 3.0, "height": 5.0, "width": 3.0, "thickness": 3.0},
+            {"bottom": 1.0, "height": 8.0, "width": 6.0, "thickness": 2.0},
+        ),
+    ],
+)  # fmt: skip
+def test_relations_hold_for_all_arguments_and_leave_as_many_numbers_free(text: str, one, other) -> None:
+    loop = Loop("translate", (2.0, 9.0, 0.0, 0.0), ())
+    for around in ((), (loop,)):
+        programs = [drawn([called(text, each, *around)]) for each in (one, other)]
+        rows = relations(programs[0], placed([called(text, one, *around)]))
+        values = [Tunable(program).values.numpy() for program in programs]
+        assert np.abs(rows @ values[0]).max() < 0.01
+        assert np.abs(rows @ values[1]).max() < 0.01
+        assert np.linalg.matrix_rank(rows) == len(rows) == rows.shape[1] - len(one) - len(around)
+
+
+def test_numbers_of_a_function_of_its_own_keep_their_ratios() -> None:
+    text = "def two(low):\n    box(at=(low, 0, 0), size=(2, 3, 1))\n    box(at=(low + 5, 0, 0), size=(1, 1, 1))\n"
+    call = called(text, {"low": -3.0})
+    rows = relations(drawn([call]), placed([call]))
+    values = Tunable(drawn([call])).values.numpy()
+    assert np.abs(rows @ values).max() < 1e-6
+    twice = np.where(np.arange(12) == 0, 2 * values[0], 2 * values)
+    assert np.abs(rows @ twice).max() < 1e-6
+    assert len(rows) == 10, "of twelve numbers, where the whole is and how large"
+
+
+def test_what_a_call_draws_is_adjusted_as_one() -> None:
+    body = "body(box(at=(-6, -2, -9), size=(12, 8, 18)))\n"
+    evidence = evidence_of_program(parse(body + format_program(drawn([called(PULL_OUT, DRAWER)]))))
+    start = [*parse(body).body, called(PULL_OUT, DRAWER | {"bottom": -3.6, "height": 4.6, "width": 15.6})]
+    program, calls = drawn(start), placed(start)
+    rows = relations(program, calls)
+    adjusted = adjust(program, evidence, relations=rows)
+    before, after = (rows @ Tunable(each).values.numpy() for each in (program, adjusted))
+    np.testing.assert_allclose(before, after, atol=0.03)  # but for rounding
+    call = moved(start, adjusted)[1]
+    assert isinstance(call, Called)
+    assert table(call) == pytest.approx(DRAWER, abs=0.05)
+
+
+def test_a_call_that_floats_is_not_taken_apart() -> None:
+    seat = "seat(box(at=(0, -6, -6), size=(1, 12, 12)))\n"
+    call = called(PULL_OUT, DRAWER | {"bottom": -6.0, "width": 8.0})
+    whole = Program((*parse(seat).body, *call.nodes))
+    evidence = evidence_of_program(whole)
+    assert connected(whole, evidence, Prices(), fixed={*call.nodes}) == whole
+    (one,) = parse(seat).body
+    assert regrouped([one, call], whole) == [one, call]
+    twice = [call.nodes[1], call, one, call]
+    assert regrouped(twice, drawn(twice)) == twice
+
+
+def test_what_a_function_leaves_open_has_one_role_in_a_call() -> None:
+    call = called(TRUMPET, {"bottom": -9.0, "height": 12.0, "width": 10.0, "thickness": 1.2})
+    (top,) = parse("box(at=(3, -9, -9), size=(1, 18, 18))").body
+    words = [chain[-1].word for chain in named([top, call], drawn([top, call])).chains]  # type: ignore[union-attr]
+    assert words[0] == "top"
+    assert words[1] == words[2] in ("pedestal", "base")
+    drawer = called(PULL_OUT, DRAWER)
+    words = [chain[-1].word for chain in named([drawer], drawn([drawer])).chains]  # type: ignore[union-attr]
+    assert words == ["drawer", "handle"]
+
+
+def test_ties_leave_what_a_call_draws_to_its_function() -> None:
+    # The drawer is nearly as wide as the body: alone it would be made as wide, and its handle left as it is.
+    body = "body(box(at=(-6, -2, -8.1), size=(12, 8, 16.2)))\n"
+    library = library_of(parse(PULL_OUT))
+    program = Program((*parse(body).body, *called(PULL_OUT, DRAWER).nodes))
+    calls = recognised(program, [library])
+    assert [table(call) for call, _ in calls] == [pytest.approx(DRAWER, abs=0.01)]
+    rows = relations(program, calls)
+    tied = tie(program, evidence_of_program(program), held=rows).program
+    assert np.abs(rows @ Tunable(Program(tied.body)).values.numpy()).max() < 0.01
+    assert [line.name for line in source_of(with_library(tied, library)).lines if isinstance(line, Call)] == [
+        "pull_out"
+    ]
+
+
+def chest() -> Shape:
+    text = PULL_OUT + "body(box(at=(0, 0, -9.5), size=(21, 11, 19)))\n"
+    for bottom in (0.4, 10.8):
+        text += f"pull_out(bottom={bottom}, height=9.6, front=-1.2, width=18, thickness=1.2, grip=0.7)\n"
+    pieces = parts(parse(text))
+    starts = np.cumsum([0, *(len(part.vertices) for part in pieces)])
+    faces = np.concatenate([part.faces + first for part, first in zip(pieces, starts, strict=False)])
+    return shape_from_mesh(np.concatenate([part.vertices for part in pieces]), faces, name="chest", axes=np.eye(3))
+
+
+def test_a_chest_of_drawers_is_written_with_the_drawer_of_a_user() -> None:
+    found = sp.infer(chest(), generator=None, libraries=[library_of(parse(PULL_OUT))], budget=600).program
+    assert {line.name for line in source_of(found).walk() if isinstance(line, Call)} == {"pull_out"}
+    assert format_program(found).count("def pull_out") == 1
+    handles = [node for node in found.flat().body if "handle" in format_program(Program((node,)))]
+    assert Program(tuple(handles)).size == 2

@@ -55,10 +55,16 @@ def cloud_of(points: Array, normals: Array | None = None) -> Cloud:
 
 def plane_normals(points: FloatArray, near: npt.NDArray[np.int64]) -> tuple[FloatArray, float]:
     """Unit normals (N, 3) of the planes that fit near points (N, k) best, and how far these usually are from them."""
+    normals, squared = planes(points, near)
+    return normals, float(np.sqrt(np.median(squared) / near.shape[1]))
+
+
+def planes(points: FloatArray, near: npt.NDArray[np.int64]) -> tuple[FloatArray, FloatArray]:
+    """Unit normals (N, 3) of planes that fit near points (N, k) best, and sums (N,) of their squared distances."""
     off = points[near]
     off -= off.mean(1, keepdims=True)
-    spread, axes = np.linalg.eigh(off.transpose(0, 2, 1) @ off / near.shape[1])
-    return np.ascontiguousarray(axes[:, :, 0]), float(np.sqrt(max(np.median(spread[:, 0]), 0.0)))
+    squared, axes = np.linalg.eigh(off.transpose(0, 2, 1) @ off)
+    return np.ascontiguousarray(axes[:, :, 0]), np.maximum(squared[:, 0], 0)
 
 
 def roughness(points: FloatArray, normals: FloatArray, near: npt.NDArray[np.int64]) -> float:

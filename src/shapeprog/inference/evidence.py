@@ -23,6 +23,7 @@ from shapeprog.data.shape import Shape
 from shapeprog.data.voxelise_kernels import mark_triangles
 from shapeprog.geometry.arrays import over_threads
 from shapeprog.geometry.mesh import union_mesh
+from shapeprog.inference.cloud import planes
 from shapeprog.inference.evidence_kernels import look_out
 from shapeprog.inference.scans import points_of_scan
 from shapeprog.inference.surface import INSET, exposed, exposed_faces
@@ -294,8 +295,7 @@ def local_planes(points: FloatArray) -> tuple[FloatArray, float, float]:
     from scipy.spatial import cKDTree
 
     distance, near = cKDTree(points).query(points, k=NEIGHBOURS)
-    offset = points[near] - points[near].mean(1, keepdims=True)
-    squared, axes = np.linalg.eigh(np.einsum("pka,pkb->pab", offset, offset))
-    noise = float(np.quantile(np.sqrt(np.maximum(squared[:, 0], 0) / (NEIGHBOURS - 3)), FLAT))
+    normals, squared = planes(points, near)
+    noise = float(np.quantile(np.sqrt(squared / (NEIGHBOURS - 3)), FLAT))
     area = float(np.median(distance[:, -1]) ** 2 * math.pi / (NEIGHBOURS - 1))
-    return np.ascontiguousarray(axes[:, :, 0]), noise, area
+    return normals, noise, area

@@ -11,6 +11,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from shapeprog.data.shape import Shape
+from shapeprog.inference.cloud import planes
 from shapeprog.space import FloatArray
 
 NEIGHBOURS = 8
@@ -34,6 +35,5 @@ def is_clean(points: FloatArray) -> bool:
     if len(points) <= NEIGHBOURS:
         return False
     near = cKDTree(points).query(points, k=NEIGHBOURS)[1]
-    off = points[near] - points[near].mean(1, keepdims=True)
-    squared = np.linalg.eigvalsh(off.transpose(0, 2, 1) @ off)[:, 0]
-    return bool(np.quantile(np.sqrt(np.maximum(squared, 0) / (NEIGHBOURS - 3)), FLATTEST) < CLEAN)
+    _, squared = planes(points, near)
+    return bool(np.quantile(np.sqrt(squared / (NEIGHBOURS - 3)), FLATTEST) < CLEAN)

@@ -110,6 +110,19 @@ def test_equal_calls_at_equal_steps_are_offered_as_one_in_a_loop() -> None:
     assert all(each.program.size == 6 for each in loops)
 
 
+def test_no_call_is_offered_of_which_a_part_lies_inside_another() -> None:
+    case = Draw("box", (-10.0, -6.0, -8.0, 20.0, 12.0, 16.0))
+    shelf = Draw("box", (-2.0, -5.0, -8.0, 1.0, 11.0, 16.0))
+    function = pattern(
+        "def shelved(bottom, height, front, depth, width, at, thickness):\n"
+        "    box(at=(bottom, front, -width / 2), size=(height, depth, width))\n"
+        "    box(at=(at, front + 1, -width / 2), size=(thickness, depth - 1, width))\n"
+    )
+    assert all(each.nodes != (case, shelf) for each in proposed([function], [case, shelf]))
+    above = Draw("box", (12.0, *shelf.values[1:]))
+    assert any(each.nodes == (case, above) for each in proposed([function], [case, above]))
+
+
 NOTHING = """\
 def nothing(wide):
     cushion(at=(0, 0, 0), size=(1, wide, wide), edge=0.3)

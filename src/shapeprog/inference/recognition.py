@@ -16,8 +16,10 @@ import numpy as np
 from shapeprog.inference.budget import NEVER, Deadline
 from shapeprog.inference.calls import Called
 from shapeprog.inference.candidates import looks_of, solid_boxes
+from shapeprog.inference.neighbours import CORNERS
 from shapeprog.inference.repeating import rows_and_pairs
 from shapeprog.inference.tunable import CELLS
+from shapeprog.language.hints import Box
 from shapeprog.language.parameters import to_float32
 from shapeprog.language.program import Chain, Draw, Node, Program
 from shapeprog.language.statement import language
@@ -43,6 +45,9 @@ OFFERED, GUESSED = 48, 96
 GUESSES = 2.0 * np.array([k for k in range(-12, 13) if k])
 """Where a number that found blocks say nothing about may be, in cells from what is usual."""
 
+HIDDEN = 0.1
+"""How far in cells a part may stand out of another part and still be hidden in it."""
+
 SAME = 0.05
 """Difference of arguments in cells below which two calls are the same."""
 
@@ -52,7 +57,21 @@ def proposed(patterns: Sequence[Pattern], nodes: Sequence[Node], deadline: Deadl
     if not patterns or not nodes:
         return []
     pool = _Pool(nodes, patterns)
-    return [call for pattern in patterns for call in _calls(pattern, pool, deadline)]
+    found = [call for pattern in patterns for call in _calls(pattern, pool, deadline)]
+    boxes = iter(solid_boxes([node for call in found for node in call.nodes]) if found else ())
+    drawn = [[box for _ in call.nodes for box in next(boxes)] for call in found]
+    return [call for call, parts in zip(found, drawn, strict=True) if not _hides(parts)]
+
+
+def _hides(parts: Sequence[Box]) -> bool:
+    """Whether one of the parts of a call lies inside another: nobody would say a solid block as a drawer in a case."""
+    corners = [part.centre + (CORNERS * part.half) @ part.rotation.T for part in parts]
+    return any(
+        bool((np.abs((corner - around.centre) @ around.rotation) <= around.half + HIDDEN).all())
+        for place, corner in enumerate(corners)
+        for other, around in enumerate(parts)
+        if place != other
+    )
 
 
 class _Pool:

@@ -19,6 +19,8 @@ NAMES = (
     "box", "taper", "bent_rod", "cushion", "mirror", "seat", "seat(box", "leg(leg", "through", "edge", "side", "role",
     "null", "true", "\t", "\\", ";", ":", "(", ")", "[", "]", "{", "}", "'", '"', "\r", "\x0c", "\u2028", "=", "==",
     "*", "**", "...", "async ", "$",
+    "def", "def legs(", "width", "legs", "shelves", "# unit:", "# unit: cm, 0 per cell", "+", "-", "/",
+    " / (shelves - 1)", "legs(", "=width",
 )  # fmt: skip
 """What is written in the place of a name or behind it."""
 
@@ -56,6 +58,30 @@ for i in mirror(side):
 for i in translate(4, by=(0, 0, 5)):
     slat(box(at=(2, 9, -8), size=(9, 0.5, 1)))
 """
+NAMED = """# unit: cm, 3.75 per cell
+# a bookcase on legs that are said once
+width, depth, height = 60, 36.5, 90
+shelves, shelf_span, thick = 4, 60, 2.5  # as many as there shall be
+floor = -height / 2
+
+
+def legs(long, at, thick=2):
+    for i in mirror(side):
+        leg(at=(floor, at, width / 2 - thick), size=(long, thick, thick))
+
+
+def pair(long, out):
+    legs(long=long, at=-out)
+    legs(long=long, at=out - 3, thick=3)
+
+
+for i in translate(shelves, by=(shelf_span / (shelves - 1), 0, 0)):
+    shelf(box(at=(floor + 15, -depth / 2, thick - width / 2), size=(thick, depth, width - 2 * thick)))
+for i in mirror(side):
+    side(box(at=(floor + 10, -depth / 2, width / 2 - thick), size=(height - 10, depth, thick)))
+foot(pair(long=10, out=depth / 2))
+post(bar(start=(floor, 0, 0), end=(floor + 10, 0, (width + depth) * 0.1), section=(thick, thick / 2), turn=-30))
+"""
 
 
 def cases(seed: int) -> Iterator[tuple[str, bytes]]:
@@ -83,7 +109,12 @@ def seeds() -> dict[str, bytes]:
     random = torch.Generator().manual_seed(0)
     some = {f"drawn{number}": random_program(random, blocks=3) for number in range(6)}
     every = {part.name: part for part in random_program(random, blocks=300, depth=1).body}
-    furniture = {"table": sp.parse(TABLE), "chair": sp.parse(CHAIR), "every": Program(tuple(every.values()))}
+    furniture = {
+        "table": sp.parse(TABLE),
+        "chair": sp.parse(CHAIR),
+        "named": sp.parse(NAMED),
+        "every": Program(tuple(every.values())),
+    }
     for name, program in {**furniture, **some}.items():
         more = {"snapped": [], "scores": {"iou": 0.5}, "reason": "done", "source": "stool.obj"}
         found[f"{name}.json"] = result_json(program, frame, **more).encode()

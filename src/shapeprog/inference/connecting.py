@@ -18,7 +18,7 @@ from shapeprog.inference.joints import gaps
 from shapeprog.inference.neighbours import alike, met, with_drawing
 from shapeprog.inference.tunable import bounds
 from shapeprog.language.hints import Box
-from shapeprog.language.program import Node, Program
+from shapeprog.language.program import Chain, Node, Program
 from shapeprog.language.tensors import encode
 from shapeprog.language.unroll import unroll
 
@@ -50,7 +50,8 @@ def _less_apart(
 ) -> Program | None:
     """The most valuable program with one block changed or left out and fewer parts afloat, if there is one worth it."""
     apart = _apart(program, seed)
-    if not any(map(any, apart)):
+    many = sum(map(sum, apart))
+    if not many:
         return None
     every = [program, *_options(program, apart, fixed)]
     nodes = list(dict.fromkeys(node for each in every for node in each.body))
@@ -59,7 +60,6 @@ def _less_apart(
     start, *worth = (value(made, tuple(place[node] for node in each.body)) for each in every)
     order = np.argsort(np.negative(worth), kind="stable")[:TRIED].tolist()
     likely = (every[1 + number] for number in order if worth[number] >= start - FLOATING)
-    many = sum(map(sum, apart))
     return next((each for each in likely if sum(map(sum, _apart(each, seed))) < many), None)
 
 
@@ -80,15 +80,16 @@ def _apart(program: Program, seed: int) -> list[list[bool]]:
         group = [group[one] if each == group[other] else each for each in group]
     half = bounds(scene)
     sizes = np.bincount(group, weights=(half * half.roll(1, -1)).sum(-1).numpy())
+    largest = int(sizes.argmax())
     for block, each in zip(scene.block.tolist(), group, strict=True):
-        found[block].append(each != int(sizes.argmax()))
+        found[block].append(each != largest)
     return found
 
 
 def _options(program: Program, apart: list[list[bool]], fixed: Collection[Node]) -> list[Program]:
     """The program without one of the blocks that float, and with one that reaches others, or one that others reach."""
-    body, found = program.body, list[Program]()
-    boxes = solid_boxes(body)
+    body, chains, found = program.body, program.chains, list[Program]()
+    boxes, drawn = solid_boxes(body), solid_boxes([chain[-1] for chain in chains])
     for place, (copies, floats) in enumerate(zip(boxes, apart, strict=True)):
         if body[place] in fixed:
             continue
@@ -101,21 +102,19 @@ def _options(program: Program, apart: list[list[bool]], fixed: Collection[Node])
                 for part, lone in zip(boxes[other], apart[other], strict=True)
                 if other != place and lone is not side
             ]
-            ways += [(node,) for node in _reaching(program, place, mine, parts)] if mine and parts else []
+            if len(drawn[place]) == 1 and mine and parts:
+                longer = _reaching(chains[place], drawn[place][0], mine, parts)
+                ways += [(node,) for node in longer if node not in body]
         found += [Program((*body[:place], *way, *body[place + 1 :])) for way in dict.fromkeys(ways)]
     return found
 
 
-def _reaching(program: Program, place: int, copies: list[Box], parts: list[Box]) -> list[Node]:
-    """A block extended so that one of its copies reaches one of some parts."""
-    chain = program.chains[place]
-    (own,) = solid_boxes([chain[-1]])
-    if len(own) != 1:
-        return []
-    longer = ((copy, each) for copy in copies for each in met(copy, parts, LINES, longer=True))
-    boxes = (box for copy, each in longer for box in _as_copied(own[0], copy, each))
-    found = dict.fromkeys(with_drawing(chain, drawn) for box in boxes for drawn in alike(chain, box))
-    return [node for node in found if node not in program.body]
+def _reaching(chain: Chain, own: Box, copies: list[Box], parts: list[Box]) -> Iterator[Node]:
+    """A block, whose statement draws its ``own`` box, extended so that one of its copies reaches one of some parts."""
+    for copy in copies:
+        for longer in met(copy, parts, LINES, longer=True):
+            for box in _as_copied(own, copy, longer):
+                yield from (with_drawing(chain, drawn) for drawn in alike(chain, box))
 
 
 def _as_copied(own: Box, copy: Box, longer: Box) -> Iterator[Box]:

@@ -145,8 +145,9 @@ def _chosen(source: Source, patterns: Sequence[Pattern]) -> list[Offer]:
                     for word, value in match.arguments
                 )
                 call = Call(pattern.function.name, arguments, role=match.role)
-                fewer = written(before) - written([within(around, call)])
-                gain = length(before) - length([within(around, call)]) - match.error / TOLERANCE
+                instead = [within(around, call)]
+                fewer = written(before) - written(instead)
+                gain = length(before) - length(instead) - match.error / TOLERANCE
                 if fewer > 0 and gain > 0:
                     offered.append(Offer(fewer, gain, call, lines, around))
     taken: set[int] = set()

@@ -61,9 +61,14 @@ WAYS: dict[str, tuple[Mutation, ...]] = {
 
 def cases(seed: int) -> Iterator[tuple[str, bytes]]:
     """Names and contents without an end: first those that are crafted, then broken ones."""
-    from .crafted_weights import crafted
-
     return itertools.chain(crafted(), mutants(seed))
+
+
+def crafted() -> Iterator[tuple[str, bytes]]:
+    """Names and contents of files made for one weakness each, the same for every seed."""
+    from . import crafted_weights  # which needs torch
+
+    return crafted_weights.crafted()
 
 
 def mutants(seed: int) -> Iterator[tuple[str, bytes]]:

@@ -31,7 +31,8 @@ def mesh(text):
 
 def target(text):
     vertices, faces = mesh(text)
-    return Shape("it", np.zeros((32, 32, 32), bool), vertices=vertices, faces=faces)
+    cells = np.zeros((32, 32, 32), bool)
+    return Shape("it", cells, vertices=vertices.astype(np.float32), faces=faces.astype(np.int32))
 
 
 def test_a_program_beside_its_own_mesh_reads_the_floors_and_outlines_are_equal():
@@ -151,7 +152,7 @@ def test_the_overlap_with_a_shifted_copy_is_that_of_boxes_whatever_way_they_are_
 
 def test_points_alone_have_f_scores_and_no_normals_and_cells_alone_have_neither():
     known = target(TABLE)
-    cloud = replace(known, points=sampled(mesh(TABLE), 0).points, vertices=None, faces=None)
+    cloud = replace(known, points=sampled(mesh(TABLE), 0).points.astype(np.float32), vertices=None, faces=None)
     row = evaluate_program(parse(TABLE), cloud, looks=True)
     assert row.f1_percent > 0.98
     assert math.isnan(row.normals)

@@ -53,7 +53,9 @@ back(board(at=(0.1, 5.8, -7), size=(11, 0.8, 14), tilt=12))
 def evidence(text: str) -> Evidence:
     """What is known of the mesh of a program, which stays where it is."""
     vertices, faces = union_mesh(unroll(parse(text)))
-    return evidence_of(Shape("planted", np.ones((32, 32, 32), np.bool_), None, vertices=vertices, faces=faces))
+    cells = np.ones((32, 32, 32), np.bool_)
+    mesh = {"vertices": vertices.astype(np.float32), "faces": faces.astype(np.int32)}
+    return evidence_of(Shape("planted", cells, None, **mesh))
 
 
 def perturbed(text: str, seed: int, most: float = 0.5, degrees: float = 4.0) -> Program:

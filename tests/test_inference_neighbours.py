@@ -27,7 +27,9 @@ TABLE = SEAT + LEGS.format(height=14)
 
 def evidence(text: str) -> Evidence:
     vertices, faces = union_mesh(unroll(parse(text)))
-    return evidence_of(replace(shape_from_mesh(vertices, faces), vertices=vertices, faces=faces))  # where it is
+    shape = shape_from_mesh(vertices, faces)
+    where_it_is = replace(shape, vertices=vertices.astype(np.float32), faces=faces.astype(np.int32))
+    return evidence_of(where_it_is)
 
 
 def best(start: str, target: str) -> Program:

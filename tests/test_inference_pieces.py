@@ -121,7 +121,7 @@ def test_splayed_legs_and_a_seat_are_five_boxes_along_their_own_axes():
         best = overlap(found, centre, half, rotation).argmax()
         np.testing.assert_allclose(found.centre[best], centre, atol=0.01)
         np.testing.assert_allclose(np.sort(found.half[best]), np.sort(half), atol=0.01)
-        assert angle(found.take([best]), rotation[:, np.argmax(half) if half[0] > 1 else 0])[0] < 0.1
+        assert angle(found.take(np.array([best])), rotation[:, np.argmax(half) if half[0] > 1 else 0])[0] < 0.1
 
 
 def test_boxes_lie_along_the_axes_of_the_world_where_that_costs_little():

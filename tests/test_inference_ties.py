@@ -12,11 +12,14 @@ from typer.testing import CliRunner
 import shapeprog as sp
 from shapeprog.cli.app import app
 from shapeprog.evaluation.editing import edit_scores
+from shapeprog.geometry.mesh import pieces, union_mesh
 from shapeprog.inference.evidence import evidence_of_program
-from shapeprog.inference.joints import Joints
+from shapeprog.inference.joints import Joints, find_joints
 from shapeprog.inference.ties.contacts import Contacts, holding
 from shapeprog.inference.ties.features import features
 from shapeprog.inference.ties.fitting import ways_free
+from shapeprog.inference.ties.following import Following
+from shapeprog.inference.ties.leaning import between_ends
 from shapeprog.inference.ties.pricing import worthwhile
 from shapeprog.inference.ties.relations import Relation
 from shapeprog.inference.ties.runs import plural
@@ -345,3 +348,94 @@ def test_edits_of_two_boxes_that_touch_are_as_known():
     parted = 2  # the upper lifted by a fifth; the lower made shorter by one
     assert scores.contacts == pytest.approx(1 - parted / 22)
     assert scores.one_piece == pytest.approx(1 - parted / 22)
+
+
+LEANING = """
+for i in mirror(side):
+    leg(box(at=(-10, 4, 6), size=(10, 1, 1)))
+for i in mirror(side):
+    leg(box(at=(-10, -5, 6), size=(10, 1, 1)))
+seat(box(at=(0, -5, -7), size=(1, 10, 14)))
+back(board(at=(1, 4, -7), size=(9, 0.8, 14), tilt=20))
+rail(box(at=(9.2, 6.8, -7), size=(1, 1, 14)))
+"""
+
+
+@pytest.mark.parametrize("size", ["(9, 0.8, 14)", "(0.8, 9, 14)"])
+@pytest.mark.parametrize("tilt", [20, -35, 70])
+def test_a_board_that_leans_is_the_same_solid_as_a_bar_between_its_ends(size: str, tilt: float):
+    board = sp.parse(f"for i in mirror(side):\n    back(board(at=(1, 4, 2), size={size}, tilt={tilt}))\n")
+    bar = between_ends(board)
+    assert [node.name for node in bar.walk()] == ["mirror", "bar"]
+    assert [node.word for node in bar.walk() if isinstance(node, Draw)] == ["back"]
+    points = unroll(board).sample(500, torch.Generator().manual_seed(0))
+    assert unroll(bar).distance(points).abs().max() < 1e-4
+    assert unroll(board).distance(unroll(bar).sample(500, torch.Generator().manual_seed(0))).abs().max() < 1e-4
+
+
+def test_upright_boards_stay_boards():
+    upright = sp.parse("back(board(at=(1, 4, 2), size=(9, 0.8, 14), tilt=0.5))")
+    assert between_ends(upright) == upright
+
+
+def test_a_rail_stays_on_a_back_that_leans_when_the_chair_grows():
+    program = sp.parse(LEANING)
+    tied = tie(program, evidence_of_program(program)).program
+    for height in (16, 24):
+        scene = unroll(sp.set(tied, height=height))
+        assert pieces(*union_mesh(scene)) == 1
+    scores = edit_scores(tied)
+    assert scores.contacts >= 0.95
+    assert scores.one_piece >= 0.9
+
+
+def test_what_changes_part_is_as_known():
+    # Two boxes on each other, of heights 4 and 2; the upper one begins where the lower one ends.
+    tunable = Tunable(sp.parse("box(at=(0, 0, 0), size=(4, 5, 6))\nbox(at=(4, 0, 0), size=(2, 5, 6))\n"))
+    numbers = np.concatenate([tunable.values.numpy(), [6, 5, 6]])
+    joints = find_joints(tunable.scene(tunable.values), -100, torch.Generator().manual_seed(0))
+    following = Following(tunable, joints, numbers)
+    height = tunable.moving.index((0, 3))
+    place = tunable.moving.index((1, 0))
+    own = np.zeros((len(tunable.values), 1))
+    own[height] = 1
+    assert following.lost(own, np.array([4.0])) == 1  # lower by a fifth, and they are apart; higher, they overlap
+    both = own.copy()
+    both[place] = 1
+    assert following.lost(both, np.array([4.0])) == 0  # the upper box stands on the lower one
+
+
+def test_a_part_that_reaches_past_another_follows_it():
+    program = sp.parse("""
+top(box(at=(5, -8, -12), size=(1, 16, 24)))
+for i in mirror(side):
+    for j in mirror(depth):
+        leg(box(at=(-6, 6.3, 10.1), size=(11, 1.2, 1.2)))
+for i in mirror(depth):
+    apron(box(at=(3, 6.6, -10.8), size=(2, 0.6, 21.6)))
+""")
+    tied = tie(program, evidence_of_program(program)).program
+    for width in (16, 36):
+        assert pieces(*union_mesh(unroll(sp.set(tied, width=width)))) == 1
+    scores = edit_scores(tied)
+    assert (scores.contacts, scores.symmetry, scores.one_piece) == (1, 1, 1)
+
+
+def test_closing_gaps_makes_no_part_thinner_than_nothing():
+    # Two steps of closing all gaps of this chair at once, with no limit, gave its rail a size below zero.
+    program = sp.parse("""
+seat(box(at=(-0.92, -6.4, -5.53), size=(0.82, 11.4, 10.95)))
+for i in mirror(side):
+    for j in mirror(depth, at=-0.71):
+        leg(bar(start=(-12.02, 4.41, 4.36), end=(-0.58, 3.58, 4.2), section=(1.22, 0.96), turn=-0.4))
+for i in mirror(side):
+    stretcher(rod(start=(-6.63, -5.44, 4.29), end=(-6.51, 4.14, 4.29), radius=0.3))
+stretcher(rod(start=(-6.56, -0.76, -4.34), end=(-6.62, -0.61, 4.33), radius=0.36))
+for i in mirror(side):
+    post(rod(start=(-0.52, 4.14, 4.48), end=(11.97, 6.16, 4.41), radius=0.33))
+rail(board(at=(10.28, 5.61, -5.4), size=(1.61, 0.54, 10.89), tilt=9.5))
+for i in translate(6, by=(0, 0, 1.23)):
+    slat(rod(start=(-0.52, 3.99, -3.06), end=(11.12, 5.96, -3.27), radius=0.14))
+""")
+    tied = tie(program, evidence_of_program(program)).program
+    assert (unroll(tied).centre - unroll(program).centre).abs().max() < 1

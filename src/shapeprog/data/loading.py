@@ -8,6 +8,8 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
+import numpy as np
+
 from shapeprog.data.folders import Skipped, files_below
 from shapeprog.data.meshes import COMMON, mesh_formats, read_mesh
 from shapeprog.data.orientation import AUTO, axes_of, default_axes, in_shapenet_layout
@@ -159,7 +161,7 @@ def _placed(path: Path, up: str | None, front: str | None, make: Callable[..., S
     if up != AUTO:
         return make(axes=axes_of(path, up, front))
     seen = make(axes=axes_of(path, None, front))
-    found = find_up(seen.voxels, seen.frame.axes, usual=default_axes(path)[0], front=front)
+    found = find_up(seen.voxels, np.array(seen.frame.axes), usual=default_axes(path)[0], front=front)
     note = f"Up is taken to be {found.up} of the file, {found.probability:.0%} likely by how the shape would stand."
     return replace(make(axes=axes_of(path, found.up, front)), note=note)
 

@@ -48,7 +48,7 @@ class Upright(NamedTuple):
 
 
 def find_up(
-    cells: Cells, axes: npt.ArrayLike | None = None, *, usual: str | None = None, front: str | None = None
+    cells: Cells, axes: FloatArray | None = None, *, usual: str | None = None, front: str | None = None
 ) -> Upright:
     """The likeliest up of a shape that is known by its cells (R, R, R), of which some are occupied.
 
@@ -61,7 +61,7 @@ def find_up(
     front
         Where the front is, if that is known: up is along another axis.
     """
-    turn = np.eye(3) if axes is None else np.asarray(axes, np.float64)
+    turn = np.eye(3) if axes is None else axes
     names = [name_of(sign * turn[:, axis]) for axis in range(3) for sign in (1, -1)]
     score = measures(cells) @ np.array(list(WEIGHTS.values()))
     if usual is not None:

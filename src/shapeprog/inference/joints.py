@@ -6,6 +6,7 @@ them is narrowest, found by projecting onto the one and the other in turn.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import torch
@@ -18,7 +19,7 @@ from shapeprog.geometry.primitive import primitives
 from shapeprog.geometry.scene import Scene
 from shapeprog.geometry.surface import sample_surface
 from shapeprog.inference.residuals import rows_of
-from shapeprog.inference.tunable import bounds
+from shapeprog.inference.tunable import ROW, bounds
 
 NEARLY, TOUCHING = 0.3, 0.05
 """Gaps in cells up to which parts nearly touch, and touch."""
@@ -131,22 +132,25 @@ def places_of(scene: Scene, known: Joints) -> Float[Tensor, "C 3"]:
 
 def needs(scene: Scene, slopes: Float[Tensor, "N 16 F"], known: Joints) -> Needs:
     """How far every joint is from closed, none where it is, and how high each part is that stands on the floor."""
-    one, ours = rows_of(scene, known.first)
-    two, theirs = rows_of(scene, known.second)
-    box = _bound(one)
-    points = one.centre[:, 0] + (one.rotation[:, 0] @ (box * known.places)[..., None])[..., 0]
-    gap = (signed_distance(two, points[:, None])[:, 0] + CLOSED).clamp(min=0)
+    reach = depths(scene, slopes, known)
+    gap = reach.residual + CLOSED
+    joined = torch.where((gap >= 0)[:, None], reach.slopes, 0.0)  # on an axis the slope of a depth is no number
     stand, feet = rows_of(scene, known.standing)
     low = _inner(scene, known.standing, _lowest(scene, known.standing))
     height = stand.centre[:, 0, 0] + (stand.rotation[:, 0, 0] * _bound(stand) * low).sum(-1) - known.floor
-    total = gap.sum() + height.sum()
-    found = torch.autograd.grad(total, [*ours, *theirs, *feet], allow_unused=True)
-    leaves = [*ours, *theirs, *feet]
-    rows = [torch.zeros_like(leaf) if each is None else each for each, leaf in zip(found, leaves, strict=True)]
-    mine, others, standing = (torch.cat([each.flatten(1) for each in rows[k : k + 3]], 1) for k in (0, 3, 6))
-    joined = _by_number(mine, slopes[known.first]) + _by_number(others, slopes[known.second])
-    residual = torch.cat([gap, height]).detach()
-    return Needs(residual, torch.cat([joined, _by_number(standing, slopes[known.standing])]))
+    standing = _by_number(_slopes_of(height, feet), slopes[known.standing])
+    return Needs(torch.cat([gap.clamp(min=0), height.detach()]), torch.cat([joined, standing]))
+
+
+def depths(scene: Scene, slopes: Float[Tensor, "N 16 F"], known: Joints) -> Needs:
+    """How far the place of every joint is from the second part, below zero inside it."""
+    one, ours = rows_of(scene, known.first)
+    two, theirs = rows_of(scene, known.second)
+    points = one.centre[:, 0] + (one.rotation[:, 0] @ (_bound(one) * known.places)[..., None])[..., 0]
+    far = signed_distance(two, points[:, None])[:, 0]
+    found = _slopes_of(far, [*ours, *theirs])
+    mine, others = found[:, :ROW], found[:, ROW:]
+    return Needs(far.detach(), _by_number(mine, slopes[known.first]) + _by_number(others, slopes[known.second]))
 
 
 def between(
@@ -166,6 +170,13 @@ def _samples(scene: Scene, generator: torch.Generator) -> tuple[Float[Tensor, "N
     distance, nearest = away.topk(4, 1, largest=False)
     places = drawn[torch.arange(len(drawn))[:, None, None], nearest].mean(1)
     return places, distance[:, 0]
+
+
+def _slopes_of(values: Float[Tensor, " R"], leaves: Sequence[Tensor]) -> Float[Tensor, "R S"]:
+    """Derivatives of values by the rows of leaves, one after another."""
+    found = torch.autograd.grad(values.sum(), leaves, allow_unused=True)
+    rows = [torch.zeros_like(leaf) if each is None else each for each, leaf in zip(found, leaves, strict=True)]
+    return torch.cat([each.flatten(1) for each in rows], 1)
 
 
 def _by_number(rows: Float[Tensor, "R 16"], slopes: Float[Tensor, "R 16 F"]) -> Float[Tensor, "R F"]:

@@ -6,7 +6,7 @@ import numpy as np
 
 from shapeprog.inference.oriented import Boxes
 from shapeprog.inference.patches import Patches
-from shapeprog.space import SPAN, FloatArray
+from shapeprog.space import SPAN, Array, FloatArray
 
 PARALLEL = 8.0
 """Degrees between the normals of two patches of a pair, at most."""
@@ -61,7 +61,7 @@ def corners(patches: Patches) -> FloatArray:
     return patches.centre[:, None] + offset
 
 
-def _between(patches: Patches, i: FloatArray, depth: FloatArray, spans: list[tuple[FloatArray, FloatArray]]) -> Boxes:
+def _between(patches: Patches, i: Array, depth: FloatArray, spans: list[tuple[FloatArray, FloatArray]]) -> Boxes:
     """Boxes over spans (n, 2) in the planes of patches ``i``, as deep as the distance along their normals."""
     middle = np.concatenate([(low + high) / 2 for low, high in spans])
     half = np.concatenate([(high - low) / 2 for low, high in spans])

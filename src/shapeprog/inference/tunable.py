@@ -161,7 +161,7 @@ def least(quantity: Quantity) -> float:
     return THINNEST / 2 if quantity.high == HALF else THINNEST
 
 
-def bounds(scene: Scene) -> Float[Tensor, "N 3"]:
+def bounds(scene: Scene) -> Float[Tensor, "*batch N 3"]:
     """Half extents of the local bounding boxes of primitives, with gradient to their sizes."""
     found = torch.zeros_like(scene.centre)
     for kind in scene.kinds:

@@ -167,4 +167,4 @@ def _rises(slots: Sequence[Slot], values: FloatArray) -> bool:
     if ("start", UP) not in ends or ("end", UP) not in ends:
         return False
     along = [ends["end", axis] - ends["start", axis] for axis in range(3)]
-    return along[UP] > max(abs(along[DEPTH]), abs(along[SIDE]))
+    return bool(along[UP] > max(abs(along[DEPTH]), abs(along[SIDE])))

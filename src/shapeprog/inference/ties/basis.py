@@ -6,13 +6,16 @@ chosen, by exchange of one for another, from which every number is the shortest 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import combinations
 from typing import Literal
 
 import numpy as np
 
 from shapeprog.inference.ties.features import Feature
+from shapeprog.inference.ties.following import Following
 from shapeprog.inference.ties.runs import Run
 from shapeprog.inference.ties.sums import SAME, Flags, cost_of_terms, nearest_quarter
 from shapeprog.space import DEPTH, SIDE, UP, Array, FloatArray
@@ -30,13 +33,19 @@ SHARED = 0.3
 PLACED = 2.0
 """Price of a name from which it measures a place."""
 
+LOST = 40.0
+"""What it costs that a change of a measure by a fifth parts all that touches."""
+
+OFFSET = 3.0
+"""Cells between sides of parts that touch, at most, that may be a measure."""
+
 Word = Literal[
-    "extent", "top", "bottom", "inset", "length", "radius", "span", "shift", "step", "angle", "side", "place"
+    "extent", "top", "bottom", "inset", "length", "radius", "span", "shift", "step", "angle", "side", "place", "offset"
 ]
 
 NAMED: dict[Word, float] = {
-    "extent": -6.0, "length": 0.8, "radius": 0.8, "top": 0.9, "bottom": 1.2, "inset": 1.2, "span": 1.0, "shift": 1.0,
-    "step": 3.0, "angle": 1.0, "side": 6.0, "place": 5.0,
+    "extent": -25.0, "length": 0.8, "radius": 0.8, "top": 0.9, "bottom": 1.2, "inset": 1.2, "span": 1.0, "shift": 1.0,
+    "step": 3.0, "angle": 1.0, "side": 9.0, "place": 8.0, "offset": 1.5,
 }  # fmt: skip
 """What a name costs its reader by what it measures, and by how much the extents of the whole are preferred.  A number
 that is used once needs no name; but a place, measured from the middle, stays behind when the whole is changed."""
@@ -44,11 +53,13 @@ that is used once needs no name; but a place, measured from the middle, stays be
 
 @dataclass(frozen=True)
 class Measure:
-    """What a name may stand for: a word for what is measured, along which axis and of which node, and its factors."""
+    """What a name may stand for: a word for what is measured, along which axis and of which node, and its factors; of
+    an offset also the node that it is measured from."""
 
     word: Word
     feature: Feature
     row: FloatArray
+    origin: int = -1
 
 
 @dataclass(frozen=True)
@@ -70,9 +81,11 @@ class Basis:
     values: FloatArray
 
 
-def measures(known: list[Feature], numbers: FloatArray, runs: Sequence[Run]) -> Iterator[Measure]:
-    """What names may stand for; heights are above the floor, insets from the nearest side of the whole, and the span of
-    a run from its first copy to the last."""
+def measures(
+    known: list[Feature], numbers: FloatArray, runs: Sequence[Run], touching: set[tuple[int, int]]
+) -> Iterator[Measure]:
+    """What names may stand for; heights are above the floor, insets from the nearest side of the whole, the span of a
+    run from its first copy to the last, and offsets between sides of parts that touch."""
     whole = {each.axis: each.row for each in known if each.kind == "extent"}
     between = {run.step: run.copies - 1 for run in runs}
     for each in known:
@@ -89,9 +102,24 @@ def measures(known: list[Feature], numbers: FloatArray, runs: Sequence[Run]) -> 
         if each.axis in (DEPTH, SIDE) and each.kind in ("low", "high", "place"):
             nearest = 1 if each.at(numbers) < 0 else -1
             yield Measure("inset", each, whole[each.axis] / 2 + nearest * each.row)
+    sides = [each for each in known if each.kind in ("low", "high", "place")]
+    for one, two in combinations(sides, 2):
+        pair = (min(one.node, two.node), max(one.node, two.node))
+        if one.axis == two.axis and pair in touching:
+            far = two.at(numbers) - one.at(numbers)
+            if 0 < abs(far) <= OFFSET:
+                yield Measure("offset", two, np.sign(far) * (two.row - one.row), one.node)
 
 
-def simplest(known: list[Feature], numbers: FloatArray, ways: FloatArray, lengths: Flags, runs: Sequence[Run]) -> Basis:
+def simplest(
+    known: list[Feature],
+    numbers: FloatArray,
+    ways: FloatArray,
+    lengths: Flags,
+    runs: Sequence[Run],
+    touching: set[tuple[int, int]],
+    following: Following | None,
+) -> Basis:
     """The measures from which every number of the program is the simplest sum.
 
     Parameters
@@ -104,13 +132,17 @@ def simplest(known: list[Feature], numbers: FloatArray, ways: FloatArray, length
         Which numbers are lengths (V,).
     runs
         The steps that may be written as a share of a span.
+    touching
+        Pairs of nodes, the smaller first, whose parts touch.
+    following
+        Tells what changes of measures part.
     """
-    every = list(measures(known, numbers, runs))
+    every = list(measures(known, numbers, runs, touching))
     seen = np.stack([each.row for each in every]) @ ways
     groups = _together(seen, every)
     heads = [every[group[0]] for group in groups]
     seen = seen[[group[0] for group in groups]]
-    reader = _Reader(heads, numbers, lengths, runs)
+    reader = _Reader(heads, numbers, lengths, runs, following)
     chosen = _independent(seen, np.argsort(reader.prices, kind="stable"))
     factors = ways @ np.linalg.inv(seen[chosen])
     total = reader.cost(factors, chosen)
@@ -124,7 +156,7 @@ def simplest(known: list[Feature], numbers: FloatArray, ways: FloatArray, length
                 change = row.copy()
                 change[place] -= 1
                 changed = factors - np.outer(factors[:, place], change / row[place])
-                cost = reader.cost(changed, [*chosen[:place], k, *chosen[place + 1 :]])
+                cost = reader.cost(changed, [*chosen[:place], k, *chosen[place + 1 :]], best)
                 if cost < best:
                     best, swap = cost, (place, k)
         if swap is None:
@@ -139,8 +171,15 @@ def simplest(known: list[Feature], numbers: FloatArray, ways: FloatArray, length
 class _Reader:
     """What it costs to read a program whose numbers are sums of some measures."""
 
-    def __init__(self, heads: list[Measure], numbers: FloatArray, lengths: Flags, runs: Sequence[Run]) -> None:
-        self.runs = runs
+    def __init__(
+        self,
+        heads: list[Measure],
+        numbers: FloatArray,
+        lengths: Flags,
+        runs: Sequence[Run],
+        following: Following | None,
+    ) -> None:
+        self.runs, self.following = runs, following
         self.prices = np.array([NAMED[each.word] for each in heads])
         self.values: FloatArray = np.array([each.row @ numbers for each in heads])
         count = len(numbers) - 3
@@ -148,8 +187,9 @@ class _Reader:
         heights = (h for h, each in enumerate(heads) if each.word == "extent" and each.feature.axis == UP)
         self.height = next(heights, -1)
 
-    def cost(self, factors: FloatArray, chosen: list[int]) -> float:
-        """The cost of the sums (V, Z) of some measures, and of the names of these."""
+    def cost(self, factors: FloatArray, chosen: list[int], most: float = math.inf) -> float:
+        """The cost of the sums (V, Z) of some measures, of the names of these, and of what their changes part; where
+        that is more than the most that is of interest, any such number."""
         factors, prices = factors[: len(self.small)], self.prices[chosen]
         size = np.abs(factors)
         used = size > SAME
@@ -165,7 +205,10 @@ class _Reader:
             terms[np.abs(factors[:, height] + 0.5) < SAME, height] = FLOOR
         terms[size * np.abs(self.values[chosen]) > self.small[:, None]] += DIFFERENCE
         literal = (used.sum(0) == 1) & (size.sum(0) < 1 + SAME) & (prices < PLACED)
-        return float(terms.sum() + prices[~literal & used.any(0)].sum())
+        cost = float(terms.sum() + prices[~literal & used.any(0)].sum())
+        if self.following is None or cost >= most:
+            return cost
+        return cost + LOST * self.following.lost(factors, self.values[chosen])
 
 
 def _together(seen: FloatArray, every: list[Measure]) -> list[list[int]]:

@@ -78,14 +78,17 @@ class Contacts:
             By how much moving parts together may raise the misfit at most.
         """
         free, left = np.linalg.inv(curvature), rows
+        least = np.minimum(self.tunable.low.numpy(), numbers[: len(self.tunable.values)])
         needed = self.at(_optimum(left[:fixed], numbers, free))
 
         def placed(first: int) -> tuple[FloatArray, bool]:
             """The optimum where the first relations hold, and whether all does that should hold together."""
             best = _optimum(left[:first], numbers, free)
+            if (best[: len(least)] < least).any():
+                return best, False
             if self.at(best)[needed].all():
                 return best, True
-            closed = self._closed(best, left[:first], curvature)
+            closed = self._closed(best, left[:first], curvature, least)
             dear = (closed - best) @ curvature @ (closed - best) > price
             return (best, False) if dear or not self.at(closed)[needed].all() else (closed, True)
 
@@ -104,8 +107,9 @@ class Contacts:
             best, holds = placed(len(left))
         return left, best
 
-    def _closed(self, numbers: FloatArray, rows: FloatArray, curvature: FloatArray) -> FloatArray:
-        """The numbers (V,) with gaps between parts closed while relations (M, V) hold, and the misfit rises least."""
+    def _closed(self, numbers: FloatArray, rows: FloatArray, curvature: FloatArray, least: FloatArray) -> FloatArray:
+        """The numbers (V,) with gaps between parts closed while relations (M, V) hold, and the misfit rises least; none
+        of those of the program falls below its least (F,)."""
         count, ways, start = len(self.tunable.values), ways_free(rows, len(numbers)), numbers
         for _ in range(CLOSING):
             poses = self.tunable.poses(torch.from_numpy(numbers[:count]))
@@ -113,7 +117,10 @@ class Contacts:
             wide = np.pad(gaps.slopes.numpy(), [(0, 0), (0, len(numbers) - count)])
             slope = curvature @ (numbers - start) + CLOSED * wide.T @ gaps.residual.numpy()
             inner = ways.T @ (curvature + CLOSED * wide.T @ wide) @ ways
-            numbers = numbers - ways @ np.linalg.solve(inner, ways.T @ slope)
+            closer = numbers - ways @ np.linalg.solve(inner, ways.T @ slope)
+            if (closer[:count] < least).any():
+                break
+            numbers = closer
         return numbers
 
 

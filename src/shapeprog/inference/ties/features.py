@@ -87,7 +87,7 @@ def _sides(tunable: Tunable, poses: Poses) -> Iterator[Feature]:
     A board that leans back still has a left and a right side, and a rod between two points its middle.
     """
     scene = poses.scene
-    value, slope = _ends(scene)
+    value, slope = ends_of(scene)
     rows = torch.einsum("enr,nrf->enf", slope, poses.slopes).numpy()
     aligned = ((scene.rotation - scene.rotation.round()).abs().amax(-1) < ALIGNED).numpy()
     drawn = [n for n, node in enumerate(tunable.nodes) if isinstance(node, Draw)]
@@ -120,7 +120,7 @@ def _step(tunable: Tunable, rows: FloatArray, low: FloatArray) -> FloatArray | N
     return step if steps and shifts == 1 and (np.abs(step) > WHOLE).sum() == 1 else None
 
 
-def _ends(scene: Scene) -> tuple[torch.Tensor, torch.Tensor]:
+def ends_of(scene: Scene) -> tuple[torch.Tensor, torch.Tensor]:
     """Low and high ends of primitives along the axes (6, N), and their slopes (6, N, 16) by sizes, centre, rotation."""
     leaves = [each.clone().requires_grad_() for each in (scene.size, scene.centre, scene.rotation)]
     half = bounds(replace(scene, size=leaves[0]))

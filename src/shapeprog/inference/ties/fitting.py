@@ -24,6 +24,9 @@ HOLD = 1e-2
 TOGETHER, CLOSED = 0.03, 0.2
 """Weights of a squared gap between parts that touched, and of one that is still open at the end."""
 
+FAR = 2.0
+"""Farthest that relations move the surface by one number at once, in cells."""
+
 FARTHEST = 0.5
 """Farthest that one step moves the surface by one number, in cells."""
 
@@ -33,8 +36,8 @@ class Misfit:
 
     Attributes
     ----------
-    numbers, low
-        Where they are at the start, and what they must not fall below.
+    numbers, low, far
+        Where they are at the start, what they must not fall below, and how far relations may move them at once.
     """
 
     def __init__(self, tunable: Tunable, evidence: Evidence, seed: int) -> None:
@@ -46,6 +49,7 @@ class Misfit:
         self.extents: FloatArray = 2 * reach
         self.numbers = np.concatenate([tunable.values.numpy(), self.extents])
         self.low = np.concatenate([tunable.low.numpy(), np.zeros(3)])
+        self.far = FAR / np.append(tunable.scale.numpy(), np.ones(3))
         gentle = np.array([GENTLE.get(kind, PLACE) for kind in tunable.kinds]) * tunable.scale.numpy() ** 2
         self._gentle = np.concatenate([gentle, np.full(3, HOLD)])
 

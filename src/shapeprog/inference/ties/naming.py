@@ -29,8 +29,8 @@ SIDES = {
     ("high", 2): "right",
 }  # fmt: skip
 
-NOTES = {"top": "above the floor", "bottom": "above the floor", "inset": "from the side of the whole"}
-"""What is said behind names whose measure begins somewhere."""
+NOTES = {"top, bottom, up: above the floor": ("top", "bottom"), "inset: from the side": ("inset",)}
+"""What is said behind the first names, for measures that begin somewhere."""
 
 SHARED = ("thickness", "radius", "edge", "spacing", "inset", "tilt")
 """What different parts may share and be called so without the name of a part."""
@@ -103,23 +103,21 @@ def written(tunable: Tunable, basis: Basis, runs: Sequence[Run]) -> Program:
 def _header(
     basis: Basis, names: list[str], order: list[int], alone: list[bool], counts: list[tuple[str, Value]]
 ) -> Iterator[Assignment]:
-    """The lines that name numbers: the extents of the whole, then what is measured from the same place together."""
-    groups: dict[str, list[tuple[str, Value]]] = {"whole": [], "": [*counts]}
-    for z in order:
-        if not alone[z]:
-            word = basis.chosen[z][0].word
-            note = "whole" if word == "extent" else NOTES.get(word, "")
-            groups.setdefault(note, []).append((names[z], to_float32(basis.values[z])))
-    groups["whole"].sort(key=lambda pair: -EXTENTS.index(pair[0]))
-    for note, pairs in groups.items():
-        line: list[tuple[str, Value]] = []
-        for pair in pairs:
-            if line and sum(len(name) + 8 for name, _ in [*line, pair]) > WIDE:
-                yield Assignment(tuple(line), note if note != "whole" else "")
-                line = []
-            line.append(pair)
-        if line:
-            yield Assignment(tuple(line), note if note != "whole" else "")
+    """The lines that name numbers: the extents of the whole, then what is repeated, then all others."""
+    free = [z for z in order if not alone[z]]
+    words = [basis.chosen[z][0].word for z in free]
+    named = [(names[z], to_float32(basis.values[z])) for z in free]
+    whole = [pair for pair, word in zip(named, words, strict=True) if word == "extent"]
+    others = [pair for pair, word in zip(named, words, strict=True) if word != "extent"]
+    note = "; ".join(note for note, about in NOTES.items() if not {*about}.isdisjoint(words))
+    lines: list[list[tuple[str, Value]]] = [sorted(whole, key=lambda pair: -EXTENTS.index(pair[0])), []]
+    for pair in (*counts, *others):
+        if lines[-1] and sum(len(name) + 8 for name, _ in [*lines[-1], pair]) > WIDE:
+            lines.append([])
+        lines[-1].append(pair)
+    for line in filter(None, lines):
+        yield Assignment(tuple(line), note)
+        note = ""
 
 
 def _names(tunable: Tunable, basis: Basis) -> tuple[list[str], list[int], set[str]]:
@@ -179,6 +177,9 @@ def _kind(tunable: Tunable, measure: Measure) -> str:
         return _length(tunable, measure)
     if word in ("shift", "step"):
         return "spacing"
+    if word == "offset":
+        parts = [_part(tunable, each) for each in (feature.node, measure.origin)]
+        return f"to_{parts[1]}" if parts[0] != parts[1] else word
     if word == "side":
         return SIDES[feature.kind, feature.axis]
     if word in ("angle", "place") or (word == "top" and feature.kind == "place"):

@@ -24,6 +24,7 @@ def worthwhile(
     *,
     fixed: FloatArray,
     low: FloatArray,
+    far: FloatArray | float = np.inf,
 ) -> tuple[FloatArray, FloatArray]:
     """Relations (M, V) that are worth having, those that are fixed first; and the optimum (V,) where they hold.
 
@@ -37,12 +38,14 @@ def worthwhile(
         Relations (M, V) that hold in any case.
     low
         What no number may fall below (V,) for the sake of a relation.
+    far
+        Farthest that relations together may move a number (V,): the misfit is known near the optimum alone.
     """
     kept, free = list(fixed), np.linalg.inv(curvature)
     rows = np.stack([*fixed, *(each.row for each in candidates)]) if len(fixed) or candidates else fixed
     if not len(rows):
         return fixed, numbers
-    low = np.minimum(low, numbers)
+    low, start = np.minimum(low, numbers), numbers
     spread, off = np.einsum("kv,vw,kw->k", rows, free, rows, optimize=True), rows @ numbers
     worth = price * np.array([np.inf] * len(fixed) + [each.trust for each in candidates])
     least = HELD * spread
@@ -54,7 +57,7 @@ def worthwhile(
         along = free @ rows[best]
         moved = numbers - along * off[best] / spread[best]
         if best >= len(fixed):
-            if (moved < low).any():
+            if (moved < low).any() or (np.abs(moved - start) > far).any():
                 spread[best] = 0.0
                 continue
             kept.append(rows[best])

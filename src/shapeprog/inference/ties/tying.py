@@ -21,6 +21,8 @@ from shapeprog.inference.ties.basis import Basis, simplest
 from shapeprog.inference.ties.contacts import Contacts
 from shapeprog.inference.ties.features import Feature, features
 from shapeprog.inference.ties.fitting import CLOSED, Misfit, refitted, ways_free
+from shapeprog.inference.ties.following import Following
+from shapeprog.inference.ties.leaning import between_ends
 from shapeprog.inference.ties.naming import written
 from shapeprog.inference.ties.pricing import worthwhile
 from shapeprog.inference.ties.relations import relations
@@ -67,7 +69,7 @@ def tie(
     held
         Relations that hold in any case, as rows (R, F) of factors of the numbers that move.
     """
-    plain = Program(program.body)
+    plain = Program(program.body) if held is not None else between_ends(program)
     if not plain.size:
         return Tied(plain, 0)
     with single_threaded():
@@ -86,7 +88,7 @@ def tie(
             before = len(rows)
             offered = relations(known, numbers, pairs)
             curvature = misfit.at(numbers)[1]
-            rows, optimum = worthwhile(offered, numbers, curvature, price, fixed=rows, low=misfit.low)
+            rows, optimum = worthwhile(offered, numbers, curvature, price, fixed=rows, low=misfit.low, far=misfit.far)
             if contacts:
                 rows, optimum = contacts.kept(rows, before, numbers, curvature, price)
             numbers = _together(misfit, optimum, rows, joints, contacts)
@@ -97,7 +99,8 @@ def tie(
         ways = ways_free(rows, len(numbers))
         repeated = list(runs(tunable, ways))
         lengths = np.append(tunable.are("length").numpy(), [False] * 3)
-        basis = _rounded(simplest(known, numbers, ways, lengths, repeated))
+        following = Following(tunable, joints, numbers) if joints else None
+        basis = _rounded(simplest(known, numbers, ways, lengths, repeated, pairs, following))
         named = written(tunable, basis, repeated)
         return Tied(named, free_numbers(named))
 

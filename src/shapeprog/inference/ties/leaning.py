@@ -1,0 +1,39 @@
+"""Boards that lean, as bars between the middles of their ends: where such a part ends is then a number it writes.
+
+A board says where its lower edge is and by how many degrees it leans, and no sum of numbers says where its upper edge
+is.  Nothing could be tied to it, and it would leave what it holds when the height is changed.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+from shapeprog.language.parameters import to_float32
+from shapeprog.language.program import Draw, Loop, Node, Program
+
+LEAST = 1.0
+"""Degrees by which a board must lean."""
+
+
+def between_ends(program: Program) -> Program:
+    """The same parts, those that lean about the left-right axis as bars."""
+    return Program(tuple(_between_ends(node) for node in program.body))
+
+
+def _between_ends(node: Node) -> Node:
+    if isinstance(node, Loop):
+        return replace(node, body=tuple(_between_ends(inner) for inner in node.body))
+    if node.name != "board" or abs(node.values[-1]) < LEAST:
+        return node
+    up, depth, side, high, deep, wide, tilt = node.values
+    sin, cos = math.sin(math.radians(tilt)), math.cos(math.radians(tilt))
+    upwards, backwards = (cos, sin), (-sin, cos)
+    along, across, length, thick = (
+        (upwards, backwards, high, deep) if high >= deep else (backwards, upwards, deep, high)
+    )
+    start = [place + way * thick / 2 for place, way in zip((up, depth), across, strict=True)]
+    end = [place + way * length for place, way in zip(start, along, strict=True)]
+    middle = side + wide / 2
+    values = (*start, middle, *end, middle, thick, wide, 0.0)
+    return Draw("bar", tuple(to_float32(value) for value in values), node.word)

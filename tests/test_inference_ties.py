@@ -439,3 +439,12 @@ for i in translate(6, by=(0, 0, 1.23)):
 """)
     tied = tie(program, evidence_of_program(program)).program
     assert (unroll(tied).centre - unroll(program).centre).abs().max() < 1
+
+
+def test_the_first_line_says_where_heights_and_insets_begin():
+    tied = tied_table()
+    first = format_program(tied).splitlines()[0]
+    ends = {each.name.rstrip("_0123456789").rpartition("_")[2] for each in sp.names(tied)}
+    assert first.startswith("width, depth, height = ")
+    assert ("above the floor" in first) == bool(ends & {"top", "bottom", "up"})
+    assert ("from the side" in first) == ("inset" in ends)

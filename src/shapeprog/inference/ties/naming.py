@@ -29,8 +29,11 @@ SIDES = {
     ("high", 2): "right",
 }  # fmt: skip
 
-NOTES = {"top, bottom, up: above the floor": ("top", "bottom"), "inset: from the side": ("inset",)}
-"""What is said behind the first names, for measures that begin somewhere."""
+BEGUN = ("top", "bottom", "inset")
+"""Measures that begin somewhere."""
+
+NOTES = {"above the floor": ("top", "bottom", "up"), "from the side": ("inset",)}
+"""Where they begin, by the ends of their names."""
 
 SHARED = ("thickness", "radius", "edge", "spacing", "inset", "tilt")
 """What different parts may share and be called so without the name of a part."""
@@ -109,7 +112,13 @@ def _header(
     named = [(names[z], to_float32(basis.values[z])) for z in free]
     whole = [pair for pair, word in zip(named, words, strict=True) if word == "extent"]
     others = [pair for pair, word in zip(named, words, strict=True) if word != "extent"]
-    note = "; ".join(note for note, about in NOTES.items() if not {*about}.isdisjoint(words))
+    ends = {
+        name.rstrip("_0123456789").rpartition("_")[2]
+        for (name, _), word in zip(named, words, strict=True)
+        if word in BEGUN
+    }
+    begins = {where: [end for end in about if end in ends] for where, about in NOTES.items()}
+    note = "; ".join(f"{', '.join(found)}: {where}" for where, found in begins.items() if found)
     lines: list[list[tuple[str, Value]]] = [sorted(whole, key=lambda pair: -EXTENTS.index(pair[0])), []]
     for pair in (*counts, *others):
         if lines[-1] and sum(len(name) + 8 for name, _ in [*lines[-1], pair]) > WIDE:

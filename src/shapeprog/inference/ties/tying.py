@@ -76,7 +76,8 @@ def tie(
         tunable = Tunable(plain)
         misfit = Misfit(tunable, evidence, seed)
         numbers = misfit.numbers
-        rows = np.zeros((0, len(numbers))) if held is None else np.pad(held, ((0, 0), (0, 3)))
+        straight = np.flatnonzero((numbers[: len(tunable.values)] == 0) & tunable.are("angle").numpy())
+        rows = np.eye(len(numbers))[straight] if held is None else np.pad(held, ((0, 0), (0, 3)))
         known: list[Feature] = []
         scene = tunable.scene(tunable.values)
         joints = _joints(scene, seed)

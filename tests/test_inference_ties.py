@@ -448,3 +448,16 @@ def test_the_first_line_says_where_heights_and_insets_begin():
     assert first.startswith("width, depth, height = ")
     assert ("above the floor" in first) == bool(ends & {"top", "bottom", "up"})
     assert ("from the side" in first) == ("inset" in ends)
+
+
+@pytest.mark.parametrize("times", [2, 3])
+def test_a_length_may_be_a_half_or_a_third_of_another(times: int):
+    short = 24 / times + 0.005
+    program = sp.parse(f"""
+body(box(at=(-6, -5, -12), size=(7, 10, 24)))
+drawer(box(at=(1, -5, -12), size=(4.4, 10, {short})))
+""")
+    tied = tie(program, evidence_of_program(program)).program
+    wide = unroll(sp.set(tied, width=30))
+    assert 2 * float(wide.size[1, 2]) == pytest.approx(30 / times, abs=0.01)
+    assert f"width / {times}" in format_program(tied)

@@ -130,6 +130,7 @@ def test_expressions_are_built_with_operators() -> None:
     width, thick = Name("width"), Name("thick")
     assert str((width - 2 * thick) / 3) == "(width - 2 * thick) / 3"
     assert str(1 - -width) == "1 - -width"
+    assert str(combined(0, [(width, 2 / 3), (thick, -1 / 3)])) == "2 * width / 3 - thick / 3"
     assert str(combined(0.25, [(width, -0.5), (thick, 1.0), (2.0, 3.0), (width * thick, 0.3)])) == (
         "-width / 2 + thick + 0.3 * (width * thick) + 6.25"
     )

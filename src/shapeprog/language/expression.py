@@ -263,4 +263,6 @@ def _scaled(value: Expression, factor: float) -> Expression:
         return -value if factor < 0 else value
     if abs(factor) < 1 and abs(1 / factor - round(1 / factor)) < 1e-9:
         return (-value if factor < 0 else value) / abs(round(1 / factor))
+    if abs(factor - round(factor)) > 1e-9 and abs(3 * factor - round(3 * factor)) < 1e-9:
+        return round(3 * factor) * value / 3
     return factor * value

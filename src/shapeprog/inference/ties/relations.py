@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from itertools import combinations
+from itertools import combinations, permutations
 from typing import NamedTuple
 
 import numpy as np
@@ -28,6 +28,10 @@ are mostly chance."""
 
 HIDDEN = {CENTRED: 1.3, HOLDING: CHANCE}
 """What relations are worth that are off by so much that only hidden surfaces can be meant."""
+
+RATIOS, RATIO = (2, 3), 0.1
+"""How many times as long one part may be as another along an axis by design, and what the number that it saves is worth
+to that: where parts have many lengths, some are nearly twice others by chance."""
 
 SIMPLE = 4
 """Factors of a relation beyond which it is worth less, in proportion: it takes a long sum to write."""
@@ -127,6 +131,10 @@ def _candidates(
                 yield one.row - two.row, LIKELY if one.axis == two.axis or thin else CHANCE
             if opposite and kind in ("shift", "angle"):
                 yield one.row + two.row, POSSIBLE
+    lengths = [(each, each.at(numbers)) for each in known if each.kind in ("length", "extent") and each.axis >= 0]
+    for (one, far), (two, near) in permutations(lengths, 2):
+        if one.axis == two.axis and near > THIN and (times := round(far / near)) in RATIOS:
+            yield one.row - times * two.row, RATIO
 
 
 def _near(alike: Sequence[Feature], numbers: FloatArray) -> Iterator[tuple[Feature, Feature, bool, bool]]:

@@ -12,7 +12,7 @@ Flags = npt.NDArray[np.bool_]
 SAME = 1e-6
 """Difference below which factors are the same."""
 
-FACTORS = {1.0: 1.0, 0.5: 1.2, 2.0: 1.3, 0.25: 2.0, 1.5: 2.0, 3.0: 2.0, 4.0: 2.0}
+FACTORS = {1.0: 1.0, 0.5: 1.2, 2.0: 1.3, 1 / 3: 1.5, 0.25: 2.0, 1.5: 2.0, 3.0: 2.0, 4.0: 2.0}
 """What a term of a sum costs a reader by its factor; others cost ``UGLY``."""
 
 UGLY = 4.0

@@ -373,6 +373,12 @@ def test_a_board_that_leans_is_the_same_solid_as_a_bar_between_its_ends(size: st
     assert unroll(board).distance(unroll(bar).sample(500, torch.Generator().manual_seed(0))).abs().max() < 1e-4
 
 
+def test_a_board_without_a_role_is_a_bar_without_one():
+    text = format_program(between_ends(sp.parse("board(at=(1, 4, 2), size=(9, 0.8, 14), tilt=20)")))
+    assert text.startswith("bar(start=")
+    assert format_program(sp.parse(text)) == text
+
+
 def test_upright_boards_stay_boards():
     upright = sp.parse("back(board(at=(1, 4, 2), size=(9, 0.8, 14), tilt=0.5))")
     assert between_ends(upright) == upright

@@ -36,4 +36,4 @@ def _between_ends(node: Node) -> Node:
     end = [place + way * length for place, way in zip(start, along, strict=True)]
     middle = side + wide / 2
     values = (*start, middle, *end, middle, thick, wide, 0.0)
-    return Draw("bar", tuple(to_float32(value) for value in values), node.word)
+    return Draw("bar", tuple(to_float32(value) for value in values), node.role)

@@ -38,7 +38,7 @@ NOTES = {"above the floor": ("top", "bottom", "up"), "from the side": ("inset",)
 SHARED = ("thickness", "radius", "edge", "spacing", "inset", "tilt")
 """What different parts may share and be called so without the name of a part."""
 
-WIDE = 96
+WIDE = 118
 """Letters of a line that names numbers, about."""
 
 LEVEL = 0.6

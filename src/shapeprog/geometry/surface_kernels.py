@@ -163,6 +163,9 @@ def visible(table, many, shares, seed, skin, most, n, chosen, places, found, beg
                 hidden = _hidden_in_runs(table, first, many, box, joined, near, slot, x, y, z, dx, dy, dz)
             if hidden:
                 continue
+            if not abs(x) + abs(y) + abs(z) < FARTHEST:
+                kept = -1
+                break
             item = base + kept
             chosen[item, 0], chosen[item, 1] = slot, face
             places[item, 0], places[item, 1], places[item, 2] = u, v, w
@@ -170,9 +173,6 @@ def visible(table, many, shares, seed, skin, most, n, chosen, places, found, beg
             places[item, 6], places[item, 7], places[item, 8] = a, b, c
             kept += 1
         found[scene] = kept
-        for item in range(base, base + kept):
-            if not abs(places[item, 3]) + abs(places[item, 4]) + abs(places[item, 5]) < FARTHEST:
-                found[scene] = -1
 
 
 @kernel("void(f8[:, ::1], i8, i8, i8[:, ::1], f8[:, ::1], f8[:, ::1], f8[::1], f8[:, ::1], f8[:, ::1], i8, i8)")

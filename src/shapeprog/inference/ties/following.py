@@ -10,7 +10,7 @@ import numpy as np
 import torch
 
 from shapeprog.inference.joints import Joints, depths, moved
-from shapeprog.inference.ties.features import ends_of
+from shapeprog.inference.ties.features import ALIGNED, ends_of
 from shapeprog.inference.ties.sums import Flags
 from shapeprog.inference.tunable import Tunable
 from shapeprog.space import FloatArray
@@ -20,9 +20,6 @@ CHANGE = 0.2
 
 TOUCHING = 0.1
 """Cells between parts that touch, at most."""
-
-ALIGNED = 1e-6
-"""How far from whole the entries of a rotation may be for a box to lie along the axes of the grid."""
 
 
 class Following:

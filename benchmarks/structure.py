@@ -140,11 +140,13 @@ def inferred(task: Task, shape: Any) -> tuple[Any, Any]:
     from shapeprog.inference import infer
     from shapeprog.inference.evidence import evidence_of
     from shapeprog.inference.ties.tying import PRICE, tie
+    from shapeprog.language.merging import merged
     from shapeprog.language.text import parse
 
     if task.method == "tied":
         evidence = evidence_of(shape, task.seed)
-        return tie(parse(task.program), evidence, price=task.price * PRICE, seed=task.seed).program, None
+        tied = tie(parse(task.program), evidence, price=task.price * PRICE, seed=task.seed)
+        return merged(tied.program), None
     statements: Literal["all", "paper"] = "paper" if task.method == "paper" else "all"
     ties = task.method != "untied"
     result = infer(shape, blocks=task.blocks, seed=task.seed, statements=statements, ties=ties)

@@ -20,12 +20,14 @@ from shapeprog.inference.ties.features import features
 from shapeprog.inference.ties.fitting import ways_free
 from shapeprog.inference.ties.following import Following
 from shapeprog.inference.ties.leaning import between_ends
+from shapeprog.inference.ties.opposite import as_images
 from shapeprog.inference.ties.pricing import worthwhile
 from shapeprog.inference.ties.relations import Relation
 from shapeprog.inference.ties.runs import plural
 from shapeprog.inference.ties.tying import tie
 from shapeprog.inference.tunable import Tunable
 from shapeprog.language.free import free_numbers, free_values, multiplied, numbers
+from shapeprog.language.merging import merged
 from shapeprog.language.program import Draw, Program
 from shapeprog.language.text import format_program
 from shapeprog.language.unroll import unroll
@@ -81,7 +83,7 @@ def test_tidy_writes_what_was_tied(tmp_path: Path):
     given.write_text(TABLE)
     result = CliRunner().invoke(app, ["tidy", str(given), str(out)])
     assert result.exit_code == 0, result.output
-    assert sp.load(out) == tied_table()
+    assert sp.load(out) == merged(tied_table())
     assert "numbers are free; 18 were" in result.stderr.replace("\n", " ")
 
 
@@ -444,7 +446,8 @@ for i in translate(6, by=(0, 0, 1.23)):
     slat(rod(start=(-0.52, 3.99, -3.06), end=(11.12, 5.96, -3.27), radius=0.14))
 """)
     tied = tie(program, evidence_of_program(program)).program
-    assert (unroll(tied).centre - unroll(program).centre).abs().max() < 1
+    points = unroll(tied).sample(2000, torch.Generator().manual_seed(0))
+    assert unroll(program).distance(points).abs().max() < 1
 
 
 def test_the_first_line_says_where_heights_and_insets_begin():
@@ -467,3 +470,37 @@ drawer(box(at=(1, -5, -12), size=(4.4, 10, {short})))
     wide = unroll(sp.set(tied, width=30))
     assert 2 * float(wide.size[1, 2]) == pytest.approx(30 / times, abs=0.01)
     assert f"width / {times}" in format_program(tied)
+
+
+@pytest.mark.parametrize("draw", [
+    "leg(at=(-6, -4, -5), size=(9, 1, 2))",
+    "leg(rod(start=(-6, -4, -4.95), end=(0, -5, -4.95), radius=0.5))",
+    "for j in translate(3, by=(2, 0.5, 0)):\n        leg(at=(-6, -4, -5), size=(9, 1, 2))",
+    "for j in mirror(depth):\n        leg(at=(-6, 4, -5), size=(9, 1, 2))",
+])  # fmt: skip
+def test_two_copies_opposite_each_other_are_a_mirror_image(draw: str):
+    centred = 9.9 if "rod" in draw else 8.0
+    for off, name in ((0.1, "mirror"), (-0.1, "mirror"), (0.6, "translate")):
+        pair = sp.parse(f"for i in translate(2, by=(0, 0, {centred + off})):\n    {draw}\n")
+        found = as_images(pair)
+        assert next(found.walk()).name == name
+        points = unroll(pair).sample(500, torch.Generator().manual_seed(0))
+        assert unroll(found).distance(points).abs().max() < 0.06
+        assert found.size == pair.size
+
+
+@pytest.mark.parametrize("text", [
+    "for i in translate(2, by=(0, 0, 8)):\n    leg(rod(start=(-6, 0, -4), end=(6, 0, -3), radius=0.5))\n",  # leans
+    "for i in translate(2, by=(0, 2, 8)):\n    leg(at=(-6, -2, -5), size=(9, 2, 2))\n",
+    "for i in translate(2, by=(8, 0, 0)):\n    leg(at=(-5, -2, -5), size=(2, 2, 2))\n",
+    "for i in translate(3, by=(0, 0, 4)):\n    leg(at=(-6, -2, -5), size=(9, 2, 2))\n",
+])  # fmt: skip
+def test_copies_that_are_no_images_stay_as_they_are(text: str):
+    assert as_images(sp.parse(text)) == sp.parse(text)
+
+
+def test_tidy_writes_equal_loops_once(tmp_path: Path):
+    (tmp_path / "table.shape").write_text(TABLE)
+    found = CliRunner().invoke(app, ["tidy", str(tmp_path / "table.shape")]).output
+    assert TABLE.count("for i in mirror(side):") == 2
+    assert found.count("for i in mirror(side):") == 1

@@ -35,6 +35,7 @@ def tidy_command(
     from shapeprog.inference.readable import in_readable_unit
     from shapeprog.inference.ties.tying import PRICE, tie
     from shapeprog.language.free import numbers
+    from shapeprog.language.merging import merged
     from shapeprog.library import with_library
 
     check_units(unit, file_unit)
@@ -47,7 +48,7 @@ def tidy_command(
     found = tied.program
     for each in libraries:
         found = with_library(found, each)
-    found = in_readable_unit(found, wanted, seed)
+    found = in_readable_unit(merged(found), wanted, seed)
     if out is not None:
         save(found, out, frame)
     terminal.print_program(terminal.output(), found)

@@ -17,11 +17,12 @@ import torch
 from jaxtyping import Float, Int
 from torch import Tensor
 
+from shapeprog.geometry.batch import Batch
 from shapeprog.geometry.distance import signed_distance
 from shapeprog.geometry.primitive import safe_norm
 from shapeprog.geometry.scene import Scene
 from shapeprog.geometry.surface import has_surface, sample_surface
-from shapeprog.inference.tunable import THINNEST
+from shapeprog.inference.tunable import ROW, THINNEST
 from shapeprog.language.hints import Box
 from shapeprog.language.parameters import Parameter, Quantity, to_float32
 from shapeprog.language.program import Draw
@@ -257,20 +258,45 @@ def _misfit(
 def _linear(render: Renderer, values: Float[Tensor, "B V"], target: Target, generator: torch.Generator) -> Linear:
     """The residuals to first order; what draws nothing has none.
 
-    Every residual has a copy of the program to itself, so one backward pass gives the slopes of all.
+    Every residual has the primitives to itself, so one backward pass tells how they move it; how the numbers move them
+    is known from another, in which a copy of the program has each number of each primitive to itself.
     """
-    drawn = has_surface(render(values)).nonzero()[:, 0]
+    scene = render(values)
+    drawn = has_surface(scene).nonzero()[:, 0]
     here, count, rows = target.take(drawn), len(values), target.points.shape[1] + SAMPLES
     off, weights, slopes = (values.new_zeros(count, rows, *rest) for rest in ((), (), values.shape[1:]))
     if len(drawn):
-        inner = values[drawn][:, None].expand(-1, rows, -1).clone().requires_grad_()
+        leaves = [
+            each[drawn, None].expand(-1, rows, *each.shape[1:]).detach().clone().requires_grad_()
+            for each in (scene.size, scene.centre, scene.rotation)
+        ]
+
+        def copies(some: slice) -> Batch:
+            kind, mask = (each[drawn, None].expand(-1, rows, -1)[:, some] for each in (scene.kind, scene.mask))
+            size, centre, rotation = (leaf[:, some] for leaf in leaves)
+            return Batch(kind, size, centre, rotation, mask)
+
         beside = here.beside.requires_grad_()
-        ahead = signed_distance(render(inner[:, :-SAMPLES]), beside[:, :, None])[..., 0]
-        sample = sample_surface(render(inner[:, -SAMPLES:]), 1, generator).points[:, :, 0]
+        ahead = signed_distance(copies(slice(-SAMPLES)), beside[:, :, None])[..., 0]
+        sample = sample_surface(copies(slice(-SAMPLES, None)), 1, generator).points[:, :, 0]
         found = _compared(here, beside, ahead, sample)
-        slopes[drawn] = torch.autograd.grad(found.off.sum(), inner)[0].nan_to_num(0)
+        moves = torch.cat([each.flatten(3) for each in torch.autograd.grad(found.off.sum(), leaves)], -1)
+        slopes[drawn] = (moves.nan_to_num(0).flatten(2) @ _moved(render, values[drawn]).flatten(1, 2)).to(slopes)
         off[drawn], weights[drawn] = found.off.detach(), found.weights
     return Linear(off, weights, slopes)
+
+
+def _moved(render: Renderer, values: Float[Tensor, "B V"]) -> Float[Tensor, "B N 16 V"]:
+    """How sizes, centre and rotation of every primitive of each program follow its numbers."""
+    inner = values[:, None].expand(-1, ROW, -1).clone().requires_grad_()
+    scene = render(inner)
+    rows = torch.cat([scene.size, scene.centre, scene.rotation.flatten(-2)], -1)  # (B, 16, N, 16)
+    which = torch.arange(ROW)
+    found = [
+        torch.autograd.grad(rows[:, which, slot, which].sum(), inner, retain_graph=True)[0]
+        for slot in range(rows.shape[2])
+    ]
+    return torch.stack(found, 1).nan_to_num(0)
 
 
 def _compared(

@@ -33,6 +33,7 @@ from shapeprog.inference.structure import Settings, search_structure
 from shapeprog.inference.surface import points_of_cells
 from shapeprog.inference.ties.tying import tie
 from shapeprog.language.free import numbers
+from shapeprog.language.merging import merged
 from shapeprog.language.program import Program
 from shapeprog.language.unroll import unroll
 from shapeprog.library import Library, with_library
@@ -220,8 +221,10 @@ def infer(
                 tied = tie(program, found.evidence, held=held, seed=seed, progress=progress).program
                 fits = target.points is not None or costs(tied) <= costs(program)
                 program = tied if fits else program
-    for library in libraries if snapped is None else ():
-        program = with_library(program, library)
+    if snapped is None:
+        for library in libraries:
+            program = with_library(program, library)
+        program = merged(program)
     if target.note:
         reason += f" {target.note}"
     cut = tuple(each.cut for each in (proposing, searching, refining) if each.cut)

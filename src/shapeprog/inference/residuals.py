@@ -19,10 +19,11 @@ from torch import Tensor
 from shapeprog.geometry.batch import Batch
 from shapeprog.geometry.distance import nearest_primitive, signed_distance
 from shapeprog.geometry.scene import Scene
-from shapeprog.geometry.surface import sample_surface
+from shapeprog.geometry.surface import SurfaceSample, sample_surface
+from shapeprog.inference import residual_kernels as kernels
 from shapeprog.inference.evidence import Evidence
 from shapeprog.inference.tunable import ROW
-from shapeprog.space import FloatArray
+from shapeprog.space import Array, FloatArray
 
 POINTS, SAMPLES = 1_500, 1_500
 """Points of the target, and samples of the surface of the program, that one step looks at."""
@@ -90,7 +91,7 @@ class Target:
         self._normals, self._sides = torch.from_numpy(normals), torch.from_numpy(sides)
         self._shares = np.cumsum(evidence.weights)
         unsure = np.flatnonzero(~sides)
-        self._owner = torch.from_numpy(np.concatenate([np.arange(len(sides)), unsure]))
+        self._owner: Array = np.concatenate([np.arange(len(sides)), unsure])
         self._tree = cKDTree(np.concatenate([
             _joint(evidence.points, normals), _joint(evidence.points[unsure], -normals[unsure])
         ]))  # fmt: skip
@@ -101,22 +102,20 @@ class Target:
         places, facing = sample.points, sample.normals
         spacing = 1.5 * math.sqrt(self.evidence.area / min(SAMPLES, len(self._points)))
         drawn = torch.rand(POINTS, generator=generator, dtype=torch.float64).numpy() * self._shares[-1]
-        some = torch.from_numpy(np.searchsorted(self._shares, drawn).clip(0, len(self._points) - 1))
+        some = np.searchsorted(self._shares, drawn).clip(0, len(self._points) - 1)
         points, normals, sides = self._points[some], self._normals[some], self._sides[some]
         tree = cKDTree(_joint(places.numpy(), facing.numpy()))
-        near = torch.from_numpy(tree.query(_joint(points.numpy(), normals.numpy()), NEAR)[1])
-        behind = near.clone()
-        unsure = ~sides
-        behind[unsure] = torch.from_numpy(tree.query(_joint(points[unsure].numpy(), -normals[unsure].numpy()), NEAR)[1])
-        near = torch.cat([near, behind], 1)
-        offset, best = _closest(points[:, None], normals[:, None], sides[:, None], places[near], facing[near], spacing)
-        partner = near.gather(1, best)[:, 0]
-        back = torch.from_numpy(self._tree.query(_joint(places.numpy(), facing.numpy()), NEAR)[1])
-        back = self._owner[back]
-        other, chosen = _closest(
-            self._points[back], self._normals[back], self._sides[back], places[:, None], facing[:, None], spacing
-        )
-        found = back.gather(1, chosen)[:, 0]
+        near = tree.query(_joint(points.numpy(), normals.numpy()), NEAR)[1]
+        behind = near.copy()
+        unsure = ~sides.numpy()
+        behind[unsure] = tree.query(_joint(points.numpy()[unsure], -normals.numpy()[unsure]), NEAR)[1]
+        near = np.concatenate([near, behind], 1)
+        offset, best = self._closest(np.broadcast_to(some[:, None], near.shape), near, sample, spacing)
+        partner = np.take_along_axis(near, best, 1)[:, 0]
+        back = self._owner[self._tree.query(_joint(places.numpy(), facing.numpy()), NEAR)[1]]
+        here = np.broadcast_to(np.arange(len(back))[:, None], back.shape)
+        other, best = self._closest(back, here, sample, spacing)
+        found = np.take_along_axis(back, best, 1)[:, 0]
         union = nearest_primitive(scene, points)[0]
         along = torch.cat([(normals * facing[partner]).sum(1), (self._normals[found] * facing).sum(1)])
         either = ~torch.cat([sides, self._sides[found]]) & (along.abs() >= SAME)
@@ -131,6 +130,18 @@ class Target:
             torch.cat([either, torch.zeros(POINTS).bool()]),
             torch.cat([torch.zeros(POINTS + SAMPLES), ones]).bool(),
         )
+
+    def _closest(
+        self, at: Array, near: Array, sample: SurfaceSample, spacing: float
+    ) -> tuple[Float[Tensor, " R"], Array]:
+        """Of several pairs (R, k) of points and samples the best (R, 1), and what beside the distance along its normal
+        tells against it, squared."""
+        offset, best = np.empty(len(at)), np.empty(len(at), np.int64)
+        points = (each.numpy() for each in (self._points, self._normals, self._sides))
+        places = (sample.points.numpy(), sample.normals.numpy())
+        at, near = np.ascontiguousarray(at), np.ascontiguousarray(near)
+        kernels.closest(*points, at, *places, near, spacing, TURNED, NEVER, offset, best)
+        return torch.from_numpy(offset), best[:, None]
 
 
 def pull(scene: Scene, pairs: Pairs, width: float) -> Pull:
@@ -152,9 +163,10 @@ def pull(scene: Scene, pairs: Pairs, width: float) -> Pull:
     robust = (width**2 / (width**2 + residual**2 + pairs.offset)) ** 2
     weight = torch.where(taken, 0.0, pairs.weights * robust)
     count = len(scene.mask)
-    gradient = by_row.new_zeros(count, ROW).index_add(0, pairs.slots, (weight * residual)[:, None] * by_row)
-    outer = (weight[:, None] * by_row)[:, :, None] * by_row[:, None]
-    return Pull(gradient, by_row.new_zeros(count, ROW, ROW).index_add(0, pairs.slots, outer))
+    found = Pull(by_row.new_zeros(count, ROW), by_row.new_zeros(count, ROW, ROW))
+    rows = (each.contiguous().numpy() for each in (by_row, weight, residual, pairs.slots))
+    kernels.gathered(*rows, *(each.numpy() for each in found))
+    return found
 
 
 def rows_of(scene: Scene, slots: Int[Tensor, " R"]) -> tuple[Batch, list[Tensor]]:
@@ -169,24 +181,3 @@ def rows_of(scene: Scene, slots: Int[Tensor, " R"]) -> tuple[Batch, list[Tensor]
 def _joint(points: FloatArray, normals: FloatArray) -> FloatArray:
     """Points and normals (P, 6), in which distances are those of places and of directions together."""
     return np.concatenate([points, TURNED / math.sqrt(2) * normals], 1)
-
-
-def _closest(
-    points: Float[Tensor, "#R #k 3"],
-    normals: Float[Tensor, "#R #k 3"],
-    sides: Bool[Tensor, "#R #k"],
-    places: Float[Tensor, "#R #k 3"],
-    facing: Float[Tensor, "#R #k 3"],
-    spacing: float,
-) -> tuple[Float[Tensor, " R"], Int[Tensor, "R 1"]]:
-    """The best of several partners (R, 1), and what beside the distance along its normal tells against it, squared."""
-    apart = points - places
-    plane = (apart * facing).sum(-1)
-    along = ((apart**2).sum(-1) - plane**2).clamp(min=0).sqrt()
-    known = (normals**2).sum(-1) > 0.25
-    cosine = (normals * facing).sum(-1)
-    differ = torch.where(known, (1 - cosine**2).clamp(min=0), 0.0)
-    differ = torch.where(known & sides & (cosine < 0), NEVER, differ)
-    offset = (along - spacing).clamp(min=0) ** 2 + TURNED**2 * differ
-    best = (plane**2 + offset).argmin(1, keepdim=True)
-    return offset.gather(1, best)[:, 0], best

@@ -24,6 +24,7 @@ CHOICE = (  # of blocks by the surface of the target
     "shapeprog.inference.evidence_kernels",
     "shapeprog.inference.choice_kernels",
     "shapeprog.inference.coverage_kernels",
+    "shapeprog.inference.residual_kernels",
 )
 PIECES = (  # of the surface of the target
     "shapeprog.inference.cover_kernels",

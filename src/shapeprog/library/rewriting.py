@@ -13,6 +13,7 @@ from shapeprog.language.converting import in_unit
 from shapeprog.language.counts import Counts
 from shapeprog.language.evaluation import evaluated
 from shapeprog.language.expression import Expression, Linear, Name, Value
+from shapeprog.language.merging import apart, merged
 from shapeprog.language.program import Program
 from shapeprog.language.source import (
     Assignment,
@@ -47,13 +48,19 @@ def with_library(program: Program, library: Library) -> Program:
         found = with_library(plain, library)
         return program if found is plain else in_unit(found, program.unit)
     chosen = offers(program, library)
-    return _rewritten(source_of(program), chosen, library.functions) if chosen else program
+    return merged(_rewritten(_apart(program), chosen, library.functions)) if chosen else program
+
+
+def _apart(program: Program) -> Source:
+    """A program as it is written, but with one statement in each nest of loops."""
+    source = source_of(program)
+    return replace(source, lines=tuple(apart(source.lines)))
 
 
 class Offer(NamedTuple):
     """A call that could stand in a program: in the place of some lines, in the loops around the first of them.
 
-    ``lines`` tells for each block of its function on which line it is.
+    ``lines`` tells for each block of its function on which line it is, where each nest of loops has one statement.
     """
 
     fewer: int
@@ -65,7 +72,7 @@ class Offer(NamedTuple):
 
 def offers(program: Program, library: Library) -> list[Offer]:
     """The calls of functions of a library that shorten a program most, none of which shares a line with another."""
-    source = source_of(program)
+    source = _apart(program)
     words = {*names_of(source), *source.functions}
     usable = [
         pattern

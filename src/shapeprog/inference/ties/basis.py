@@ -6,7 +6,6 @@ chosen, by exchange of one for another, from which every number is the shortest 
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import combinations
@@ -35,6 +34,9 @@ PLACED = 2.0
 
 LOST = 40.0
 """What it costs that a change of a measure by a fifth parts all that touches."""
+
+AT_ONCE = 1 << 22
+"""Factors that are looked at together."""
 
 OFFSET = 3.0
 """Cells between sides of parts that touch, at most, that may be a measure."""
@@ -143,29 +145,14 @@ def simplest(
     heads = [every[group[0]] for group in groups]
     seen = seen[[group[0] for group in groups]]
     reader = _Reader(heads, numbers, lengths, runs, following)
-    chosen = _independent(seen, np.argsort(reader.prices, kind="stable"))
+    chosen: Array = np.array(_independent(seen, np.argsort(reader.prices, kind="stable")), np.int64)
     factors = ways @ np.linalg.inv(seen[chosen])
-    total = reader.cost(factors, chosen)
-    while True:
-        best, swap = total - 1e-9, None
-        inner = seen @ np.linalg.inv(seen[chosen])  # every measure by those chosen
-        for k, row in enumerate(inner):
-            if k in chosen:
-                continue
-            for place in np.flatnonzero(np.abs(row) > SAME).tolist():
-                change = row.copy()
-                change[place] -= 1
-                changed = factors - np.outer(factors[:, place], change / row[place])
-                cost = reader.cost(changed, [*chosen[:place], k, *chosen[place + 1 :]], best)
-                if cost < best:
-                    best, swap = cost, (place, k)
-        if swap is None:
-            break
-        chosen[swap[0]] = swap[1]
-        factors, total = ways @ np.linalg.inv(seen[chosen]), best
+    total = float(reader.reading(factors, chosen)) + reader.parting(factors, chosen)
+    while (better := reader.exchanged(seen, factors, chosen, total)) is not None:
+        factors, chosen, total = better
     near = nearest_quarter(factors)
     factors = np.where(np.abs(factors - near) < SAME, near, factors)
-    return Basis([[every[k] for k in groups[c]] for c in chosen], factors, reader.values[chosen])
+    return Basis([[every[k] for k in groups[c]] for c in chosen.tolist()], factors, reader.values[chosen])
 
 
 class _Reader:
@@ -187,28 +174,65 @@ class _Reader:
         heights = (h for h, each in enumerate(heads) if each.word == "extent" and each.feature.axis == UP)
         self.height = next(heights, -1)
 
-    def cost(self, factors: FloatArray, chosen: list[int], most: float = math.inf) -> float:
-        """The cost of the sums (V, Z) of some measures, of the names of these, and of what their changes part; where
-        that is more than the most that is of interest, any such number."""
-        factors, prices = factors[: len(self.small)], self.prices[chosen]
+    def exchanged(
+        self, seen: FloatArray, factors: FloatArray, chosen: Array, total: float
+    ) -> tuple[FloatArray, Array, float] | None:
+        """The sums (V, Z), measures (Z,) and cost where that measure is exchanged for another which lowers it most.
+
+        Parameters
+        ----------
+        seen
+            The measures by the ways that are free (M, Z).
+        factors, chosen, total
+            The sums as they are, of which measures, and what they cost.
+        """
+        inner = seen @ np.linalg.inv(seen[chosen])  # every measure by those chosen
+        inner[chosen] = 0
+        new, place = np.nonzero(np.abs(inner) > SAME)
+        best, found = total - 1e-9, None
+        for some in np.array_split(np.arange(len(new)), 1 + len(new) * factors.size // AT_ONCE):
+            k, z = new[some], place[some]
+            rows = np.arange(len(some))
+            change = inner[k]
+            change[rows, z] -= 1
+            changed = factors - factors.T[z][:, :, None] * (change / inner[k, z][:, None])[:, None]
+            others = np.tile(chosen, (len(some), 1))
+            others[rows, z] = k
+            costs = self.reading(changed, others)
+            for row in np.argsort(costs, kind="stable").tolist():
+                if costs[row] >= best:
+                    break
+                cost = float(costs[row]) + self.parting(changed[row], others[row])
+                if cost < best:
+                    best, found = cost, (changed[row], others[row], cost)
+        return found
+
+    def reading(self, factors: FloatArray, chosen: Array) -> FloatArray:
+        """What sums (..., V, Z) of some measures (..., Z) cost a reader, and the names of these."""
+        factors = factors[..., : len(self.small), :]
+        prices = self.prices[chosen]
         size = np.abs(factors)
         used = size > SAME
         terms = cost_of_terms(factors)
         for run in self.runs:
+            mine = terms[..., run.step, :]
             for shares in (run.copies - 1, run.copies, run.copies + 1):
-                shared = cost_of_terms(shares * factors[run.step])
-                if SHARED + shared.sum() < terms[run.step].sum():
-                    terms[run.step] = shared
-                    terms[run.step, 0] += SHARED
-        if self.height in chosen:
-            height = chosen.index(self.height)
-            terms[np.abs(factors[:, height] + 0.5) < SAME, height] = FLOOR
-        terms[size * np.abs(self.values[chosen]) > self.small[:, None]] += DIFFERENCE
-        literal = (used.sum(0) == 1) & (size.sum(0) < 1 + SAME) & (prices < PLACED)
-        cost = float(terms.sum() + prices[~literal & used.any(0)].sum())
-        if self.following is None or cost >= most:
-            return cost
-        return cost + LOST * self.following.lost(factors, self.values[chosen])
+                shared = cost_of_terms(shares * factors[..., run.step, :])
+                cheaper = SHARED + shared.sum(-1) < mine.sum(-1)
+                mine[cheaper] = shared[cheaper]
+                mine[..., 0] += SHARED * cheaper
+        floor = (chosen == self.height)[..., None, :] & (np.abs(factors + 0.5) < SAME)
+        terms[floor] = FLOOR
+        terms += DIFFERENCE * (size * np.abs(self.values[chosen])[..., None, :] > self.small[:, None])
+        literal = (used.sum(-2) == 1) & (size.sum(-2) < 1 + SAME) & (prices < PLACED)
+        found: FloatArray = terms.sum((-2, -1)) + np.where(~literal & used.any(-2), prices, 0).sum(-1)
+        return found
+
+    def parting(self, factors: FloatArray, chosen: Array) -> float:
+        """What it costs that changes of some measures (Z,), from which numbers (V, Z) follow, part what touches."""
+        if self.following is None:
+            return 0.0
+        return LOST * self.following.lost(factors[: len(self.small)], self.values[chosen])
 
 
 def _together(seen: FloatArray, every: list[Measure]) -> list[list[int]]:

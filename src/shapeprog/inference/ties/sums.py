@@ -17,6 +17,15 @@ FACTORS = {1.0: 1.0, 0.5: 1.2, 2.0: 1.3, 1 / 3: 1.5, 0.25: 2.0, 1.5: 2.0, 3.0: 2
 
 UGLY = 4.0
 
+PARTS = 12
+"""All of these factors are whole numbers of such parts."""
+
+COSTS: FloatArray = np.full(1 + round(max(FACTORS) * PARTS), UGLY)
+"""What a term costs by its factor in these parts; none at all is not written."""
+COSTS[0] = 0.0
+for factor, price in FACTORS.items():
+    COSTS[round(factor * PARTS)] = price
+
 
 def nearest_quarter(factors: FloatArray) -> FloatArray:
     """The quarters of whole numbers that are nearest to factors."""
@@ -26,7 +35,7 @@ def nearest_quarter(factors: FloatArray) -> FloatArray:
 def cost_of_terms(factors: FloatArray) -> FloatArray:
     """What the terms of sums cost a reader, by their factors."""
     size = np.abs(factors)
-    terms: FloatArray = np.where(size > SAME, UGLY, 0.0)
-    for factor, price in FACTORS.items():
-        terms[np.abs(size - factor) < SAME] = price
-    return terms
+    near = np.round(size * PARTS)
+    known = (np.abs(size - near / PARTS) < SAME) & (near < len(COSTS))
+    found: FloatArray = np.where(known, COSTS[np.where(known, near, 0).astype(np.int64)], UGLY)
+    return found

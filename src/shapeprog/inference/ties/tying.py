@@ -24,6 +24,7 @@ from shapeprog.inference.ties.fitting import CLOSED, Misfit, refitted, ways_free
 from shapeprog.inference.ties.following import Following
 from shapeprog.inference.ties.leaning import between_ends
 from shapeprog.inference.ties.naming import written
+from shapeprog.inference.ties.opposite import as_images
 from shapeprog.inference.ties.pricing import worthwhile
 from shapeprog.inference.ties.relations import relations
 from shapeprog.inference.ties.runs import runs
@@ -69,7 +70,7 @@ def tie(
     held
         Relations that hold in any case, as rows (R, F) of factors of the numbers that move.
     """
-    plain = Program(program.body) if held is not None else between_ends(program)
+    plain = Program(program.body) if held is not None else restated(program)
     if not plain.size:
         return Tied(plain, 0)
     with single_threaded():
@@ -104,6 +105,11 @@ def tie(
         basis = _rounded(simplest(known, numbers, ways, lengths, repeated, pairs, following))
         named = written(tunable, basis, repeated)
         return Tied(named, free_numbers(named))
+
+
+def restated(program: Program) -> Program:
+    """The same parts, said so that what should hold together can be tied: see the modules of these two functions."""
+    return as_images(between_ends(program))
 
 
 def _together(

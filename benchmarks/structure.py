@@ -139,13 +139,13 @@ def inferred(task: Task, shape: Any) -> tuple[Any, Any]:
     """The program of an object, and its whole-numbered form where it has one."""
     from shapeprog.inference import infer
     from shapeprog.inference.evidence import evidence_of
-    from shapeprog.inference.ties.tying import PRICE, tie
+    from shapeprog.inference.ties.tying import tie
     from shapeprog.language.merging import merged
     from shapeprog.language.text import parse
 
     if task.method == "tied":
         evidence = evidence_of(shape, task.seed)
-        tied = tie(parse(task.program), evidence, price=task.price * PRICE, seed=task.seed)
+        tied = tie(parse(task.program), evidence, price=task.price, seed=task.seed)
         return merged(tied.program), None
     statements: Literal["all", "paper"] = "paper" if task.method == "paper" else "all"
     ties = task.method != "untied"

@@ -96,7 +96,7 @@ def of_furniture(task: Task) -> dict[str, Any]:
     noisy = with_noise(planted, np.random.default_rng((task.seed, task.number)))
     evidence = evidence_of_program(planted if task.set == "fitted" else noisy, task.seed)
     started = time.process_time()
-    tied = tie(noisy, evidence, seed=task.seed)
+    tied = tie(noisy, evidence, known=task.set == "alone", seed=task.seed)
     seconds = time.process_time() - started
     drawn, ways = redrawn(task.number, task.seed), ways_of(tied.program, planted)
     written = relations_written(planted)

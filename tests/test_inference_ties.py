@@ -43,9 +43,9 @@ for i in mirror(side):
 """A table whose numbers are off by hundredths from: height 12, depth 16, width 24, thicknesses 1, 1.5 and .5."""
 
 
-def tied_table() -> Program:
+def tied_table(*, known: bool = False) -> Program:
     program = sp.parse(TABLE)
-    return tie(program, evidence_of_program(program)).program
+    return tie(program, evidence_of_program(program), known=known).program
 
 
 def test_a_table_is_written_with_few_names_and_draws_nearly_the_same():
@@ -83,7 +83,7 @@ def test_tidy_writes_what_was_tied(tmp_path: Path):
     given.write_text(TABLE)
     result = CliRunner().invoke(app, ["tidy", str(given), str(out)])
     assert result.exit_code == 0, result.output
-    assert sp.load(out) == merged(tied_table())
+    assert sp.load(out) == merged(tied_table(known=True))
     assert "numbers are free; 18 were" in result.stderr.replace("\n", " ")
 
 
@@ -504,3 +504,16 @@ def test_tidy_writes_equal_loops_once(tmp_path: Path):
     found = CliRunner().invoke(app, ["tidy", str(tmp_path / "table.shape")]).output
     assert TABLE.count("for i in mirror(side):") == 2
     assert found.count("for i in mirror(side):") == 1
+
+
+def test_numbers_that_somebody_wrote_are_known_even_where_they_are_hidden():
+    # The rod ends inside the box, .3 cells below its top, where nobody sees it.
+    text = "box(at=(0, -4, -4), size=(8, 8, 8))\nrod(start=(-9, 0, 0), end=(7.7, 0, 0), radius=1)\n"
+    program = sp.parse(text)
+    ends = {
+        known: next(node for node in tie(program, evidence_of_program(program), known=known).program.walk()
+                    if node.name == "rod").values[3]
+        for known in (False, True)
+    }  # fmt: skip
+    assert abs(ends[True] - 7.7) < 0.1
+    assert abs(ends[False] - 8) < 0.1

@@ -33,7 +33,7 @@ def tidy_command(
     from shapeprog.formats import load_with_frame, save
     from shapeprog.inference.evidence import evidence_of_program
     from shapeprog.inference.readable import in_readable_unit
-    from shapeprog.inference.ties.tying import PRICE, tie
+    from shapeprog.inference.ties.tying import tie
     from shapeprog.language.free import numbers
     from shapeprog.language.merging import merged
     from shapeprog.library import with_library
@@ -44,7 +44,7 @@ def tidy_command(
     if not given.size:
         raise InputError(f"{program} draws nothing", "name a program that draws something")
     wanted = asked_unit(given.unit, frame, program, unit, file_unit)
-    tied = tie(given, evidence_of_program(given, seed), price=price * PRICE, seed=seed)
+    tied = tie(given, evidence_of_program(given, seed), price=price, known=True, seed=seed)
     found = tied.program
     for each in libraries:
         found = with_library(found, each)

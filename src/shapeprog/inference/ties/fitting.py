@@ -24,6 +24,9 @@ HOLD = 1e-2
 TOGETHER, CLOSED = 0.03, 0.2
 """Weights of a squared gap between parts that touched, and of one that is still open at the end."""
 
+KNOWN = 1e-2
+"""Weight of a squared move in cells of a length or place that somebody wrote: it is known, even where it is hidden."""
+
 FAR = 2.0
 """Farthest that relations move the surface by one number at once, in cells."""
 
@@ -34,13 +37,18 @@ FARTHEST = 0.5
 class Misfit:
     """How far the surface of a program is from that of a target, about its numbers and the extents of the whole (V,).
 
+    Parameters
+    ----------
+    known
+        Whether the numbers themselves are known, and not only where the surface is.
+
     Attributes
     ----------
     numbers, low, far
         Where they are at the start, what they must not fall below, and how far relations may move them at once.
     """
 
-    def __init__(self, tunable: Tunable, evidence: Evidence, seed: int) -> None:
+    def __init__(self, tunable: Tunable, evidence: Evidence, seed: int, *, known: bool = False) -> None:
         self.tunable, self.target = tunable, Target(evidence)
         self.width = EXPLAINED * evidence.tolerance
         self.generator = torch.Generator().manual_seed(seed)
@@ -50,7 +58,8 @@ class Misfit:
         self.numbers = np.concatenate([tunable.values.numpy(), self.extents])
         self.low = np.concatenate([tunable.low.numpy(), np.zeros(3)])
         self.far = FAR / np.append(tunable.scale.numpy(), np.ones(3))
-        gentle = np.array([GENTLE.get(kind, PLACE) for kind in tunable.kinds]) * tunable.scale.numpy() ** 2
+        weights = [KNOWN if known and kind != "angle" else GENTLE.get(kind, PLACE) for kind in tunable.kinds]
+        gentle = np.array(weights) * tunable.scale.numpy() ** 2
         self._gentle = np.concatenate([gentle, np.full(3, HOLD)])
 
     def at(

@@ -36,6 +36,9 @@ from shapeprog.space import FloatArray
 PRICE = 1e-4
 """What a number is worth: mean squared distance in cells; chosen on val."""
 
+WRITTEN_PRICE = 4e-4
+"""The same in a program that somebody wrote, whose numbers are known; chosen on planted programs."""
+
 ROUNDS = 3
 """Most times that relations are looked for."""
 
@@ -54,7 +57,8 @@ def tie(
     program: Program,
     evidence: Evidence,
     *,
-    price: float = PRICE,
+    price: float = 1.0,
+    known: bool = False,
     held: FloatArray | None = None,
     seed: int = 0,
     progress: Progress | None = None,
@@ -66,7 +70,9 @@ def tie(
     evidence
         What it should fit: how far relations may move its parts.
     price
-        What a number is worth, as mean squared distance in cells.
+        What a number is worth, times the usual ``PRICE`` or ``WRITTEN_PRICE``.
+    known
+        Whether somebody wrote the numbers: each is then known, and not only the surface that they come to.
     held
         Relations that hold in any case, as rows (R, F) of factors of the numbers that move.
     """
@@ -75,20 +81,21 @@ def tie(
         return Tied(plain, 0)
     with single_threaded():
         tunable = Tunable(plain)
-        misfit = Misfit(tunable, evidence, seed)
+        misfit = Misfit(tunable, evidence, seed, known=known)
+        price = price * (WRITTEN_PRICE if known else PRICE)
         numbers = misfit.numbers
         straight = np.flatnonzero((numbers[: len(tunable.values)] == 0) & tunable.are("angle").numpy())
         rows = np.eye(len(numbers))[straight] if held is None else np.pad(held, ((0, 0), (0, 3)))
-        known: list[Feature] = []
+        measured: list[Feature] = []
         scene = tunable.scene(tunable.values)
         joints = _joints(scene, seed)
         pairs = touching(tunable, scene, joints) if joints else set()
         contacts = Contacts(tunable, joints) if joints else None
         for round_ in range(ROUNDS):
             poses = tunable.poses(torch.from_numpy(numbers[: len(tunable.values)]))
-            known = features(tunable, poses)
+            measured = features(tunable, poses)
             before = len(rows)
-            offered = relations(known, numbers, pairs)
+            offered = relations(measured, numbers, pairs)
             curvature = misfit.at(numbers)[1]
             rows, optimum = worthwhile(offered, numbers, curvature, price, fixed=rows, low=misfit.low, far=misfit.far)
             if contacts:
@@ -102,7 +109,7 @@ def tie(
         repeated = list(runs(tunable, ways))
         lengths = np.append(tunable.are("length").numpy(), [False] * 3)
         following = Following(tunable, joints, numbers) if joints else None
-        basis = _rounded(simplest(known, numbers, ways, lengths, repeated, pairs, following))
+        basis = _rounded(simplest(measured, numbers, ways, lengths, repeated, pairs, following))
         named = written(tunable, basis, repeated)
         return Tied(named, free_numbers(named))
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import combinations
 from pathlib import Path
 
 import numpy as np
@@ -517,3 +518,17 @@ def test_numbers_that_somebody_wrote_are_known_even_where_they_are_hidden():
     }  # fmt: skip
     assert abs(ends[True] - 7.7) < 0.1
     assert abs(ends[False] - 8) < 0.1
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_no_relation_is_kept_that_follows_from_others(seed: int):
+    # Numbers that nothing sees leave the misfit flat: of what is free there, rounding is the larger part.
+    random, count = np.random.default_rng(seed), 12
+    turned = np.linalg.qr(random.normal(size=(count, count)))[0]
+    curvature = turned @ np.diag(10.0 ** random.uniform(-12, 0, count)) @ turned.T
+    rows = random.integers(-1, 2, (6, count)).astype(float)
+    rows = np.stack([*rows, *(one + sign * two for one, two in combinations(rows, 2) for sign in (1, -1))])
+    offered = [Relation(row, 1.0) for row in rows]
+    numbers, low = random.normal(0, 0.01, count), np.full(count, -np.inf)
+    kept, _ = worthwhile(offered, numbers, (curvature + curvature.T) / 2, 1.0, fixed=np.zeros((0, count)), low=low)
+    assert 0 < len(kept) == np.linalg.matrix_rank(kept)

@@ -165,6 +165,16 @@ def test_equal_loops_around_what_a_function_draws_become_one_loop_around_its_cal
     assert with_library(other, library(desk)) == other
 
 
+def test_what_equal_loops_say_as_shortly_is_no_call() -> None:
+    sides = "def sides(front):\n    for i in mirror(side):\n        side(box(at=(-5, front, 6), size=(10, 8, 1)))\n"
+    library = library_of(parse(sides))
+    alone = parse("for i in mirror(side):\n    side(box(at=(-5, -4, 6), size=(10, 8, 1)))\n")
+    assert len(calls(with_library(alone, library))) == 1
+    leg = "for i in mirror(side):\n    leg(taper(start=(-9, 0, 6), end=(-5, 0, 6), radius=(1, 2)))\n"
+    more = parse(format_program(alone) + leg)
+    assert with_library(more, library) is more
+
+
 def test_a_comment_in_a_loop_is_no_statement() -> None:
     text = "for i in mirror(depth, at=9):\n    # legs\n    leg(at=(0, 3, 9), size=(8, 1, 1))\n"
     one = "def one(low):\n    for i in mirror(depth, at=9):\n        leg(at=(low, 3, 9), size=(8, 1, 1))\n"

@@ -28,7 +28,7 @@ from shapeprog.language.source import (
     values,
 )
 from shapeprog.language.text import source_of
-from shapeprog.library.length import length, outside, written
+from shapeprog.library.length import length, outside, statements, written
 from shapeprog.library.matching import TOLERANCE, Form, Matcher, Pattern, Sums, forms
 from shapeprog.library.store import Library
 from shapeprog.space import FloatArray
@@ -48,7 +48,10 @@ def with_library(program: Program, library: Library) -> Program:
         found = with_library(plain, library)
         return program if found is plain else in_unit(found, program.unit)
     chosen = offers(program, library)
-    return merged(_rewritten(_apart(program), chosen, library.functions)) if chosen else program
+    if not chosen:
+        return program
+    found = merged(_rewritten(_apart(program), chosen, library.functions))
+    return found if statements(found) < statements(merged(program)) else program
 
 
 def _apart(program: Program) -> Source:

@@ -15,6 +15,7 @@ import numpy as np
 
 from shapeprog.inference.ties.features import Feature
 from shapeprog.inference.ties.following import Following
+from shapeprog.inference.ties.pricing import beside
 from shapeprog.inference.ties.runs import Run
 from shapeprog.inference.ties.sums import SAME, Flags, cost_of_terms, nearest_quarter
 from shapeprog.space import DEPTH, SIDE, UP, Array, FloatArray
@@ -251,11 +252,9 @@ def _together(seen: FloatArray, every: list[Measure]) -> list[list[int]]:
 def _independent(rows: FloatArray, order: Array) -> list[int]:
     """As many rows as are independent, the first in an order."""
     kept: list[int] = []
-    basis = np.zeros((0, rows.shape[1]))
+    axes = np.zeros((0, rows.shape[1]))
     for k in order.tolist():
-        rest = rows[k] - basis.T @ (basis @ rows[k])
-        rest = rest - basis.T @ (basis @ rest)
-        if np.linalg.norm(rest) > 1e-6 * float(np.linalg.norm(rows[k])):
+        if (new := beside(rows[k], axes)) is not None:
             kept.append(k)
-            basis = np.vstack([basis, rest / np.linalg.norm(rest)])
+            axes = np.vstack([axes, new])
     return kept

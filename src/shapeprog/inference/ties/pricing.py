@@ -12,8 +12,9 @@ import numpy as np
 from shapeprog.inference.ties.relations import Relation
 from shapeprog.space import FloatArray
 
-HELD = 1e-9
-"""Share of its freedom below which a relation holds already, or contradicts what does."""
+HELD, DEPENDENT = 1e-9, 1e-6
+"""Shares of its freedom, and of its length, below which a relation holds already, or contradicts what does: of the
+freedom of numbers that nothing sees, rounding alone leaves more."""
 
 
 def worthwhile(
@@ -45,7 +46,10 @@ def worthwhile(
     rows = np.stack([*fixed, *(each.row for each in candidates)]) if len(fixed) or candidates else fixed
     if not len(rows):
         return fixed, numbers
-    low, start = np.minimum(low, numbers), numbers
+    low, start, axes = np.minimum(low, numbers), numbers, np.zeros((0, len(numbers)))
+    for row in fixed:
+        if (new := beside(row, axes)) is not None:
+            axes = np.vstack([axes, new])
     spread, off = np.einsum("kv,vw,kw->k", rows, free, rows, optimize=True), rows @ numbers
     worth = price * np.array([np.inf] * len(fixed) + [each.trust for each in candidates])
     least = HELD * spread
@@ -57,12 +61,22 @@ def worthwhile(
         along = free @ rows[best]
         moved = numbers - along * off[best] / spread[best]
         if best >= len(fixed):
-            if (moved < low).any() or (np.abs(moved - start) > far).any():
+            new = beside(rows[best], axes)
+            if new is None or (moved < low).any() or (np.abs(moved - start) > far).any():
                 spread[best] = 0.0
                 continue
             kept.append(rows[best])
+            axes = np.vstack([axes, new])
         across, numbers = rows @ along, moved
         free = free - np.outer(along, along) / spread[best]
         off = off - across * off[best] / spread[best]
         spread = spread - across**2 / spread[best]
         spread[best] = 0.0
+
+
+def beside(row: FloatArray, axes: FloatArray) -> FloatArray | None:
+    """The direction (V,) of what orthonormal axes (M, V) leave of a row; none if they leave nothing."""
+    rest = row - axes.T @ (axes @ row)
+    rest = rest - axes.T @ (axes @ rest)
+    size = float(np.linalg.norm(rest))
+    return rest / size if size > DEPENDENT * float(np.linalg.norm(row)) else None

@@ -41,7 +41,8 @@ lint: $(READY)
 	$(BIN)/mypy
 
 nightly: $(READY)
-	$(BIN)/python -m pytest -n 2 --dist loadfile --typecheck --nightly
+	$(BIN)/python -m pytest -n 2 --dist loadfile --nightly -m "not nightly" --typecheck
+	$(BIN)/python -m pytest -n 2 --dist worksteal --nightly -m nightly
 
 experiment-table: $(READY)
 	$(EXPERIMENT) train $(PACKS) $(RESULTS) $(OPTIONS)

@@ -150,7 +150,8 @@ def simplest(
     factors = ways @ np.linalg.inv(seen[chosen])
     total = float(reader.reading(factors, chosen)) + reader.parting(factors, chosen)
     while (better := reader.exchanged(seen, factors, chosen, total)) is not None:
-        factors, chosen, total = better
+        chosen, total = better
+        factors = ways @ np.linalg.inv(seen[chosen])
     near = nearest_quarter(factors)
     factors = np.where(np.abs(factors - near) < SAME, near, factors)
     return Basis([[every[k] for k in groups[c]] for c in chosen.tolist()], factors, reader.values[chosen])
@@ -177,15 +178,16 @@ class _Reader:
 
     def exchanged(
         self, seen: FloatArray, factors: FloatArray, chosen: Array, total: float
-    ) -> tuple[FloatArray, Array, float] | None:
-        """The sums (V, Z), measures (Z,) and cost where that measure is exchanged for another which lowers it most.
+    ) -> tuple[Array, float] | None:
+        """The measures (Z,) with one exchanged for another, which makes the cost least, and that cost; none if it falls
+        by nothing.
 
         Parameters
         ----------
         seen
-            The measures by the ways that are free (M, Z).
+            All measures by the ways that are free (M, Z).
         factors, chosen, total
-            The sums as they are, of which measures, and what they cost.
+            The sums (V, Z) as they are, of which measures, and what they cost.
         """
         inner = seen @ np.linalg.inv(seen[chosen])  # every measure by those chosen
         inner[chosen] = 0
@@ -205,7 +207,7 @@ class _Reader:
                     break
                 cost = float(costs[row]) + self.parting(changed[row], others[row])
                 if cost < best:
-                    best, found = cost, (changed[row], others[row], cost)
+                    best, found = cost, (others[row], cost)
         return found
 
     def reading(self, factors: FloatArray, chosen: Array) -> FloatArray:

@@ -254,7 +254,7 @@ def _together(seen: FloatArray, every: list[Measure]) -> list[list[int]]:
 def _independent(rows: FloatArray, order: Array) -> list[int]:
     """As many rows as are independent, the first in an order."""
     kept: list[int] = []
-    axes = np.zeros((0, rows.shape[1]))
+    axes: FloatArray = np.zeros((0, rows.shape[1]))
     for k in order.tolist():
         if (new := beside(rows[k], axes)) is not None:
             kept.append(k)

@@ -46,7 +46,8 @@ def worthwhile(
     rows = np.stack([*fixed, *(each.row for each in candidates)]) if len(fixed) or candidates else fixed
     if not len(rows):
         return fixed, numbers
-    low, start, axes = np.minimum(low, numbers), numbers, np.zeros((0, len(numbers)))
+    low, start = np.minimum(low, numbers), numbers
+    axes: FloatArray = np.zeros((0, len(numbers)))
     for row in fixed:
         if (new := beside(row, axes)) is not None:
             axes = np.vstack([axes, new])

@@ -148,7 +148,7 @@ def simplest(
     reader = _Reader(heads, numbers, lengths, runs, following)
     chosen: Array = np.array(_independent(seen, np.argsort(reader.prices, kind="stable")), np.int64)
     factors = ways @ np.linalg.inv(seen[chosen])
-    total = float(reader.reading(factors, chosen)) + reader.parting(factors, chosen)
+    total = float(reader.reading(factors[None], chosen[None])[0]) + reader.parting(factors, chosen)
     while (better := reader.exchanged(seen, factors, chosen, total)) is not None:
         chosen, total = better
         factors = ways @ np.linalg.inv(seen[chosen])
@@ -211,24 +211,24 @@ class _Reader:
         return found
 
     def reading(self, factors: FloatArray, chosen: Array) -> FloatArray:
-        """What sums (..., V, Z) of some measures (..., Z) cost a reader, and the names of these."""
-        factors = factors[..., : len(self.small), :]
+        """What sums (C, V, Z) of some measures (C, Z) cost a reader, and the names of these (C,)."""
+        factors = factors[:, : len(self.small)]
         prices = self.prices[chosen]
         size = np.abs(factors)
         used = size > SAME
         terms = cost_of_terms(factors)
         for run in self.runs:
-            mine = terms[..., run.step, :]
+            mine = terms[:, run.step]
             for shares in (run.copies - 1, run.copies, run.copies + 1):
-                shared = cost_of_terms(shares * factors[..., run.step, :])
+                shared = cost_of_terms(shares * factors[:, run.step])
                 cheaper = SHARED + shared.sum(-1) < mine.sum(-1)
                 mine[cheaper] = shared[cheaper]
-                mine[..., 0] += SHARED * cheaper
-        floor = (chosen == self.height)[..., None, :] & (np.abs(factors + 0.5) < SAME)
+                mine[:, 0] += SHARED * cheaper
+        floor = (chosen == self.height)[:, None] & (np.abs(factors + 0.5) < SAME)
         terms[floor] = FLOOR
-        terms += DIFFERENCE * (size * np.abs(self.values[chosen])[..., None, :] > self.small[:, None])
-        literal = (used.sum(-2) == 1) & (size.sum(-2) < 1 + SAME) & (prices < PLACED)
-        found: FloatArray = terms.sum((-2, -1)) + np.where(~literal & used.any(-2), prices, 0).sum(-1)
+        terms += DIFFERENCE * (size * np.abs(self.values[chosen])[:, None] > self.small[:, None])
+        literal = (used.sum(1) == 1) & (size.sum(1) < 1 + SAME) & (prices < PLACED)
+        found: FloatArray = terms.sum((1, 2)) + np.where(~literal & used.any(1), prices, 0).sum(1)
         return found
 
     def parting(self, factors: FloatArray, chosen: Array) -> float:

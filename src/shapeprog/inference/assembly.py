@@ -29,6 +29,8 @@ from shapeprog.inference.pieces import find_pieces
 from shapeprog.inference.recognition import proposed
 from shapeprog.inference.repeating import repeated
 from shapeprog.inference.roles import in_order
+from shapeprog.inference.splitting import split
+from shapeprog.inference.thickness import thickened
 from shapeprog.language.free import numbers_outside
 from shapeprog.language.program import Node, Program
 from shapeprog.library.matching import Pattern
@@ -154,7 +156,9 @@ def _of_surface(
     choice, candidates = _improved(candidates, functions, evidence, prices, blocks, seed, deadline)
     start = _connected(_chosen(candidates, choice.best.chosen), evidence, prices, seed)
     adjusted = _adjusted(start, evidence, seed=seed, deadline=deadline, progress=progress)
-    parts = _connected(_unharmed(adjusted, start, evidence, prices, seed), evidence, prices, seed)
+    unharmed = _unharmed(adjusted, start, evidence, prices, seed)
+    thick = regrouped(unharmed, thickened(drawn(unharmed), evidence, _fixed(unharmed)))
+    parts = _connected(thick, evidence, prices, seed)
     program = in_order(named(parts, tidy(Program(tuple(plain(node) for node in drawn(parts).body)))))
     seen = _seen(choice, candidates)
     share = explained(_covers(program.body, evidence, prices, seed), tuple(range(len(program.body))))
@@ -202,7 +206,12 @@ def _improved(
             break
         rest = [candidates[place] for place in missed(made, choice.best.chosen)[:REST]]
         adjusted = _adjusted(parts, evidence, steps=ROUGH, seed=seed, deadline=deadline)
-        nodes = [*drawn(parts).body, *drawn(adjusted).body, *neighbours(drawn(adjusted))]
+        nodes = [
+            *drawn(parts).body,
+            *drawn(adjusted).body,
+            *neighbours(drawn(adjusted)),
+            *split(drawn(adjusted), evidence),
+        ]
         near = list(dict.fromkeys([*parts, *adjusted, *nodes, *rest]))
         near += proposed(functions, [part for part in near if not isinstance(part, Called)], deadline)
         more = _covers(near, evidence, prices, seed)
@@ -222,8 +231,12 @@ def _adjusted(parts: Sequence[Part], evidence: Evidence, **options: Any) -> list
 
 def _connected(parts: Sequence[Part], evidence: Evidence, prices: Prices, seed: int) -> list[Part]:
     """The parts with single blocks that float extended to others."""
-    fixed = {node for part in parts if isinstance(part, Called) for node in part.nodes}
-    return regrouped(parts, connected(drawn(parts), evidence, prices, seed, fixed))
+    return regrouped(parts, connected(drawn(parts), evidence, prices, seed, _fixed(parts)))
+
+
+def _fixed(parts: Sequence[Part]) -> set[Node]:
+    """Nodes that stay as they are: what calls draw."""
+    return {node for part in parts if isinstance(part, Called) for node in part.nodes}
 
 
 def _unharmed(

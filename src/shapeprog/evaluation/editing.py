@@ -3,7 +3,7 @@
 Contacts
     Share of the pairs of primitives that touch which still do.
 Symmetry
-    Whether a program that is its own mirror image, left for right, still is.
+    Whether a program that is its own mirror image, left for right, still is: in every point that is looked at.
 One piece
     Whether a program that is one connected solid still is.
 
@@ -88,7 +88,7 @@ def _symmetric(scene: Scene) -> bool:
         return False
     image = points.clone()
     image[:, SIDE] *= -1
-    return bool((signed_distance(scene, image).abs() <= SYMMETRIC).double().mean() >= 0.99)
+    return bool((signed_distance(scene, image).abs() <= SYMMETRIC).all())
 
 
 def _one_piece(scene: Scene) -> bool:

@@ -74,6 +74,15 @@ for i in translate(2, by=(0, 0, 11.2)):
     box(at=(4, -5.3, -11.1), size=(5, 0.4, 10.8))  # drawer
 """
 
+WARDROBE = """
+for i in mirror(side):
+    box(at=(-12, -5, 7), size=(24, 10, 0.6))  # side
+box(at=(-6, -4.6, -7), size=(0.5, 9, 14))  # shelf
+box(at=(-12, 4.7, -7), size=(24, 0.3, 14))  # panel
+box(at=(10, -5, -7), size=(2, 0.5, 14))  # rail
+box(at=(-12, -5, -7), size=(5.5, 0.4, 14))  # drawer
+"""
+
 BED = """
 box(at=(-3, -11, -8), size=(3, 21, 16))  # mattress
 box(at=(-6, 10.5, -9), size=(12, 1, 18))  # headboard
@@ -95,8 +104,8 @@ for i in mirror(side):
 box(at=(-5, 4, -10), size=(12, 2, 20))  # back
 """
 
-WHOLE = [CHAIR, STOOL_BACK, TABLE, BOOKCASE, CABINET, BED, SOFA]
-NAMES = ["chair", "swivel chair", "table", "bookcase", "cabinet", "bed", "sofa"]
+WHOLE = [CHAIR, STOOL_BACK, TABLE, BOOKCASE, CABINET, WARDROBE, BED, SOFA]
+NAMES = ["chair", "swivel chair", "table", "bookcase", "cabinet", "wardrobe", "bed", "sofa"]
 
 
 def wanted(text: str) -> list[str]:

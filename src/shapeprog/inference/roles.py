@@ -1,7 +1,7 @@
 """What the parts of a program are for: a role for every drawing statement, by rules that look at its solids alone.
 
-First it is seen what the whole is: something to sit on, or a bed, has a main surface that something rises behind; all
-else is a table or a case.  Then the first rule of its list that fits a solid gives it a role; copies of one statement
+First it is seen what the whole is: something to sit on has a main surface that something rises behind, as has a bed, or
+on either side of; unless it stands between walls as high as the whole.  All else is a table or a case.  Then the first rule of its list that fits a solid gives it a role; copies of one statement
 have one role, that of most of their surface.
 """
 
@@ -16,7 +16,7 @@ from shapeprog.inference.measures import Mask, Parts
 from shapeprog.language.program import Draw, Loop, Node, Program
 from shapeprog.language.statement import language
 from shapeprog.language.unroll import unroll
-from shapeprog.space import DEPTH, SIDE, UP, Array
+from shapeprog.space import DEPTH, SIDE, UP, Array, FloatArray
 
 Rule = tuple[str, Callable[[Parts], Mask]]
 
@@ -25,6 +25,10 @@ BACKED = 0.12
 
 BROAD = 0.4
 """Share of the width of the main surface that a back is wide, with all its posts and rails."""
+
+ENCLOSED, CASED = 0.9, 0.6
+"""Walls at both sides that end at this share of the height, or higher, and are themselves so high, make a case: what is
+behind its main surface is no back to lean on."""
 
 LOW = 0.6
 """A bed is at most this share of its depth high."""
@@ -114,6 +118,7 @@ CASE: tuple[Rule, ...] = (
     ("post", lambda p: p.upright),
     ("base", lambda p: p.level & p.grounded),
     ("leg", lambda p: p.slender & p.grounded),
+    ("rail", lambda p: p.level & p.cased),
     ("apron", lambda p: p.level & (p.top >= p.floor + 0.8 * p.size[UP])),
     ("stretcher", lambda p: p.level),
     ("brace", lambda p: p.slender),
@@ -187,11 +192,21 @@ def _rules(p: Parts) -> tuple[Rule, ...]:
     """The rules for what the whole seems to be."""
     if p.count == 1:
         return (("body", anything),)
-    back = p.rising & (p.rear > 0.1) & (p.aside < 0.6)
-    if not p.main.any() or not back.any():
+    walls = p.facing_side & p.outermost & (p.run >= 0.5) & (p.up >= CASED * p.size[UP])
+    walls &= p.top >= p.floor + ENCLOSED * p.size[UP]
+    if not p.main.any() or walls.sum() > 1:
         return CASE
+    back, height = p.rising & (p.rear > 0.1) & (p.aside < 0.6), p.top - p.main_high[UP]
+    if _backed(p, back, height):
+        return BED if p.size[DEPTH] > p.size[SIDE] and p.size[UP] < LOW * p.size[DEPTH] else SEATING
+    arms = p.rising & (p.aside > 0.3) & (height >= BACKED * p.size[UP])
+    middle = p.low[:, SIDE] + p.high[:, SIDE] - p.main_low[SIDE] - p.main_high[SIDE]
+    return SEATING if (arms & (middle < 0)).any() and (arms & (middle > 0)).any() and not p.cased.any() else CASE
+
+
+def _backed(p: Parts, back: Mask, height: FloatArray) -> bool:
+    """Whether parts that rise above the main surface, so high (N,), make a back."""
+    if not back.any():
+        return False
     width = p.high[back, SIDE].max() - p.low[back, SIDE].min()
-    height = p.top[back].max() - p.main_high[UP]
-    if height < BACKED * p.size[UP] or width < BROAD * (p.main_high[SIDE] - p.main_low[SIDE]):
-        return CASE
-    return BED if p.size[DEPTH] > p.size[SIDE] and p.size[UP] < LOW * p.size[DEPTH] else SEATING
+    return bool(height[back].max() >= BACKED * p.size[UP] and width >= BROAD * (p.main_high[SIDE] - p.main_low[SIDE]))

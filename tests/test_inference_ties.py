@@ -458,6 +458,7 @@ def test_the_first_line_says_where_heights_and_insets_begin():
     assert first.startswith("width, depth, height = ")
     assert ("above the floor" in first) == bool(ends & {"top", "bottom", "up"})
     assert ("from the side" in first) == ("inset" in ends)
+    assert ("from front or rear" in first) == ("setback" in ends)
 
 
 @pytest.mark.parametrize("times", [2, 3])

@@ -16,7 +16,7 @@ from shapeprog.language.parameters import to_float32
 from shapeprog.language.program import Draw, Node, Program
 from shapeprog.language.source import Assignment, Line, Source, WrittenDraw, WrittenLoop
 from shapeprog.language.statement import language
-from shapeprog.space import UP, FloatArray
+from shapeprog.space import DEPTH, SIDE, UP, FloatArray
 
 EXTENTS = ("height", "depth", "width")
 """What the extents of the whole are called along the axes of the grid."""
@@ -32,11 +32,17 @@ SIDES = {
 BEGUN = ("top", "bottom", "inset")
 """Measures that begin somewhere."""
 
-NOTES = {"above the floor": ("top", "bottom", "up"), "from the side": ("inset",)}
+NOTES = {"above the floor": ("top", "bottom", "up"), "from the side": ("inset",), "from front or rear": ("setback",)}
 """Where they begin, by the ends of their names."""
 
-SHARED = ("thickness", "radius", "edge", "spacing", "inset", "tilt")
+SHARED = ("thickness", "radius", "edge", "spacing", "inset", "setback", "tilt")
 """What different parts may share and be called so without the name of a part."""
+
+WORDS = (("lower", "upper"), ("front", "rear"), ("inner", "outer"))
+"""What tells parts with one role apart, along each axis; the last by how far from the middle they are."""
+
+APART = 1.0
+"""How far apart they must be for that, in cells."""
 
 WIDE = 118
 """Letters of a line that names numbers, about."""
@@ -136,10 +142,33 @@ def _names(tunable: Tunable, basis: Basis) -> tuple[list[str], list[int], set[st
     taken |= {*known.names, *known.roles}
     first = [min(each.feature.node for each in group) for group in basis.chosen]
     order = sorted(range(len(first)), key=lambda z: (basis.chosen[z][0].word != "extent", first[z], z))
-    names = [""] * len(first)
+    names, middles, holder = [""] * len(first), _middles(tunable), dict[str, int]()
     for z in order:
-        names[z] = _unused(_name(tunable, basis.chosen[z]), taken)
+        offered, node = _name(tunable, basis.chosen[z])
+        words = [
+            f"{word}_{offered[-1]}" for word in _apart(middles.get(holder.get(offered[-1], -1)), middles.get(node))
+        ]
+        names[z] = _unused(next((name for name in (*offered, *words) if name not in taken), offered[-1]), taken)
+        holder[names[z]] = node
     return names, order, taken
+
+
+def _middles(tunable: Tunable) -> dict[int, FloatArray]:
+    """For each node that draws the mean place of its copies: up, depth, and how far to either side."""
+    scene = tunable.scene(tunable.values)
+    drawn = [n for n, node in enumerate(tunable.nodes) if isinstance(node, Draw)]
+    centre, block = scene.centre.abs().numpy(), scene.block.numpy()
+    centre[:, :SIDE] = scene.centre[:, :SIDE].numpy()
+    return {node: centre[block == place].mean(0) for place, node in enumerate(drawn) if (block == place).any()}
+
+
+def _apart(one: FloatArray | None, other: FloatArray | None) -> Iterator[str]:
+    """Words for the second of two places that tell it from the first, the best first."""
+    if one is not None and other is not None:
+        away = other - one
+        for axis in np.argsort(-np.abs(away), kind="stable"):
+            if abs(away[axis]) >= APART:
+                yield WORDS[axis][int(away[axis] > 0)]
 
 
 def _unused(base: str, taken: set[str]) -> str:
@@ -155,11 +184,14 @@ def _roles(nodes: list[Node]) -> Iterator[str]:
     return (node.role for node in nodes if isinstance(node, Draw) and node.role)
 
 
-def _name(tunable: Tunable, group: list[Measure]) -> str:
-    """The name of measures that always agree: of the part that it is of, or none if several kinds of parts share it."""
+def _name(tunable: Tunable, group: list[Measure]) -> tuple[list[str], int]:
+    """What measures that always agree may be called, the best first, and the node of the part that they are of.
+
+    The name has that of the part, unless several kinds of parts share what is measured.
+    """
     first = group[0]
     if first.word == "extent":
-        return EXTENTS[first.feature.axis]
+        return [EXTENTS[first.feature.axis]], first.feature.node
     alike = [each for each in group if each.word == first.word]
     parts = [_part(tunable, each.feature.node) for each in alike]
     part = max(dict.fromkeys(parts), key=parts.count)  # the one that has it most often, else the first
@@ -167,15 +199,19 @@ def _name(tunable: Tunable, group: list[Measure]) -> str:
     earliest = min(mine, key=lambda each: (each.feature.node, each.feature.all))
     square = len({each.feature.node for each in mine}) < len(mine)  # two sides of one section
     kind = "thickness" if first.word == "length" and square else _kind(tunable, earliest)
-    if kind in SHARED and not square and len(set(parts)) > 1:
-        return kind
-    return f"{part}_{kind}"
+    shared = kind in SHARED and not square and len(set(parts)) > 1
+    along = [f"{part}_{kind}_{EXTENTS[first.feature.axis]}"] if first.word == "offset" else []
+    return [*([kind] if shared else []), f"{part}_{kind}", *along], _drawn(tunable, earliest.feature.node)[0]
 
 
 def _part(tunable: Tunable, node: int) -> str:
     """What the part is called that a node is; of a loop the first part in it."""
-    rest = tunable.nodes[node:]
-    return next(node.word for node in rest if isinstance(node, Draw))
+    return _drawn(tunable, node)[1].word
+
+
+def _drawn(tunable: Tunable, node: int) -> tuple[int, Draw]:
+    """The node that draws, and where it stands: this one, or the first in a loop."""
+    return next((n, each) for n, each in enumerate(tunable.nodes[node:], node) if isinstance(each, Draw))
 
 
 def _kind(tunable: Tunable, measure: Measure) -> str:
@@ -189,6 +225,8 @@ def _kind(tunable: Tunable, measure: Measure) -> str:
     if word == "offset":
         parts = [_part(tunable, each) for each in (feature.node, measure.origin)]
         return f"to_{parts[1]}" if parts[0] != parts[1] else word
+    if word == "inset":
+        return "setback" if feature.axis == DEPTH else word
     if word == "side":
         return SIDES[feature.kind, feature.axis]
     if word in ("angle", "place") or (word == "top" and feature.kind == "place"):

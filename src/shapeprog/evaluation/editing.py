@@ -3,7 +3,8 @@
 Contacts
     Share of the pairs of primitives that touch which still do.
 Symmetry
-    Whether a program that is its own mirror image, left for right, still is: in every point that is looked at.
+    Whether a program that is its own mirror image, left for right, still is: the share of its surface whose image lies
+    on it falls by no more than 1 %.
 One piece
     Whether a program that is one connected solid still is.
 
@@ -34,8 +35,9 @@ FACTORS = (1.2, 0.8)
 TOUCHING = 0.1
 """Cells between two primitives that touch, at most."""
 
-SYMMETRIC = 0.1
-"""How far the mirror image of a point of the surface may be from the surface, in cells."""
+SYMMETRIC, STRAY = 0.1, 0.01
+"""How far the mirror image of a point of the surface may be from the surface, in cells; and the share of points for which
+it may be farther, and by which an edit may raise that share."""
 
 LOOKED = 1_000
 """Points of the surface that are mirrored."""
@@ -54,7 +56,7 @@ def edit_scores(program: Program) -> EditScores:
     """What is kept of a program when its free numbers are changed, one at a time; see the module."""
     before = unroll(program)
     touching = _contacts(before)
-    symmetric, whole = _symmetric(before), _one_piece(before)
+    mirrored, whole = _mirrored(before), _one_piece(before)
     kept: list[tuple[float, float, float]] = []
     free = free_numbers(program)
     for place, factor in product(range(free), FACTORS):
@@ -65,7 +67,7 @@ def edit_scores(program: Program) -> EditScores:
             continue
         kept.append((
             len(touching & _contacts(after)) / len(touching) if touching else np.nan,
-            float(_symmetric(after)) if symmetric else np.nan,
+            float(_mirrored(after) >= mirrored - STRAY) if mirrored >= 1 - STRAY else np.nan,
             float(_one_piece(after)) if whole else np.nan,
         ))  # fmt: skip
     scores = np.array(kept).reshape(-1, 3)
@@ -81,14 +83,15 @@ def _contacts(scene: Scene) -> set[tuple[int, int]]:
         return set()
 
 
-def _symmetric(scene: Scene) -> bool:
+def _mirrored(scene: Scene) -> float:
+    """The share of the surface whose mirror image lies on it."""
     try:
         points = sample_surface(scene, LOOKED, torch.Generator().manual_seed(0)).points.detach()
     except ShapeProgError:  # nothing is drawn
-        return False
+        return 0.0
     image = points.clone()
     image[:, SIDE] *= -1
-    return bool((signed_distance(scene, image).abs() <= SYMMETRIC).all())
+    return float((signed_distance(scene, image).abs() <= SYMMETRIC).double().mean())
 
 
 def _one_piece(scene: Scene) -> bool:

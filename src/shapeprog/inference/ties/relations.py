@@ -21,7 +21,7 @@ DEGREES = 2.0
 THIN = 3.0
 """Cells below which lengths along different axes may well be the two sides of one section."""
 
-CENTRED, HOLDING, SURE, LIKELY, POSSIBLE, CHANCE = 2.0, 1.2, 1.0, 0.6, 0.25, 0.03
+CENTRED, HOLDING, SURE, LIKELY, POSSIBLE, CHANCE = 4.0, 1.2, 1.0, 0.6, 0.25, 0.03
 """What the number that a relation saves is worth to it: for parts that are their own mirror image, for relations that
 hold touching parts together when a number is changed, for such as furniture is built by, are common, are possible, and
 are mostly chance."""
@@ -94,6 +94,7 @@ def _candidates(
     whole = {each.axis: each for each in known if each.kind == "extent"}
     places = [each for each in known if each.kind in ("low", "high", "middle", "place")]
     ends: Ends = {(each.node, each.all, each.axis, each.kind): each.at(numbers) for each in places}
+    across = _across(places, numbers)
     for axis in range(3):
         here = [each for each in places if each.axis == axis]
         for one in here:
@@ -107,9 +108,9 @@ def _candidates(
             middles = (one.kind == "middle") + (two.kind == "middle")
             if one.kind == two.kind == "place" and one.node == two.node:  # the ends of one part
                 if flush:
-                    yield one.row - two.row, SURE
+                    yield one.row - two.row, CENTRED if axis != SIDE and one.node in across else SURE
                 if mirrored and axis in (DEPTH, SIDE):
-                    yield one.row + two.row, LIKELY
+                    yield one.row + two.row, CENTRED if axis == SIDE else LIKELY
                 continue
             if middles == 1 or (one.node == two.node and one.all == two.all):
                 continue
@@ -135,6 +136,16 @@ def _candidates(
     for (one, far), (two, near) in permutations(lengths, 2):
         if one.axis == two.axis and near > THIN and (times := round(far / near)) in RATIOS:
             yield one.row - times * two.row, RATIO
+
+
+def _across(places: Sequence[Feature], numbers: FloatArray) -> set[int]:
+    """Nodes of parts whose ends are as far to the left of the middle as to the right: bars and rods that lie across."""
+    ends = [each for each in places if each.kind == "place" and each.axis == SIDE]
+    return {
+        one.node
+        for one, two in combinations(ends, 2)
+        if one.node == two.node and abs(one.at(numbers) + two.at(numbers)) < WITHIN < abs(one.at(numbers))
+    }
 
 
 def _near(alike: Sequence[Feature], numbers: FloatArray) -> Iterator[tuple[Feature, Feature, bool, bool]]:

@@ -36,8 +36,8 @@ TOUCHING = 0.1
 """Cells between two primitives that touch, at most."""
 
 SYMMETRIC, STRAY = 0.1, 0.01
-"""How far the mirror image of a point of the surface may be from the surface, in cells; and the share of points for which
-it may be farther, and by which an edit may raise that share."""
+"""How far the mirror image of a point of the surface may be from the surface, in cells; and the share of the points for
+which it may be farther, and by which an edit may raise that share."""
 
 LOOKED = 1_000
 """Points of the surface that are mirrored."""

@@ -79,6 +79,42 @@ def test_a_wider_table_keeps_its_contacts_its_symmetry_and_is_one_piece():
     assert edit_scores(sp.parse(TABLE)).contacts < 0.9
 
 
+BENCH = (
+    TABLE
+    + """
+back(bar(start=(9, {rear}, -11.95), end=(9, 7, 12.03), section=(3, 0.6), turn=12))
+drawer(box(at=(3, -7, -5.96), size=(2, 13, 12)))
+"""
+)
+
+
+def test_what_is_off_the_middle_by_hundredths_is_symmetric_however_it_is_edited():
+    program = sp.parse(BENCH.format(rear=6.92))
+    tied = tie(program, evidence_of_program(program)).program
+    assert edit_scores(tied).symmetry == 1
+    assert (unroll(tied).centre[-2:, 2].abs() < 1e-4).all()
+    assert rear_ends(tied)[0] == pytest.approx(rear_ends(tied)[1], abs=1e-4)
+    askew = sp.parse(BENCH.format(rear=5.5))
+    one, other = rear_ends(tie(askew, evidence_of_program(askew)).program)
+    assert other - one == pytest.approx(1.5, abs=0.2)
+
+
+def rear_ends(program: Program) -> tuple[float, float]:
+    """How far back the ends of the bar are."""
+    values = next(node.values for node in program.walk() if node.name == "bar")
+    return values[1], values[4]
+
+
+def test_symmetry_is_that_of_nearly_the_whole_surface_and_an_edit_may_not_lose_more():
+    knob = "handle(box(at=(4, -8.3, {at}), size=(0.3, 0.3, 0.3)))\n"  # far below 1 % of the surface
+    assert edit_scores(sp.parse("width = 24\n" + MIDDLE + knob.format(at="width / 4"))).symmetry == 1
+    assert edit_scores(sp.parse("width = 24\n" + MIDDLE.replace("-width / 2", "-12"))).symmetry == pytest.approx(4 / 6)
+    assert np.isnan(edit_scores(sp.parse("box(at=(4, -8, -11), size=(2, 16, 24))")).symmetry)
+
+
+MIDDLE = "top(box(at=(4, -8, -width / 2), size=(2, 16, width)))\n"
+
+
 def test_tidy_writes_what_was_tied(tmp_path: Path):
     given, out = tmp_path / "table.shape", tmp_path / "tidy.shape"
     given.write_text(TABLE)

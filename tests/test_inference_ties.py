@@ -82,7 +82,7 @@ def test_a_wider_table_keeps_its_contacts_its_symmetry_and_is_one_piece():
 BENCH = (
     TABLE
     + """
-back(bar(start=(9, {rear}, -11.95), end=(9, 7, 12.03), section=(3, 0.6), turn=12))
+back(bar(start=(11, {rear}, -11.95), end=(11, 7, 12.03), section=(9, 0.6), turn=12))
 drawer(box(at=(3, -7, -5.96), size=(2, 13, 12)))
 """
 )

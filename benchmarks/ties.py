@@ -53,6 +53,9 @@ COLUMNS["alone"] = COLUMNS["fitted"]
 NOISE = 0.05
 """Standard deviation of the noise, in cells."""
 
+ROUNDING = 1e-5
+"""What rounding to single precision may add to that, in cells."""
+
 VARIANTS = 40
 """Redrawings of one piece of furniture."""
 
@@ -102,9 +105,9 @@ def of_furniture(task: Task) -> dict[str, Any]:
     written = relations_written(planted)
     off = np.abs(written @ drawn.T)
     holding = np.abs(written @ ways).max(1, initial=0) < 1e-6
-    designed = off.max(1) <= ROUNDED
+    designed, happening = off.max(1) <= ROUNDED, off[:, 0] <= 2 * NOISE + ROUNDING
     wanted, found = rank(written[designed]), len(ways) - rank(ways)
-    kept, likely = rank(written[designed & holding]), rank(written[(designed | (off[:, 0] <= 2 * NOISE)) & holding])
+    kept, likely = rank(written[designed & holding]), rank(written[(designed | happening) & holding])
     return {
         "planted": wanted, "found": found, "kept": kept, "recall": kept / max(wanted, 1),
         "chance": (likely - kept) / max(found, 1), "false": (found - likely) / max(found, 1),

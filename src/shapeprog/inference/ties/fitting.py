@@ -24,7 +24,7 @@ HOLD = 1e-2
 TOGETHER, CLOSED = 0.03, 0.2
 """Weights of a squared gap between parts that touched, and of one that is still open at the end."""
 
-KNOWN = 1e-2
+KNOWN = 0.1
 """Weight of a squared move in cells of a length or place that somebody wrote: it is known, even where it is hidden."""
 
 FAR = 2.0

@@ -21,17 +21,44 @@ DEGREES = 2.0
 THIN = 3.0
 """Cells below which lengths along different axes may well be the two sides of one section."""
 
-CENTRED, HOLDING, SURE, LIKELY, POSSIBLE, CHANCE = 4.0, 1.2, 1.0, 0.6, 0.25, 0.03
-"""What the number that a relation saves is worth to it: for parts that are their own mirror image, for relations that
-hold touching parts together when a number is changed, for such as furniture is built by, are common, are possible, and
-are mostly chance."""
 
-HIDDEN = {CENTRED: 1.3, HOLDING: CHANCE}
-"""What relations are worth that are off by so much that only hidden surfaces can be meant."""
+class Worth(NamedTuple):
+    """What the number that a relation saves is worth to it.
 
-RATIOS, RATIO = (2, 3), 0.1
-"""How many times as long one part may be as another along an axis by design, and what the number that it saves is worth
-to that: where parts have many lengths, some are nearly twice others by chance."""
+    Parameters
+    ----------
+    centred
+        For parts that are their own mirror image.
+    holding
+        For relations that hold touching parts together when a number is changed.
+    sure, likely, possible, chance
+        For such as furniture is built by, are common, are possible, and are mostly chance.
+    ratio
+        For lengths that are a simple multiple of others along an axis.
+    """
+
+    centred: float
+    holding: float
+    sure: float
+    likely: float
+    possible: float
+    chance: float
+    ratio: float
+
+
+INFERRED = Worth(centred=4.0, holding=1.2, sure=1.0, likely=0.6, possible=0.25, chance=0.03, ratio=0.1)
+"""In programs that inference found, whose numbers may be off by as much as nobody sees; chosen on val."""
+
+WRITTEN = Worth(centred=4.0, holding=0.9, sure=0.8, likely=0.25, possible=0.25, chance=0.03, ratio=0.1)
+"""In programs that somebody wrote: numbers that are known are rarely off by much; chosen on planted programs."""
+
+BURIED = 1.3
+"""What relations of parts that are their own mirror image are worth where they are off by so much that only hidden
+surfaces can be meant; those that hold parts together are chance there, all others nothing."""
+
+RATIOS = (2, 3)
+"""How many times as long one part may be as another along an axis by design: where parts have many lengths, some are
+nearly twice others by chance."""
 
 SIMPLE = 4
 """Factors of a relation beyond which it is worth less, in proportion: it takes a long sum to write."""
@@ -56,7 +83,9 @@ class Relation(NamedTuple):
     trust: float
 
 
-def relations(known: list[Feature], numbers: FloatArray, touching: set[tuple[int, int]]) -> list[Relation]:
+def relations(
+    known: list[Feature], numbers: FloatArray, touching: set[tuple[int, int]], worth: Worth = INFERRED
+) -> list[Relation]:
     """Relations that nearly hold, each once, with the highest trust that any of its readings has.
 
     Parameters
@@ -65,8 +94,10 @@ def relations(known: list[Feature], numbers: FloatArray, touching: set[tuple[int
         Where the numbers of the program and the extents are (F + 3,).
     touching
         Pairs of nodes, the smaller first, whose parts touch.
+    worth
+        What relations are worth in such a program.
     """
-    offered = [(row, trust) for row, trust in _candidates(known, numbers, touching) if row.any()]
+    offered = [(row, trust) for row, trust in _candidates(known, numbers, touching, worth) if row.any()]
     if not offered:
         return []
     rows, trust = np.stack([row for row, _ in offered]), np.array([trust for _, trust in offered])
@@ -76,9 +107,9 @@ def relations(known: list[Feature], numbers: FloatArray, touching: set[tuple[int
     angles = np.any([each.row != 0 for each in known if each.kind == "angle"] or np.zeros((1, len(numbers)), bool), 0)
     near = off < np.where(used[:, angles].any(1), DEGREES, WITHIN)
     hidden = ~near & ~used[:, angles].any(1) & (off < JOINED)
-    for visible, worth in HIDDEN.items():
+    for visible, buried in ((worth.centred, BURIED), (worth.holding, worth.chance)):
         here = hidden & (trust == visible)
-        trust[here], near[here] = worth, True
+        trust[here], near[here] = buried, True
     trust *= np.minimum(1.0, SIMPLE / used.sum(1))
     found: dict[bytes, Relation] = {}
     for k in np.flatnonzero(near).tolist():
@@ -89,7 +120,7 @@ def relations(known: list[Feature], numbers: FloatArray, touching: set[tuple[int
 
 
 def _candidates(
-    known: list[Feature], numbers: FloatArray, touching: set[tuple[int, int]]
+    known: list[Feature], numbers: FloatArray, touching: set[tuple[int, int]], worth: Worth
 ) -> Iterator[tuple[FloatArray, float]]:
     whole = {each.axis: each for each in known if each.kind == "extent"}
     places = [each for each in known if each.kind in ("low", "high", "middle", "place")]
@@ -100,42 +131,42 @@ def _candidates(
         for one in here:
             level = one.kind == "middle"
             if axis in (DEPTH, SIDE):
-                yield one.row, CENTRED if level else POSSIBLE
+                yield one.row, worth.centred if level else worth.possible
             if not level:
-                yield one.row - whole[axis].row / 2, SURE
-                yield one.row + whole[axis].row / 2, HOLDING if axis == UP else SURE
+                yield one.row - whole[axis].row / 2, worth.sure
+                yield one.row + whole[axis].row / 2, worth.holding if axis == UP else worth.sure
         for one, two, flush, mirrored in _near(here, numbers):
             middles = (one.kind == "middle") + (two.kind == "middle")
             if one.kind == two.kind == "place" and one.node == two.node:  # the ends of one part
                 if flush:
-                    yield one.row - two.row, CENTRED if axis != SIDE and one.node in across else SURE
+                    yield one.row - two.row, worth.centred if axis != SIDE and one.node in across else worth.sure
                 if mirrored and axis in (DEPTH, SIDE):
-                    yield one.row + two.row, CENTRED if axis == SIDE else LIKELY
+                    yield one.row + two.row, worth.centred if axis == SIDE else worth.likely
                 continue
             if middles == 1 or (one.node == two.node and one.all == two.all):
                 continue
             pair = (min(one.node, two.node), max(one.node, two.node))
             if flush and (one.kind == two.kind or not _edge(one, two, ends, mirror=False)):
-                yield one.row - two.row, HOLDING if pair in touching and not middles else LIKELY
+                yield one.row - two.row, worth.holding if pair in touching and not middles else worth.likely
             if mirrored and axis in (DEPTH, SIDE) and not (one.kind == two.kind and _edge(one, two, ends, mirror=True)):
-                yield one.row + two.row, LIKELY if middles == 0 else POSSIBLE
+                yield one.row + two.row, worth.likely if middles == 0 else worth.possible
     for run in known:  # the gap between the run and a part is that between its copies
         facing = {"before": "high", "behind": "low"}.get(run.kind)
         for side in places:
             if side.kind == facing and side.axis == run.axis and side.node != run.node:
-                yield run.row - side.row, LIKELY
+                yield run.row - side.row, worth.likely
     for kind in ("length", "radius", "shift", "angle"):
         alike = [each for each in known if each.kind == kind]
         for one, two, same, opposite in _near(alike, numbers):
             thin = kind == "length" and max(abs(one.at(numbers)), abs(two.at(numbers))) < THIN
             if same:
-                yield one.row - two.row, LIKELY if one.axis == two.axis or thin else CHANCE
+                yield one.row - two.row, worth.likely if one.axis == two.axis or thin else worth.chance
             if opposite and kind in ("shift", "angle"):
-                yield one.row + two.row, POSSIBLE
+                yield one.row + two.row, worth.possible
     lengths = [(each, each.at(numbers)) for each in known if each.kind in ("length", "extent") and each.axis >= 0]
     for (one, far), (two, near) in permutations(lengths, 2):
         if one.axis == two.axis and near > THIN and (times := round(far / near)) in RATIOS:
-            yield one.row - times * two.row, RATIO
+            yield one.row - times * two.row, worth.ratio
 
 
 def _across(places: Sequence[Feature], numbers: FloatArray) -> set[int]:

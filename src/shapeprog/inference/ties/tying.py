@@ -26,7 +26,7 @@ from shapeprog.inference.ties.leaning import between_ends
 from shapeprog.inference.ties.naming import written
 from shapeprog.inference.ties.opposite import as_images
 from shapeprog.inference.ties.pricing import worthwhile
-from shapeprog.inference.ties.relations import relations
+from shapeprog.inference.ties.relations import INFERRED, WRITTEN, relations
 from shapeprog.inference.ties.runs import runs
 from shapeprog.inference.tunable import CELLS, DEGREES, Tunable
 from shapeprog.language.free import free_numbers
@@ -36,7 +36,7 @@ from shapeprog.space import FloatArray
 PRICE = 1e-4
 """What a number is worth: mean squared distance in cells; chosen on val."""
 
-WRITTEN_PRICE = 4e-4
+WRITTEN_PRICE = 1.5e-3
 """The same in a program that somebody wrote, whose numbers are known; chosen on planted programs."""
 
 ROUNDS = 3
@@ -95,7 +95,7 @@ def tie(
             poses = tunable.poses(torch.from_numpy(numbers[: len(tunable.values)]))
             measured = features(tunable, poses)
             before = len(rows)
-            offered = relations(measured, numbers, pairs)
+            offered = relations(measured, numbers, pairs, WRITTEN if known else INFERRED)
             curvature = misfit.at(numbers)[1]
             rows, optimum = worthwhile(offered, numbers, curvature, price, fixed=rows, low=misfit.low, far=misfit.far)
             if contacts:

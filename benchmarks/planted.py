@@ -15,8 +15,10 @@ hinted_cones   the same with its hint
 Each is given as its parts (``parts``), as one smooth mesh in which they have grown together (``fused``), and as 32^3
 cells alone (``cells``).  A part is found where a primitive of its own has IoU >= .5 with it: with its oriented box, as
 ``shapeprog evaluate --parts`` does (``part_recall``, ``part_precision``; the planted program itself is beside it as the
-ceiling), and with the solid itself (``solid_recall``, ``solid_precision``).  Of those found by the solid, ``roles`` and
-``labels`` are the shares whose role is the planted one, or has its label.
+ceiling), and with the solid itself (``solid_recall``, ``solid_precision``).  ``cells_ceiling`` is how many parts would
+be found in cells by one who is told which of them each part touches, and how thick parts of one or two cells are on
+average.  Of those found by the solid, ``roles`` and ``labels`` are the shares whose role is the planted one, or has its
+label.
 """
 
 from __future__ import annotations
@@ -38,9 +40,12 @@ SETS = ("furniture", "cones", "hinted_cones")
 KINDS = ("parts", "fused", "cells")
 
 COLUMNS = (
-    "part_recall", "part_precision", "ceiling_recall", "ceiling_precision", "solid_recall", "solid_precision", "roles",
-    "labels", "found", "planted", "primitives", "planted_numbers", "numbers", "seconds",
+    "part_recall", "part_precision", "ceiling_recall", "ceiling_precision", "cells_ceiling", "solid_recall",
+    "solid_precision", "roles", "labels", "found", "planted", "primitives", "planted_numbers", "numbers", "seconds",
 )  # fmt: skip
+
+THICKNESS = (0.6, 0.8)
+"""How thick parts of the prior are that touch one cell or two along an axis, by which most are found."""
 
 EXAMPLE = Path(__file__).parents[1] / "examples" / "statements" / "cone_leg.py"
 
@@ -95,6 +100,7 @@ def measure(task: Task) -> dict[str, Any]:
     ceiling = part_scores(placed, drawing)
     return vars(task) | part_scores(placed, scene)._asdict() | {
         "ceiling_recall": ceiling.part_recall, "ceiling_precision": ceiling.part_precision,
+        "cells_ceiling": float(np.mean([likeness_of_cells(each.vertices) >= 0.5 for each in placed])),
         **solid_scores(planted, drawing, found, scene),
         "planted": planted.size, "primitives": found.size,
         "planted_numbers": sum(map(numbers_written, planted.walk())),
@@ -156,6 +162,17 @@ def solid_overlaps(planted: Any, found: Any) -> Any:
     return table
 
 
+def likeness_of_cells(vertices: Any) -> float:
+    """IoU of the box of a part with what the cells tell of it that it touches, along the axes of the grid."""
+    low, high = vertices.min(0), vertices.max(0)
+    first, last = np.floor(low), np.ceil(high)
+    wide = last - first
+    half = np.select([wide <= 1, wide <= 2], [each / 2 for each in THICKNESS], (wide - 1) / 2)
+    middle = (first + last) / 2
+    shared = np.prod(np.clip(np.minimum(high, middle + half) - np.maximum(low, middle - half), 0, None))
+    return float(shared / (np.prod(high - low) + np.prod(2 * half) - shared))
+
+
 def declare(hinted: bool) -> None:
     """Bring in the example, once in a process; without what it says of starts unless it is ``hinted``."""
     from shapeprog.language.statement import language
@@ -212,7 +229,7 @@ def table(path: Path) -> str:
         groups.setdefault((row["set"], row["kind"]), []).append(row)
     lines = ["| set, programs | " + " | ".join(COLUMNS) + " |", "|" + "---|" * (len(COLUMNS) + 1)]
     for (which, kind), rows in sorted(groups.items()):
-        means = [np.mean([row[column] for row in rows]) for column in COLUMNS]
+        means = [np.mean([row.get(column, np.nan) for row in rows]) for column in COLUMNS]
         cells = [f"{mean:.1f}" if mean > 2 else f"{mean:.3f}" for mean in means]
         lines.append("| " + " | ".join([f"{which}, {kind}, {len(rows)}", *cells]) + " |")
     return "\n".join(lines)

@@ -43,8 +43,8 @@ NOISE = 2.0
 CELL_TOLERANCE = 0.65
 """The same for cells: a surface is anywhere within the cells that it touches."""
 
-THIN = 0.4
-"""Thickness of what is one cell thick, on average."""
+THIN = 0.5
+"""Thickness of what is one cell thick, on average: .50 of parts of furniture (IKEA, val)."""
 
 AGREEMENT, SCANNED = 0.5, 0.6
 """Least cosine between normals that fit; and of scans, of which noise could pass for a surface otherwise.

@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from shapeprog.errors import ShapeProgError
+from shapeprog.independence import independent
 from shapeprog.language.counts import Counts
 from shapeprog.language.evaluation import expanded, symbolic
 from shapeprog.language.expression import Linear, Name, Value, combined, value_at
@@ -290,7 +291,7 @@ class Matcher:
         offered: list[dict[bytes, FloatArray]] = [{} for _ in near]
         for attempt in range(TRIES):
             order = np.argsort(sizes + random.random(len(rows)) * attempt, kind="stable")
-            chosen = order[_independent(factors[order])]
+            chosen = np.array(independent(factors, order.tolist()), np.int64)
             for options, row in zip(offered, np.linalg.inv(factors[chosen]) @ rows[chosen], strict=True):
                 options.setdefault((np.round(row, 5) + 0.0).tobytes(), row)
         found: list[Value] = []
@@ -300,16 +301,3 @@ class Matcher:
             best = min(range(len(values)), key=lambda k: (terms(values[k]), away[k]))
             found.append(values[best])
         return found
-
-
-def _independent(rows: FloatArray) -> list[int]:
-    """The first rows (M, P) that are independent of those before them."""
-    kept: list[int] = []
-    basis = np.zeros((0, rows.shape[1]))
-    for place, row in enumerate(rows):
-        rest = row - (basis @ row) @ basis
-        size = float(np.linalg.norm(rest))
-        if size > 1e-6 and len(kept) < rows.shape[1]:
-            kept.append(place)
-            basis = np.vstack([basis, rest / size])
-    return kept

@@ -13,9 +13,9 @@ from typing import Literal
 
 import numpy as np
 
+from shapeprog.independence import independent
 from shapeprog.inference.ties.features import Feature
 from shapeprog.inference.ties.following import Following
-from shapeprog.inference.ties.pricing import beside
 from shapeprog.inference.ties.runs import Run
 from shapeprog.inference.ties.sums import SAME, Flags, cost_of_terms, nearest_quarter
 from shapeprog.space import DEPTH, SIDE, UP, Array, FloatArray
@@ -146,7 +146,7 @@ def simplest(
     heads = [every[group[0]] for group in groups]
     seen = seen[[group[0] for group in groups]]
     reader = _Reader(heads, numbers, lengths, runs, following)
-    chosen: Array = np.array(_independent(seen, np.argsort(reader.prices, kind="stable")), np.int64)
+    chosen: Array = np.array(independent(seen, np.argsort(reader.prices, kind="stable").tolist()), np.int64)
     factors = ways @ np.linalg.inv(seen[chosen])
     total = float(reader.reading(factors[None], chosen[None])[0]) + reader.parting(factors, chosen)
     while (better := reader.exchanged(seen, factors, chosen, total)) is not None:
@@ -249,14 +249,3 @@ def _together(seen: FloatArray, every: list[Measure]) -> list[list[int]]:
         if np.abs(row).max(initial=0) > SAME:
             groups.setdefault((np.round(row, 6) + 0.0).tobytes(), []).append(k)
     return [sorted(group, key=order) for group in groups.values()]
-
-
-def _independent(rows: FloatArray, order: Array) -> list[int]:
-    """As many rows as are independent, the first in an order."""
-    kept: list[int] = []
-    axes: FloatArray = np.zeros((0, rows.shape[1]))
-    for k in order.tolist():
-        if (new := beside(rows[k], axes)) is not None:
-            kept.append(k)
-            axes = np.vstack([axes, new])
-    return kept

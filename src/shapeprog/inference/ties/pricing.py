@@ -9,12 +9,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from shapeprog.independence import beside
 from shapeprog.inference.ties.relations import Relation
 from shapeprog.space import FloatArray
 
-HELD, DEPENDENT = 1e-9, 1e-6
-"""Shares of its freedom, and of its length, below which a relation holds already, or contradicts what does: of the
-freedom of numbers that nothing sees, rounding alone leaves more."""
+HELD = 1e-9
+"""Share of its freedom below which a relation holds already: of the freedom of numbers that nothing sees, rounding
+alone leaves more, so independence is asked of the rows themselves."""
 
 
 def worthwhile(
@@ -73,11 +74,3 @@ def worthwhile(
         off = off - across * off[best] / spread[best]
         spread = spread - across**2 / spread[best]
         spread[best] = 0.0
-
-
-def beside(row: FloatArray, axes: FloatArray) -> FloatArray | None:
-    """The direction (V,) of what orthonormal axes (M, V) leave of a row; none if they leave nothing."""
-    rest = row - axes.T @ (axes @ row)
-    rest = rest - axes.T @ (axes @ rest)
-    size = float(np.linalg.norm(rest))
-    return rest / size if size > DEPENDENT * float(np.linalg.norm(row)) else None

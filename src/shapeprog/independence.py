@@ -1,0 +1,34 @@
+"""Which rows of factors are independent of each other."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from shapeprog.space import FloatArray
+
+DEPENDENT = 1e-6
+"""Share of its length below which a row is a combination of others: rounding alone leaves that much."""
+
+
+def beside(row: FloatArray, axes: FloatArray) -> FloatArray | None:
+    """The direction (V,) of what orthonormal axes (M, V) leave of a row; none if they leave nothing."""
+    rest = row - axes.T @ (axes @ row)
+    rest = rest - axes.T @ (axes @ rest)
+    size = float(np.linalg.norm(rest))
+    return rest / size if size > DEPENDENT * float(np.linalg.norm(row)) else None
+
+
+def independent(rows: FloatArray, order: Iterable[int] | None = None) -> list[int]:
+    """The places of rows (M, V) that are independent of those before them, in an order; in their own if none is given.
+
+    Each that can be kept is, so as many are as the rows have dimensions.
+    """
+    kept: list[int] = []
+    axes: FloatArray = np.zeros((0, rows.shape[1]))
+    for place in range(len(rows)) if order is None else order:
+        if (new := beside(rows[place], axes)) is not None:
+            kept.append(place)
+            axes = np.vstack([axes, new])
+    return kept

@@ -39,6 +39,13 @@ for i in mirror(side):
 board(at=(6, 4.5, -5), size=(6, 0.8, 10), tilt=8)  # back
 """
 
+UPHOLSTERED = """
+box(at=(-12, -6, -6), size=(11.5, 11, 12))  # base
+for i in mirror(side):
+    box(at=(-12, -6, 6), size=(17, 11, 2.5))  # arm
+bar(start=(-12, 4.5, 0), end=(12, 5, 0), section=(3, 12))  # back
+"""
+
 TABLE = """
 box(at=(7, -8, -12), size=(1, 16, 24))  # top
 for i in mirror(depth):
@@ -104,8 +111,8 @@ for i in mirror(side):
 box(at=(-5, 4, -10), size=(12, 2, 20))  # back
 """
 
-WHOLE = [CHAIR, STOOL_BACK, TABLE, BOOKCASE, CABINET, WARDROBE, BED, SOFA]
-NAMES = ["chair", "swivel chair", "table", "bookcase", "cabinet", "wardrobe", "bed", "sofa"]
+WHOLE = [CHAIR, STOOL_BACK, UPHOLSTERED, TABLE, BOOKCASE, CABINET, WARDROBE, BED, SOFA]
+NAMES = ["chair", "swivel chair", "upholstered chair", "table", "bookcase", "cabinet", "wardrobe", "bed", "sofa"]
 
 
 def wanted(text: str) -> list[str]:

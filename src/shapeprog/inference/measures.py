@@ -21,6 +21,10 @@ NEAR = 0.04
 FLAT = 0.8
 """What lies is at most so high, as a share of the side of a square as large as its upper face."""
 
+STOOL, BENEATH = 1.2, 0.75
+"""Where nothing lies, a body is the main surface that is at most so high, as such a share, and ends at most at this
+share of the height of the whole: an upholstered seat that reaches the floor."""
+
 PLATE = 0.25
 """A plate is at most so high, as such a share."""
 
@@ -68,6 +72,7 @@ class Parts:
     ``face``, ``surface``                    area seen from above; all of it, as that of a box
     ``rise``                                 sine of the slope of the longest axis
     ``lying``, ``flat``, ``wide``            its upper face is the larger one; and it is a plate; and large
+    ``squat``                                a body that may be higher than it is wide, but not by much
     ``slender``, ``upright``, ``level``      a stick; that stands; that lies
     ``facing_front``, ``facing_side``        a board by the way that it faces
     ``small``, ``bulky``                     against the whole: its length; how much of it it fills
@@ -110,6 +115,7 @@ class Parts:
         self.up, self.depth, self.side = (2 * half[every, axis] for axis in (up, depth, 3 - up - depth))
         self.thin, self.middle, self.long = 2 * np.sort(half, 1).T
         self.face = self.depth * self.side
+        self.squat: Mask = (self.up <= STOOL * np.sqrt(self.face)) & (steep[every, up] >= UPWARD)
         self.surface = 2 * (self.up * self.depth + self.depth * self.side + self.side * self.up)
         self.rise = steep[every, half.argmax(1)]
         self.lying: Mask = (self.up <= FLAT * np.sqrt(self.face)) & (steep[every, up] >= UPWARD)
@@ -130,12 +136,15 @@ class Parts:
         self.near = NEAR * max(float(self.size.max()), 1e-6)  # a point has no size
         self.floor = float(first[UP])
         off = centre - (first + last) / 2
-        fitting = self.lying & (off[:, DEPTH] <= REAR * self.size[DEPTH])
-        fitting &= np.abs(off[:, SIDE]) <= self.size[SIDE] / 4
+        central = (off[:, DEPTH] <= REAR * self.size[DEPTH]) & (np.abs(off[:, SIDE]) <= self.size[SIDE] / 4)
+        fitting = self.lying & central
+        if not fitting.any():
+            fitting = self.squat & central & (self.top <= self.floor + BENEATH * self.size[UP])
+            fitting &= self.face >= SEATLIKE * self.size[DEPTH] * self.size[SIDE]
         self.main: Mask = np.zeros(self.count, bool)
         self.main_low, self.main_high = first, last
         if fitting.any():
-            cover = self._cover()
+            cover = np.where(self.lying, self._cover(), self.face)
             able = np.flatnonzero(fitting & (cover >= SEATLIKE * cover[fitting].max()))
             chosen = able[self.top[able].argmax()]
             self.main[chosen] = True

@@ -62,7 +62,8 @@ SEATING: tuple[Rule, ...] = (
     ("base", lambda p: p.below & p.grounded & (p.top < p.main_high[UP] + p.near) & (p.span > 0.3) & ~p.slender),
     ("shelf", lambda p: p.wide & p.below & (p.top < p.main_low[UP] - 1.5 * p.near)),
     ("cushion", lambda p: p.wide & p.beside & p.padded & (p.bottom >= p.main_low[UP] - p.near)),
-    ("seat", lambda p: p.wide & (p.main | p.beside | p.below) & (p.top <= p.main_high[UP] + 2 * p.near)),
+    ("base", lambda p: p.main & ~p.lying & p.grounded),
+    ("seat", lambda p: p.main | (p.wide & (p.beside | p.below) & (p.top <= p.main_high[UP] + 2 * p.near))),
     # What goes on above the seat from the ground is a leg all the same.
     ("leg", lambda p: p.rising & p.grounded & p.upright),
     # Behind: a back, its rails and slats, its posts.

@@ -6,11 +6,11 @@
 
 One line of JSON is kept for every shape, method and number of blocks; a run that was stopped goes on where it was.
 Packs with points give the methods ``search`` (mesh points given) and ``search, voxels alone``; packs without give
-``search``. ``greedy boxes`` and ``greedy boxes, refined`` are the baselines of the measuring protocol. ``search`` is
+``search``.  ``greedy boxes`` and ``greedy boxes, refined`` are the baselines of the measuring protocol.  ``search`` is
 the search without a generator and without a memory, ``search, recalling`` the one with a memory alone, ``generator`` a
 single pass of the weights, and ``generator + search`` what ``shapeprog infer --paper`` does with them, at about the
-time of ``search`` or after 60 rounds. ``all statements`` is what ``shapeprog infer --no-ties`` does. What has no
-weights or no points to work with is left out. There is no time budget: the seed alone decides.
+time of ``search`` or after 60 rounds.  ``all statements`` is what ``shapeprog infer --no-ties`` does.  What has no
+weights or no points to work with is left out.  There is no time budget: the seed alone decides.
 """
 
 from __future__ import annotations

@@ -115,11 +115,12 @@ class Parts:
         self.up, self.depth, self.side = (2 * half[every, axis] for axis in (up, depth, 3 - up - depth))
         self.thin, self.middle, self.long = 2 * np.sort(half, 1).T
         self.face = self.depth * self.side
-        self.squat: Mask = (self.up <= STOOL * np.sqrt(self.face)) & (steep[every, up] >= UPWARD)
         self.surface = 2 * (self.up * self.depth + self.depth * self.side + self.side * self.up)
         self.rise = steep[every, half.argmax(1)]
-        self.lying: Mask = (self.up <= FLAT * np.sqrt(self.face)) & (steep[every, up] >= UPWARD)
-        self.flat: Mask = self.up <= PLATE * np.sqrt(self.face)
+        straight, square = steep[every, up] >= UPWARD, np.sqrt(self.face)
+        self.lying: Mask = (self.up <= FLAT * square) & straight
+        self.squat: Mask = (self.up <= STOOL * square) & straight
+        self.flat: Mask = self.up <= PLATE * square
         self.slender: Mask = self.middle <= SLENDER * self.long
         self.upright: Mask = self.slender & (self.rise >= UPRIGHT)
         self.level: Mask = self.slender & (self.rise <= LEVEL)
@@ -137,14 +138,14 @@ class Parts:
         self.floor = float(first[UP])
         off = centre - (first + last) / 2
         central = (off[:, DEPTH] <= REAR * self.size[DEPTH]) & (np.abs(off[:, SIDE]) <= self.size[SIDE] / 4)
-        fitting = self.lying & central
+        fitting, cover = self.lying & central, self._cover()
         if not fitting.any():
+            cover = self.face
             fitting = self.squat & central & (self.top <= self.floor + BENEATH * self.size[UP])
             fitting &= self.face >= SEATLIKE * self.size[DEPTH] * self.size[SIDE]
         self.main: Mask = np.zeros(self.count, bool)
         self.main_low, self.main_high = first, last
         if fitting.any():
-            cover = np.where(self.lying, self._cover(), self.face)
             able = np.flatnonzero(fitting & (cover >= SEATLIKE * cover[fitting].max()))
             chosen = able[self.top[able].argmax()]
             self.main[chosen] = True

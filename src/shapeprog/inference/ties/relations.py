@@ -84,7 +84,7 @@ class Relation(NamedTuple):
 
 
 def relations(
-    known: list[Feature], numbers: FloatArray, touching: set[tuple[int, int]], worth: Worth = INFERRED
+    known: list[Feature], numbers: FloatArray, touching: set[tuple[int, int]], worth: Worth
 ) -> list[Relation]:
     """Relations that nearly hold, each once, with the highest trust that any of its readings has.
 
@@ -97,18 +97,19 @@ def relations(
     worth
         What relations are worth in such a program.
     """
-    offered = [(row, trust) for row, trust in _candidates(known, numbers, touching, worth) if row.any()]
+    offered = [(row, kind) for row, kind in _candidates(known, numbers, touching) if row.any()]
     if not offered:
         return []
-    rows, trust = np.stack([row for row, _ in offered]), np.array([trust for _, trust in offered])
+    rows, kinds = np.stack([row for row, _ in offered]), np.array([kind for _, kind in offered])
+    trust = np.array([getattr(worth, kind) for _, kind in offered])
     used = rows != 0
     tidy = rows / np.take_along_axis(rows, used.argmax(1)[:, None], 1)
     off = np.abs(tidy @ numbers) / np.abs(tidy).max(1)
     angles = np.any([each.row != 0 for each in known if each.kind == "angle"] or np.zeros((1, len(numbers)), bool), 0)
     near = off < np.where(used[:, angles].any(1), DEGREES, WITHIN)
     hidden = ~near & ~used[:, angles].any(1) & (off < JOINED)
-    for visible, buried in ((worth.centred, BURIED), (worth.holding, worth.chance)):
-        here = hidden & (trust == visible)
+    for kind, buried in (("centred", BURIED), ("holding", worth.chance)):
+        here = hidden & (kinds == kind)
         trust[here], near[here] = buried, True
     trust *= np.minimum(1.0, SIMPLE / used.sum(1))
     found: dict[bytes, Relation] = {}
@@ -120,8 +121,9 @@ def relations(
 
 
 def _candidates(
-    known: list[Feature], numbers: FloatArray, touching: set[tuple[int, int]], worth: Worth
-) -> Iterator[tuple[FloatArray, float]]:
+    known: list[Feature], numbers: FloatArray, touching: set[tuple[int, int]]
+) -> Iterator[tuple[FloatArray, str]]:
+    """Rows that may be relations, and what each would be: the name of its worth."""
     whole = {each.axis: each for each in known if each.kind == "extent"}
     places = [each for each in known if each.kind in ("low", "high", "middle", "place")]
     ends: Ends = {(each.node, each.all, each.axis, each.kind): each.at(numbers) for each in places}
@@ -131,42 +133,42 @@ def _candidates(
         for one in here:
             level = one.kind == "middle"
             if axis in (DEPTH, SIDE):
-                yield one.row, worth.centred if level else worth.possible
+                yield one.row, "centred" if level else "possible"
             if not level:
-                yield one.row - whole[axis].row / 2, worth.sure
-                yield one.row + whole[axis].row / 2, worth.holding if axis == UP else worth.sure
+                yield one.row - whole[axis].row / 2, "sure"
+                yield one.row + whole[axis].row / 2, "holding" if axis == UP else "sure"
         for one, two, flush, mirrored in _near(here, numbers):
             middles = (one.kind == "middle") + (two.kind == "middle")
             if one.kind == two.kind == "place" and one.node == two.node:  # the ends of one part
                 if flush:
-                    yield one.row - two.row, worth.centred if axis != SIDE and one.node in across else worth.sure
+                    yield one.row - two.row, "centred" if axis != SIDE and one.node in across else "sure"
                 if mirrored and axis in (DEPTH, SIDE):
-                    yield one.row + two.row, worth.centred if axis == SIDE else worth.likely
+                    yield one.row + two.row, "centred" if axis == SIDE else "likely"
                 continue
             if middles == 1 or (one.node == two.node and one.all == two.all):
                 continue
             pair = (min(one.node, two.node), max(one.node, two.node))
             if flush and (one.kind == two.kind or not _edge(one, two, ends, mirror=False)):
-                yield one.row - two.row, worth.holding if pair in touching and not middles else worth.likely
+                yield one.row - two.row, "holding" if pair in touching and not middles else "likely"
             if mirrored and axis in (DEPTH, SIDE) and not (one.kind == two.kind and _edge(one, two, ends, mirror=True)):
-                yield one.row + two.row, worth.likely if middles == 0 else worth.possible
+                yield one.row + two.row, "likely" if middles == 0 else "possible"
     for run in known:  # the gap between the run and a part is that between its copies
         facing = {"before": "high", "behind": "low"}.get(run.kind)
         for side in places:
             if side.kind == facing and side.axis == run.axis and side.node != run.node:
-                yield run.row - side.row, worth.likely
+                yield run.row - side.row, "likely"
     for kind in ("length", "radius", "shift", "angle"):
         alike = [each for each in known if each.kind == kind]
         for one, two, same, opposite in _near(alike, numbers):
             thin = kind == "length" and max(abs(one.at(numbers)), abs(two.at(numbers))) < THIN
             if same:
-                yield one.row - two.row, worth.likely if one.axis == two.axis or thin else worth.chance
+                yield one.row - two.row, "likely" if one.axis == two.axis or thin else "chance"
             if opposite and kind in ("shift", "angle"):
-                yield one.row + two.row, worth.possible
+                yield one.row + two.row, "possible"
     lengths = [(each, each.at(numbers)) for each in known if each.kind in ("length", "extent") and each.axis >= 0]
     for (one, far), (two, near) in permutations(lengths, 2):
         if one.axis == two.axis and near > THIN and (times := round(far / near)) in RATIOS:
-            yield one.row - times * two.row, worth.ratio
+            yield one.row - times * two.row, "ratio"
 
 
 def _across(places: Sequence[Feature], numbers: FloatArray) -> set[int]:

@@ -7,9 +7,9 @@ every length as one of the extents.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import math
+from collections.abc import Callable, Iterator, Sequence
 from itertools import product
-from math import prod
 from typing import NamedTuple
 
 import numpy as np
@@ -22,6 +22,7 @@ from shapeprog.geometry.distance import signed_distance
 from shapeprog.geometry.primitive import safe_norm
 from shapeprog.geometry.scene import Scene
 from shapeprog.geometry.surface import has_surface, sample_surface
+from shapeprog.inference.refine import single_threaded
 from shapeprog.inference.tunable import ROW, THINNEST
 from shapeprog.language.hints import Box
 from shapeprog.language.parameters import Parameter, Quantity, to_float32
@@ -116,61 +117,71 @@ class Linear(NamedTuple):
 
 
 class Renderer:
-    """What a statement draws for numbers (..., V); how it is unrolled is worked out once for each shape of them."""
+    """What B statements draw, each for numbers of its own, of which it takes the first.
 
-    def __init__(self, declared: Statement) -> None:
-        self.declared = declared
+    How they are unrolled is worked out once for each number of copies.
+    """
+
+    def __init__(self, statements: Sequence[Statement]) -> None:
+        self.statements = statements
+        self._ids = torch.tensor([declared.id for declared in statements])
         self._plans: dict[torch.Size, Plan] = {}
 
-    def __call__(self, values: Float[Tensor, "*batch V"]) -> Scene:
-        """A scene for each row of numbers, with gradient."""
+    def __call__(self, values: Float[Tensor, "B *copies V"]) -> Scene:
+        """A scene for each row of numbers, with gradient; of every statement there may be several."""
         shape, parameters = values.shape[:-1], values[..., None, None, :]
         if shape not in self._plans:
-            self._plans[shape] = Plan(Code(torch.full((*shape, 1, 1), self.declared.id), parameters))
+            ids = self._ids.reshape(-1, *(1 for _ in shape[1:])).expand(shape)
+            self._plans[shape] = Plan(Code(ids[..., None, None], parameters))
         return self._plans[shape].scene(parameters)
+
+    def table(self, of: Callable[[Quantity], float], rest: float) -> Float[Tensor, "B V"]:
+        """Something of the quantity of every number, and what stands for it where a statement takes no more."""
+        rows = [[of(quantity) for quantity in declared.quantities] for declared in self.statements]
+        most = max(map(len, rows))
+        return torch.tensor([row + [rest] * (most - len(row)) for row in rows], dtype=torch.float64)
 
 
 def fit(declared: Statement, boxes: Sequence[Box], target: Target, seed: int = 0) -> list[Draw]:
     """The statement fitted to each piece, from many starts in its box; the same for the same seed."""
     if not boxes:
         return []
-    render = Renderer(declared)
     random, generator = np.random.default_rng(seed), torch.Generator().manual_seed(seed)
     started = [_some(starts(declared, box), random) for box in boxes]
     owner = torch.from_numpy(np.repeat(np.arange(len(boxes)), [len(each) for each in started]))
     values = torch.from_numpy(np.concatenate(started))
 
     def best(count: int) -> Int[Tensor, " C"]:
-        off = _misfit(render, values, target.take(owner), generator)
+        off = _misfit(Renderer([declared] * len(values)), values, target.take(owner), generator)
         mine = [(owner == number).nonzero()[:, 0] for number in range(len(boxes))]
         return torch.cat([here[off[here].argsort(stable=True)[:count]] for here in mine])
 
     chosen = best(BEST)
     values, owner = values[chosen], owner[chosen]
-    values = _descended(render, values, target.take(owner), generator)
-    return _draws(declared, values[best(1)])
+    values = _descended(Renderer([declared] * len(values)), values, target.take(owner), generator)
+    return [_draw(declared, row) for row in values[best(1)].tolist()]
 
 
 def improve(drawn: Sequence[Draw], target: Target, seed: int = 0) -> list[Draw]:
     """Statements fitted each to its own points, from the numbers that they have."""
-    generator, found = torch.Generator().manual_seed(seed), list(drawn)
-    for name in dict.fromkeys(draw.name for draw in drawn):
-        mine = [place for place, draw in enumerate(drawn) if draw.name == name]
-        values = torch.tensor([drawn[place].values for place in mine], dtype=torch.float64)
-        values = _descended(Renderer(language()[name]), values, target.take(torch.tensor(mine)), generator)
-        for place, draw in zip(mine, _draws(language()[name], values), strict=True):
-            found[place] = draw
-    return found
+    if not drawn:
+        return []
+    statements = [language()[draw.name] for draw in drawn]
+    values = torch.zeros(len(drawn), max(len(draw.values) for draw in drawn), dtype=torch.float64)
+    for row, draw in zip(values, drawn, strict=True):
+        row[: len(draw.values)] = torch.tensor(draw.values)
+    values = _descended(Renderer(statements), values, target, torch.Generator().manual_seed(seed))
+    return [_draw(declared, row) for declared, row in zip(statements, values.tolist(), strict=True)]
 
 
-def _draws(declared: Statement, values: Float[Tensor, "B V"]) -> list[Draw]:
-    return [Draw(declared.name, tuple(map(to_float32, row))) for row in values.tolist()]
+def _draw(declared: Statement, values: Sequence[float]) -> Draw:
+    return Draw(declared.name, tuple(map(to_float32, values[: len(declared.quantities)])))
 
 
 def starts(declared: Statement, box: Box) -> FloatArray:
     """All starts (S, slots) of a statement in a box: every combination of what each parameter may start as."""
     options = [_options(parameter, box) for parameter in declared.parameters]
-    many = prod(map(len, options))
+    many = math.prod(map(len, options))
     if many > STARTS**2:  # too many to list: those of each parameter in turn, out of step with each other
         rows = [[each[(row // (k + 1)) % len(each)] for k, each in enumerate(options)] for row in range(STARTS**2)]
         return np.array([np.concatenate(row) for row in rows])
@@ -220,19 +231,18 @@ def _descended(
     render: Renderer, values: Float[Tensor, "B V"], target: Target, generator: torch.Generator
 ) -> Float[Tensor, "B V"]:
     """The numbers after some steps of Gauss and Newton, in which residuals of ever fewer cells count."""
-    quantities = render.declared.quantities
-    free = torch.tensor([not quantity.discrete for quantity in quantities])
-    lengths = torch.tensor([quantity.kind == "length" for quantity in quantities])
-    scale = torch.tensor([0.1 if quantity.kind == "angle" else 1.0 for quantity in quantities], dtype=values.dtype)
-    low = torch.where(lengths, THINNEST, -torch.inf).to(values)
-    damping = torch.diag(torch.where(free, DAMPING * scale**2, 1.0))
-    for step in range(STEPS):
-        width = WIDEST * (NARROWEST / WIDEST) ** (step / (STEPS - 1))
-        off, weights, slopes = _linear(render, values, target, generator)
-        slopes = slopes * free
-        weighted = (weights * (width**2 / (width**2 + off**2)) ** 2)[..., None] * slopes
-        move = -torch.linalg.solve(weighted.mT @ slopes + damping, (weighted * off[..., None]).sum(1))
-        values = torch.maximum(values + (move * scale).clamp(-FARTHEST, FARTHEST) / scale, low)
+    free = render.table(lambda quantity: not quantity.discrete, 0.0)
+    scale = render.table(lambda quantity: 0.1 if quantity.kind == "angle" else 1.0, 1.0)
+    low = render.table(lambda quantity: THINNEST if quantity.kind == "length" else -math.inf, -math.inf)
+    damping = torch.diag_embed(torch.where(free > 0, DAMPING * scale**2, 1.0))
+    with single_threaded():
+        for step in range(STEPS):
+            width = WIDEST * (NARROWEST / WIDEST) ** (step / (STEPS - 1))
+            off, weights, slopes = _linear(render, values, target, generator)
+            slopes = slopes * free[:, None]
+            weighted = (weights * (width**2 / (width**2 + off**2)) ** 2)[..., None] * slopes
+            move = -torch.linalg.solve(weighted.mT @ slopes + damping, (weighted * off[..., None]).sum(1))
+            values = torch.maximum(values + (move * scale).clamp(-FARTHEST, FARTHEST) / scale, low)
     return values
 
 
@@ -244,8 +254,7 @@ def _misfit(
     drawn = has_surface(scene)
     off = torch.full_like(values[:, 0], torch.inf)
     if drawn.any():
-        here = target.take(drawn.nonzero()[:, 0])
-        scene = render(values[drawn])
+        here, scene = target.take(drawn.nonzero()[:, 0]), scene[drawn]
         beside = here.beside.requires_grad_()
         found = _compared(
             here, beside, signed_distance(scene, beside), sample_surface(scene, SAMPLES, generator).points
@@ -261,7 +270,9 @@ def _linear(render: Renderer, values: Float[Tensor, "B V"], target: Target, gene
     Every residual has the primitives to itself, so one backward pass tells how they move it; how the numbers move them
     is known from another, in which a copy of the program has each number of each primitive to itself.
     """
-    scene = render(values)
+    moving = values[:, None].expand(-1, ROW, -1).clone().requires_grad_()
+    moved = render(moving)
+    scene = Batch(*(each[:, 0].detach() for each in (moved.kind, moved.size, moved.centre, moved.rotation, moved.mask)))
     drawn = has_surface(scene).nonzero()[:, 0]
     here, count, rows = target.take(drawn), len(values), target.points.shape[1] + SAMPLES
     off, weights, slopes = (values.new_zeros(count, rows, *rest) for rest in ((), (), values.shape[1:]))
@@ -281,19 +292,20 @@ def _linear(render: Renderer, values: Float[Tensor, "B V"], target: Target, gene
         sample = sample_surface(copies(slice(-SAMPLES, None)), 1, generator).points[:, :, 0]
         found = _compared(here, beside, ahead, sample)
         moves = torch.cat([each.flatten(3) for each in torch.autograd.grad(found.off.sum(), leaves)], -1)
-        slopes[drawn] = (moves.nan_to_num(0).flatten(2) @ _moved(render, values[drawn]).flatten(1, 2)).to(slopes)
+        slopes[drawn] = (moves.nan_to_num(0).flatten(2) @ _moved(moved, moving)[drawn].flatten(1, 2)).to(slopes)
         off[drawn], weights[drawn] = found.off.detach(), found.weights
     return Linear(off, weights, slopes)
 
 
-def _moved(render: Renderer, values: Float[Tensor, "B V"]) -> Float[Tensor, "B N 16 V"]:
-    """How sizes, centre and rotation of every primitive of each program follow its numbers."""
-    inner = values[:, None].expand(-1, ROW, -1).clone().requires_grad_()
-    scene = render(inner)
+def _moved(scene: Scene, moving: Float[Tensor, "B 16 V"]) -> Float[Tensor, "B N 16 V"]:
+    """How sizes, centre and rotation of every primitive of each program follow its numbers.
+
+    The scene is that of 16 copies of the numbers: one for each number of a primitive.
+    """
     rows = torch.cat([scene.size, scene.centre, scene.rotation.flatten(-2)], -1)  # (B, 16, N, 16)
     which = torch.arange(ROW)
     found = [
-        torch.autograd.grad(rows[:, which, slot, which].sum(), inner, retain_graph=True)[0]
+        torch.autograd.grad(rows[:, which, slot, which].sum(), moving, retain_graph=True)[0]
         for slot in range(rows.shape[2])
     ]
     return torch.stack(found, 1).nan_to_num(0)

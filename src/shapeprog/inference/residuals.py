@@ -148,18 +148,19 @@ def pull(scene: Scene, pairs: Pairs, width: float) -> Pull:
     """What the pairs ask of every primitive, where residuals of ``width`` cells count for a quarter."""
     single, leaves = rows_of(scene, pairs.slots)
     at = pairs.points[:, None].clone().requires_grad_()
-    value = signed_distance(single, at)[:, 0]
-    (slope,) = torch.autograd.grad(value.sum(), at)
-    value, slope = value.detach(), slope[:, 0]
-    cosine = (slope * pairs.normals).sum(1)
+    level = signed_distance(single, at)[:, 0]
+    slope, *by = torch.autograd.grad(level.sum(), [at, *leaves])
+    value, by_row = level.detach(), torch.cat([each.flatten(1) for each in by], 1)
+    cosine = (slope[:, 0] * pairs.normals).sum(1)
     plane = ((pairs.points - pairs.places) * pairs.normals).sum(1)
     same = (cosine >= SAME) | pairs.anywhere
     residual = torch.where(same, value, plane)
     taken = pairs.either & ~same & (value.abs() < OTHER * plane.abs())
-    at = torch.where(same[:, None], pairs.points, pairs.places + 1e-3 * pairs.normals)[:, None]
-    by_row = torch.cat([each.flatten(1) for each in torch.autograd.grad(
-        signed_distance(single, at).sum(), leaves
-    )], 1)  # fmt: skip
+    if len(others := (~same).nonzero()[:, 0]):  # the nearest place is on another face: the plane at the sample is meant
+        single, leaves = rows_of(scene, pairs.slots[others])
+        at = (pairs.places + 1e-3 * pairs.normals)[others, None]
+        there = torch.autograd.grad(signed_distance(single, at).sum(), leaves)
+        by_row[others] = torch.cat([each.flatten(1) for each in there], 1)
     robust = (width**2 / (width**2 + residual**2 + pairs.offset)) ** 2
     weight = torch.where(taken, 0.0, pairs.weights * robust)
     count = len(scene.mask)

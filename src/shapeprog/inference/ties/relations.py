@@ -19,7 +19,8 @@ DEGREES = 2.0
 """The same for angles, in degrees."""
 
 THIN = 3.0
-"""Cells below which lengths along different axes may well be the two sides of one section."""
+"""Cells below which lengths along different axes may well be the two sides of one section; others are equal by chance:
+a leg as high as the seat is deep."""
 
 
 class Worth(NamedTuple):
@@ -31,10 +32,13 @@ class Worth(NamedTuple):
         For parts that are their own mirror image.
     holding
         For relations that hold touching parts together when a number is changed.
-    sure, likely, possible, chance
-        For such as furniture is built by, are common, are possible, and are mostly chance.
+    sure, likely, possible
+        For such as furniture is built by, are common, and are possible.
     ratio
         For lengths that are a simple multiple of others along an axis.
+    buried, inside
+        For relations of parts that are their own mirror image, and for those that hold touching parts together, where
+        they are off by so much that only hidden surfaces can be meant; others are worth nothing there.
     """
 
     centred: float
@@ -42,19 +46,16 @@ class Worth(NamedTuple):
     sure: float
     likely: float
     possible: float
-    chance: float
     ratio: float
+    buried: float
+    inside: float
 
 
-INFERRED = Worth(centred=4.0, holding=1.2, sure=1.0, likely=0.6, possible=0.25, chance=0.03, ratio=0.1)
+INFERRED = Worth(centred=4.0, holding=1.2, sure=1.0, likely=0.6, possible=0.25, ratio=0.1, buried=1.3, inside=0.03)
 """In programs that inference found, whose numbers may be off by as much as nobody sees; chosen on val."""
 
-WRITTEN = Worth(centred=4.0, holding=0.9, sure=0.8, likely=0.25, possible=0.25, chance=0.03, ratio=0.1)
+WRITTEN = Worth(centred=4.0, holding=0.9, sure=0.8, likely=0.25, possible=0.25, ratio=0.1, buried=1.3, inside=0.03)
 """In programs that somebody wrote: numbers that are known are rarely off by much; chosen on planted programs."""
-
-BURIED = 1.3
-"""What relations of parts that are their own mirror image are worth where they are off by so much that only hidden
-surfaces can be meant; those that hold parts together are chance there, all others nothing."""
 
 RATIOS = (2, 3)
 """How many times as long one part may be as another along an axis by design: where parts have many lengths, some are
@@ -108,7 +109,7 @@ def relations(
     angles = np.any([each.row != 0 for each in known if each.kind == "angle"] or np.zeros((1, len(numbers)), bool), 0)
     near = off < np.where(used[:, angles].any(1), DEGREES, WITHIN)
     hidden = ~near & ~used[:, angles].any(1) & (off < JOINED)
-    for kind, buried in (("centred", BURIED), ("holding", worth.chance)):
+    for kind, buried in (("centred", worth.buried), ("holding", worth.inside)):
         here = hidden & (kinds == kind)
         trust[here], near[here] = buried, True
     trust *= np.minimum(1.0, SIMPLE / used.sum(1))
@@ -161,8 +162,8 @@ def _candidates(
         alike = [each for each in known if each.kind == kind]
         for one, two, same, opposite in _near(alike, numbers):
             thin = kind == "length" and max(abs(one.at(numbers)), abs(two.at(numbers))) < THIN
-            if same:
-                yield one.row - two.row, "likely" if one.axis == two.axis or thin else "chance"
+            if same and (one.axis == two.axis or thin):
+                yield one.row - two.row, "likely"
             if opposite and kind in ("shift", "angle"):
                 yield one.row + two.row, "possible"
     lengths = [(each, each.at(numbers)) for each in known if each.kind in ("length", "extent") and each.axis >= 0]

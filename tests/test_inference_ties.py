@@ -23,7 +23,7 @@ from shapeprog.inference.ties.following import Following
 from shapeprog.inference.ties.leaning import between_ends
 from shapeprog.inference.ties.opposite import as_images
 from shapeprog.inference.ties.pricing import worthwhile
-from shapeprog.inference.ties.relations import Relation
+from shapeprog.inference.ties.relations import INFERRED, Relation, relations
 from shapeprog.inference.ties.runs import plural
 from shapeprog.inference.ties.tying import tie
 from shapeprog.inference.tunable import Tunable
@@ -495,6 +495,20 @@ def test_the_first_line_says_where_heights_and_insets_begin():
     assert ("above the floor" in first) == bool(ends & {"top", "bottom", "up"})
     assert ("from the side" in first) == ("inset" in ends)
     assert ("from front or rear" in first) == ("setback" in ends)
+
+
+@pytest.mark.parametrize(("first", "second", "alike"), [
+    ("(1.5, 6, 7)", "(9, 1.5, 3)", True),  # thickness of a board, section of a bar: both are thin
+    ("(9.5, 6, 7)", "(2, 9.5, 3)", False),  # as high as the other is deep, by chance
+    ("(9.5, 6, 7)", "(9.5, 2, 3)", True),
+])  # fmt: skip
+def test_lengths_along_different_axes_are_one_only_where_they_are_thin(first: str, second: str, alike: bool):
+    tunable = Tunable(sp.parse(f"box(at=(0.3, 1.1, 2.2), size={first})\nbox(at=(0.9, -7.4, -9.7), size={second})\n"))
+    numbers = np.append(tunable.values.numpy(), [24.0, 24.0, 24.0])
+    known = features(tunable, tunable.poses(tunable.values))
+    found = [relation.row for relation in relations(known, numbers, set(), INFERRED)]
+    lengths = [f for f, (_, slot) in enumerate(tunable.moving) if slot >= 3]
+    assert any(np.flatnonzero(row).size == 2 and set(np.flatnonzero(row)) <= set(lengths) for row in found) == alike
 
 
 @pytest.mark.parametrize("times", [2, 3])

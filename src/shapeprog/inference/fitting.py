@@ -23,7 +23,7 @@ from shapeprog.geometry.primitive import safe_norm
 from shapeprog.geometry.scene import Scene
 from shapeprog.geometry.surface import has_surface, sample_surface
 from shapeprog.inference.refine import single_threaded
-from shapeprog.inference.tunable import ROW, THINNEST
+from shapeprog.inference.tunable import ROW, least
 from shapeprog.language.hints import Box
 from shapeprog.language.parameters import Parameter, Quantity, to_float32
 from shapeprog.language.program import Draw
@@ -233,7 +233,7 @@ def _descended(
     """The numbers after some steps of Gauss and Newton, in which residuals of ever fewer cells count."""
     free = render.table(lambda quantity: not quantity.discrete, 0.0)
     scale = render.table(lambda quantity: 0.1 if quantity.kind == "angle" else 1.0, 1.0)
-    low = render.table(lambda quantity: THINNEST if quantity.kind == "length" else -math.inf, -math.inf)
+    low = render.table(least, -math.inf)
     damping = torch.diag_embed(torch.where(free > 0, DAMPING * scale**2, 1.0))
     with single_threaded():
         for step in range(STEPS):

@@ -28,8 +28,8 @@ class Worth(NamedTuple):
 
     Parameters
     ----------
-    centred
-        For parts that are their own mirror image.
+    centred, even
+        For parts that are their own mirror image, left and right; and for those that lie in the middle of the depth.
     holding
         For relations that hold touching parts together when a number is changed.
     sure, likely, possible
@@ -42,6 +42,7 @@ class Worth(NamedTuple):
     """
 
     centred: float
+    even: float
     holding: float
     sure: float
     likely: float
@@ -51,10 +52,14 @@ class Worth(NamedTuple):
     inside: float
 
 
-INFERRED = Worth(centred=4.0, holding=1.2, sure=1.0, likely=0.6, possible=0.25, ratio=0.1, buried=1.3, inside=0.03)
+INFERRED = Worth(
+    centred=4.0, even=4.0, holding=1.2, sure=1.0, likely=0.6, possible=0.25, ratio=0.1, buried=1.3, inside=0.03
+)
 """In programs that inference found, whose numbers may be off by as much as nobody sees; chosen on val."""
 
-WRITTEN = Worth(centred=4.0, holding=0.9, sure=0.8, likely=0.25, possible=0.25, ratio=0.1, buried=1.3, inside=0.03)
+WRITTEN = Worth(
+    centred=4.0, even=4.0, holding=0.9, sure=0.8, likely=0.25, possible=0.25, ratio=0.1, buried=1.3, inside=0.03
+)
 """In programs that somebody wrote: numbers that are known are rarely off by much; chosen on planted programs."""
 
 RATIOS = (2, 3)
@@ -134,7 +139,7 @@ def _candidates(
         for one in here:
             level = one.kind == "middle"
             if axis in (DEPTH, SIDE):
-                yield one.row, "centred" if level else "possible"
+                yield one.row, ("centred" if axis == SIDE else "even") if level else "possible"
             if not level:
                 yield one.row - whole[axis].row / 2, "sure"
                 yield one.row + whole[axis].row / 2, "holding" if axis == UP else "sure"

@@ -583,3 +583,17 @@ def test_no_relation_is_kept_that_follows_from_others(seed: int):
     numbers, low = random.normal(0, 0.01, count), np.full(count, -np.inf)
     kept, _ = worthwhile(offered, numbers, (curvature + curvature.T) / 2, 1.0, fixed=np.zeros((0, count)), low=low)
     assert 0 < len(kept) == np.linalg.matrix_rank(kept)
+
+
+def test_a_part_with_hidden_ends_stays_between_the_faces_that_it_meets():
+    # From the inner face of the front leg to the outer face of the rear one: nobody sees where in the rear leg it ends.
+    program = sp.parse(
+        "for i in mirror(side):\n"
+        "    leg(at=(-10, -6, 4), size=(20, 2, 2))\n"
+        "    leg(at=(-10, 4, 4), size=(20, 2, 2))\n"
+        "    box(at=(-4, -4.07, 4), size=(1, 10.06, 2))\n"
+        "box(at=(10, -6, -6), size=(2, 12, 12))\n"
+    )
+    tied = sp.inline(tie(program, evidence_of_program(program)).program)
+    box = next(node for node in tied.walk() if node.name == "box")
+    np.testing.assert_allclose([box.values[1], box.values[1] + box.values[4]], [-4, 6], atol=0.05)

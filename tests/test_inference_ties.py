@@ -379,6 +379,16 @@ for i in translate(3, by=(0, 0, c)):
     assert (scene.centre[1] - scene.centre[0]).tolist() == [0, 0, 4]
 
 
+def test_what_an_expression_adds_is_free_and_what_it_multiplies_by_is_not():
+    program = sp.parse("a, b = 3, 4\nbox(at=(a + 1.5, -(b - 2), 0), size=(2 * (a - 0.5), b / 2, 4 - a))\n")
+    assert free_values(program) == [3, 4, 1.5, 2, 0.5, 4]
+    changed = [multiplied(program, place, 2.0).body[0].values for place in range(6)]
+    assert changed[2] == (6, -2, 0, 5, 2, 1)
+    assert changed[3] == (4.5, 0, 0, 5, 2, 1)
+    assert changed[4] == (4.5, -2, 0, 4, 2, 1)
+    assert changed[5] == (4.5, -2, 0, 5, 2, 5)
+
+
 def test_edits_of_two_boxes_that_touch_are_as_known():
     # One stands on the other. Seven of the eight edits that move or stretch in height part or join them as follows.
     program = sp.parse("box(at=(0, -1, -1), size=(2, 2, 2))\nbox(at=(2, -1, -1), size=(2, 2, 2))\n")

@@ -1,18 +1,19 @@
 """The free numbers of a program: those that may be set without another having to follow.
 
-They are the names that stand for plain numbers and all other plain numbers of statements, loops and calls, in the order
-of the text.  Counts, turns and axes are none; neither is a zero, which says that something is left as it is.
+They are the names that stand for plain numbers, all other plain numbers of statements, loops and calls, and those that
+expressions add, in the order of the text.  Counts, turns and axes are none; neither is a zero, which says that
+something is left as it is, nor what an expression multiplies or divides by, which is how it follows from others.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from itertools import count
 
 from shapeprog.language.counts import Counts
 from shapeprog.language.evaluation import evaluated
-from shapeprog.language.expression import Expression, Value
+from shapeprog.language.expression import Binary, Expression, Negative, Value
 from shapeprog.language.parameters import to_float32
 from shapeprog.language.program import Program
 from shapeprog.language.source import (
@@ -67,35 +68,61 @@ def multiplied(program: Program, place: int, factor: float) -> Program:
 
 
 def _places(lines: tuple[Line, ...], counts: Counts) -> Iterator[float]:
+    found: list[float] = []
+
+    def noted(number: float) -> float:
+        found.append(number)
+        return number
+
     for line in lines:
-        yield from (value for value, free in _numbers(line, counts) if free and not isinstance(value, Expression))
+        for value, free in _numbers(line, counts):
+            if free:
+                _mapped(value, noted)
+        yield from found
+        found.clear()
         if isinstance(line, WrittenLoop | Function):
             yield from _places(line.body, counts)
 
 
 def _numbers(line: Line, counts: Counts) -> Iterator[tuple[Value, bool]]:
-    """The numbers on a line, and whether each is free: plain, continuous and not zero."""
+    """The numbers on a line, and whether each may have free ones in it: it is continuous, and no count."""
     if isinstance(line, WrittenDraw | WrittenLoop):
         declared = language()[line.name]
         for value, quantity in zip(line.values, declared.quantities, strict=True):
-            yield value, _plain(value) and not quantity.discrete
+            yield value, not quantity.discrete
     elif isinstance(line, Assignment):
-        yield from ((value, _plain(value) and name not in counts.outside) for name, value in line.numbers)
+        yield from ((value, name not in counts.outside) for name, value in line.numbers)
     elif isinstance(line, Call):
         whole = counts.of.get(line.name, ())
-        yield from ((value, _plain(value) and name not in whole) for name, value in line.arguments)
+        yield from ((value, name not in whole) for name, value in line.arguments)
 
 
-def _plain(value: Value) -> bool:
-    return not isinstance(value, Expression) and value != 0
+def _mapped(value: Value, change: Callable[[float], float]) -> Value:
+    """The number with a change made to all that is free in it, from left to right: itself, or what it adds."""
+    if not isinstance(value, Expression):
+        return change(value) if value else value
+    if isinstance(value, Negative):
+        of = _mapped(value.of, change)
+        assert isinstance(of, Expression)
+        return replace(value, of=of)
+    if not isinstance(value, Binary):
+        return value
+    adds = value.operator in ("+", "-")
+    left, right = value.left, value.right
+    if adds or isinstance(left, Expression):
+        left = _mapped(left, change)
+    if adds or (value.operator == "*" and isinstance(right, Expression)):
+        right = _mapped(right, change)
+    return replace(value, left=left, right=right)
 
 
 def _changed(line: Line, counts: Counts, counter: Iterator[int], place: int, factor: float) -> Line:
     """The line with one free number of the program multiplied."""
-    values = [
-        to_float32(value * factor) if free and not isinstance(value, Expression) and next(counter) == place else value
-        for value, free in _numbers(line, counts)
-    ]
+
+    def changed(number: float) -> float:
+        return to_float32(number * factor) if next(counter) == place else number
+
+    values = [_mapped(value, changed) if free else value for value, free in _numbers(line, counts)]
     found = line if isinstance(line, Function) else with_values(line, values)
     if isinstance(found, WrittenLoop | Function):
         body = tuple(_changed(inner, counts, counter, place, factor) for inner in found.body)

@@ -7,12 +7,13 @@
 The set ``planted`` needs no data: chests of drawers, chairs and tables with calls of three functions that a user might
 have written.  Each is given as its parts.  A call is found where the program calls the same function, and all that it
 draws has IoU >= .5 with what is drawn there.  The other sets are those of :mod:`benchmarks.structure`, val, written
-with the library that ships.
+with the library that ships, or with another (``--library FILE``).
 
 ==========  ============================================================================================================
-method      how a program is written with a library
+method      how a program is written
 ==========  ============================================================================================================
-recognised  once it is inferred
+plain       without a library
+recognised  with functions, once it is inferred
 proposed    the functions compete with single blocks, too
 ==========  ============================================================================================================
 """
@@ -33,7 +34,7 @@ from benchmarks.rows import measure_all, read_rows
 from benchmarks.structure import Task as Object
 from benchmarks.structure import given, objects
 
-METHODS = ("recognised", "proposed")
+METHODS = ("plain", "recognised", "proposed")
 
 COLUMNS = (
     "planted", "found", "statements", "parts", "f1_half_percent", "f1_percent", "silhouette", "one_piece", "numbers",
@@ -71,6 +72,7 @@ class Task:
     name: str
     files: tuple[Path, ...]
     method: str
+    library: Path | None = None
     seed: int = 0
 
 
@@ -123,13 +125,15 @@ def measure(task: Task) -> dict[str, Any]:
     torch.set_num_threads(1)
     own = task.set == "planted"
     text = planted(int(task.name)) if own else ""
-    library = library_of(parse(LIBRARY)) if own else load_library()
+    library = library_of(parse(LIBRARY)) if own else load_library(task.library)
     parts, shape = _apart(text) if own else given(Object(task.set, task.name, task.files, seed=task.seed))
     cpu = time.process_time()
     if task.method == "proposed":
         program = infer(shape, libraries=[library], seed=task.seed, budget=BUDGET).program
     else:
-        program = with_library(infer(shape, seed=task.seed, budget=BUDGET).program, library)
+        program = infer(shape, seed=task.seed, budget=BUDGET).program
+        if task.method == "recognised":
+            program = with_library(program, library)
     seconds = time.process_time() - cpu
     placed = [Triangles(shape.frame.to_grid(vertices), faces) for vertices, faces in parts]
     vertices = np.concatenate([each.vertices for each in placed])
@@ -198,7 +202,7 @@ def tasks(args: argparse.Namespace) -> Iterator[Task]:
             yield Task("planted", str(number), (), method)
         for which in args.sets if args.data else ():
             for name, files in list(objects(args.data, which, "val"))[: args.objects]:
-                yield Task(which, name, files, method)
+                yield Task(which, name, files, method, args.library)
 
 
 def table(path: Path) -> str:
@@ -225,6 +229,7 @@ def main() -> None:
     )
     parser.add_argument("--sets", nargs="*", default=["bench", "cabinet", "ikea"])
     parser.add_argument("--objects", type=int, default=4, help="so many of each set")
+    parser.add_argument("--library", type=Path, default=None, help="functions for --data; without it those that ship")
     parser.add_argument("--programs", type=int, default=20, help="so many planted ones")
     parser.add_argument("--methods", nargs="*", default=list(METHODS), choices=METHODS)
     parser.add_argument("--workers", type=int, default=2)

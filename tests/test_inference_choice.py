@@ -14,7 +14,7 @@ from shapeprog.data.sampling import sample_surface
 from shapeprog.data.shape import Shape
 from shapeprog.geometry.mesh import union_mesh
 from shapeprog.inference import evidence as seen
-from shapeprog.inference.choice import Choice, choose, value
+from shapeprog.inference.choice import Choice, choose, explained, value
 from shapeprog.inference.coverage import (
     Covers,
     Prices,
@@ -101,6 +101,22 @@ def test_what_lies_inside_another_costs_its_price_and_no_more():
     assert value(made, (0, 1)) == pytest.approx(value(made, (0,)) - made.prices[1])
 
 
+def test_what_another_buries_explains_nothing():
+    body, board, side = (
+        parse("locker(at=(-12, -8, -12), size=(24, 16, 24))"),
+        parse("layer(at=(0, 0, 0), thickness=1, half=(6, 9))"),
+        parse("locker(at=(-12, -8, -12), size=(24, 16, 1))"),
+    )
+    vertices, faces = zip(*(union_mesh(unroll(each)) for each in (body, board)), strict=True)
+    both = shape_from_mesh(np.concatenate(vertices), np.concatenate([faces[0], faces[1] + len(vertices[0])]))
+    made = covers([body, board, side], evidence_of(both), Prices())
+    assert explained(made, (1,)) > 0.02  # the board is in the mesh, unseen
+    assert explained(made, (0, 1)) == explained(made, (1, 0)) == explained(made, (0,))
+    assert value(made, (0, 1)) == pytest.approx(value(made, (0,)) - made.prices[1])
+    assert explained(made, (1, 2)) == pytest.approx(explained(made, (1,)) + explained(made, (2,)))
+    assert choose(made, 3).best.chosen == (0,)
+
+
 def test_copies_of_a_loop_hide_each_other(table):
     crossing = "for i in translate(2, by=(0, 3, 0)):\n    locker(at=(-4, -3, -5), size=(6, 6, 10))\n"
     apart = crossing.replace("(0, 3, 0)", "(0, 6.5, 0)")
@@ -136,9 +152,10 @@ def random_covers(seed: int, count: int, free: int = 1) -> Covers:
     random = np.random.default_rng(seed)
     flags = random.random((count, 64 * (2 + free + count))) < 0.25
     weights = np.concatenate([random.random(2) / 64, -random.random(free) / 400])
+    buried = pack((random.random((count, 64 * 2)) < 0.1) & ~flags[:, : 64 * 2])
     rows = pack(flags)
     own = pack(random.random((count, 64)) < 0.5)[:, 0] & ~rows[np.arange(count), 2 + free + np.arange(count)]
-    return Covers(rows, weights, 2, own, random.random(count) / 600, random.random(count) / 50)
+    return Covers(rows, weights, 2, buried, own, random.random(count) / 600, random.random(count) / 50)
 
 
 @pytest.mark.parametrize("seed", range(8))

@@ -38,7 +38,7 @@ def cost_on_cells(
 def covers_of_cells(
     candidates: Sequence[Program], voxels: npt.NDArray[np.bool_], evidence: Evidence, prices: Prices
 ) -> Covers:
-    """What candidates cover of cells (32, 32, 32), each a program of one block; their surface costs nothing."""
+    """What candidates cover of cells (32, 32, 32), each a program of one block; surface neither costs nor hides."""
     scene, count = unroll(candidates).detach(), len(candidates)
     near = replace(evidence, tolerance=TOUCHING)
     wanted, empty = (_in_places(np.argwhere(cells).astype(np.float64) + 0.5 - HALF) for cells in (voxels, ~voxels))
@@ -48,8 +48,8 @@ def covers_of_cells(
     weights = [by_word(np.full(len(places), sign / len(wanted))) for places, sign in ((wanted, 1.0), (empty, -1.0))]
     nothing = np.zeros((count, count), np.uint64)
     return Covers(
-        np.concatenate([*rows, nothing], 1), np.concatenate(weights), rows[0].shape[1], nothing[0].copy(),
-        np.zeros(count), np.array([prices.of(each) for each in candidates]),
+        np.concatenate([*rows, nothing], 1), np.concatenate(weights), rows[0].shape[1], np.zeros_like(rows[0]),
+        nothing[0].copy(), np.zeros(count), np.array([prices.of(each) for each in candidates]),
     )  # fmt: skip
 
 

@@ -3,7 +3,8 @@
     value = share explained - unsupported surface - free space filled - price of what is written
 
 all in shares of the target, see :class:`shapeprog.inference.coverage.Prices`.  A candidate that explains what others
-explain gains nothing and costs its price; surface that lies inside another chosen one costs nothing.
+explain gains nothing and costs its price; surface that lies inside another chosen one costs nothing, and explains
+nothing.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from shapeprog.inference.choice_kernels import search
 from shapeprog.inference.coverage import Bits, Covers
@@ -46,11 +48,10 @@ def choose(covers: Covers, blocks: int, *, rounds: int = ROUNDS, seed: int = 0) 
     bounds = gains - covers.prices
     order = np.argsort(-bounds, kind="stable")
     order = order[bounds[order] > 0]
-    candidate, words = np.nonzero(covers.rows[:, : len(covers.weights)])
-    words, begins = np.ascontiguousarray(words), np.searchsorted(candidate, np.arange(len(covers.rows) + 1))
     search(
-        covers.rows, covers.weights, words, begins, covers.own, covers.charges, covers.prices, bounds, order, rounds,
-        BLINK, seed, values, sets,
+        covers.rows, covers.buried, covers.weights, *_words(covers.rows[:, : len(covers.weights)]),
+        *_words(covers.buried), covers.own, covers.charges, covers.prices, bounds, order, rounds, BLINK, seed, values,
+        sets,
     )  # fmt: skip
     found = [
         Option(tuple(map(int, chosen[:size])), float(value), explained(covers, chosen[:size]))
@@ -60,17 +61,34 @@ def choose(covers: Covers, blocks: int, *, rounds: int = ROUNDS, seed: int = 0) 
     return Choice(max(found, key=lambda option: option.value), tuple(found))
 
 
+def _words(rows: Bits) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
+    """The words that hold bits, row after row, and where those of each row begin."""
+    row, words = np.nonzero(rows)
+    return np.ascontiguousarray(words), np.searchsorted(row, np.arange(len(rows) + 1))
+
+
 def explained(covers: Covers, chosen: Sequence[int] | Array) -> float:
     """Share of the target that some of the candidates explain together."""
+    return float(np.bitwise_count(_seen(covers, chosen)) @ covers.weights[: covers.evidence])
+
+
+def _seen(covers: Covers, chosen: Sequence[int] | Array) -> Bits:
+    """The points (E,) that some of the candidates explain, and none of them buries."""
     union: Bits = np.bitwise_or.reduce(covers.rows[list(chosen), : covers.evidence], axis=0, initial=0)
-    return float(np.bitwise_count(union) @ covers.weights[: covers.evidence])
+    return union & ~_under(covers, chosen)
+
+
+def _under(covers: Covers, chosen: Sequence[int] | Array) -> Bits:
+    """The points (E,) that some of the candidates bury."""
+    found: Bits = np.bitwise_or.reduce(covers.buried[list(chosen)], axis=0, initial=0)
+    return found
 
 
 def missed(covers: Covers, chosen: tuple[int, ...]) -> Array:
     """The candidates that are not chosen, those first that would explain most of what is not explained."""
-    rows = covers.rows[:, : covers.evidence]
-    union: Bits = np.bitwise_or.reduce(rows[list(chosen)], axis=0, initial=0)
-    more = np.bitwise_count(rows & ~union) @ covers.weights[: covers.evidence] - covers.prices
+    done = _seen(covers, chosen) | _under(covers, chosen)
+    more = np.bitwise_count(covers.rows[:, : covers.evidence] & ~done) @ covers.weights[: covers.evidence]
+    more -= covers.prices
     order = np.argsort(-more, kind="stable")
     return order[~np.isin(order, chosen)]
 
@@ -79,6 +97,7 @@ def value(covers: Covers, chosen: tuple[int, ...]) -> float:
     """The value of a set of candidates, by its definition: what the kernel adds up piece by piece."""
     rows, known = covers.rows[list(chosen)], len(covers.weights)
     union: Bits = np.bitwise_or.reduce(rows, axis=0, initial=0)
+    union[: covers.evidence] = _seen(covers, chosen)
     total = float(np.bitwise_count(union[:known]) @ covers.weights)
     for one in chosen:
         total -= covers.prices[one] + covers.charges[one] * int(np.bitwise_count(covers.own[one] & ~union[known + one]))

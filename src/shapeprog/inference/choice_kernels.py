@@ -26,28 +26,43 @@ def gain(rows, weights, words, begins, own, charges, prices, cover, chosen, coun
 
 
 @helper
+def lost(buried, weights, inner, starts, cover, under, candidate):
+    """What the chosen explain, and one more candidate would bury."""
+    total = 0.0
+    for place in range(starts[candidate], starts[candidate + 1]):
+        word = inner[place]
+        total += weights[word] * ones(buried[candidate, word] & cover[word] & ~under[word])
+    return total
+
+
+@helper
 def charge(own, charges, cover, last, candidate):
     """What is charged to a candidate: nobody can gain more by hiding it."""
     return charges[candidate] * ones(own[candidate] & ~cover[last + candidate])
 
 
 @kernel(
-    "void(u8[:, ::1], f8[::1], i8[::1], i8[::1], u8[::1], f8[::1], f8[::1], f8[::1], i8[::1], i8, f8, i8, f8[::1],"
-    " i8[:, ::1])"
+    "void(u8[:, ::1], u8[:, ::1], f8[::1], i8[::1], i8[::1], i8[::1], i8[::1], u8[::1], f8[::1], f8[::1], f8[::1],"
+    " i8[::1], i8, f8, i8, f8[::1], i8[:, ::1])"
 )
-def search(rows, weights, words, begins, own, charges, prices, bounds, order, rounds, blink, seed, values, sets):
+def search(
+    rows, buried, weights, words, begins, inner, starts, own, charges, prices, bounds, order, rounds, blink, seed,
+    values, sets,
+):  # fmt: skip
     """Ruin and recreate: drop some of the chosen, fill up greedily, keep what is no worse; the best set of each size.
 
-    A gain never grows while others are added, but for what is charged to these and could be hidden: one that was known
-    before bounds it, and few have to be found again.  With probability ``blink`` the best candidate is overlooked
-    (Christiaens and Vanden Berghe 2020).
+    A gain never grows while others are added, but for what is charged to these and could be hidden, and for what it
+    buries of theirs: one that was known before, without the latter, bounds it, and few have to be found again.  With
+    probability ``blink`` the best candidate is overlooked (Christiaens and Vanden Berghe 2020).
 
     Parameters
     ----------
-    rows, weights, own, charges, prices
+    rows, buried, weights, own, charges, prices
         See ``Covers``.
     words, begins
         Which of the words with a weight hold bits of each candidate, one after another, and where those of each begin.
+    inner, starts
+        The same for the words of what each buries.
     bounds, order
         What each candidate (C,) is worth alone, if nothing is charged to it but its price; and the falling order.
     rounds, blink, seed
@@ -57,7 +72,7 @@ def search(rows, weights, words, begins, own, charges, prices, bounds, order, ro
         infinity and -1.
     """
     most, last = sets.shape[1], len(weights)
-    cover = np.empty(rows.shape[1], np.uint64)
+    cover, under = np.empty(rows.shape[1], np.uint64), np.empty(buried.shape[1], np.uint64)
     kept, chosen = np.empty(most, np.int64), np.empty(most, np.int64)
     known, since = np.empty(len(rows)), np.empty(len(rows))
     size, best_value, draws = 0, 0.0, 0
@@ -67,14 +82,18 @@ def search(rows, weights, words, begins, own, charges, prices, bounds, order, ro
         dropped = int(uniform(seed, draws + 1) * size)
         draws += 2
         count, value = 0, 0.0
-        cover[:] = np.uint64(0)
+        cover[:] = np.uint64(0)  # what is covered or buried, so that nothing more is gained there
+        under[:] = np.uint64(0)
         for place in range(size):
             draws += 1
             if place == dropped or uniform(seed, draws) < share:
                 continue
             one = kept[place]
             value += gain(rows, weights, words, begins, own, charges, prices, cover, chosen, count, one)
+            value -= lost(buried, weights, inner, starts, cover, under, one)
             cover |= rows[one]
+            cover[: len(under)] |= buried[one]
+            under |= buried[one]
             chosen[count] = one
             count += 1
         since[:] = 0.0
@@ -100,12 +119,15 @@ def search(rows, weights, words, begins, own, charges, prices, bounds, order, ro
                     continue
                 more = gain(rows, weights, words, begins, own, charges, prices, cover, chosen, count, one)
                 known[one], since[one] = more, charged
+                more -= lost(buried, weights, inner, starts, cover, under, one)
                 if more > best:
                     best, found = more, one
             if found < 0:
                 break
             value += best
             cover |= rows[found]
+            cover[: len(under)] |= buried[found]
+            under |= buried[found]
             chosen[count] = found
             count += 1
             charged += charge(own, charges, cover, last, found)

@@ -3,6 +3,7 @@
 A candidate is a program of one block.  All that choosing between them needs is put into bits once:
 
 *   points of the evidence that its surface explains (near enough, with a fitting normal);
+*   points that lie deep inside of it, where nothing that another candidate draws can be seen;
 *   points of space known to be free that it fills;
 *   samples of its own surface that the target gives no reason for.  They are charged by their area, unless a chosen
     candidate holds them, its own other copies included: nobody sees them then.
@@ -100,6 +101,8 @@ class Covers(NamedTuple):
         What a bit of each of the first E + F words is worth, negative for free points.
     evidence
         E, the number of words for points to be explained.
+    buried
+        Of each the points that lie deeper inside it than the tolerance (C, E): none explains what another buries.
     own
         Samples of its own surface that have no reason, and that it does not hide itself (C,).
     charges
@@ -111,6 +114,7 @@ class Covers(NamedTuple):
     rows: Bits
     weights: FloatArray
     evidence: int
+    buried: Bits
     own: Bits
     charges: FloatArray
     prices: FloatArray
@@ -133,6 +137,7 @@ def covers(candidates: Sequence[Program], evidence: Evidence, prices: Prices, se
     scene, count = unroll(candidates).detach(), len(candidates)
     order = np.lexsort((nearby(evidence.points), -evidence.weights))  # so the points of a word weigh nearly the same
     explained = explains(scene, evidence.points[order], evidence.normals[order], evidence)
+    buried = holds(scene, evidence.points[order], evidence.tolerance)
     free, volume = free_points(evidence, seed)
     filled = holds(scene, free, evidence.tolerance)
     places, owners, areas = unsupported(scene, evidence, seed)
@@ -149,7 +154,7 @@ def covers(candidates: Sequence[Program], evidence: Evidence, prices: Prices, se
         by_word(evidence.weights[order]), by_word(np.full(len(free), -prices.free * volume / evidence.area)),
     ])  # fmt: skip
     return Covers(
-        np.concatenate([explained, filled, hidden], 1), weights, explained.shape[1], own,
+        np.concatenate([explained & ~buried, filled, hidden], 1), weights, explained.shape[1], buried, own,
         prices.unsupported / evidence.area * charges, np.array([prices.of(each) for each in candidates]),
     )  # fmt: skip
 

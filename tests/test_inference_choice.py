@@ -168,6 +168,33 @@ def test_the_search_finds_the_best_of_all_sets(seed):
         assert option.value == pytest.approx(value(made, option.chosen))
 
 
+def test_a_body_does_not_stand_in_for_the_boards_around_what_it_buries():
+    """A body explains all that is outside at once; six boards explain that and the inside, and only all together."""
+    boards, words = 6, 2
+    inner, outer = np.zeros((boards + 1, 64), bool), np.zeros((boards + 1, 64), bool)
+    outer[0] = True
+    for board in range(boards):
+        inner[1 + board, board::boards] = outer[1 + board, board::boards] = True
+    buried = np.zeros((boards + 1, 64 * words), bool)
+    buried[0, 64:] = True
+    rows = pack(np.concatenate([outer, inner, np.zeros((boards + 1, 64 * (boards + 1)), bool)], 1))
+    nothing = np.zeros(boards + 1)
+    weights = np.array([0.7, 0.3]) / 64
+    made = Covers(rows, weights, words, pack(buried), nothing.astype(np.uint64), nothing, nothing + 0.01)
+    assert value(made, (0,)) == pytest.approx(0.69)
+    assert all(value(made, (0, *range(1, 1 + size))) < value(made, (0,)) for size in range(1, 1 + boards))
+    found = choose(made, 10)
+    assert set(found.best.chosen) == set(range(1, 1 + boards))
+    assert found.best.value == pytest.approx(0.94)
+    assert found.options[1].chosen == (0,)
+
+
+def test_a_choice_goes_on_from_where_it_is_told_to():
+    made = random_covers(3, 40)
+    best = choose(made, 6, rounds=4000).best
+    assert choose(made, 6, start=best.chosen, rounds=4).best.value >= best.value - 1e-12
+
+
 # ---------------------------------------------------------------- kernels and their twins
 
 

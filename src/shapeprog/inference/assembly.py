@@ -212,10 +212,10 @@ def _improved(
             *neighbours(drawn(adjusted)),
             *split(drawn(adjusted), evidence),
         ]
-        near = list(dict.fromkeys([*parts, *adjusted, *nodes, *rest]))
+        near = list(dict.fromkeys([*parts, *adjusted, *nodes, *rest]))  # the parts first: the search goes on from them
         near += proposed(functions, [part for part in near if not isinstance(part, Called)], deadline)
         more = _covers(near, evidence, prices, seed)
-        better = choose(more, blocks, seed=seed)
+        better = choose(more, blocks, start=range(len(parts)), seed=seed)
         if better.best.value <= choice.best.value + LEAST_GAIN:
             break
         made, choice, candidates = more, better, near

@@ -17,13 +17,16 @@ import numpy.typing as npt
 
 from shapeprog.inference.choice_kernels import search
 from shapeprog.inference.coverage import Bits, Covers
-from shapeprog.space import Array
+from shapeprog.space import Array, FloatArray
 
 ROUNDS = 1000
 """Rounds of ruin and recreate."""
 
 BLINK = 0.05
 """Probability with which a round overlooks a candidate."""
+
+BURYING = (4.0, 1.0)
+"""Prices of what is buried, in what it weighs, with which the search begins."""
 
 
 class Option(NamedTuple):
@@ -34,6 +37,19 @@ class Option(NamedTuple):
     explained: float
 
 
+class Found(NamedTuple):
+    """The best value of each number of blocks (M + 1,) that was found, and its candidates (M + 1, M)."""
+
+    values: FloatArray
+    sets: npt.NDArray[np.int64]
+
+    @property
+    def set(self) -> npt.NDArray[np.int64]:
+        """The best of all; empty if there is none."""
+        size = int(np.argmax(self.values))
+        return self.sets[size, :size].copy()
+
+
 class Choice(NamedTuple):
     """The best option, and the best of each number of blocks that was found: numbers against what is explained."""
 
@@ -41,24 +57,44 @@ class Choice(NamedTuple):
     options: tuple[Option, ...]
 
 
-def choose(covers: Covers, blocks: int, *, rounds: int = ROUNDS, seed: int = 0) -> Choice:
-    """The most valuable at most ``blocks`` of the candidates: greedily, then by ruin and recreate."""
-    values, sets = np.full(blocks + 1, -np.inf), np.full((blocks + 1, blocks), -1, np.int64)
+def choose(covers: Covers, blocks: int, *, start: Sequence[int] = (), rounds: int = ROUNDS, seed: int = 0) -> Choice:
+    """The most valuable at most ``blocks`` of the candidates: greedily, then by ruin and recreate.
+
+    A solid that holds what could be seen without it is a local optimum: greed takes it at once, and no exchange of a
+    few leaves it.  So all that is buried has a price in a first search, which falls while it goes on from the best set;
+    a second one goes on from ``start``.
+    """
     gains = np.bitwise_count(covers.rows[:, : covers.evidence]) @ covers.weights[: covers.evidence]
     bounds = gains - covers.prices
     order = np.argsort(-bounds, kind="stable")
     order = order[bounds[order] > 0]
-    search(
-        covers.rows, covers.buried, covers.weights, *_words(covers.rows[:, : len(covers.weights)]),
-        *_words(covers.buried), covers.own, covers.charges, covers.prices, bounds, order, rounds, BLINK, seed, values,
-        sets,
-    )  # fmt: skip
+    words = *_words(covers.rows[:, : len(covers.weights)]), *_words(covers.buried)
+    searches = len(BURYING) + 2 if covers.buried.any() else 1
+
+    def searched(bury: float, known: Array, found: Found) -> Found:
+        search(
+            covers.rows, covers.buried, covers.weights, *words, covers.own, covers.charges, covers.prices, bury, bounds,
+            order, rounds // searches, BLINK, seed, known, *found,
+        )  # fmt: skip
+        return found
+
+    best = _nothing(blocks)
+    if searches > 1:
+        known = best.set
+        for bury in BURYING:
+            known = searched(bury, known, _nothing(blocks)).set
+        best = searched(0.0, known, best)
+    best = searched(0.0, np.array(start, np.int64), best)
     found = [
         Option(tuple(map(int, chosen[:size])), float(value), explained(covers, chosen[:size]))
-        for size, (value, chosen) in enumerate(zip(values, sets, strict=True))
+        for size, (value, chosen) in enumerate(zip(*best, strict=True))
         if np.isfinite(value)
     ]
     return Choice(max(found, key=lambda option: option.value), tuple(found))
+
+
+def _nothing(blocks: int) -> Found:
+    return Found(np.full(blocks + 1, -np.inf), np.full((blocks + 1, blocks), -1, np.int64))
 
 
 def _words(rows: Bits) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:

@@ -26,12 +26,13 @@ def gain(rows, weights, words, begins, own, charges, prices, cover, chosen, coun
 
 
 @helper
-def lost(buried, weights, inner, starts, cover, under, candidate):
-    """What the chosen explain, and one more candidate would bury."""
+def lost(buried, weights, inner, starts, bury, cover, under, candidate):
+    """What the chosen explain, and one more candidate would bury; and the price of all that it would."""
     total = 0.0
     for place in range(starts[candidate], starts[candidate + 1]):
         word = inner[place]
-        total += weights[word] * ones(buried[candidate, word] & cover[word] & ~under[word])
+        new = buried[candidate, word] & ~under[word]
+        total += weights[word] * (ones(new & cover[word]) + bury * ones(new))
     return total
 
 
@@ -42,12 +43,12 @@ def charge(own, charges, cover, last, candidate):
 
 
 @kernel(
-    "void(u8[:, ::1], u8[:, ::1], f8[::1], i8[::1], i8[::1], i8[::1], i8[::1], u8[::1], f8[::1], f8[::1], f8[::1],"
-    " i8[::1], i8, f8, i8, f8[::1], i8[:, ::1])"
+    "void(u8[:, ::1], u8[:, ::1], f8[::1], i8[::1], i8[::1], i8[::1], i8[::1], u8[::1], f8[::1], f8[::1], f8, f8[::1],"
+    " i8[::1], i8, f8, i8, i8[::1], f8[::1], i8[:, ::1])"
 )
 def search(
-    rows, buried, weights, words, begins, inner, starts, own, charges, prices, bounds, order, rounds, blink, seed,
-    values, sets,
+    rows, buried, weights, words, begins, inner, starts, own, charges, prices, bury, bounds, order, rounds, blink, seed,
+    known_set, values, sets,
 ):  # fmt: skip
     """Ruin and recreate: drop some of the chosen, fill up greedily, keep what is no worse; the best set of each size.
 
@@ -63,20 +64,24 @@ def search(
         Which of the words with a weight hold bits of each candidate, one after another, and where those of each begin.
     inner, starts
         The same for the words of what each buries.
+    bury
+        Price of all that is buried, in what it weighs, whether others explain it or not.
     bounds, order
         What each candidate (C,) is worth alone, if nothing is charged to it but its price; and the falling order.
     rounds, blink, seed
         How often; see above; of the random numbers.
+    known_set
+        Candidates to begin with (S,).
     values, sets
-        Output: the best value of each number of blocks (M + 1,) and its candidates (M + 1, M), come filled with minus
-        infinity and -1.
+        Output: the best value of each number of blocks (M + 1,) and its candidates (M + 1, M), come filled with those
+        of another search, or with minus infinity and -1.
     """
     most, last = sets.shape[1], len(weights)
     cover, under = np.empty(rows.shape[1], np.uint64), np.empty(buried.shape[1], np.uint64)
     kept, chosen = np.empty(most, np.int64), np.empty(most, np.int64)
     known, since = np.empty(len(rows)), np.empty(len(rows))
-    size, best_value, draws = 0, 0.0, 0
-    values[0] = 0.0
+    size, best_value, draws = len(known_set), 0.0, 0
+    kept[:size] = known_set
     for turn in range(rounds + 1):
         share = RUIN_LEAST + (RUIN_MOST - RUIN_LEAST) * uniform(seed, draws)
         dropped = int(uniform(seed, draws + 1) * size)
@@ -86,16 +91,19 @@ def search(
         under[:] = np.uint64(0)
         for place in range(size):
             draws += 1
-            if place == dropped or uniform(seed, draws) < share:
+            if turn > 0 and (place == dropped or uniform(seed, draws) < share):
                 continue
             one = kept[place]
             value += gain(rows, weights, words, begins, own, charges, prices, cover, chosen, count, one)
-            value -= lost(buried, weights, inner, starts, cover, under, one)
+            value -= lost(buried, weights, inner, starts, bury, cover, under, one)
             cover |= rows[one]
             cover[: len(under)] |= buried[one]
             under |= buried[one]
             chosen[count] = one
             count += 1
+        if value > values[count]:
+            values[count] = value
+            sets[count, :count] = chosen[:count]
         since[:] = 0.0
         known[:] = bounds
         charged = 0.0
@@ -119,7 +127,7 @@ def search(
                     continue
                 more = gain(rows, weights, words, begins, own, charges, prices, cover, chosen, count, one)
                 known[one], since[one] = more, charged
-                more -= lost(buried, weights, inner, starts, cover, under, one)
+                more -= lost(buried, weights, inner, starts, bury, cover, under, one)
                 if more > best:
                     best, found = more, one
             if found < 0:

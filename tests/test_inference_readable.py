@@ -59,3 +59,15 @@ def test_a_program_in_its_unit_is_left_as_it_is() -> None:
     program = in_readable_unit(parse(CHAIR), Unit("cm", 3.75))
     assert in_readable_unit(program, Unit("cm", 3.75)) is program
     assert in_readable_unit(in_readable_unit(program, None), Unit("cm", 3.75)) == program
+
+
+def test_several_parts_in_one_loop_are_told_apart() -> None:
+    program = parse(
+        "box(at=(0, 0, -2), size=(4, 4, 4))\n"
+        "for i in mirror(side):\n"
+        "    leg(at=(-4, 0, 0.26), size=(4, 1, 1))\n"
+        "    arm(box(at=(8, 0, 0.26), size=(1, 4, 1)))\n"
+    )
+    assert floating(program) == [2]
+    unit = Unit("cm", 4)
+    assert floating(in_readable_unit(program, unit)) == [2]

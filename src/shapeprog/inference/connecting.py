@@ -70,7 +70,7 @@ def floating(program: Program, seed: int = 0) -> list[int]:
 
 def _apart(program: Program, seed: int) -> list[list[bool]]:
     """For every part of every block, whether it is outside of the largest group."""
-    found: list[list[bool]] = [[] for _ in program.body]
+    found: list[list[bool]] = [[] for _ in range(program.blocks)]
     if not program.size:
         return found
     scene = unroll(encode(program, dtype=torch.float64))

@@ -128,12 +128,10 @@ def measure(task: Task) -> dict[str, Any]:
     library = library_of(parse(LIBRARY)) if own else load_library(task.library)
     parts, shape = _apart(text) if own else given(Object(task.set, task.name, task.files, seed=task.seed))
     cpu = time.process_time()
-    if task.method == "proposed":
-        program = infer(shape, libraries=[library], seed=task.seed, budget=BUDGET).program
-    else:
-        program = infer(shape, seed=task.seed, budget=BUDGET).program
-        if task.method == "recognised":
-            program = with_library(program, library)
+    offered = [library] if task.method == "proposed" else []
+    program = infer(shape, libraries=offered, seed=task.seed, budget=BUDGET).program
+    if task.method == "recognised":
+        program = with_library(program, library)
     seconds = time.process_time() - cpu
     placed = [Triangles(shape.frame.to_grid(vertices), faces) for vertices, faces in parts]
     vertices = np.concatenate([each.vertices for each in placed])

@@ -104,36 +104,30 @@ def _words(rows: Bits) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
 
 
 def explained(covers: Covers, chosen: Sequence[int] | Array) -> float:
-    """Share of the target that some of the candidates explain together."""
-    return float(np.bitwise_count(_seen(covers, chosen)) @ covers.weights[: covers.evidence])
+    """Share of the target that some of the candidates explain together, and none of them buries."""
+    seen = _union(covers.rows[:, : covers.evidence], chosen) & ~_union(covers.buried, chosen)
+    return float(np.bitwise_count(seen) @ covers.weights[: covers.evidence])
 
 
-def _seen(covers: Covers, chosen: Sequence[int] | Array) -> Bits:
-    """The points (E,) that some of the candidates explain, and none of them buries."""
-    union: Bits = np.bitwise_or.reduce(covers.rows[list(chosen), : covers.evidence], axis=0, initial=0)
-    return union & ~_under(covers, chosen)
-
-
-def _under(covers: Covers, chosen: Sequence[int] | Array) -> Bits:
-    """The points (E,) that some of the candidates bury."""
-    found: Bits = np.bitwise_or.reduce(covers.buried[list(chosen)], axis=0, initial=0)
+def _union(rows: Bits, chosen: Sequence[int] | Array) -> Bits:
+    """The bits that are set in any of the chosen rows."""
+    found: Bits = np.bitwise_or.reduce(rows[list(chosen)], axis=0, initial=0)
     return found
 
 
 def missed(covers: Covers, chosen: tuple[int, ...]) -> Array:
     """The candidates that are not chosen, those first that would explain most of what is not explained."""
-    done = _seen(covers, chosen) | _under(covers, chosen)
-    more = np.bitwise_count(covers.rows[:, : covers.evidence] & ~done) @ covers.weights[: covers.evidence]
-    more -= covers.prices
+    rows = covers.rows[:, : covers.evidence]
+    done = _union(rows, chosen) | _union(covers.buried, chosen)
+    more = np.bitwise_count(rows & ~done) @ covers.weights[: covers.evidence] - covers.prices
     order = np.argsort(-more, kind="stable")
     return order[~np.isin(order, chosen)]
 
 
 def value(covers: Covers, chosen: tuple[int, ...]) -> float:
     """The value of a set of candidates, by its definition: what the kernel adds up piece by piece."""
-    rows, known = covers.rows[list(chosen)], len(covers.weights)
-    union: Bits = np.bitwise_or.reduce(rows, axis=0, initial=0)
-    union[: covers.evidence] = _seen(covers, chosen)
+    known, union = len(covers.weights), _union(covers.rows, chosen)
+    union[: covers.evidence] &= ~_union(covers.buried, chosen)
     total = float(np.bitwise_count(union[:known]) @ covers.weights)
     for one in chosen:
         total -= covers.prices[one] + covers.charges[one] * int(np.bitwise_count(covers.own[one] & ~union[known + one]))

@@ -37,6 +37,14 @@ def lost(buried, weights, inner, starts, bury, cover, under, candidate):
 
 
 @helper
+def include(rows, buried, cover, under, candidate):
+    """Have one more candidate cover what it covers, and bury what it buries: nothing more is gained there."""
+    cover |= rows[candidate]
+    cover[: len(under)] |= buried[candidate]
+    under |= buried[candidate]
+
+
+@helper
 def charge(own, charges, cover, last, candidate):
     """What is charged to a candidate: nobody can gain more by hiding it."""
     return charges[candidate] * ones(own[candidate] & ~cover[last + candidate])
@@ -87,7 +95,7 @@ def search(
         dropped = int(uniform(seed, draws + 1) * size)
         draws += 2
         count, value = 0, 0.0
-        cover[:] = np.uint64(0)  # what is covered or buried, so that nothing more is gained there
+        cover[:] = np.uint64(0)
         under[:] = np.uint64(0)
         for place in range(size):
             draws += 1
@@ -96,20 +104,20 @@ def search(
             one = kept[place]
             value += gain(rows, weights, words, begins, own, charges, prices, cover, chosen, count, one)
             value -= lost(buried, weights, inner, starts, bury, cover, under, one)
-            cover |= rows[one]
-            cover[: len(under)] |= buried[one]
-            under |= buried[one]
+            include(rows, buried, cover, under, one)
             chosen[count] = one
             count += 1
-        if value > values[count]:
-            values[count] = value
-            sets[count, :count] = chosen[:count]
         since[:] = 0.0
         known[:] = bounds
         charged = 0.0
         for place in range(count):
             charged += charge(own, charges, cover, last, chosen[place])
-        while count < most:
+        while True:
+            if value > values[count]:
+                values[count] = value
+                sets[count, :count] = chosen[:count]
+            if count == most:
+                break
             best, found, first = 0.0, -1, -1
             for place in range(len(order)):
                 one = order[place]
@@ -133,15 +141,10 @@ def search(
             if found < 0:
                 break
             value += best
-            cover |= rows[found]
-            cover[: len(under)] |= buried[found]
-            under |= buried[found]
+            include(rows, buried, cover, under, found)
             chosen[count] = found
             count += 1
             charged += charge(own, charges, cover, last, found)
-            if value > values[count]:
-                values[count] = value
-                sets[count, :count] = chosen[:count]
         if value >= best_value:
             best_value, size = value, count
             kept[:count] = chosen[:count]

@@ -68,20 +68,24 @@ def multiplied(program: Program, place: int, factor: float) -> Program:
 
 
 def _places(lines: tuple[Line, ...], counts: Counts) -> Iterator[float]:
+    for line in lines:
+        for value, free in _numbers(line, counts):
+            if free:
+                yield from _within(value)
+        if isinstance(line, WrittenLoop | Function):
+            yield from _places(line.body, counts)
+
+
+def _within(value: Value) -> list[float]:
+    """All that is free in a number, from left to right."""
     found: list[float] = []
 
     def noted(number: float) -> float:
         found.append(number)
         return number
 
-    for line in lines:
-        for value, free in _numbers(line, counts):
-            if free:
-                _mapped(value, noted)
-        yield from found
-        found.clear()
-        if isinstance(line, WrittenLoop | Function):
-            yield from _places(line.body, counts)
+    _mapped(value, noted)
+    return found
 
 
 def _numbers(line: Line, counts: Counts) -> Iterator[tuple[Value, bool]]:

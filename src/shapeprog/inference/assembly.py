@@ -24,6 +24,7 @@ from shapeprog.inference.choice import Choice, choose, explained, missed, value
 from shapeprog.inference.connecting import connected
 from shapeprog.inference.coverage import Covers, Prices, covers
 from shapeprog.inference.evidence import Evidence, evidence_of
+from shapeprog.inference.images import images
 from shapeprog.inference.neighbours import neighbours
 from shapeprog.inference.pieces import find_pieces
 from shapeprog.inference.recognition import proposed
@@ -124,11 +125,14 @@ def assemble(
 
     evidence = evidence_of(shape, seed)
     told(0.1)
-    singles = single_candidates(find_pieces(shape, seed), seed)
+    pieces = find_pieces(shape, seed)
+    singles = single_candidates(pieces, seed)
     singles = [singles[place] for place in distinct(singles, looks(singles))] if singles else []
     told(0.5)
     elsewhere = [plain(node) for node in more]
-    found = [*elsewhere, *singles[: MOST_CANDIDATES // 2], *repeated(singles)][:MOST_CANDIDATES]
+    loops = [*repeated(singles), *images(singles, pieces.cloud.points)]
+    loops = [loops[place] for place in distinct(loops, looks(loops))] if loops else []
+    found = [*elsewhere, *singles[: MOST_CANDIDATES // 2], *loops][:MOST_CANDIDATES]
     several = [function for function in functions if function.blocks > 1]
     candidates = [*found, *proposed(several, [*found[len(elsewhere) :], *elsewhere], deadline)]
     told(0.7)

@@ -2,7 +2,8 @@
 
 The largest ball inside a solid that touches its surface at a point (the shrinking ball of Ma, Bae and Choi 2012) has
 its centre on the middle line of a bar and on the middle sheet of a board.  Where these centres run on in one direction,
-the points that they belong to are one limb; where a leg meets a seat, the direction ends.
+the points that they belong to are one limb; where a leg meets a seat, the direction ends.  Where it goes on beyond what
+it meets, the two stretches are one limb, too.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from shapeprog.inference.cloud import Cloud
+from shapeprog.inference.strands import in_line
 from shapeprog.space import FloatArray
 
 COUNT = 5000
@@ -58,7 +60,7 @@ def limbs(cloud: Cloud) -> list[npt.NDArray[np.int64]]:
     off = (centre[near] - (centre[near] * weight).sum(1, keepdims=True) / weight.sum(1, keepdims=True)) * weight
     spread, axes = np.linalg.eigh(off.transpose(0, 2, 1) @ off)
     spread = np.sqrt(np.maximum(spread, 0))
-    found = []
+    found = list[npt.NDArray[np.int64]]()
     line = spread[:, 1] < LINEAR * spread[:, 2]
     for kind, direction in ((line, axes[:, :, 2]), (~line & (spread[:, 0] < LINEAR * spread[:, 1]), axes[:, :, 0])):
         facing = np.abs(np.einsum("nki,ni->nk", direction[near], direction)) > np.cos(np.radians(BEND))
@@ -66,8 +68,8 @@ def limbs(cloud: Cloud) -> list[npt.NDArray[np.int64]]:
         graph = coo_matrix((np.ones(len(i), np.bool_), (i, near[i, k])), shape=(len(near), len(near)))
         _, label = connected_components(graph, directed=False)
         of_point = label[name]
-        for each in np.flatnonzero(np.bincount(of_point) >= LEAST):
-            found.append(which[of_point == each])
+        mine = [which[of_point == each] for each in np.flatnonzero(np.bincount(of_point) >= LEAST)]
+        found += [*mine, *(in_line(cloud.points, mine) if kind is line else [])]
     return sorted(found, key=len, reverse=True)
 
 

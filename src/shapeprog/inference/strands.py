@@ -6,7 +6,7 @@ they are one strand.
 
 from __future__ import annotations
 
-from itertools import combinations
+from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -58,23 +58,25 @@ def strands(cloud: Cloud) -> list[npt.NDArray[np.int64]]:
         graph = coo_matrix((np.ones(len(first), np.bool_), (first, second)), shape=(len(points), len(points)))
         _, label = connected_components(graph, directed=False)
         mine = [which[label == each] for each in np.flatnonzero(np.bincount(label) >= LEAST)]
-        found += [*mine, *_in_line(cloud.points, mine)]
+        found += [*mine, *in_line(cloud.points, mine)]
     return sorted(found, key=len, reverse=True)
 
 
-def _in_line(points: FloatArray, found: list[npt.NDArray[np.int64]]) -> list[npt.NDArray[np.int64]]:
-    """Strands that continue each other, as one: a rail may join a leg half-way up."""
+def in_line(points: FloatArray, found: Sequence[npt.NDArray[np.int64]]) -> list[npt.NDArray[np.int64]]:
+    """Stretches that continue each other, as one: a rail or a shelf may meet a leg half-way up."""
+    if len(found) < 2:
+        return []
     lines = [_line(points[each]) for each in found]
-    first, second = [], []
-    for (one, (middle, along, half)), (two, (other, its, its_half)) in combinations(enumerate(lines), 2):
-        away = other - middle
-        apart = np.abs(away @ along) - half - its_half
-        aside = max(np.linalg.norm(away - (away @ each) * each) for each in (along, its))
-        if np.abs(along @ its) > np.cos(np.radians(BEND)) and apart < GAP and aside < ASIDE:
-            first.append(one)
-            second.append(two)
-    graph = coo_matrix((np.ones(len(first), np.bool_), (first, second)), shape=(len(found), len(found)))
-    _, label = connected_components(graph, directed=False)
+    middle, along = (np.stack([line[k] for line in lines]) for k in (0, 1))
+    half = np.array([line[2] for line in lines])
+    away = middle[None] - middle[:, None]
+    ahead = np.einsum("ijc,ic->ij", away, along)
+    aside = np.linalg.norm(away - ahead[..., None] * along[:, None], axis=2)
+    straight = np.abs(along @ along.T) > np.cos(np.radians(BEND))
+    one, two = np.nonzero(np.triu(straight & (np.maximum(aside, aside.T) < ASIDE), 1))
+    near = np.abs(ahead[one, two]) - half[one] - half[two] < GAP
+    edges = np.ones(near.sum(), np.bool_), (one[near], two[near])
+    _, label = connected_components(coo_matrix(edges, shape=(len(found),) * 2), directed=False)
     many = np.flatnonzero(np.bincount(label, minlength=1) > 1)
     return [np.concatenate([found[k] for k in np.flatnonzero(label == each)]) for each in many]
 

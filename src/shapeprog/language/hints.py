@@ -18,6 +18,9 @@ STRAIGHT = 0.9986
 ROUND = 0.75
 """Least ratio of the sides of a section that may be round."""
 
+SOFT = 0.5
+"""Least radius in cells of an edge that can be told from a sharp one."""
+
 STEEPEST = 45.0
 """Degrees up to which a board is tilted."""
 
@@ -114,9 +117,13 @@ def bent(box: Box) -> Iterator[list[float]]:
 
 
 def rounded(box: Box) -> Iterator[list[float]]:
-    """Low corner, extents and radius of the edges, of a box along the axes of the grid."""
+    """Low corner, extents and radius of the edges, of a box along the axes of the grid: round all the way; and half as
+    much, where that can be told from an edge."""
     for values in upright_box(box):
-        yield [*values, 0.5 * min(values[3:])]
+        least = min(values[3:])
+        yield [*values, 0.5 * least]
+        if 0.25 * least >= SOFT:
+            yield [*values, 0.25 * least]
 
 
 def _leaned(along: FloatArray, main: int, axis: int) -> FloatArray:

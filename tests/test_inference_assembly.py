@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections import Counter
+from pathlib import Path
 
 import numpy as np
 import pytest
 import torch
 
 import shapeprog as sp
+from shapeprog.data import load
 from shapeprog.data.placement import shape_from_mesh, shape_from_points
 from shapeprog.data.shape import Shape
 from shapeprog.evaluation.metrics import evaluate_program
@@ -16,13 +18,19 @@ from shapeprog.formats.parts import parts, solid
 from shapeprog.geometry.batch import Solids
 from shapeprog.inference.assembly import assemble
 from shapeprog.inference.candidates import distinct, looks, plain
+from shapeprog.inference.evidence import evidence_of_program
+from shapeprog.inference.images import images
 from shapeprog.inference.repeating import repeated
+from shapeprog.inference.tunable import bounds
 from shapeprog.language import Draw, Language, Loop, Program, language, standard, statement, using
 from shapeprog.language.hints import Box
 from shapeprog.language.parameters import Length, Position, Radius
 from shapeprog.language.program import Node
 from shapeprog.language.shapes import disc
 from shapeprog.language.text import parse
+from shapeprog.language.unroll import unroll
+
+EXAMPLES = Path(__file__).parent.parent / "examples"
 
 SPLAYED = """\
 box(at=(3, -7, -7), size=(1, 14, 14))
@@ -126,6 +134,20 @@ def test_mirror_images_are_found_about_any_plane():
     assert found == Loop("mirror", (2.0, 2.0, 1.5), (one,))
 
 
+def test_a_copy_that_is_no_candidate_is_found_on_the_surface():
+    surface = evidence_of_program(parse(SPLAYED)).surface
+    top, leg = Draw("box", (3, -7, -7, 1, 14, 14)), Draw("bar", (-12, 7, 7, 3, 5, 5, 1.5, 1.5, 0))
+    turned = Draw("bar", (-12, 5, 5, 3, 7, 7, 1.5, 1.5, 0))
+
+    def mirrored(axis: int, node: Node) -> Node:
+        return Loop("mirror", (2.0, float(axis), 0.0), (node,))
+
+    assert images([top, leg, turned], surface) == [mirrored(2, leg), mirrored(1, leg), mirrored(2, mirrored(1, leg))]
+    assert images([leg], surface[surface[:, 2] > 0]) == [mirrored(1, leg)]
+    assert not images([leg], surface[(surface[:, 1:] > 0).all(1)])
+    assert not images([], surface)
+
+
 def test_a_tapered_leg_is_no_mirror_image_of_one_that_stands_on_its_head():
     one = Draw("taper", (-12.0, 1.0, 6.0, 2.0, 1.0, 6.0, 0.5, 1.0))
     other = Draw("taper", (-12.0, 1.0, -6.0, 2.0, 1.0, -6.0, 1.0, 0.5))
@@ -159,6 +181,19 @@ def test_looks_do_not_depend_on_how_a_solid_is_written():
     np.testing.assert_allclose(seen.spread[1:], seen.spread[:1].repeat(2, 0), atol=1e-5)
     np.testing.assert_allclose(seen.skew, 0, atol=1e-5)
     assert distinct([upright, as_bar, as_bar], looks([upright, as_bar, as_bar])) == [0, 1]
+
+
+def test_solids_with_others_inside_are_not_drawn_as_hollow():
+    found = assemble(load(EXAMPLES / "armchair_kaykit.obj")).program
+    assert found.blocks <= 6
+    assert bounds(unroll(found)).amin() > 0.5  # half of the thinnest part: walls of the arms would be of .1 cells
+
+
+def test_a_thick_seat_with_bevelled_edges_is_a_cushion():
+    found = assemble(load(EXAMPLES / "stool_kaykit.obj")).program
+    seat = next(node for node in found.walk() if isinstance(node, Draw) and node.values[4] > 20)
+    assert seat.name == "cushion"
+    assert seat.values == pytest.approx([1.6, -12, -12, 6.4, 24, 24, 1.7], abs=0.3)
 
 
 def test_the_same_seed_gives_the_same_program():

@@ -24,9 +24,10 @@ from shapeprog.inference.coverage import (
     holds,
     holds_twin,
     pack,
-    supported,
-    supported_twin,
+    shares,
+    shares_twin,
 )  # fmt: skip
+from shapeprog.inference.coverage_kernels import TURNED
 from shapeprog.inference.evidence import Evidence, evidence_of
 from shapeprog.language.program import Program
 from shapeprog.language.syntax import parse
@@ -115,6 +116,24 @@ def test_what_another_buries_explains_nothing():
     assert value(made, (0, 1)) == pytest.approx(value(made, (0,)) - made.prices[1])
     assert explained(made, (1, 2)) == pytest.approx(explained(made, (1,)) + explained(made, (2,)))
     assert choose(made, 3).best.chosen == (0,)
+
+
+@pytest.mark.parametrize(
+    ("block", "known"),
+    [
+        ("box(at=(0, 3, -6), size=(1, 2, 12))", 1),
+        ("box(at=(0, -1, -6), size=(1, 2, 12))", 2),
+        ("box(at=(0, 3, -5), size=(1, 2, 12))", 0),
+        ("for i in translate(3, by=(0, 0, 5)):\n    box(at=(0, 3, -6), size=(1, 2, 2))", 1),
+        ("for i in mirror(side):\n    box(at=(0, 3, 4), size=(1, 2, 2))", 0),
+        ("for i in mirror(side):\n    box(at=(0, -1, 4), size=(1, 2, 2))", 1),
+        ("for i in rotate(4, step=1):\n    box(at=(0, 3, 4), size=(1, 2, 2))", 0),
+    ],
+)
+def test_what_is_in_the_middle_writes_a_number_less(table, block, known):
+    prices, program = Prices(), parse(block)
+    (price,) = covers([program], table, prices).prices
+    assert price == pytest.approx(prices.of(program) - known * prices.number)
 
 
 def test_copies_of_a_loop_hide_each_other(table):
@@ -215,15 +234,28 @@ def test_points_explained_and_held_are_those_of_the_declarations(user):
         assert np.array_equal(holds(scene, points, depth), pack(holds_twin(scene, at, depth).numpy()))
 
 
-def test_supported_samples_are_those_of_all_pairs(table):
+def test_samples_pay_what_all_pairs_say(table):
     random = np.random.default_rng(0)
-    few = replace(table, surface=table.surface[::40], surface_normals=table.surface_normals[::40])
+    kept = {name: getattr(table, name)[::40] for name in ("surface", "surface_normals")}
+    few = replace(table, **kept, surface_outward=random.random(1000) < 0.5)
     samples = random.uniform(-13, 13, (500, 3))
-    samples[:250] = few.surface[:250] + random.normal(0, 0.3, (250, 3))
-    normals = np.eye(3)[random.integers(3, size=500)]
-    wanted = supported_twin(samples, normals, few)
-    assert 20 < wanted.sum() < 400
-    assert np.array_equal(supported(samples, normals, few), wanted)
+    samples[:250] = few.surface[:250] + random.normal(0, 0.1, (250, 3))
+    normals = random.choice([-1, 1], (500, 1)) * np.eye(3)[random.integers(3, size=500)]
+    wanted = shares_twin(samples, normals, few)
+    assert all((wanted == share).sum() >= 10 for share in (0, TURNED, 1))
+    assert np.array_equal(shares(samples, normals, few), wanted)
+
+
+def test_the_inner_face_of_the_wall_of_a_solid_pays_for_facing_the_other_way(table):
+    highest = table.surface[:, 0].max() - 0.1
+    top = table.surface[(table.surface_normals @ [1, 0, 0] > 0.9) & (table.surface[:, 0] > highest)]
+    below = top[:200] - [0.5 * table.reach, 0, 0]
+    facing = np.tile([1.0, 0, 0], (200, 1))
+    assert (shares(below, facing, table) == 0).all()
+    assert (shares(below, -facing, table) == TURNED).all()
+    unknown = replace(table, surface_outward=np.zeros(len(table.surface), np.bool_))
+    assert (shares(below, -facing, unknown) == 0).all()
+    assert (shares(below - [1, 0, 0], facing, table) == 1).all()
 
 
 @pytest.mark.parametrize("through", [False, True])

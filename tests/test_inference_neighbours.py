@@ -70,6 +70,16 @@ def test_a_run_with_a_copy_more_or_less_is_mended_at_either_end(first, count):
     assert [node.count for node in found.body if isinstance(node, Loop)] == [5]
 
 
+@pytest.mark.parametrize("ends", [(-11, 7), (-7, 10.5)])
+def test_a_seat_whose_ends_nobody_sees_is_put_in_the_middle(ends):
+    sofa = "for i in mirror(side):\n    box(at=(-8, -9, 7), size=(14, 18, 5))\n"
+    seat = "box(at=(-7, -9, {low}), size=(6, 17, {width}))\n"
+    found = best(sofa + seat.format(low=ends[0], width=ends[1] - ends[0]), sofa + seat.format(low=-9, width=18))
+    middle = [unroll(Program((node,))).centre[:, 2].mean().item() for node in found.body]
+    assert len(middle) == 2
+    assert middle == pytest.approx([0, 0], abs=1e-4)
+
+
 def test_a_missing_mirror_image_is_found():
     found = best(SEAT + "box(at=(-12, -1, 8), size=(14, 2, 2))\n", TABLE)
     assert same(found, TABLE)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from functools import cache
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -14,7 +15,8 @@ from shapeprog.data.sampling import sample_surface
 from shapeprog.data.shape import Shape
 from shapeprog.geometry.mesh import union_mesh
 from shapeprog.inference.cloud import cloud_of
-from shapeprog.inference.components import align_copies, components
+from shapeprog.inference.components import align_copies, components, solid_sides
+from shapeprog.inference.limbs import limbs
 from shapeprog.inference.oriented import Boxes, bounds, boxes_around
 from shapeprog.inference.pieces import Pieces, Source, find_pieces
 from shapeprog.inference.scans import points_of_scan
@@ -214,6 +216,25 @@ def test_components_come_by_falling_area_and_no_face_is_lost():
     assert found.area.sum() == pytest.approx(2 * 144 + 4 * 12 + 4 * (4 * 12 + 2), rel=1e-6)
 
 
+def test_faces_of_closed_solids_are_told_which_way_they_face():
+    cube = box(np.zeros(3), np.ones(3))
+    turned = box(np.array([5.0, 0, 0]), np.ones(3))
+    rod = cylinder(np.array([0.0, 5, 0]), np.array([1.0, 2, 3]), 0.5, 3)
+    sheet = np.array([[0, 9, 0], [1, 9, 0], [0, 9, 1.0]]), np.array([[0, 1, 2]])
+    open_box = box(np.array([0.0, 0, 5]), np.ones(3))
+    crumpled = box(np.array([0.0, 0, 9]), np.array([1, 1, 0.05]))
+    everything = [cube, (turned[0], turned[1][:, ::-1]), rod, sheet, (open_box[0], open_box[1][1:]), crumpled]
+    sides = solid_sides(*together(*everything))
+    known = np.cumsum([0, *(len(faces) for _, faces in everything)])
+    found = [set(sides[low:high].tolist()) for low, high in pairwise(known)]
+    vertices, faces = cube
+    outwards = (
+        np.cross(*(vertices[faces[0, k]] - vertices[faces[0, 0]] for k in (1, 2))) @ vertices[faces[0]].mean(0) > 0
+    )
+    sign = 1 if outwards else -1
+    assert found == [{sign}, {-sign}, {1}, {0}, {0}, {0}]
+
+
 def test_copies_get_boxes_that_the_motions_between_them_take_to_each_other():
     model, faces = cylinder(np.zeros(3), np.array([1.0, 0, 0]), 1, 3, 7)
     model = model * [1, 1.3, 0.8]
@@ -321,6 +342,18 @@ def test_strands_that_continue_each_other_are_offered_as_one_too():
     lengths = [np.ptp(ends_of(points[each])[:, 0]) for each in strands(cloud_of(points))]
     assert min(abs(length - 20) for length in lengths) < 1
     assert min(abs(length - 8) for length in lengths) < 1
+
+
+def test_a_leg_that_goes_through_a_shelf_is_one_limb_too():
+    leg = box(np.zeros(3), np.array([10.0, 0.3, 0.3]))
+    shelf = box(np.array([1.0, 4, 4]), np.array([0.3, 5, 5]))
+    vertices, faces = together(leg, shelf)
+    points = sample_surface(vertices, faces, 20_000, 0)
+    hidden = (np.abs(points[:, 0] - 1) < 0.3) & (np.abs(points[:, 1:]) < 0.31).all(1)
+    cloud = cloud_of(points[~hidden])
+    lengths = sorted(np.ptp(cloud.points[each][:, 0]) for each in limbs(cloud))
+    assert lengths[-1] > 15  # of 20; on either side of the shelf it is 9 and 11
+    assert lengths[-2] < 11
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.003, 0.12])

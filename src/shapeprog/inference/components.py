@@ -24,6 +24,12 @@ LARGEST_COPY = 2000
 KINDS = 64
 """Different components of equal counts that are told apart."""
 
+OPEN = 0.02
+"""Share of its edges at which a component may be open and yet bound a solid."""
+
+THICK = 0.2
+"""Least thickness of such a solid in cells, on average: the volume of a crumpled sheet says nothing about its sides."""
+
 
 class Components(NamedTuple):
     """Components by falling area, and the welded mesh they are made of.
@@ -48,9 +54,7 @@ def components(vertices: Array, faces: Array) -> Components:
     """The components of a triangle mesh in cells, once vertices are welded and doubled and empty faces left out."""
     places, listed = weld(np.asarray(vertices, np.float64), np.asarray(faces, np.int64))
     listed, area = once_each(places, listed)
-    links = np.concatenate([listed[:, :2], listed[:, 1:]])
-    graph = coo_matrix((np.ones(len(links), np.bool_), (links[:, 0], links[:, 1])), shape=(len(places), len(places)))
-    count, label = connected_components(graph, directed=False)
+    count, label = _joined(listed, len(places))
     of_face = label[listed[:, 0]]
     total = np.bincount(of_face, area, minlength=count)
     used = np.flatnonzero(total > 0)
@@ -101,6 +105,38 @@ def once_each(vertices: FloatArray, faces: npt.NDArray[np.int64]) -> tuple[npt.N
     again[order[likely[same] + 1]] = True
     keep = ~again & (area > 0)
     return faces[keep], area[keep]
+
+
+def solid_sides(vertices: FloatArray, faces: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
+    """Of each face (F,) 1 if it is of a component that bounds a solid and faces outwards, -1 if inwards, else 0.
+
+    At each edge of a closed surface as many faces run one way as the other, and the volume that it encloses is above
+    zero where they face outwards.
+    """
+    places, listed = weld(vertices, faces)
+    count, of_vertex = _joined(listed, len(places))
+    label = of_vertex[listed[:, 0]]
+    start, end = listed.reshape(-1), listed[:, [1, 2, 0]].reshape(-1)
+    name = np.minimum(start, end) * len(places) + np.maximum(start, end)
+    _, edge = np.unique(name, return_inverse=True)
+    uneven = np.bincount(edge, np.sign(end - start)) != 0
+    many = np.bincount(label, minlength=count)
+    gaps = np.bincount(np.repeat(label, 3), uneven[edge], minlength=count) / np.maximum(3 * many, 1)
+    corners = places[listed]
+    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    area = np.bincount(label, np.linalg.norm(across, axis=1), minlength=count) / 2
+    volume = np.bincount(label, (corners[:, 0] * across).sum(1), minlength=count) / 6
+    solid = (gaps <= OPEN) & (2 * np.abs(volume) > THICK * area)
+    found: npt.NDArray[np.int64] = np.where(solid, np.sign(volume), 0).astype(np.int64)[label]
+    return found
+
+
+def _joined(faces: npt.NDArray[np.int64], vertices: int) -> tuple[int, npt.NDArray[np.int64]]:
+    """How many components faces join so many vertices to, and which each vertex is of (V,)."""
+    links = np.concatenate([faces[:, :2], faces[:, 1:]])
+    graph = coo_matrix((np.ones(len(links), np.bool_), (links[:, 0], links[:, 1])), shape=(vertices, vertices))
+    count, label = connected_components(graph, directed=False)
+    return int(count), label
 
 
 def align_copies(found: Components, boxes: Boxes) -> Boxes:

@@ -27,14 +27,15 @@ from shapeprog.geometry.batch import Batch
 from shapeprog.geometry.distance import each_distance
 from shapeprog.geometry.scene import Scene
 from shapeprog.geometry.surface import face_areas, sample_surface
-from shapeprog.inference.coverage_kernels import LIFT, explain, hold, support
+from shapeprog.inference.coverage_kernels import LIFT, TURNED, charged, explain, hold
 from shapeprog.inference.evidence import Evidence
+from shapeprog.inference.repeating import mirrors
 from shapeprog.language.free import numbers_outside
 from shapeprog.language.program import Loop, Program
 from shapeprog.language.source import Assignment, Comment, WrittenLoop
 from shapeprog.language.unroll import unroll
 from shapeprog.library.length import outside
-from shapeprog.space import HALF, RESOLUTION, FloatArray
+from shapeprog.space import DEPTH, HALF, RESOLUTION, SIDE, FloatArray
 
 WORD = 64
 """Bits of a word; every candidate has one for samples of its surface."""
@@ -50,6 +51,9 @@ AWAY = 4.0 * HALF
 
 FREE_POINTS = 2048
 """Points drawn in free space."""
+
+CENTRED = 0.1
+"""Cells within which a candidate is in the middle."""
 
 COARSE, FINE = 16, 64
 """Cells along each side of the grids by which points are found near primitives, and near other points."""
@@ -135,6 +139,7 @@ def covers(candidates: Sequence[Program], evidence: Evidence, prices: Prices, se
     A ``ShapeProgError`` if one draws more copies than :func:`shapeprog.language.unroll` takes.
     """
     scene, count = unroll(candidates).detach(), len(candidates)
+    written = np.array([prices.of(each) for each in candidates]) - prices.number * centred(scene, candidates)
     order = np.lexsort((nearby(evidence.points), -evidence.weights))  # so the points of a word weigh nearly the same
     explained = explains(scene, evidence.points[order], evidence.normals[order], evidence)
     buried = holds(scene, evidence.points[order], evidence.tolerance)
@@ -155,8 +160,22 @@ def covers(candidates: Sequence[Program], evidence: Evidence, prices: Prices, se
     ])  # fmt: skip
     return Covers(
         np.concatenate([explained & ~buried, filled, hidden], 1), weights, explained.shape[1], buried, own,
-        prices.unsupported / evidence.area * charges, np.array([prices.of(each) for each in candidates]),
+        prices.unsupported / evidence.area * charges, written,
     )  # fmt: skip
+
+
+def centred(scene: Scene, candidates: Sequence[Program]) -> npt.NDArray[np.int64]:
+    """How many numbers (B,) of candidates are known because these are in the middle, left to right or in depth.
+
+    Where such a part is follows from how large it is.  Of what is mirrored or turned it is no news.
+    """
+    share = (scene.mask / scene.mask.sum(1, keepdim=True).clamp(min=1)).numpy()
+    middle = np.einsum("bn,bni->bi", share, scene.centre.numpy())
+    count = np.zeros(len(candidates), np.int64)
+    for axis in (SIDE, DEPTH):
+        around = [any(mirrors(node, axis) or node.name == "rotate" for node in each.walk()) for each in candidates]
+        count += (np.abs(middle[:, axis]) < CENTRED) & ~np.array(around, np.bool_)
+    return count
 
 
 def by_word(values: FloatArray) -> FloatArray:
@@ -188,7 +207,7 @@ def free_points(evidence: Evidence, seed: int) -> tuple[FloatArray, float]:
 def unsupported(scene: Scene, evidence: Evidence, seed: int) -> tuple[FloatArray, npt.NDArray[np.int64], FloatArray]:
     """Samples of the surfaces of candidates (B, N) that the target gives no reason for.
 
-    Returns places (S, 3) just above the surface, whose they are (S,), and the area that each stands for (S,).
+    Returns places (S, 3) just above the surface, whose they are (S,), and the area that each pays for (S,).
     """
     area = np.where(scene.mask, face_areas(scene).double().sum(-1), 0.0)
     whole = area.sum(1, keepdims=True)
@@ -202,29 +221,42 @@ def unsupported(scene: Scene, evidence: Evidence, seed: int) -> tuple[FloatArray
         return np.zeros((0, 3)), np.zeros(0, np.int64), np.zeros(0)
     drawn = sample_surface(single, DRAWN, torch.Generator().manual_seed(seed))
     points, normals = (each.double().reshape(-1, 3).numpy() for each in (drawn.points, drawn.normals))
-    bare = ~supported(points, normals, evidence)
+    share = shares(points, normals, evidence)
+    bare = share > 0
     source = np.repeat(row.numpy(), DRAWN)[bare]
     places = points[bare] + SKIN * evidence.tolerance * normals[bare]
-    return places, source // max(scene.mask.shape[1], 1), area.reshape(-1)[source] / (DRAWN * times[source])
+    return (
+        places,
+        source // max(scene.mask.shape[1], 1),
+        share[bare] * area.reshape(-1)[source] / (DRAWN * times[source]),
+    )
 
 
-def supported(samples: FloatArray, normals: FloatArray, evidence: Evidence) -> Flags:
-    """Which samples (S, 3) of surfaces have a point of the target within reach whose normal fits."""
+def shares(samples: FloatArray, normals: FloatArray, evidence: Evidence) -> FloatArray:
+    """Which share of the price of unsupported surface each sample (S, 3) of surfaces pays.
+
+    None where a point of the target within reach has a normal that fits, ``TURNED`` where one is known to face the
+    other way, as behind the wall of a solid, and all of it elsewhere.
+    """
     places = sorted_by_cell(evidence.surface, FINE)
-    found = np.zeros(len(samples), np.bool_)
+    found = np.zeros(len(samples))
     data = (
-        samples, normals, places.points, evidence.surface_normals[places.order], places.starts, places.cells,
-        evidence.reach, evidence.agreement, found,
+        samples, normals, places.points, evidence.surface_normals[places.order],
+        evidence.surface_outward[places.order], places.starts, places.cells, evidence.reach, evidence.agreement,
+        found,
     )  # fmt: skip
-    over_threads(partial(support, *data), len(samples), least=1024)
+    over_threads(partial(charged, *data), len(samples), least=1024)
     return found
 
 
-def supported_twin(samples: FloatArray, normals: FloatArray, evidence: Evidence) -> Flags:
-    """The twin of :func:`supported`, over all pairs."""
+def shares_twin(samples: FloatArray, normals: FloatArray, evidence: Evidence) -> FloatArray:
+    """The twin of :func:`shares`, over all pairs."""
     near = np.linalg.norm(samples[:, None] - evidence.surface, axis=2) <= evidence.reach
     unknown = np.linalg.norm(evidence.surface_normals, axis=1) < 0.5
-    return (near & ((np.abs(normals @ evidence.surface_normals.T) >= evidence.agreement) | unknown)).any(1)
+    cosine = normals @ evidence.surface_normals.T
+    fits = np.where(evidence.surface_outward, cosine, np.abs(cosine)) >= evidence.agreement
+    turned = (near & (cosine <= -evidence.agreement)).any(1)
+    return np.where((near & (fits | unknown)).any(1), 0.0, np.where(turned, TURNED, 1.0))
 
 
 def explains(scene: Batch, points: FloatArray, normals: FloatArray, evidence: Evidence) -> Bits:

@@ -16,6 +16,9 @@ from shapeprog.space import HALF, RESOLUTION
 LIFT = 1e-3
 """How far in cells above a point the slope of a distance is taken: on a surface it has none."""
 
+TURNED = 0.75
+"""Share of the price that surface pays which is where the target has one, but faces the other way."""
+
 
 @helper
 def cell_of(value, cells):
@@ -92,16 +95,19 @@ def hold(table, many, points, bits, starts, cells, depth, rows, begin, end):
                         put(rows, row // many, bits[item])
 
 
-@kernel("void(f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], i8[::1], i8, f8, f8, b1[::1], i8, i8)")
-def support(samples, sides, points, normals, starts, cells, reach, agreement, found, begin, end):
-    """Say which samples have a point within reach whose normal fits their own; zero normals fit all."""
+@kernel("void(f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], b1[::1], i8[::1], i8, f8, f8, f8[::1], i8, i8)")
+def charged(samples, sides, points, normals, outward, starts, cells, reach, agreement, share, begin, end):
+    """Say which share of its price each sample pays: none with a point within reach whose normal fits its own.
+
+    Zero normals fit all; where a normal is known to point outwards, what faces the other way pays ``TURNED``.
+    """
     low, high = np.empty(3, np.int64), np.empty(3, np.int64)
     for sample in range(begin, end):
         x, y, z = samples[sample, 0], samples[sample, 1], samples[sample, 2]
         for axis in range(3):
             low[axis] = cell_of(samples[sample, axis] - reach, cells)
             high[axis] = cell_of(samples[sample, axis] + reach, cells)
-        found[sample] = False
+        share[sample] = 1.0
         for i in range(low[0], high[0] + 1):
             for j in range(low[1], high[1] + 1):
                 line = (i * cells + j) * cells
@@ -110,11 +116,13 @@ def support(samples, sides, points, normals, starts, cells, reach, agreement, fo
                     if dx * dx + dy * dy + dz * dz > reach * reach:
                         continue
                     u, v, w = normals[item, 0], normals[item, 1], normals[item, 2]
-                    fit = abs(sides[sample, 0] * u + sides[sample, 1] * v + sides[sample, 2] * w)
-                    if fit >= agreement or u * u + v * v + w * w < 0.25:
-                        found[sample] = True
+                    fit = sides[sample, 0] * u + sides[sample, 1] * v + sides[sample, 2] * w
+                    if (fit if outward[item] else abs(fit)) >= agreement or u * u + v * v + w * w < 0.25:
+                        share[sample] = 0.0
                         break
-                if found[sample]:
+                    if -fit >= agreement:
+                        share[sample] = TURNED
+                if share[sample] == 0.0:
                     break
-            if found[sample]:
+            if share[sample] == 0.0:
                 break

@@ -24,6 +24,7 @@ from shapeprog.data.voxelise_kernels import mark_triangles
 from shapeprog.geometry.arrays import over_threads
 from shapeprog.geometry.mesh import union_mesh
 from shapeprog.inference.cloud import planes
+from shapeprog.inference.components import solid_sides
 from shapeprog.inference.evidence_kernels import look_out
 from shapeprog.inference.scans import points_of_scan
 from shapeprog.inference.surface import INSET, exposed, exposed_faces
@@ -95,6 +96,9 @@ class Evidence:
     surface, surface_normals, reach
         The same surface in more points (Q, 3): a program has a reason for a surface where one of them is within
         ``reach`` and has a fitting normal.
+    surface_outward
+        Which of these normals are known to point outwards (Q,), as they bound a solid: what faces the other way
+        within it has no reason there.
     area
         Area in cells that all points stand for, each for its weight.
     free
@@ -109,6 +113,7 @@ class Evidence:
     agreement: float
     surface: FloatArray
     surface_normals: FloatArray
+    surface_outward: Flags
     reach: float
     area: float
     free: Flags
@@ -138,7 +143,8 @@ def _of_mesh(vertices: FloatArray, faces: npt.NDArray[np.int64], seed: int) -> E
     surface, corners = drawn.astype(np.float64), vertices[faces]
     across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     length = np.linalg.norm(across, axis=1, keepdims=True)
-    normals = (across / np.where(length > 0, length, 1))[face]
+    side = solid_sides(vertices, faces)[face]
+    normals = np.where(side < 0, -1, 1)[:, None] * (across / np.where(length > 0, length, 1))[face]
     barrier = touched(corners, LOOKING)
     points = surface[:POINTS]
     front, back = (visible(points, sign * normals[:POINTS], barrier) for sign in (1, -1))
@@ -147,7 +153,7 @@ def _of_mesh(vertices: FloatArray, faces: npt.NDArray[np.int64], seed: int) -> E
     area = float(length.sum() / 2)
     coarse: Flags = np.any(barrier.reshape((FREE, LOOKING // FREE) * 3), (1, 3, 5))
     return Evidence(
-        points, facing, weights / weights.sum(), known, TOLERANCE, AGREEMENT, surface, normals,
+        points, facing, weights / weights.sum(), known, TOLERANCE, AGREEMENT, surface, normals, side != 0,
         _reach(TOLERANCE, area), area * float(weights.mean()), free_cells(coarse, surface, through=False),
     )  # fmt: skip
 
@@ -164,7 +170,8 @@ def _of_points(surface: FloatArray, voxels: Flags, seed: int) -> Evidence:
     above = 1.5 * RESOLUTION / FREE * normals[chosen]
     facing, known = outward(normals[chosen], *(_within(free, points + sign * above) for sign in (1, -1)))
     return Evidence(
-        points, facing, weights, known, tolerance, SCANNED, surface, normals, reach, area, free
+        points, facing, weights, known, tolerance, SCANNED, surface, normals,
+        np.zeros(len(surface), np.bool_), reach, area, free,
     )  # fmt: skip
 
 
@@ -185,7 +192,7 @@ def _of_cells(voxels: Flags) -> Evidence:
     count = len(surface)
     return Evidence(
         surface, normals, np.full(count, 1 / count), np.ones(count, np.bool_), CELL_TOLERANCE, AGREEMENT,
-        surface, normals, _reach(CELL_TOLERANCE, count, count), float(count), ~voxels,
+        surface, normals, np.zeros(count, np.bool_), _reach(CELL_TOLERANCE, count, count), float(count), ~voxels,
     )  # fmt: skip
 
 

@@ -15,7 +15,7 @@ import torch
 
 from shapeprog.inference.candidates import drawings, solid_boxes
 from shapeprog.inference.repeating import mirrors, repeated
-from shapeprog.language.hints import Box
+from shapeprog.language.hints import STRAIGHT, Box
 from shapeprog.language.program import Chain, Draw, Loop, Node, Program, nest
 from shapeprog.language.statement import language
 from shapeprog.language.tensors import encode
@@ -37,6 +37,9 @@ WITHIN = 0.8
 GAP = 1.5
 """Cells between two parts up to which they may be one."""
 
+OFF_LEAST, OFF_MOST = 0.02, 2.5
+"""Cells by which the middle of a part is off that of the shape when it may be meant to be there."""
+
 CORNERS = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
 
 
@@ -55,7 +58,9 @@ def neighbours(program: Program) -> list[Node]:
         if box is not None:
             parts = [part for other, each in enumerate(others) if other != place for part in each]
             found += [with_drawing(chain, other) for other in drawings(box)]
-            found += [with_drawing(chain, other) for edited in met(box, parts) for other in alike(chain, edited)]
+            edited = list(met(box, parts))
+            edited += [middle for each in [box, *edited] for middle in centred(each)]
+            found += [with_drawing(chain, other) for each in edited for other in alike(chain, each)]
             found += _recounted(chain, box)
             found += _filled(chain)
     for (one, first), (two, second) in itertools.combinations(zip(chains, boxes, strict=True), 2):
@@ -172,6 +177,20 @@ def met(box: Box, parts: Sequence[Box], within: Sequence[float] = (WITHIN,), *, 
                     half = box.half.copy()
                     half[axis] = length
                     yield Box(box.centre + (end - box.half[axis]) / 2 * along, box.rotation, half)
+
+
+def centred(box: Box) -> Iterator[Box]:
+    """A box that is a little off the middle plane of the shape, left to right or in depth: as far on both sides as it
+    is on one of them."""
+    for axis in (SIDE, DEPTH):
+        along = int(np.abs(box.rotation[axis]).argmax())
+        off = abs(float(box.centre[axis]))
+        if np.abs(box.rotation[axis, along]) >= STRAIGHT and OFF_LEAST < off < min(OFF_MOST, box.half[along] / 2):
+            for more in (-off, off):
+                centre, half = box.centre.copy(), box.half.copy()
+                centre[axis] = 0
+                half[along] += more
+                yield Box(centre, box.rotation, half)
 
 
 def _crossed(starts: FloatArray, along: FloatArray, part: Box) -> set[float]:

@@ -17,7 +17,7 @@ from shapeprog.evaluation.metrics import evaluate_program
 from shapeprog.formats.parts import parts, solid
 from shapeprog.geometry.batch import Solids
 from shapeprog.inference.assembly import assemble
-from shapeprog.inference.candidates import distinct, looks, plain
+from shapeprog.inference.candidates import at_the_far_side, distinct, looks, plain
 from shapeprog.inference.evidence import evidence_of_program
 from shapeprog.inference.images import images
 from shapeprog.inference.repeating import repeated
@@ -171,6 +171,29 @@ def test_a_block_is_written_by_the_plainest_statement_that_draws_it():
     assert plain(leaning) == leaning
     spoke = Loop("rotate", (5.0, 1.0), (Draw("line", (0.0, 0.0, 0.0, 0.0, 6.0, 0.0, 1.0)),))
     assert plain(spoke) == spoke
+
+
+@pytest.mark.parametrize(
+    ("loops", "left", "right"),
+    [
+        ("mirror(side)", "box(at=(-12, 3, -9), size=(10, 2, 1))", "box(at=(-12, 3, 8), size=(10, 2, 1))"),
+        ("mirror(depth)", "box(at=(0, -9, -9), size=(1, 2, 3))", "box(at=(0, 7, -9), size=(1, 2, 3))"),
+        (
+            "mirror(side) mirror(depth)",
+            "bar(start=(-12, -7, -8), end=(3, -5, -5), section=(1, 2), turn=10)",
+            "bar(start=(-12, 7, 8), end=(3, 5, 5), section=(1, 2), turn=10)",
+        ),
+        ("mirror(side)", "rod(start=(-12, 7, -8), end=(3, 5, -5), radius=1)",
+         "rod(start=(-12, 7, 8), end=(3, 5, 5), radius=1)"),
+        ("mirror(side, at=1)", "box(at=(0, 3, -9), size=(1, 2, 3))", None),
+        ("translate(2, by=(0, 2, 1)) mirror(side)", "box(at=(0, 3, -9), size=(1, 2, 3))", None),
+    ],
+)  # fmt: skip
+def test_what_is_mirrored_is_drawn_on_the_right_and_at_the_rear(loops, left, right):
+    heads = loops.replace(") mirror", ");mirror").split(";")
+    text = "".join(f"{'    ' * depth}for {'ij'[depth]} in {head}:\n" for depth, head in enumerate(heads))
+    text += "    " * len(heads)
+    assert at_the_far_side(*parse(f"{text}{left}\n").body) == parse(f"{text}{right or left}\n").body[0]
 
 
 def test_looks_do_not_depend_on_how_a_solid_is_written():

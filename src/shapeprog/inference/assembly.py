@@ -18,7 +18,7 @@ from shapeprog.data.shape import Shape
 from shapeprog.inference.adjustment import adjust, tidy
 from shapeprog.inference.budget import NEVER, Deadline, Progress
 from shapeprog.inference.calls import Called, Part, drawn, moved, named, placed, program_of, regrouped, relations
-from shapeprog.inference.candidates import distinct, looks, plain, single_candidates
+from shapeprog.inference.candidates import at_the_far_side, distinct, looks, plain, single_candidates
 from shapeprog.inference.cell_coverage import choose_on_cells, cost_on_cells, covers_of_cells
 from shapeprog.inference.choice import Choice, choose, explained, missed, value
 from shapeprog.inference.connecting import connected
@@ -163,7 +163,7 @@ def _of_surface(
     unharmed = _unharmed(adjusted, start, evidence, prices, seed)
     thick = regrouped(unharmed, thickened(drawn(unharmed), evidence, _fixed(unharmed)))
     parts = _connected(thick, evidence, prices, seed)
-    program = in_order(named(parts, tidy(Program(tuple(plain(node) for node in drawn(parts).body)))))
+    program = in_order(named(parts, tidy(Program(tuple(at_the_far_side(plain(node)) for node in drawn(parts).body)))))
     seen = _seen(choice, candidates)
     share = explained(_covers(program.body, evidence, prices, seed), tuple(range(len(program.body))))
     reason = _reason(len(parts), share, seen, blocks, "surface")

@@ -7,7 +7,7 @@ Statements without a hint are fitted to the most important pieces, and kept wher
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import chain, compress
 from typing import NamedTuple
@@ -28,7 +28,7 @@ from shapeprog.inference.pieces import Pieces, Source
 from shapeprog.inference.tunable import THINNEST, bounds
 from shapeprog.language.hints import Box
 from shapeprog.language.parameters import to_float32
-from shapeprog.language.program import Draw, Loop, Node, Program
+from shapeprog.language.program import Draw, Loop, Node, Program, nest
 from shapeprog.language.statement import END, language
 from shapeprog.language.tensors import encode
 from shapeprog.language.text import numbers_written
@@ -146,13 +146,41 @@ def plain(node: Node) -> Node:
         return node
     (boxes,) = solid_boxes([node])
     others = [replace(other, role=node.role) for other in drawings(boxes[0])] if len(boxes) == 1 else []
-    if not others:
+    return min(_drawing_the_same(others, node, np.ones(3)), key=numbers_written, default=node)
+
+
+def at_the_far_side(node: Node) -> Node:
+    """The same block with what is mirrored about the middle of the shape drawn on the right, and at the rear.
+
+    Nothing changes where the statement has no drawing of the image, or other loops stand between.
+    """
+    if Program((node,)).blocks != 1:
         return node
+    *loops, drawn = Program((node,)).chains[0]
+    assert isinstance(drawn, Draw)
+    (boxes,) = solid_boxes([drawn])
+    signs = np.ones(3)
+    for loop in loops:
+        if loop.name == "mirror" and loop.values[2] == 0 and boxes and boxes[0].centre[int(loop.values[1])] < 0:
+            signs[int(loop.values[1])] = -1
+    if (signs > 0).all() or len(boxes) != 1 or any(loop.name != "mirror" for loop in loops):
+        return node
+    turn = signs[:, None] * boxes[0].rotation * [1, 1, signs.prod()]  # a box is its own image along its last axis
+    image = Box(signs * boxes[0].centre, turn, boxes[0].half)
+    others = [replace(other, role=drawn.role) for other in drawings(image) if other.name == drawn.name]
+    found = next(_drawing_the_same(others, drawn, signs), None)
+    return node if found is None else nest((*loops, found))
+
+
+def _drawing_the_same(others: Sequence[Draw], node: Node, signs: FloatArray) -> Iterator[Draw]:
+    """Those of some drawings whose surface is that of a node, or of its image by these signs of its coordinates."""
+    if not others:
+        return
     scene = unroll(encode(Program((node,)), dtype=torch.float64))
-    points = sample_surface(scene, POINTS, torch.Generator().manual_seed(0)).points.double()
+    points = sample_surface(scene, POINTS, torch.Generator().manual_seed(0)).points.double() * torch.from_numpy(signs)
     drawn = unroll(encode([Program((other,)) for other in others], dtype=torch.float64))
     off = signed_distance(drawn, points.expand(len(others), -1, -1)).abs().amax(-1).tolist()
-    return min((other for other, far in zip(others, off, strict=True) if far < SAME), key=numbers_written, default=node)
+    yield from (other for other, far in zip(others, off, strict=True) if far < SAME)
 
 
 def drawings(box: Box) -> list[Draw]:

@@ -5,8 +5,9 @@ A candidate is a program of one block.  All that choosing between them needs is 
 *   points of the evidence that its surface explains (near enough, with a fitting normal);
 *   points that lie deep inside of it, where nothing that another candidate draws can be seen;
 *   points of space known to be free that it fills;
-*   samples of its own surface that the target gives no reason for.  They are charged by their area, unless a chosen
-    candidate holds them, its own other copies included: nobody sees them then.
+*   samples of its own surface that the target gives no reason for, or that face the other way than the target's.  They
+    are charged by their area, unless a chosen candidate holds them, its own other copies included: nobody sees them
+    then.
 """
 
 from __future__ import annotations

@@ -78,7 +78,7 @@ def in_line(points: FloatArray, found: Sequence[npt.NDArray[np.int64]]) -> list[
     edges = np.ones(near.sum(), np.bool_), (one[near], two[near])
     _, label = connected_components(coo_matrix(edges, shape=(len(found),) * 2), directed=False)
     many = np.flatnonzero(np.bincount(label, minlength=1) > 1)
-    return [np.concatenate([found[k] for k in np.flatnonzero(label == each)]) for each in many]
+    return [np.concatenate([found[k] for k in np.flatnonzero(label == each).tolist()]) for each in many]
 
 
 def _line(points: FloatArray) -> tuple[FloatArray, FloatArray, float]:

@@ -34,6 +34,15 @@ UPWARD = 0.75
 SEATLIKE = 0.5
 """The main surface covers at least this share of what the widest level covers; it is the highest that does."""
 
+AMONG = 0.3
+"""What lies at that level belongs to it, as the slats of a seat do, from this share of the largest there."""
+
+SMALLER = 0.2
+"""Share of a plate on the floor from which what lies higher is the main surface instead."""
+
+WALL = 0.5
+"""An upright board is a wall or a front, however slender, from this share of the depth or the width of the whole."""
+
 REAR = 0.15
 """The middle of the main surface is at most this share of the depth to the rear of that of the whole."""
 
@@ -52,6 +61,9 @@ BULKY = 0.3
 SMALL = 0.12
 """A small part, such as a foot or a handle, is at most this share of the longest side of the whole long."""
 
+STUBBY = 0.25
+"""Something stubby covers at most this share of the depth and the width of the whole, and is higher than that."""
+
 LOWEST = 0.2
 """The bottom board of a case is at most at this share of its height."""
 
@@ -61,6 +73,8 @@ UPRIGHT, LEVEL = 0.75, 0.35
 
 class Parts:
     """The parts of one scene, N of them, in its frame: up, depth (positive to the rear), left-right.
+
+    The frame may be turned by so many quarters about up, for furniture that faces another way.
 
     The *main* surface is what one sits on, puts things on or lies on: the highest of those that cover most of the
     floor, or the whole where nothing does.
@@ -75,33 +89,37 @@ class Parts:
     ``squat``                                a body that may be higher than it is wide, but not by much
     ``slender``, ``upright``, ``level``      a stick; that stands; that lies
     ``facing_front``, ``facing_side``        a board by the way that it faces
-    ``small``, ``bulky``                     against the whole: its length; how much of it it fills
+    ``front``, ``wall``                      the same, and uprights that are wide against the whole, however slender
+    ``small``, ``stubby``, ``bulky``         against the whole: its length; its plan; how much of it it fills
     ``equal``                                how many parts of about its size there are
     ``low``, ``high``, ``bottom``, ``top``   bounds (N, 3), and along up
-    ``main``, ``main_low``, ``main_high``    which part is the main surface; its bounds (3,)
+    ``main``, ``main_low``, ``main_high``    which parts are the main surface; its bounds (3,)
     ``rear``, ``aside``                      from its middle to the rear, and to either side, .5 at its edges
     ``run``, ``span``                        extents along depth and left-right, as shares of those of the main surface
     ``grounded``, ``below``, ``beside``      on the floor; under the main surface; at its height
     ``rising``, ``above``                    it ends clearly above the main surface; it begins there
+    ``rest``                                 height of the whole above the main surface
     ``central``, ``behind``, ``outermost``   by place along depth and left-right
     ``in_front``, ``lowest``                 at the front of the whole; the lowest plate, near the floor
-    ``cased``, ``on_pedestal``, ``padded``   of the whole: it has sides or a body; one column carries the main surface;
-                                             something wide lies right under the main surface
+    ``walled``, ``cased``                    of the whole: it has sides; or a body
+    ``on_pedestal``, ``padded``              of the whole: one column carries the main surface; something wide lies
+                                             right under it
     ``size``, ``floor``, ``near``            of the whole: extents (3,), height of its lowest point, what counts as near
     ======================================== =========================================================================
     """
 
-    def __init__(self, scene: Scene) -> None:
+    def __init__(self, scene: Scene, turns: int = 0) -> None:
         here = scene.mask.numpy()
         half = np.zeros((len(here), 3))
         for kind in scene.kinds:
             of_kind = scene.mask & (scene.kind == kind)
             half[of_kind.numpy()] = primitives[kind].bound(scene.size[of_kind].double()).numpy()
-        half, pose = half[here], scene.rotation.double().numpy()[here]
+        centre, pose = turned(scene.centre.double().numpy()[here], turns), scene.rotation.double().numpy()[here]
+        half, pose = half[here], np.swapaxes(turned(np.swapaxes(pose, -1, -2), turns), -1, -2)
         self.block = scene.block.numpy()[here]
         self.count = len(half)
         self._form(half, pose)
-        self._whole(scene.centre.double().numpy()[here], (np.abs(pose) @ half[..., None])[..., 0])
+        self._whole(centre, (np.abs(pose) @ half[..., None])[..., 0])
         self._places()
 
     def _form(self, half: FloatArray, pose: FloatArray) -> None:
@@ -124,9 +142,9 @@ class Parts:
         self.slender: Mask = self.middle <= SLENDER * self.long
         self.upright: Mask = self.slender & (self.rise >= UPRIGHT)
         self.level: Mask = self.slender & (self.rise <= LEVEL)
-        board = ~self.slender & (self.thin <= THIN * self.middle)
-        self.facing_front: Mask = board & (self.depth == self.thin)
-        self.facing_side: Mask = board & (self.side == self.thin)
+        self.board: Mask = self.thin <= THIN * self.middle
+        self.facing_front: Mask = self.board & ~self.slender & (self.depth == self.thin)
+        self.facing_side: Mask = self.board & ~self.slender & (self.side == self.thin)
 
     def _whole(self, centre: FloatArray, reach: FloatArray) -> None:
         """Where the parts are, and the main surface among them."""
@@ -143,13 +161,20 @@ class Parts:
             cover = self.face
             fitting = self.squat & central & (self.top <= self.floor + BENEATH * self.size[UP])
             fitting &= self.face >= SEATLIKE * self.size[DEPTH] * self.size[SIDE]
+        plate = fitting & (self.bottom <= self.floor + self.near)
+        raised = fitting & ~plate
+        if self.face[raised].max(initial=0) >= SMALLER * self.face[plate].max(initial=0):
+            fitting = raised  # the plate that a column stands on is no seat
         self.main: Mask = np.zeros(self.count, bool)
         self.main_low, self.main_high = first, last
         if fitting.any():
-            able = np.flatnonzero(fitting & (cover >= SEATLIKE * cover[fitting].max()))
-            chosen = able[self.top[able].argmax()]
-            self.main[chosen] = True
-            self.main_low, self.main_high = self.low[chosen], self.high[chosen]
+            able = fitting & (cover >= SEATLIKE * cover[fitting].max())
+            level = (self.lying | fitting) & (np.abs(self.top - self.top[able].max()) <= self.near)
+            plates = level & self.flat
+            if self.face[plates].max(initial=0) >= SEATLIKE * self.face[level].max():
+                level = plates  # without the body that carries them
+            self.main = level & (self.face >= AMONG * self.face[level].max())
+            self.main_low, self.main_high = self.low[self.main].min(0), self.high[self.main].max(0)
 
     def _cover(self) -> FloatArray:
         """How much is covered by what lies at about the height of each part."""
@@ -176,7 +201,10 @@ class Parts:
         self.below: Mask = ~self.main & (middle < bottom)
         self.rising: Mask = (self.top >= top + 2 * self.near) | (middle >= top)
         self.above: Mask = self.bottom >= top - 2 * self.near
+        self.rest = np.full(self.count, self.floor + self.size[UP] - top)
         self.small: Mask = self.long <= SMALL * self.size.max()
+        stubby = (self.depth <= STUBBY * self.size[DEPTH]) & (self.side <= STUBBY * self.size[SIDE])
+        self.stubby: Mask = stubby & (self.up >= np.maximum(self.depth, self.side))
         self.bulky: Mask = self.up * self.face >= BULKY * self.size.prod()
         self.central: Mask = (np.abs(self.rear) <= 0.15) & (self.aside <= 0.15)
         self.behind: Mask = (self.rear > 0.1) & (self.aside < 0.3)
@@ -185,13 +213,26 @@ class Parts:
         plate = self.wide & self.flat & (self.bottom <= self.floor + LOWEST * self.size[UP])
         self.lowest: Mask = plate & (self.bottom <= self.bottom[plate].min(initial=np.inf) + self.near)
 
-        sides = self.facing_side & self.outermost & (self.up >= self.size[UP] / 2)
+        standing = self.board & self.upright
+        wide = (self.side == self.thin) & (self.depth >= WALL * self.size[DEPTH])
+        self.wall: Mask = self.facing_side | (standing & wide)
+        wide = (self.depth == self.thin) & (self.side >= WALL * self.size[SIDE])
+        self.front: Mask = self.facing_front | (standing & wide)
+        sides = self.wall & self.outermost & (self.up >= self.size[UP] / 2)
         carrying = self.wide & self.below & ~self.grounded & (self.top >= bottom - 1.5 * self.near)
         column = self.below & self.central & self.upright
-        self.cased: Mask = np.full(self.count, sides.sum() > 1 or self.bulky.any())
+        self.walled: Mask = np.full(self.count, sides.sum() > 1)
+        self.cased: Mask = self.walled | self.bulky.any()
         self.padded: Mask = np.full(self.count, carrying.any())
         self.on_pedestal: Mask = np.full(self.count, column.any())
 
         sizes = np.round(np.stack([self.thin, self.middle, self.long], 1) / self.near).astype(np.int64)
         _, kind, copies = np.unique(sizes, axis=0, return_inverse=True, return_counts=True)
         self.equal = copies[kind.reshape(-1)]
+
+
+def turned(vectors: FloatArray, turns: int) -> FloatArray:
+    """Vectors (..., 3) in a frame turned by so many quarters about up."""
+    for _ in range(turns % 4):
+        vectors = vectors[..., [UP, SIDE, DEPTH]] * [1, 1, -1]
+    return vectors

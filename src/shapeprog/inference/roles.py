@@ -12,6 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from shapeprog.geometry.scene import Scene
 from shapeprog.inference.measures import Mask, Parts
 from shapeprog.language.program import Draw, Loop, Node, Program
 from shapeprog.language.statement import language
@@ -32,6 +33,9 @@ behind its main surface is no back to lean on."""
 
 LOW = 0.6
 """A bed is at most this share of its depth high."""
+
+ONE_SIDED = 0.5
+"""A back has at most this share of its surface on the other side of the seat, as arm rests that end there."""
 
 MANY = 3
 """So many equal parts are slats."""
@@ -67,8 +71,8 @@ SEATING: tuple[Rule, ...] = (
     # What goes on above the seat from the ground is a leg all the same.
     ("leg", lambda p: p.rising & p.grounded & p.upright),
     # Behind: a back, its rails and slats, its posts.
-    ("rail", lambda p: p.rising & p.behind & (p.span >= 0.5) & p.level & (p.equal < MANY)),
-    ("slat", lambda p: p.rising & p.behind & (p.span >= 0.5) & p.level),
+    ("slat", lambda p: p.rising & p.behind & (p.span >= 0.5) & p.level & (p.equal >= MANY)),
+    ("rail", lambda p: p.rising & p.behind & (p.span >= 0.5) & p.level & (p.up <= 0.5 * p.rest)),
     ("back", lambda p: p.rising & p.behind & (p.span >= 0.5)),
     # Beside: arm rests and what carries them.
     ("arm_post", lambda p: p.rising & (p.aside > 0.3) & (p.rear < 0.25) & p.upright),
@@ -100,22 +104,25 @@ BED: tuple[Rule, ...] = (
 
 CASE: tuple[Rule, ...] = (
     # Lying boards: the highest is the top, one on the ground the base.
-    ("top", lambda p: p.wide & (p.top >= p.floor + p.size[UP] - p.near) & (p.up <= 0.3 * p.size[UP])),
+    ("top", lambda p: (p.wide | p.main) & (p.top >= p.floor + p.size[UP] - p.near) & (p.up <= 0.3 * p.size[UP])),
     ("base", lambda p: p.wide & p.flat & (p.grounded | (p.cased & p.lowest))),
+    ("base", lambda p: p.wide & p.grounded & (p.up <= 0.2 * p.size[UP])),
     ("shelf", lambda p: p.wide & p.flat),
+    ("body", lambda p: p.bulky),
     # Standing boards: at the sides, within, behind and in front.
-    ("side", lambda p: p.facing_side & p.outermost & (p.long >= 0.3 * p.size[UP])),
-    ("panel", lambda p: p.facing_side),
-    ("base", lambda p: p.facing_front & p.in_front & p.grounded & (p.span >= 0.6) & (p.up <= 0.15 * p.size[UP])),
-    ("door", lambda p: p.facing_front & p.in_front & p.cased & (p.up >= p.side)),
-    ("drawer", lambda p: p.facing_front & p.in_front & p.cased),
-    ("side", lambda p: p.facing_front & p.grounded & (np.abs(p.rear) > 0.25) & (p.equal > 1) & ~p.cased),
-    ("panel", lambda p: p.facing_front),
+    ("side", lambda p: p.wall & p.outermost & (p.long >= 0.3 * p.size[UP])),
+    ("panel", lambda p: p.wall),
+    ("base", lambda p: p.front & p.in_front & p.grounded & (p.up <= 0.2 * p.size[UP])),
+    ("door", lambda p: p.front & p.in_front & p.cased & ((p.up >= p.side) | (p.up > 0.5 * p.size[UP]))),
+    ("drawer", lambda p: p.front & p.in_front & p.cased),
+    ("side", lambda p: p.front & p.grounded & (np.abs(p.rear) > 0.25) & (p.equal > 1) & ~p.cased),
+    ("panel", lambda p: p.front),
     # Sticks.
     ("handle", lambda p: p.small & (p.rear < -0.4) & ~p.grounded),
     ("foot", lambda p: p.grounded & ~p.level & p.small),
     ("pedestal", lambda p: p.upright & p.central),
-    ("leg", lambda p: p.upright & p.grounded),
+    ("post", lambda p: p.upright & p.walled & (p.top >= p.floor + 0.6 * p.size[UP])),
+    ("leg", lambda p: p.grounded & (p.upright | p.stubby)),
     ("post", lambda p: p.upright),
     ("base", lambda p: p.level & p.grounded),
     ("leg", lambda p: p.slender & p.grounded),
@@ -123,11 +130,17 @@ CASE: tuple[Rule, ...] = (
     ("apron", lambda p: p.level & (p.top >= p.floor + 0.8 * p.size[UP])),
     ("stretcher", lambda p: p.level),
     ("brace", lambda p: p.slender),
-    # Bodies.
-    ("body", lambda p: p.bulky),
-    ("drawer", lambda p: p.cased & p.in_front),
+    # What is left.
+    ("shelf", lambda p: p.lying & p.flat),
+    ("drawer", lambda p: p.cased & p.in_front & ~p.grounded),
     ("block", anything),
 )
+
+MIXED = ({"top", "base", "shelf"}, "shelf"), ({"door", "drawer", "panel", "side"}, "panel")
+"""What copies are called that lie, or stand, in places of several names, as the top and the base of one loop."""
+
+MOSTLY = 0.75
+"""Share of the surface of its copies from which a role is that of the block."""
 
 
 def with_roles(program: Program) -> Program:
@@ -138,7 +151,7 @@ def with_roles(program: Program) -> Program:
     scene = unroll(program)
     if not scene.mask.any():
         return program
-    roles = iter(_roles_of_blocks(Parts(scene), program.blocks))
+    roles = iter(_roles_of_blocks(_facing(scene), program.blocks))
     return Program(tuple(_named(node, roles) for node in program.body))
 
 
@@ -164,7 +177,7 @@ def in_order(program: Program) -> Program:
 def roles_of(parts: Parts) -> Array:
     """The role of each part (N,)."""
     found = np.full(parts.count, "", object)
-    for role, fits in _rules(parts):
+    for role, fits in (("body", anything),) if parts.count == 1 else _kind(parts):
         found[(found == "") & fits(parts)] = role
     return found
 
@@ -174,7 +187,15 @@ def _roles_of_blocks(parts: Parts, blocks: int) -> list[str]:
     shares: list[dict[str, float]] = [{} for _ in range(blocks)]
     for block, role, surface in zip(parts.block.tolist(), roles_of(parts), parts.surface.tolist(), strict=True):
         shares[block][role] = shares[block].get(role, 0.0) + surface
-    return [max(share, key=share.__getitem__, default="") for share in shares]
+    return [_common(share) for share in shares]
+
+
+def _common(share: dict[str, float]) -> str:
+    """One role for copies that have so much surface in each of several."""
+    role = max(share, key=share.__getitem__, default="")
+    if role and share[role] < MOSTLY * sum(share.values()):
+        return next((common for names, common in MIXED if set(share) <= names), role)
+    return role
 
 
 def _named(node: Node, roles: Iterator[str]) -> Node:
@@ -189,17 +210,34 @@ def _named(node: Node, roles: Iterator[str]) -> Node:
     return replace(node, role="" if role == node.name else role)
 
 
-def _rules(p: Parts) -> tuple[Rule, ...]:
+def _facing(scene: Scene) -> Parts:
+    """The parts as given, or in a frame turned by quarters so that the back, which is on one side alone, is behind."""
+    given = Parts(scene)
+    if _leaned_on(given) > 0:
+        return given
+    best = max((Parts(scene, turns) for turns in (2, 1, 3)), key=_leaned_on)
+    return best if _leaned_on(best) > 0 else given
+
+
+def _leaned_on(p: Parts) -> float:
+    """How much surface rises behind the main surface and not before it, if the whole has a back there; 0 if not."""
+    behind = float(p.surface[p.rising & (p.rear > 0.25)].sum())
+    before = float(p.surface[p.rising & (p.rear < -0.25)].sum())
+    return behind - before if _kind(p) is not CASE and before < ONE_SIDED * behind else 0.0
+
+
+def _kind(p: Parts) -> tuple[Rule, ...]:
     """The rules for what the whole seems to be."""
-    if p.count == 1:
-        return (("body", anything),)
-    walls = p.facing_side & p.outermost & (p.run >= 0.5) & (p.up >= CASED * p.size[UP])
+    walls = p.wall & p.outermost & (p.run >= 0.5) & (p.up >= CASED * p.size[UP])
     walls &= p.top >= p.floor + ENCLOSED * p.size[UP]
-    if not p.main.any() or walls.sum() > 1:
+    open_above = not (p.main & p.flat).any() and not (p.wide & p.above).any()  # a deep seat between wings
+    if not p.main.any() or (walls.sum() > 1 and not open_above):
         return CASE
     back, height = p.rising & (p.rear > 0.1) & (p.aside < 0.6), p.top - p.main_high[UP]
     if _backed(p, back, height):
-        return BED if p.size[DEPTH] > p.size[SIDE] and p.size[UP] < LOW * p.size[DEPTH] else SEATING
+        if p.size[DEPTH] <= p.size[SIDE] or p.size[UP] >= LOW * p.size[DEPTH]:
+            return SEATING
+        return CASE if (p.rising & p.bulky).any() else BED
     arms = p.rising & (p.aside > 0.3) & (height >= BACKED * p.size[UP])
     middle = p.low[:, SIDE] + p.high[:, SIDE] - p.main_low[SIDE] - p.main_high[SIDE]
     return SEATING if (arms & (middle < 0)).any() and (arms & (middle > 0)).any() and not p.cased.any() else CASE

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from declared import LANGUAGE
 
 import shapeprog as sp
 from shapeprog.data import load
@@ -249,6 +250,21 @@ def test_a_statement_of_a_users_own_is_proposed_by_its_hint():
         assert found.size == 2
         assert sorted(set(words(found)) - {"drum"})[0] in ("mirror", "translate")
     assert "drum" not in language()
+
+
+def test_the_legs_of_a_real_table_are_written_with_the_cone_leg_of_the_examples():
+    own = Language()
+    for declared in standard:
+        if not declared.taught or declared.is_loop:
+            own.register(declared)
+    with using(own):
+        own.register(LANGUAGE["cone_leg"])
+        found = assemble(load(EXAMPLES / "cabinet_quaternius_night_stand.obj")).program
+        legs = next(chain for chain in found.chains if chain[-1].name == "cone_leg")
+        assert [loop.name for loop in legs[:-1]] == ["mirror", "mirror"]
+        height, bottom, top = legs[-1].values[3:]
+        assert height == pytest.approx(5, abs=1)  # it ends within the body
+        assert (bottom, top) == pytest.approx((0.8, 1.5), abs=0.2)
 
 
 def _drum(box: Box) -> list[float]:

@@ -452,12 +452,11 @@ def test_what_changes_part_is_as_known():
     following = Following(tunable, joints, numbers)
     height = tunable.moving.index((0, 3))
     place = tunable.moving.index((1, 0))
-    own = np.zeros((len(tunable.values), 1))
-    own[height] = 1
-    assert following.lost(own, np.array([4.0])) == 1  # lower by a fifth, and they are apart; higher, they overlap
-    both = own.copy()
-    both[place] = 1
-    assert following.lost(both, np.array([4.0])) == 0  # the upper box stands on the lower one
+    own, both = np.zeros((2, len(tunable.values), 1))
+    own[height] = both[height] = both[place] = 1
+    lost = following.lost(np.stack([own, both, own]), np.full((3, 1), 4.0))
+    # Lower by a fifth, and they are apart, higher, they overlap; or the upper box stands on the lower one.
+    np.testing.assert_array_equal(lost, [1, 0, 1])
 
 
 def test_a_part_that_reaches_past_another_follows_it():

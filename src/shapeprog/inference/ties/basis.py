@@ -36,6 +36,9 @@ PLACED = 2.0
 LOST = 40.0
 """What it costs that a change of a measure by a fifth parts all that touches."""
 
+TRIED = 32
+"""Exchanges, the most readable, of which it is seen at once what they part."""
+
 AT_ONCE = 1 << 22
 """Factors that are looked at together."""
 
@@ -148,7 +151,7 @@ def simplest(
     reader = _Reader(heads, numbers, lengths, runs, following)
     chosen: Array = np.array(independent(seen, np.argsort(reader.prices, kind="stable").tolist()), np.int64)
     factors = ways @ np.linalg.inv(seen[chosen])
-    total = float(reader.reading(factors[None], chosen[None])[0]) + reader.parting(factors, chosen)
+    total = float((reader.reading(factors[None], chosen[None]) + reader.parting(factors[None], chosen[None]))[0])
     while (better := reader.exchanged(seen, factors, chosen, total)) is not None:
         chosen, total = better
         factors = ways @ np.linalg.inv(seen[chosen])
@@ -202,12 +205,17 @@ class _Reader:
             others = np.tile(chosen, (len(some), 1))
             others[rows, z] = k
             costs = self.reading(changed, others)
-            for row in np.argsort(costs, kind="stable").tolist():
-                if costs[row] >= best:
+            order = np.argsort(costs, kind="stable")
+            for first in range(0, len(order), TRIED):
+                rows = order[first : first + TRIED]
+                rows = rows[costs[rows] < best]  # what parts nothing costs as much at least
+                if not len(rows):
                     break
-                cost = float(costs[row]) + self.parting(changed[row], others[row])
-                if cost < best:
-                    best, found = cost, (others[row], cost)
+                whole = costs[rows] + self.parting(changed[rows], others[rows])
+                least = int(whole.argmin())
+                if whole[least] < best:
+                    best = float(whole[least])
+                    found = others[rows[least]], best
         return found
 
     def reading(self, factors: FloatArray, chosen: Array) -> FloatArray:
@@ -231,11 +239,12 @@ class _Reader:
         found: FloatArray = terms.sum((1, 2)) + np.where(~literal & used.any(1), prices, 0).sum(1)
         return found
 
-    def parting(self, factors: FloatArray, chosen: Array) -> float:
-        """What it costs that changes of some measures (Z,), from which numbers (V, Z) follow, part what touches."""
+    def parting(self, factors: FloatArray, chosen: Array) -> FloatArray:
+        """What it costs (C,) that changes of some measures (C, Z), from which numbers (C, V, Z) follow, part what
+        touches."""
         if self.following is None:
-            return 0.0
-        return LOST * self.following.lost(factors[: len(self.small)], self.values[chosen])
+            return np.zeros(len(chosen))
+        return LOST * self.following.lost(factors[:, : len(self.small)], self.values[chosen])
 
 
 def _together(seen: FloatArray, every: list[Measure]) -> list[list[int]]:

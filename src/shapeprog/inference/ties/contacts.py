@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 import torch
-from jaxtyping import Bool
+from jaxtyping import Bool, Float
 from torch import Tensor
 
 from shapeprog.geometry.distance import signed_distance
@@ -80,6 +80,7 @@ class Contacts:
         free, left = np.linalg.inv(curvature), rows
         least = np.minimum(self.tunable.low.numpy(), numbers[: len(self.tunable.values)])
         needed = self.at(_optimum(left[:fixed], numbers, free))
+        slopes = self.tunable.poses(torch.from_numpy(numbers[: len(least)])).slopes
 
         def placed(first: int) -> tuple[FloatArray, bool]:
             """The optimum where the first relations hold, and whether all does that should hold together."""
@@ -88,7 +89,7 @@ class Contacts:
                 return best, False
             if self.at(best)[needed].all():
                 return best, True
-            closed = self._closed(best, left[:first], curvature, least)
+            closed = self._closed(best, left[:first], curvature, least, slopes)
             dear = (closed - best) @ curvature @ (closed - best) > price
             return (best, False) if dear or not self.at(closed)[needed].all() else (closed, True)
 
@@ -107,13 +108,23 @@ class Contacts:
             best, holds = placed(len(left))
         return left, best
 
-    def _closed(self, numbers: FloatArray, rows: FloatArray, curvature: FloatArray, least: FloatArray) -> FloatArray:
+    def _closed(
+        self,
+        numbers: FloatArray,
+        rows: FloatArray,
+        curvature: FloatArray,
+        least: FloatArray,
+        slopes: Float[Tensor, "N 16 F"],
+    ) -> FloatArray:
         """The numbers (V,) with gaps between parts closed while relations (M, V) hold, and the misfit rises least; none
-        of those of the program falls below its least (F,)."""
+        of those of the program falls below its least (F,).
+
+        The slopes of the poses may be those of numbers close by: of parts that do not turn they are the same.
+        """
         count, ways, start = len(self.tunable.values), ways_free(rows, len(numbers)), numbers
         for _ in range(CLOSING):
-            poses = self.tunable.poses(torch.from_numpy(numbers[:count]))
-            gaps = needs(poses.scene, poses.slopes, moved(poses.scene, self.joints))
+            scene = self.tunable.scene(torch.from_numpy(numbers[:count]))
+            gaps = needs(scene, slopes, moved(scene, self.joints))
             wide = np.pad(gaps.slopes.numpy(), [(0, 0), (0, len(numbers) - count)])
             slope = curvature @ (numbers - start) + CLOSED * wide.T @ gaps.residual.numpy()
             inner = ways.T @ (curvature + CLOSED * wide.T @ wide) @ ways

@@ -44,22 +44,25 @@ class Following:
         self._least = np.minimum(self._overlaps(self.ends[..., None]), 0) - TOUCHING
         self._known: dict[bytes, float] = {}
 
-    def lost(self, factors: FloatArray, values: FloatArray) -> float:
-        """The share of contacts that changes of measures part, each up and down, summed over all.
+    def lost(self, factors: FloatArray, values: FloatArray) -> FloatArray:
+        """The share of contacts that changes of measures part, each up and down, summed over all (C,).
 
         Parameters
         ----------
         factors
-            Of every number (F, Z) by how much it follows from each measure.
+            Of every number (C, F, Z) by how much it follows from each measure, in several cases.
         values
-            Where the measures are (Z,).
+            Where the measures are (C, Z).
         """
-        moves = np.ascontiguousarray((CHANGE * np.abs(values) * factors).T.round(9) + 0.0)
-        keys = [move.tobytes() for move in moves]
-        new = [z for z, key in enumerate(keys) if key not in self._known]  # most are those of other sums
+        moves = (CHANGE * np.abs(values)[:, :, None] * factors.swapaxes(1, 2)).round(9) + 0.0
+        moves = np.ascontiguousarray(moves).reshape(-1, factors.shape[1])
+        size, written = moves.itemsize * moves.shape[1], moves.tobytes()
+        keys = [written[start : start + size] for start in range(0, size * len(moves), max(size, 1))]
+        new = {key: row for row, key in enumerate(keys) if key not in self._known}  # most are those of other sums
         if new:
-            self._known |= zip([keys[z] for z in new], self._lost(moves[new].T).tolist(), strict=True)
-        return sum(self._known[key] for key in keys)
+            self._known |= zip(new, self._lost(moves[list(new.values())].T).tolist(), strict=True)
+        found: FloatArray = np.array([self._known[key] for key in keys]).reshape(values.shape).sum(1)
+        return found
 
     def _lost(self, moves: FloatArray) -> FloatArray:
         """The share of contacts (Z,) that moves of all numbers (F, Z) part, forwards and backwards together."""

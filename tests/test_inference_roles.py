@@ -93,7 +93,7 @@ box(at=(-12, -5, -7), size=(5.5, 0.4, 14))  # drawer
 BED = """
 box(at=(-3, -11, -8), size=(3, 21, 16))  # mattress
 box(at=(-6, 10.5, -9), size=(12, 1, 18))  # headboard
-box(at=(-6, -12, -9), size=(6, 1, 18))  # footboard
+box(at=(-6, -12, -9), size=(4, 1, 18))  # footboard
 for i in mirror(side):
     box(at=(-4.5, -11, 8.2), size=(3, 21.5, 0.6))  # side
     box(at=(0, 5.5, 0.8), size=(1.2, 4, 6))  # pillow
@@ -143,6 +143,15 @@ for i in mirror(side):
         box(at=(-9, 4.5, 10), size=(3, 1.1, 0.9))  # leg
 """
 
+DESK = """
+box(at=(11, -12, -12), size=(1, 24, 24))  # top
+for i in mirror(side):
+    for j in mirror(depth):
+        box(at=(-12, 9.7, 10), size=(23, 1.3, 1.3))  # leg
+    box(at=(-8, -9, 10.3), size=(18, 18, 0.7))  # side
+box(at=(-12, 10, -10), size=(23, 0.7, 20))  # panel
+"""
+
 PLATE = """
 box(at=(-12, -8, -8), size=(1, 16, 16))  # base
 box(at=(-11, -1, -1), size=(9, 2, 2))  # pedestal
@@ -151,10 +160,10 @@ board(at=(0, 4, -5), size=(12, 1, 10), tilt=1)  # back
 """
 
 WHOLE = [
-    CHAIR, STOOL_BACK, UPHOLSTERED, TABLE, BOOKCASE, CABINET, WARDROBE, BED, SOFA, SLATTED, TALL, SIDEBOARD, PLATE
+    CHAIR, STOOL_BACK, UPHOLSTERED, TABLE, BOOKCASE, CABINET, WARDROBE, BED, SOFA, SLATTED, TALL, SIDEBOARD, DESK, PLATE
 ]  # fmt: skip
 NAMES = ["chair", "swivel chair", "upholstered chair", "table", "bookcase", "cabinet", "wardrobe", "bed", "sofa"]
-NAMES += ["slatted bench", "tall cabinet", "sideboard", "chair on a plate"]
+NAMES += ["slatted bench", "tall cabinet", "sideboard", "desk", "chair on a plate"]
 
 
 def wanted(text: str) -> list[str]:

@@ -101,7 +101,7 @@ class Parts:
     ``rest``                                 height of the whole above the main surface
     ``central``, ``behind``, ``outermost``   by place along depth and left-right
     ``in_front``, ``lowest``                 at the front of the whole; the lowest plate, near the floor
-    ``walled``, ``cased``                    of the whole: it has sides; or a body
+    ``walled``, ``cased``                    of the whole: it stands on its sides; it has some, or a body
     ``on_pedestal``, ``padded``              of the whole: one column carries the main surface; something wide lies
                                              right under it
     ``size``, ``floor``, ``near``            of the whole: extents (3,), height of its lowest point, what counts as near
@@ -221,8 +221,8 @@ class Parts:
         sides = self.wall & self.outermost & (self.up >= self.size[UP] / 2)
         carrying = self.wide & self.below & ~self.grounded & (self.top >= bottom - 1.5 * self.near)
         column = self.below & self.central & self.upright
-        self.walled: Mask = np.full(self.count, sides.sum() > 1)
-        self.cased: Mask = self.walled | self.bulky.any()
+        self.walled: Mask = np.full(self.count, (sides & self.grounded).sum() > 1)
+        self.cased: Mask = np.full(self.count, sides.sum() > 1 or self.bulky.any())
         self.padded: Mask = np.full(self.count, carrying.any())
         self.on_pedestal: Mask = np.full(self.count, column.any())
 

@@ -1,8 +1,9 @@
 """What the parts of a program are for: a role for every drawing statement, by rules that look at its solids alone.
 
 First it is seen what the whole is: something to sit on has a main surface that something rises behind, as a bed has, or
-on either side of; unless it stands between walls as high as the whole.  All else is a table or a case.  Then the first
-rule of its list that fits a solid gives it a role: copies of one statement have one, that of most of their surface.
+on either side of; unless it stands between walls as high as the whole.  All else is a table or a case.  A chair may face
+any way.  Then the first rule of its list that fits a solid gives it a role: copies of one statement have one, that of
+most of their surface, or one that says both what the one and what the other is.
 """
 
 from __future__ import annotations
@@ -89,6 +90,7 @@ SEATING: tuple[Rule, ...] = (
 BED: tuple[Rule, ...] = (
     ("headboard", lambda p: p.rising & p.facing_front & (p.span >= 0.6) & (p.rear > 0.25)),
     ("footboard", lambda p: p.facing_front & (p.span >= 0.6) & (p.rear < -0.25)),
+    ("footboard", lambda p: p.level & (p.up > 2 * p.depth) & (p.span >= 0.6) & (p.rear < -0.4)),
     ("base", lambda p: p.below & p.wide & p.grounded),
     ("mattress", lambda p: p.wide & ~p.below & (p.top <= p.main_high[UP] + 2 * p.near)),
     ("base", lambda p: p.below & p.wide),
@@ -131,6 +133,8 @@ CASE: tuple[Rule, ...] = (
     ("stretcher", lambda p: p.level),
     ("brace", lambda p: p.slender),
     # What is left.
+    ("top", lambda p: p.lying & (p.top >= p.floor + p.size[UP] - p.near) & (p.up <= 0.3 * p.size[UP])),
+    ("base", lambda p: p.lying & p.flat & p.grounded),
     ("shelf", lambda p: p.lying & p.flat),
     ("drawer", lambda p: p.cased & p.in_front & ~p.grounded),
     ("block", anything),

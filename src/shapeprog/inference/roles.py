@@ -1,9 +1,9 @@
 """What the parts of a program are for: a role for every drawing statement, by rules that look at its solids alone.
 
 First it is seen what the whole is: something to sit on has a main surface that something rises behind, as a bed has, or
-on either side of; unless it stands between walls as high as the whole.  All else is a table or a case.  A chair may face
-any way.  Then the first rule of its list that fits a solid gives it a role: copies of one statement have one, that of
-most of their surface, or one that says both what the one and what the other is.
+on either side of; unless it stands between walls as high as the whole.  All else is a table or a case.  A chair may
+face any way.  Then the first rule of its list that fits a solid gives it a role: copies of one statement have one, that
+of most of their surface, or one that says both what the one and what the other is.
 """
 
 from __future__ import annotations

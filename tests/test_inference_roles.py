@@ -234,6 +234,18 @@ for i in mirror(depth):
     assert words(with_roles(sp.parse(text))) == wanted(text)
 
 
+def test_a_ring_between_legs_is_no_shelf() -> None:
+    text = """
+cylinder(at=(8, 0, 0), height=1, radius=6)  # top
+for i in mirror(side):
+    for j in mirror(depth):
+        rod(start=(-12, 5, 5), end=(8, 3, 3), radius=0.5)  # leg
+for i in rotate(4, step=1):
+    bent_rod(start=(-5, -3.5, 3.5), through=(-5, 0, 5), end=(-5, 3.5, 3.5), radius=0.3)  # stretcher
+"""
+    assert words(with_roles(sp.parse(text))) == wanted(text)
+
+
 def test_a_single_solid_is_a_body() -> None:
     assert words(with_roles(sp.parse("box(at=(-12, -3, -2), size=(24, 6, 4))"))) == ["body"]
 

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from shapeprog.geometry.primitive import primitives
+from shapeprog.geometry.primitives.arc import ARC
 from shapeprog.geometry.scene import Scene
 from shapeprog.space import DEPTH, SIDE, UP, FloatArray
 
@@ -118,12 +119,12 @@ class Parts:
         half, pose = half[here], np.swapaxes(turned(np.swapaxes(pose, -1, -2), turns), -1, -2)
         self.block = scene.block.numpy()[here]
         self.count = len(half)
-        self._form(half, pose)
+        self._form(half, pose, (scene.kind == primitives.number(ARC)).numpy()[here])
         self._whole(centre, (np.abs(pose) @ half[..., None])[..., 0])
         self._places()
 
-    def _form(self, half: FloatArray, pose: FloatArray) -> None:
-        """What the parts look like."""
+    def _form(self, half: FloatArray, pose: FloatArray, bent: Mask) -> None:
+        """What the parts look like; bent rods, whose boxes are nearly empty, are sticks and no plates."""
         every = np.arange(len(half))
         steep = np.abs(pose[:, UP])
         up = steep.argmax(1)
@@ -136,13 +137,13 @@ class Parts:
         self.surface = 2 * (self.up * self.depth + self.depth * self.side + self.side * self.up)
         self.rise = steep[every, half.argmax(1)]
         straight, square = steep[every, up] >= UPWARD, np.sqrt(self.face)
-        self.lying: Mask = (self.up <= FLAT * square) & straight
-        self.squat: Mask = (self.up <= STOOL * square) & straight
-        self.flat: Mask = self.up <= PLATE * square
-        self.slender: Mask = self.middle <= SLENDER * self.long
+        self.lying: Mask = (self.up <= FLAT * square) & straight & ~bent
+        self.squat: Mask = (self.up <= STOOL * square) & straight & ~bent
+        self.flat: Mask = (self.up <= PLATE * square) & ~bent
+        self.slender: Mask = (self.middle <= SLENDER * self.long) | bent
         self.upright: Mask = self.slender & (self.rise >= UPRIGHT)
         self.level: Mask = self.slender & (self.rise <= LEVEL)
-        self.board: Mask = self.thin <= THIN * self.middle
+        self.board: Mask = (self.thin <= THIN * self.middle) & ~bent
         self.facing_front: Mask = self.board & ~self.slender & (self.depth == self.thin)
         self.facing_side: Mask = self.board & ~self.slender & (self.side == self.thin)
 

@@ -36,7 +36,7 @@ from shapeprog.space import FloatArray
 PRICE = 1e-4
 """What a number is worth: mean squared distance in cells; chosen on val."""
 
-WRITTEN_PRICE = 1.5e-3
+WRITTEN_PRICE = 1.2e-3
 """The same in a program that somebody wrote, whose numbers are known; chosen on planted programs."""
 
 ROUNDS = 3

@@ -93,7 +93,7 @@ box(at=(-12, -5, -7), size=(5.5, 0.4, 14))  # drawer
 BED = """
 box(at=(-3, -11, -8), size=(3, 21, 16))  # mattress
 box(at=(-6, 10.5, -9), size=(12, 1, 18))  # headboard
-box(at=(-6, -12, -9), size=(4, 1, 18))  # footboard
+box(at=(-6, -12, -9), size=(6, 1, 18))  # footboard
 for i in mirror(side):
     box(at=(-4.5, -11, 8.2), size=(3, 21.5, 0.6))  # side
     box(at=(0, 5.5, 0.8), size=(1.2, 4, 6))  # pillow
@@ -209,6 +209,12 @@ def test_copies_written_one_by_one_as_boxes_of_any_size_and_place_get_the_same_r
 def test_a_chair_has_the_same_parts_whichever_way_it_faces(text: str, turns: int) -> None:
     alone, block = copies(sp.parse(text), turns=turns)
     assert words(with_roles(alone)) == [wanted(text)[each] for each in block]
+
+
+def test_a_low_board_at_the_foot_of_a_bed_is_its_footboard_too() -> None:
+    low = BED.replace("size=(6, 1, 18))  # footboard", "size=(4, 1, 18))  # footboard")
+    assert low != BED
+    assert words(with_roles(sp.parse(low))) == wanted(low)
 
 
 def test_a_bench_with_two_arms_and_no_back_is_not_turned() -> None:

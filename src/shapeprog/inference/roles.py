@@ -219,8 +219,7 @@ def _facing(scene: Scene) -> Parts:
     given = Parts(scene)
     if _leaned_on(given) > 0:
         return given
-    best = max((Parts(scene, turns) for turns in (2, 1, 3)), key=_leaned_on)
-    return best if _leaned_on(best) > 0 else given
+    return max((given, *(Parts(scene, turns) for turns in (2, 1, 3))), key=_leaned_on)  # as given where all are 0
 
 
 def _leaned_on(p: Parts) -> float:

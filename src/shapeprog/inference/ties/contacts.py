@@ -6,6 +6,8 @@ are one piece to the eye, but two to a printer and to every edit.
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import torch
 from jaxtyping import Bool, Float
@@ -80,7 +82,11 @@ class Contacts:
         free, left = np.linalg.inv(curvature), rows
         least = np.minimum(self.tunable.low.numpy(), numbers[: len(self.tunable.values)])
         needed = self.at(_optimum(left[:fixed], numbers, free))
-        slopes = self.tunable.poses(torch.from_numpy(numbers[: len(least)])).slopes
+
+        @cache
+        def slopes() -> Float[Tensor, "N 16 F"]:
+            """Those of the poses at the optimum: they are needed only where something comes apart."""
+            return self.tunable.poses(torch.from_numpy(numbers[: len(least)])).slopes
 
         def placed(first: int) -> tuple[FloatArray, bool]:
             """The optimum where the first relations hold, and whether all does that should hold together."""
@@ -89,7 +95,7 @@ class Contacts:
                 return best, False
             if self.at(best)[needed].all():
                 return best, True
-            closed = self._closed(best, left[:first], curvature, least, slopes)
+            closed = self._closed(best, left[:first], curvature, least, slopes())
             dear = (closed - best) @ curvature @ (closed - best) > price
             return (best, False) if dear or not self.at(closed)[needed].all() else (closed, True)
 

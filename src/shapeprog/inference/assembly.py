@@ -18,7 +18,7 @@ from shapeprog.data.shape import Shape
 from shapeprog.inference.adjustment import adjust, tidy
 from shapeprog.inference.budget import NEVER, Deadline, Progress
 from shapeprog.inference.calls import Called, Part, drawn, moved, named, placed, program_of, regrouped, relations
-from shapeprog.inference.candidates import at_the_far_side, distinct, looks, plain, single_candidates
+from shapeprog.inference.candidates import at_the_far_side, distinct, looks, plain, restated, single_candidates
 from shapeprog.inference.cell_coverage import choose_on_cells, cost_on_cells, covers_of_cells
 from shapeprog.inference.choice import Choice, choose, explained, missed, value
 from shapeprog.inference.connecting import connected
@@ -246,16 +246,21 @@ def _fixed(parts: Sequence[Part]) -> set[Node]:
 def _unharmed(
     adjusted: Sequence[Part], start: Sequence[Part], evidence: Evidence, prices: Prices, seed: int
 ) -> list[Part]:
-    """The adjusted parts, with those as they were at the start where adjustment has clearly done harm.
+    """The adjusted parts, those where adjustment has clearly done harm as they were at the start, and those that a
+    statement without a hint draws better as it does.
 
     Calls that no longer pay are left out: what one drew may be drawn by another since all have moved.
     """
-    both, count = (*adjusted, *start), len(start)
+    count = len(start)
+    free = [place for place, part in enumerate(adjusted) if not isinstance(part, Called)]
+    again = [(free[k], node) for k, node in restated(drawn([adjusted[place] for place in free]).body, seed)]
+    both = (*adjusted, *start, *(node for _, node in again))
+    ways = [*((place, HARM) for place in range(count)), *((place, 0.0) for place, _ in again)]
     made = _covers(both, evidence, prices, seed)
     kept = tuple(range(count))
-    for place in range(count):
-        other = (*kept[:place], count + place, *kept[place + 1 :])
-        if value(made, other) > value(made, kept) + HARM:
+    for new, (place, least) in enumerate(ways, start=count):
+        other = (*kept[:place], new, *kept[place + 1 :])
+        if value(made, other) > value(made, kept) + least:
             kept = other
     for place in [place for place in kept if isinstance(both[place], Called)]:
         other = tuple(each for each in kept if each != place)

@@ -25,11 +25,12 @@ from shapeprog.geometry.surface import sample_surface
 from shapeprog.inference.cover_kernels import near_boxes
 from shapeprog.inference.fitting import BESIDE, Target, fit, improve
 from shapeprog.inference.pieces import Pieces, Source
+from shapeprog.inference.stretching import stretched
 from shapeprog.inference.tunable import THINNEST, bounds
 from shapeprog.language.hints import Box
 from shapeprog.language.parameters import to_float32
-from shapeprog.language.program import Draw, Loop, Node, Program, nest
-from shapeprog.language.statement import END, language
+from shapeprog.language.program import Chain, Draw, Loop, Node, Program, nest
+from shapeprog.language.statement import END, Statement, language
 from shapeprog.language.tensors import encode
 from shapeprog.language.text import numbers_written
 from shapeprog.language.unroll import unroll
@@ -115,9 +116,7 @@ def single_candidates(pieces: Pieces, seed: int = 0) -> list[Node]:
     unsure = np.isin(owner, some) & (least[owner] > GOOD) & (misfit <= least[owner] + WORTH)
     more = [(improve(list(compress(drawn, unsure)), shells.target(owner[unsure]), seed), owner[unsure])]
     more += [
-        (fit(declared, [boxes[piece] for piece in some], shells.target(some), seed), some)
-        for declared in language()
-        if declared.hint is None and not declared.is_loop and declared.id > END
+        (fit(declared, [boxes[piece] for piece in some], shells.target(some), seed), some) for declared in unhinted()
     ]
     for draws, whose in more:
         drawn, owner = [*drawn, *draws], np.append(owner, whose)
@@ -126,6 +125,37 @@ def single_candidates(pieces: Pieces, seed: int = 0) -> list[Node]:
     fitting.sort(key=lambda k: (numbers_written(drawn[k]), misfit[k]), reverse=True)
     found = {int(owner[k]): drawn[k] for k in fitting}
     return [found[piece] for piece in sorted(found)]
+
+
+def unhinted() -> list[Statement]:
+    """The drawing statements that do not say how they start from a box."""
+    return [declared for declared in language() if declared.hint is None and not declared.is_loop and declared.id > END]
+
+
+def restated(nodes: Sequence[Node], seed: int = 0) -> list[tuple[int, Node]]:
+    """Blocks as statements without a hint draw them, each with the place of the block that it is fitted to.
+
+    Pieces are boxes that others with a hint may fit as well; what was chosen in the end can be fitted without doubt.
+    """
+    statements = unhinted()
+    if not statements or not nodes:
+        return []
+    programs = [Program((node,)) for node in nodes]
+    single = [(place, program.chains[0]) for place, program in enumerate(programs) if program.blocks == 1]
+    around = solid_boxes([chain[-1] for _, chain in single])
+    single = [each for each, drawn in zip(single, around, strict=True) if len(drawn) == 1]
+    boxes = [drawn[0] for drawn in around if len(drawn) == 1]
+    if not single:
+        return []
+    scene = unroll(encode([Program((chain[-1],)) for _, chain in single], dtype=torch.float64))
+    surface = sample_surface(scene, POINTS, torch.Generator().manual_seed(seed))
+    target = Target.of(surface.points.double().numpy(), surface.normals.double().numpy())
+    return [
+        (place, nest((*chain[:-1], stretched(drawn, box) or drawn)))  # points seldom lie where it ends
+        for declared in statements
+        for (place, chain), box, drawn in zip(single, boxes, fit(declared, boxes, target, seed), strict=True)
+        if chain[-1].name != declared.name
+    ]
 
 
 def _least(misfit: FloatArray, owner: Array, count: int) -> FloatArray:
@@ -146,7 +176,7 @@ def plain(node: Node) -> Node:
         return node
     (boxes,) = solid_boxes([node])
     others = [replace(other, role=node.role) for other in drawings(boxes[0])] if len(boxes) == 1 else []
-    return min(_drawing_the_same(others, node, np.ones(3)), key=numbers_written, default=node)
+    return min((*_drawing_the_same(others, node, np.ones(3)), node), key=numbers_written)
 
 
 def at_the_far_side(node: Node) -> Node:
@@ -167,7 +197,7 @@ def at_the_far_side(node: Node) -> Node:
         return node
     turn = signs[:, None] * boxes[0].rotation * [1, 1, signs.prod()]  # a box is its own image along its last axis
     image = Box(signs * boxes[0].centre, turn, boxes[0].half)
-    others = [replace(other, role=drawn.role) for other in drawings(image) if other.name == drawn.name]
+    others = [replace(other, role=drawn.role) for other in alike((drawn,), image) if other.name == drawn.name]
     found = next(_drawing_the_same(others, drawn, signs), None)
     return node if found is None else nest((*loops, found))
 
@@ -191,6 +221,18 @@ def drawings(box: Box) -> list[Draw]:
         if declared.hint is not None
         for values in declared.hint(box)
     ]
+
+
+def alike(chain: Chain, box: Box) -> list[Draw]:
+    """How the statement of a block draws a box; how all others do where it does not."""
+    drawn = chain[-1]
+    assert isinstance(drawn, Draw)
+    every = drawings(box)
+    same = [other for other in every if other.name == drawn.name]
+    if not same and language()[drawn.name].hint is None:
+        other = stretched(drawn, box)
+        same = [other] if other else []
+    return same or every
 
 
 def solid_boxes(nodes: Sequence[Node]) -> list[list[Box]]:

@@ -10,12 +10,12 @@ from collections.abc import Collection, Iterator
 import numpy as np
 import torch
 
-from shapeprog.inference.candidates import solid_boxes
+from shapeprog.inference.candidates import alike, solid_boxes
 from shapeprog.inference.choice import value
 from shapeprog.inference.coverage import Prices, covers
 from shapeprog.inference.evidence import Evidence
 from shapeprog.inference.joints import gaps
-from shapeprog.inference.neighbours import alike, met, with_drawing
+from shapeprog.inference.neighbours import met, with_drawing
 from shapeprog.inference.tunable import bounds
 from shapeprog.language.hints import Box
 from shapeprog.language.program import Chain, Node, Program

@@ -13,7 +13,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 import torch
 
-from shapeprog.inference.candidates import drawings, solid_boxes
+from shapeprog.inference.candidates import alike, drawings, solid_boxes
 from shapeprog.inference.repeating import mirrors, repeated
 from shapeprog.language.hints import STRAIGHT, Box
 from shapeprog.language.program import Chain, Draw, Loop, Node, Program, nest
@@ -85,12 +85,6 @@ def _loops(chain: Chain) -> tuple[tuple[str, int], ...]:
     return tuple((node.name, node.count) for node in chain[:-1] if isinstance(node, Loop))
 
 
-def alike(chain: Chain, box: Box) -> list[Draw]:
-    """How the statement of a block draws a box; all others where it does not."""
-    every = drawings(box)
-    return [drawn for drawn in every if drawn.name == chain[-1].name] or every
-
-
 def _unlooped(chain: Chain) -> Iterator[Node]:
     """A block without one of its loops."""
     for place in range(len(chain) - 1):
@@ -120,7 +114,7 @@ def _recounted(chain: Chain, box: Box) -> Iterator[Node]:
             rest = chain[place + 1 :]
             yield nest((*other, *rest))
             moved = box._replace(centre=box.centre - more * (second - first))
-            for drawn in drawings(moved):
+            for drawn in alike(chain, moved):
                 if drawn.name == chain[-1].name:
                     yield nest((*other, *rest[:-1], drawn))
 

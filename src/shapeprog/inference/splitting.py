@@ -11,9 +11,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from shapeprog.inference.candidates import solid_boxes
+from shapeprog.inference.candidates import alike, solid_boxes
 from shapeprog.inference.evidence import Evidence
-from shapeprog.inference.neighbours import alike, with_drawing
+from shapeprog.inference.neighbours import with_drawing
 from shapeprog.inference.repeating import repeated
 from shapeprog.language.hints import Box
 from shapeprog.language.program import Node, Program, nest

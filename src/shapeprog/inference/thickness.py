@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from shapeprog.inference.candidates import drawings, solid_boxes
+from shapeprog.inference.candidates import alike, solid_boxes
 from shapeprog.inference.evidence import TOLERANCE, Evidence
 from shapeprog.inference.neighbours import with_drawing
 from shapeprog.language.hints import Box
@@ -66,7 +66,7 @@ def thickened(program: Program, evidence: Evidence, fixed: Collection[Node] = ()
     for place, (chain, board, alone) in enumerate(zip(chains, boards, single, strict=True)):
         if board is not None and alone and program.body[place] not in fixed:
             box = _as_thick(board, likes, evidence)
-            same = [drawn for drawn in drawings(box) if drawn.name == chain[-1].name]
+            same = [drawn for drawn in alike(chain, box) if drawn.name == chain[-1].name]
             nodes[place] = with_drawing(chain, same[0]) if same else nodes[place]
     return Program(tuple(nodes))
 

@@ -128,7 +128,7 @@ def single_candidates(pieces: Pieces, seed: int = 0) -> list[Node]:
 
 
 def unhinted() -> list[Statement]:
-    """The drawing statements that do not say how they start from a box."""
+    """The drawing statements that do not say how they start from a box, but for those of the paper."""
     return [declared for declared in language() if declared.hint is None and not declared.is_loop and declared.id > END]
 
 
@@ -176,7 +176,10 @@ def plain(node: Node) -> Node:
         return node
     (boxes,) = solid_boxes([node])
     others = [replace(other, role=node.role) for other in drawings(boxes[0])] if len(boxes) == 1 else []
-    return min((*_drawing_the_same(others, node, np.ones(3)), node), key=numbers_written)
+    same = list(_drawing_the_same(others, node, np.ones(3)))
+    if not same or language()[node.name] in unhinted():  # those of the paper are said as a solid with a role
+        same.append(node)
+    return min(same, key=numbers_written)
 
 
 def at_the_far_side(node: Node) -> Node:
@@ -229,7 +232,7 @@ def alike(chain: Chain, box: Box) -> list[Draw]:
     assert isinstance(drawn, Draw)
     every = drawings(box)
     same = [other for other in every if other.name == drawn.name]
-    if not same and language()[drawn.name].hint is None:
+    if not same and language()[drawn.name] in unhinted():
         other = stretched(drawn, box)
         same = [other] if other else []
     return same or every

@@ -100,7 +100,7 @@ def test_names_expressions_functions_and_notes_are_kept():
     scad, script = scad_text(parse(CHAIR), Frame()), script_text(parse(CHAIR), Frame())
     for line in (
         "width = 10.25; // [0:0.1:21]",
-        "n = 3; // [0:1:6]",
+        "n = 3; // [2:1:6]",
         "floor_ = -height / 2;",
         "module legs(long, inset, thick = 2) {",
         "  far = depth / 2 - thick;",
@@ -118,6 +118,9 @@ def test_names_expressions_functions_and_notes_are_kept():
     ):
         assert line in script.splitlines()
     assert "leg_1_at" not in scad + script
+    for text in (scad, script):
+        assert "arc_through" not in text  # no more is defined than what is called
+        assert text.count("top of the seat above the floor") == 1
 
 
 def test_words_of_a_script_are_no_names_of_numbers():

@@ -16,6 +16,7 @@ from shapeprog.files import atomic_path, write_text
 from shapeprog.formats.colours import colour
 from shapeprog.formats.parts import drawn_parts
 from shapeprog.formats.plan import Definition, Invocation, Module, Repetition, Step, Variable
+from shapeprog.formats.preamble import needed
 from shapeprog.formats.symbolic import number
 from shapeprog.formats.written_plan import script_plan
 from shapeprog.language.program import Program
@@ -249,7 +250,9 @@ def script_text(program: Program, frame: Frame, stem: str = "model") -> str:
         lines += [f"{name} = {table.tolist()}"]
     functions = [line for function in made.functions for line in _function(function)]
     steps = [line for step in made.body for line in _step(step, 0, "")]
-    return "\n".join(lines) + _TOOLS + "\n".join([*functions, *steps, ""]) + _TAIL.format(stem=stem)
+    body = "\n".join([*functions, *steps, ""])
+    tools = "\n\n\n".join(needed(_TOOLS.strip().split("\n\n\n"), body))
+    return "\n".join(lines) + f"\n{tools}\n\n\n{body}" + _TAIL.format(stem=stem)
 
 
 def _function(function: Module) -> Iterator[str]:

@@ -22,6 +22,7 @@ from shapeprog.formats.plan import (
     Step,
     Variable,
 )
+from shapeprog.formats.preamble import needed
 from shapeprog.formats.symbolic import number
 from shapeprog.formats.written_plan import script_plan
 from shapeprog.geometry.primitives.cylinder import SEGMENTS
@@ -169,12 +170,11 @@ def scad_text(program: Program, frame: Frame) -> str:
     matrix = ", ".join(f"[{', '.join(number(value) for value in row)}]" for row in placed)
     lines += [f"// From {made.word} to the world of the input.", f"world = [{matrix}];", ""]
     lines += ["/* [Hidden] */", *_tables(made)]
-    lines += [_MODULES.strip(), ""]
-    for function in made.functions:
-        lines += [*_module(function), ""]
-    lines += ["multmatrix(world) union() {"]
-    lines += [line for step in made.body for line in _step(step, 1)]
-    return "\n".join([*lines, "}", ""])
+    body = [line for function in made.functions for line in [*_module(function), ""]]
+    body += ["multmatrix(world) union() {"]
+    body += [line for step in made.body for line in _step(step, 1)]
+    tools = [f"{piece}\n" for piece in needed(_MODULES.strip().split("\n\n"), "\n".join(body))]
+    return "\n".join([*lines, *tools, *body, "}", ""])
 
 
 def _heading(heading: Heading, made: Plan) -> Iterator[str]:
@@ -191,6 +191,8 @@ def _definition(each: Definition, step: float) -> Iterator[str]:
     if each.value is not None:
         far = 10 * step * np.ceil(abs(each.value) / (5 * step))
         low, high = sorted((0.0, np.copysign(far, each.value)))
+        if each.whole:  # what is shared out between copies has no meaning for one
+            low = min(2.0, each.value)
         slider = f" // [{number(low)}:{1 if each.whole else number(step)}:{number(max(high, 10 * step))}]"
     yield f"{each.name} = {each.text};{slider}"
 

@@ -22,6 +22,10 @@ from shapeprog.language.unit import Unit
 from shapeprog.space import FloatArray
 
 
+NOWHERE = "[0, 0, 0]"
+"""A shift that moves nothing, as that of a mirror about the middle."""
+
+
 @dataclass(frozen=True)
 class Variable:
     """A parameter of a statement by name: one number, or several as a list."""
@@ -291,7 +295,8 @@ def _repetition(
         made.tables[f"{each.name}_turns"], made.tables[f"{each.name}_shifts"] = motion.table[:, 0], motion.table[:, 1:]
         shift, turn = ("1", f"{each.name}_shifts[{letter}]"), (f"{each.name}_turns[{letter}]", pivot)
     if motion.shift is not None:
-        shift = (letter, _vector(motion.shift, each.slots))
+        vector = _vector(motion.shift, each.slots)
+        shift = (letter, vector) if vector != NOWHERE else None
     if motion.even:
         turn = (f"360 * {letter} / {count}", pivot)
     elif motion.turn is not None:

@@ -87,9 +87,9 @@ class _Planner:
         found = {named.name: named for named in names(program)}
         for line in source.lines:
             if isinstance(line, Assignment):
-                for name, value in line.numbers:
-                    free = found[name].value if found[name].free else None
-                    definition = Definition(self.words[name], self._text(value), line.note, free, found[name].whole)
+                for place, (name, value) in enumerate(line.numbers):
+                    free, note = found[name].value if found[name].free else None, "" if place else line.note
+                    definition = Definition(self.words[name], self._text(value), note, free, found[name].whole)
                     self.made.numbers.append(definition)
 
     def _planned(self, line: Line) -> list[Planned]:

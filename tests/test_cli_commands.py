@@ -227,6 +227,39 @@ def test_changes_that_cannot_be_made_are_told(run: Run, tmp_path: Path, change: 
         assert (ended.code, words in ended.err) == (2, True), ended.err
 
 
+def test_export_replaces_no_other_program(run: Run, tmp_path: Path, program: Path):
+    text = NAMED.replace("8, 2", "9, 2")
+    (tmp_path / "a.shape").write_text(NAMED)
+    (tmp_path / "b.shape").write_text(text)
+    ended = run("export", "a.shape", "b.shape", "all.stl")  # as a shell makes of *.shape
+    assert (ended.code, "b.shape is there already" in ended.err) == (2, True), ended.err
+    assert (tmp_path / "b.shape").read_text() == text
+    assert not (tmp_path / "all.stl").exists()
+    assert run("export", "a.shape", "b.shape", "--overwrite").code == 0
+    assert run("export", "a.shape", "b.shape", "all.stl").code == 0  # the same program by now
+
+
+def test_parts_that_other_numbers_leave_without_volume_are_named(run: Run, tmp_path: Path):
+    (tmp_path / "post.shape").write_text(
+        "long = 4\npost(box(at=(0, 0, 0), size=(long - 3, 1, 1)))\nleg(at=(2, 0, 0), size=(1, 1, 1))\n"
+    )
+    assert "left out: post" in run("export", "post.shape", "a.stl", "--set", "long=2").err
+    assert run("export", "post.shape", "a.stl", "--set", "long=5").err == ""
+
+
+def test_a_share_of_a_span_for_one_copy_says_how_many_there_must_be(run: Run, tmp_path: Path):
+    (tmp_path / "shelves.shape").write_text(
+        "n = 3\nfor i in translate(n, by=(9 / (n - 1), 0, 0)):\n    box(at=(0, 0, 0), size=(1, 5, 5))\n"
+    )
+    assert "let n be more than 1" in run("export", "shelves.shape", "a.stl", "--set", "n=1").err
+
+
+def test_a_folder_in_the_place_of_a_program_names_one_in_it(run: Run, tmp_path: Path, program: Path):
+    (tmp_path / "folder").mkdir()
+    (tmp_path / "folder" / "a.json").write_bytes(program.read_bytes())
+    assert "such as folder/a.json" in run("export", "folder", "a.stl").err
+
+
 def test_render_makes_pictures_cells_and_points(run: Run, tmp_path: Path, program: Path):
     table(tmp_path / "input.obj")
     for words in (["a.png", "--shape", "input.obj"], ["b.npy", "--resolution", 16], ["c.xyz", "--points", 50]):

@@ -606,3 +606,18 @@ def test_a_part_with_hidden_ends_stays_between_the_faces_that_it_meets():
     tied = sp.inline(tie(program, evidence_of_program(program)).program)
     box = next(node for node in tied.walk() if node.name == "box")
     np.testing.assert_allclose([box.values[1], box.values[1] + box.values[4]], [-4, 6], atol=0.05)
+
+
+def test_the_height_of_a_round_leg_is_called_so_and_no_name_ends_in_two_without_a_first():
+    program = sp.parse(
+        "top(box(at=(10, -8, -10), size=(2, 16, 20)))\n"
+        "for i in mirror(side):\n"
+        "    for j in mirror(depth):\n"
+        "        leg(cylinder(at=(-12, 6, 8), height=14, radius=1))\n"
+        "        post(cylinder(at=(2, 6, 8), height=8, radius=0.5))\n"
+    )
+    tied = tie(program, evidence_of_program(program)).program
+    found = {each.name: each.value for each in sp.names(tied)}
+    assert found.get("leg_height", found.get("post_height")) in (pytest.approx(14, abs=0.1), pytest.approx(8, abs=0.1))
+    assert not any(name.endswith("breadth") for name in found)
+    assert all(name.removesuffix("_2") in found for name in found)

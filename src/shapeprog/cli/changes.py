@@ -61,3 +61,15 @@ def changed(program: Program, changes: Sequence[str]) -> Program:
         except ZeroDivisionError:
             raise InputError(f"{change!r} divides by zero", "divide by another number") from None
     return set_numbers(program, wanted)
+
+
+def vanished(before: Program, after: Program) -> list[str]:
+    """What parts are called that have a volume in a program, and none with other numbers in it."""
+    from shapeprog.language.program import Draw
+    from shapeprog.language.unroll import unroll
+
+    scenes = [unroll(program) for program in (before, after)]
+    flat = [set(scene.block[~scene.mask].tolist()) for scene in scenes]
+    draws = [chain[-1] for chain in after.chains]
+    words = [draw.word if isinstance(draw, Draw) else draw.name for draw in draws]
+    return [words[block] for block in sorted(flat[1] - flat[0])]

@@ -25,6 +25,10 @@ if TYPE_CHECKING:
 
 FOLDER = Path("shapeprog-out")
 
+TIPPED = (".stl", ".ply", ".off", ".xyz")
+"""Files of formats that say nothing of which way is up, so that many lie."""
+
+
 _SUFFIXES = (".json", ".shape", ".glb", ".png")
 _LONGEST = 120
 
@@ -146,7 +150,7 @@ def infer_command(
                     told = {"name": shape.name, "folder": str(folder), "seconds": found.seconds}
                     terminal.print_json(told | json.loads(_document(found, shape)))
                 elif talk:
-                    _report(console, found, shape, folder, names, file_unit)
+                    _report(console, found, shape, folder, names, file_unit, up)
         except KeyboardInterrupt:
             raise terminal.Interrupted(_kept(written, folder)) from None
     for path, problem in failures:
@@ -311,13 +315,20 @@ def _source(shape: Shape) -> str | None:
     return f"{place}#{shape.name.removeprefix(f'{shape.source.stem}#')}"
 
 
-def _report(console: Any, found: Found, shape: Shape, folder: Path, names: list[str], file_unit: str | None) -> None:
+def _report(
+    console: Any, found: Found, shape: Shape, folder: Path, names: list[str], file_unit: str | None, up: str | None
+) -> None:
+    from shapeprog.data.orientation import default_axes
+    from shapeprog.data.placement import SCAN
     from shapeprog.view.page import scores_text
 
     console.print(shape.name, style="bold")
     if shape.kind != "mesh":
-        held = f"a cloud of {len(shape.points)} points" if shape.points is not None else "voxels"
-        console.print(f"Read as {held}.", style="dim")
+        seen = f"a cloud; normals are estimated, of up to {SCAN:,} of its points"
+        console.print(f"Read as {'voxels' if shape.points is None else seen}.", style="dim")
+    if up is None and shape.source is not None and shape.source.suffix.lower() in TIPPED:
+        said = f"Up is taken to be {default_axes(shape.source)[0]}; if it stands otherwise, give --up, or --up auto."
+        console.print(said, style="dim")
     terminal.print_program(console, found.program)
     if found.program.unit and file_unit is None:
         said = "One unit of the file is taken for a metre; where it is another, say so with --file-unit."

@@ -126,7 +126,9 @@ def evaluate_command(
         if isinstance(shape, ShapeProgError):
             failures.append(ShapeProgError(f"target {path}: {shape.message}", shape.hint))
         elif shape.name in shapes:
-            failures.append(ShapeProgError(f"two targets are called {shape.name}", "only the first is used"))
+            both = " and ".join(str(each) for each in (shapes[shape.name].source, shape.source) if each is not None)
+            cure = "name one of them, or give them different names; until then the first is the target"
+            failures.append(ShapeProgError(f"two targets are called {shape.name}: {both or path}", cure))
         else:
             shapes[shape.name] = shape
     generates = weights is not None

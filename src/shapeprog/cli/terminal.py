@@ -191,12 +191,18 @@ def read_program_file(path: Path, changes: Sequence[str] | None = None) -> tuple
     InputError
         Where the file holds a shape instead, with the command that makes a program of it.
     """
-    from shapeprog.cli.changes import changed
+    from shapeprog.cli.changes import changed, vanished
     from shapeprog.formats import load_with_frame, program_suffixes
 
     try:
         program, frame = load_with_frame(path)
-        return changed(program, changes or ()), frame
+        if not changes:
+            return program, frame
+        other = changed(program, changes)
+        if lost := vanished(program, other):
+            said = f"With these numbers parts have no volume and are left out: {', '.join(dict.fromkeys(lost))}."
+            errors().print(said, style="yellow", markup=False)
+        return other, frame
     except InputError as error:
         if path.is_file() and path.suffix.lower() not in program_suffixes():
             raise InputError(error.message, f"make a program of it first: shapeprog infer {path}") from None

@@ -36,6 +36,7 @@ def export_command(
     modules: terminal.With = None,
     unit: AsUnit = None,
     file_unit: FileUnit = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace other programs.")] = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
 ) -> None:
     """Write a program for other tools: as a mesh, for CAD, as cells or points, or in another form of program.
@@ -49,6 +50,8 @@ def export_command(
 
     check_units(unit, file_unit)
     terminal.load_modules(modules)
+    if not overwrite:
+        _refuse_programs(program, outputs)
     found, frame = terminal.read_program_file(program, changes)
     if unit is not None:
         from shapeprog.inference.readable import in_readable_unit
@@ -58,6 +61,23 @@ def export_command(
         export(found, path, frame)
         if not quiet:
             terminal.output().print(f"wrote {path}")
+
+
+def _refuse_programs(program: Path, outputs: Sequence[Path]) -> None:
+    """Refuse to replace a program by another form of itself that has the same suffix: ``*.json`` may have named both.
+
+    Raises
+    ------
+    OutputError
+        If one of the files to write is another program.
+    """
+    for path in outputs:
+        same = path.suffix.lower() == program.suffix.lower() and path.suffix.lower() in program_suffixes()
+        if same and path.is_file() and not path.samefile(program) and path.read_bytes() != program.read_bytes():
+            raise OutputError(
+                f"{path} is there already, and export would replace it by {program}",
+                "export takes one program, then the files to write; say --overwrite if it is to be replaced",
+            )
 
 
 def render_command(

@@ -38,7 +38,12 @@ def load_with_frame(path: str | os.PathLike[str]) -> tuple[Program, Frame | None
     chosen = format_of(file)
     if chosen is None or not chosen.reader:
         known = " or ".join(program_suffixes())
-        raise InputError(f"{file} holds no program: its name ends in {file.suffix!r}", f"programs are {known} files")
+        if file.is_dir():
+            held = sorted(each.name for each in file.iterdir() if each.suffix.lower() in program_suffixes())
+            cure = f"name one of its programs, such as {file / held[0]}" if held else f"programs are {known} files"
+            raise InputError(f"{file} is a folder", cure)
+        ending = f"its name ends in {file.suffix!r}" if file.suffix else "its name has no suffix"
+        raise InputError(f"{file} holds no program: {ending}", f"programs are {known} files")
     return chosen.read(file)
 
 

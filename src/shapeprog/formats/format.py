@@ -141,7 +141,7 @@ FORMATS = (
     ),
     Format(
         "NPY", "sample", (".npy",), GRID,
-        "the cells at any resolution",
+        "the 32^3 cells; others with render --resolution",
         writer="samples:write_grid", options=("resolution",),
     ),
     Format(

@@ -137,6 +137,10 @@ def solid(program: Program, frame: Frame | None = None) -> tuple[Vertices, Faces
     try:
         vertices, faces = union_mesh(unroll(encode(program, dtype=torch.float64)))
     except ShapeProgError as error:
+        if not program.body:
+            raise OutputError(
+                "this program is empty", "write a statement, such as box(at=(0, 0, 0), size=(1, 1, 1))"
+            ) from error
         raise OutputError(f"this program makes no solid: {error.message}", error.hint) from error
     return placed(vertices, frame), faces
 

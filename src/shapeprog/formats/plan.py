@@ -21,7 +21,6 @@ from shapeprog.language.text import variable
 from shapeprog.language.unit import Unit
 from shapeprog.space import FloatArray
 
-
 NOWHERE = "[0, 0, 0]"
 """A shift that moves nothing, as that of a mirror about the middle."""
 

@@ -147,6 +147,8 @@ class Binary(Expression):
             found = _APPLY[self.operator](value_at(self.left, numbers), value_at(self.right, numbers))
         except ZeroDivisionError:
             cure = f"let {text_of(self.right)} be another number"
+            if isinstance(self.right, Binary) and self.right.operator == "-" and isinstance(self.right.left, Name):
+                cure = f"let {self.right.left} be more than {text_of(self.right.right)}"
             raise ExpressionError(self, f"{self} divides by zero", cure) from None
         if isinstance(found, float) and not math.isfinite(found):
             raise ExpressionError(self, f"{self} is too large", "numbers end at 3.4028235e+38")

@@ -9,7 +9,7 @@ from shapeprog.errors import ShapeProgError, did_you_mean
 from shapeprog.language.counts import Counts
 from shapeprog.language.evaluation import evaluated, in_own_unit
 from shapeprog.language.expression import Expression, Value, text_of, value_at
-from shapeprog.language.parameters import to_float32
+from shapeprog.language.parameters import LARGEST, to_float32
 from shapeprog.language.program import Program
 from shapeprog.language.source import Assignment, Comment, Function, Line, Source, WrittenLoop, values
 from shapeprog.language.text import line_of
@@ -86,6 +86,10 @@ def set(program: Program, changes: Mapping[str, float] | None = None, /, **numbe
         if name not in known:
             hint = did_you_mean(name, known) if known else "a plain program has none: write name = number at its top"
             raise ShapeProgError(f"this program has no number called {name!r}", hint)
+        if not abs(wanted[name]) <= LARGEST:  # neither is what is no number at all
+            raise ShapeProgError(
+                f"{name} = {wanted[name]:g} is too large, or no number at all", "write one such as 12.5"
+            )
         value = known[name]
         if isinstance(value, Expression) and not _is_free(value):
             others = dict.fromkeys(each.name for each in value.names())

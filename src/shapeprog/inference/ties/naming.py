@@ -56,13 +56,13 @@ def written(tunable: Tunable, basis: Basis, runs: Sequence[Run]) -> Program:
 
     Runs are written by their counts where their steps follow from a span.
     """
-    names, order, taken = _names(tunable, basis)
     count = len(tunable.moving)
     uses = np.abs(basis.factors[:count]) > SAME
     alone = [  # used once, as it is; or, an extent that nothing follows from, not at all
         not uses[:, z].any() or bool(uses[:, z].sum() == 1 and abs(np.abs(basis.factors[:count, z]).sum() - 1) < SAME)
         for z in range(len(basis.chosen))
     ]
+    names, order, taken = _names(tunable, basis, alone)
     up = [z for z in range(len(basis.chosen)) if names[z] == EXTENTS[UP]]
     floors = bool(up) and not alone[up[0]] and int((basis.factors[:count, up[0]] == -0.5).sum()) > 1
     terms: dict[int, Value] = {
@@ -135,15 +135,15 @@ def _header(
         note = ""
 
 
-def _names(tunable: Tunable, basis: Basis) -> tuple[list[str], list[int], set[str]]:
+def _names(tunable: Tunable, basis: Basis, alone: list[bool]) -> tuple[list[str], list[int], set[str]]:
     """A name for every measure; the order in which they are met, the whole first, then by the order of the text; and
-    all words that are taken."""
+    all words that are taken.  Those that nobody reads come last, so that they take no name from others."""
     known, taken = language(), {FLOOR, *(node.name for node in tunable.nodes), *_roles(tunable.nodes)}
     taken |= {*known.names, *known.roles}
     first = [min(each.feature.node for each in group) for group in basis.chosen]
     order = sorted(range(len(first)), key=lambda z: (basis.chosen[z][0].word != "extent", first[z], z))
     names, middles, holder = [""] * len(first), _middles(tunable), dict[str, int]()
-    for z in order:
+    for z in sorted(order, key=lambda z: alone[z]):
         offered, node = _name(tunable, basis.chosen[z])
         words = [
             f"{word}_{offered[-1]}" for word in _apart(middles.get(holder.get(offered[-1], -1)), middles.get(node))
@@ -249,7 +249,9 @@ def _length(tunable: Tunable, measure: Measure) -> str:
     sizes = sorted(node.values[s] for s in lengths)
     own = node.values[_slot(tunable, measure)]
     if measure.feature.axis < 0:
-        return "thickness" if own == sizes[0] else "breadth"
+        parameter = declared.parameter_at(_slot(tunable, measure))
+        longer = parameter.name if parameter.quantity.width == 1 else "breadth"
+        return "thickness" if own == sizes[0] else longer
     if len(sizes) < 2 or (own <= LEVEL * sizes[1] and own == sizes[0]):
         return "thickness"
     return EXTENTS[measure.feature.axis]

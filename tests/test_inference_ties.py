@@ -16,6 +16,7 @@ from shapeprog.evaluation.editing import edit_scores
 from shapeprog.geometry.mesh import pieces, union_mesh
 from shapeprog.inference.evidence import evidence_of_program
 from shapeprog.inference.joints import Joints, find_joints
+from shapeprog.inference.ties.buried import buried
 from shapeprog.inference.ties.contacts import Contacts, holding
 from shapeprog.inference.ties.features import features
 from shapeprog.inference.ties.fitting import ways_free
@@ -621,3 +622,26 @@ def test_the_height_of_a_round_leg_is_called_so_and_no_name_ends_in_two_without_
     assert found.get("leg_height", found.get("post_height")) in (pytest.approx(14, abs=0.1), pytest.approx(8, abs=0.1))
     assert not any(name.endswith("breadth") for name in found)
     assert all(name.removesuffix("_2") in found for name in found)
+
+
+CHEST = """
+for i in translate(4, by=(2.85, 0, 0)):
+    shelf(box(at=(-4.55, -3.86, -11.99), size=(0.47, 7.72, 23.6)))
+back(box(at=(-4.55, -3.65, -12), size=(9.1, 7.51, 23.99)))
+"""
+"""A body with boards in it whose edges stand out by a fifth of a cell in front, by a tenth in depth."""
+
+
+def test_a_part_that_ties_would_bury_is_left_out_and_the_rest_is_named_anew():
+    program = sp.parse(CHEST)
+    assert buried(program) == []
+    assert buried(sp.parse(CHEST.replace("-3.86", "-3.65").replace("7.72", "7.51"))) == [0]
+    tied = tie(program, evidence_of_program(program), price=100).program  # faces a fifth of a cell apart are flush
+    assert [chain[-1].word for chain in tied.chains] == ["body"]
+    assert tie(program, evidence_of_program(program), known=True).program.blocks == 2  # somebody wrote it
+
+
+def test_of_two_equal_parts_one_is_buried_and_without_others_none():
+    box = "box(at=(-6, -5, -10), size=(12, 10, 20))\n"
+    assert buried(sp.parse(2 * box)) == [0]
+    assert buried(sp.parse(box)) == buried(Program()) == []

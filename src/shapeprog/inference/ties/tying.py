@@ -18,6 +18,7 @@ from shapeprog.inference.evidence import Evidence
 from shapeprog.inference.joints import Joints, find_joints
 from shapeprog.inference.refine import single_threaded
 from shapeprog.inference.ties.basis import Basis, simplest
+from shapeprog.inference.ties.buried import buried, without
 from shapeprog.inference.ties.contacts import Contacts
 from shapeprog.inference.ties.features import Feature, features
 from shapeprog.inference.ties.fitting import CLOSED, Misfit, refitted, ways_free
@@ -65,6 +66,8 @@ def tie(
 ) -> Tied:
     """The same program with names for its free numbers and expressions for all others; the same for the same seed.
 
+    Parts that lie wholly inside of others once the relations hold are left out, unless somebody wrote them.
+
     Parameters
     ----------
     evidence
@@ -111,7 +114,9 @@ def tie(
         following = Following(tunable, joints, numbers) if joints else None
         basis = _rounded(simplest(measured, numbers, ways, lengths, repeated, pairs, following))
         named = written(tunable, basis, repeated)
-        return Tied(named, free_numbers(named))
+    if held is None and not known and (gone := buried(named)):
+        return tie(without(plain, gone), evidence, price=price / PRICE, seed=seed, progress=progress)
+    return Tied(named, free_numbers(named))
 
 
 def restated(program: Program) -> Program:

@@ -1,0 +1,74 @@
+"""Parts that nobody sees: ties that make faces flush may leave a thin part wholly inside of others."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import replace
+
+import torch
+from jaxtyping import Float
+from torch import Tensor
+
+from shapeprog.geometry.distance import signed_distance
+from shapeprog.geometry.primitive import primitives
+from shapeprog.geometry.scene import Scene
+from shapeprog.geometry.surface import has_surface, sample_surface
+from shapeprog.inference.candidates import plain
+from shapeprog.inference.roles import in_order, with_roles
+from shapeprog.language.program import Loop, Node, Program, nest
+from shapeprog.language.tensors import encode
+from shapeprog.language.unroll import unroll
+
+SAMPLES = 512
+"""Points of the surface of each block that are looked at."""
+
+ON = 0.011
+"""Cells above the others up to which a point counts as covered: numbers have two decimals."""
+
+SEEN = 0.005
+"""Share of its surface that is left of a part that is seen."""
+
+
+def buried(program: Program) -> list[int]:
+    """The blocks whose whole surface lies inside or on that of the others; of several that hide each other the
+    smallest."""
+    scene = unroll(encode([Program(program.body)], dtype=torch.float64))
+    found: list[int] = []
+    while hidden := _hidden(scene):
+        found.append(min(hidden, key=lambda block: _volume(scene, block)))
+        scene = replace(scene, mask=scene.mask & (scene.block != found[-1]))
+    return sorted(found)
+
+
+def without(program: Program, blocks: Collection[int]) -> Program:
+    """The program without some of its blocks; the others are named anew, by what they stand beside now."""
+    rest = [nest(chain) for block, chain in enumerate(program.chains) if block not in blocks]
+    return in_order(with_roles(Program(tuple(_unnamed(plain(node)) for node in rest))))
+
+
+def _unnamed(node: Node) -> Node:
+    if isinstance(node, Loop):
+        return replace(node, body=tuple(map(_unnamed, node.body)))
+    return replace(node, role="")
+
+
+def _hidden(scene: Scene) -> list[int]:
+    """The blocks of a scene (1, N) that nothing is seen of beside the others."""
+    blocks = torch.unique(scene.block[scene.mask])
+    own = scene.mask & (scene.block == blocks[:, None])
+    several = scene[torch.zeros(len(blocks), dtype=torch.long)]
+    mine, rest = replace(several, mask=own), replace(several, mask=scene.mask & ~own)
+    drawn = has_surface(mine) & has_surface(rest)
+    if not drawn.any():
+        return []
+    points = sample_surface(mine[drawn], SAMPLES, torch.Generator().manual_seed(0)).points
+    seen: Float[Tensor, " B"] = (signed_distance(rest[drawn], points) > ON).double().mean(-1)
+    return [int(block) for block in blocks[drawn][seen < SEEN]]
+
+
+def _volume(scene: Scene, block: int) -> float:
+    mine = scene.mask & (scene.block == block)
+    return sum(
+        float(primitives[kind].volume(scene.size[mine & (scene.kind == kind)]).sum())
+        for kind in torch.unique(scene.kind[mine]).tolist()
+    )

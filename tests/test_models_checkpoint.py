@@ -50,6 +50,14 @@ def written(folder: Path, **changes: object) -> Path:
     return path
 
 
+def test_weights_of_a_run_are_listed_by_the_folder_of_all_runs(tmp_path: Path) -> None:
+    for run in ("first", "second"):
+        (tmp_path / run).mkdir()
+        written(tmp_path / run)
+    found = [path.parent.name for path, _ in list_checkpoints([tmp_path], shipped=False)]
+    assert found == ["first", "second"]
+
+
 @pytest.mark.parametrize("half", [False, True])
 def test_a_network_comes_back_as_it_was(network: nn.Module, half: bool, tmp_path: Path) -> None:
     path = tmp_path / "one.safetensors"

@@ -17,6 +17,9 @@ if TYPE_CHECKING:
     from shapeprog.models.checkpoint import Listed
     from shapeprog.models.tian2019 import Told
 
+SCORES = 4
+"""Scores of weights that the table has room for."""
+
 CALIBRATION = 32
 """Shapes of one batch of calibration, as in the published training."""
 
@@ -104,7 +107,12 @@ def _print_table(listed: list[Listed]) -> None:
     from rich import box
     from rich.table import Table
 
-    table = Table("name", "kind", "design", box=box.SIMPLE_HEAD)
+    from shapeprog.models.checkpoint import SHIPPED
+
+    table = Table(box=box.SIMPLE_HEAD)
+    table.add_column("name", overflow="fold")
+    for heading in ("kind", "design"):
+        table.add_column(heading)
     for heading in ("parameters", "MB"):
         table.add_column(heading, justify="right")
     table.add_column("data")
@@ -114,9 +122,12 @@ def _print_table(listed: list[Listed]) -> None:
     table.add_column("scores")
     for each in listed:
         card = each.card
-        scores = ", ".join(f"{name} {value:.4g}" for name, value in card.scores.items())
+        scores = ", ".join(f"{name} {value:.4g}" for name, value in list(card.scores.items())[:SCORES])
+        scores += ", ... (--json)" * (len(card.scores) > SCORES)
+        alone = [other.name for other in listed].count(each.name) == 1 or each.path.parent == SHIPPED
+        name = each.name if alone else f"{each.path.parent.name}/{each.name}"
         table.add_row(
-            each.name, card.kind, card.design, f"{each.parameters:,}", f"{each.size / 1e6:.1f}", card.data,
+            name, card.kind, card.design, f"{each.parameters:,}", f"{each.size / 1e6:.1f}", card.data,
             f"{card.visits:,}", str(card.seed), card.version, scores,
         )  # fmt: skip
     terminal.output().print(table)

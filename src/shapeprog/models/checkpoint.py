@@ -183,12 +183,12 @@ def load_executor(name: str | os.PathLike[str], *, device: torch.device | str = 
 def list_checkpoints(
     folders: Sequence[str | os.PathLike[str]] = (), *, shipped: bool = True
 ) -> Iterator[tuple[Path, Listed | ShapeProgError]]:
-    """Weights that ship, then those in folders, with what is wrong with a file instead where it cannot be used.
+    """Weights that ship, those in folders and one level below, and what is wrong with files that cannot be used.
 
     Only headers are read.
     """
     for folder in [*([SHIPPED] if shipped and SHIPPED.is_dir() else []), *(Path(each) for each in folders)]:
-        for path in sorted(folder.glob(f"*{SUFFIX}")) if folder.is_dir() else [folder]:
+        for path in sorted([*folder.glob(f"*{SUFFIX}"), *folder.glob(f"*/*{SUFFIX}")]) if folder.is_dir() else [folder]:
             try:
                 header = read_header(path)
                 if folder.is_dir() and "card" not in header.metadata:

@@ -29,6 +29,7 @@ from shapeprog.inference.budget import BUDGET, Deadline, Progress
 from shapeprog.inference.calls import recognised, relations
 from shapeprog.inference.cell_coverage import cost_on_cells
 from shapeprog.inference.refine import REACH, Schedule, refine
+from shapeprog.inference.roles import named_anew
 from shapeprog.inference.structure import Settings, search_structure
 from shapeprog.inference.surface import points_of_cells
 from shapeprog.inference.ties.tying import tie
@@ -142,8 +143,8 @@ def infer(
         How much finer than usual the program may be where the surface is known: prices of what is written are divided
         by it.
     ties
-        Whether numbers that hold together are tied where the surface is known: the program then has names for the few
-        that are free, and expressions for all others.
+        Whether numbers that hold together are tied: the program then has names for the few that are free, and
+        expressions for all others.  Of cells alone only where the description gets no longer by it.
     libraries
         Functions that the program is written with wherever that is shorter, unless it has the paper's statements alone.
         What they draw competes with single blocks, at the price of a call, and a call counts as one block.
@@ -221,6 +222,10 @@ def infer(
                 tied = tie(program, found.evidence, held=held, seed=seed, progress=progress).program
                 fits = target.points is not None or costs(tied) <= costs(program)
                 program = tied if fits else program
+        elif ties and target.points is None:
+            tied = tie(named_anew(program), found.evidence, seed=seed, progress=progress).program
+            if costs(tied) <= costs(program, snapped=snapped):
+                program, snapped = tied, None
     if snapped is None:
         for library in libraries:
             program = with_library(program, library)

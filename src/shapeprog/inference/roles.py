@@ -14,8 +14,9 @@ from dataclasses import replace
 import numpy as np
 
 from shapeprog.geometry.scene import Scene
+from shapeprog.inference.candidates import plain
 from shapeprog.inference.measures import Mask, Parts
-from shapeprog.language.program import Draw, Loop, Node, Program
+from shapeprog.language.program import Draw, Loop, Node, Program, nest
 from shapeprog.language.statement import language
 from shapeprog.language.unroll import unroll
 from shapeprog.space import DEPTH, SIDE, UP, Array, FloatArray
@@ -157,6 +158,18 @@ def with_roles(program: Program) -> Program:
         return program
     roles = iter(_roles_of_blocks(_facing(scene), program.blocks))
     return Program(tuple(_named(node, roles) for node in program.body))
+
+
+def named_anew(program: Program) -> Program:
+    """The program with each block drawn by the plainest statement, named by what it stands beside, and in order; what
+    it was called before counts for nothing."""
+    return in_order(with_roles(Program(tuple(_unnamed(plain(nest(chain))) for chain in program.chains))))
+
+
+def _unnamed(node: Node) -> Node:
+    if isinstance(node, Loop):
+        return replace(node, body=tuple(map(_unnamed, node.body)))
+    return replace(node, role="")
 
 
 def in_order(program: Program) -> Program:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
 from dataclasses import replace
 
 import torch
@@ -13,9 +12,7 @@ from shapeprog.geometry.distance import signed_distance
 from shapeprog.geometry.primitive import primitives
 from shapeprog.geometry.scene import Scene
 from shapeprog.geometry.surface import has_surface, sample_surface
-from shapeprog.inference.candidates import plain
-from shapeprog.inference.roles import in_order, with_roles
-from shapeprog.language.program import Loop, Node, Program, nest
+from shapeprog.language.program import Program
 from shapeprog.language.tensors import encode
 from shapeprog.language.unroll import unroll
 
@@ -38,18 +35,6 @@ def buried(program: Program) -> list[int]:
         found.append(min(hidden, key=lambda block: _volume(scene, block)))
         scene = replace(scene, mask=scene.mask & (scene.block != found[-1]))
     return sorted(found)
-
-
-def without(program: Program, blocks: Collection[int]) -> Program:
-    """The program without some of its blocks; the others are named anew, by what they stand beside now."""
-    rest = [nest(chain) for block, chain in enumerate(program.chains) if block not in blocks]
-    return in_order(with_roles(Program(tuple(_unnamed(plain(node)) for node in rest))))
-
-
-def _unnamed(node: Node) -> Node:
-    if isinstance(node, Loop):
-        return replace(node, body=tuple(map(_unnamed, node.body)))
-    return replace(node, role="")
 
 
 def _hidden(scene: Scene) -> list[int]:

@@ -17,8 +17,9 @@ from shapeprog.inference.budget import Progress
 from shapeprog.inference.evidence import Evidence
 from shapeprog.inference.joints import Joints, find_joints
 from shapeprog.inference.refine import single_threaded
+from shapeprog.inference.roles import named_anew
 from shapeprog.inference.ties.basis import Basis, simplest
-from shapeprog.inference.ties.buried import buried, without
+from shapeprog.inference.ties.buried import buried
 from shapeprog.inference.ties.contacts import Contacts
 from shapeprog.inference.ties.features import Feature, features
 from shapeprog.inference.ties.fitting import CLOSED, Misfit, refitted, ways_free
@@ -31,7 +32,7 @@ from shapeprog.inference.ties.relations import INFERRED, WRITTEN, relations
 from shapeprog.inference.ties.runs import runs
 from shapeprog.inference.tunable import CELLS, DEGREES, Tunable
 from shapeprog.language.free import free_numbers
-from shapeprog.language.program import Draw, Program
+from shapeprog.language.program import Draw, Program, nest
 from shapeprog.space import FloatArray
 
 PRICE = 1e-4
@@ -115,7 +116,9 @@ def tie(
         basis = _rounded(simplest(measured, numbers, ways, lengths, repeated, pairs, following))
         named = written(tunable, basis, repeated)
     if held is None and not known and (gone := buried(named)):
-        return tie(without(plain, gone), evidence, price=price / PRICE, seed=seed, progress=progress)
+        rest = [nest(chain) for block, chain in enumerate(plain.chains) if block not in gone]
+        anew = named_anew(Program(tuple(rest)))
+        return tie(anew, evidence, price=price / PRICE, seed=seed, progress=progress)
     return Tied(named, free_numbers(named))
 
 

@@ -25,6 +25,7 @@ from shapeprog.inference.proposing import propose_program, ready_generator, sing
 from shapeprog.inference.raster_kernels import ROWS
 from shapeprog.inference.reading import from_program
 from shapeprog.inference.structure import Proposals, search_structure
+from shapeprog.language.named import names
 from shapeprog.language.parameters import Length, Position
 from shapeprog.language.program import Draw, Loop, Program
 from shapeprog.language.shapes import disc
@@ -203,10 +204,21 @@ def test_inference_with_a_generator_repeats_and_says_who_took_part():
     assert one == two
     assert "generator took part" in one.reason
     assert one.scores["proposed"] in (0, 1)
-    alone = infer(shape(), settings=settings, schedule=schedule, generator=None)
+    alone = infer(shape(), settings=settings, schedule=schedule, generator=None, ties=False)
     assert "generator" not in alone.reason
     assert "proposed" not in alone.scores
-    assert snapped_from(one.program, one.snapped)
+    assert snapped_from(alone.program, alone.snapped)
+
+
+def test_a_program_found_on_cells_is_tied_where_it_gets_no_longer():
+    tied, plain = (
+        infer(shape(), settings=QUICK, schedule=Schedule(steps=2), generator=None, ties=ties) for ties in (True, False)
+    )
+    assert plain.snapped is not None
+    assert tied.snapped is None
+    assert [each.name for each in names(tied.program)][:2] == ["width", "depth"]
+    assert tied.scores["numbers"] < plain.scores["numbers"]
+    assert tied.scores["iou"] >= plain.scores["iou"] - 0.02
 
 
 def test_a_single_pass_is_what_the_generator_writes():

@@ -168,7 +168,13 @@ def function(*body: str, head: str = "def legs(w):") -> str:
     ("text", "line", "column", "words", "hint"),
     [
         ("w = 1 / 0\n" + LEG, 1, 5, "1 / 0 divides by zero", "another number"),
-        ("a, w = 2, 1\nn = w / (a - 2)\n" + LEG.replace("w", "n"), 2, 5, r"w / \(a - 2\) divides by zero", "let a - 2"),
+        (
+            "a, w = 2, 1\nn = w / (a - 2)\n" + LEG.replace("w", "n"),
+            2,
+            5,
+            r"w / \(a - 2\) divides by zero",
+            "let a be more than 2",
+        ),
         ("w = 1\n", 1, 1, "w is used by nothing", "leave it out"),
         (function(LEG, head="def legs(w, h=2):"), 1, 13, "h is used by nothing", "leave it out"),
         ("w = 1\nw = 2\n" + LEG, 2, 1, "w is named twice", "another name"),

@@ -65,7 +65,7 @@ def frame_from(data: Any, name: str) -> Frame:
     except (KeyError, TypeError, ValueError, OverflowError):
         good = False
     if not good:
-        raise InputError(f"{name}: the frame {shortened(data)} is no positive scale, centre and rotation", _CURE)
+        raise InputError(f"{name}: the frame {shortened(data)} is no scale, centre and rotation", _CURE)
     return Frame(scale, (centre[0], centre[1], centre[2]), tuple((a, b, c) for a, b, c in axes))
 
 

@@ -207,15 +207,15 @@ class _Reader:
             costs = self.reading(changed, others)
             order = np.argsort(costs, kind="stable")
             for first in range(0, len(order), TRIED):
-                rows = order[first : first + TRIED]
-                rows = rows[costs[rows] < best]  # what parts nothing costs as much at least
-                if not len(rows):
+                cheap = order[first : first + TRIED]
+                cheap = cheap[costs[cheap] < best]  # what parts nothing costs as much at least
+                if not len(cheap):
                     break
-                whole = costs[rows] + self.parting(changed[rows], others[rows])
+                whole = costs[cheap] + self.parting(changed[cheap], others[cheap])
                 least = int(whole.argmin())
                 if whole[least] < best:
                     best = float(whole[least])
-                    found = others[rows[least]], best
+                    found = others[cheap[least]], best
         return found
 
     def reading(self, factors: FloatArray, chosen: Array) -> FloatArray:

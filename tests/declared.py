@@ -24,6 +24,16 @@ with using(LANGUAGE):
     for _module in MODULES:
         load_statements(_module)
 
+
+def without_the_paper() -> Language:
+    """A language of our own statements and all loops, for tests to add theirs to."""
+    own = Language()
+    for declared in standard:
+        if not declared.taught or declared.is_loop:
+            own.register(declared)
+    return own
+
+
 STATEMENTS = [declared for declared in LANGUAGE if not declared.is_loop]
 LOOPS = [declared for declared in LANGUAGE if declared.is_loop]
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
-from declared import LANGUAGE
+from declared import LANGUAGE, without_the_paper
 
 import shapeprog as sp
 from shapeprog.data import load
@@ -253,11 +253,7 @@ def test_a_statement_of_a_users_own_is_proposed_by_its_hint():
 
 
 def test_the_legs_of_a_real_table_are_written_with_the_cone_leg_of_the_examples():
-    own = Language()
-    for declared in standard:
-        if not declared.taught or declared.is_loop:
-            own.register(declared)
-    with using(own):
+    with using(without_the_paper()) as own:
         own.register(LANGUAGE["cone_leg"])
         found = assemble(load(EXAMPLES / "cabinet_quaternius_night_stand.obj")).program
         legs = next(chain for chain in found.chains if chain[-1].name == "cone_leg")

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
-from declared import LANGUAGE, STATEMENTS, name_of
+from declared import LANGUAGE, STATEMENTS, name_of, without_the_paper
 
 import shapeprog as sp
 from shapeprog.data.placement import shape_from_mesh
@@ -98,11 +98,7 @@ def pieces_of(text: str) -> Pieces:
 
 @pytest.mark.parametrize("hinted", [True, False], ids=["hinted", "without a hint"])
 def test_a_statement_of_a_users_own_stands_for_the_legs_of_a_table(hinted: bool) -> None:
-    own = Language()
-    for declared in standard:
-        if not declared.taught or declared.is_loop:
-            own.register(declared)
-    with using(own):
+    with using(without_the_paper()) as own:
         example = LANGUAGE["cone_leg"]
         own.register(replace(example, hint=example.hint if hinted else None))
         legs = [node for node in single_candidates(pieces_of(TABLE)) if node.name == "cone_leg"]

@@ -6,17 +6,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from declared import LANGUAGE
+from declared import LANGUAGE, without_the_paper
+from test_inference_assembly import apart
 
-from shapeprog.data.placement import shape_from_mesh
-from shapeprog.formats.parts import parts
 from shapeprog.inference.assembly import assemble
-from shapeprog.inference.candidates import alike, drawings, plain, restated, solid_boxes, unhinted
+from shapeprog.inference.candidates import alike, as_unhinted, drawings, is_unhinted, plain, solid_boxes
 from shapeprog.inference.stretching import OFF, stretched
 from shapeprog.language.hints import Box
 from shapeprog.language.program import Draw, Loop
-from shapeprog.language.statement import Language, standard, using
-from shapeprog.language.text import parse
+from shapeprog.language.statement import language, using
 
 CONE = Draw("cone_leg", (-12.0, 3.0, 4.0, 20.0, 1.0, 0.5))
 BOX = Box(np.array([-1.0, 2.0, 5.0]), np.eye(3), np.array([11.0, 1.5, 1.5]))
@@ -33,11 +31,7 @@ SQUARE = [Draw(name, values) for name, values in (
 @pytest.fixture
 def without_hint():
     """All statements of the package, and the cone leg of the examples without its hint."""
-    own = Language()
-    for declared in standard:
-        if not declared.taught or declared.is_loop:
-            own.register(declared)
-    with using(own):
+    with using(without_the_paper()) as own:
         own.register(replace(LANGUAGE["cone_leg"], hint=None))
         yield
 
@@ -63,12 +57,12 @@ def test_what_moves_no_face_stays(without_hint):
 def test_what_a_statement_cannot_draw_is_no_statement(without_hint):
     flat = BOX._replace(half=np.array([11.0, 1.5, 0.5]))  # a cone is as deep as it is wide
     assert stretched(CONE, flat) is None
-    assert alike((CONE,), flat) == drawings(flat)
-    assert [draw.name for draw in alike((CONE,), BOX)] == ["cone_leg"]
+    assert alike(CONE, flat) == drawings(flat)
+    assert [draw.name for draw in alike(CONE, BOX)] == ["cone_leg"]
 
 
 def test_a_statement_of_fewer_numbers_is_not_written_with_more(without_hint):
-    assert [declared.name for declared in unhinted()] == ["cone_leg"]
+    assert [declared.name for declared in language() if is_unhinted(declared)] == ["cone_leg"]
     assert plain(CONE) == CONE
     looped = Loop("mirror", (2.0, 2.0, 0.0), (CONE,))
     assert plain(looped) == looped
@@ -77,7 +71,7 @@ def test_a_statement_of_fewer_numbers_is_not_written_with_more(without_hint):
 def test_what_was_chosen_is_drawn_by_a_statement_without_a_hint_too(without_hint):
     taper = Draw("taper", (-12.0, 3.0, 4.0, 8.0, 3.0, 4.0, 1.0, 0.5))
     around = Loop("mirror", (2.0, 2.0, 0.0), (taper,))
-    ((place, again),) = restated([CONE, around])
+    ((place, again),) = as_unhinted([CONE, around])
     assert place == 1
     assert isinstance(again, Loop)
     assert again.body[0].name == "cone_leg"
@@ -87,12 +81,7 @@ def test_what_was_chosen_is_drawn_by_a_statement_without_a_hint_too(without_hint
 def test_every_leg_of_a_planted_table_is_a_cone_leg(without_hint):
     top = "box(at=(10, -8, -10), size=(2, 16, 20))\n"
     legs = "for i in mirror(side):\n    for j in mirror(depth):\n        "
-    planted = parse(f"{top}{legs}cone_leg(at=(-12, 6, 8), height=22, bottom=.6, top=1.2)\n")
-    drawn = parts(planted)
-    counts = np.cumsum([0, *(len(part.vertices) for part in drawn)])
-    faces = np.concatenate([part.faces + first for part, first in zip(drawn, counts, strict=False)])
-    vertices = np.concatenate([part.vertices for part in drawn])
-    found = assemble(shape_from_mesh(vertices, faces, name="table", axes=np.eye(3))).program
+    found = assemble(apart(f"{top}{legs}cone_leg(at=(-12, 6, 8), height=22, bottom=.6, top=1.2)\n")).program
     (legs_found,) = (chain for chain in found.chains if chain[-1].name == "cone_leg")
     assert [loop.name for loop in legs_found[:-1]] == ["mirror", "mirror"]
     assert found.blocks == 2

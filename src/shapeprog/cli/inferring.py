@@ -28,7 +28,6 @@ FOLDER = Path("shapeprog-out")
 TIPPED = (".stl", ".ply", ".off", ".xyz")
 """Files of formats that say nothing of which way is up, so that many lie."""
 
-
 _SUFFIXES = (".json", ".shape", ".glb", ".png")
 _LONGEST = 120
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shlex
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import asdict
 from pathlib import Path
@@ -120,11 +121,12 @@ def _print_table(listed: list[Listed]) -> None:
         table.add_column(heading, justify="right")
     table.add_column("version")
     table.add_column("scores")
+    count = Counter(each.name for each in listed)
     for each in listed:
         card = each.card
         scores = ", ".join(f"{name} {value:.4g}" for name, value in list(card.scores.items())[:SCORES])
         scores += ", ... (--json)" * (len(card.scores) > SCORES)
-        alone = [other.name for other in listed].count(each.name) == 1 or each.path.parent == SHIPPED
+        alone = count[each.name] == 1 or each.path.parent == SHIPPED
         name = each.name if alone else f"{each.path.parent.name}/{each.name}"
         table.add_row(
             name, card.kind, card.design, f"{each.parameters:,}", f"{each.size / 1e6:.1f}", card.data,

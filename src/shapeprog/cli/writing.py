@@ -64,7 +64,7 @@ def export_command(
 
 
 def _refuse_programs(program: Path, outputs: Sequence[Path]) -> None:
-    """Refuse to replace a program by another form of itself that has the same suffix: ``*.json`` may have named both.
+    """Refuse to replace another program with the same suffix as the one that is read: ``*.json`` may have named both.
 
     Raises
     ------

@@ -11,12 +11,11 @@ _CALLED = re.compile(r"(\w+)\s*\(")
 
 def needed(pieces: Sequence[str], text: str) -> list[str]:
     """Those of some pieces of script, in their order, that define nothing or something that a text needs."""
-    defined = [_DEFINED.search(piece) for piece in pieces]
-    names = [found[1] if found else "" for found in defined]
+    named = [(found[1] if (found := _DEFINED.search(piece)) else "", piece) for piece in pieces]
     used: set[str] = {""}
-    waiting = [text, *(piece for piece, name in zip(pieces, names, strict=True) if not name)]
+    waiting = [text, *(piece for name, piece in named if not name)]
     while waiting:
         called = set(_CALLED.findall(waiting.pop())) - used
-        waiting += [piece for piece, name in zip(pieces, names, strict=True) if name in called]
-        used |= called & set(names)
-    return [piece for piece, name in zip(pieces, names, strict=True) if name in used]
+        waiting += [piece for name, piece in named if name in called]
+        used |= called
+    return [piece for name, piece in named if name in used]

@@ -18,7 +18,7 @@ from shapeprog.data.shape import Shape
 from shapeprog.inference.adjustment import adjust, tidy
 from shapeprog.inference.budget import NEVER, Deadline, Progress
 from shapeprog.inference.calls import Called, Part, drawn, moved, named, placed, program_of, regrouped, relations
-from shapeprog.inference.candidates import at_the_far_side, distinct, looks, plain, restated, single_candidates
+from shapeprog.inference.candidates import as_unhinted, at_the_far_side, distinct, looks, plain, single_candidates
 from shapeprog.inference.cell_coverage import choose_on_cells, cost_on_cells, covers_of_cells
 from shapeprog.inference.choice import Choice, choose, explained, missed, value
 from shapeprog.inference.connecting import connected
@@ -252,8 +252,8 @@ def _unharmed(
     Calls that no longer pay are left out: what one drew may be drawn by another since all have moved.
     """
     count = len(start)
-    free = [place for place, part in enumerate(adjusted) if not isinstance(part, Called)]
-    again = [(free[k], node) for k, node in restated(drawn([adjusted[place] for place in free]).body, seed)]
+    free = [(place, part) for place, part in enumerate(adjusted) if not isinstance(part, Called)]
+    again = [(free[k][0], node) for k, node in as_unhinted([part for _, part in free], seed)]
     both = (*adjusted, *start, *(node for _, node in again))
     ways = [*((place, HARM) for place in range(count)), *((place, 0.0) for place, _ in again)]
     made = _covers(both, evidence, prices, seed)

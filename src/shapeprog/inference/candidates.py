@@ -29,7 +29,7 @@ from shapeprog.inference.stretching import stretched
 from shapeprog.inference.tunable import THINNEST, bounds
 from shapeprog.language.hints import Box
 from shapeprog.language.parameters import to_float32
-from shapeprog.language.program import Chain, Draw, Loop, Node, Program, nest
+from shapeprog.language.program import Draw, Loop, Node, Program, nest
 from shapeprog.language.statement import END, Statement, language
 from shapeprog.language.tensors import encode
 from shapeprog.language.text import numbers_written
@@ -116,7 +116,8 @@ def single_candidates(pieces: Pieces, seed: int = 0) -> list[Node]:
     unsure = np.isin(owner, some) & (least[owner] > GOOD) & (misfit <= least[owner] + WORTH)
     more = [(improve(list(compress(drawn, unsure)), shells.target(owner[unsure]), seed), owner[unsure])]
     more += [
-        (fit(declared, [boxes[piece] for piece in some], shells.target(some), seed), some) for declared in unhinted()
+        (fit(declared, [boxes[piece] for piece in some], shells.target(some), seed), some)
+        for declared in filter(is_unhinted, language())
     ]
     for draws, whose in more:
         drawn, owner = [*drawn, *draws], np.append(owner, whose)
@@ -127,33 +128,34 @@ def single_candidates(pieces: Pieces, seed: int = 0) -> list[Node]:
     return [found[piece] for piece in sorted(found)]
 
 
-def unhinted() -> list[Statement]:
-    """The drawing statements that do not say how they start from a box, but for those of the paper."""
-    return [declared for declared in language() if declared.hint is None and not declared.is_loop and declared.id > END]
+def is_unhinted(declared: Statement) -> bool:
+    """Whether a drawing statement, but for those of the paper, does not say how it starts from a box."""
+    return declared.hint is None and not declared.is_loop and declared.id > END
 
 
-def restated(nodes: Sequence[Node], seed: int = 0) -> list[tuple[int, Node]]:
+def as_unhinted(nodes: Sequence[Node], seed: int = 0) -> list[tuple[int, Node]]:
     """Blocks as statements without a hint draw them, each with the place of the block that it is fitted to.
 
     Pieces are boxes that others with a hint may fit as well; what was chosen in the end can be fitted without doubt.
     """
-    statements = unhinted()
+    statements = list(filter(is_unhinted, language()))
     if not statements or not nodes:
         return []
     programs = [Program((node,)) for node in nodes]
     single = [(place, program.chains[0]) for place, program in enumerate(programs) if program.blocks == 1]
     around = solid_boxes([chain[-1] for _, chain in single])
-    single = [each for each, drawn in zip(single, around, strict=True) if len(drawn) == 1]
-    boxes = [drawn[0] for drawn in around if len(drawn) == 1]
-    if not single:
+    blocks = [(place, chain, boxes[0]) for (place, chain), boxes in zip(single, around, strict=True) if len(boxes) == 1]
+    if not blocks:
         return []
-    scene = unroll(encode([Program((chain[-1],)) for _, chain in single], dtype=torch.float64))
+    scene = unroll(encode([Program((chain[-1],)) for _, chain, _ in blocks], dtype=torch.float64))
     surface = sample_surface(scene, POINTS, torch.Generator().manual_seed(seed))
     target = Target.of(surface.points.double().numpy(), surface.normals.double().numpy())
     return [
         (place, nest((*chain[:-1], stretched(drawn, box) or drawn)))  # points seldom lie where it ends
         for declared in statements
-        for (place, chain), box, drawn in zip(single, boxes, fit(declared, boxes, target, seed), strict=True)
+        for (place, chain, box), drawn in zip(
+            blocks, fit(declared, [box for *_, box in blocks], target, seed), strict=True
+        )
         if chain[-1].name != declared.name
     ]
 
@@ -177,7 +179,7 @@ def plain(node: Node) -> Node:
     (boxes,) = solid_boxes([node])
     others = [replace(other, role=node.role) for other in drawings(boxes[0])] if len(boxes) == 1 else []
     same = list(_drawing_the_same(others, node, np.ones(3)))
-    if not same or language()[node.name] in unhinted():  # those of the paper are said as a solid with a role
+    if not same or is_unhinted(language()[node.name]):  # those of the paper are said as a solid with a role
         same.append(node)
     return min(same, key=numbers_written)
 
@@ -200,7 +202,7 @@ def at_the_far_side(node: Node) -> Node:
         return node
     turn = signs[:, None] * boxes[0].rotation * [1, 1, signs.prod()]  # a box is its own image along its last axis
     image = Box(signs * boxes[0].centre, turn, boxes[0].half)
-    others = [replace(other, role=drawn.role) for other in alike((drawn,), image) if other.name == drawn.name]
+    others = [replace(other, role=drawn.role) for other in redrawn(drawn, image)]
     found = next(_drawing_the_same(others, drawn, signs), None)
     return node if found is None else nest((*loops, found))
 
@@ -218,24 +220,28 @@ def _drawing_the_same(others: Sequence[Draw], node: Node, signs: FloatArray) -> 
 
 def drawings(box: Box) -> list[Draw]:
     """How the statements that have a hint draw a box."""
-    return [
-        Draw(declared.name, tuple(to_float32(value) for value in values))
-        for declared in language()
-        if declared.hint is not None
-        for values in declared.hint(box)
-    ]
+    return [drawn for declared in language() for drawn in _hinted(declared, box)]
 
 
-def alike(chain: Chain, box: Box) -> list[Draw]:
-    """How the statement of a block draws a box; how all others do where it does not."""
-    drawn = chain[-1]
-    assert isinstance(drawn, Draw)
-    every = drawings(box)
-    same = [other for other in every if other.name == drawn.name]
-    if not same and language()[drawn.name] in unhinted():
-        other = stretched(drawn, box)
-        same = [other] if other else []
-    return same or every
+def _hinted(declared: Statement, box: Box) -> list[Draw]:
+    """How a statement draws a box by its hint."""
+    if declared.hint is None:
+        return []
+    return [Draw(declared.name, tuple(to_float32(value) for value in values)) for values in declared.hint(box)]
+
+
+def redrawn(drawn: Draw, box: Box) -> list[Draw]:
+    """How the same statement draws another box."""
+    declared = language()[drawn.name]
+    if not is_unhinted(declared):
+        return _hinted(declared, box)
+    other = stretched(drawn, box)
+    return [other] if other else []
+
+
+def alike(drawn: Draw, box: Box) -> list[Draw]:
+    """How the same statement draws another box; how all others do where it does not."""
+    return redrawn(drawn, box) or drawings(box)
 
 
 def solid_boxes(nodes: Sequence[Node]) -> list[list[Box]]:

@@ -15,7 +15,7 @@ from shapeprog.inference.choice import value
 from shapeprog.inference.coverage import Prices, covers
 from shapeprog.inference.evidence import Evidence
 from shapeprog.inference.joints import gaps
-from shapeprog.inference.neighbours import met, with_drawing
+from shapeprog.inference.neighbours import drawing_of, met, with_drawing
 from shapeprog.inference.tunable import bounds
 from shapeprog.language.hints import Box
 from shapeprog.language.program import Chain, Node, Program
@@ -114,7 +114,7 @@ def _reaching(chain: Chain, own: Box, copies: list[Box], parts: list[Box]) -> It
     for copy in copies:
         for longer in met(copy, parts, LINES, longer=True):
             for box in _as_copied(own, copy, longer):
-                yield from (with_drawing(chain, drawn) for drawn in alike(chain, box))
+                yield from (with_drawing(chain, drawn) for drawn in alike(drawing_of(chain), box))
 
 
 def _as_copied(own: Box, copy: Box, longer: Box) -> Iterator[Box]:

@@ -13,7 +13,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 import torch
 
-from shapeprog.inference.candidates import alike, drawings, solid_boxes
+from shapeprog.inference.candidates import alike, drawings, redrawn, solid_boxes
 from shapeprog.inference.repeating import mirrors, repeated
 from shapeprog.language.hints import STRAIGHT, Box
 from shapeprog.language.program import Chain, Draw, Loop, Node, Program, nest
@@ -48,7 +48,7 @@ def neighbours(program: Program) -> list[Node]:
     chains = program.chains
     if not chains:
         return []
-    drawn = [_drawn(chain) for chain in chains]
+    drawn = [drawing_of(chain) for chain in chains]
     boxes = [each[0] if len(each) == 1 else None for each in solid_boxes(drawn)]
     others = solid_boxes(program.body)
     found: list[Node] = [*repeated([*drawn, *program.body])]
@@ -60,7 +60,7 @@ def neighbours(program: Program) -> list[Node]:
             found += [with_drawing(chain, other) for other in drawings(box)]
             edited = list(met(box, parts))
             edited += [middle for each in [box, *edited] for middle in centred(each)]
-            found += [with_drawing(chain, other) for each in edited for other in alike(chain, each)]
+            found += [with_drawing(chain, other) for each in edited for other in alike(drawing_of(chain), each)]
             found += _recounted(chain, box)
             found += _filled(chain)
     for (one, first), (two, second) in itertools.combinations(zip(chains, boxes, strict=True), 2):
@@ -70,7 +70,8 @@ def neighbours(program: Program) -> list[Node]:
     return [node for node in dict.fromkeys(found) if node not in known]
 
 
-def _drawn(chain: Chain) -> Draw:
+def drawing_of(chain: Chain) -> Draw:
+    """What a block draws in its loops."""
     drawn = chain[-1]
     assert isinstance(drawn, Draw)
     return drawn
@@ -114,9 +115,8 @@ def _recounted(chain: Chain, box: Box) -> Iterator[Node]:
             rest = chain[place + 1 :]
             yield nest((*other, *rest))
             moved = box._replace(centre=box.centre - more * (second - first))
-            for drawn in alike(chain, moved):
-                if drawn.name == chain[-1].name:
-                    yield nest((*other, *rest[:-1], drawn))
+            for drawn in redrawn(drawing_of(chain), moved):
+                yield nest((*other, *rest[:-1], drawn))
 
 
 def _places(node: Node) -> FloatArray:

@@ -13,7 +13,7 @@ import numpy as np
 
 from shapeprog.inference.candidates import alike, solid_boxes
 from shapeprog.inference.evidence import Evidence
-from shapeprog.inference.neighbours import with_drawing
+from shapeprog.inference.neighbours import drawing_of, with_drawing
 from shapeprog.inference.repeating import repeated
 from shapeprog.language.hints import Box
 from shapeprog.language.program import Node, Program, nest
@@ -44,7 +44,7 @@ def split(program: Program, evidence: Evidence) -> list[Node]:
     for chain, boxes in zip(chains, solid_boxes([chain[-1] for chain in chains]), strict=True):
         if len(boxes) == 1:
             for parts in divided(boxes[0], evidence):
-                drawn = [draw for part in parts for draw in alike(chain, part)[:1]]
+                drawn = [draw for part in parts for draw in alike(drawing_of(chain), part)[:1]]
                 found += [with_drawing(chain, draw) for draw in drawn]
                 found += [nest((*chain[:-1], *run)) for run in Program(tuple(repeated(drawn))).chains]
     return list(dict.fromkeys(found))

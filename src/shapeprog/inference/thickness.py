@@ -11,9 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from shapeprog.inference.candidates import alike, solid_boxes
+from shapeprog.inference.candidates import redrawn, solid_boxes
 from shapeprog.inference.evidence import TOLERANCE, Evidence
-from shapeprog.inference.neighbours import with_drawing
+from shapeprog.inference.neighbours import drawing_of, with_drawing
 from shapeprog.language.hints import Box
 from shapeprog.language.program import Node, Program
 
@@ -66,7 +66,7 @@ def thickened(program: Program, evidence: Evidence, fixed: Collection[Node] = ()
     for place, (chain, board, alone) in enumerate(zip(chains, boards, single, strict=True)):
         if board is not None and alone and program.body[place] not in fixed:
             box = _as_thick(board, likes, evidence)
-            same = [drawn for drawn in alike(chain, box) if drawn.name == chain[-1].name]
+            same = redrawn(drawing_of(chain), box)
             nodes[place] = with_drawing(chain, same[0]) if same else nodes[place]
     return Program(tuple(nodes))
 

@@ -9,7 +9,7 @@ from jaxtyping import Float
 from torch import Tensor
 
 from shapeprog.geometry.distance import signed_distance
-from shapeprog.geometry.primitive import primitives
+from shapeprog.geometry.losses import volume
 from shapeprog.geometry.scene import Scene
 from shapeprog.geometry.surface import has_surface, sample_surface
 from shapeprog.language.program import Program
@@ -32,13 +32,13 @@ def buried(program: Program) -> list[int]:
     scene = unroll(encode([Program(program.body)], dtype=torch.float64))
     found: list[int] = []
     while hidden := _hidden(scene):
-        found.append(min(hidden, key=lambda block: _volume(scene, block)))
+        found.append(min(hidden)[1])
         scene = replace(scene, mask=scene.mask & (scene.block != found[-1]))
     return sorted(found)
 
 
-def _hidden(scene: Scene) -> list[int]:
-    """The blocks of a scene (1, N) that nothing is seen of beside the others."""
+def _hidden(scene: Scene) -> list[tuple[float, int]]:
+    """The blocks of a scene (1, N) that nothing is seen of beside the others, each behind its volume."""
     blocks = torch.unique(scene.block[scene.mask])
     own = scene.mask & (scene.block == blocks[:, None])
     several = scene[torch.zeros(len(blocks), dtype=torch.long)]
@@ -48,12 +48,5 @@ def _hidden(scene: Scene) -> list[int]:
         return []
     points = sample_surface(mine[drawn], SAMPLES, torch.Generator().manual_seed(0)).points
     seen: Float[Tensor, " B"] = (signed_distance(rest[drawn], points) > ON).double().mean(-1)
-    return [int(block) for block in blocks[drawn][seen < SEEN]]
-
-
-def _volume(scene: Scene, block: int) -> float:
-    mine = scene.mask & (scene.block == block)
-    return sum(
-        float(primitives[kind].volume(scene.size[mine & (scene.kind == kind)]).sum())
-        for kind in torch.unique(scene.kind[mine]).tolist()
-    )
+    hidden = seen < SEEN
+    return list(zip(volume(mine[drawn][hidden]).tolist(), blocks[drawn][hidden].tolist(), strict=True))

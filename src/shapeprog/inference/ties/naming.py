@@ -247,9 +247,10 @@ def _length(tunable: Tunable, measure: Measure) -> str:
     declared = language()[node.name]
     lengths = [s for s, quantity in enumerate(declared.quantities) if quantity.kind == "length"]
     sizes = sorted(node.values[s] for s in lengths)
-    own = node.values[_slot(tunable, measure)]
+    slot = _slot(tunable, measure)
+    own = node.values[slot]
     if measure.feature.axis < 0:
-        parameter = declared.parameter_at(_slot(tunable, measure))
+        parameter = declared.parameter_at(slot)
         longer = parameter.name if parameter.quantity.width == 1 else "breadth"
         return "thickness" if own == sizes[0] else longer
     if len(sizes) < 2 or (own <= LEVEL * sizes[1] and own == sizes[0]):

@@ -86,7 +86,7 @@ def tie(
     with single_threaded():
         tunable = Tunable(plain)
         misfit = Misfit(tunable, evidence, seed, known=known)
-        price = price * (WRITTEN_PRICE if known else PRICE)
+        worth = price * (WRITTEN_PRICE if known else PRICE)
         numbers = misfit.numbers
         straight = np.flatnonzero((numbers[: len(tunable.values)] == 0) & tunable.are("angle").numpy())
         rows = np.eye(len(numbers))[straight] if held is None else np.pad(held, ((0, 0), (0, 3)))
@@ -101,9 +101,9 @@ def tie(
             before = len(rows)
             offered = relations(measured, numbers, pairs, WRITTEN if known else INFERRED)
             curvature = misfit.at(numbers)[1]
-            rows, optimum = worthwhile(offered, numbers, curvature, price, fixed=rows, low=misfit.low, far=misfit.far)
+            rows, optimum = worthwhile(offered, numbers, curvature, worth, fixed=rows, low=misfit.low, far=misfit.far)
             if contacts:
-                rows, optimum = contacts.kept(rows, before, numbers, curvature, price)
+                rows, optimum = contacts.kept(rows, before, numbers, curvature, worth)
             numbers = _together(misfit, optimum, rows, joints, contacts)
             if progress:
                 progress("tying numbers", (round_ + 1) / ROUNDS)
@@ -117,8 +117,7 @@ def tie(
         named = written(tunable, basis, repeated)
     if held is None and not known and (gone := buried(named)):
         rest = [nest(chain) for block, chain in enumerate(plain.chains) if block not in gone]
-        anew = named_anew(Program(tuple(rest)))
-        return tie(anew, evidence, price=price / PRICE, seed=seed, progress=progress)
+        return tie(named_anew(Program(tuple(rest))), evidence, price=price, seed=seed, progress=progress)
     return Tied(named, free_numbers(named))
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from itertools import combinations
 from pathlib import Path
+from textwrap import dedent
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ from shapeprog.geometry.mesh import pieces, union_mesh
 from shapeprog.inference.evidence import evidence_of_program
 from shapeprog.inference.joints import Joints, find_joints
 from shapeprog.inference.ties.buried import buried
+from shapeprog.inference.ties.closeness import Closeness
 from shapeprog.inference.ties.contacts import Contacts, holding
 from shapeprog.inference.ties.features import features
 from shapeprog.inference.ties.fitting import ways_free
@@ -645,3 +647,57 @@ def test_of_two_equal_parts_one_is_buried_and_without_others_none():
     box = "box(at=(-6, -5, -10), size=(12, 10, 20))\n"
     assert buried(sp.parse(2 * box)) == [0]
     assert buried(sp.parse(box)) == buried(Program()) == []
+
+
+def test_an_overhang_that_is_the_same_on_all_sides_is_one_number():
+    text = dedent("""
+    top(box(at=(5, -8, -12), size=(1, 16, 24)))
+    for i in mirror(side):
+        for j in mirror(depth):
+            leg(at=(-6, {depth}, 9.98), size=(11, 1.5, 1.48))
+    """)
+    free = {}
+    for overhang in (0.54, 1.54):  # beside .52 at the sides
+        program = sp.parse(text.format(depth=8 - 1.5 - overhang))
+        free[overhang] = tie(program, evidence_of_program(program)).free
+    assert free[0.54] == free[1.54] - 1
+
+
+def test_surfaces_are_close_to_themselves_and_the_less_the_more_of_them_is_elsewhere():
+    program = sp.parse("box(at=(-6, -6, -6), size=(12, 12, 12))")
+    closeness = Closeness(evidence_of_program(program), 0)
+    found = [
+        closeness.of(unroll(sp.parse(f"box(at=(-6, -6, -6), size=({height}, 12, 12))"))) for height in (12, 10, 6, 0.4)
+    ]
+    assert found[0] == pytest.approx(1, abs=1e-3)
+    assert found == sorted(found, reverse=True)
+    side, base = (
+        12 * 10,
+        144,
+    )  # of a box that is 2 lower the top is nowhere, and a sixth of the target's sides and its top
+    precision, recall = (4 * side + base) / (4 * side + 2 * base), (4 * side + base) / (6 * base)
+    assert found[1] == pytest.approx(2 * precision * recall / (precision + recall), abs=0.03)
+    assert closeness.of(unroll(sp.parse("box(at=(8, 8, 8), size=(1, 1, 1))"))) == 0
+
+
+@pytest.mark.parametrize("price", [1.0, 1000.0])
+def test_ties_cost_little_of_the_surface_whatever_a_number_is_worth(price: float):
+    program = sp.parse(
+        dedent("""
+        for i in mirror(side):
+            side(box(at=(-12, -4, 11.85), size=(24, 8, 0.15)))
+        for i in translate(5, by=(5.6, 0, 0)):
+            shelf(box(at=(-11.7, -3.9, -11.85), size=(0.5, 7.8, 23.7)))
+        panel(box(at=(-12, 3.9, -11.85), size=(24, 0.3, 23.7)))
+        """)
+    )
+    evidence = evidence_of_program(program)
+    closeness = Closeness(evidence, 0)
+    tied = tie(program, evidence, price=price).program
+    assert closeness.of(unroll(program)) - closeness.of(unroll(tied)) <= 0.03
+
+
+def test_copies_that_are_off_their_line_by_hundredths_lie_in_it():
+    program = sp.parse("for i in translate(3, by=(4, 0.02, 0)):\n    shelf(box(at=(-4.5, -6, -8), size=(1, 12, 16)))")
+    tied = tie(program, evidence_of_program(program)).program
+    assert len(set(unroll(tied).centre[:, 1].tolist())) == 1

@@ -102,17 +102,16 @@ def written(tunable: Tunable, basis: Basis, runs: Sequence[Run]) -> Program:
                 table[tunable.moving[start]] = sum_of(row, (each, way.before))
         table[tunable.moving[run.step]] = each
         table[run.node, run.slot] = name
-    lines: list[Line] = list(_header(basis, names, order, alone, counts))
-    if floors:
-        lines.append(Assignment(((FLOOR, -Name(EXTENTS[UP]) / 2),)))
+    floor: list[tuple[str, Value]] = [(FLOOR, -Name(EXTENTS[UP]) / 2)] if floors else []
+    lines: list[Line] = list(_header(basis, names, order, alone, [*floor, *counts]))
     body = _lines(tunable.program.body, iter(range(len(tunable.nodes))), table)
     return evaluated(Source((*lines, *spacings, *body)))
 
 
 def _header(
-    basis: Basis, names: list[str], order: list[int], alone: list[bool], counts: list[tuple[str, Value]]
+    basis: Basis, names: list[str], order: list[int], alone: list[bool], before: list[tuple[str, Value]]
 ) -> Iterator[Assignment]:
-    """The lines that name numbers: the extents of the whole, then what is repeated, then all others."""
+    """The lines that name numbers: the extents of the whole, then what comes before all others, then these."""
     free = [z for z in order if not alone[z]]
     words = [basis.chosen[z][0].word for z in free]
     named = [(names[z], to_float32(basis.values[z])) for z in free]
@@ -126,7 +125,7 @@ def _header(
     begins = {where: [end for end in about if end in ends] for where, about in NOTES.items()}
     note = "; ".join(f"{', '.join(found)}: {where}" for where, found in begins.items() if found)
     lines: list[list[tuple[str, Value]]] = [sorted(whole, key=lambda pair: -EXTENTS.index(pair[0])), []]
-    for pair in (*counts, *others):
+    for pair in (*before, *others):
         if lines[-1] and sum(len(name) + 8 for name, _ in [*lines[-1], pair]) > WIDE:
             lines.append([])
         lines[-1].append(pair)

@@ -53,7 +53,7 @@ class Worth(NamedTuple):
 
 
 INFERRED = Worth(
-    centred=4.0, even=4.0, holding=1.2, sure=1.0, likely=0.6, possible=0.25, ratio=0.1, buried=1.3, inside=0.03
+    centred=4.0, even=4.0, holding=1.2, sure=1.0, likely=1.0, possible=0.4, ratio=0.25, buried=1.3, inside=0.03
 )
 """In programs that inference found, whose numbers may be off by as much as nobody sees; chosen on val."""
 
@@ -163,6 +163,9 @@ def _candidates(
         for side in places:
             if side.kind == facing and side.axis == run.axis and side.node != run.node:
                 yield run.row - side.row, "likely"
+    for each in known:
+        if each.kind == "shift":  # copies lie in line
+            yield each.row, "sure"
     for kind in ("length", "radius", "shift", "angle"):
         alike = [each for each in known if each.kind == kind]
         for one, two, same, opposite in _near(alike, numbers):

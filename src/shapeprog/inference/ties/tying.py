@@ -18,8 +18,10 @@ from shapeprog.inference.evidence import Evidence
 from shapeprog.inference.joints import Joints, find_joints
 from shapeprog.inference.refine import single_threaded
 from shapeprog.inference.roles import named_anew
+from shapeprog.inference.ties.alike import alike
 from shapeprog.inference.ties.basis import Basis, simplest
 from shapeprog.inference.ties.buried import buried
+from shapeprog.inference.ties.closeness import Closeness
 from shapeprog.inference.ties.contacts import Contacts
 from shapeprog.inference.ties.features import Feature, features
 from shapeprog.inference.ties.fitting import CLOSED, Misfit, refitted, ways_free
@@ -28,18 +30,23 @@ from shapeprog.inference.ties.leaning import between_ends
 from shapeprog.inference.ties.naming import written
 from shapeprog.inference.ties.opposite import as_images
 from shapeprog.inference.ties.pricing import worthwhile
-from shapeprog.inference.ties.relations import INFERRED, WRITTEN, relations
-from shapeprog.inference.ties.runs import runs
+from shapeprog.inference.ties.relations import INFERRED, WRITTEN, Relation, relations
+from shapeprog.inference.ties.runs import Run, runs
 from shapeprog.inference.tunable import CELLS, DEGREES, Tunable
 from shapeprog.language.free import free_numbers
 from shapeprog.language.program import Draw, Program, nest
+from shapeprog.language.unroll import unroll
 from shapeprog.space import FloatArray
 
-PRICE = 1e-4
+PRICE = 2e-4
 """What a number is worth: mean squared distance in cells; chosen on val."""
 
 WRITTEN_PRICE = 1.2e-3
 """The same in a program that somebody wrote, whose numbers are known; chosen on planted programs."""
+
+LOST, CHEAPER, CHEAPEST = 0.03, 3.0, 0.3
+"""How much less of the surface may be near that of the target when numbers are tied; beyond that a number is worth so
+many times less, as long as it is worth more than this share of the usual."""
 
 ROUNDS = 3
 """Most times that relations are looked for."""
@@ -83,41 +90,27 @@ def tie(
     plain = Program(program.body) if held is not None else restated(program)
     if not plain.size:
         return Tied(plain, 0)
+    closeness = Closeness(evidence, seed)
     with single_threaded():
-        tunable = Tunable(plain)
-        misfit = Misfit(tunable, evidence, seed, known=known)
-        worth = price * (WRITTEN_PRICE if known else PRICE)
-        numbers = misfit.numbers
-        straight = np.flatnonzero((numbers[: len(tunable.values)] == 0) & tunable.are("angle").numpy())
-        rows = np.eye(len(numbers))[straight] if held is None else np.pad(held, ((0, 0), (0, 3)))
-        measured: list[Feature] = []
-        scene = tunable.scene(tunable.values)
-        joints = _joints(scene, seed)
-        pairs = touching(tunable, scene, joints) if joints else set()
-        contacts = Contacts(tunable, joints) if joints else None
+        ties = _Ties(plain, Misfit(Tunable(plain), evidence, seed, known=known), closeness, held, seed)
+        worth, trusted = price * (WRITTEN_PRICE if known else PRICE), WRITTEN if known else INFERRED
         for round_ in range(ROUNDS):
-            poses = tunable.poses(torch.from_numpy(numbers[: len(tunable.values)]))
-            measured = features(tunable, poses)
-            before = len(rows)
-            offered = relations(measured, numbers, pairs, WRITTEN if known else INFERRED)
-            curvature = misfit.at(numbers)[1]
-            rows, optimum = worthwhile(offered, numbers, curvature, worth, fixed=rows, low=misfit.low, far=misfit.far)
-            if contacts:
-                rows, optimum = contacts.kept(rows, before, numbers, curvature, worth)
-            numbers = _together(misfit, optimum, rows, joints, contacts)
+            more = ties.impose(relations(ties.measured(), ties.numbers, ties.touching, trusted), worth)
             if progress:
                 progress("tying numbers", (round_ + 1) / ROUNDS)
-            if len(rows) == before:
+            if not more:
                 break
-        ways = ways_free(rows, len(numbers))
-        repeated = list(runs(tunable, ways))
-        lengths = np.append(tunable.are("length").numpy(), [False] * 3)
-        following = Following(tunable, joints, numbers) if joints else None
-        basis = _rounded(simplest(measured, numbers, ways, lengths, repeated, pairs, following))
-        named = written(tunable, basis, repeated)
+        basis, following, repeated = ties.simplest()
+        if not known and ties.impose(list(alike(basis, following, trusted)), worth):
+            basis, _, repeated = ties.simplest()
+        named = written(ties.tunable, _rounded(basis), repeated)
     if held is None and not known and (gone := buried(named)):
         rest = [nest(chain) for block, chain in enumerate(plain.chains) if block not in gone]
         return tie(named_anew(Program(tuple(rest))), evidence, price=price, seed=seed, progress=progress)
+    if held is None and not known and price > CHEAPEST:
+        lost = closeness.of(unroll(plain)) - closeness.of(unroll(named))
+        if lost > LOST:
+            return tie(program, evidence, price=price / CHEAPER, seed=seed, progress=progress)
     return Tied(named, free_numbers(named))
 
 
@@ -126,16 +119,71 @@ def restated(program: Program) -> Program:
     return as_images(between_ends(program))
 
 
-def _together(
-    misfit: Misfit, numbers: FloatArray, rows: FloatArray, joints: Joints | None, contacts: Contacts | None
-) -> FloatArray:
-    """The numbers (V,) refitted as they best fit; where parts come apart so, with what holds them weighing more; and
-    where even that parts them, as they are."""
-    fitting = refitted(misfit, numbers, rows, joints)
-    if contacts is None or contacts.hold(fitting, numbers):
-        return fitting
-    closer = refitted(misfit, numbers, rows, joints, CLOSED)
-    return closer if contacts.hold(closer, numbers) else numbers
+class _Ties:
+    """The relations of a program that hold so far.
+
+    Attributes
+    ----------
+    numbers, rows
+        Where its numbers and the extents of the whole are (V,), and the relations (M, V) that hold for them.
+    joints, touching
+        Where its parts touch, and the pairs of nodes that do.
+    """
+
+    def __init__(
+        self, program: Program, misfit: Misfit, closeness: Closeness, held: FloatArray | None, seed: int
+    ) -> None:
+        self.tunable, self.misfit, self.closeness = misfit.tunable, misfit, closeness
+        self.numbers = misfit.numbers
+        values = self.tunable.values
+        straight = np.flatnonzero((self.numbers[: len(values)] == 0) & self.tunable.are("angle").numpy())
+        self.rows = np.eye(len(self.numbers))[straight] if held is None else np.pad(held, ((0, 0), (0, 3)))
+        scene = self.tunable.scene(values)
+        self.joints = _joints(scene, seed)
+        self.touching = touching(self.tunable, scene, self.joints) if self.joints else set()
+        self._contacts = Contacts(self.tunable, self.joints) if self.joints else None
+
+    def measured(self) -> list[Feature]:
+        """What can be measured of the program."""
+        return features(self.tunable, self.tunable.poses(self._own(self.numbers)))
+
+    def impose(self, offered: list[Relation], worth: float) -> bool:
+        """Let relations hold that are worth having where a number is worth so much, and tell whether some are."""
+        before, curvature = len(self.rows), self.misfit.at(self.numbers)[1]
+        self.rows, optimum = worthwhile(
+            offered, self.numbers, curvature, worth, fixed=self.rows, low=self.misfit.low, far=self.misfit.far
+        )
+        if self._contacts:
+            self.rows, optimum = self._contacts.kept(self.rows, before, self.numbers, curvature, worth)
+        self.numbers = self._closest(optimum)
+        return len(self.rows) > before
+
+    def simplest(self) -> tuple[Basis, Following | None, list[Run]]:
+        """The measures that all numbers follow from, what changes of them part, and runs that are written by counts."""
+        ways = ways_free(self.rows, len(self.numbers))
+        repeated = list(runs(self.tunable, ways))
+        lengths = np.append(self.tunable.are("length").numpy(), [False] * 3)
+        following = Following(self.tunable, self.joints, self.numbers) if self.joints else None
+        basis = simplest(self.measured(), self.numbers, ways, lengths, repeated, self.touching, following)
+        return basis, following, repeated
+
+    def _closest(self, numbers: FloatArray) -> FloatArray:
+        """The numbers (V,) for which the relations hold: as they fit best, as they are, or half-way.
+
+        Where parts come apart as they fit best, what holds them weighs more.
+        """
+        ways = ways_free(self.rows, len(numbers))
+        start = ways @ (ways.T @ numbers)  # all but rounding of what is there
+        fitting = refitted(self.misfit, start, self.rows, self.joints)
+        if self._contacts and not self._contacts.hold(fitting, numbers):
+            fitting = refitted(self.misfit, start, self.rows, self.joints, CLOSED)
+        offered = [fitting, (start + fitting) / 2, start]
+        holding = [each for each in offered if not self._contacts or self._contacts.hold(each, numbers)]
+        return max(holding, key=lambda each: self.closeness.of(self.tunable.scene(self._own(each))), default=numbers)
+
+    def _own(self, numbers: FloatArray) -> torch.Tensor:
+        """Those of numbers and extents that the program writes."""
+        return torch.from_numpy(numbers[: len(self.tunable.values)])
 
 
 def touching(tunable: Tunable, scene: Scene, joints: Joints) -> set[tuple[int, int]]:

@@ -1,0 +1,48 @@
+"""How much of the surface of a program lies near that of its target, and the other way round: what a change is worth.
+
+A misfit of squares says where numbers are best as long as it is known what they should fit.  Of thin parts and sheets
+that is in doubt, and there it may fall while parts leave the surface that they stood for.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import torch
+from scipy.spatial import cKDTree
+
+from shapeprog.geometry.distance import signed_distance
+from shapeprog.geometry.scene import Scene
+from shapeprog.geometry.surface import sample_surface
+from shapeprog.inference.evidence import Evidence
+
+POINTS, SAMPLES = 4_000, 4_000
+"""Points of the target, and samples of the surface of the program."""
+
+REACH = 0.01
+"""Share of the diagonal of the target's box within which surfaces are near, as they are measured by."""
+
+
+class Closeness:
+    """A target as points, ready to be compared with.
+
+    Parameters
+    ----------
+    evidence
+        The target.
+    seed
+        Which of its points are looked at, and where programs are sampled: always at the same places.
+    """
+
+    def __init__(self, evidence: Evidence, seed: int) -> None:
+        surface = evidence.surface
+        self.seed, self.reach = seed, REACH * float(np.linalg.norm(np.ptp(surface, 0)))
+        drawn = np.random.default_rng(seed).integers(0, len(surface), POINTS)
+        self._points, self._tree = torch.from_numpy(surface[drawn]), cKDTree(surface)
+
+    def of(self, scene: Scene) -> float:
+        """The F-score of the two surfaces."""
+        recall = float((signed_distance(scene, self._points).abs() <= self.reach).double().mean())
+        sample = sample_surface(scene, SAMPLES, torch.Generator().manual_seed(self.seed))
+        away = self._tree.query(sample.points.numpy(), distance_upper_bound=self.reach)[0]
+        precision = float(np.isfinite(away).mean())
+        return 2 * precision * recall / (precision + recall) if precision + recall else 0.0

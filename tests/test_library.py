@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from textwrap import dedent
 
 import pytest
 import torch
@@ -20,7 +21,7 @@ from shapeprog.language.text import format_program, format_source, parse, source
 from shapeprog.language.unit import Unit
 from shapeprog.language.unroll import unroll
 from shapeprog.library import Library, learn, library_of, load_library, save_library, with_library
-from shapeprog.library.blocks import blocks_of
+from shapeprog.library.blocks import Kind, blocks_of
 from shapeprog.library.length import statements
 from shapeprog.library.matching import TOLERANCE
 from shapeprog.library.rewriting import offers
@@ -279,7 +280,7 @@ def test_commands_learn_show_and_draw_libraries(run: Run, tmp_path: Path) -> Non
     shown = run("library", "show", "mine.shape")
     assert "# shapeprog library learn programs --out mine.shape" in shown.out
     assert shown.out == (tmp_path / "mine.shape").read_text()
-    assert "def left_and_right(" in run("library", "show").out
+    assert "def boxes(" in run("library", "show").out
     ended = run("library", "learn", "programs/0.shape")
     assert ended.code == 2
     assert "no function is worth its lines in 1 program" in ended.err
@@ -321,4 +322,108 @@ def test_tidy_and_infer_write_programs_with_a_library(
     run("export", "table.shape", "table.obj")
     ended = run("infer", "table.obj", "--no-picture", "--with", "posts.shape", "--library")
     assert ended.code == 0, ended.err
-    assert given == ["posts", "left_and_right"]
+    assert given == ["posts", "boxes"]
+
+
+GRID = """\
+def boxes(bottom, height, depth, width, levels=1, level_spacing=0, rows=1, row_spacing=0, columns=1, column_spacing=0):
+    for i in translate(levels, by=(level_spacing, 0, 0)):
+        for j in translate(rows, by=(0, row_spacing, 0)):
+            for k in translate(columns, by=(0, 0, column_spacing)):
+                box(
+                    at=(bottom, -(depth + (rows - 1) * row_spacing) / 2, -(width + (columns - 1) * column_spacing) / 2),
+                    size=(height, depth, width),
+                )
+"""
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (
+            "for i in mirror(side):\n    side(box(at=(-8, -4, 5), size=(16, 8, 1)))",
+            {"columns": 2, "column_spacing": 11},
+        ),
+        ("for i in translate(4, by=(3, 0, 0)):\n    shelf(box(at=(-8, -4, -5), size=(1, 8, 10)))", {"levels": 4}),
+        (
+            "for i in mirror(depth):\n    for j in mirror(side):\n        leg(at=(-8, 4, 5), size=(6, 1, 1))",
+            {"rows": 2, "row_spacing": 9, "columns": 2, "column_spacing": 11},
+        ),
+    ],
+)
+def test_a_grid_serves_pairs_rows_and_fours_and_says_only_what_is_repeated(text: str, said: dict[str, float]) -> None:
+    program, library = parse(text), library_of(parse(GRID))
+    found = with_library(program, library)
+    (call,) = calls(found)
+    arguments = dict(call.arguments)
+    assert said.items() <= arguments.items()
+    assert {"levels", "rows", "columns"} & arguments.keys() == {"levels", "rows", "columns"} & said.keys()
+    assert away(program, found) < TOLERANCE
+    loops = [node for node in inline(found).walk() if isinstance(node, Loop)]
+    assert len(loops) == len({"levels", "rows", "columns"} & said.keys())  # rows of one are not written out
+    assert all(loop.count > 1 for loop in loops)
+
+
+def test_rails_that_run_straight_along_a_mirror_are_a_row_of_two_and_splayed_legs_are_not() -> None:
+    text = dedent("""
+    for i in mirror(side):
+        {}(rod(start=(-8, -4, 5), end=({}), radius=0.5))
+    """)
+    straight, splayed = (blocks(parse(text.format(*each))) for each in (("rail", "-8, 4, 5"), ("leg", "0, -4, 4")))
+    assert [kind.repeats for kind in straight] == [((2, "mirror"),), ((2, "row"),)]
+    assert [kind.repeats for kind in splayed] == [((2, "mirror"),), ((2, "mirror"),)]
+
+
+def blocks(program: Program) -> list[Kind]:
+    """The kinds of the one block of a program, as it is written and where mirror images are rows."""
+    (chain,) = program.chains
+    return [next(blocks_of(chain, rows)).kind for rows in ((), (0, 1, 2))]
+
+
+def test_grids_are_learned_where_many_programs_repeat_boxes_along_different_axes() -> None:
+    texts = [
+        "for i in mirror(side):\n    side(box(at=(-8, -4, {0}), size=(16, 8, 1)))",
+        "for i in mirror(depth):\n    panel(box(at=(-{0}, 6, -4), size=(9, 1, 8)))",
+        "for i in translate({1}, by=(3.5, 0, 0)):\n    shelf(box(at=(-9, -4, -{0}), size=(1, 8, 12)))",
+        "for i in mirror(depth):\n    for j in mirror(side):\n        leg(at=(-8, {0}, 6), size=(6, 1, 1))",
+    ]
+    programs = [parse(text.format(3 + number, 3 + number % 3)) for number in range(5) for text in texts]
+    (function,) = learn(programs).functions
+    assert function.name == "boxes"
+    assert {"levels", "rows", "columns"} <= {name for name, _ in function.parameters}
+    written = [with_library(program, learn(programs)) for program in programs]
+    assert sum(map(statements, written)) == len(programs)
+    assert all(away(*pair) < TOLERANCE for pair in zip(programs, written, strict=True))
+
+
+def test_steps_along_several_axes_are_learned_with_their_steps() -> None:
+    slat = "slat(bar(start=(-6, -3, -{0}), end=(-6, -3, {0}), section=(0.4, 1)))"
+    text = "for i in translate({1}, by=(1.5, {2}, 0)):\n    " + slat
+    programs = [parse(text.format(5 + number, 3 + number % 2, 0.4 + 0.1 * number)) for number in range(6)]
+    library = learn(programs)
+    (function,) = library.functions
+    assert {"step_up", "step_back"} & {name for name, _ in function.parameters}
+    for program in programs:
+        written = with_library(program, library)
+        assert statements(written) == 1
+        assert away(program, written) < TOLERANCE
+
+
+def test_a_cushion_in_a_function_has_the_role_around_its_call() -> None:
+    program = parse(
+        dedent("""
+        def soft(at):
+            cushion(at=(0, at, 0), size=(2, 4, 4), edge=0.5)
+            leg(at=(-4, at, 0), size=(4, 1, 1))
+
+        door(soft(at=1))
+        cushion(soft(at=6))
+        """)
+    )
+    drawn = [node for node in inline(program).walk() if isinstance(node, Draw)]
+    assert [(node.name, node.role) for node in drawn] == [
+        ("cushion", "door"),
+        ("leg", ""),
+        ("cushion", ""),
+        ("leg", ""),
+    ]

@@ -23,7 +23,7 @@ from shapeprog.language.hints import Box
 from shapeprog.language.parameters import to_float32
 from shapeprog.language.program import Chain, Draw, Node, Program
 from shapeprog.language.statement import language
-from shapeprog.library.blocks import Kind, blocks_of
+from shapeprog.library.blocks import Kind, blocks_of, readings
 from shapeprog.library.matching import Form, Pattern
 from shapeprog.space import FloatArray
 
@@ -96,7 +96,7 @@ class _Pool:
         self.counts = sorted({float(count) for _, counts in self._rows for count in counts})
 
     def _add(self, chain: Chain) -> None:
-        for block in blocks_of(chain):
+        for block in (*blocks_of(chain), *readings(chain)[1:]):
             rows = self._rows.setdefault((replace(block.kind, word=""), block.counts), {})
             if len(rows) < ALIKE:
                 rows.setdefault(np.round(block.values, CELLS).tobytes(), block.values)
@@ -116,10 +116,9 @@ def _pointed(patterns: Sequence[Pattern]) -> list[str]:
 def _calls(pattern: Pattern, pool: _Pool, deadline: Deadline) -> list[Called]:
     """The calls of one function that are nearest to blocks of a pool, and loops around them."""
     found: list[tuple[float, dict[str, float]]] = []
-    for counts in itertools.product(pool.counts, repeat=len(pattern.counts)):
+    for given in pattern.choices(pool.counts):
         if deadline.passed("the search for calls of functions"):
             break
-        given = dict(zip(pattern.counts, counts, strict=True))
         usual = pattern.arguments | given
         start = np.array([usual[name] for name in pattern.measures])
         for wanted in pattern.forms(given):

@@ -124,8 +124,9 @@ class _Run:
                         raise Fault(line, f"loops are nested more than {DEEPEST} deep", cure)
                     body = tuple(self.block(line.body, scope, loops + 1, calls, role))
                     kind = Loop if self.given is None else Symbolic
-                    found.append(kind(line.name, self._values(line, scope), body))
-                    self.met[id(line)].append(found[-1])
+                    loop = kind(line.name, self._values(line, scope), body)
+                    self.met[id(line)].append(loop)
+                    found += body if calls and _once(loop) else [loop]
                 case Call():
                     self._count(line, calls + 1)
                     if calls >= DEEPEST:
@@ -196,9 +197,14 @@ class _Run:
         return tuple(found)
 
 
+def _once(loop: Loop | Symbolic) -> bool:
+    """Whether a loop draws its body once, where it stands: a function may be called for a row of one."""
+    return loop.name == "translate" and isinstance(loop.values[0], float) and loop.values[0] == 1
+
+
 def _role(line: WrittenDraw, around: str) -> str:
     """The role of a part: its own, that of its statement, which is not written, or else the one around the call."""
-    return line.role or ("" if line.name in language().roles else around)
+    return line.role or ("" if line.name == around or language().own_role(line.name) else around)
 
 
 def _at(line: Line, key: int | str, value: Value, scope: dict[str, Any]) -> Any:

@@ -206,6 +206,13 @@ class Language:
         """The role with this id, if there is one."""
         return next((role for role in self.roles.values() if role.id == number), None)
 
+    def own_role(self, name: str) -> str:
+        """The role that a statement has by itself, such as ``leg``; none if it is a shape that any part may have.
+
+        ``cushion`` is called after a part, and yet the shape of many.
+        """
+        return name if name in self.roles and self[name].hint is None else ""
+
     def called(self, word: str) -> Role | Statement:
         """What parts are called by a word: a role, or a statement that is none."""
         return self.roles[word] if word in self.roles else self._by_name[word]

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from functools import cache
+from dataclasses import dataclass, replace
+from functools import cache, lru_cache
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -20,15 +20,23 @@ from torch import Tensor
 
 from shapeprog.geometry.batch import Solids
 from shapeprog.geometry.primitive import primitives
-from shapeprog.language.program import Chain, Draw, Loop
+from shapeprog.language.program import Chain, Draw, Loop, Program
 from shapeprog.language.statement import Statement, language
-from shapeprog.space import FloatArray
+from shapeprog.language.unroll import unroll
+from shapeprog.space import DEPTH, HALF, SIDE, SPAN, UP, FloatArray
 
 ZERO = 1e-6
 """Shifts in cells below this are none."""
 
-Way = Literal["pair", "row", "mirror"]
-"""How copies lie along an axis: two, any number at equal steps, or one and its mirror image."""
+ROWS: tuple[tuple[int, ...], ...] = ((), (UP, DEPTH, SIDE), (DEPTH,), (SIDE,))
+"""Axes along which mirror images may be told as rows."""
+
+STRAIGHT = 0.02
+"""How far in cells a part that is told by points may be from its own mirror image."""
+
+Way = Literal["pair", "row", "mirror", "grid", "steps"]
+"""How copies lie along an axis: two, any number at equal steps, or one and its mirror image; in a grid there may be one
+alone, and in steps each is shifted along all axes at once."""
 
 
 class Slot(NamedTuple):
@@ -74,6 +82,16 @@ class Kind:
     repeats: tuple[tuple[int, Way], ...] = ()
     others: tuple[str, ...] = ()
 
+    @property
+    def grid(self) -> bool:
+        """Whether it is told as a grid."""
+        return any(way == "grid" for _, way in self.repeats)
+
+    @property
+    def steps(self) -> bool:
+        """Whether its copies are shifted along several axes at once."""
+        return any(way == "steps" for _, way in self.repeats)
+
 
 class Block(NamedTuple):
     """A block in its form: its numbers (M,), what they are, their factors (M, V + 1) by the V of the text, its counts.
@@ -89,58 +107,128 @@ class Block(NamedTuple):
     counts: tuple[int, ...]
 
 
-def blocks_of(chain: Chain) -> Iterator[Block]:
-    """The forms of a block: first the narrowest, then those where a pair is taken for a row of two."""
+def blocks_of(chain: Chain, rows: Sequence[int] = ()) -> Iterator[Block]:
+    """The forms of a block: first the narrowest, then those where a pair is taken for a row of two.
+
+    Parts that run straight along a mirror, such as a rail on either side, are rows of two along the axes ``rows``, too.
+    """
     *outer, draw = chain
     assert isinstance(draw, Draw)
     loops = [node for node in outer if isinstance(node, Loop)]
-    word = draw.role or (draw.name if draw.name in language().roles else "")
+    word = draw.role or language().own_role(draw.name)
     solid = solid_of(draw.name)
     numbers = np.array([*(value for node in chain for value in node.values), 1.0])
     first = len(numbers) - 1 - len(draw.values)
     base = np.zeros((len(solid.rows), len(numbers)))
     base[:, first:] = solid.rows
-    found = _repeated(loops, base, solid, numbers)
+    found = _repeated(loops, base, solid, numbers, draw, rows)
     if found is None:
         names = tuple(node.name for node in loops)
         more = [slot for node in loops for slot in _slots(language()[node.name])]
-        rows = np.vstack([base, np.eye(len(numbers))[:first]])
+        every = np.vstack([base, np.eye(len(numbers))[:first]])
         kind = Kind(word, solid.shape, solid.boxed, (), names)
-        yield Block(kind, (*solid.slots, *more), rows @ numbers, rows, tuple(node.count for node in loops))
+        yield Block(kind, (*solid.slots, *more), every @ numbers, every, tuple(node.count for node in loops))
         return
-    ways, rows, counts = found
+    ways, every, counts = found
     spans = tuple(Slot("plane" if way == "mirror" else "span", "length", axis) for axis, way in ways)
     pairs = [place for place, (_, way) in enumerate(ways) if way == "pair"]
     for chosen in (each for size in range(len(pairs) + 1) for each in itertools.combinations(pairs, size)):
         repeats = tuple((axis, "row" if place in chosen else way) for place, (axis, way) in enumerate(ways))
         kind = Kind(word, solid.shape, solid.boxed, repeats)
-        yield Block(kind, (*solid.slots, *spans), rows @ numbers, rows, counts)
+        yield Block(kind, (*solid.slots, *spans), every @ numbers, every, counts)
+
+
+def readings(chain: Chain) -> list[Block]:
+    """The narrowest forms of a block: as it is written, then with mirror images as rows of two along some axes."""
+    found: dict[Kind, Block] = {}
+    for rows in ROWS:
+        block = next(blocks_of(chain, rows))
+        found.setdefault(block.kind, block)
+    return list(found.values())
+
+
+def stepped(block: Block) -> Block | None:
+    """A block that one loop shifts along several axes at once, with its steps along all; none if it is another."""
+    if block.kind.others != ("translate",):
+        return None
+    kept = [place for place, slot in enumerate(block.slots) if slot.kind != "count"]
+    kind = replace(block.kind, repeats=tuple((axis, "steps") for axis in range(3)), others=())
+    return Block(kind, tuple(block.slots[k] for k in kept), block.values[kept], block.rows[kept], block.counts)
+
+
+def gridded(block: Block) -> Iterator[Block]:
+    """The same block as grids: along the axes of its copies, and along others where there is one alone.
+
+    Instead of the span of all copies grids have the spacing between them, which is zero where there is one alone; and
+    instead of the low corner of a solid that is symmetric the middle of all copies, but for how high it begins, so that
+    a grid which lies in the middle need not say so.  Nothing for a block that is not repeated.
+    """
+    if block.kind.others or not block.kind.repeats:
+        return
+    ways = dict(block.kind.repeats)
+    free = [axis for axis in range(3) if axis not in ways]
+    for more in (each for size in range(len(free) + 1) for each in itertools.combinations(free, size)):
+        along = [axis for axis in range(3) if axis in more or ways.get(axis, "mirror") != "mirror"]
+        if along:
+            yield _grid(block, along)
+
+
+def _grid(block: Block, along: Sequence[int]) -> Block:
+    kind, unit = block.kind, np.eye(len(block.rows))
+    first = len(unit) - len(kind.repeats)
+    ends = {axis: unit[first + place] for place, (axis, _) in enumerate(kind.repeats)}
+    known = dict(zip(ends, block.counts, strict=True))
+    rows, slots = [*unit[:first]], [*block.slots[:first]]
+    repeats: list[tuple[int, Way]] = []
+    for axis in range(3):
+        size = unit[3 + axis] if kind.boxed else np.zeros(len(unit))
+        if kind.boxed and axis != UP:
+            rows[axis] = unit[axis] + ends.get(axis, size) / 2
+            slots[axis] = Slot("middle", "position", axis)
+        if axis in along:
+            repeats.append((axis, "grid"))
+            rows.append((ends.get(axis, size) - size) / max(known.get(axis, 1) - 1, 1))
+            slots.append(Slot("spacing", "length", axis))
+        elif axis in ends:
+            repeats.append((axis, "mirror"))
+            rows.append(ends[axis])
+            slots.append(Slot("plane", "length", axis))
+    change = np.stack(rows)
+    counts = tuple(known.get(axis, 1) for axis, _ in repeats)
+    kind = replace(kind, repeats=tuple(repeats))
+    return Block(kind, tuple(slots), change @ block.values, change @ block.rows, counts)
 
 
 def _repeated(
-    loops: Sequence[Loop], base: FloatArray, solid: Solid, numbers: FloatArray
+    loops: Sequence[Loop], base: FloatArray, solid: Solid, numbers: FloatArray, draw: Draw, straight: Sequence[int]
 ) -> tuple[list[tuple[int, Way]], FloatArray, tuple[int, ...]] | None:
-    """How a block is repeated along each axis, its rows with those of the spans, and its counts; none if it is not."""
+    """How a block is repeated along each axis, its rows with those of the spans, and its counts; none if it is not.
+
+    A solid that is not boxed is a row of two in a mirror across one of the axes ``straight`` where it is its own image.
+    """
     rows, start = base.copy(), 0
     ways: dict[int, tuple[Way, FloatArray, int]] = {}
     for loop in loops:
         slots = np.eye(len(numbers))[start : start + len(loop.values)]
         start += len(loop.values)
+        if loop.name == "translate" and loop.count == 1:  # once, where it stands
+            continue
         if loop.name == "mirror":
             axis, plane = int(loop.values[1]), slots[2]
-        elif loop.name == "translate" and loop.count > 1:
+        elif loop.name == "translate":
             along = [axis for axis in range(3) if abs(loop.values[1 + axis]) > ZERO]
             axis = along[0] if len(along) == 1 else -1
         else:
             return None
         if axis < 0 or axis in ways:
             return None
-        if loop.name == "mirror" and not solid.boxed:
+        if loop.name == "mirror" and not solid.boxed and not (axis in straight and _own_image(draw, axis)):
             ways[axis] = "mirror", plane, 2
             continue
         if loop.name == "mirror":
-            other = 2 * plane - rows[axis] - rows[3 + axis]
-            reach = other - rows[axis]
+            one = next(place for place, slot in enumerate(solid.slots) if slot.axis == axis and slot.kind == "position")
+            other = 2 * plane - rows[one] - (rows[3 + axis] if solid.boxed else 0)
+            reach = other - rows[one]
         else:
             reach = (loop.count - 1) * slots[1 + axis]
         if reach @ numbers < 0:  # the first copy becomes the lowest
@@ -153,6 +241,20 @@ def _repeated(
     order = sorted(ways)
     whole = np.vstack([rows, *(ways[axis][1] for axis in order)])
     return [(axis, ways[axis][0]) for axis in order], whole, tuple(ways[axis][2] for axis in order)
+
+
+@lru_cache(1024)
+def _own_image(draw: Draw, axis: int) -> bool:
+    """Whether a part that is told by points is its own mirror image across the plane of all of them."""
+    slots = [slot for slot, each in enumerate(_slots(language()[draw.name])) if each == (each.word, "position", axis)]
+    places = [draw.values[slot] for slot in slots]
+    if not places or np.ptp(places) > STRAIGHT:
+        return False
+    points = torch.rand(64, 3, dtype=torch.float64, generator=torch.Generator().manual_seed(0)) * SPAN - HALF
+    mirrored = points.clone()
+    mirrored[:, axis] = 2 * float(np.mean(places)) - points[:, axis]
+    scene = unroll(Program((draw,)))
+    return bool((scene.distance(points) - scene.distance(mirrored)).abs().max() <= STRAIGHT)
 
 
 def solid_of(name: str) -> Solid:

@@ -13,7 +13,7 @@ import numpy.typing as npt
 from shapeprog.language.program import Draw, Program, nest
 from shapeprog.language.statement import language
 from shapeprog.language.text import source_of
-from shapeprog.library.blocks import Block, Kind, Slot, blocks_of
+from shapeprog.library.blocks import Block, Kind, Slot, blocks_of, gridded, readings, stepped
 from shapeprog.library.length import STATEMENT, length
 from shapeprog.library.measures import Group, Measure, measures, relations
 from shapeprog.space import FloatArray
@@ -23,6 +23,9 @@ NEAR = 0.03
 
 LARGEST = 3
 """Most blocks of a function."""
+
+ARGUMENTS = 10
+"""Most arguments of a function that draws several blocks: with more, nobody would call it."""
 
 OPEN = 0.6
 """Share of the uses from which a measure that is zero need not be said."""
@@ -74,10 +77,13 @@ def units_of(program: Program) -> list[Unit | None]:
     """The blocks of a program that functions may draw, in the order of its text."""
     found: list[Unit | None] = []
     for chain in program.chains:
-        forms = tuple(form for form in blocks_of(chain) if not form.kind.others)
+        known = list(blocks_of(chain))
+        forms = [form for form in known if not form.kind.others]
+        forms += {form.kind: form for each in readings(chain) for form in gridded(each)}.values()
+        forms += filter(None, [stepped(known[0])])
         draw = chain[-1]
         assert isinstance(draw, Draw)
-        found.append(Unit(forms, draw, length(source_of(Program((nest(chain),))).lines)) if forms else None)
+        found.append(Unit(tuple(forms), draw, length(source_of(Program((nest(chain),))).lines)) if forms else None)
     return found
 
 
@@ -92,7 +98,10 @@ def candidates(corpus: Corpus, least: int) -> Iterator[Candidate]:
                     slots[kind] = form.slots
                     use = Use(number, (place,), form.values, unit.length - STATEMENT)  # type: ignore[union-attr]
                     groups[(kind,)].append(use)
-    level = _frequent({kinds: uses for kinds, uses in groups.items() if kinds[0].word}, least)
+    level = _frequent(
+        {kinds: uses for kinds, uses in groups.items() if kinds[0].word and not (kinds[0].grid or kinds[0].steps)},
+        least,
+    )
     for _ in range(1, LARGEST):
         level = _frequent(_larger(level, corpus), least)
         groups |= level
@@ -109,9 +118,8 @@ def programs(uses: Iterable[Use]) -> int:
 
 def statement_of(shape: str) -> str:
     """The statement that draws a solid and gives it no role; nothing if there is none."""
-    name = {"cuboid": "box"}.get(shape, shape)
-    known = language()
-    return name if name in known and name not in known.roles else ""
+    name, known = {"cuboid": "box", "rounded_box": "cushion"}.get(shape, shape), language()
+    return name if name in known and not known.own_role(name) else ""
 
 
 def _frequent(level: dict[tuple[Kind, ...], list[Use]], least: int) -> dict[tuple[Kind, ...], list[Use]]:
@@ -127,6 +135,8 @@ def _larger(level: dict[tuple[Kind, ...], list[Use]], corpus: Corpus) -> dict[tu
                 if unit is None or place in use.blocks:
                     continue
                 form = unit.forms[0]
+                if form.kind.steps:
+                    continue
                 behind = repr(form.kind) > repr(kinds[-1])
                 other = form.kind.word and form.kind.word not in [kind.word for kind in kinds]
                 if other and behind:
@@ -153,7 +163,9 @@ def _best(group: Group, uses: Sequence[Use], least: int) -> Iterator[Candidate]:
         if joined >= len(group.kinds) - 1:
             fitting = [use for use, fits in zip(uses, alive, strict=True) if fits]
             found = _priced(group, rows, openings, fitting)
-            if programs(found.uses) >= least and found.gain > (best.gain if best else 0):
+            asked = group.size - len(found.rows) - len(found.openings) + group.counts
+            called = len(group.kinds) == 1 or asked <= ARGUMENTS
+            if called and programs(found.uses) >= least and found.gain > (best.gain if best else 0):
                 best = found
         support = (holds[:, untried] & alive[:, None]).sum(0)
         order = np.argsort(-support, kind="stable")
@@ -177,17 +189,21 @@ def _offered(group: Group, known: Sequence[Measure], openings: Sequence[Measure]
 def _priced(group: Group, rows: FloatArray, openings: Sequence[Measure], uses: Sequence[Use]) -> Candidate:
     """The function of a group for which relations hold, and what it saves where it is used."""
     chosen: FloatArray = np.zeros((0, group.size))
+    counted: list[bool] = []
     for each in openings:
         zero = [bool(abs(use.values @ each.row) <= NEAR) for use in uses]
-        if sum(zero) < OPEN * len(uses) or not _independent(np.vstack([rows, chosen]), each.row):
+        rare = sum(zero) >= OPEN * len(uses) or each.sort == "spacing"
+        if not rare or not _independent(np.vstack([rows, chosen]), each.row):
             continue
-        if all(zero):
+        counted.append(each.sort == "spacing")
+        if all(zero) and each.sort != "spacing":
+            counted.pop()
             rows = np.vstack([rows, each.row])
         else:
             chosen = np.vstack([chosen, each.row])
     values = np.array([use.values for use in uses]).reshape(-1, group.size)
     arguments = group.size - len(rows) - len(chosen) + group.counts
-    said = (np.abs(values @ chosen.T) > NEAR).sum(1).tolist()
+    said = ((np.abs(values @ chosen.T) > NEAR) @ (1 + np.array(counted, np.int64))).tolist()  # a spacing has its count
     taken: set[tuple[int, int]] = set()
     kept: list[Use] = []
     for use, more in zip(uses, said, strict=True):

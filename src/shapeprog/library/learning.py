@@ -18,10 +18,10 @@ from shapeprog.language.evaluation import evaluated
 from shapeprog.language.program import Program
 from shapeprog.language.source import Call, Comment, Function, Line, Source
 from shapeprog.language.text import format_source, source_of
-from shapeprog.library.blocks import Kind
+from shapeprog.library.blocks import Block, Kind
 from shapeprog.library.groups import NEAR, Candidate, Corpus, Unit, candidates, statement_of, units_of
 from shapeprog.library.length import statements
-from shapeprog.library.measures import Group
+from shapeprog.library.measures import LINES, Group
 from shapeprog.library.rewriting import with_library
 from shapeprog.library.store import Library
 from shapeprog.library.words import name_of
@@ -118,16 +118,30 @@ def _made(best: Candidate, corpus: Corpus, taken: set[str]) -> Learned | None:
     written = function(name_of(kinds, taken), best.group, made, draws)
     counts = (count for kind, unit in zip(kinds, units, strict=True) for count in _counts(kind, unit))
     numbers = {name: float(each.row @ typical.values) for name, each in zip(made.names, made.chosen, strict=True)}
-    arguments = [
-        (name, round(numbers[name], 2) + 0.0 if name in numbers else float(next(counts)))
-        for name, default in written.parameters
-        if default is None or abs(numbers[name]) > NEAR
-    ]
+    lines = _lines(kinds[0], units[0]) if kinds[0].grid else {}
+    arguments: list[tuple[str, float]] = []
+    for name, default in written.parameters:
+        if name in lines:
+            value = float(lines[name])
+        else:
+            value = round(numbers[name], 2) + 0.0 if name in numbers else float(next(counts))
+        if default is None or abs(value - default) > NEAR:
+            arguments.append((name, value))
     role = "" if kinds[0].word else units[0].forms[0].kind.word
     return Learned(written, Call(written.name, tuple(arguments), role=role))
 
 
 def _counts(kind: Kind, unit: Unit) -> Iterator[int]:
     """The counts of the rows of a block."""
-    form = next(form for form in unit.forms if replace(form.kind, word=kind.word) == kind)
-    return (count for (_, way), count in zip(kind.repeats, form.counts, strict=True) if way == "row")
+    if kind.steps:
+        return iter(_form(kind, unit).counts)
+    return (count for (_, way), count in zip(kind.repeats, _form(kind, unit).counts, strict=True) if way == "row")
+
+
+def _lines(kind: Kind, unit: Unit) -> dict[str, int]:
+    """How many copies a grid has along each axis, by the parameters that say so."""
+    return {LINES[axis]: count for (axis, _), count in zip(kind.repeats, _form(kind, unit).counts, strict=True)}
+
+
+def _form(kind: Kind, unit: Unit) -> Block:
+    return next(form for form in unit.forms if replace(form.kind, word=kind.word) == kind)

@@ -8,12 +8,13 @@ program follows from as many of its numbers as there are parameters, those with 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from shapeprog.errors import ShapeProgError
 from shapeprog.independence import independent
@@ -87,6 +88,12 @@ class Pattern:
         """How many blocks it draws; none if they are not linear in its measures."""
         return len(self.forms_at(self.arguments))
 
+    def choices(self, seen: Iterable[float]) -> Iterator[dict[str, float]]:
+        """What its counts may be where blocks are repeated as often as these; once only where it says so by itself."""
+        defaults, every = dict(self.function.parameters), sorted({*seen})
+        options = [sorted({1.0, *every}) if defaults[name] == 1 else every for name in self.counts]
+        return (dict(zip(self.counts, counts, strict=True)) for counts in itertools.product(*options))
+
     @property
     def shortens(self) -> bool:
         """Whether a call is less to write than what it draws."""
@@ -111,7 +118,8 @@ class Pattern:
                     self._assumed(lambda place: GENERIC / STEEP ** (last - 1 - place)),
                     self._assumed(lambda _: GENERIC),
                 ]
-            found = {_key(each): each for each in (self.forms_at({**one, **counts}) for one in assumed) if each}
+            apart = ({name: value or GENERIC for name, value in one.items()} for one in assumed)  # no copies on others
+            found = {_key(each): each for one in apart if (each := self.forms_at({**one, **counts}))}
             self._known[key] = tuple(found.values())
         return self._known[key]
 
@@ -147,17 +155,27 @@ class Match(NamedTuple):
     error: float
 
 
-def forms(source: Source, given: Mapping[str, Any], names: Sequence[str]) -> Iterator[Form]:
-    """The blocks of a program as it is written, linear in ``names``; ``given`` is what its names stand for."""
+def _lines(block: Block) -> tuple[int, ...]:
+    """How many copies of a block lie along the axes across which no mirror does, in order of number."""
+    if block.kind.others:
+        return ()
+    return tuple(sorted(n for (_, way), n in zip(block.kind.repeats, block.counts, strict=True) if way != "mirror"))
+
+
+def forms(source: Source, given: Mapping[str, Any], names: Sequence[str], rows: Sequence[int] = ()) -> Iterator[Form]:
+    """The blocks of a program as it is written, linear in ``names``; ``given`` is what its names stand for.
+
+    Mirror images are rows of two along the axes ``rows`` wherever they are the same.
+    """
     chains = Program(expanded(source)).chains
     parts = [part for node in symbolic(source, given) for part in node.chains()]
     for chain, part in zip(chains, parts, strict=True):
-        block = next(blocks_of(chain))
+        block = next(blocks_of(chain, rows))
         numbers = [_linear(value) for node in part for value in node.values]
         factors = np.array([[dict(each.factors).get(name, 0.0) for name in names] for each in numbers])
         constants = np.array([each.constant for each in numbers])
-        rows = block.rows[:, :-1]
-        yield Form(block, rows @ factors.reshape(len(numbers), len(names)), rows @ constants + block.rows[:, -1])
+        every = block.rows[:, :-1]
+        yield Form(block, every @ factors.reshape(len(numbers), len(names)), every @ constants + block.rows[:, -1])
 
 
 def _linear(value: Any) -> Linear:
@@ -211,10 +229,12 @@ class Matcher:
 
     def matches(self, pattern: Pattern) -> Iterator[Match]:
         """All ways in which blocks of the program are a call of a function."""
-        seen = sorted({float(count) for form in self.forms for count in form.block.counts})
+        seen = {float(count) for form in self.forms for count in form.block.counts}
         found: dict[tuple[int, ...], tuple[int, Match]] = {}
-        for counts in itertools.product(seen, repeat=len(pattern.counts)):
-            given = dict(zip(pattern.counts, counts, strict=True))
+        known = {_lines(form.block) for form in self.forms}
+        for given in pattern.choices(seen):
+            if 1.0 in given.values() and tuple(sorted(count for count in given.values() if count > 1)) not in known:
+                continue  # a grid is a block, which some block should be
             for wanted in pattern.forms(given):
                 for blocks in self._alike(wanted):
                     solved = self._solved(pattern, given, wanted, blocks)
@@ -254,18 +274,23 @@ class Matcher:
         factors = np.vstack([form.factors for form in wanted])
         constants = np.concatenate([form.constants for form in wanted])
         values = np.concatenate([form.block.values for form in mine])
-        count = factors.shape[1]
-        if np.linalg.matrix_rank(factors) < count:
+        defaults = [dict(pattern.function.parameters)[name] for name in pattern.measures]
+        free: npt.NDArray[np.bool_] = np.any(factors, 0)  # the spacing of a row of one is not
+        if np.linalg.matrix_rank(factors) < free.sum() or any(
+            default is None for default, told in zip(defaults, free, strict=True) if not told
+        ):
             return None
         found = np.linalg.lstsq(factors, values - constants, rcond=None)[0]
         if np.abs(factors @ found + constants - values).max(initial=0) > TOLERANCE:
             return None
         rows = np.vstack([np.column_stack([form.factors, form.constants]) for form in mine])
         rows[:, -1] -= constants
-        written = self._written(factors, rows, found)
-        defaults = [dict(pattern.function.parameters)[name] for name in pattern.measures]
+        told = iter(self._written(factors[:, free], rows, found[free]))
+        written: list[Value] = [
+            next(told) if each else default or 0.0 for each, default in zip(free, defaults, strict=True)
+        ]
         for place, default in enumerate(defaults):
-            if isinstance(default, float) and abs(found[place] - default) <= EXACT:
+            if free[place] and isinstance(default, float) and abs(found[place] - default) <= EXACT:
                 written[place] = default
         exact = np.array([value_at(value, self._numbers) for value in written])
         error = float(np.abs(factors @ exact + constants - values).max(initial=0))

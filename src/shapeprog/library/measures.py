@@ -15,6 +15,9 @@ from shapeprog.space import DEPTH, SIDE, UP, FloatArray
 EXTENTS = ("height", "depth", "width")
 LOW = ("bottom", "front", "left")
 AXIS = ("up", "depth", "side")
+LINES = ("levels", "rows", "columns")
+SPACINGS = ("level_spacing", "row_spacing", "column_spacing")
+STEPS = ("step_up", "step_back", "step_aside")
 
 THIN = 0.6
 """A solid is thin along an axis where it measures less than this share of the next longer."""
@@ -22,7 +25,7 @@ THIN = 0.6
 CHOSEN = 2.5
 """Price up to which a place is a side of a whole block; dearer ones are of single copies, or ends of rods."""
 
-Sort = Literal["length", "place", "middle", "angle"]
+Sort = Literal["length", "place", "middle", "angle", "spacing", "step"]
 
 
 class Group(NamedTuple):
@@ -39,7 +42,7 @@ class Group(NamedTuple):
     @property
     def counts(self) -> int:
         """How many of their repetitions have a count that is open."""
-        return sum(way == "row" for kind in self.kinds for _, way in kind.repeats)
+        return sum(kind.steps + sum(way == "row" for _, way in kind.repeats) for kind in self.kinds)
 
 
 class Measure(NamedTuple):
@@ -58,7 +61,7 @@ class Measure(NamedTuple):
     @property
     def opening(self) -> bool:
         """Whether it may be an argument that need not be said."""
-        return self.sort == "angle" or (self.sort == "middle" and self.axis != UP)
+        return self.sort in ("angle", "spacing", "step") or (self.sort == "middle" and self.axis != UP)
 
 
 def measures(group: Group, typical: FloatArray) -> Iterator[Measure]:
@@ -106,15 +109,26 @@ def _boxed(kind: Kind, slots: Sequence[Slot], own: FloatArray, values: FloatArra
     flat = bool(sizes[thin] < THIN * np.sort(sizes)[1])
     for axis in range(3):
         low, size, word = own[axis], own[3 + axis], EXTENTS[axis]
+        if kind.steps:
+            yield STEPS[axis], "step", axis, own[repeats.pop(axis)], 0.5
         span = own[repeats[axis]] if axis in repeats else size
-        if axis in repeats:
+        if axis in repeats and not kind.grid:
             yield word, "length", axis, span, 0.0
             word = f"each_{word}"
         if kind.shape == "cylinder" and axis != UP:
             word = "diameter"
-        elif flat and axis == thin:
+        elif flat and axis == thin and not kind.grid:
             word = "thickness"
         yield word, "length", axis, size, 1.0 + 0.1 * axis
+        if kind.grid:
+            if axis in repeats:
+                yield SPACINGS[axis], "spacing", axis, own[repeats[axis]], 0.5
+            yield (
+                (LOW[axis], "place", axis, low, 2.0)
+                if axis == UP
+                else (f"middle_{AXIS[axis]}", "middle", axis, low, 2.0)
+            )
+            continue
         yield LOW[axis], "place", axis, low, 2.0
         yield f"middle_{AXIS[axis]}", "middle", axis, low + span / 2, 4.0
         yield f"{LOW[axis]}_end", "place", axis, low + span, 5.0
@@ -157,6 +171,10 @@ def _pointed(kind: Kind, slots: Sequence[Slot], own: FloatArray, values: FloatAr
     for place, (axis, way) in enumerate(kind.repeats, first):
         if way == "mirror":
             yield f"middle_{AXIS[axis]}", "middle", axis, own[place], 4.0
+        elif way == "grid":
+            yield SPACINGS[axis], "spacing", axis, own[place], 0.5
+        elif way == "steps":
+            yield STEPS[axis], "step", axis, own[place], 0.5
         else:
             yield EXTENTS[axis], "length", axis, own[place], 0.5
 

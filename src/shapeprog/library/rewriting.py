@@ -28,6 +28,7 @@ from shapeprog.language.source import (
     values,
 )
 from shapeprog.language.text import source_of
+from shapeprog.library.blocks import ROWS
 from shapeprog.library.length import length, outside, statements, written
 from shapeprog.library.matching import TOLERANCE, Form, Matcher, Pattern, Sums, forms
 from shapeprog.library.store import Library
@@ -100,17 +101,18 @@ def matchers_of(source: Source) -> Iterator[tuple[Matcher, tuple[WrittenLoop, ..
     def of(
         lines: Sequence[tuple[int, Line]], *around: WrittenLoop
     ) -> Iterator[tuple[Matcher, tuple[WrittenLoop, ...]]]:
-        found: list[Form] = []
+        found: list[list[Form]] = [[] for _ in ROWS]
         units: list[int] = []
         inner: dict[WrittenLoop, list[tuple[int, Line]]] = {}
         for number, line in lines:
             if isinstance(line, WrittenDraw | WrittenLoop):
-                new = list(forms(Source((*named, line)), given, free))
-                found += new
-                units += [number] * len(new)
+                for rows, some in zip(ROWS, found, strict=True):
+                    some += forms(Source((*named, line)), given, free, rows)
+                units += [number] * (len(found[0]) - len(units))
             if isinstance(line, WrittenLoop) and len(line.body) == 1:
                 inner.setdefault(replace(line, body=(), note=""), []).append((number, line.body[0]))
-        yield Matcher(found, units, numbers, sums), around
+        for some in {tuple(form.block.kind for form in some): some for some in found}.values():
+            yield Matcher(some, units, numbers, sums), around
         for loop, within_it in inner.items():
             if len(within_it) > 1 or isinstance(within_it[0][1], WrittenLoop):
                 yield from of(within_it, *around, loop)

@@ -15,7 +15,7 @@ LOOKS = {
 
 SOLIDS = {
     "cuboid": "", "cylinder": "cylinders", "rod": "rods", "taper": "tapers", "bent_rod": "bent_rods",
-    "board": "boards", "bar": "bars",
+    "board": "boards", "bar": "bars", "rounded_box": "cushions",
 }  # fmt: skip
 
 PLACES = {
@@ -49,6 +49,19 @@ def name_of(kinds: Sequence[Kind], taken: Collection[str]) -> str:
 
 
 def _one(kind: Kind) -> Iterator[str]:
+    solids = SOLIDS.get(kind.shape, plural(kind.shape))
+    if kind.grid:
+        images = tuple((axis, "pair") for axis, way in kind.repeats if way == "mirror")
+        place = PLACES.get(images, "") if images else ""
+        yield (
+            _joined(place, LOOKS.get(kind.shape, ""), plural(kind.word))
+            if kind.word
+            else _joined(place, solids or "boxes")
+        )
+        return
+    if kind.steps:
+        yield f"{plural(kind.word) if kind.word else solids or 'boxes'}_in_steps"
+        return
     ways = tuple((axis, "pair" if way == "mirror" else way) for axis, way in kind.repeats)
     place = PLACES.get(ways, "several")
     if kind.word:
@@ -56,7 +69,6 @@ def _one(kind: Kind) -> Iterator[str]:
         yield _joined(look, plural(kind.word))
         yield _joined(place, look, plural(kind.word))
     else:
-        solids = SOLIDS.get(kind.shape, plural(kind.shape))
         yield _joined(place, solids or ("boxes" if place == "four" else ""))
 
 

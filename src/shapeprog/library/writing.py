@@ -11,8 +11,8 @@ from shapeprog.language.expression import Binary, Expression, Name, Value, combi
 from shapeprog.language.source import Function, Line, Source, WrittenDraw, WrittenLoop, values
 from shapeprog.language.statement import language
 from shapeprog.library.blocks import Kind, solid_of
-from shapeprog.library.measures import Group, Measure, measures
-from shapeprog.space import FloatArray
+from shapeprog.library.measures import LINES, SPACINGS, Group, Measure, measures
+from shapeprog.space import UP, FloatArray
 
 SAME = 1e-6
 """Difference below which factors are the same."""
@@ -71,7 +71,12 @@ def function(name: str, group: Group, made: Basis, draws: Sequence[tuple[str, st
         if isinstance(value, Expression) for name in value.names()
     }  # fmt: skip
     said = len(made.names) - made.openings
-    parameters = [(word, None if place < said else 0.0) for place, word in enumerate(made.names) if word in used]
+    parameters: list[tuple[str, float | None]] = []
+    for place, word in enumerate(made.names):
+        if word in SPACINGS:  # how often something is repeated, and how far apart
+            parameters.append((LINES[SPACINGS.index(word)], 1.0))
+        if word in used:
+            parameters.append((word, None if place < said else 0.0))
     return Function(name, (*((count, None) for count in counts), *parameters), tuple(lines))
 
 
@@ -82,23 +87,41 @@ def _block(
     solid = solid_of(statement)
     first = len(own) - len(kind.repeats)
     base = own[:first].copy()
+    place = np.linalg.pinv(solid.rows[:, :-1])
+    before: dict[int, Value] = {}
     loops: list[tuple[str, tuple[Value, ...]]] = []
+    if kind.grid and solid.boxed:
+        base[1:3] -= own[4:6] / 2  # of the middle
     for (axis, way), span in zip(kind.repeats, own[first:], strict=True):
-        reach = span - own[3 + axis] if solid.boxed else span
-        middle = own[axis] + span / 2
         if way == "mirror":
             loops.append(("mirror", (2.0, float(axis), _sum(span, names))))
-        elif way == "pair" and (not middle.any() or np.array_equal(np.sort(middle)[::-1], np.eye(len(middle))[0])):
+            continue
+        if way == "steps":
+            if not loops:
+                steps = [_sum(row, names) for row in own[first:]]
+                loops.append(("translate", (Name(next(counts)), *steps)))
+            continue
+        shift: list[Value] = [0.0, 0.0, 0.0]
+        if way == "grid":
+            count, shift[axis] = Name(LINES[axis]), _sum(span, names)
+            loops.append(("translate", (count, *shift)))
+            if solid.boxed and axis != UP:
+                before[int(np.flatnonzero(place[:, axis])[0])] = (count - 1.0) * shift[axis]
+            continue
+        reach = span - own[3 + axis] if solid.boxed else span
+        middle = own[axis] + span / 2
+        if way == "pair" and (not middle.any() or np.array_equal(np.sort(middle)[::-1], np.eye(len(middle))[0])):
             base[axis] = base[axis] + reach  # the copy on the far side, which the mirror brings back
             loops.append(("mirror", (2.0, float(axis), _sum(middle, names))))
         else:
-            count = Name(next(counts)) if way == "row" else 2.0
+            number = Name(next(counts)) if way == "row" else 2.0
             step = _sum(reach, names)
-            shift: list[Value] = [0.0, 0.0, 0.0]
-            shift[axis] = Binary("/", step, count - 1.0) if isinstance(count, Name) else step
-            loops.append(("translate", (count, *shift)))
-    numbers = np.linalg.pinv(solid.rows[:, :-1]) @ base
-    line: WrittenDraw | WrittenLoop = WrittenDraw(statement, tuple(_sum(row, names) for row in numbers), role)
+            shift[axis] = Binary("/", step, number - 1.0) if isinstance(number, Name) else step
+            loops.append(("translate", (number, *shift)))
+    numbers = [
+        _sum(row, names, *([(before[slot], -0.5)] if slot in before else [])) for slot, row in enumerate(place @ base)
+    ]
+    line: WrittenDraw | WrittenLoop = WrittenDraw(statement, tuple(numbers), role)
     for loop, given in reversed(loops):
         line = WrittenLoop(loop, given, (line,))
     return line
@@ -130,6 +153,6 @@ def _names(group: Group, chosen: Sequence[Measure]) -> tuple[str, ...]:
     return tuple(names)
 
 
-def _sum(row: FloatArray, names: Sequence[str]) -> Value:
+def _sum(row: FloatArray, names: Sequence[str], *more: tuple[Value, float]) -> Value:
     parts = [(Name(name), float(factor)) for name, factor in zip(names, np.round(row, 6) + 0.0, strict=True) if factor]
-    return combined(0.0, sorted(parts, key=lambda part: part[1] < 0))
+    return combined(0.0, [*sorted(parts, key=lambda part: part[1] < 0), *more])

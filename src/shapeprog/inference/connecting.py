@@ -63,12 +63,15 @@ def _less_apart(
     return next((each for each in likely if sum(map(sum, _apart(each, seed))) < many), None)
 
 
-def floating(program: Program, seed: int = 0) -> list[int]:
-    """Which blocks have a part that no chain of touching parts joins to the largest such group."""
-    return [place for place, parts in enumerate(_apart(program, seed)) if any(parts)]
+def floating(program: Program, seed: int = 0, flush: float = FLUSH) -> list[int]:
+    """Which blocks have a part that no chain of touching parts joins to the largest such group.
+
+    Parts touch across a gap of ``flush`` cells.
+    """
+    return [place for place, parts in enumerate(_apart(program, seed, flush)) if any(parts)]
 
 
-def _apart(program: Program, seed: int) -> list[list[bool]]:
+def _apart(program: Program, seed: int, flush: float = FLUSH) -> list[list[bool]]:
     """For every part of every block, whether it is outside of the largest group."""
     found: list[list[bool]] = [[] for _ in range(program.blocks)]
     if not program.size:
@@ -76,7 +79,7 @@ def _apart(program: Program, seed: int) -> list[list[bool]]:
     scene = unroll(encode(program, dtype=torch.float64))
     group = list(range(len(scene.mask)))
     near = gaps(scene, torch.Generator().manual_seed(seed))
-    for one, other in torch.stack([near.first, near.second], 1)[near.width <= FLUSH].tolist():
+    for one, other in torch.stack([near.first, near.second], 1)[near.width <= flush].tolist():
         group = [group[one] if each == group[other] else each for each in group]
     half = bounds(scene)
     sizes = np.bincount(group, weights=(half * half.roll(1, -1)).sum(-1).numpy())

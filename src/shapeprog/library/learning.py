@@ -125,7 +125,7 @@ def _made(best: Candidate, corpus: Corpus, taken: set[str]) -> Learned | None:
             value = float(lines[name])
         else:
             value = round(numbers[name], 2) + 0.0 if name in numbers else float(next(counts))
-        if default is None or abs(value - default) > NEAR:
+        if not isinstance(default, float) or abs(value - default) > NEAR:
             arguments.append((name, value))
     role = "" if kinds[0].word else units[0].forms[0].kind.word
     return Learned(written, Call(written.name, tuple(arguments), role=role))

@@ -14,6 +14,7 @@ import torch
 from shapeprog.errors import ShapeProgError
 from shapeprog.geometry.scene import Scene
 from shapeprog.inference.budget import Progress
+from shapeprog.inference.connecting import floating
 from shapeprog.inference.evidence import Evidence
 from shapeprog.inference.joints import Joints, find_joints
 from shapeprog.inference.refine import single_threaded
@@ -46,7 +47,10 @@ WRITTEN_PRICE = 1.2e-3
 
 LOST, CHEAPER, CHEAPEST = 0.03, 3.0, 0.3
 """How much less of the surface may be near that of the target when numbers are tied; beyond that a number is worth so
-many times less, as long as it is worth more than this share of the usual."""
+many times less, as long as it is worth more than this share of the usual; the same where parts come apart."""
+
+APART = 0.005
+"""Gap in cells from which parts are apart."""
 
 ROUNDS = 3
 """Most times that relations are looked for."""
@@ -109,9 +113,17 @@ def tie(
         return tie(named_anew(Program(tuple(rest))), evidence, price=price, seed=seed, progress=progress)
     if held is None and not known and price > CHEAPEST:
         lost = closeness.of(unroll(plain)) - closeness.of(unroll(named))
-        if lost > LOST:
+        if lost > LOST or _apart(named, seed) > _apart(plain, seed):
             return tie(program, evidence, price=price / CHEAPER, seed=seed, progress=progress)
     return Tied(named, free_numbers(named))
+
+
+def _apart(program: Program, seed: int) -> int:
+    """How many blocks hang together with the others by nothing."""
+    try:
+        return len(floating(program, seed, APART))
+    except ShapeProgError:  # a part without a surface touches nothing
+        return 0
 
 
 def restated(program: Program) -> Program:

@@ -25,7 +25,7 @@ from shapeprog.language.parameters import to_float32
 from shapeprog.language.program import Draw, Loop, Node, Program, nest
 from shapeprog.language.source import Call, Source, WrittenLoop
 from shapeprog.language.statement import language
-from shapeprog.library.blocks import Block, blocks_of, readings
+from shapeprog.library.blocks import Block, forms_of
 from shapeprog.library.matching import EXACT, Form, Pattern
 from shapeprog.library.rewriting import offers, within
 from shapeprog.library.store import Library
@@ -125,11 +125,7 @@ class Called:
         """The blocks within its loops in the form that its function has them in."""
         chains = [chain[len(self.around) :] for chain in Program(tuple(nodes)).chains]
         return [
-            next(
-                each
-                for each in (*blocks_of(chain), *readings(chain)[1:])
-                if replace(each.kind, word=form.block.kind.word) == form.block.kind
-            )
+            next(each for each in forms_of(chain) if replace(each.kind, word=form.block.kind.word) == form.block.kind)
             for chain, form in zip(chains, self.forms, strict=True)
         ]
 

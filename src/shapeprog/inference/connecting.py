@@ -10,6 +10,7 @@ from collections.abc import Collection, Iterator
 import numpy as np
 import torch
 
+from shapeprog.errors import ShapeProgError
 from shapeprog.inference.candidates import alike, solid_boxes
 from shapeprog.inference.choice import value
 from shapeprog.inference.coverage import Prices, covers
@@ -69,6 +70,14 @@ def floating(program: Program, seed: int = 0, flush: float = FLUSH) -> list[int]
     Parts touch across a gap of ``flush`` cells.
     """
     return [place for place, parts in enumerate(_apart(program, seed, flush)) if any(parts)]
+
+
+def afloat(program: Program, seed: int = 0, flush: float = FLUSH) -> int:
+    """How many blocks are ``floating``; none where a part has no surface, which touches nothing."""
+    try:
+        return len(floating(program, seed, flush))
+    except ShapeProgError:
+        return 0
 
 
 def _apart(program: Program, seed: int, flush: float = FLUSH) -> list[list[bool]]:

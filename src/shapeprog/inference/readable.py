@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 
-from shapeprog.errors import ShapeProgError
-from shapeprog.inference.connecting import floating
+from shapeprog.inference.connecting import afloat
 from shapeprog.language.converting import in_unit
 from shapeprog.language.program import Loop, Program
 from shapeprog.language.statement import language
@@ -50,7 +49,4 @@ def _decimals(program: Program, per_cell: float) -> int:
 
 def _floating(program: Program, seed: int) -> int:
     """How many blocks hang together with the others by nothing."""
-    try:
-        return len(floating(program, seed)) if program.size <= MOST else 0
-    except ShapeProgError:  # a part without a surface touches nothing
-        return 0
+    return afloat(program, seed) if program.size <= MOST else 0

@@ -23,7 +23,7 @@ from shapeprog.language.hints import Box
 from shapeprog.language.parameters import to_float32
 from shapeprog.language.program import Chain, Draw, Node, Program
 from shapeprog.language.statement import language
-from shapeprog.library.blocks import Kind, blocks_of, readings
+from shapeprog.library.blocks import Kind, forms_of
 from shapeprog.library.matching import Form, Pattern
 from shapeprog.space import FloatArray
 
@@ -96,7 +96,7 @@ class _Pool:
         self.counts = sorted({float(count) for _, counts in self._rows for count in counts})
 
     def _add(self, chain: Chain) -> None:
-        for block in (*blocks_of(chain), *readings(chain)[1:]):
+        for block in forms_of(chain):
             rows = self._rows.setdefault((replace(block.kind, word=""), block.counts), {})
             if len(rows) < ALIKE:
                 rows.setdefault(np.round(block.values, CELLS).tobytes(), block.values)

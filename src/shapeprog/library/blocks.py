@@ -147,6 +147,11 @@ def readings(chain: Chain) -> list[Block]:
     return list(found.values())
 
 
+def forms_of(chain: Chain) -> list[Block]:
+    """All forms of a block: those as it is written, then where mirror images are rows of two."""
+    return [*blocks_of(chain), *readings(chain)[1:]]
+
+
 def stepped(block: Block) -> Block | None:
     """A block that one loop shifts along several axes at once, with its steps along all; none if it is another."""
     if block.kind.others != ("translate",):

@@ -72,6 +72,11 @@ class Candidate:
     uses: tuple[Use, ...]
     gain: float
 
+    @property
+    def arguments(self) -> int:
+        """How many arguments every call says."""
+        return _arguments(self.group, self.rows, self.openings)
+
 
 def units_of(program: Program) -> list[Unit | None]:
     """The blocks of a program that functions may draw, in the order of its text."""
@@ -163,8 +168,7 @@ def _best(group: Group, uses: Sequence[Use], least: int) -> Iterator[Candidate]:
         if joined >= len(group.kinds) - 1:
             fitting = [use for use, fits in zip(uses, alive, strict=True) if fits]
             found = _priced(group, rows, openings, fitting)
-            asked = group.size - len(found.rows) - len(found.openings) + group.counts
-            called = len(group.kinds) == 1 or asked <= ARGUMENTS
+            called = len(group.kinds) == 1 or found.arguments <= ARGUMENTS
             if called and programs(found.uses) >= least and found.gain > (best.gain if best else 0):
                 best = found
         support = (holds[:, untried] & alive[:, None]).sum(0)
@@ -189,21 +193,20 @@ def _offered(group: Group, known: Sequence[Measure], openings: Sequence[Measure]
 def _priced(group: Group, rows: FloatArray, openings: Sequence[Measure], uses: Sequence[Use]) -> Candidate:
     """The function of a group for which relations hold, and what it saves where it is used."""
     chosen: FloatArray = np.zeros((0, group.size))
-    counted: list[bool] = []
+    words: list[int] = []
     for each in openings:
         zero = [bool(abs(use.values @ each.row) <= NEAR) for use in uses]
         rare = sum(zero) >= OPEN * len(uses) or each.sort == "spacing"
         if not rare or not _independent(np.vstack([rows, chosen]), each.row):
             continue
-        counted.append(each.sort == "spacing")
         if all(zero) and each.sort != "spacing":
-            counted.pop()
             rows = np.vstack([rows, each.row])
         else:
             chosen = np.vstack([chosen, each.row])
+            words.append(1 + (each.sort == "spacing"))  # which has a count
     values = np.array([use.values for use in uses]).reshape(-1, group.size)
-    arguments = group.size - len(rows) - len(chosen) + group.counts
-    said = ((np.abs(values @ chosen.T) > NEAR) @ (1 + np.array(counted, np.int64))).tolist()  # a spacing has its count
+    arguments = _arguments(group, rows, chosen)
+    said = ((np.abs(values @ chosen.T) > NEAR) @ np.array(words, np.int64)).tolist()
     taken: set[tuple[int, int]] = set()
     kept: list[Use] = []
     for use, more in zip(uses, said, strict=True):
@@ -214,6 +217,10 @@ def _priced(group: Group, rows: FloatArray, openings: Sequence[Measure], uses: S
     lines = 1 + sum(len(kind.repeats) + 1 for kind in group.kinds)
     cost = STATEMENT * lines + arguments + len(chosen) + group.size
     return Candidate(group, rows, chosen, tuple(kept), sum(use.gain for use in kept) - cost)
+
+
+def _arguments(group: Group, rows: FloatArray, openings: FloatArray) -> int:
+    return group.size - len(rows) - len(openings) + group.counts
 
 
 def _independent(rows: FloatArray, row: FloatArray) -> bool:

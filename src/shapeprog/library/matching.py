@@ -137,7 +137,7 @@ class Pattern:
         source = Source((*self.others, Assignment(tuple(numbers.items())), *self.function.body))
         given = {name: Linear.of(name) if name in self.measures else numbers[name] for name in numbers}
         try:
-            return tuple(forms(source, given, self.measures))
+            return tuple(form for (form,) in forms(source, given, self.measures))
         except (ShapeProgError, ZeroDivisionError):
             return ()
 
@@ -162,20 +162,27 @@ def _lines(block: Block) -> tuple[int, ...]:
     return tuple(sorted(n for (_, way), n in zip(block.kind.repeats, block.counts, strict=True) if way != "mirror"))
 
 
-def forms(source: Source, given: Mapping[str, Any], names: Sequence[str], rows: Sequence[int] = ()) -> Iterator[Form]:
+def forms(
+    source: Source, given: Mapping[str, Any], names: Sequence[str], ways: Sequence[Sequence[int]] = ((),)
+) -> Iterator[tuple[Form, ...]]:
     """The blocks of a program as it is written, linear in ``names``; ``given`` is what its names stand for.
 
-    Mirror images are rows of two along the axes ``rows`` wherever they are the same.
+    Each comes in several ways: with mirror images as rows of two along these axes wherever they are the same.
     """
     chains = Program(expanded(source)).chains
     parts = [part for node in symbolic(source, given) for part in node.chains()]
     for chain, part in zip(chains, parts, strict=True):
-        block = next(blocks_of(chain, rows))
         numbers = [_linear(value) for node in part for value in node.values]
         factors = np.array([[dict(each.factors).get(name, 0.0) for name in names] for each in numbers])
         constants = np.array([each.constant for each in numbers])
-        every = block.rows[:, :-1]
-        yield Form(block, every @ factors.reshape(len(numbers), len(names)), every @ constants + block.rows[:, -1])
+        factors = factors.reshape(len(numbers), len(names))
+        yield tuple(_form(next(blocks_of(chain, rows)), factors, constants) for rows in ways)
+
+
+def _form(block: Block, factors: FloatArray, constants: FloatArray) -> Form:
+    """A block of numbers that are linear in names, with their factors (V, N) and constants (V,)."""
+    every = block.rows[:, :-1]
+    return Form(block, every @ factors, every @ constants + block.rows[:, -1])
 
 
 def _linear(value: Any) -> Linear:

@@ -106,9 +106,10 @@ def matchers_of(source: Source) -> Iterator[tuple[Matcher, tuple[WrittenLoop, ..
         inner: dict[WrittenLoop, list[tuple[int, Line]]] = {}
         for number, line in lines:
             if isinstance(line, WrittenDraw | WrittenLoop):
-                for rows, some in zip(ROWS, found, strict=True):
-                    some += forms(Source((*named, line)), given, free, rows)
-                units += [number] * (len(found[0]) - len(units))
+                for read in forms(Source((*named, line)), given, free, ROWS):
+                    units.append(number)
+                    for some, form in zip(found, read, strict=True):
+                        some.append(form)
             if isinstance(line, WrittenLoop) and len(line.body) == 1:
                 inner.setdefault(replace(line, body=(), note=""), []).append((number, line.body[0]))
         for some in {tuple(form.block.kind for form in some): some for some in found}.values():

@@ -90,6 +90,8 @@ def _block(
     place = np.linalg.pinv(solid.rows[:, :-1])
     before: dict[int, Value] = {}
     loops: list[tuple[str, tuple[Value, ...]]] = []
+    if kind.steps:
+        loops.append(("translate", (Name(next(counts)), *(_sum(row, names) for row in own[first:]))))
     if kind.grid and solid.boxed:
         base[1:3] -= own[4:6] / 2  # of the middle
     for (axis, way), span in zip(kind.repeats, own[first:], strict=True):
@@ -97,9 +99,6 @@ def _block(
             loops.append(("mirror", (2.0, float(axis), _sum(span, names))))
             continue
         if way == "steps":
-            if not loops:
-                steps = [_sum(row, names) for row in own[first:]]
-                loops.append(("translate", (Name(next(counts)), *steps)))
             continue
         shift: list[Value] = [0.0, 0.0, 0.0]
         if way == "grid":

@@ -14,7 +14,7 @@ import torch
 from shapeprog.errors import ShapeProgError
 from shapeprog.geometry.scene import Scene
 from shapeprog.inference.budget import Progress
-from shapeprog.inference.connecting import floating
+from shapeprog.inference.connecting import afloat
 from shapeprog.inference.evidence import Evidence
 from shapeprog.inference.joints import Joints, find_joints
 from shapeprog.inference.refine import single_threaded
@@ -99,31 +99,27 @@ def tie(
         ties = _Ties(plain, Misfit(Tunable(plain), evidence, seed, known=known), closeness, held, seed)
         worth, trusted = price * (WRITTEN_PRICE if known else PRICE), WRITTEN if known else INFERRED
         for round_ in range(ROUNDS):
-            more = ties.impose(relations(ties.measured(), ties.numbers, ties.touching, trusted), worth)
+            imposed = ties.impose(relations(ties.measured(), ties.numbers, ties.touching, trusted), worth)
             if progress:
                 progress("tying numbers", (round_ + 1) / ROUNDS)
-            if not more:
+            if not imposed:
                 break
         basis, following, repeated = ties.simplest()
-        if not known and ties.impose(list(alike(basis, following, trusted)), worth):
+        more = [] if known else list(alike(basis, following, trusted))
+        if more and ties.impose(more, worth):
             basis, _, repeated = ties.simplest()
         named = written(ties.tunable, _rounded(basis), repeated)
-    if held is None and not known and (gone := buried(named)):
+    found = Tied(named, free_numbers(named))
+    if held is not None or known:
+        return found
+    if gone := buried(named):
         rest = [nest(chain) for block, chain in enumerate(plain.chains) if block not in gone]
         return tie(named_anew(Program(tuple(rest))), evidence, price=price, seed=seed, progress=progress)
-    if held is None and not known and price > CHEAPEST:
+    if price > CHEAPEST:
         lost = closeness.of(unroll(plain)) - closeness.of(unroll(named))
-        if lost > LOST or _apart(named, seed) > _apart(plain, seed):
+        if lost > LOST or afloat(named, seed, APART) > afloat(plain, seed, APART):
             return tie(program, evidence, price=price / CHEAPER, seed=seed, progress=progress)
-    return Tied(named, free_numbers(named))
-
-
-def _apart(program: Program, seed: int) -> int:
-    """How many blocks hang together with the others by nothing."""
-    try:
-        return len(floating(program, seed, APART))
-    except ShapeProgError:  # a part without a surface touches nothing
-        return 0
+    return found
 
 
 def restated(program: Program) -> Program:

@@ -277,12 +277,18 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--out", default="structure.jsonl", help="rows, one line of JSON each; appended to")
     parser.add_argument("--table", default=None, help="print the table of these rows and do nothing else")
+    parser.add_argument("--programs", type=Path, help="a folder for the program of each object, that of its last row")
     args = parser.parse_args()
     if args.table is None:
         if args.data is None:
             parser.error("name the folder of the data")
         run(args)
-    print(table(Path(args.table or args.out)))
+    rows = Path(args.table or args.out)
+    print(table(rows))
+    if args.programs is not None:
+        args.programs.mkdir(parents=True, exist_ok=True)
+        for row in read_rows(rows):
+            (args.programs / f"{row['set']}_{row['name']}.shape").write_text(row["program"], encoding="utf-8")
 
 
 if __name__ == "__main__":

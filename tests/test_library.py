@@ -374,6 +374,59 @@ def test_rails_that_run_straight_along_a_mirror_are_a_row_of_two_and_splayed_leg
     assert [kind.repeats for kind in splayed] == [((2, "mirror"),), ((2, "mirror"),)]
 
 
+STEPS = """\
+def boxes(bottom, height, depth, width, levels=1, level_spacing=0, columns=1, column_spacing=0, middle_side=0,
+          steps=1, step_up=0, step_back=0, step_aside=0):
+    for h in translate(steps, by=(step_up, step_back, step_aside)):
+        for i in translate(levels, by=(level_spacing, 0, 0)):
+            for k in translate(columns, by=(0, 0, column_spacing)):
+                box(
+                    at=(
+                        bottom,
+                        -(depth + (steps - 1) * step_back) / 2,
+                        middle_side - (width + (columns - 1) * column_spacing + (steps - 1) * step_aside) / 2,
+                    ),
+                    size=(height, depth, width),
+                )
+"""
+
+
+@pytest.mark.parametrize(
+    ("loops", "corner", "said"),
+    [
+        (["translate(4, by=(3, 1, 0))"], "-8, -3.5, -5", {"steps": 4, "step_up": 3, "step_back": 1}),
+        (["translate(4, by=(-3, -1, 0))"], "1, -0.5, -5", {"steps": 4, "step_up": 3, "step_back": 1}),
+        (["translate(3, by=(2, -1, 0))", "mirror(side)"], "-8, -1, 6", {"steps": 3, "step_back": -1, "columns": 2}),
+        (["mirror(side)", "translate(3, by=(2, -1, 0))"], "-8, -1, 6", {"steps": 3, "step_back": -1, "columns": 2}),
+        (["mirror(side)", "mirror(side, at=5)"], "-8, -2, 5.5", {"steps": 2, "step_aside": 10, "columns": 2}),
+        (["mirror(side)", "translate(3, by=(0, 0, -1.5))"], "-8, -2, 9", {"steps": 2, "columns": 3}),
+        (["translate(2, by=(6, 0, 0))", "translate(3, by=(-1.5, 0, 0))"], "0, -2, 1", {"steps": 2, "levels": 3}),
+    ],
+)
+def test_steps_of_a_grid_go_along_several_axes_or_along_one_of_its_own(
+    loops: list[str], corner: str, said: dict[str, float]
+) -> None:
+    """Whichever copy a program begins with, and whichever of its loops is outside."""
+    lines = [f"for i{number} in {loop}:" for number, loop in enumerate(loops)] + [f"box(at=({corner}), size=(1, 4, 2))"]
+    program = parse("".join("    " * depth + line + "\n" for depth, line in enumerate(lines)))
+    found = with_library(program, library_of(parse(STEPS)))
+    (call,) = calls(found)
+    assert said.items() <= dict(call.arguments).items()
+    assert statements(found) == 1
+    assert away(program, found) < TOLERANCE
+
+
+def test_what_steps_the_other_way_behind_a_mirror_is_no_grid() -> None:
+    text = (
+        "for i in mirror(side):\n    for j in translate(3, by=(2, 0, 1)):\n        box(at=(-8, -2, 3), size=(1, 4, 2))"
+    )
+    (kind, *_) = blocks(parse(text))
+    assert kind.others == ("mirror", "translate")
+    found = with_library(parse(text), library_of(parse(STEPS)))
+    assert statements(found) == 2, "the mirror stays around a call"
+    assert away(parse(text), found) < TOLERANCE
+
+
 def blocks(program: Program) -> list[Kind]:
     """The kinds of the one block of a program, as it is written and where mirror images are rows."""
     (chain,) = program.chains
@@ -394,6 +447,38 @@ def test_grids_are_learned_where_many_programs_repeat_boxes_along_different_axes
     written = [with_library(program, learn(programs)) for program in programs]
     assert sum(map(statements, written)) == len(programs)
     assert all(away(*pair) < TOLERANCE for pair in zip(programs, written, strict=True))
+
+
+def test_grids_in_steps_are_learned_where_some_programs_have_stairs() -> None:
+    texts = [
+        "for i in mirror(side):\n    side(box(at=(-8, -4, {0}), size=(16, 8, 1)))",
+        "for i in translate(3, by=(3.5, 0, 0)):\n    shelf(box(at=(-9, -4, -{0}), size=(1, 8, 12)))",
+        "for i in translate(4, by=(2, {0}, 0)):\n    for j in mirror(side):\n        "
+        "panel(box(at=(-9, -4, {0}), size=(1, 2, 1)))",
+        "for i in mirror(side):\n    for j in mirror(side, at={0}):\n        "
+        "door(box(at=(-9, -4, {0}), size=(9, 1, 1)))",
+    ]
+    programs = [parse(text.format(3 + number)) for number in range(5) for text in texts]
+    found = learn(programs)
+    (function,) = found.functions
+    assert {"levels", "columns", "steps", "step_up", "step_back"} <= {name for name, _ in function.parameters}
+    written = [with_library(program, found) for program in programs]
+    assert sum(map(statements, written)) == len(programs)
+    assert all(away(*pair) < TOLERANCE for pair in zip(programs, written, strict=True))
+
+
+def test_mirrored_rows_of_slanting_bars_are_learned_with_the_mirror_around_their_steps() -> None:
+    text = dedent("""
+    for i in mirror(side):
+        for j in translate({1}, by=({2}, {0}, 0)):
+            slat(bar(start=(-6, -3, 9), end=(-4, -3, {0}), section=(0.4, 1)))
+    """)
+    programs = [parse(text.format(3 + number / 2, 3 + number % 2, 2 - number / 4)) for number in range(6)]
+    found = learn(programs)
+    for program in programs:
+        written = with_library(program, found)
+        assert statements(written) == 1
+        assert away(program, written) < TOLERANCE
 
 
 def test_steps_along_several_axes_are_learned_with_their_steps() -> None:

@@ -93,7 +93,7 @@ class _Pool:
                 if len(own) == 1 and name != chain[-1].name:
                     for values in hint(own[0]):
                         self._add((*chain[:-1], Draw(name, tuple(map(to_float32, values)))))
-        self.counts = sorted({float(count) for _, counts in self._rows for count in counts})
+        self.counts = {counts for _, counts in self._rows}
 
     def _add(self, chain: Chain) -> None:
         for block in forms_of(chain):

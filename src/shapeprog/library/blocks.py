@@ -34,9 +34,9 @@ ROWS: tuple[tuple[int, ...], ...] = ((), (UP, DEPTH, SIDE), (DEPTH,), (SIDE,))
 STRAIGHT = 0.02
 """How far in cells a part that is told by points may be from its own mirror image."""
 
-Way = Literal["pair", "row", "mirror", "grid", "steps"]
+Way = Literal["pair", "row", "mirror", "grid"]
 """How copies lie along an axis: two, any number at equal steps, or one and its mirror image; in a grid there may be one
-alone, and in steps each is shifted along all axes at once."""
+alone."""
 
 
 class Slot(NamedTuple):
@@ -45,6 +45,10 @@ class Slot(NamedTuple):
     word: str
     kind: str
     axis: int
+
+
+STEPS = tuple(Slot("step", "length", axis) for axis in range(3))
+"""The numbers of steps."""
 
 
 class Solid(NamedTuple):
@@ -72,14 +76,17 @@ class Kind:
         Its solid, and whether that is told by low corner and extents.
     repeats
         The axes along which it is repeated, and how.
+    steps
+        Whether all that is repeated again, shifted along several axes at once or along one of these.
     others
-        Loops that are kept as they are written: turns, steps along no axis, two loops along one.
+        Loops that are kept as they are written: turns, steps in steps.
     """
 
     word: str
     shape: str
     boxed: bool
     repeats: tuple[tuple[int, Way], ...] = ()
+    steps: bool = False
     others: tuple[str, ...] = ()
 
     @property
@@ -88,16 +95,16 @@ class Kind:
         return any(way == "grid" for _, way in self.repeats)
 
     @property
-    def steps(self) -> bool:
-        """Whether its copies are shifted along several axes at once."""
-        return any(way == "steps" for _, way in self.repeats)
+    def spans(self) -> int:
+        """How many of its numbers, the last, tell how it is repeated."""
+        return len(self.repeats) + 3 * self.steps
 
 
 class Block(NamedTuple):
     """A block in its form: its numbers (M,), what they are, their factors (M, V + 1) by the V of the text, its counts.
 
     After the numbers of the solid come, for each axis along which it is repeated, the span of all copies, or the place
-    of the mirror.
+    of the mirror; then the three shifts of its steps.  The count of these comes last, too.
     """
 
     kind: Kind
@@ -126,16 +133,16 @@ def blocks_of(chain: Chain, rows: Sequence[int] = ()) -> Iterator[Block]:
         names = tuple(node.name for node in loops)
         more = [slot for node in loops for slot in _slots(language()[node.name])]
         every = np.vstack([base, np.eye(len(numbers))[:first]])
-        kind = Kind(word, solid.shape, solid.boxed, (), names)
+        kind = Kind(word, solid.shape, solid.boxed, others=names)
         yield Block(kind, (*solid.slots, *more), every @ numbers, every, tuple(node.count for node in loops))
         return
-    ways, every, counts = found
-    spans = tuple(Slot("plane" if way == "mirror" else "span", "length", axis) for axis, way in ways)
-    pairs = [place for place, (_, way) in enumerate(ways) if way == "pair"]
+    spans = [Slot("plane" if way == "mirror" else "span", "length", axis) for axis, way in found.ways]
+    slots = (*solid.slots, *spans, *(STEPS if found.steps else ()))
+    pairs = [place for place, (_, way) in enumerate(found.ways) if way == "pair"]
     for chosen in (each for size in range(len(pairs) + 1) for each in itertools.combinations(pairs, size)):
-        repeats = tuple((axis, "row" if place in chosen else way) for place, (axis, way) in enumerate(ways))
-        kind = Kind(word, solid.shape, solid.boxed, repeats)
-        yield Block(kind, (*solid.slots, *spans), every @ numbers, every, counts)
+        repeats = tuple((axis, "row" if place in chosen else way) for place, (axis, way) in enumerate(found.ways))
+        kind = Kind(word, solid.shape, solid.boxed, repeats, found.steps)
+        yield Block(kind, slots, found.rows @ numbers, found.rows, found.counts)
 
 
 def readings(chain: Chain) -> list[Block]:
@@ -152,43 +159,39 @@ def forms_of(chain: Chain) -> list[Block]:
     return [*blocks_of(chain), *readings(chain)[1:]]
 
 
-def stepped(block: Block) -> Block | None:
-    """A block that one loop shifts along several axes at once, with its steps along all; none if it is another."""
-    if block.kind.others != ("translate",):
-        return None
-    kept = [place for place, slot in enumerate(block.slots) if slot.kind != "count"]
-    kind = replace(block.kind, repeats=tuple((axis, "steps") for axis in range(3)), others=())
-    return Block(kind, tuple(block.slots[k] for k in kept), block.values[kept], block.rows[kept], block.counts)
-
-
 def gridded(block: Block) -> Iterator[Block]:
     """The same block as grids: along the axes of its copies, and along others where there is one alone.
 
     Instead of the span of all copies grids have the spacing between them, which is zero where there is one alone; and
     instead of the low corner of a solid that is symmetric the middle of all copies, but for how high it begins, so that
-    a grid which lies in the middle need not say so.  Nothing for a block that is not repeated.
+    a grid which lies in the middle need not say so.  There may be steps, which are zero where there is one alone, too.
+    Nothing for a block that is not repeated.
     """
-    if block.kind.others or not block.kind.repeats:
+    kind = block.kind
+    if kind.others or not kind.spans:
         return
-    ways = dict(block.kind.repeats)
+    ways = dict(kind.repeats)
     free = [axis for axis in range(3) if axis not in ways]
     for more in (each for size in range(len(free) + 1) for each in itertools.combinations(free, size)):
         along = [axis for axis in range(3) if axis in more or ways.get(axis, "mirror") != "mirror"]
-        if along:
-            yield _grid(block, along)
+        for steps in (True,) if kind.steps else (False, True):
+            if along:
+                yield _grid(block, along, steps)
 
 
-def _grid(block: Block, along: Sequence[int]) -> Block:
+def _grid(block: Block, along: Sequence[int], steps: bool) -> Block:
     kind, unit = block.kind, np.eye(len(block.rows))
-    first = len(unit) - len(kind.repeats)
+    first = len(unit) - kind.spans
     ends = {axis: unit[first + place] for place, (axis, _) in enumerate(kind.repeats)}
-    known = dict(zip(ends, block.counts, strict=True))
+    shifts = unit[-3:] if kind.steps else np.zeros((3, len(unit)))
+    known = dict(zip(ends, block.counts, strict=False))
+    times = block.counts[-1] if kind.steps else 1
     rows, slots = [*unit[:first]], [*block.slots[:first]]
     repeats: list[tuple[int, Way]] = []
     for axis in range(3):
         size = unit[3 + axis] if kind.boxed else np.zeros(len(unit))
         if kind.boxed and axis != UP:
-            rows[axis] = unit[axis] + ends.get(axis, size) / 2
+            rows[axis] = unit[axis] + (ends.get(axis, size) + (times - 1) * shifts[axis]) / 2
             slots[axis] = Slot("middle", "position", axis)
         if axis in along:
             repeats.append((axis, "grid"))
@@ -198,54 +201,91 @@ def _grid(block: Block, along: Sequence[int]) -> Block:
             repeats.append((axis, "mirror"))
             rows.append(ends[axis])
             slots.append(Slot("plane", "length", axis))
-    change = np.stack(rows)
     counts = tuple(known.get(axis, 1) for axis, _ in repeats)
-    kind = replace(kind, repeats=tuple(repeats))
+    if steps:
+        rows, slots, counts = [*rows, *shifts], [*slots, *STEPS], (*counts, times)
+    change = np.stack(rows)
+    kind = replace(kind, repeats=tuple(repeats), steps=steps)
     return Block(kind, tuple(slots), change @ block.values, change @ block.rows, counts)
+
+
+class _Repeated(NamedTuple):
+    """How a block is repeated along each axis, whether in steps, its rows with those of all of it, and its counts."""
+
+    ways: tuple[tuple[int, Way], ...]
+    steps: bool
+    rows: FloatArray
+    counts: tuple[int, ...]
 
 
 def _repeated(
     loops: Sequence[Loop], base: FloatArray, solid: Solid, numbers: FloatArray, draw: Draw, straight: Sequence[int]
-) -> tuple[list[tuple[int, Way]], FloatArray, tuple[int, ...]] | None:
-    """How a block is repeated along each axis, its rows with those of the spans, and its counts; none if it is not.
+) -> _Repeated | None:
+    """How a block is repeated, from its innermost loop outwards; none if not along the axes and in steps alone.
 
     A solid that is not boxed is a row of two in a mirror across one of the axes ``straight`` where it is its own image.
     """
-    rows, start = base.copy(), 0
+    rows = base.copy()
+    places = [
+        [k for k, slot in enumerate(solid.slots) if (slot.axis, slot.kind) == (axis, "position")] for axis in range(3)
+    ]
     ways: dict[int, tuple[Way, FloatArray, int]] = {}
-    for loop in loops:
+    steps: tuple[FloatArray, int] | None = None
+    starts = np.cumsum([0, *(len(loop.values) for loop in loops)])
+    for loop, start in reversed([*zip(loops, starts, strict=False)]):
         slots = np.eye(len(numbers))[start : start + len(loop.values)]
-        start += len(loop.values)
         if loop.name == "translate" and loop.count == 1:  # once, where it stands
             continue
-        if loop.name == "mirror":
-            axis, plane = int(loop.values[1]), slots[2]
-        elif loop.name == "translate":
-            along = [axis for axis in range(3) if abs(loop.values[1 + axis]) > ZERO]
-            axis = along[0] if len(along) == 1 else -1
-        else:
+        if loop.name == "translate":
+            shift = slots[1:4]
+            along = [axis for axis in range(3) if abs(shift[axis] @ numbers) > ZERO]
+            if len(along) == 1 and along[0] not in ways:
+                ways[along[0]] = "row", (loop.count - 1) * shift[along[0]], loop.count
+            elif along and steps is None and not any(ways[axis][0] == "mirror" for axis in along if axis in ways):
+                steps = shift, loop.count
+            else:
+                return None
+            continue
+        if loop.name != "mirror":
             return None
-        if axis < 0 or axis in ways:
-            return None
-        if loop.name == "mirror" and not solid.boxed and not (axis in straight and _own_image(draw, axis)):
+        axis, plane = int(loop.values[1]), slots[2]
+        own = solid.boxed or (axis in straight and _own_image(draw, axis))
+        if own and steps is not None and abs(steps[0][axis] @ numbers) > ZERO:
+            return None  # the images step the other way
+        if not own:
+            if axis in ways and (ways[axis][0] == "mirror" or steps is not None):
+                return None
+            if axis in ways:
+                _, reach, count = ways.pop(axis)
+                steps = np.eye(3)[:, [axis]] * (reach / (count - 1)), count
             ways[axis] = "mirror", plane, 2
             continue
-        if loop.name == "mirror":
-            one = next(place for place, slot in enumerate(solid.slots) if slot.axis == axis and slot.kind == "position")
-            other = 2 * plane - rows[one] - (rows[3 + axis] if solid.boxed else 0)
-            reach = other - rows[one]
+        low = rows[places[axis][0]]
+        reach = 2 * plane - 2 * low - (rows[3 + axis] if solid.boxed else 0)
+        if axis not in ways:
+            ways[axis] = "row", reach, 2
+        elif ways[axis][0] == "row" and steps is None:
+            steps = np.eye(3)[:, [axis]] * (reach - ways[axis][1]), 2
         else:
-            reach = (loop.count - 1) * slots[1 + axis]
-        if reach @ numbers < 0:  # the first copy becomes the lowest
-            for place, slot in enumerate(solid.slots):
-                if slot.axis == axis and slot.kind == "position":
-                    rows[place] = rows[place] + reach
-            reach = -reach
-        span = reach + rows[3 + axis] if solid.boxed else reach
-        ways[axis] = "pair" if loop.count == 2 and solid.boxed else "row", span, loop.count
+            return None
+    spans: dict[int, FloatArray] = {}
+    for axis, (way, reach, _) in ways.items():
+        back = way == "row" and reach @ numbers < 0
+        spans[axis] = (-reach if back else reach) + (rows[3 + axis] if solid.boxed else 0)
+        rows[places[axis]] += reach if back else 0  # the first copy becomes the lowest
+    if steps is not None:
+        shift, count = steps
+        if next((step for step in shift @ numbers if abs(step) > ZERO), 0) < 0:
+            for axis in range(3):
+                rows[places[axis]] += (count - 1) * shift[axis]
+            shift = -shift
+        spans |= dict(enumerate(shift, 3))
     order = sorted(ways)
-    whole = np.vstack([rows, *(ways[axis][1] for axis in order)])
-    return [(axis, ways[axis][0]) for axis in order], whole, tuple(ways[axis][2] for axis in order)
+    pairs = [axis for axis, (way, _, count) in ways.items() if solid.boxed and way == "row" and count == 2]
+    told = tuple((axis, "pair" if axis in pairs else ways[axis][0]) for axis in order)
+    counts = tuple(ways[axis][2] for axis in order)
+    whole = np.vstack([rows, *(spans[place] for place in sorted(spans))])
+    return _Repeated(told, steps is not None, whole, (*counts, *(steps[1:] if steps else ())))
 
 
 @lru_cache(1024)

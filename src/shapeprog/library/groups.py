@@ -13,13 +13,16 @@ import numpy.typing as npt
 from shapeprog.language.program import Draw, Program, nest
 from shapeprog.language.statement import language
 from shapeprog.language.text import source_of
-from shapeprog.library.blocks import Block, Kind, Slot, blocks_of, gridded, readings, stepped
+from shapeprog.library.blocks import Block, Kind, Slot, blocks_of, gridded, readings
 from shapeprog.library.length import STATEMENT, length
 from shapeprog.library.measures import Group, Measure, measures, relations
 from shapeprog.space import FloatArray
 
 NEAR = 0.03
 """How far in cells a relation may be from holding."""
+
+LEAST_PROGRAMS, LEAST_SHARE = 3, 0.02
+"""How many programs must use a function, and which share of all for each of its blocks."""
 
 LARGEST = 3
 """Most blocks of a function."""
@@ -82,18 +85,22 @@ def units_of(program: Program) -> list[Unit | None]:
     """The blocks of a program that functions may draw, in the order of its text."""
     found: list[Unit | None] = []
     for chain in program.chains:
-        known = list(blocks_of(chain))
-        forms = [form for form in known if not form.kind.others]
+        forms = [form for form in blocks_of(chain) if not form.kind.others]
         forms += {form.kind: form for each in readings(chain) for form in gridded(each)}.values()
-        forms += filter(None, [stepped(known[0])])
         draw = chain[-1]
         assert isinstance(draw, Draw)
         found.append(Unit(tuple(forms), draw, length(source_of(Program((nest(chain),))).lines)) if forms else None)
     return found
 
 
-def candidates(corpus: Corpus, least: int) -> Iterator[Candidate]:
-    """The best function for each group that is in at least so many programs."""
+def least_of(corpus: Corpus, blocks: int = 1) -> int:
+    """How many programs a function of so many blocks must serve: what is alike in a few may be so by chance."""
+    return max(LEAST_PROGRAMS, round(LEAST_SHARE * blocks * len(corpus)))
+
+
+def candidates(corpus: Corpus) -> Iterator[Candidate]:
+    """The best function for each group that is in enough programs."""
+    least = least_of(corpus)
     slots: dict[Kind, tuple[Slot, ...]] = {}
     groups: dict[tuple[Kind, ...], list[Use]] = defaultdict(list)
     for number, units in enumerate(corpus):
@@ -112,8 +119,9 @@ def candidates(corpus: Corpus, least: int) -> Iterator[Candidate]:
         groups |= level
     for kinds, uses in groups.items():
         written = kinds[0].word or statement_of(kinds[0].shape)
-        if programs(uses) >= least and written and (len(kinds) > 1 or kinds[0].repeats):
-            yield from _best(Group(kinds, tuple(slots[kind] for kind in kinds)), uses, least)
+        if programs(uses) >= least_of(corpus, len(kinds)) and written and (len(kinds) > 1 or kinds[0].repeats):
+            group = Group(kinds, tuple(slots[kind] for kind in kinds))
+            yield from _best(group, uses, least_of(corpus, len(kinds)))
 
 
 def programs(uses: Iterable[Use]) -> int:
@@ -193,20 +201,24 @@ def _offered(group: Group, known: Sequence[Measure], openings: Sequence[Measure]
 def _priced(group: Group, rows: FloatArray, openings: Sequence[Measure], uses: Sequence[Use]) -> Candidate:
     """The function of a group for which relations hold, and what it saves where it is used."""
     chosen: FloatArray = np.zeros((0, group.size))
-    words: list[int] = []
+    sorts: list[str] = []
     for each in openings:
         zero = [bool(abs(use.values @ each.row) <= NEAR) for use in uses]
-        rare = sum(zero) >= OPEN * len(uses) or each.sort == "spacing"
+        free = group.kinds[0].grid and each.sort in ("spacing", "step")
+        rare = free or sum(zero) >= OPEN * len(uses)
         if not rare or not _independent(np.vstack([rows, chosen]), each.row):
             continue
         if all(zero) and each.sort != "spacing":
             rows = np.vstack([rows, each.row])
         else:
             chosen = np.vstack([chosen, each.row])
-            words.append(1 + (each.sort == "spacing"))  # which has a count
+            sorts.append(each.sort)
     values = np.array([use.values for use in uses]).reshape(-1, group.size)
     arguments = _arguments(group, rows, chosen)
-    said = ((np.abs(values @ chosen.T) > NEAR) @ np.array(words, np.int64)).tolist()
+    told = np.abs(values @ chosen.T) > NEAR
+    counted = [sort == "spacing" for sort in sorts]  # each with a count of its own, steps with one
+    stepping = [sort == "step" and group.kinds[0].grid for sort in sorts]
+    said = (told.sum(1) + told[:, counted].sum(1) + told[:, stepping].any(1)).tolist()
     taken: set[tuple[int, int]] = set()
     kept: list[Use] = []
     for use, more in zip(uses, said, strict=True):
@@ -214,7 +226,7 @@ def _priced(group: Group, rows: FloatArray, openings: Sequence[Measure], uses: S
         if not own & taken:
             taken |= own
             kept.append(use._replace(gain=use.gain - arguments - more))
-    lines = 1 + sum(len(kind.repeats) + 1 for kind in group.kinds)
+    lines = 1 + sum(1 + len(kind.repeats) + kind.steps for kind in group.kinds)
     cost = STATEMENT * lines + arguments + len(chosen) + group.size
     return Candidate(group, rows, chosen, tuple(kept), sum(use.gain for use in kept) - cost)
 

@@ -30,9 +30,6 @@ from shapeprog.library.writing import basis, function
 MOST = 12
 """Most functions of a library."""
 
-LEAST_PROGRAMS, LEAST_SHARE = 3, 0.02
-"""How many programs must use a function, and which share of all."""
-
 OWN = 0.9
 """Share of the uses of a function from which parts of one role make it their own."""
 
@@ -68,10 +65,9 @@ def learn(given: Sequence[Program], most: int = MOST) -> Library:
 
 def _functions(given: Sequence[Program], most: int) -> Iterator[Learned]:
     corpus: Corpus = [units_of(program) for program in given]
-    least = max(LEAST_PROGRAMS, round(LEAST_SHARE * len(given)))
     taken: set[str] = set()
     while len(taken) < most:
-        offered = sorted(candidates(corpus, least), key=lambda each: -each.gain)
+        offered = sorted(candidates(corpus), key=lambda each: -each.gain)
         pairs = ((best, _made(best, corpus, taken)) for best in (_owned(each, corpus) for each in offered))
         best, made = next(((best, made) for best, made in pairs if made is not None), (None, None))
         if best is None or made is None:
@@ -132,15 +128,18 @@ def _made(best: Candidate, corpus: Corpus, taken: set[str]) -> Learned | None:
 
 
 def _counts(kind: Kind, unit: Unit) -> Iterator[int]:
-    """The counts of the rows of a block."""
-    if kind.steps:
-        return iter(_form(kind, unit).counts)
-    return (count for (_, way), count in zip(kind.repeats, _form(kind, unit).counts, strict=True) if way == "row")
+    """The counts of a block that are no parameters by themselves: of its steps, then of its rows."""
+    counts = _form(kind, unit).counts
+    if kind.steps and not kind.grid:
+        yield counts[-1]
+    yield from (count for (_, way), count in zip(kind.repeats, counts, strict=False) if way == "row")
 
 
 def _lines(kind: Kind, unit: Unit) -> dict[str, int]:
     """How many copies a grid has along each axis, by the parameters that say so."""
-    return {LINES[axis]: count for (axis, _), count in zip(kind.repeats, _form(kind, unit).counts, strict=True)}
+    counts = _form(kind, unit).counts
+    lines = {LINES[axis]: count for (axis, _), count in zip(kind.repeats, counts, strict=False)}
+    return lines | ({"steps": counts[-1]} if kind.steps else {})
 
 
 def _form(kind: Kind, unit: Unit) -> Block:

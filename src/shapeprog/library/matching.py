@@ -8,6 +8,7 @@ program follows from as many of its numbers as there are parameters, those with 
 from __future__ import annotations
 
 import itertools
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -88,11 +89,18 @@ class Pattern:
         """How many blocks it draws; none if they are not linear in its measures."""
         return len(self.forms_at(self.arguments))
 
-    def choices(self, seen: Iterable[float]) -> Iterator[dict[str, float]]:
-        """What its counts may be where blocks are repeated as often as these; once only where it says so by itself."""
-        defaults, every = dict(self.function.parameters), sorted({*seen})
+    def choices(self, seen: Iterable[tuple[int, ...]]) -> Iterator[dict[str, float]]:
+        """What its counts may be where blocks are repeated as often as these; once only where it says so by itself.
+
+        What draws one block repeats it as some block is.
+        """
+        known = {tuple(sorted(counts)): Counter(counts) for counts in seen}
+        defaults, every = dict(self.function.parameters), sorted({float(n) for counts in known for n in counts})
         options = [sorted({1.0, *every}) if defaults[name] == 1 else every for name in self.counts]
-        return (dict(zip(self.counts, counts, strict=True)) for counts in itertools.product(*options))
+        for counts in itertools.product(*options):
+            several = Counter(count for count in counts if count > 1)
+            if self.blocks > 1 or any(several <= one for one in known.values()):
+                yield dict(zip(self.counts, counts, strict=True))
 
     @property
     def shortens(self) -> bool:
@@ -153,13 +161,6 @@ class Match(NamedTuple):
     role: str
     arguments: tuple[tuple[str, Value], ...]
     error: float
-
-
-def _lines(block: Block) -> tuple[int, ...]:
-    """How many copies of a block lie along the axes across which no mirror does, in order of number."""
-    if block.kind.others:
-        return ()
-    return tuple(sorted(n for (_, way), n in zip(block.kind.repeats, block.counts, strict=True) if way != "mirror"))
 
 
 def forms(
@@ -236,12 +237,8 @@ class Matcher:
 
     def matches(self, pattern: Pattern) -> Iterator[Match]:
         """All ways in which blocks of the program are a call of a function."""
-        seen = {float(count) for form in self.forms for count in form.block.counts}
         found: dict[tuple[int, ...], tuple[int, Match]] = {}
-        known = {_lines(form.block) for form in self.forms}
-        for given in pattern.choices(seen):
-            if 1.0 in given.values() and tuple(sorted(count for count in given.values() if count > 1)) not in known:
-                continue  # a grid is a block, which some block should be
+        for given in pattern.choices(form.block.counts for form in self.forms):
             for wanted in pattern.forms(given):
                 for blocks in self._alike(wanted):
                     solved = self._solved(pattern, given, wanted, blocks)

@@ -42,7 +42,7 @@ class Group(NamedTuple):
     @property
     def counts(self) -> int:
         """How many of their repetitions have a count that is open."""
-        return sum(kind.steps + sum(way == "row" for _, way in kind.repeats) for kind in self.kinds)
+        return sum((kind.steps and not kind.grid) + sum(way == "row" for _, way in kind.repeats) for kind in self.kinds)
 
 
 class Measure(NamedTuple):
@@ -103,14 +103,15 @@ Found = tuple[str, Sort, int, FloatArray, float]
 
 def _boxed(kind: Kind, slots: Sequence[Slot], own: FloatArray, values: FloatArray) -> Iterator[Found]:
     """Measures of solids that are told by low corner, extents and what else shapes them."""
-    repeats = {axis: place for place, (axis, _) in enumerate(kind.repeats, len(slots) - len(kind.repeats))}
+    first = len(slots) - kind.spans
+    repeats = {axis: place for place, (axis, _) in enumerate(kind.repeats, first)}
     sizes = values[3:6]
     thin = int(np.argmin(sizes))
     flat = bool(sizes[thin] < THIN * np.sort(sizes)[1])
     for axis in range(3):
         low, size, word = own[axis], own[3 + axis], EXTENTS[axis]
         if kind.steps:
-            yield STEPS[axis], "step", axis, own[repeats.pop(axis)], 0.5
+            yield STEPS[axis], "step", axis, own[axis - 3], 0.5
         span = own[repeats[axis]] if axis in repeats else size
         if axis in repeats and not kind.grid:
             yield word, "length", axis, span, 0.0
@@ -135,13 +136,13 @@ def _boxed(kind: Kind, slots: Sequence[Slot], own: FloatArray, values: FloatArra
         if axis in repeats:
             yield f"inner_{LOW[axis]}", "place", axis, low + size, 6.0
             yield f"outer_{LOW[axis]}", "place", axis, low + span - size, 6.0
-    for place in range(6, len(slots) - len(kind.repeats)):
+    for place in range(6, first):
         yield slots[place].word, "length", -1, own[place], 1.3
 
 
 def _pointed(kind: Kind, slots: Sequence[Slot], own: FloatArray, values: FloatArray) -> Iterator[Found]:
     """Measures of solids that are told by points, such as the two ends of a rod."""
-    first = len(slots) - len(kind.repeats)
+    first = len(slots) - kind.spans
     planes = {axis: own[place] for place, (axis, way) in enumerate(kind.repeats, first) if way == "mirror"}
     rising = _rises(slots, values)
     heights: dict[str, FloatArray] = {}
@@ -173,10 +174,10 @@ def _pointed(kind: Kind, slots: Sequence[Slot], own: FloatArray, values: FloatAr
             yield f"middle_{AXIS[axis]}", "middle", axis, own[place], 4.0
         elif way == "grid":
             yield SPACINGS[axis], "spacing", axis, own[place], 0.5
-        elif way == "steps":
-            yield STEPS[axis], "step", axis, own[place], 0.5
         else:
             yield EXTENTS[axis], "length", axis, own[place], 0.5
+    for axis in range(3 * kind.steps):
+        yield STEPS[axis], "step", axis, own[axis - 3], 0.5
 
 
 def _rises(slots: Sequence[Slot], values: FloatArray) -> bool:

@@ -11,8 +11,8 @@ from shapeprog.language.expression import Binary, Expression, Name, Value, combi
 from shapeprog.language.source import Function, Line, Source, WrittenDraw, WrittenLoop, values
 from shapeprog.language.statement import language
 from shapeprog.library.blocks import Kind, solid_of
-from shapeprog.library.measures import LINES, SPACINGS, Group, Measure, measures
-from shapeprog.space import UP, FloatArray
+from shapeprog.library.measures import LINES, SPACINGS, STEPS, Group, Measure, measures
+from shapeprog.space import DEPTH, SIDE, UP, FloatArray
 
 SAME = 1e-6
 """Difference below which factors are the same."""
@@ -51,7 +51,10 @@ def basis(group: Group, typical: FloatArray, rows: FloatArray, openings: FloatAr
     near = np.round(factors * 4) / 4
     if np.abs(factors - near).max(initial=0) > SAME:
         return None
-    order = sorted(range(len(chosen)), key=lambda k: (k < len(last), _rank(chosen[k].word), chosen[k].block, k))
+    order = sorted(
+        range(len(chosen)),
+        key=lambda k: (k < len(last), chosen[k].sort == "step", _rank(chosen[k].word), chosen[k].block, k),
+    )
     ordered = tuple(chosen[k] for k in order)
     return Basis(ordered, _names(group, ordered), near[:, order] + 0.0, len(last))
 
@@ -75,6 +78,8 @@ def function(name: str, group: Group, made: Basis, draws: Sequence[tuple[str, st
     for place, word in enumerate(made.names):
         if word in SPACINGS:  # how often something is repeated, and how far apart
             parameters.append((LINES[SPACINGS.index(word)], 1.0))
+        if word in STEPS and group.kinds[0].grid and not any(name == "steps" for name, _ in parameters):
+            parameters.append(("steps", 1.0))
         if word in used:
             parameters.append((word, None if place < said else 0.0))
     return Function(name, (*((count, None) for count in counts), *parameters), tuple(lines))
@@ -85,27 +90,37 @@ def _block(
 ) -> WrittenDraw | WrittenLoop:
     """The lines of one block whose numbers follow from the parameters by ``own`` (M, P)."""
     solid = solid_of(statement)
-    first = len(own) - len(kind.repeats)
+    first = len(own) - kind.spans
     base = own[:first].copy()
-    place = np.linalg.pinv(solid.rows[:, :-1])
-    before: dict[int, Value] = {}
+    place = np.round(np.linalg.pinv(solid.rows[:, :-1]), 9)  # which leaves traces where it has zeros
+    before: dict[int, list[tuple[Value, float]]] = {}
+    mirrors: list[tuple[str, tuple[Value, ...]]] = []
     loops: list[tuple[str, tuple[Value, ...]]] = []
-    if kind.steps:
-        loops.append(("translate", (Name(next(counts)), *(_sum(row, names) for row in own[first:]))))
+
+    def starts_before(axis: int, count: Name, step: Value) -> None:
+        """What copies on either side of the middle take away from where the first begins."""
+        slot = int(np.flatnonzero(place[:, axis])[0])
+        before.setdefault(slot, []).append(((count - 1.0) * step, -0.5))
+
     if kind.grid and solid.boxed:
         base[1:3] -= own[4:6] / 2  # of the middle
-    for (axis, way), span in zip(kind.repeats, own[first:], strict=True):
+    if kind.steps:
+        times = Name("steps") if kind.grid else Name(next(counts))
+        steps = [_sum(row, names) for row in own[-3:]]
+        loops.append(("translate", (times, *steps)))
+        for axis in (DEPTH, SIDE) if kind.grid and solid.boxed else ():
+            if isinstance(steps[axis], Expression):
+                starts_before(axis, times, steps[axis])
+    for (axis, way), span in zip(kind.repeats, own[first:], strict=False):
         if way == "mirror":
-            loops.append(("mirror", (2.0, float(axis), _sum(span, names))))
-            continue
-        if way == "steps":
+            mirrors.append(("mirror", (2.0, float(axis), _sum(span, names))))
             continue
         shift: list[Value] = [0.0, 0.0, 0.0]
         if way == "grid":
             count, shift[axis] = Name(LINES[axis]), _sum(span, names)
             loops.append(("translate", (count, *shift)))
             if solid.boxed and axis != UP:
-                before[int(np.flatnonzero(place[:, axis])[0])] = (count - 1.0) * shift[axis]
+                starts_before(axis, count, shift[axis])
             continue
         reach = span - own[3 + axis] if solid.boxed else span
         middle = own[axis] + span / 2
@@ -117,11 +132,9 @@ def _block(
             step = _sum(reach, names)
             shift[axis] = Binary("/", step, number - 1.0) if isinstance(number, Name) else step
             loops.append(("translate", (number, *shift)))
-    numbers = [
-        _sum(row, names, *([(before[slot], -0.5)] if slot in before else [])) for slot, row in enumerate(place @ base)
-    ]
+    numbers = [_sum(row, names, *before.get(slot, ())) for slot, row in enumerate(place @ base)]
     line: WrittenDraw | WrittenLoop = WrittenDraw(statement, tuple(numbers), role)
-    for loop, given in reversed(loops):
+    for loop, given in reversed([*mirrors, *loops]):
         line = WrittenLoop(loop, given, (line,))
     return line
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from textwrap import dedent
 
+import numpy as np
 import pytest
 import torch
 from commands import Run
@@ -512,3 +513,14 @@ def test_a_cushion_in_a_function_has_the_role_around_its_call() -> None:
         ("cushion", ""),
         ("leg", ""),
     ]
+
+
+def test_two_boxes_that_share_little_are_no_function_of_their_own() -> None:
+    random = np.random.default_rng(0)
+    lines = "base(box(at=({0}, {1}, -{2}), size=({3}, {4}, {5})))\ntop(box(at=({6}, {7}, -{2}), size=({8}, {9}, {5})))"
+    programs = [parse(lines.format(*(round(value, 2) for value in random.uniform(1, 4, 10)))) for _ in range(12)]
+    assert learn(programs).functions == ()
+    flush = "base(box(at=(-6, -{0}, -{1}), size=(1, 6, {2})))\ntop(box(at=(5, -{0}, -{1}), size=(1, 6, {2})))"
+    programs = [parse(flush.format(*(round(value, 2) for value in random.uniform(1, 4, 3)))) for _ in range(12)]
+    (function,) = learn(programs).functions
+    assert function.name == "base_with_top"

@@ -27,8 +27,9 @@ LEAST_PROGRAMS, LEAST_SHARE = 3, 0.02
 LARGEST = 3
 """Most blocks of a function."""
 
-ARGUMENTS = 10
-"""Most arguments of a function that draws several blocks: with more, nobody would call it."""
+ARGUMENTS, SHARE = 10, 0.6
+"""Most arguments of a function that draws several blocks, and the share of their numbers that these may be: nobody
+would call one with more, and whatever has a base and a top would do for one of two loose boxes."""
 
 OPEN = 0.6
 """Share of the uses from which a measure that is zero need not be said."""
@@ -176,7 +177,7 @@ def _best(group: Group, uses: Sequence[Use], least: int) -> Iterator[Candidate]:
         if joined >= len(group.kinds) - 1:
             fitting = [use for use, fits in zip(uses, alive, strict=True) if fits]
             found = _priced(group, rows, openings, fitting)
-            called = len(group.kinds) == 1 or found.arguments <= ARGUMENTS
+            called = len(group.kinds) == 1 or found.arguments <= min(ARGUMENTS, SHARE * group.size)
             if called and programs(found.uses) >= least and found.gain > (best.gain if best else 0):
                 best = found
         support = (holds[:, untried] & alive[:, None]).sum(0)

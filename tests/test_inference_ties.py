@@ -346,6 +346,25 @@ def test_more_copies_share_the_span_of_the_others(text: str, name: str, axis: in
     assert free_numbers(tied) == free_numbers(sp.set(tied, {name: 7})), "a count is no free number"
 
 
+DRAWERS = """
+body(box(at=(-12, -4, -8), size=(24, 10, 16)))
+for i in translate(3, by=(7.6, 0, 0)):
+    handle(box(at=(-8.5, -6, -3), size=(0.8, 0.8, 6)))
+for i in translate(3, by=(7.61, 0, 0)):
+    drawer(box(at=(-11.5, -5.2, -7.5), size=(6.8, 1.2, 15)))
+"""
+
+
+def test_as_many_drawers_as_handles_are_one_count_named_after_the_larger() -> None:
+    program = sp.parse(DRAWERS)
+    tied = tie(program, evidence_of_program(program)).program
+    (count,) = (each for each in sp.names(tied) if each.whole)
+    assert count.name == "drawers"
+    scene = unroll(sp.set(tied, drawers=5))
+    handles, drawers = (scene.centre[scene.block == block] for block in range(3) if (scene.block == block).sum() == 5)
+    torch.testing.assert_close(handles[:, 0], drawers[:, 0], atol=0.05, rtol=0)
+
+
 def test_names_of_counts_are_plurals():
     words = ("shelf", "leg", "foot", "box", "bench", "body", "tray", "cross")
     assert [plural(word) for word in words] == [

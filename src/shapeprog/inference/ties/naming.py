@@ -6,8 +6,9 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from shapeprog.inference.candidates import solid_boxes
 from shapeprog.inference.ties.basis import Basis, Measure
-from shapeprog.inference.ties.runs import Run, plural, shares
+from shapeprog.inference.ties.runs import Run, Shares, plural, shares
 from shapeprog.inference.ties.sums import SAME, nearest_quarter
 from shapeprog.inference.tunable import Tunable
 from shapeprog.language.evaluation import evaluated
@@ -85,27 +86,47 @@ def written(tunable: Tunable, basis: Basis, runs: Sequence[Run]) -> Program:
     counts: list[tuple[str, Value]] = []
     spacings: list[Line] = []
     steps = np.array([group[0].word == "step" for group in basis.chosen])
-    for run in runs:
-        way = shares(run, basis.factors, steps)
-        if way is None:
-            continue
-        part = _part(tunable, run.node)
+    for way, alike in _together(tunable, basis.factors, [(run, shares(run, basis.factors, steps)) for run in runs]):
+        part = _part(tunable, max(alike, key=lambda run: _bulk(tunable, run.node)).node)
         name = Name(_unused(plural(part), taken))
-        counts.append((name.name, float(run.copies)))
-        step = basis.factors[run.step]
-        each: Value = sum_of(nearest_quarter((run.copies + way.more) * step)) / combined(way.more, [(name, 1.0)])
+        copies, step = alike[0].copies, basis.factors[alike[0].step]
+        counts.append((name.name, float(copies)))
+        each: Value = sum_of(nearest_quarter((copies + way.more) * step)) / combined(way.more, [(name, 1.0)])
         if way.before:
             spacings.append(Assignment((((spacing := _unused(f"{part}_spacing", taken)), each),)))
             each = Name(spacing)
-            for start in run.starts:
+        for run in alike:
+            for start in run.starts if way.before else ():
                 row = nearest_quarter(basis.factors[start] - way.before * step)
                 table[tunable.moving[start]] = sum_of(row, (each, way.before))
-        table[tunable.moving[run.step]] = each
-        table[run.node, run.slot] = name
+            table[tunable.moving[run.step]] = each
+            table[run.node, run.slot] = name
     floor: list[tuple[str, Value]] = [(FLOOR, -Name(EXTENTS[UP]) / 2)] if floors else []
     lines: list[Line] = list(_header(basis, names, order, alone, [*floor, *counts]))
     body = _lines(tunable.program.body, iter(range(len(tunable.nodes))), table)
     return evaluated(Source((*lines, *spacings, *body)))
+
+
+def _together(
+    tunable: Tunable, factors: FloatArray, written: Sequence[tuple[Run, Shares | None]]
+) -> Iterator[tuple[Shares, list[Run]]]:
+    """Runs that are written by their counts, those of as many copies at the same step along the same axis together.
+
+    So a handle stays on each of some drawers, however many there are.
+    """
+    groups: dict[tuple[Shares, int, str, int, bytes], list[Run]] = {}
+    for run, way in written:
+        if way is not None:
+            (node, slot), step = tunable.moving[run.step], np.round(factors[run.step], 6) + 0.0
+            key = (way, run.copies, tunable.nodes[node].name, slot, step.tobytes())
+            groups.setdefault(key, []).append(run)
+    return ((key[0], alike) for key, alike in groups.items())
+
+
+def _bulk(tunable: Tunable, node: int) -> float:
+    """How much the part of a node fills, about."""
+    (boxes,) = solid_boxes([_drawn(tunable, node)[1]])
+    return sum(float(np.prod(box.half)) for box in boxes)
 
 
 def _header(

@@ -365,6 +365,20 @@ def test_a_grid_serves_pairs_rows_and_fours_and_says_only_what_is_repeated(text:
     assert all(loop.count > 1 for loop in loops)
 
 
+@pytest.mark.parametrize(("first", "sign"), [("-8", ""), ("4", "-")])
+def test_more_copies_share_the_span_of_a_call_too(first: str, sign: str) -> None:
+    text = dedent(f"""
+    shelves, span = 4, 12
+    for i in translate(shelves, by=({sign}span / (shelves - 1), 0, 0)):
+        shelf(box(at=({first}, -4, -5), size=(1, 8, 10)))
+    """)
+    program = parse(text)
+    found = with_library(program, library_of(parse(GRID)))
+    assert statements(found) == 1
+    for changed in ({"shelves": 7}, {"span": 9}, {"shelves": 2, "span": 14}):
+        assert away(set_numbers(program, changed), set_numbers(found, changed)) < TOLERANCE
+
+
 def test_rails_that_run_straight_along_a_mirror_are_a_row_of_two_and_splayed_legs_are_not() -> None:
     text = dedent("""
     for i in mirror(side):

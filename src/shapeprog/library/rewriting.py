@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -30,9 +30,12 @@ from shapeprog.language.source import (
 from shapeprog.language.text import source_of
 from shapeprog.library.blocks import ROWS
 from shapeprog.library.length import length, outside, statements, written
-from shapeprog.library.matching import TOLERANCE, Form, Matcher, Pattern, Sums, forms
+from shapeprog.library.matching import TOLERANCE, Form, Match, Matcher, Pattern, Sums, forms
 from shapeprog.library.store import Library
 from shapeprog.space import FloatArray
+
+SAME = 1e-4
+"""How far factors of two sums may be from each other where these are the same: written ones are rounded."""
 
 
 def with_library(program: Program, library: Library) -> Program:
@@ -93,8 +96,7 @@ def matchers_of(source: Source) -> Iterator[tuple[Matcher, tuple[WrittenLoop, ..
     With each come the loops that stay around, without bodies.  None if its numbers are not linear in its names.
     """
     named = tuple(line for line in source.lines if isinstance(line, Assignment | Function))
-    whole, plain = Counts(source).outside, _plain(source)
-    free = [name for name in plain if name not in whole]
+    plain, free = _plain(source), _free(source)
     given = {name: Linear.of(name) for name in free}
     numbers = np.array([plain[name] for name in free])
 
@@ -127,16 +129,31 @@ def matchers_of(source: Source) -> Iterator[tuple[Matcher, tuple[WrittenLoop, ..
 
 def _others(source: Source, free: Sequence[str]) -> dict[str, FloatArray]:
     """The names that follow from those that are free, as rows of factors and a constant."""
-    known: dict[str, Linear | float] = {**_plain(source), **{name: Linear.of(name) for name in free}}
-    found: dict[str, FloatArray] = {}
+    known = _known(source)
+    return {name: _row(value, known, free) for name, value in source.numbers.items() if isinstance(value, Expression)}
+
+
+def _known(source: Source) -> dict[str, Linear | float]:
+    """What the names of a program stand for: numbers, or sums of those that are free."""
+    known: dict[str, Linear | float] = {**_plain(source), **{name: Linear.of(name) for name in _free(source)}}
     for name, value in source.numbers.items():
         if isinstance(value, Expression):
-            form = value.at(known)
-            form = form if isinstance(form, Linear) else Linear(form)
-            known[name] = form
-            factors = dict(form.factors)
-            found[name] = np.array([*(factors.get(each, 0.0) for each in free), form.constant])
-    return found
+            known[name] = value.at(known)
+    return known
+
+
+def _row(value: Value, known: Mapping[str, Linear | float], free: Sequence[str]) -> FloatArray:
+    """A value as a row of factors of the free names and a constant."""
+    form = value.at(known) if isinstance(value, Expression) else value
+    form = form if isinstance(form, Linear) else Linear(form)
+    factors = dict(form.factors)
+    return np.array([*(factors.get(each, 0.0) for each in free), form.constant])
+
+
+def _free(source: Source) -> list[str]:
+    """The names of plain numbers that are no counts."""
+    whole = Counts(source).outside
+    return [name for name in _plain(source) if name not in whole]
 
 
 def _plain(source: Source) -> dict[str, float]:
@@ -152,11 +169,7 @@ def _chosen(source: Source, patterns: Sequence[Pattern]) -> list[Offer]:
             for match in matcher.matches(pattern):
                 lines = tuple(matcher.units[k] for k in match.blocks)
                 before = [source.lines[k] for k in sorted({*lines})]
-                counts = _counts(source, before)
-                arguments = tuple(
-                    (word, counts.get(value, value) if word in pattern.counts and isinstance(value, float) else value)
-                    for word, value in match.arguments
-                )
+                arguments = tuple(_counted(source, before, pattern, match))
                 call = Call(pattern.function.name, arguments, role=match.role)
                 instead = [within(around, call)]
                 fewer = written(before) - written(instead)
@@ -172,11 +185,40 @@ def _chosen(source: Source, patterns: Sequence[Pattern]) -> list[Offer]:
     return chosen
 
 
-def _counts(source: Source, lines: Sequence[Line]) -> dict[float, Value]:
-    """The names that loops among some lines have for their counts, by what these are."""
-    plain = _plain(source)
-    given = (line.values[0] for line in Source(tuple(lines)).walk() if isinstance(line, WrittenLoop))
-    return {plain[count.name]: count for count in given if isinstance(count, Name) and count.name in plain}
+def _counted(source: Source, lines: Sequence[Line], pattern: Pattern, match: Match) -> Iterator[tuple[str, Value]]:
+    """The arguments of a match with the names that loops among some lines have for their counts.
+
+    Steps that follow from such a count are as they are there: more copies share the same span.
+    """
+    plain, known, free = _plain(source), _known(source), _free(source)
+    loops = [line for line in Source(tuple(lines)).walk() if isinstance(line, WrittenLoop)]
+    counts = {
+        plain[count.name]: count
+        for count in (loop.values[0] for loop in loops)
+        if isinstance(count, Name) and count.name in plain
+    }
+    named = {count.name for count in counts.values()}
+    steps = [
+        step for loop in loops for step in loop.values[1:]
+        if isinstance(step, Expression) and named & {name.name for name in step.names()}
+    ]  # fmt: skip
+    shifts = {
+        name.name
+        for line in Source(pattern.function.body).walk() if isinstance(line, WrittenLoop)
+        for value in line.values[1:] if isinstance(value, Expression)
+        for name in value.names()
+    }  # fmt: skip
+    for word, value in match.arguments:
+        if word in pattern.counts and isinstance(value, float):
+            yield word, counts.get(value, value)
+            continue
+        row = _row(value, known, free)
+        same = (
+            each
+            for step in steps if word in shifts
+            for each in (step, -step) if np.allclose(_row(each, known, free), row, atol=SAME)
+        )  # fmt: skip
+        yield word, next(same, value)
 
 
 def within(around: Sequence[WrittenLoop], line: Line) -> Line:

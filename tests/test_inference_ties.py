@@ -346,6 +346,19 @@ def test_more_copies_share_the_span_of_the_others(text: str, name: str, axis: in
     assert free_numbers(tied) == free_numbers(sp.set(tied, {name: 7})), "a count is no free number"
 
 
+def test_a_part_that_comes_to_lie_on_its_own_mirror_image_is_drawn_once() -> None:
+    program = sp.parse(
+        """
+    for i in mirror(depth, at=-0.55):
+        seat(box(at=(-1, -3.02, -12), size=(0.5, 4.96, 24)))
+    for i in mirror(side):
+        leg(at=(-6, -3, 10), size=(5, 4.8, 1))
+    """.replace("\n    ", "\n")
+    )
+    found = tie(program, evidence_of_program(program)).program
+    assert sorted(len(chain) - 1 for chain in Program(found.body).chains) == [0, 1], "the legs stay a pair"
+
+
 DRAWERS = """
 body(box(at=(-12, -4, -8), size=(24, 10, 16)))
 for i in translate(3, by=(7.6, 0, 0)):

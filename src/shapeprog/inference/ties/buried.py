@@ -1,4 +1,5 @@
-"""Parts that nobody sees: ties that make faces flush may leave a thin part wholly inside of others."""
+"""Parts that nobody sees: ties that make faces flush may leave a thin part wholly inside of others, or a part on its
+own mirror image."""
 
 from __future__ import annotations
 
@@ -12,7 +13,7 @@ from shapeprog.geometry.distance import signed_distance
 from shapeprog.geometry.losses import volume
 from shapeprog.geometry.scene import Scene
 from shapeprog.geometry.surface import has_surface, sample_surface
-from shapeprog.language.program import Program
+from shapeprog.language.program import Chain, Loop, Program, nest
 from shapeprog.language.tensors import encode
 from shapeprog.language.unroll import unroll
 
@@ -35,6 +36,25 @@ def buried(program: Program) -> list[int]:
         found.append(min(hidden)[1])
         scene = replace(scene, mask=scene.mask & (scene.block != found[-1]))
     return sorted(found)
+
+
+def doubled(program: Program) -> list[Chain]:
+    """The blocks of a program, without loops of two whose copies lie on each other; none if there is no such loop."""
+    chains = Program(program.body).chains
+    found = [_once(chain) for chain in chains]
+    return found if found != [*chains] else []
+
+
+def _once(chain: Chain) -> Chain:
+    """A block without loops of two whose copies lie on each other."""
+    for place, loop in enumerate(chain):
+        if isinstance(loop, Loop) and loop.count == 2:
+            rest = (*chain[:place], *chain[place + 1 :])
+            both, one = (unroll(encode([Program((nest(each),))], dtype=torch.float64)) for each in (chain, rest))
+            points = sample_surface(both, SAMPLES, torch.Generator().manual_seed(0)).points
+            if bool((signed_distance(one, points) <= ON).all()):
+                return _once(rest)
+    return chain
 
 
 def _hidden(scene: Scene) -> list[tuple[float, int]]:

@@ -21,7 +21,7 @@ from shapeprog.inference.refine import single_threaded
 from shapeprog.inference.roles import named_anew
 from shapeprog.inference.ties.alike import alike
 from shapeprog.inference.ties.basis import Basis, simplest
-from shapeprog.inference.ties.buried import buried
+from shapeprog.inference.ties.buried import buried, doubled
 from shapeprog.inference.ties.closeness import Closeness
 from shapeprog.inference.ties.contacts import Contacts
 from shapeprog.inference.ties.features import Feature, features
@@ -115,6 +115,8 @@ def tie(
     if gone := buried(named):
         rest = [nest(chain) for block, chain in enumerate(plain.chains) if block not in gone]
         return tie(named_anew(Program(tuple(rest))), evidence, price=price, seed=seed, progress=progress)
+    if once := doubled(named):
+        return tie(Program(tuple(map(nest, once))), evidence, price=price, seed=seed, progress=progress)
     if price > CHEAPEST:
         lost = closeness.of(unroll(plain)) - closeness.of(unroll(named))
         if lost > LOST or afloat(named, seed, APART) > afloat(plain, seed, APART):

@@ -23,6 +23,9 @@ SAMPLES = 512
 ON = 0.011
 """Cells above the others up to which a point counts as covered: numbers have two decimals."""
 
+FEW = 512
+"""Copies of a block that are compared with each other."""
+
 SEEN = 0.005
 """Share of its surface that is left of a part that is seen."""
 
@@ -40,9 +43,14 @@ def buried(program: Program) -> list[int]:
 
 def doubled(program: Program) -> list[Chain]:
     """The blocks of a program, without loops of two whose copies lie on each other; none if there is no such loop."""
-    chains = Program(program.body).chains
-    found = [_once(chain) for chain in chains]
+    chains, scene = Program(program.body).chains, unroll(Program(program.body))
+    found = [_once(chain) if _meet(scene.centre[scene.block == block]) else chain for block, chain in enumerate(chains)]
     return found if found != [*chains] else []
+
+
+def _meet(centres: Float[Tensor, "N 3"]) -> bool:
+    """Whether two of these, if they are few, lie at one place."""
+    return len(centres) <= FEW and bool((torch.pdist(centres) <= ON).any())
 
 
 def _once(chain: Chain) -> Chain:

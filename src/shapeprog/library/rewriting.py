@@ -190,7 +190,7 @@ def _counted(source: Source, lines: Sequence[Line], pattern: Pattern, match: Mat
 
     Steps that follow from such a count are as they are there: more copies share the same span.
     """
-    plain, known, free = _plain(source), _known(source), _free(source)
+    plain = _plain(source)
     loops = [line for line in Source(tuple(lines)).walk() if isinstance(line, WrittenLoop)]
     counts = {
         plain[count.name]: count
@@ -208,14 +208,18 @@ def _counted(source: Source, lines: Sequence[Line], pattern: Pattern, match: Mat
         for value in line.values[1:] if isinstance(value, Expression)
         for name in value.names()
     }  # fmt: skip
+    known, free = (_known(source), _free(source)) if steps else ({}, [])
     for word, value in match.arguments:
         if word in pattern.counts and isinstance(value, float):
             yield word, counts.get(value, value)
             continue
+        if not steps or word not in shifts:
+            yield word, value
+            continue
         row = _row(value, known, free)
         same = (
             each
-            for step in steps if word in shifts
+            for step in steps
             for each in (step, -step) if np.allclose(_row(each, known, free), row, atol=SAME)
         )  # fmt: skip
         yield word, next(same, value)

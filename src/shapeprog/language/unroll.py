@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import torch
 from jaxtyping import Bool, Float, Int
@@ -29,16 +30,30 @@ MOST_COPIES = 1 << 17
 MOST_PRIMITIVES = 1 << 20
 """Most copies that one batch may unroll to; more is a mistake in a loop count."""
 
+THINNEST = 0.2
+"""Cells; a shorter length is drawn as this where gradients are recorded.
+
+Four steps of Adam at a rate of .05: with less, the momentum of a length that shrinks carries it below zero.
+"""
+
 
 def unroll(program: Program | Sequence[Program] | Code) -> Scene:
     """The scene of a program, or scenes (B, N) of a batch; N is the largest number of primitives in it.
 
     Blocks that are not loops followed by one drawing statement draw nothing, nor do loops without copies, nor
-    primitives with a negative extent.  A ``ShapeProgError`` if a program makes more than ``MOST_COPIES`` copies, or the
-    batch more than ``MOST_PRIMITIVES``.
+    primitives with a negative extent.
+
+    Where gradients are recorded (``code.parameters`` requires one), no part vanishes: a length below ``THINNEST`` is
+    drawn as that, and the sign of its gradient is made negative, so that descent lengthens it.  The parameters stay as
+    they are, and so does what they draw without gradient.
+
+    Raises
+    ------
+    ShapeProgError
+        If a program makes more than ``MOST_COPIES`` copies, or the batch more than ``MOST_PRIMITIVES``.
     """
     code = program if isinstance(program, Code) else encode(program)
-    return Plan(code).scene(code.parameters)
+    return Plan(code).scene(code.parameters, clamp=torch.is_grad_enabled() and code.parameters.requires_grad)
 
 
 def draw_blocks(code: Code) -> Int[Tensor, "*batch K 32 32"]:
@@ -106,10 +121,13 @@ class Plan:
                 self._levels.append(_Level(language()[number], moved, place, index[moved, level], quarter[moved]))
         self._known: _Layout | None = None
 
-    def scene(self, parameters: Float[Tensor, "*batch K J slots"]) -> Scene:
-        """The scenes for parameters of the same programs, with gradient."""
+    def scene(self, parameters: Float[Tensor, "*batch K J slots"], *, clamp: bool = False) -> Scene:
+        """The scenes for parameters of the same programs, with gradient; see :func:`unroll` for clamped lengths."""
         values = parameters.reshape(-1, parameters.shape[-1])
-        pieces = values.index_select(0, self._place).split(self._counts)
+        own = values.index_select(0, self._place)
+        if clamp:
+            own = _ClampedLengths.apply(own, self._thinnest(own))  # type: ignore[no-untyped-call]
+        pieces = own.split(self._counts)
         drawn = [declared.solids(piece) for declared, piece in zip(self._kinds, pieces, strict=True)]
         layout = self._layout(tuple(tuple(solids.kind for solids in each) for each in drawn))
         parts = [solids for each in drawn for solids in each]
@@ -136,6 +154,14 @@ class Plan:
         if rotation is not None:
             pose = torch.where(mask[..., None, None], slots[..., SIZES + 3 :].unflatten(-1, (3, 3)), pose)
         return Scene(size=size, centre=centre, rotation=pose, mask=mask, **layout.fixed)
+
+    def _thinnest(self, values: Float[Tensor, "M slots"]) -> Float[Tensor, "M slots"]:
+        """The least that each number of the drawing statements is drawn as; only lengths are bounded."""
+        lengths = [[quantity.kind == "length" for quantity in declared.quantities] for declared in self._kinds]
+        rows = [[THINNEST if each else -math.inf for each in row] for row in lengths]
+        padded = [row + [-math.inf] * (values.shape[1] - len(row)) for row in rows]
+        parts = [values.new_tensor(row).expand(many, -1) for row, many in zip(padded, self._counts, strict=True)]
+        return torch.cat([torch.zeros_like(values[:0]), *parts])
 
     def _layout(self, drawn: tuple[tuple[int, ...], ...]) -> _Layout:
         """The layout for the kinds of primitive that each statement returned; made once."""
@@ -207,6 +233,24 @@ class Plan:
                 point = declared.pivot(**declared.split(values.index_select(0, place)))
                 points.append(torch.cat([torch.zeros_like(point[:, :1]), point[:, 1:]], -1))
         return torch.cat(points)
+
+
+class _ClampedLengths(torch.autograd.Function):
+    """Numbers clamped to at least ``least``; where one was less, its gradient is minus its magnitude.
+
+    A straight-through clamp (Bengio et al. 2013) lets lengths run off below zero; one that passes only the gradients
+    that lengthen leaves them where momentum took them.
+    """
+
+    @staticmethod
+    def forward(ctx: Any, values: Tensor, least: Tensor) -> Tensor:
+        ctx.save_for_backward(values < least)
+        return torch.maximum(values, least)
+
+    @staticmethod
+    def backward(ctx: Any, gradient: Tensor) -> tuple[Tensor, None]:
+        (short,) = ctx.saved_tensors
+        return torch.where(short, -gradient.abs(), gradient), None
 
 
 def _are(ids: Int[Tensor, "*batch"], wanted: Callable[[Statement], bool]) -> Bool[Tensor, "*batch"]:

@@ -6,8 +6,9 @@ from .formats.files import export, load, load_with_frame, save
 from .formats.json_form import program_from_json, program_to_json
 from .formats.notation import format_notation, parse_notation
 from .formats.plugins import load_statements
-from .geometry.losses import chamfer
+from .geometry.losses import chamfer, coverage
 from .geometry.scene import Scene
+from .geometry.surface import sample
 from .inference.infer import infer
 from .inference.refine import refine
 from .language.converting import in_unit
@@ -30,8 +31,8 @@ __version__: str
 __all__ = [
     "Code", "Draw", "Expression", "Frame", "InputError", "Library", "Linear", "Loop", "Name", "Named", "OutputError",
     "Parametric", "Program", "ProgramError", "Scene", "Shape", "ShapeProgError", "Source", "Unit",
-    "chamfer", "decode", "encode", "evaluated", "export", "format_notation", "format_program", "in_unit", "infer",
-    "inline", "learn", "load", "load_library", "load_shape", "load_statements", "load_with_frame", "loop", "names",
-    "parse", "parse_notation", "program_from_json", "program_to_json", "random_program", "refine", "save",
-    "save_library", "set", "statement", "unroll", "using", "with_library",
+    "chamfer", "coverage", "decode", "encode", "evaluated", "export", "format_notation", "format_program", "in_unit",
+    "infer", "inline", "learn", "load", "load_library", "load_shape", "load_statements", "load_with_frame", "loop",
+    "names", "parse", "parse_notation", "program_from_json", "program_to_json", "random_program", "refine", "sample",
+    "save", "save_library", "set", "statement", "unroll", "using", "with_library",
 ]  # fmt: skip

@@ -67,6 +67,7 @@ def nearest_primitive(batch: Batch, points: Float[Tensor, "*shared P 3"]) -> Nea
 def signed_distance(batch: Batch, points: Float[Tensor, "*shared P 3"]) -> Float[Tensor, "*batch P"]:
     """Signed distance of points to the union of each element, with gradient to points, sizes and poses.
 
+    Outside, it is equation 2 of Liang (2022), of primitives posed as in equation 4.
     The nearest primitive is selected without gradient, and only its distance is differentiated: the gradient of the
     minimum over all primitives for one evaluation a point.  An empty union is infinitely far away.  A
     ``ShapeProgError`` if so many of more than a thousand primitives lie over each other that it would take long.

@@ -1,5 +1,6 @@
 """Losses between shapes: chamfer, coverage and its reverse, occupancy, and the price of volume and of parts.
 
+Sections and equations are those of Liang (2022), "Learning to Infer 3D Shape Programs with Differentiable Renderer".
 All return one value for each shape of the batch.  Distances are in cells; squared ones are means, not sums.
 """
 
@@ -55,15 +56,46 @@ def chamfer_directions(
 def chamfer(
     points: Cloud, target: Target, *, weights: Weights | None = None, target_weights: TargetWeights | None = None
 ) -> Values:
-    """Chamfer distance: mean squared distance to the nearest neighbour, points to target plus target to points."""
+    """Chamfer distance: mean squared distance to the nearest neighbour, points to target plus target to points.
+
+    That of section 4.3.1, which says sum where its numbers are means.
+
+    Parameters
+    ----------
+    points, target
+        Clouds (..., P, 3) and (..., Q, 3) in cells, with gradient to both.
+    weights, target_weights
+        How much each point counts in the mean of its cloud; evenly by default.  Those of :func:`shapeprog.sample` make
+        the gradient exact.
+
+    Returns
+    -------
+    Tensor
+        One value for each shape, in squared cells.
+    """
     return chamfer_directions(points, target, weights=weights, target_weights=target_weights).total
 
 
 def coverage(scene: Batch, target: Cloud, *, surface: bool = False) -> Values:
-    """How far the target is from the union on average: the paper's coverage loss (equation of section 3.4).
+    """How far the target is from the union on average: the coverage loss, equation 1 of section 4.3.2.
 
-    A target point inside a primitive costs nothing, so alone it is minimised by one box that fills everything: add
-    :func:`excess` and a price.  With ``surface`` the distance to the surface counts, and points deep inside cost too.
+    The distance to a union is equation 2, that to a cuboid equation 3, to a primitive in any pose equation 4; that to
+    a cylinder is appendix A, mended.  A target point inside a primitive costs nothing, so alone it is minimised by one
+    box that fills everything: add :func:`excess` and a price.
+
+    Parameters
+    ----------
+    scene
+        What programs unroll to, with gradient to sizes and poses.
+    target
+        Points (..., P, 3) in cells.
+    surface
+        Whether the distance to the surface counts, so that points deep inside cost too.
+
+    Returns
+    -------
+    Tensor
+        One value for each shape, in cells.
     """
     distance = signed_distance(scene, target)
     return (distance.abs() if surface else distance.clamp(min=0)).mean(-1)
@@ -84,7 +116,10 @@ def volume(scene: Batch) -> Values:
 
 
 def parts(scene: Batch, presence: Float[Tensor, "*batch N"] | None = None) -> Values:
-    """Price of parts: how many primitives there are, or are expected where ``presence`` gives their probabilities."""
+    """Price of parts: how many primitives there are, or are expected where ``presence`` gives their probabilities.
+
+    It has a gradient to ``presence`` alone: no size or position changes how many there are.
+    """
     mask = scene.mask.to(scene.size)
     return (mask if presence is None else mask * presence).sum(-1)
 

@@ -89,10 +89,18 @@ def sample_surface(batch: Batch, n: int, generator: torch.Generator | None = Non
 
     Parameters
     ----------
+    batch
+        A scene, or any batch of primitives, with gradient to sizes and poses.
     n
         Points for each element.
     generator
         Source of randomness; equal states draw equal points.
+
+    Returns
+    -------
+    SurfaceSample
+        Points, weights with which a mean over them has the gradient of the mean over the surface, the primitive of each
+        point and its normal.
 
     Raises
     ------
@@ -118,6 +126,9 @@ def sample_surface(batch: Batch, n: int, generator: torch.Generator | None = Non
         normals = choice.places[..., 6:].to(points)
     found = SurfaceSample(points, weights, choice.slot, normals)
     return SurfaceSample(*(each.reshape(*batch.batch_shape, *each.shape[1:]) for each in found))
+
+
+sample = sample_surface  # its public name, shapeprog.sample
 
 
 def has_surface(batch: Batch) -> Bool[Tensor, "*batch"]:

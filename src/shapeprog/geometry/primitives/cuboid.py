@@ -26,7 +26,7 @@ FACES = 6
 
 
 def distance(points: Points, size: Sizes) -> Scalars:
-    """Exact signed distance to a sheared cuboid.
+    """Exact signed distance to a sheared cuboid; upright and outside it is equation 3 of Liang (2022).
 
     The distance to the parallelogram follows from its horizontal and its slanted edges after folding the plane
     by its point symmetry; extrusion combines it with the distance along axis 2, which keeps it exact.

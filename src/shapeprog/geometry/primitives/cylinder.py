@@ -26,7 +26,7 @@ SEGMENTS = 48
 def distance(points: Points, size: Sizes) -> Scalars:
     """Exact signed distance: a rectangle in (axial, radial) coordinates.
 
-    The appendix of the paper mixes full and half height and takes a squared length for a length; here both
+    Appendix A of Liang (2022) mixes full and half height and takes a squared length for a length; here both
     coordinates are lengths and the half height is meant.
     """
     half_height, radius = size[..., :2].clamp(min=0).unbind(-1)

@@ -9,7 +9,7 @@ import pytest
 from shapeprog.errors import InputError, ProgramError, ShapeProgError
 from shapeprog.formats.json_form import code_from_json, program_from_json
 from shapeprog.formats.notation import parse_notation
-from shapeprog.language import Draw, Language, Loop, Program, using
+from shapeprog.language import Draw, Language, Loop, Program, decode, encode, using
 from shapeprog.language.text import format_program, parse
 
 LEG = "leg(at=(1, 2, 3), size=(1, 2, 3))"
@@ -301,3 +301,10 @@ def test_lines_and_names_of_texts_command_no_terminal() -> None:
 def test_numbers_without_names_behind_those_with_names_are_told_in_our_words() -> None:
     with pytest.raises(ProgramError, match="a number without a name follows one with a name"):
         parse("leg(at=(1, 2, 3), 5)")
+
+
+def test_a_list_of_programs_has_no_text() -> None:
+    programs = decode(encode(parse("leg(at=(1, 2, 3), size=(1, 1, 1))")))
+    with pytest.raises(ShapeProgError, match="takes one program, not a list") as caught:
+        format_program(programs)  # type: ignore[arg-type]
+    assert "format each" in caught.value.hint

@@ -204,3 +204,7 @@ def test_files(tmp_path: object) -> None:
             save(program, place / "z" / "x.shape")
     with pytest.raises(sp.ShapeProgError, match="no number"):
         save(Program((Draw("leg", (math.nan,) * 6),)), path)
+
+
+def test_a_seed_stands_for_a_new_generator() -> None:
+    assert random_program(3) == random_program(torch.Generator().manual_seed(3)) != random_program(4)

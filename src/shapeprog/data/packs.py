@@ -153,6 +153,8 @@ def read_pack(path: str | os.PathLike[str], split: str | None = None, *, whole: 
         If the file cannot be read, is no pack, or its arrays do not fit together.
     """
     source = Path(path)
+    if not source.exists():
+        raise InputError(f"there is no pack {source}", "check the path, or make the pack with 'shapeprog prepare'")
     arrays = read_numpy(source, _ARRAYS)
     missing = {"ids", "voxels"} - set(arrays)
     if missing:

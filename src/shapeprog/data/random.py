@@ -9,7 +9,7 @@ from shapeprog.language.statement import Statement, language
 
 
 def random_program(
-    generator: torch.Generator,
+    generator: torch.Generator | int,
     *,
     blocks: int = 6,
     depth: int = PUBLISHED_DEPTH,
@@ -24,7 +24,7 @@ def random_program(
     Parameters
     ----------
     generator
-        Where the randomness comes from; the same state gives the same program.
+        Where the randomness comes from, or the seed of a new generator; the same state gives the same program.
     blocks
         How many drawing statements; each gets loops of its own.
     depth
@@ -36,6 +36,8 @@ def random_program(
     published
         Whether to stay within the published blocks.
     """
+    if not isinstance(generator, torch.Generator):
+        generator = torch.Generator().manual_seed(generator)
     drawing = [declared for declared in language() if not declared.is_loop]
     loops = [declared for declared in language() if declared.is_loop]
     body: list[Chain] = []

@@ -35,10 +35,15 @@ INDENT = "    "
 def format_program(program: Program) -> str:
     """The canonical text of a program: parameters by name in declared order, the fewest digits, loops i, j, k...
 
-    Names, expressions, functions and comments stand as they are written.  A ``ShapeProgError`` if a number is not
-    finite, a statement is not declared or has more or fewer, or the text would be longer, or its loops deeper, than can
-    be read back.
+    Names, expressions, functions and comments stand as they are written.  A ``ShapeProgError`` if this is no program,
+    a number is not finite, a statement is not declared or has more or fewer, or the text would be longer, or its loops
+    deeper, than can be read back.
     """
+    if not isinstance(program, Program):
+        raise ShapeProgError(
+            f"format_program takes one program, not a {type(program).__name__}",
+            "decode returns a list of programs: format each of them",
+        )
     return format_source(source_of(program))
 
 

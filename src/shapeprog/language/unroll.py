@@ -160,8 +160,8 @@ class Plan:
         lengths = [[quantity.kind == "length" for quantity in declared.quantities] for declared in self._kinds]
         rows = [[THINNEST if each else -math.inf for each in row] for row in lengths]
         padded = [row + [-math.inf] * (values.shape[1] - len(row)) for row in rows]
-        parts = [values.new_tensor(row).expand(many, -1) for row, many in zip(padded, self._counts, strict=True)]
-        return torch.cat([torch.zeros_like(values[:0]), *parts])
+        each = [row for row, count in enumerate(self._counts) for _ in range(count)]
+        return values.new_tensor(padded).reshape(-1, values.shape[1])[each]
 
     def _layout(self, drawn: tuple[tuple[int, ...], ...]) -> _Layout:
         """The layout for the kinds of primitive that each statement returned; made once."""

@@ -7,10 +7,8 @@
 One line of JSON is kept for every shape, method and number of blocks; a run that was stopped goes on where it was.
 Packs with points give the methods ``search`` (mesh points given) and ``search, voxels alone``; packs without give
 ``search``.  ``greedy boxes`` and ``greedy boxes, refined`` are the baselines of the measuring protocol.  ``search`` is
-the search without a generator and without a memory, ``search, recalling`` the one with a memory alone, ``generator`` a
-single pass of the weights, and ``generator + search`` what ``shapeprog infer --paper`` does with them, at about the
-time of ``search`` or after 60 rounds.  ``all statements`` is what ``shapeprog infer --no-ties`` does.  What has no
-weights or no points to work with is left out.  There is no time budget: the seed alone decides.
+what ``shapeprog infer --paper`` does, ``all statements`` what ``shapeprog infer --no-ties`` does.  What has no points
+to work with is left out.  There is no time budget: the seed alone decides.
 """
 
 from __future__ import annotations
@@ -28,15 +26,11 @@ from typing import Any
 import numpy as np
 import torch
 
-Task = tuple[str, int, int, tuple[str, ...], int, str]
-"""Pack, index, most blocks, methods, seed, weights."""
+Task = tuple[str, int, int, tuple[str, ...], int]
+"""Pack, index, most blocks, methods, seed."""
 
 GREEDY, REFINED, SEARCH, ALONE = "greedy boxes", "greedy boxes, refined", "search", "search, voxels alone"
-RECALLING, SINGLE = "search, recalling", "generator"
-BOTH, SHORT = "generator + search", "generator + search, 60 rounds"
 EVERY = "all statements"
-SHORT_ROUNDS = 60
-"""Rounds of editing of the short search, which refinement and the generator outweigh."""
 
 COLUMNS = (
     "iou", "cd", "f1", "noise_floor", "f1_half_percent", "f1_percent", "one_piece", "slivers", "blocks", "statements",
@@ -51,15 +45,12 @@ def measure(task: Task) -> list[dict[str, Any]]:
     from shapeprog.evaluation.metrics import evaluate_program
     from shapeprog.inference import greedy_boxes, infer, refine, snapped_from
     from shapeprog.inference.infer import prepare_kernels
-    from shapeprog.inference.proposing import ready_generator
     from shapeprog.inference.refine import REACH
-    from shapeprog.inference.structure import PLAIN, Settings
     from shapeprog.inference.surface import points_of_cells
 
     torch.set_num_threads(1)
     prepare_kernels()
-    pack, index, blocks, methods, seed, weights = task
-    writer, _ = ready_generator(weights)
+    pack, index, blocks, methods, seed = task
     shape = read_pack(Path(pack))[index]
     cloud = None if shape.points is None else torch.from_numpy(np.asarray(shape.points, np.float32))
     rows = []
@@ -78,21 +69,11 @@ def measure(task: Task) -> list[dict[str, Any]]:
     if REFINED in methods and cloud is not None:
         started = time.monotonic()
         keep(REFINED, refine(boxes, cloud, reach=REACH, seed=seed), boxes, time.monotonic() - started)
-    for method, settings, generator in (
-        (SEARCH, PLAIN, None),
-        (RECALLING, Settings(), None),
-        (BOTH, Settings(), writer),
-        (SHORT, Settings(rounds=SHORT_ROUNDS), writer),
-        (SINGLE, None, writer),
-        (EVERY, None, writer),
-    ):
-        if method not in methods or (method in (BOTH, SHORT, SINGLE) and writer is None):
+    for method, statements in ((SEARCH, "paper"), (EVERY, "all")):
+        if method not in methods:
             continue
         before = time.thread_time()
-        result = infer(
-            shape, blocks=blocks, seed=seed, budget=math.inf, settings=settings, generator=generator,
-            search=method != SINGLE, statements="all" if method == EVERY else "paper", ties=False,
-        )  # fmt: skip
+        result = infer(shape, blocks=blocks, seed=seed, budget=math.inf, statements=statements, ties=False)
         keep(method, result.program, result.snapped, result.seconds, time.thread_time() - before)
         if method == SEARCH and ALONE in methods and cloud is not None:  # the same structure: it is found on cells
             guessed = torch.from_numpy(points_of_cells(shape.voxels, seed=seed))
@@ -111,7 +92,7 @@ def tasks(args: argparse.Namespace, done: set[tuple[str, str, int]]) -> Iterator
         for index in chosen[: args.shapes]:
             for blocks in args.blocks:
                 if (Path(pack).stem, str(shapes.ids[index]), blocks) not in done:
-                    yield pack, index, blocks, tuple(args.methods), args.seed, args.weights
+                    yield pack, index, blocks, tuple(args.methods), args.seed
 
 
 def run(args: argparse.Namespace) -> None:
@@ -160,9 +141,8 @@ def main() -> None:
     parser.add_argument("--split", default="test", help="split to use of packs that name one")
     parser.add_argument("--shapes", type=int, default=None, help="only the first so many of each pack")
     parser.add_argument("--blocks", type=int, nargs="*", default=[10], help="most blocks, one run for each")
-    every = [GREEDY, REFINED, SEARCH, ALONE, RECALLING, SINGLE, BOTH, SHORT, EVERY]
+    every = [GREEDY, REFINED, SEARCH, ALONE, EVERY]
     parser.add_argument("--methods", nargs="*", default=every, choices=every)
-    parser.add_argument("--weights", default="default", help="generator: weights that ship, or a file")
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--out", default="reconstruction.jsonl", help="rows, one line of JSON each; appended to")

@@ -30,7 +30,6 @@ from shapeprog.data.packs import write_pack
 from shapeprog.data.preparation import prepare
 from shapeprog.data.shape import Shape
 from shapeprog.formats import export
-from shapeprog.inference.labelling import label
 from shapeprog.language.text import parse
 from shapeprog.language.unroll import unroll
 from shapeprog.models.designs import build_generator
@@ -88,17 +87,6 @@ def trained(folder: Path) -> Any:
     return sorted(path.name for path in folder.iterdir()), log, {**kept, PREVIOUS: b""}
 
 
-def find_labels(inputs: Path, folder: Path) -> None:
-    for _ in label(inputs / "boxes.npz", folder / "labels.jsonl", blocks=1, processes=2):
-        pass
-
-
-def labelled(folder: Path) -> Any:
-    rows = [json.loads(line) for line in (folder / "labels.jsonl").read_text().splitlines()]
-    timeless = [{name: value for name, value in row.items() if "seconds" not in name} for row in rows]
-    return sorted(path.name for path in folder.iterdir()), timeless
-
-
 def make_packs(inputs: Path, folder: Path) -> None:
     for _ in prepare(inputs / "models", folder, points=200):
         pass
@@ -116,7 +104,6 @@ TRAINING = ("accelerate", "torch._dynamo")
 TASKS = {
     "pretrain": Task(pretrain, trained, TRAINING),
     "adapt": Task(adapt, trained, TRAINING),
-    "label": Task(find_labels, labelled, ()),
     "prepare": Task(make_packs, packed, ("trimesh", "numba")),
 }
 

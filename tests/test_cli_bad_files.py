@@ -51,12 +51,10 @@ def test_a_bad_file_between_two_good_ones_is_told_at_the_end_by_every_command(ru
 
 
 @pytest.mark.wrong_types  # a pack is a sequence, which the checker looks into
-def test_bad_shapes_of_a_pack_between_two_good_ones_are_told_and_the_others_labelled(run: Run, tmp_path: Path):
+def test_bad_shapes_of_a_pack_between_two_good_ones_are_told_and_the_others_inferred(run: Run, tmp_path: Path):
     sides = {"first": 1.0, "hollow": 1.0, "tiny": 5e-324, "vast": 1.7e308, "unknown": np.nan, "last": 1.0}
     voxels = np.stack([np.packbits(CELLS & (name != "hollow")) for name in sides])
     written(tmp_path / "few.npz", npz(ids=np.array([*sides]), voxels=voxels, longest_side=np.array([*sides.values()])))
-    ended = run("label", "few.npz", "--out", "labels.jsonl", "--blocks", 1, "--processes", 1)
+    ended = run("infer", "few.npz", "--out", "res", "--no-picture", "--baseline")
     names(ended, "hollow", "tiny", "vast", "unknown")
-    assert "labels of 2 of 6 shapes" in ended.out
-    lines = (tmp_path / "labels.jsonl").read_text().splitlines()
-    assert [json.loads(line)["name"] for line in lines] == ["first", "last"]
+    assert sorted(path.stem for path in (tmp_path / "res").glob("*.json")) == ["first", "last"]

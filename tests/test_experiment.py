@@ -16,13 +16,10 @@ from benchmarks.experiment.measuring import ARGMAX
 from benchmarks.experiment.recipes import CATEGORIES, RECIPES
 from benchmarks.experiment.stages import Experiment, Run, runs
 from benchmarks.experiment.tables import DIRECT, GUIDED, ORDER, cell, reached, table
-from shapeprog.cli import main
 from shapeprog.geometry.cells import voxels
 from shapeprog.language.statement import language
 from shapeprog.language.tensors import Code
 from shapeprog.language.unroll import unroll
-from shapeprog.models.checkpoint import card_of, save_checkpoint
-from shapeprog.models.designs import build_generator
 
 MEASURES = {"f1": 0.5, "blocks": 3, "statements": 4, "primitives": 5, "cpu_seconds": 0.02, "noise_floor": 0.0001}
 
@@ -118,23 +115,6 @@ def test_blocks_leave_the_range_and_stay_in_the_grid(kinds: tuple[str, ...]) -> 
     scene = unroll(Code(ids[:, None], parameters[:, None]))
     assert bool(extrapolation.in_grid(scene).all())
     assert bool(voxels(scene).flatten(1).any(1).all())
-
-
-def test_evaluate_measures_the_single_pass_of_weights(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    generator = build_generator("swift")
-    save_checkpoint(tmp_path / "new.safetensors", generator, card_of(generator))
-    cells = np.zeros((2, 32, 32, 32), bool)
-    cells[:, 8:24, 10:20, 6:26] = True
-    np.savez(tmp_path / "pack.npz", ids=np.array(["one", "two"]), voxels=np.packbits(cells.reshape(2, -1), 1))
-    with pytest.raises(SystemExit) as ended:
-        main(["evaluate", "--weights", str(tmp_path / "new.safetensors"), str(tmp_path / "pack.npz"), "--json"])
-    assert ended.value.code == 0
-    told = json.loads(capsys.readouterr().out)
-    assert [each["name"] for each in told["rows"]] == ["one", "two"]
-    assert told["missing"] == []
-    with pytest.raises(SystemExit):
-        main(["evaluate", str(tmp_path / "pack.npz")])
-    assert "there are no targets" in capsys.readouterr().err
 
 
 def test_every_slot_has_one_kind() -> None:

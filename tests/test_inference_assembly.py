@@ -279,20 +279,20 @@ def test_what_has_no_surface_is_rebuilt_from_its_cells_or_said_to_be_explained(w
         "a line": np.linspace(0, 1, 200)[:, None] * [1.0, 2, 3],
         "noise": random.random((300, 3)),
     }[what]
-    found = sp.infer(shape_from_points(points, name=what, axes=np.eye(3)), blocks=2, generator=None)
+    found = sp.infer(shape_from_points(points, name=what, axes=np.eye(3)), blocks=2)
     assert found.snapped is not None or found.scores["explained"] >= 0.5
     assert found.program.blocks >= 1
 
 
 def test_inference_tells_what_it_explains_and_what_more_would_cost():
     shape = whole(SPLAYED)
-    found = sp.infer(shape, generator=None)
+    found = sp.infer(shape)
     assert found.snapped is None
     assert found.scores["explained"] > 0.95
     assert found.reason.startswith(f"Stopped because {found.program.blocks} blocks explain")
     numbers = [each.numbers for each in found.trade_off]
     assert [each.blocks for each in found.trade_off] == list(range(len(numbers)))
     assert {node.word for node in found.program.walk() if isinstance(node, Draw)} >= {"leg"}
-    published = sp.infer(shape, generator=None, statements="paper")
+    published = sp.infer(shape, statements="paper")
     assert published.snapped is not None
     assert all(language()[node.name].taught for node in published.program.walk())

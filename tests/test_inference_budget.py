@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import time
 from collections.abc import Callable, Iterator
 from itertools import accumulate, chain, repeat
@@ -10,17 +9,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import torch
 from test_inference_search import TABLE, cells
 
 from shapeprog import view
 from shapeprog.cli import main
-from shapeprog.data.packs import write_pack
 from shapeprog.data.shape import Shape
-from shapeprog.inference import Result, Schedule, Settings, infer, labelling
+from shapeprog.inference import Result, Schedule, Settings, infer
 from shapeprog.inference.budget import BUDGET
-from shapeprog.inference.infer import PROPOSAL_SHARE
-from shapeprog.models.designs import build_generator
+from shapeprog.inference.infer import SEARCH_SHARE
 
 SHAPE = Shape("table", cells(TABLE))
 SETTINGS, SCHEDULE = Settings(rounds=6, chunk=2), Schedule(steps=6, points=100, samples=100, cells=100)
@@ -41,9 +37,7 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
 
 @pytest.fixture(scope="module")
 def found() -> Callable[[float], Result]:
-    """What is found within a budget, by a generator, a search and a refinement that are all short."""
-    torch.manual_seed(0)
-    writer = build_generator("swift", {"widths": (4, 4, 4), "squeeze": 4, "feature": 16}).eval()
+    """What is found within a budget, by a search and a refinement that are both short."""
 
     def infer_within(budget: float) -> Result:
         return infer(
@@ -52,8 +46,6 @@ def found() -> Callable[[float], Result]:
             budget=budget,
             settings=SETTINGS,
             schedule=SCHEDULE,
-            generator=writer,
-            proposals=4,
             statements="paper",
         )
 
@@ -62,7 +54,7 @@ def found() -> Callable[[float], Result]:
 
 @pytest.mark.parametrize("seed", range(3))
 def test_how_the_clock_goes_changes_nothing_below_the_budget(found: Callable[[float], Result], clock: Clock, seed: int):
-    usual, total = found(BUDGET), 0.9 * PROPOSAL_SHARE * BUDGET
+    usual, total = found(BUDGET), 0.9 * SEARCH_SHARE * BUDGET
     clock(chain([0.0], np.random.default_rng(seed).dirichlet(np.full(8, 0.1)) * total, repeat(0.0)))
     odd = found(BUDGET)
     assert odd == usual
@@ -86,7 +78,7 @@ def test_a_result_is_either_the_usual_one_or_says_what_the_budget_cut_short(
         stopped = "the time budget ran out after" if "search" in stages else "all 6 rounds of editing were done"
         assert hurried.reason.startswith(f"Stopped because {stopped}")
         seen |= stages or {"nothing"}
-    assert seen == {"generator", "search", "refinement", "nothing"}
+    assert seen == {"search", "refinement", "nothing"}
 
 
 def test_the_same_seed_writes_the_same_files_whatever_the_clock_says(
@@ -102,20 +94,3 @@ def test_the_same_seed_writes_the_same_files_whatever_the_clock_says(
     one, two = ({path.name: path.read_bytes() for path in (tmp_path / name).iterdir()} for name in ("one", "two"))
     assert sorted(one) == ["table.glb", "table.json", "table.png", "table.shape"]
     assert one == two
-
-
-def test_labels_stand_in_the_order_of_the_pack_and_those_cut_short_are_counted(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-):
-    names = [f"s{number}" for number in range(4)]
-    write_pack(tmp_path / "few.npz", [Shape(name, SHAPE.voxels) for name in names])
-
-    rows = [{"name": name, "program": "", "cut": ["the search"] * (name == "s2")} for name in names[1:]]
-    monkeypatch.setattr(labelling, "answers", lambda *_: (json.dumps(row) for row in rows))
-    out = tmp_path / "labels.jsonl"
-    out.write_text('{"name": "s0", "program": "", "cut": ["the refinement"]}\n')
-    with pytest.raises(SystemExit) as end:
-        main(["label", str(tmp_path / "few.npz"), "--out", str(out), "--processes", "2"])
-    assert not end.value.code
-    assert [json.loads(line)["name"] for line in out.read_text().splitlines()] == names
-    assert "cut short 2 of them" in capsys.readouterr().err

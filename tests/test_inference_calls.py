@@ -262,7 +262,7 @@ def chest() -> Shape:
 
 
 def test_a_chest_of_drawers_is_written_with_the_drawer_of_a_user() -> None:
-    found = sp.infer(chest(), generator=None, libraries=[library_of(parse(PULL_OUT))], budget=600).program
+    found = sp.infer(chest(), libraries=[library_of(parse(PULL_OUT))], budget=600).program
     assert {line.name for line in source_of(found).walk() if isinstance(line, Call)} == {"pull_out"}
     assert format_program(found).count("def pull_out") == 1
     handles = [node for node in found.flat().body if "handle" in format_program(Program((node,)))]

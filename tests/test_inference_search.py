@@ -11,6 +11,7 @@ from shapeprog.geometry.cells import voxels as voxels_of
 from shapeprog.inference import editing
 from shapeprog.inference.blocks import to_program
 from shapeprog.inference.budget import Deadline
+from shapeprog.inference.chance_kernels import start
 from shapeprog.inference.descent_kernels import moves, statements, valid
 from shapeprog.inference.drawing import draw_all
 from shapeprog.inference.families import families
@@ -100,6 +101,23 @@ def test_a_passed_deadline_still_gives_a_structure_and_says_so():
     done = search_structure(cells(TABLE), Settings(rounds=2), progress=lambda what, share: told.append((what, share)))
     assert "all 2 rounds" in done.reason
     assert told[-1] == ("searching structure", 1.0)
+
+
+def test_the_search_stops_when_nothing_has_gained_for_long():
+    found = search_structure(cells(TABLE), Settings(rounds=200, patience=40))
+    assert found.reason == "40 rounds of editing in a row gained nothing"
+    assert found.iou == 1
+
+
+def test_a_block_of_the_pool_is_put_in_where_it_gains():
+    aim = target(cells(STAR))
+    whole = search_structure(cells(STAR), Settings()).blocks
+    plan = editing.Plan(10, len(aim.table), forms=0.0, heat=0.0, recall=1.0, pool=editing.Pool.of([whole, whole], aim))
+    assert len(plan.pool.blocks) == len(whole)
+    for missing in range(len(whole)):
+        start(0)
+        found = editing.recreate(np.delete(whole, missing, 0), 1, aim, plan)
+        assert editing.value_of(found, aim) == pytest.approx(editing.value_of(whole, aim))
 
 
 def noisy_blocks(solid, seed, count=5):

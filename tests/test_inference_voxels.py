@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from test_inference_search import CHAIR, cells
 
 import shapeprog as sp
 from shapeprog.data.placement import shape_from_mesh
 from shapeprog.data.shape import Shape
 from shapeprog.formats.parts import solid
 from shapeprog.geometry.cells import rasterise, unpack
+from shapeprog.inference import Schedule, Settings
 from shapeprog.inference.assembly import assemble
 from shapeprog.inference.cell_coverage import choose_on_cells, cost_on_cells, covers_of_cells
 from shapeprog.inference.coverage import Prices
@@ -83,7 +85,7 @@ def test_planted_furniture_is_found_in_its_cells(text):
 
 def test_cells_are_described_no_longer_than_in_the_statements_of_the_paper():
     shape = cells_of(TABLE)
-    paper, every = (sp.infer(shape, statements=which, generator=None) for which in ("paper", "all"))
+    paper, every = (sp.infer(shape, statements=which) for which in ("paper", "all"))
     assert every.scores["iou"] > paper.scores["iou"] - 0.02
     assert cost_on_cells(every.program, shape.voxels, snapped=every.snapped) <= cost_on_cells(
         paper.program, shape.voxels, snapped=paper.snapped
@@ -96,6 +98,16 @@ def test_cells_are_described_no_longer_than_in_the_statements_of_the_paper():
 def test_full_grids_single_cells_and_flat_sheets_are_one_block(kind):
     solid = np.zeros((32, 32, 32), bool)
     solid[{"full": np.s_[:], "cell": np.s_[16, 16, 16], "sheet": np.s_[16, 4:28, 4:28]}[kind]] = True
-    found = sp.infer(Shape(kind, solid), blocks=1, generator=None)
+    found = sp.infer(Shape(kind, solid), blocks=1)
     assert found.scores["iou"] == 1
     assert found.program.size == 1
+
+
+def test_a_program_found_on_cells_is_tied_where_it_gets_no_longer():
+    shape, quick = Shape("planted", cells(CHAIR)), {"settings": Settings(rounds=20), "schedule": Schedule(steps=2)}
+    tied, plain = (sp.infer(shape, ties=ties, **quick) for ties in (True, False))
+    assert plain.snapped is not None
+    assert tied.snapped is None
+    assert [each.name for each in sp.names(tied.program)][:2] == ["width", "depth"]
+    assert tied.scores["numbers"] < plain.scores["numbers"]
+    assert tied.scores["iou"] >= plain.scores["iou"] - 0.02

@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-import os
 import signal
 import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-import numpy as np
 import pytest
-
-from shapeprog.data.packs import write_pack
-from shapeprog.data.shape import Shape
 
 WHILE_IMPORTING = """
 import signal, sys
@@ -34,19 +29,6 @@ class Files:
 sys.meta_path.insert(0, Files())
 sys.argv = ["shapeprog", "--version"]
 import shapeprog.__main__
-"""
-AT_WORK = """
-import sys, time
-from shapeprog.language.parameters import Length, Position, Radius
-from shapeprog.language.shapes import disc
-from shapeprog.language.statement import statement
-@statement("crumb")
-def crumb(at: Position, thickness: Length, radius: Radius):
-    "A crumb."
-    return disc(at, thickness, radius)
-if sys.modules["__main__"].__spec__.name.endswith("labelling"):
-    print("at work", file=sys.stderr, flush=True)
-    time.sleep(60)
 """
 
 
@@ -83,20 +65,3 @@ def test_an_interruption_that_is_ignored_stays_so():
     ended = interrupted_while_importing("typer", "--version")
     assert ended.returncode == 0
     assert ended.stdout.startswith("shapeprog ")
-
-
-def test_labelling_is_interrupted_with_the_processes_that_it_started(tmp_path: Path):
-    """As by a terminal, which interrupts all processes of a command."""
-    write_pack(tmp_path / "pack.npz", [Shape(name, np.ones((32, 32, 32), np.bool_)) for name in "ab"])
-    (tmp_path / "slow.py").write_text(AT_WORK)
-    words = [sys.executable, "-m", "shapeprog", "label", "pack.npz", "--out", "labels.jsonl", "--processes", "2"]
-    with subprocess.Popen(
-        [*words, "--with", "slow.py"], cwd=tmp_path, stderr=subprocess.PIPE, text=True, start_new_session=True
-    ) as process:
-        assert process.stderr is not None
-        assert [process.stderr.readline() for _ in range(2)] == ["at work\n"] * 2
-        os.killpg(process.pid, signal.SIGINT)
-        _, told = process.communicate(timeout=30)  # all who could write to it have gone
-    assert process.returncode == 130
-    assert "labels.jsonl holds 0 of 2 labels; the same command goes on" in " ".join(told.split())
-    assert "Traceback" not in told

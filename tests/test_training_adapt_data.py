@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import json
 from pathlib import Path
 from typing import Any
@@ -10,17 +9,13 @@ from typing import Any
 import numpy as np
 import pytest
 import torch
-from bad_files import PYTHON
 
-from shapeprog.cli import main
 from shapeprog.data.packs import write_pack
 from shapeprog.data.shape import Shape
-from shapeprog.errors import InputError, OutputError, ShapeProgError
+from shapeprog.errors import InputError, ShapeProgError
 from shapeprog.formats.json_form import program_to_json
 from shapeprog.geometry.losses import chamfer
 from shapeprog.geometry.surface import sample_surface
-from shapeprog.inference import labelling
-from shapeprog.inference.labelling import label
 from shapeprog.language.converting import in_unit
 from shapeprog.language.text import parse
 from shapeprog.language.unit import Unit
@@ -177,93 +172,3 @@ def test_nothing_counts_as_a_point_in_the_centre():
     found: dict[str, Any] = lacking(cloud, weights)
     assert set(found) == set(TERMS)
     torch.testing.assert_close(found["chamfer"], chamfer(torch.zeros(1, 1, 3), cloud))
-
-
-def test_the_command_labels_and_goes_on(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
-    shapes = [Shape(f"s{n}", unroll(parse(TEXTS[1])).voxels().numpy().astype(np.bool_)) for n in range(3)]
-    write_pack(tmp_path / "few.npz", shapes)
-    out = tmp_path / "labels.jsonl"
-    out.write_text(json.dumps({"name": "s0", "program": TEXTS[0]}) + "\n" + '{"name": "s1", "prog')
-    with pytest.raises(SystemExit) as end:
-        main(["label", str(tmp_path / "few.npz"), "--out", str(out), "--processes", "1", "--quiet"])
-    assert not end.value.code
-    rows = [json.loads(line) for line in out.read_text().splitlines()]
-    assert sorted(row["name"] for row in rows) == ["s0", "s1", "s2"]
-    assert rows[0]["program"] == TEXTS[0], "what was there is kept"
-    found = read_labels([out], ["s1"], Vocabulary.current(), 10)
-    assert torch.equal(rendered(found.code)[0], torch.from_numpy(shapes[1].voxels.astype(np.uint8)))
-    out.write_text("no label\n")
-    with pytest.raises(SystemExit) as end:
-        main(["label", str(tmp_path / "few.npz"), "--out", str(out)])
-    assert end.value.code == 2
-    assert "is no label" in capsys.readouterr().err
-
-
-def test_a_fault_of_ours_costs_one_label_and_is_told_in_words(pack: Path, monkeypatch: pytest.MonkeyPatch):
-    def fail(*_: object, **__: object) -> None:
-        raise AttributeError("'NoneType' object has no attribute 'points'")
-
-    monkeypatch.setattr(importlib.import_module("shapeprog.inference.infer"), "infer", fail)
-    task = {"pack": str(pack), "place": 1, "blocks": 1, "budget": 1, "seed": 0, "modules": []}
-    told = json.loads(labelling._labelled(json.dumps(task)))
-    assert not PYTHON.search(told["error"])
-    assert f"{pack}#1" in told["hint"], "the shape that it was"
-
-
-def test_labels_that_are_cut_anywhere_are_gone_on_with(pack: Path, tmp_path: Path):
-    out = tmp_path / "labels.jsonl"
-    lines = [json.dumps({"name": f"s{number}", "program": TEXTS[number]}) for number in range(2)]
-    whole = "".join(f"{line}\n" for line in lines).encode()
-    for cut in range(len(whole) + 1):
-        out.write_bytes(whole[:cut])
-        begun = next(label(pack, out))
-        kept = [line for line, end in zip(lines, (len(lines[0]), len(whole) - 1), strict=True) if cut >= end]
-        assert out.read_text() == "".join(f"{line}\n" for line in kept), cut
-        assert (begun.done, begun.total) == (len(kept), 3)
-
-
-@pytest.mark.parametrize("content", [b"\xff\xfe\n", b"{}\n", b"[" * 9999 + b"\n", b'"name"\n{"name": "s0"}\n'])
-def test_what_is_no_file_of_labels_is_left_as_it_is(pack: Path, tmp_path: Path, content: bytes):
-    out = tmp_path / "labels.jsonl"
-    out.write_bytes(content)
-    with pytest.raises(InputError, match=r"line 1 of .* is no label|is not UTF-8"):
-        next(label(pack, out))
-    assert out.read_bytes() == content
-    with pytest.raises(InputError, match="is not a file"):
-        next(label(pack, tmp_path))
-
-
-def test_a_shape_that_cannot_be_labelled_is_told_and_stops_nothing(
-    pack: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-):
-    answer = {name: json.dumps({"name": name, "program": TEXTS[0], "cut": []}) for name in ("s0", "s2")}
-    error = json.dumps({"error": "it is too odd", "hint": "leave it out"})
-    monkeypatch.setattr(labelling, "answers", lambda *_: (each for each in (answer["s0"], error, answer["s2"])))
-    out = tmp_path / "labels.jsonl"
-    with pytest.raises(SystemExit) as end:
-        main(["label", str(pack), "--out", str(out)])
-    assert end.value.code == 1
-    told = capsys.readouterr()
-    assert "s1: it is too odd" in told.err
-    assert "leave it out" in told.err
-    assert "labels of 2 of 3 shapes" in told.out
-    assert [json.loads(line)["name"] for line in out.read_text().splitlines()] == ["s0", "s2"]
-
-
-def test_a_disk_that_is_full_amid_a_label_is_told_and_the_label_found_again(
-    pack: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-):
-    resource = pytest.importorskip("resource")
-    answer = json.dumps({"name": "s0", "program": TEXTS[0] * 100})
-    monkeypatch.setattr(labelling, "answers", lambda *_: (each for each in (answer,) * 3))
-    out = tmp_path / "labels.jsonl"
-    before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (5000, before[1]))
-    try:
-        with pytest.raises(OutputError, match=f"cannot write {out}: the file is larger than the disk allows"):
-            list(label(pack, out))
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, before)
-    assert 0 < out.stat().st_size < len(answer)
-    assert next(label(pack, out)).done == 0
-    assert out.read_text() == ""

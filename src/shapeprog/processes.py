@@ -11,16 +11,11 @@ import signal
 import subprocess
 import sys
 import threading
-from collections import deque
-from collections.abc import Callable, Generator, Sequence
-from contextlib import suppress
+from collections.abc import Callable
 from queue import SimpleQueue
 from typing import NoReturn
 
 from shapeprog.errors import ShapeProgError
-
-Answer = str | ShapeProgError
-"""A line, or why there is none."""
 
 
 class Worker:
@@ -43,9 +38,7 @@ class Worker:
                 start_new_session=True,
             )  # fmt: skip
         except OSError as error:
-            raise ShapeProgError(
-                f"cannot start another process: {error.strerror}", "end other programs, or give --processes 1"
-            ) from error
+            raise ShapeProgError(f"cannot start another process: {error.strerror}", "end other programs") from error
 
     def ask(self, line: str) -> str:
         """Its answer to a line.
@@ -67,83 +60,14 @@ class Worker:
         if not answer.endswith("\n"):
             raise ShapeProgError(
                 f"a process that was to help ended {_ending(self._process.wait())}",
-                "it may have run out of memory; give fewer --processes, or look for its last words above",
+                "it may have run out of memory",
             )
         return answer[:-1]
-
-    def kill(self) -> None:
-        """End it at once; whoever waits for an answer gets an error."""
-        self._process.kill()
 
     def close(self) -> None:
         """End it and give back what it held; nobody may be asking any more."""
         self._process.kill()
         self._process.communicate()
-
-
-def answers(module: str, lines: Sequence[str], processes: int) -> Generator[Answer, None, None]:
-    """What other processes answer to lines, in the order of the lines.
-
-    A process that ends instead of answering is replaced, and its line's answer is an error.  Closing ends all of them.
-
-    Parameters
-    ----------
-    module
-        What the processes run.
-    lines
-        What they are asked, from the first to the last.
-    processes
-        How many work at a time.
-    """
-    waiting = deque(enumerate(lines))
-    found: SimpleQueue[tuple[int, Answer]] = SimpleQueue()
-    workers: list[Worker] = []  # those of all threads, to be ended together
-    ending = threading.Event()
-    starting = threading.Lock()
-
-    def begin() -> Worker | None:
-        with starting:
-            if ending.is_set():
-                return None
-            workers.append(Worker(module))
-            return workers[-1]
-
-    def work() -> None:
-        worker: Worker | None = None
-        with suppress(IndexError):  # nothing is waiting any more
-            while True:
-                place, line = waiting.popleft()
-                try:
-                    worker = worker or begin()
-                    if worker is None:
-                        break
-                    found.put((place, worker.ask(line)))
-                except ShapeProgError as error:
-                    if worker is not None:
-                        worker.close()
-                        worker = None
-                    found.put((place, error))
-        if worker is not None:
-            worker.close()
-
-    threads = [threading.Thread(target=work, daemon=True) for _ in range(processes)]
-    for thread in threads:
-        thread.start()
-    try:
-        early: dict[int, Answer] = {}
-        for place in range(len(lines)):
-            while place not in early:
-                other, answer = found.get()
-                early[other] = answer
-            yield early.pop(place)
-    finally:
-        ending.set()
-        waiting.clear()
-        with starting:
-            for worker in workers:
-                worker.kill()
-        for thread in threads:
-            thread.join()
 
 
 def serve(answer: Callable[[str], str]) -> NoReturn:

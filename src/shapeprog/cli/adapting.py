@@ -1,69 +1,14 @@
-"""Commands that learn from real shapes: label them by search, adapt a generator to them."""
+"""The command that adapts a generator to real shapes."""
 
 from __future__ import annotations
 
-import os
-from contextlib import closing
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from shapeprog.cli import terminal, training
-from shapeprog.errors import InputError, ShapeProgError
-from shapeprog.inference.budget import BUDGET
-
-if TYPE_CHECKING:
-    from shapeprog.inference.labelling import Labelled
-
-
-def label_command(
-    pack: Annotated[Path, typer.Argument(help="A pack of shapes.")],
-    out: Annotated[Path, typer.Option("--out", "-o", help="File of labels; goes on with those that it holds.")],
-    blocks: Annotated[int, typer.Option(help="Most blocks of a program.", min=1)] = 10,
-    budget: Annotated[float, typer.Option(help="Most seconds for each shape; a safety net.", min=0.1)] = BUDGET,
-    processes: Annotated[int | None, typer.Option(help="Shapes at a time; by default one per core.", min=1)] = None,
-    seed: terminal.Seed = 0,
-    modules: terminal.With = None,
-    quiet: training.Quiet = False,
-) -> None:
-    """Find programs for all shapes of a pack by search, as labels to learn from: shapeprog adapt --labels FILE.
-
-    Each line of the file is a JSON object: name, program, snapped, scores, and what --budget cut short. Interrupted,
-    the same command goes on. The same --seed writes the same file.
-    """
-    from rich.progress import track
-
-    from shapeprog.inference.labelling import label
-
-    os.environ.setdefault("OMP_NUM_THREADS", "1")  # the processes share the cores
-    terminal.load_modules(modules)
-    records = label(pack, out, blocks=blocks, budget=budget, seed=seed, processes=processes, modules=modules or ())
-    last = next(records)
-    console, left = terminal.errors(), last.total - last.done
-    failures: list[Labelled] = []
-    try:
-        with closing(records):
-            for last in track(records, "labelling", total=left, console=console, transient=True, disable=quiet):
-                if last.error is not None:
-                    failures.append(last)
-    except KeyboardInterrupt:
-        kept = f"{out} holds {last.done} of {last.total} labels; the same command goes on"
-        raise terminal.Interrupted(kept) from None
-    for each in failures:
-        assert each.error is not None
-        terminal.complain(ShapeProgError(f"{each.name}: {each.error.message}", each.error.hint))
-    if not quiet:
-        which = f"all {last.total} shapes" if not failures else f"{last.done} of {last.total} shapes"
-        terminal.output().print(f"{out} holds labels of {which}")
-    if last.cut and not quiet:
-        terminal.errors().print(
-            f"The time budget cut short {last.cut} of them, which may come out otherwise in another run; to have them "
-            "decided by the seed alone, take out their lines (those that name a cut) and give a larger --budget.",
-            style="yellow", markup=False,
-        )  # fmt: skip
-    if failures:
-        raise typer.Exit(1)
+from shapeprog.errors import InputError
 
 
 def adapt_command(
@@ -113,8 +58,8 @@ def adapt_command(
 ) -> None:
     """Adapt a generator to real shapes, whose programs are not known.
 
-    guided draws with the neural executor, direct with the renderer, hybrid with both; distill learns from labels
-    (shapeprog label), which --labels adds to the other methods too. Interrupted, the same command goes on exactly.
+    guided draws with the neural executor, direct with the renderer, hybrid with both; distill learns from labels,
+    which --labels adds to the other methods too. Interrupted, the same command goes on exactly.
     """
     from shapeprog.training.adapt import adapt
     from shapeprog.training.adapt_settings import METHODS, AdaptSettings

@@ -48,7 +48,6 @@ for name, command, help_line in (
     ("sample", sampling.sample_command, "Draw synthetic furniture: a contact sheet or a data set."),
     ("pretrain", training.pretrain_command, "Pretrain a generator on synthetic furniture."),
     ("train-executor", training.train_executor_command, "Train the neural executor on synthetic blocks."),
-    ("label", adapting.label_command, "Find programs for a pack by search, as labels."),
     ("adapt", adapting.adapt_command, "Adapt a generator to real shapes."),
     ("models", modelling.models_command, "List the weights that ship, and those in folders."),
     ("import-weights", modelling.import_weights_command, "Turn published weights into a file of this package."),

@@ -63,13 +63,6 @@ def infer_command(
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object per shape, one per line.")] = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
     no_picture: Annotated[bool, typer.Option("--no-picture", help="Write no PNG.")] = False,
-    weights: Annotated[
-        str, typer.Option(help="Generator that helps the search: weights that ship, a file, or none.")
-    ] = "default",
-    proposals: Annotated[int, typer.Option(help="Blocks the generator suggests for each place.", min=0)] = 16,
-    no_search: Annotated[
-        bool, typer.Option("--no-search", help="What the generator writes in a single pass, as it is.")
-    ] = False,
     paper: Annotated[
         bool, typer.Option("--paper", help="The statements of the paper alone, found on cells and refined.")
     ] = False,
@@ -99,9 +92,7 @@ def infer_command(
     libraries = terminal.load_libraries(modules, library)
     finished = partial(_in_unit, unit=unit, file_unit=file_unit)
     infer_one = (
-        partial(_baseline, finished)
-        if baseline
-        else _chosen(finished, weights, proposals, rounds, no_search, paper, detail, not no_ties, libraries)
+        partial(_baseline, finished) if baseline else _chosen(finished, rounds, paper, detail, not no_ties, libraries)
     )
     folder = make_folder(out)
     failures: list[tuple[Path, ShapeProgError]] = []
@@ -188,10 +179,7 @@ def _in_unit(program: Program, shape: Shape, unit: str | None, file_unit: str | 
 
 def _chosen(
     finished: Finish,
-    weights: str,
-    proposals: int,
     rounds: int | None,
-    no_search: bool,
     paper: bool,
     detail: float,
     ties: bool,
@@ -199,17 +187,13 @@ def _chosen(
 ) -> Inference:
     """Inference with what was asked for, which is looked at before any shape is; programs are ``finished`` last."""
     from shapeprog.inference import Settings, infer
-    from shapeprog.inference.proposing import ready_generator
 
     settings = None if rounds is None else Settings(rounds=rounds)
-    asked = None if weights == "none" else weights
-    ready_generator(asked, needed=no_search)
 
     def one(shape: Shape, blocks: int, budget: float, seed: int, progress: Progress) -> Found:
         result = infer(
-            shape, blocks=blocks, budget=budget, seed=seed, settings=settings, generator=asked, proposals=proposals,
-            search=not no_search, statements="paper" if paper else "all", detail=detail, ties=ties, libraries=libraries,
-            progress=progress,
+            shape, blocks=blocks, budget=budget, seed=seed, settings=settings,
+            statements="paper" if paper else "all", detail=detail, ties=ties, libraries=libraries, progress=progress,
         )  # fmt: skip
         program = finished(result.program, shape)
         scores = _scores(program, result.snapped, shape, result.scores, seed)

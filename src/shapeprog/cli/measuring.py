@@ -68,11 +68,7 @@ def prepare_command(
 
 def evaluate_command(
     predictions: Annotated[Path, typer.Argument(help="Programs, meshes, clouds or voxels: a file, pack or folder.")],
-    targets: Annotated[list[Path] | None, typer.Argument(help="Targets of any kind: files, packs or folders.")] = None,
-    weights: Annotated[
-        str | None, typer.Option(help="A generator instead of predictions, which rebuilds all targets in one pass.")
-    ] = None,
-    choose: Annotated[str, typer.Option(help="How it chooses blocks: drawn or argmax.")] = "drawn",
+    targets: Annotated[list[Path], typer.Argument(help="Targets of any kind: files, packs or folders.")],
     parts: Annotated[
         Path | None, typer.Option(help="A folder with a folder of part meshes for each target, named as it is.")
     ] = None,
@@ -98,9 +94,6 @@ def evaluate_command(
     program as it is, 5,000 points each, bounding box of the target scaled to diagonal 1, squared distances, both
     directions added. The noise floor is the CD between two samplings of the target itself. Predicted meshes and
     clouds must lie in the world of their target. One prediction and one target need not have the same name.
-
-    With --weights all arguments are targets: shapeprog evaluate --weights default bench_test.npz. The IoU is then that
-    of the rounded program, with no search at all, and an empty program counts as a single point in the centre.
     """
     from rich.progress import track
 
@@ -111,18 +104,13 @@ def evaluate_command(
 
     terminal.load_modules(modules)
     terminal.check_axes(up, front)
-    wanted = [*([predictions] if weights else []), *(targets or [])]
-    missing = [path for path in [predictions, *wanted] if not Path(str(path).split("#")[0]).exists()]
+    missing = [path for path in [predictions, *targets] if not Path(str(path).split("#")[0]).exists()]
     if missing:
         raise InputError(f"there is no file or folder {missing[0]}", "check the path")
-    if not wanted:
-        raise InputError("there are no targets", "name them after the predictions, or give --weights")
-    if choose not in ("drawn", "argmax"):
-        raise InputError(f"blocks cannot be chosen by {choose!r}", "give --choose drawn or --choose argmax")
     files = part_files(parts) if parts else {}
     failures: list[ShapeProgError] = []
     shapes: dict[str, Shape] = {}
-    for path, shape in load_all(wanted, up=up, front=front, points=2 * points, seed=seed):
+    for path, shape in load_all(targets, up=up, front=front, points=2 * points, seed=seed):
         if isinstance(shape, ShapeProgError):
             failures.append(ShapeProgError(f"target {path}: {shape.message}", shape.hint))
         elif shape.name in shapes:
@@ -131,8 +119,7 @@ def evaluate_command(
             failures.append(ShapeProgError(f"two targets are called {shape.name}: {both or path}", cure))
         else:
             shapes[shape.name] = shape
-    generates = weights is not None
-    found = list(scoring.generated(weights, shapes, choose) if weights else scoring.predictions(predictions))
+    found = list(scoring.predictions(predictions))
     rows: list[Metrics] = []
     console = terminal.errors()
     silent = quiet or as_json or as_csv
@@ -144,7 +131,7 @@ def evaluate_command(
             failures.append(ShapeProgError(f"prediction {name} has no target of that name", "rename one of them"))
         else:
             try:
-                row = scoring.measure(prediction, target, points, seed, finite=generates)
+                row = scoring.measure(prediction, target, points, seed)
             except ShapeProgError as refused:
                 failures.append(ShapeProgError(f"prediction {name}: {refused.message}", refused.hint))
                 continue

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -32,8 +32,6 @@ from shapeprog.language.program import Program
 if TYPE_CHECKING:
     from torch import Tensor
 
-    from shapeprog.models.decoding import Choice
-
 Prediction = tuple[Program, Program | None] | Shape
 """A program with its whole-numbered form where the file holds one, or a shape."""
 
@@ -56,32 +54,10 @@ def predictions(path: Path) -> Iterator[tuple[str, Prediction | ShapeProgError]]
             yield (file.stem if isinstance(shape, ShapeProgError) else shape.name), shape
 
 
-def generated(weights: str, shapes: Mapping[str, Shape], choose: str) -> Iterator[tuple[str, Prediction]]:
-    """Names and single-pass programs of shapes; ``weights`` is a file, or the name of weights that ship."""
-    from shapeprog.evaluation.generated import generated as programs_of
-    from shapeprog.models.checkpoint import load_generator
-
-    generator, _ = load_generator(weights)
-    written = programs_of(generator, list(shapes.values()), choose=cast("Choice", choose))
-    yield from zip(shapes, written, strict=True)
-
-
-def measure(prediction: Prediction, target: Shape, points: int, seed: int, *, finite: bool = False) -> Metrics:
-    """The measures of one prediction; sizes are 0 for what is no program.
-
-    Parameters
-    ----------
-    finite
-        Whether a program that draws nothing counts as a point in the centre, instead of an infinite CD.
-    """
+def measure(prediction: Prediction, target: Shape, points: int, seed: int) -> Metrics:
+    """The measures of one prediction; sizes are 0 for what is no program."""
     if isinstance(prediction, Shape):
         return _measure_shape(prediction, target, points, seed)
-    if finite:
-        from shapeprog.evaluation.generated import Written, measured
-
-        program, whole = prediction
-        written = Written(program, program.snap() if whole is None else whole)
-        return measured(written, target, points, seed, looks=True)
     return evaluate_program(prediction[0], target, prediction[1], points, seed, looks=True)
 
 

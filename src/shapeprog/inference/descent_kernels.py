@@ -209,10 +209,3 @@ def descend(block, occupied, others, price, far, scratch_rows, scratch_words, ar
             block[slot] = around[chosen, slot]
         number = moves(block, around, far)
     return best
-
-
-@kernel("void(f8[:, ::1], b1[::1])")
-def sound(blocks, out):
-    """Which blocks descent can start from."""
-    for k in range(len(blocks)):
-        out[k] = valid(blocks[k])

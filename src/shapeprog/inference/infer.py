@@ -1,8 +1,7 @@
 """Inference: a shape in, a program out, with its scores and a sentence that says why the search stopped.
 
-A program of the paper's statements is searched on cells; where there are weights, a generator proposes programs and
-blocks, and the search keeps what helps.  Its blocks then compete with those found on the surface of the shape, from
-every statement there is; cells have a surface as well, if a coarse one.
+A program of the paper's statements is searched on cells.  Its blocks then compete with those found on the surface of
+the shape, from every statement there is; cells have a surface as well, if a coarse one.
 """
 
 from __future__ import annotations
@@ -12,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 import torch
@@ -39,17 +38,8 @@ from shapeprog.language.program import Program
 from shapeprog.language.unroll import unroll
 from shapeprog.library import Library, with_library
 
-if TYPE_CHECKING:
-    from shapeprog.models.generator import Generator
-
 SEARCH_SHARE = 0.65
 """Share of the time budget after which the structure search hands over to refinement."""
-
-PROPOSAL_SHARE = 0.2
-"""Share of the time budget after which the generator is not asked again."""
-
-PROPOSALS = 16
-"""Blocks that the generator suggests for each place; chosen on val."""
 
 EXPLAINED = 0.5
 """Share of the surface that blocks must explain; else what has a surface is no furniture, and its cells are rebuilt."""
@@ -72,7 +62,7 @@ class Result:
     scores
         ``blocks``, ``statements``, ``primitives``; ``numbers``, those that are free; ``explained``, the share of the
         surface, where that was looked at; ``iou`` at 32^3 of programs found on cells, and of all for targets that are
-        cells; with a generator ``proposed``: 1 if the program on cells is its own or grew from it, else 0.
+        cells.
     reason
         Why the search stopped, where the program came from, what the time budget cut short, and what to try next.
     cut
@@ -100,9 +90,6 @@ def infer(
     seed: int = 0,
     settings: Settings | None = None,
     schedule: Schedule | None = None,
-    generator: Generator | str | Path | None = "default",
-    proposals: int = PROPOSALS,
-    search: bool = True,
     statements: Literal["all", "paper"] = "all",
     detail: float = 1.0,
     ties: bool = True,
@@ -111,12 +98,11 @@ def infer(
 ) -> Result:
     """A short program of at most ``blocks`` blocks that rebuilds a shape.
 
-    Structure is searched on the touched cells, with whole numbers, with the help of a generator where there is one;
-    then all parameters are refined together on surface points through the renderer.  These blocks and those that the
-    surface itself suggests are candidates of one choice, whose parameters are adjusted and whose parts are named.  Of
-    a shape that is known by its cells the shorter description is kept: share of cells wrong, and price of what is
-    written.  The result is the same for the same seed unless the time
-    budget cuts in, which ``cut`` and ``reason`` tell.
+    Structure is searched on the touched cells, with whole numbers; then all parameters are refined together on surface
+    points through the renderer.  These blocks and those that the surface itself suggests are candidates of one choice,
+    whose parameters are adjusted and whose parts are named.  Of a shape that is known by its cells the shorter
+    description is kept: share of cells wrong, and price of what is written.  The result is the same for the same seed
+    unless the time budget cuts in, which ``cut`` and ``reason`` tell.
 
     Parameters
     ----------
@@ -129,16 +115,8 @@ def infer(
         the common case is up to ``settings`` and ``schedule``.
     settings, schedule
         Rounds of the search and steps of refinement, and more; the defaults were chosen on validation shapes.
-    generator
-        A generator, the path of its weights, or the name of weights that ship.  The search goes without for ``None``,
-        and as long as no default weights ship.
-    proposals
-        Blocks that the generator suggests for each place; none leaves it out of the search.
-    search
-        Whether to search; else the program is what the generator writes in a single pass, refined only when a
-        ``schedule`` is given.
     statements
-        All statements in force, or those of the paper alone, which generators can be taught.
+        All statements in force, or those of the paper alone.
     detail
         How much finer than usual the program may be where the surface is known: prices of what is written are divided
         by it.
@@ -154,56 +132,28 @@ def infer(
     Raises
     ------
     InputError
-        If the path is no readable shape, or there are no such weights.
-    ShapeProgError
-        If there is neither a search nor a generator.
+        If the path is no readable shape.
     """
-    from shapeprog.inference.proposing import propose_program, ready_generator, single_pass
-
     prepare_kernels()
-    writer, hindered = ready_generator(generator if proposals or not search else None, needed=not search)
     started = time.monotonic()
-    proposing, searching, refining = (
-        Deadline(started + share * budget) for share in (PROPOSAL_SHARE, SEARCH_SHARE, 1.0)
-    )
+    searching, refining = (Deadline(started + share * budget) for share in (SEARCH_SHARE, 1.0))
     target = _load(shape)
     scores: dict[str, float] = {}
-    snapped: Program | None
-    if search:
-        chosen = replace(settings or Settings(), blocks=blocks)
-        offered = None
-        if writer is not None:
-            offered = propose_program(
-                writer, target.voxels, blocks=blocks, suggestions=proposals, price=chosen.price, seed=seed,
-                deadline=proposing,
-            )  # fmt: skip
-        structure = search_structure(
-            target.voxels, chosen, proposals=offered, seed=seed, deadline=searching, progress=progress
-        )
-        program = snapped = to_program(structure.blocks)
-        reason = f"Stopped because {structure.reason}"
-        reason += "." if searching.cut else _advice(program.blocks, blocks)
-        if writer is not None:
-            scores["proposed"] = float(structure.proposed)
-            grown = (
-                "the generator's program" if structure.proposed else "greedy boxes, which fitted better than its own"
-            )
-            reason += f" The generator took part; the program grew from {grown}."
-    else:
-        assert writer is not None
-        program, snapped = single_pass(writer, target.voxels, blocks)
-        scores["proposed"] = 1.0
-        reason = "A single pass of the generator wrote this; the search would improve it."
-    if hindered:
-        reason += f" The generator was left out: {hindered}."
-    if search or schedule is not None:
-        program = refine(
-            snapped, outer_points(target, snapped, seed), voxels=target.voxels if target.points is None else None,
-            schedule=schedule, reach=REACH, seed=seed, deadline=refining, progress=progress,
-        )  # fmt: skip
+    structure = search_structure(
+        target.voxels, replace(settings or Settings(), blocks=blocks), seed=seed, deadline=searching, progress=progress
+    )
+    on_cells = to_program(structure.blocks)
+    snapped: Program | None = on_cells
+    reason = f"Stopped because {structure.reason}"
+    reason += "." if searching.cut else _advice(on_cells.blocks, blocks)
+    program = refine(
+        on_cells, outer_points(target, on_cells, seed),
+        voxels=target.voxels if target.points is None else None, schedule=schedule, reach=REACH, seed=seed,
+        deadline=refining, progress=progress,
+    )  # fmt: skip
     trade_off: tuple[TradeOff, ...] = ()
     costs = partial(cost_on_cells, voxels=target.voxels, detail=detail)
-    if search and statements == "all":
+    if statements == "all":
         functions = [pattern for library in libraries for pattern in library.patterns if pattern.shortens]
         found = assemble(
             target, blocks=blocks, more=program.flat().body, functions=functions, detail=detail, seed=seed,
@@ -232,7 +182,7 @@ def infer(
         program = merged(program)
     if target.note:
         reason += f" {target.note}"
-    cut = tuple(each.cut for each in (proposing, searching, refining) if each.cut)
+    cut = tuple(each.cut for each in (searching, refining) if each.cut)
     if cut:
         reason += f" The time budget of {budget:g} s cut short {' and '.join(cut)}: "
         reason += "give it a larger --budget, and the seed alone decides."

@@ -1,14 +1,12 @@
 """Structure search: voxels to blocks of whole numbers that maximise IoU minus price x statements.
 
 Blocks are first added one by one, each the repeated box that gains most on what is still uncovered; then rounds of
-ruin and recreate take some out and put others in, discs, sheared backs, bars, stars and crosses among them.  Programs
-and blocks that somebody else proposes, such as a generator, take part in both.
+ruin and recreate take some out and put others in, discs, sheared backs, bars, stars and crosses among them.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,8 +16,6 @@ from shapeprog.geometry.cells import pack, words_of
 from shapeprog.inference.block_layout import WIDTH
 from shapeprog.inference.budget import NEVER, Deadline, Progress
 from shapeprog.inference.families import families
-from shapeprog.inference.reading import from_program
-from shapeprog.language.program import Program
 from shapeprog.space import FloatArray
 
 if TYPE_CHECKING:
@@ -31,14 +27,13 @@ PLANES = 3
 MOST_COPIES = 8
 """Most copies of one loop that the search proposes; descent may add more."""
 
+KEPT = 12
+"""Programs, the latest, whose blocks the search may use again."""
 
 STARTS = (0.9, 2.0, 5.0)
 """Weights of an empty cell against an occupied one, from which greedy starts are made; the best start is kept.
 
 A light weight finds solid bodies, a heavy one the boards of a shelf that a single filled box would swallow."""
-
-KEPT = 12
-"""Programs of its own, the latest, whose blocks the search may recall."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +49,7 @@ class Settings:
     rounds
         Most rounds of ruin and recreate.
     chunk
-        Rounds with the same heat and the same pool, before the next look at the clock.
+        Rounds with the same heat, before the next look at the clock.
     families
         Ways of repeating a box that one round tries, drawn at random.
     forms
@@ -62,7 +57,7 @@ class Settings:
     heat
         Largest loss of the objective that a first round may accept; it cools linearly.
     recall
-        Share of the blocks put in that were suggested or were of use before, instead of sought anew.
+        Share of the blocks put in that come from earlier programs of the search, instead of being sought anew.
     patience
         Rounds without a gain after which the search stops.
     """
@@ -78,51 +73,19 @@ class Settings:
     patience: int = 120
 
 
-PLAIN = Settings(rounds=200, recall=0.0, patience=200)
-"""The search without a memory, as it was measured before a generator took part; the baseline of what came after."""
-
-
-def _no_blocks() -> FloatArray:
-    return np.zeros((0, WIDTH))
-
-
-@dataclass(frozen=True)
-class Proposals:
-    """What the structure search may begin with and draw from.
-
-    Parameters
-    ----------
-    programs
-        Whole programs as blocks (K, 20), each a start of the search.
-    loose
-        Blocks (P, 20) to put in one by one.
-    """
-
-    programs: tuple[FloatArray, ...] = ()
-    loose: FloatArray = field(default_factory=_no_blocks)
-
-    @classmethod
-    def of(cls, programs: Sequence[Program]) -> Proposals:
-        """Whole programs, whose blocks are loose ones as well; what the search cannot draw is left out."""
-        read = tuple(from_program(program) for program in programs)
-        return cls(read, np.concatenate([_no_blocks(), *read]))
-
-
 @dataclass(frozen=True)
 class Structure:
-    """Blocks (K, 20), their IoU, why the search stopped, and whether it grew from a proposed program."""
+    """Blocks (K, 20), their IoU, and why the search stopped."""
 
     blocks: FloatArray
     iou: float
     reason: str
-    proposed: bool = False
 
 
 def search_structure(
     voxels: npt.NDArray[np.bool_],
     settings: Settings,
     *,
-    proposals: Proposals | None = None,
     seed: int = 0,
     deadline: Deadline = NEVER,
     progress: Progress | None = None,
@@ -131,27 +94,22 @@ def search_structure(
 
     Parameters
     ----------
-    proposals
-        Programs to start from beside the greedy ones, and blocks to put in; what does not help is not kept.
     deadline
         When no further round starts.
     progress
         Called with what is being done and the share done.
     """
     from shapeprog.inference import editing
-    from shapeprog.inference.pool import Pool
 
     cells = np.argwhere(voxels)
     low, high = cells.min(0), cells.max(0) + 1
     table = families((high - low).tolist(), PLANES, MOST_COPIES)
     target = editing.Target(words_of(pack(voxels)).reshape(-1), low, high, table, settings.price, len(cells))
-    offered = proposals or Proposals()
-    rough = [each[: settings.blocks] for each in offered.programs] + greedy_starts(target, settings.blocks)
+    rough = greedy_starts(target, settings.blocks)
     starts = [editing.polish(each, target, 1, 3) for each in rough]
-    values = [editing.value_of(each, target) for each in starts]
-    first = int(np.argmax(values))
-    best, best_value = starts[first], values[first]
-    own = [*rough[len(offered.programs) :], *starts]
+    best = max(starts, key=lambda blocks: editing.value_of(blocks, target))
+    best_value = editing.value_of(best, target)
+    earlier = [*rough, *starts]
     done, gained, reason = 0, 0, f"all {settings.rounds} rounds of editing were done"
     while done < settings.rounds:
         if done - gained >= settings.patience:
@@ -162,22 +120,21 @@ def search_structure(
             break
         rounds = min(settings.chunk, settings.rounds - done)
         heat = settings.heat * (1 - done / settings.rounds)
-        pool = Pool.of([offered.loose, *own[-KEPT:]], target.price * target.cells) if settings.recall else None
+        pool = editing.Pool.of(earlier[-KEPT:], target)
         plan = editing.Plan(
             settings.blocks, min(settings.families, len(table)), settings.forms, heat, settings.recall, pool
         )
         blocks, value = editing.rebuild(best, target, plan, rounds, seed + done)
         done += rounds
         if value > best_value:
-            own.append(blocks)
+            earlier.append(blocks)
             gained = done
         if value >= best_value:
             best, best_value = blocks, value
         if progress:
             progress("searching structure", done / settings.rounds)
     found = editing.polish(best, target, 3, 5)
-    proposed = first < len(offered.programs)
-    return Structure(found, editing.iou(found, target), reason, proposed)
+    return Structure(found, editing.iou(found, target), reason)
 
 
 def greedy_starts(target: Target, most: int) -> list[FloatArray]:

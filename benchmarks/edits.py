@@ -1,7 +1,7 @@
 """The same edits of programs with named numbers and of the same programs with plain numbers, side by side.
 
     python -m benchmarks.edits docs/edits.png examples/chair_kenney.obj leg_height=12 \\
-        examples/bookcase_kenney_open.obj shelves=6 examples/table_polyhaven_wooden.obj 'width*=1.5'
+        examples/table_polyhaven_wooden.obj 'width*=1.5'
 
 Above, each change is made to the name.  Below, it is made to the one plain number that reads the same, the first in the
 text; to a count, where the name is one.

@@ -17,17 +17,14 @@ from shapeprog.evaluation.editing import edit_scores
 from shapeprog.geometry.mesh import pieces, union_mesh
 from shapeprog.inference.evidence import evidence_of_program
 from shapeprog.inference.joints import Joints, find_joints
-from shapeprog.inference.ties.buried import buried
 from shapeprog.inference.ties.closeness import Closeness
 from shapeprog.inference.ties.contacts import Contacts, holding
 from shapeprog.inference.ties.features import features
 from shapeprog.inference.ties.fitting import ways_free
 from shapeprog.inference.ties.following import Following
 from shapeprog.inference.ties.leaning import between_ends
-from shapeprog.inference.ties.opposite import as_images
 from shapeprog.inference.ties.pricing import worthwhile
 from shapeprog.inference.ties.relations import INFERRED, Relation, relations
-from shapeprog.inference.ties.runs import plural
 from shapeprog.inference.ties.tying import tie
 from shapeprog.inference.tunable import Tunable
 from shapeprog.language.free import free_numbers, free_values, multiplied, numbers
@@ -297,94 +294,6 @@ def test_gaps_beside_a_run_are_those_between_its_copies():
     np.testing.assert_allclose(boards, [-12, -5, 0, 5, 11], atol=0.1)
 
 
-STACK = """
-for i in mirror(side):
-    side(box(at=(-12, -4, 8), size=(24, 8, 1)))
-for i in translate(4, by=(7.67, 0.01, 0)):
-    shelf(box(at=(-12, -4, -8), size=(1, 8, 16)))
-"""
-
-SLATS = """
-seat(box(at=(-12, -6, -9), size=(1, 12, 18)))
-for i in mirror(side):
-    post(box(at=(-12, 5, 8), size=(24, 1, 1)))
-for i in translate(6, by=(0, 0, 2.4)):
-    slat(box(at=(-11, 5.2, -6.3), size=(20, 0.5, 0.6)))
-rail(box(at=(9, 5, -8), size=(1, 1, 16)))
-"""
-
-
-@pytest.mark.parametrize(
-    ("text", "name", "axis", "part", "divided"),
-    [
-        (STACK, "shelves", 0, 1, " / (shelves - 1)"),  # from one end of the case to the other
-        (CASE.format(step=5.75, first=-6.25), "shelves", 0, 3, " / (shelves + 1)"),  # gaps below and above
-        (SLATS, "slats", 2, 2, " / (slats - 1)"),  # a span of their own
-    ],
-)
-def test_more_copies_share_the_span_of_the_others(text: str, name: str, axis: int, part: int, divided: str):
-    program = sp.parse(text)
-    tied = tie(program, evidence_of_program(program)).program
-    assert divided in format_program(tied)
-    (count,) = (each for each in sp.names(tied) if each.whole)
-    assert (count.name, count.free) == (name, True)
-
-    def places(copies: float) -> np.ndarray:
-        scene = unroll(sp.set(tied, {name: copies}))
-        others = scene.centre[scene.block != part]
-        torch.testing.assert_close(others, unroll(tied).centre[unroll(tied).block != part])
-        return np.sort(scene.centre[scene.block == part, axis].numpy())
-
-    was = places(count.value)
-    gap = was[1] - was[0] if "+ 1" in divided else 0  # this is kept free at both ends, however wide
-    for copies in (count.value + 2, count.value - 1):
-        new = places(copies)
-        assert len(new) == copies
-        np.testing.assert_allclose(np.diff(new), new[1] - new[0], atol=1e-5)
-        beside = new[1] - new[0] if gap else 0
-        np.testing.assert_allclose([new[0] - beside, new[-1] + beside], [was[0] - gap, was[-1] + gap], atol=1e-5)
-    assert free_numbers(tied) == free_numbers(sp.set(tied, {name: 7})), "a count is no free number"
-
-
-def test_a_part_that_comes_to_lie_on_its_own_mirror_image_is_drawn_once() -> None:
-    program = sp.parse(
-        """
-    for i in mirror(depth, at=-0.55):
-        seat(box(at=(-1, -3.02, -12), size=(0.5, 4.96, 24)))
-    for i in mirror(side):
-        leg(at=(-6, -3, 10), size=(5, 4.8, 1))
-    """.replace("\n    ", "\n")
-    )
-    found = tie(program, evidence_of_program(program)).program
-    assert sorted(len(chain) - 1 for chain in Program(found.body).chains) == [0, 1], "the legs stay a pair"
-
-
-DRAWERS = """
-body(box(at=(-12, -4, -8), size=(24, 10, 16)))
-for i in translate(3, by=(7.6, 0, 0)):
-    handle(box(at=(-8.5, -6, -3), size=(0.8, 0.8, 6)))
-for i in translate(3, by=(7.61, 0, 0)):
-    drawer(box(at=(-11.5, -5.2, -7.5), size=(6.8, 1.2, 15)))
-"""
-
-
-def test_as_many_drawers_as_handles_are_one_count_named_after_the_larger() -> None:
-    program = sp.parse(DRAWERS)
-    tied = tie(program, evidence_of_program(program)).program
-    (count,) = (each for each in sp.names(tied) if each.whole)
-    assert count.name == "drawers"
-    scene = unroll(sp.set(tied, drawers=5))
-    handles, drawers = (scene.centre[scene.block == block] for block in range(3) if (scene.block == block).sum() == 5)
-    torch.testing.assert_close(handles[:, 0], drawers[:, 0], atol=0.05, rtol=0)
-
-
-def test_names_of_counts_are_plurals():
-    words = ("shelf", "leg", "foot", "box", "bench", "body", "tray", "cross")
-    assert [plural(word) for word in words] == [
-        "shelves", "legs", "feet", "boxes", "benches", "bodies", "trays", "crosses",
-    ]  # fmt: skip
-
-
 def test_relations_hold_for_the_ways_that_are_free():
     rows = np.array([[1.0, -1, 0, 0], [0, 0, 1, -2]])
     ways = ways_free(rows, 4)
@@ -568,33 +477,6 @@ drawer(box(at=(1, -5, -12), size=(4.4, 10, {short})))
     assert f"width / {times}" in format_program(tied)
 
 
-@pytest.mark.parametrize("draw", [
-    "leg(at=(-6, -4, -5), size=(9, 1, 2))",
-    "leg(rod(start=(-6, -4, -4.95), end=(0, -5, -4.95), radius=0.5))",
-    "for j in translate(3, by=(2, 0.5, 0)):\n        leg(at=(-6, -4, -5), size=(9, 1, 2))",
-    "for j in mirror(depth):\n        leg(at=(-6, 4, -5), size=(9, 1, 2))",
-])  # fmt: skip
-def test_two_copies_opposite_each_other_are_a_mirror_image(draw: str):
-    centred = 9.9 if "rod" in draw else 8.0
-    for off, name in ((0.1, "mirror"), (-0.1, "mirror"), (0.6, "translate")):
-        pair = sp.parse(f"for i in translate(2, by=(0, 0, {centred + off})):\n    {draw}\n")
-        found = as_images(pair)
-        assert next(found.walk()).name == name
-        points = unroll(pair).sample(500, torch.Generator().manual_seed(0))
-        assert unroll(found).distance(points).abs().max() < 0.06
-        assert found.size == pair.size
-
-
-@pytest.mark.parametrize("text", [
-    "for i in translate(2, by=(0, 0, 8)):\n    leg(rod(start=(-6, 0, -4), end=(6, 0, -3), radius=0.5))\n",  # leans
-    "for i in translate(2, by=(0, 2, 8)):\n    leg(at=(-6, -2, -5), size=(9, 2, 2))\n",
-    "for i in translate(2, by=(8, 0, 0)):\n    leg(at=(-5, -2, -5), size=(2, 2, 2))\n",
-    "for i in translate(3, by=(0, 0, 4)):\n    leg(at=(-6, -2, -5), size=(9, 2, 2))\n",
-])  # fmt: skip
-def test_copies_that_are_no_images_stay_as_they_are(text: str):
-    assert as_images(sp.parse(text)) == sp.parse(text)
-
-
 def test_tidy_writes_equal_loops_once(tmp_path: Path):
     (tmp_path / "table.shape").write_text(TABLE)
     found = CliRunner().invoke(app, ["tidy", str(tmp_path / "table.shape")]).output
@@ -656,29 +538,6 @@ def test_the_height_of_a_round_leg_is_called_so_and_no_name_ends_in_two_without_
     assert found.get("leg_height", found.get("post_height")) in (pytest.approx(14, abs=0.1), pytest.approx(8, abs=0.1))
     assert not any(name.endswith("breadth") for name in found)
     assert all(name.removesuffix("_2") in found for name in found)
-
-
-CHEST = """
-for i in translate(4, by=(2.85, 0, 0)):
-    shelf(box(at=(-4.55, -3.86, -11.99), size=(0.47, 7.72, 23.6)))
-back(box(at=(-4.55, -3.65, -12), size=(9.1, 7.51, 23.99)))
-"""
-"""A body with boards in it whose edges stand out by a fifth of a cell in front, by a tenth in depth."""
-
-
-def test_a_part_that_ties_would_bury_is_left_out_and_the_rest_is_named_anew():
-    program = sp.parse(CHEST)
-    assert buried(program) == []
-    assert buried(sp.parse(CHEST.replace("-3.86", "-3.65").replace("7.72", "7.51"))) == [0]
-    tied = tie(program, evidence_of_program(program), price=100).program  # faces a fifth of a cell apart are flush
-    assert [chain[-1].word for chain in tied.chains] == ["body"]
-    assert tie(program, evidence_of_program(program), known=True).program.blocks == 2  # somebody wrote it
-
-
-def test_of_two_equal_parts_one_is_buried_and_without_others_none():
-    box = "box(at=(-6, -5, -10), size=(12, 10, 20))\n"
-    assert buried(sp.parse(2 * box)) == [0]
-    assert buried(sp.parse(box)) == buried(Program()) == []
 
 
 def test_an_overhang_that_is_the_same_on_all_sides_is_one_number():

@@ -26,6 +26,7 @@ from shapeprog.library.blocks import Kind, blocks_of
 from shapeprog.library.length import statements
 from shapeprog.library.matching import TOLERANCE
 from shapeprog.library.rewriting import offers
+from shapeprog.library.words import plural
 
 SHELVES = """\
 # such as shelves(count=4, bottom=-8, height=16, width=12, thick=1)
@@ -538,3 +539,10 @@ def test_two_boxes_that_share_little_are_no_function_of_their_own() -> None:
     programs = [parse(flush.format(*(round(value, 2) for value in random.uniform(1, 4, 3)))) for _ in range(12)]
     (function,) = learn(programs).functions
     assert function.name == "base_with_top"
+
+
+def test_names_of_several_parts_are_plurals():
+    words = ("shelf", "leg", "foot", "box", "bench", "body", "tray", "cross")
+    assert [plural(word) for word in words] == [
+        "shelves", "legs", "feet", "boxes", "benches", "bodies", "trays", "crosses",
+    ]  # fmt: skip

@@ -30,8 +30,6 @@ from shapeprog.inference.pieces import find_pieces
 from shapeprog.inference.recognition import proposed
 from shapeprog.inference.repeating import repeated
 from shapeprog.inference.roles import in_order
-from shapeprog.inference.splitting import split
-from shapeprog.inference.thickness import thickened
 from shapeprog.language.free import numbers_outside
 from shapeprog.language.program import Node, Program
 from shapeprog.library.matching import Pattern
@@ -161,8 +159,7 @@ def _of_surface(
     start = _connected(_chosen(candidates, choice.best.chosen), evidence, prices, seed)
     adjusted = _adjusted(start, evidence, seed=seed, deadline=deadline, progress=progress)
     unharmed = _unharmed(adjusted, start, evidence, prices, seed)
-    thick = regrouped(unharmed, thickened(drawn(unharmed), evidence, _fixed(unharmed)))
-    parts = _connected(thick, evidence, prices, seed)
+    parts = _connected(unharmed, evidence, prices, seed)
     program = in_order(named(parts, tidy(Program(tuple(at_the_far_side(plain(node)) for node in drawn(parts).body)))))
     seen = _seen(choice, candidates)
     share = explained(_covers(program.body, evidence, prices, seed), tuple(range(len(program.body))))
@@ -210,12 +207,7 @@ def _improved(
             break
         rest = [candidates[place] for place in missed(made, choice.best.chosen)[:REST]]
         adjusted = _adjusted(parts, evidence, steps=ROUGH, seed=seed, deadline=deadline)
-        nodes = [
-            *drawn(parts).body,
-            *drawn(adjusted).body,
-            *neighbours(drawn(adjusted)),
-            *split(drawn(adjusted), evidence),
-        ]
+        nodes = [*drawn(parts).body, *drawn(adjusted).body, *neighbours(drawn(adjusted))]
         near = list(dict.fromkeys([*parts, *adjusted, *nodes, *rest]))  # the parts first: the search goes on from them
         near += proposed(functions, [part for part in near if not isinstance(part, Called)], deadline)
         more = _covers(near, evidence, prices, seed)

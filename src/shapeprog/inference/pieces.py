@@ -6,8 +6,7 @@ source    box around
 component a connected component of the mesh
 group     boxes that touch, such as the frame of a back
 rod       points on a cylinder
-limb      points whose inner balls run on in one direction: bent bars and curved boards too;
-          thin stretches of scans and of cells
+limb      thin stretches of scans and of cells; of these also points whose inner balls run on in one direction
 slab      the space between two planar patches that face each other
 sheet     one planar patch; how thick it is, is not known
 ========= ==========================================================================================
@@ -121,9 +120,9 @@ def find_pieces(shape: Shape, seed: int = 0) -> Pieces:
         return _of_mesh(mesh, seed)
     if shape.points is not None:
         cloud = cloud_of(points_of_scan(shape))
-        return _of_points(cloud, _told(cloud, seed, strands(cloud)))
+        return _of_points(cloud, _told(cloud, seed, [*strands(cloud), *limbs(cloud)]))
     cloud = cloud_of(*faces_of_cells(shape.voxels, POINTS, seed=seed))
-    found = _of_points(cloud, [(Source.LIMB, stacks(shape.voxels)), *_told(cloud, seed)])
+    found = _of_points(cloud, [(Source.LIMB, stacks(shape.voxels)), *_told(cloud, seed, limbs(cloud))])
     return found._replace(boxes=shrunk(found.boxes, TOO_FAT))
 
 
@@ -142,7 +141,7 @@ def _of_mesh(mesh: Components, seed: int) -> Pieces:
     corners = mesh.vertices[mesh.faces[face]]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     cloud = cloud_of(points, normals / np.linalg.norm(normals, axis=1, keepdims=True))
-    listed = [(Source.GROUP, groups(boxes)), *_told(cloud, seed)]
+    listed = [(Source.GROUP, groups(boxes)), *_told(cloud, seed, [])]
     return _ranked(cloud, listed, boxes, mesh.component_of(face))
 
 
@@ -151,8 +150,11 @@ def _of_points(cloud: Cloud, listed: list[tuple[Source, Boxes]]) -> Pieces:
     return _ranked(cloud, listed, join([]), np.full(len(cloud.points), -1))
 
 
-def _told(cloud: Cloud, seed: int, thin: Sequence[npt.NDArray[np.int64]] = ()) -> list[tuple[Source, Boxes]]:
-    """Pieces that points with normals tell of, by source, and groups of those that explain the points together."""
+def _told(cloud: Cloud, seed: int, along: Sequence[npt.NDArray[np.int64]]) -> list[tuple[Source, Boxes]]:
+    """Pieces that points with normals tell of, by source, and groups of those that explain the points together.
+
+    ``along`` has the points of each limb.
+    """
     if len(cloud.points) < LEAST:
         return [(Source.GROUP, boxes_around(cloud.points, np.array([0, len(cloud.points)])))]
     patches = planar_patches(cloud)
@@ -161,7 +163,7 @@ def _told(cloud: Cloud, seed: int, thin: Sequence[npt.NDArray[np.int64]] = ()) -
     support = Support(cloud, between)
     kept = np.flatnonzero(support.filled)
     kept = kept[np.argsort(-support.near[kept].sum(1), kind="stable")[:SLABS]]
-    along = [*thin, *limbs(cloud)][:LIMBS]
+    along = along[:LIMBS]
     members = cloud.points[np.concatenate(along)] if along else np.zeros((0, 3))
     found = [
         (Source.ROD, rods(cloud, seed)),

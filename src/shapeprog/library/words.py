@@ -84,5 +84,13 @@ def _joined(*words: str) -> str:
 
 
 def plural(word: str) -> str:
-    """Several of something."""
-    return "shelves" if word == "shelf" else f"{word}es" if word.endswith(("s", "x", "ch", "sh")) else f"{word}s"
+    """The plural of an English noun: ``shelf`` and ``shelves``."""
+    if word.endswith("foot"):
+        return f"{word[:-4]}feet"
+    if word.endswith("f"):
+        return f"{word[:-1]}ves"
+    if word.endswith(("s", "x", "ch", "sh")):
+        return f"{word}es"
+    if word.endswith("y") and word[-2:-1] not in "aeiou":
+        return f"{word[:-1]}ies"
+    return f"{word}s"

@@ -6,7 +6,7 @@ chosen, by exchange of one for another, from which every number is the shortest 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import combinations
 from typing import Literal
@@ -16,7 +16,6 @@ import numpy as np
 from shapeprog.independence import independent
 from shapeprog.inference.ties.features import Feature
 from shapeprog.inference.ties.following import Following
-from shapeprog.inference.ties.runs import Run
 from shapeprog.inference.ties.sums import SAME, Flags, cost_of_terms, nearest_quarter
 from shapeprog.space import DEPTH, SIDE, UP, Array, FloatArray
 
@@ -26,9 +25,6 @@ FLOOR = 0.4
 SENSITIVE, DIFFERENCE = 3.0, 3.0
 """A length that is the difference of numbers so many times as large is lost when one of them is changed; what each such
 number costs."""
-
-SHARED = 0.3
-"""What dividing by the number of copies costs."""
 
 PLACED = 2.0
 """Price of a name from which it measures a place."""
@@ -45,13 +41,11 @@ AT_ONCE = 1 << 22
 OFFSET = 3.0
 """Cells between sides of parts that touch, at most, that may be a measure."""
 
-Word = Literal[
-    "extent", "top", "bottom", "inset", "length", "radius", "span", "shift", "step", "angle", "side", "place", "offset"
-]
+Word = Literal["extent", "top", "bottom", "inset", "length", "radius", "shift", "angle", "side", "place", "offset"]
 
 NAMED: dict[Word, float] = {
-    "extent": -25.0, "length": 0.8, "radius": 0.8, "top": 0.9, "bottom": 1.2, "inset": 1.2, "span": 1.0, "shift": 1.0,
-    "step": 3.0, "angle": 1.0, "side": 9.0, "place": 8.0, "offset": 1.5,
+    "extent": -25.0, "length": 0.8, "radius": 0.8, "top": 0.9, "bottom": 1.2, "inset": 1.2, "shift": 1.0,
+    "angle": 1.0, "side": 9.0, "place": 8.0, "offset": 1.5,
 }  # fmt: skip
 """What a name costs its reader by what it measures, and by how much the extents of the whole are preferred.  A number
 that is used once needs no name; but a place, measured from the middle, stays behind when the whole is changed."""
@@ -87,19 +81,12 @@ class Basis:
     values: FloatArray
 
 
-def measures(
-    known: list[Feature], numbers: FloatArray, runs: Sequence[Run], touching: set[tuple[int, int]]
-) -> Iterator[Measure]:
-    """What names may stand for; heights are above the floor, insets from the nearest side of the whole, the span of a
-    run from its first copy to the last, and offsets between sides of parts that touch."""
+def measures(known: list[Feature], numbers: FloatArray, touching: set[tuple[int, int]]) -> Iterator[Measure]:
+    """What names may stand for; heights are above the floor, insets from the nearest side of the whole, and offsets
+    between sides of parts that touch."""
     whole = {each.axis: each.row for each in known if each.kind == "extent"}
-    between = {run.step: run.copies - 1 for run in runs}
     for each in known:
-        step = int(np.argmax(each.row != 0)) if each.kind == "shift" else -1
-        if step in between:
-            yield Measure("span", each, between[step] * each.row)
-            yield Measure("step", each, each.row)
-        elif each.kind in ("extent", "length", "radius", "shift", "angle", "place"):
+        if each.kind in ("extent", "length", "radius", "shift", "angle", "place"):
             yield Measure(each.kind, each, each.row)
         if each.kind in ("low", "high"):
             yield Measure("side", each, each.row)
@@ -122,7 +109,6 @@ def simplest(
     numbers: FloatArray,
     ways: FloatArray,
     lengths: Flags,
-    runs: Sequence[Run],
     touching: set[tuple[int, int]],
     following: Following | None,
 ) -> Basis:
@@ -136,19 +122,17 @@ def simplest(
         A basis (V, Z) of the numbers for which they hold.
     lengths
         Which numbers are lengths (V,).
-    runs
-        The steps that may be written as a share of a span.
     touching
         Pairs of nodes, the smaller first, whose parts touch.
     following
         Tells what changes of measures part.
     """
-    every = list(measures(known, numbers, runs, touching))
+    every = list(measures(known, numbers, touching))
     seen = np.stack([each.row for each in every]) @ ways
     groups = _together(seen, every)
     heads = [every[group[0]] for group in groups]
     seen = seen[[group[0] for group in groups]]
-    reader = _Reader(heads, numbers, lengths, runs, following)
+    reader = _Reader(heads, numbers, lengths, following)
     chosen: Array = np.array(independent(seen, np.argsort(reader.prices, kind="stable").tolist()), np.int64)
     factors = ways @ np.linalg.inv(seen[chosen])
     total = float((reader.reading(factors[None], chosen[None]) + reader.parting(factors[None], chosen[None]))[0])
@@ -168,10 +152,9 @@ class _Reader:
         heads: list[Measure],
         numbers: FloatArray,
         lengths: Flags,
-        runs: Sequence[Run],
         following: Following | None,
     ) -> None:
-        self.runs, self.following = runs, following
+        self.following = following
         self.prices = np.array([NAMED[each.word] for each in heads])
         self.values: FloatArray = np.array([each.row @ numbers for each in heads])
         count = len(numbers) - 3
@@ -225,13 +208,6 @@ class _Reader:
         size = np.abs(factors)
         used = size > SAME
         terms = cost_of_terms(factors)
-        for run in self.runs:
-            mine = terms[:, run.step]
-            for shares in (run.copies - 1, run.copies, run.copies + 1):
-                shared = cost_of_terms(shares * factors[:, run.step])
-                cheaper = SHARED + shared.sum(-1) < mine.sum(-1)
-                mine[cheaper] = shared[cheaper]
-                mine[:, 0] += SHARED * cheaper
         floor = (chosen == self.height)[:, None] & (np.abs(factors + 0.5) < SAME)
         terms[floor] = FLOOR
         terms += DIFFERENCE * (size * np.abs(self.values[chosen])[:, None] > self.small[:, None])

@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 
 import numpy as np
 
-from shapeprog.inference.candidates import solid_boxes
 from shapeprog.inference.ties.basis import Basis, Measure
-from shapeprog.inference.ties.runs import Run, Shares, plural, shares
-from shapeprog.inference.ties.sums import SAME, nearest_quarter
+from shapeprog.inference.ties.sums import SAME
 from shapeprog.inference.tunable import Tunable
 from shapeprog.language.evaluation import evaluated
 from shapeprog.language.expression import Name, Value, combined
 from shapeprog.language.parameters import to_float32
 from shapeprog.language.program import Draw, Node, Program
-from shapeprog.language.source import Assignment, Line, Source, WrittenDraw, WrittenLoop
+from shapeprog.language.source import Assignment, Source, WrittenDraw, WrittenLoop
 from shapeprog.language.statement import language
 from shapeprog.space import DEPTH, SIDE, UP, FloatArray
 
@@ -52,25 +50,22 @@ LEVEL = 0.6
 """A part is thin along an axis where it measures less than this share of the next longer."""
 
 
-def written(tunable: Tunable, basis: Basis, runs: Sequence[Run]) -> Program:
-    """The program whose numbers follow from named ones; those used once stay where they are used.
-
-    Runs are written by their counts where their steps follow from a span.
-    """
+def written(tunable: Tunable, basis: Basis) -> Program:
+    """The program whose numbers follow from named ones; those used once stay where they are used."""
     count = len(tunable.moving)
     uses = np.abs(basis.factors[:count]) > SAME
     alone = [  # used once, as it is; or, an extent that nothing follows from, not at all
         not uses[:, z].any() or bool(uses[:, z].sum() == 1 and abs(np.abs(basis.factors[:count, z]).sum() - 1) < SAME)
         for z in range(len(basis.chosen))
     ]
-    names, order, taken = _names(tunable, basis, alone)
+    names, order = _names(tunable, basis, alone)
     up = [z for z in range(len(basis.chosen)) if names[z] == EXTENTS[UP]]
     floors = bool(up) and not alone[up[0]] and int((basis.factors[:count, up[0]] == -0.5).sum()) > 1
     terms: dict[int, Value] = {
         z: to_float32(basis.values[z]) if alone[z] else Name(names[z]) for z in range(len(basis.chosen))
     }
 
-    def sum_of(row: FloatArray, *others: tuple[Value, float]) -> Value:
+    def sum_of(row: FloatArray) -> Value:
         parts: list[tuple[Value, float]] = []
         for z in order:
             if not row[z]:
@@ -80,53 +75,13 @@ def written(tunable: Tunable, basis: Basis, runs: Sequence[Run]) -> Program:
             else:
                 parts.append((terms[z], float(row[z])))
         parts.sort(key=lambda part: part[1] < 0)  # sums begin with what is added
-        return combined(0.0, [*parts, *others])
+        return combined(0.0, parts)
 
     table = {place: sum_of(row) for place, row in zip(tunable.moving, basis.factors[:count], strict=True)}
-    counts: list[tuple[str, Value]] = []
-    spacings: list[Line] = []
-    steps = np.array([group[0].word == "step" for group in basis.chosen])
-    for way, alike in _together(tunable, basis.factors, [(run, shares(run, basis.factors, steps)) for run in runs]):
-        part = _part(tunable, max(alike, key=lambda run: _bulk(tunable, run.node)).node)
-        name = Name(_unused(plural(part), taken))
-        copies, step = alike[0].copies, basis.factors[alike[0].step]
-        counts.append((name.name, float(copies)))
-        each: Value = sum_of(nearest_quarter((copies + way.more) * step)) / combined(way.more, [(name, 1.0)])
-        if way.before:
-            spacings.append(Assignment((((spacing := _unused(f"{part}_spacing", taken)), each),)))
-            each = Name(spacing)
-        for run in alike:
-            for start in run.starts if way.before else ():
-                row = nearest_quarter(basis.factors[start] - way.before * step)
-                table[tunable.moving[start]] = sum_of(row, (each, way.before))
-            table[tunable.moving[run.step]] = each
-            table[run.node, run.slot] = name
     floor: list[tuple[str, Value]] = [(FLOOR, -Name(EXTENTS[UP]) / 2)] if floors else []
-    lines: list[Line] = list(_header(basis, names, order, alone, [*floor, *counts]))
+    lines = _header(basis, names, order, alone, floor)
     body = _lines(tunable.program.body, iter(range(len(tunable.nodes))), table)
-    return evaluated(Source((*lines, *spacings, *body)))
-
-
-def _together(
-    tunable: Tunable, factors: FloatArray, written: Sequence[tuple[Run, Shares | None]]
-) -> Iterator[tuple[Shares, list[Run]]]:
-    """Runs that are written by their counts, those of as many copies at the same step along the same axis together.
-
-    So a handle stays on each of some drawers, however many there are.
-    """
-    groups: dict[tuple[Shares, int, str, int, bytes], list[Run]] = {}
-    for run, way in written:
-        if way is not None:
-            (node, slot), step = tunable.moving[run.step], np.round(factors[run.step], 6) + 0.0
-            key = (way, run.copies, tunable.nodes[node].name, slot, step.tobytes())
-            groups.setdefault(key, []).append(run)
-    return ((key[0], alike) for key, alike in groups.items())
-
-
-def _bulk(tunable: Tunable, node: int) -> float:
-    """How much the part of a node fills, about."""
-    (boxes,) = solid_boxes([_drawn(tunable, node)[1]])
-    return sum(float(np.prod(box.half)) for box in boxes)
+    return evaluated(Source((*lines, *body)))
 
 
 def _header(
@@ -155,9 +110,11 @@ def _header(
         note = ""
 
 
-def _names(tunable: Tunable, basis: Basis, alone: list[bool]) -> tuple[list[str], list[int], set[str]]:
-    """A name for every measure; the order in which they are met, the whole first, then by the order of the text; and
-    all words that are taken.  Those that nobody reads come last, so that they take no name from others."""
+def _names(tunable: Tunable, basis: Basis, alone: list[bool]) -> tuple[list[str], list[int]]:
+    """A name for every measure, and the order in which they are met, the whole first, then by the order of the text.
+
+    Those that nobody reads come last, so that they take no name from others.
+    """
     known, taken = language(), {FLOOR, *(node.name for node in tunable.nodes), *_roles(tunable.nodes)}
     taken |= {*known.names, *known.roles}
     first = [min(each.feature.node for each in group) for group in basis.chosen]
@@ -170,7 +127,7 @@ def _names(tunable: Tunable, basis: Basis, alone: list[bool]) -> tuple[list[str]
         ]
         names[z] = _unused(next((name for name in (*offered, *words) if name not in taken), offered[-1]), taken)
         holder[names[z]] = node
-    return names, order, taken
+    return names, order
 
 
 def _middles(tunable: Tunable) -> dict[int, FloatArray]:
@@ -240,7 +197,7 @@ def _kind(tunable: Tunable, measure: Measure) -> str:
     node = tunable.nodes[feature.node]
     if word == "length":
         return _length(tunable, measure)
-    if word in ("shift", "step"):
+    if word == "shift":
         return "spacing"
     if word == "offset":
         parts = [_part(tunable, each) for each in (feature.node, measure.origin)]

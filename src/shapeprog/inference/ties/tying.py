@@ -18,10 +18,8 @@ from shapeprog.inference.connecting import afloat
 from shapeprog.inference.evidence import Evidence
 from shapeprog.inference.joints import Joints, find_joints
 from shapeprog.inference.refine import single_threaded
-from shapeprog.inference.roles import named_anew
 from shapeprog.inference.ties.alike import alike
 from shapeprog.inference.ties.basis import Basis, simplest
-from shapeprog.inference.ties.buried import buried, doubled
 from shapeprog.inference.ties.closeness import Closeness
 from shapeprog.inference.ties.contacts import Contacts
 from shapeprog.inference.ties.features import Feature, features
@@ -29,13 +27,11 @@ from shapeprog.inference.ties.fitting import CLOSED, Misfit, refitted, ways_free
 from shapeprog.inference.ties.following import Following
 from shapeprog.inference.ties.leaning import between_ends
 from shapeprog.inference.ties.naming import written
-from shapeprog.inference.ties.opposite import as_images
 from shapeprog.inference.ties.pricing import worthwhile
 from shapeprog.inference.ties.relations import INFERRED, WRITTEN, Relation, relations
-from shapeprog.inference.ties.runs import Run, runs
 from shapeprog.inference.tunable import CELLS, DEGREES, Tunable
 from shapeprog.language.free import free_numbers
-from shapeprog.language.program import Draw, Program, nest
+from shapeprog.language.program import Draw, Program
 from shapeprog.language.unroll import unroll
 from shapeprog.space import FloatArray
 
@@ -78,8 +74,6 @@ def tie(
 ) -> Tied:
     """The same program with names for its free numbers and expressions for all others; the same for the same seed.
 
-    Parts that lie wholly inside of others once the relations hold are left out, unless somebody wrote them.
-
     Parameters
     ----------
     evidence
@@ -91,7 +85,7 @@ def tie(
     held
         Relations that hold in any case, as rows (R, F) of factors of the numbers that move.
     """
-    plain = Program(program.body) if held is not None else restated(program)
+    plain = Program(program.body) if held is not None else between_ends(program)
     if not plain.size:
         return Tied(plain, 0)
     closeness = Closeness(evidence, seed)
@@ -104,29 +98,17 @@ def tie(
                 progress("tying numbers", (round_ + 1) / ROUNDS)
             if not imposed:
                 break
-        basis, following, repeated = ties.simplest()
+        basis, following = ties.simplest()
         more = [] if known else list(alike(basis, following, trusted))
         if more and ties.impose(more, worth):
-            basis, _, repeated = ties.simplest()
-        named = written(ties.tunable, _rounded(basis), repeated)
+            basis, _ = ties.simplest()
+        named = written(ties.tunable, _rounded(basis))
     found = Tied(named, free_numbers(named))
-    if held is not None or known:
-        return found
-    if gone := buried(named):
-        rest = [nest(chain) for block, chain in enumerate(plain.chains) if block not in gone]
-        return tie(named_anew(Program(tuple(rest))), evidence, price=price, seed=seed, progress=progress)
-    if once := doubled(named):
-        return tie(Program(tuple(map(nest, once))), evidence, price=price, seed=seed, progress=progress)
-    if price > CHEAPEST:
+    if held is None and not known and price > CHEAPEST:
         lost = closeness.of(unroll(plain)) - closeness.of(unroll(named))
         if lost > LOST or afloat(named, seed, APART) > afloat(plain, seed, APART):
             return tie(program, evidence, price=price / CHEAPER, seed=seed, progress=progress)
     return found
-
-
-def restated(program: Program) -> Program:
-    """The same parts, said so that what should hold together can be tied: see the modules of these two functions."""
-    return as_images(between_ends(program))
 
 
 class _Ties:
@@ -168,14 +150,12 @@ class _Ties:
         self.numbers = self._closest(optimum)
         return len(self.rows) > before
 
-    def simplest(self) -> tuple[Basis, Following | None, list[Run]]:
-        """The measures that all numbers follow from, what changes of them part, and runs that are written by counts."""
+    def simplest(self) -> tuple[Basis, Following | None]:
+        """The measures that all numbers follow from, and what changes of them part."""
         ways = ways_free(self.rows, len(self.numbers))
-        repeated = list(runs(self.tunable, ways))
         lengths = np.append(self.tunable.are("length").numpy(), [False] * 3)
         following = Following(self.tunable, self.joints, self.numbers) if self.joints else None
-        basis = simplest(self.measured(), self.numbers, ways, lengths, repeated, self.touching, following)
-        return basis, following, repeated
+        return simplest(self.measured(), self.numbers, ways, lengths, self.touching, following), following
 
     def _closest(self, numbers: FloatArray) -> FloatArray:
         """The numbers (V,) for which the relations hold: as they fit best, as they are, or half-way.

@@ -155,14 +155,28 @@ def test_a_tapered_leg_is_no_mirror_image_of_one_that_stands_on_its_head():
     assert repeated([one, other]) == []
 
 
-@pytest.mark.parametrize("count", [3, 4, 5, 6])
-def test_legs_around_the_middle_are_turned(count):
+def spokes(count):
+    """Rods around the middle, one by one."""
     text = f"for i in rotate({count}, step=1):\n    rod(start=(-12, 7, 1), end=(2, 3, 1), radius=0.8)\n"
     scene = sp.unroll(parse(text))
     ends = [scene.centre + sign * scene.rotation[..., 0] * scene.size[..., :1] for sign in (-1, 1)]
-    singles = [Draw("rod", (*a, *b, 0.8)) for a, b in zip(*(each.tolist() for each in ends), strict=True)]
+    return scene, [Draw("rod", (*a, *b, 0.8)) for a, b in zip(*(each.tolist() for each in ends), strict=True)]
+
+
+@pytest.mark.parametrize("count", [3, 4, 5, 6])
+def test_legs_around_the_middle_are_turned(count):
+    scene, singles = spokes(count)
     found = [node for node in repeated(singles) if node.name == "rotate" and node.values[0] == count]
     assert any(torch.cdist(sp.unroll(Program((node,))).centre, scene.centre).amin(1).max() < 1e-3 for node in found)
+
+
+def test_single_parts_are_turned_whatever_stands_before_them_and_pairs_never():
+    _, singles = spokes(3)
+    pairs = [Loop("translate", (2.0, 30.0, 0.0, 0.0), (spoke,)) for spoke in singles]
+    for nodes in ([*pairs, *singles], [*singles, *pairs]):
+        turned = [node for node in repeated(nodes) if node.name == "rotate"]
+        assert turned
+        assert all(isinstance(node.body[0], Draw) for node in turned)
 
 
 def test_a_block_is_written_by_the_plainest_statement_that_draws_it():

@@ -13,6 +13,7 @@ from shapeprog.geometry.cells import voxels as voxels_of
 from shapeprog.geometry.surface import sample_surface
 from shapeprog.inference import Schedule, Settings, infer, refine, snap, snapped_from
 from shapeprog.inference.budget import Deadline
+from shapeprog.inference.tunable import THINNEST
 from shapeprog.language.tensors import Code, decode, encode
 from shapeprog.language.text import parse
 from shapeprog.language.unroll import unroll
@@ -48,6 +49,14 @@ def test_refinement_finds_planted_lengths_and_places():
     assert encode(found.flat()).ids.equal(encode(planted.flat()).ids)
     assert (found.blocks, found.size) == (planted.blocks, planted.size)
     assert float((numbers(found) - numbers(planted)).abs().max()) < 0.05
+
+
+def test_refinement_leaves_no_part_thinner_than_fitting_does():
+    for text, slot in (("leg(at=(0, 0, 0), size=(1, 9, 9))", 3), ("top_square(at=(0, 0, 0), thickness=9, half=1)", 4)):
+        program = parse(text)
+        flat = points(program) * torch.tensor([1e-3, 1, 1] if slot == 3 else [1, 1e-3, 1e-3])
+        found = refine(program, flat, schedule=Schedule(steps=60, rate=0.3))
+        assert numbers(found)[0, 0, slot] >= (THINNEST if slot == 3 else THINNEST / 2) - 1e-6
 
 
 def test_refinement_moves_no_number_farther_than_its_reach():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import torch
 from test_inference_search import CHAIR, cells
 
 import shapeprog as sp
@@ -16,6 +17,8 @@ from shapeprog.inference.assembly import assemble
 from shapeprog.inference.cell_coverage import choose_on_cells, cost_on_cells, covers_of_cells
 from shapeprog.inference.coverage import Prices
 from shapeprog.inference.evidence import evidence_of
+from shapeprog.inference.residuals import Target
+from shapeprog.inference.tunable import Tunable
 from shapeprog.language import Program
 from shapeprog.language.text import numbers_written, parse
 
@@ -111,3 +114,12 @@ def test_a_program_found_on_cells_is_tied_where_it_gets_no_longer():
     assert [each.name for each in sp.names(tied.program)][:2] == ["width", "depth"]
     assert tied.scores["numbers"] < plain.scores["numbers"]
     assert tied.scores["iou"] >= plain.scores["iou"] - 0.02
+
+
+def test_cells_without_any_order_have_pairs():
+    solid = np.indices((32, 32, 32)).sum(0) % 2 == 0
+    tunable = Tunable(parse(TABLE))
+    pairs = Target(evidence_of(Shape("checkerboard", solid))).pairs(
+        tunable.scene(tunable.values), torch.Generator().manual_seed(0)
+    )
+    assert pairs.weights.isfinite().all()

@@ -26,14 +26,12 @@ from shapeprog.geometry.primitive import primitives
 from shapeprog.geometry.scene import Scene
 from shapeprog.geometry.surface import sample_surface
 from shapeprog.inference.budget import NEVER, Deadline, Progress
+from shapeprog.inference.tunable import least
 from shapeprog.language.program import Program
 from shapeprog.language.statement import language
 from shapeprog.language.tensors import Code, decode, encode
 from shapeprog.language.unroll import Plan
 from shapeprog.space import HALF
-
-THINNEST = 0.05
-"""Smallest length in cells that refinement leaves, so that no part vanishes."""
 
 DECIMALS = 2
 """Decimals of a cell that refined parameters keep: a hundredth is .04 % of the longest side."""
@@ -118,9 +116,8 @@ def refine(
     if not program.size:
         return program
     start = encode(program.flat())
-    free, length = _slots(start)
+    free, low = _slots(start)
     values = start.parameters.clone()
-    low = torch.where(length, THINNEST, -torch.inf)
     high = torch.full_like(low, torch.inf)
     if reach is not None:
         low, high = torch.maximum(low, values - reach), values + reach
@@ -161,13 +158,13 @@ def refine(
     return decode(start.having(tidy))[0]
 
 
-def _slots(code: Code) -> tuple[Bool[Tensor, "K J slots"], Bool[Tensor, "K J slots"]]:
-    """Which slots of a program may move, and which of those in use are lengths.
+def _slots(code: Code) -> tuple[Bool[Tensor, "K J slots"], Float[Tensor, "K J slots"]]:
+    """Which slots of a program may move, and the least value of each, so that no part vanishes.
 
     Continuous parameters move; a shift that is exactly zero stays zero, so that a loop along an axis keeps to it.
     """
     free = torch.zeros(code.parameters.shape, dtype=torch.bool)
-    length = torch.zeros_like(free)
+    low = torch.full_like(code.parameters, -torch.inf)
     for declared in language():
         here = code.ids == declared.id
         if not bool(here.any()):
@@ -175,8 +172,8 @@ def _slots(code: Code) -> tuple[Bool[Tensor, "K J slots"], Bool[Tensor, "K J slo
         for slot, quantity in enumerate(declared.quantities):
             still = (code.parameters[..., slot] == 0) & (quantity.kind == "shift")
             free[..., slot] |= here & (not quantity.discrete) & ~still
-            length[..., slot] |= here & (quantity.kind == "length")
-    return free, length
+            low[..., slot] = torch.where(here, least(quantity), low[..., slot])
+    return free, low
 
 
 def _ends(scene: Scene) -> tuple[Float[Tensor, "N 3"], Float[Tensor, "N 3"]]:

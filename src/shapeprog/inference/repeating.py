@@ -61,8 +61,9 @@ def _rolled(nodes: Sequence[Node]) -> list[Node]:
         return []
     seen = looks(nodes)
     found: list[Node] = [replace(loop, body=(nodes[one],)) for one, loop in rows_and_pairs(seen)]
-    for count in () if isinstance(nodes[0], Loop) else TURNS:  # turned pairs would be drawn twice
-        found += [Loop("rotate", _values(count, 1), (nodes[one],)) for one in turned(seen, count)]
+    drawn = {place for place, node in enumerate(nodes) if not isinstance(node, Loop)}  # not pairs, which would overlap
+    for count in TURNS if drawn else ():
+        found += [Loop("rotate", _values(count, 1), (nodes[one],)) for one in turned(seen, count) if one in drawn]
     if not found:
         return []
     return [found[place] for place in distinct(found, looks(found))]

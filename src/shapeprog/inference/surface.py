@@ -61,7 +61,7 @@ def exposed_faces(voxels: npt.NDArray[np.bool_]) -> npt.NDArray[np.int64]:
             beyond = np.roll(padded, -sign, axis)[1:-1, 1:-1, 1:-1]
             cells = np.argwhere(voxels & ~beyond)
             found.append(np.column_stack([cells, np.full(len(cells), axis), np.full(len(cells), sign)]))
-    return np.concatenate(found)
+    return np.ascontiguousarray(np.concatenate(found))  # as kernels want what is made of it
 
 
 def exposed(

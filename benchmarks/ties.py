@@ -92,10 +92,11 @@ def of_furniture(task: Task) -> dict[str, Any]:
     """How many ties of a planted program are found again."""
     from shapeprog.data.synthetic.furniture import furniture
     from shapeprog.inference.evidence import evidence_of_program
-    from shapeprog.inference.ties.tying import restated, tie
+    from shapeprog.inference.ties.leaning import between_ends
+    from shapeprog.inference.ties.tying import tie
     from shapeprog.language.text import format_program
 
-    planted = restated(furniture(task.number, task.seed))
+    planted = between_ends(furniture(task.number, task.seed))
     noisy = with_noise(planted, np.random.default_rng((task.seed, task.number)))
     evidence = evidence_of_program(planted if task.set == "fitted" else noisy, task.seed)
     started = time.process_time()
@@ -119,10 +120,10 @@ def of_furniture(task: Task) -> dict[str, Any]:
 def redrawn(number: int, seed: int) -> Any:
     """The numbers that may move (K, F) of furniture that is designed as that of a number is, which comes first."""
     from shapeprog.data.synthetic.furniture import furniture
-    from shapeprog.inference.ties.tying import restated
+    from shapeprog.inference.ties.leaning import between_ends
     from shapeprog.inference.tunable import Tunable
 
-    tunable = Tunable(restated(furniture(number, seed)))
+    tunable = Tunable(between_ends(furniture(number, seed)))
     moving = set(tunable.moving)
 
     def design(program: Any) -> list[Any]:
@@ -132,7 +133,7 @@ def redrawn(number: int, seed: int) -> Any:
             for n, node in enumerate(program.walk())
         ]
 
-    programs = (tunable.program, *(restated(furniture(number, seed, measures)) for measures in range(VARIANTS)))
+    programs = (tunable.program, *(between_ends(furniture(number, seed, measures)) for measures in range(VARIANTS)))
     alike = (list(each.walk()) for each in programs if design(each) == design(tunable.program))
     return np.array([[nodes[n].values[slot] for n, slot in tunable.moving] for nodes in alike])
 

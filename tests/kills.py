@@ -24,21 +24,10 @@ from typing import Any
 
 import numpy as np
 import torch
-from toy_training import Toy
 
-from shapeprog.data.packs import write_pack
 from shapeprog.data.preparation import prepare
-from shapeprog.data.shape import Shape
 from shapeprog.formats import export
 from shapeprog.language.text import parse
-from shapeprog.language.unroll import unroll
-from shapeprog.models.designs import build_generator
-from shapeprog.training.adapt import Adaptation
-from shapeprog.training.adapt_settings import AdaptSettings
-from shapeprog.training.engine import Engine
-from shapeprog.training.folder import PREVIOUS, read_log
-from shapeprog.training.loop import run
-from shapeprog.training.settings import Settings
 
 TEXTS = (
     "leg(at=(-12, -4, -6), size=(24, 8, 12))\n",
@@ -61,32 +50,6 @@ class Task:
     libraries: tuple[str, ...]
 
 
-def pretrain(inputs: Path, folder: Path) -> None:
-    settings = Settings(visits=160, batch=4, validate_every=20)
-    for _ in run(Toy(pause=0.002), settings, folder, Engine("cpu", threads=1), save_seconds=0.01):
-        pass
-
-
-def adapt(inputs: Path, folder: Path) -> None:
-    packs = (str(inputs / "boxes.npz"),)
-    settings = AdaptSettings(
-        packs=packs, batch=2, precision="float32", points=50, blocks=2, visits=24, choose="argmax", loss="chamfer",
-        ids="nvil", validate_every=8,
-    )  # fmt: skip
-    torch.manual_seed(0)
-    generator = build_generator("swift", {"widths": (4, 4, 8), "squeeze": 4, "feature": 32})
-    objective = Adaptation(generator, settings, val=[Path(packs[0])])
-    for _ in run(objective, settings, folder, Engine("cpu", threads=1), save_seconds=0.01):
-        pass
-
-
-def trained(folder: Path) -> Any:
-    """Files, and their bytes where these do not depend on when the task was killed."""
-    log = [{name: value for name, value in record.items() if name != "seconds"} for record in read_log(folder)]
-    kept = {path.name: path.read_bytes() for path in folder.iterdir() if path.suffix == ".safetensors"}
-    return sorted(path.name for path in folder.iterdir()), log, {**kept, PREVIOUS: b""}
-
-
 def make_packs(inputs: Path, folder: Path) -> None:
     for _ in prepare(inputs / "models", folder, points=200):
         pass
@@ -100,23 +63,17 @@ def packed(folder: Path) -> Any:
     return found
 
 
-TRAINING = ("accelerate", "torch._dynamo")
 TASKS = {
-    "pretrain": Task(pretrain, trained, TRAINING),
-    "adapt": Task(adapt, trained, TRAINING),
     "prepare": Task(make_packs, packed, ("trimesh", "numba")),
 }
 
 
 def make_inputs(inputs: Path) -> None:
-    shapes = []
     for number, text in enumerate(TEXTS):
         program = parse(text)
-        shapes.append(Shape(f"box{number}", unroll(program).voxels().numpy().astype(np.bool_)))
         for category in ("one", "two"):
             (inputs / "models" / category).mkdir(parents=True, exist_ok=True)
             export(program, inputs / "models" / category / f"{number}.obj")
-    write_pack(inputs / "boxes.npz", shapes)
 
 
 def started(task: Task, inputs: Path, folder: Path) -> int:

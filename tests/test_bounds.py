@@ -27,7 +27,6 @@ CHOSEN = [
     "tests/test_many_parts.py::test_distances_to_many_parts_are_those_of_all_pairs",
     "tests/test_geometry_cells.py::test_any_pose_and_kind_fills_the_same_cells_by_kernel_and_by_declaration",
     "tests/test_geometry_surface.py::test_gradient_of_placing_is_that_of_the_declarations",
-    "tests/test_data_synthetic.py::test_every_block_has_cells_of_its_own",
 ]
 """Tests that between them run kernels of every room."""
 

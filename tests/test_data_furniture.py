@@ -13,10 +13,9 @@ from typer.testing import CliRunner
 
 import shapeprog as sp
 from shapeprog.cli.app import app
-from shapeprog.data.synthetic import prior, programs
-from shapeprog.data.synthetic.furniture import FURNITURE, furniture
+from shapeprog.data import read_pack
+from shapeprog.data.synthetic import FURNITURE, furniture
 from shapeprog.data.synthetic.sketch import Sketch, between
-from shapeprog.errors import InputError
 from shapeprog.geometry.distance import each_distance
 from shapeprog.geometry.mesh import part_meshes
 from shapeprog.geometry.surface import sample_surface
@@ -30,7 +29,7 @@ TOUCHING = 0.02
 
 @cache
 def sample() -> tuple[Program, ...]:
-    return tuple(programs(FURNITURE, COUNT, SEED))
+    return tuple(furniture(number, SEED) for number in range(COUNT))
 
 
 def corners(program: Program) -> list[np.ndarray]:
@@ -82,7 +81,7 @@ def test_parts_are_no_thinner_than_wood_and_no_two_are_the_same() -> None:
 
 
 def test_it_draws_splayed_mirrored_tapered_bent_tilted_and_soft_parts() -> None:
-    drawn = [node for program in programs(FURNITURE, 120, SEED) for node in program.walk()]
+    drawn = [node for number in range(120) for node in furniture(number, SEED).walk()]
     names = {node.name for node in drawn}
     solids = {"box", "board", "bar", "cylinder", "rod", "taper", "bent_rod", "cushion", "leg"}
     assert names == {*solids, "mirror", "translate", "rotate"}
@@ -112,12 +111,15 @@ def test_lengths_in_centimetres_become_tidy_cells() -> None:
     assert between((0, 2, 1), (4, 0, 3), 1) == (1, 1.5, 1.5)
 
 
-def test_generators_cannot_learn_from_it_and_it_is_sampled_by_command(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="generators cannot learn from furniture") as caught:
-        prior(FURNITURE)
-    assert "use narrow or wide" in str(caught.value)
+def test_it_is_sampled_by_command(tmp_path: Path) -> None:
     words = ["sample", FURNITURE, "--count", "2", "--seed", str(SEED), "--quiet"]
-    done = CliRunner().invoke(app, [*words, "--folder", str(tmp_path), "--pack", str(tmp_path / "pack.npz")])
+    files = ["--folder", str(tmp_path), "--pack", str(tmp_path / "pack.npz"), "--out", str(tmp_path / "sheet.png")]
+    done = CliRunner().invoke(app, [*words, *files])
     assert done.exit_code == 0, done.output
     assert sp.load(tmp_path / "furniture_1.shape") == sample()[1]
-    assert CliRunner().invoke(app, [*words, "--programs", str(tmp_path / "all.npz")]).exit_code == 2
+    assert len(read_pack(tmp_path / "pack.npz")) == 2
+    assert (tmp_path / "sheet.png").stat().st_size > 1000
+    assert "# furniture_0" in CliRunner().invoke(app, words).output
+    wrong = CliRunner().invoke(app, ["sample", "furnitur"])
+    assert wrong.exit_code == 2
+    assert "did you mean 'furniture'?" in wrong.output

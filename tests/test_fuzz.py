@@ -1,4 +1,4 @@
-"""Broken files, programs and weights by the thousand: each ends in a result or in words, whatever it holds."""
+"""Broken files and programs by the thousand: each ends in a result or in words, whatever it holds."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from shapeprog.data.loading import ARRAY_SUFFIXES
 from shapeprog.data.meshes import COMMON
 from shapeprog.data.shape import Shape
 from shapeprog.formats.format import program_suffixes
-from tests.fuzz import by_hand, faults, loaders, programs, weights
+from tests.fuzz import by_hand, faults, loaders, programs
 from tests.fuzz.campaign import run, summary, tonight
 from tests.fuzz.mutations import mutants_of
 
-NIGHTLY = {"loaders": 30_000, "programs": 10_000, "weights": 2_000}
+NIGHTLY = {"loaders": 30_000, "programs": 10_000}
 """Cases of one night."""
 
 
@@ -27,7 +27,7 @@ def test_there_is_a_valid_file_of_every_format_that_is_read(tmp_path: Path) -> N
     assert set(program_suffixes()) - {".txt"} <= {Path(name).suffix for name in programs.seeds()}
     for name, content in loaders.seeds().items():
         (tmp_path / name).write_bytes(content)
-    shapes = [tmp_path / name for name in loaders.seeds() if name not in (loaders.PROGRAMS, "labels.jsonl")]
+    shapes = [tmp_path / name for name in loaders.seeds()]
     assert {path.name: found for path, found in load_all(shapes) if not isinstance(found, Shape)} == {}
 
 
@@ -69,7 +69,7 @@ def test_everything_ends_in_a_result_or_in_words(kind: str, night: int) -> None:
 
 def crafted(kind: str) -> int:
     """How many cases of a kind are the same for every seed, and come first."""
-    return sum(1 for _ in {"programs": programs.crafted, "weights": weights.crafted}.get(kind, tuple)())
+    return sum(1 for _ in {"programs": programs.crafted}.get(kind, tuple)())
 
 
 def expected(count: int) -> list[tuple[int, str]]:

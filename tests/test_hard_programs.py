@@ -224,7 +224,11 @@ def test_show_says_that_an_input_elsewhere_is_not_shown(places: Path, capsys: py
 def test_an_ascii_terminal_shows_every_letter_somehow(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     name = tmp_path / "t\N{LATIN SMALL LETTER O WITH DIAERESIS}p.json"
     save(PROGRAM, name)
-    for words in (["export", str(name), str(name.with_suffix(".notation"))], ["models", str(name)], ["--help"]):
+    for words in (
+        ["export", str(name), str(name.with_suffix(".notation"))],
+        ["paper", "models", str(name)],
+        ["--help"],
+    ):
         both = [io.TextIOWrapper(io.BytesIO(), "ascii", errors="strict") for _ in range(2)]
         monkeypatch.setattr(sys, "stdout", both[0])
         monkeypatch.setattr(sys, "stderr", both[1])

@@ -1,3 +1,4 @@
+from . import liang2022
 from .data.loading import load_shape
 from .data.random import random_program
 from .data.shape import Shape
@@ -32,7 +33,8 @@ __all__ = [
     "Code", "Draw", "Expression", "Frame", "InputError", "Library", "Linear", "Loop", "Name", "Named", "OutputError",
     "Parametric", "Program", "ProgramError", "Scene", "Shape", "ShapeProgError", "Source", "Unit",
     "chamfer", "coverage", "decode", "encode", "evaluated", "export", "format_notation", "format_program", "in_unit",
-    "infer", "inline", "learn", "load", "load_library", "load_shape", "load_statements", "load_with_frame", "loop",
-    "names", "parse", "parse_notation", "program_from_json", "program_to_json", "random_program", "refine", "sample",
-    "save", "save_library", "set", "statement", "unroll", "using", "with_library",
+    "infer", "inline", "learn", "liang2022", "load", "load_library", "load_shape", "load_statements",
+    "load_with_frame", "loop", "names", "parse", "parse_notation", "program_from_json", "program_to_json",
+    "random_program", "refine", "sample", "save", "save_library", "set", "statement", "unroll", "using",
+    "with_library",
 ]  # fmt: skip

@@ -35,7 +35,6 @@ PATIENCE = 5
 KINDS = {
     "loaders": "tests.fuzz.loaders",
     "programs": "tests.fuzz.programs",
-    "weights": "tests.fuzz.weights",
     "everything": "tests.fuzz.everything",
     "faults": "tests.fuzz.faults",
 }

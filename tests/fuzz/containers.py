@@ -70,13 +70,6 @@ def change_json(random: Random, content: bytes) -> bytes:
     return json.dumps(whole).encode()
 
 
-def change_json_line(random: Random, content: bytes) -> bytes:
-    """One of many lines of JSON, as :func:`change_json`."""
-    lines = content.split(b"\n")
-    at = random.randrange(len(lines))
-    return b"\n".join([*lines[:at], change_json(random, lines[at]), *lines[at + 1 :]])
-
-
 def change_glb(random: Random, content: bytes) -> bytes:
     """The JSON or the buffer of a GLB, with the lengths put right again."""
     size = struct.unpack_from("<I", content, 12)[0] if len(content) >= 20 else 0

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from . import by_hand
-from .containers import change_glb, change_hdf5, change_head, change_json, change_json_line, change_npy, change_zip
+from .containers import change_glb, change_hdf5, change_head, change_json, change_npy, change_zip
 from .mutations import BYTES, TEXT, Mutation, mutants_of
 
 WAYS: dict[str, tuple[Mutation, ...]] = {
@@ -28,12 +28,8 @@ WAYS: dict[str, tuple[Mutation, ...]] = {
     ".npz": (*BYTES, *12 * (change_zip,)),
     ".h5": (*BYTES, *4 * (change_hdf5,)),
     ".hdf5": (*BYTES, *4 * (change_hdf5,)),
-    ".jsonl": (*BYTES, *TEXT, *8 * (change_json_line,)),
 }
 """How files of a suffix are broken: as bytes, and in the way of their format."""
-
-PROGRAMS = "programs.npz"
-"""The one file that holds no shape for any reader of shapes but programs."""
 
 
 def cases(seed: int) -> Iterator[tuple[str, bytes]]:
@@ -59,8 +55,6 @@ def seeds() -> dict[str, bytes]:
 def _write_programs(folder: Path) -> None:
     """What our own writers make of a program."""
     import shapeprog as sp
-    from shapeprog.data.synthetic import write_programs
-    from shapeprog.formats.json_form import result_json
 
     program = sp.parse(
         "top_rectangle(at=(4, 0, 0), thickness=2, half=(9, 11))\nleg(at=(-12, -8, -10), size=(16, 2, 2))"
@@ -69,11 +63,6 @@ def _write_programs(folder: Path) -> None:
         sp.export(program, folder / f"program{suffix}")
     sp.export(program, folder / "program.npy", resolution=8)
     sp.export(program, folder / "program.xyz", points=40)
-    write_programs(folder / PROGRAMS, sp.encode([program, program]))
-    text = result_json(program, name="stool").replace("\n", "")
-    (folder / "labels.jsonl").write_text(
-        f'{text}\n{{"name": "bench", "program": "leg(at=(0, 0, 0), size=(4, 2, 2))"}}\n'
-    )
 
 
 def _write_shapes(folder: Path) -> None:

@@ -22,26 +22,17 @@ def uses(path: Path, out: Path) -> Iterator[Use]:
         yield "fault", lambda: faults.commit(path)
     elif path.suffix in program_suffixes():
         yield from _program_file(path, out)
-    elif path.suffix in (".safetensors", ".pt", ".t7", ".state"):
-        yield from _weights_file(path)
     else:
         yield from _shape_file(path)
 
 
 def _shape_file(path: Path) -> Iterator[Use]:
-    """Every reader of shapes, labels and data sets that would open a file of this suffix."""
+    """Every reader of shapes that would open a file of this suffix."""
     from shapeprog.data import load_all, read_pack
-    from shapeprog.data.synthetic.store import read_programs
-    from shapeprog.models.vocabulary import Vocabulary
-    from shapeprog.training.labels import read_labels
 
-    if path.suffix == ".jsonl":
-        yield "read_labels", lambda: read_labels([path], ["stool", "bench"], Vocabulary.current(), 10)
-        return
     yield "load_all", lambda: _shapes(found for _, found in load_all([path]))
     if path.suffix == ".npz":
         yield "read_pack", lambda: _shapes(read_pack(path))
-        yield "read_programs", lambda: read_programs(path)
 
 
 def _program_file(path: Path, out: Path) -> Iterator[Use]:
@@ -66,21 +57,6 @@ def _program_file(path: Path, out: Path) -> Iterator[Use]:
         if suffix not in (".step", ".stp"):  # through build123d, a second for each part
             yield f"export {suffix}", lambda: sp.export(program, out / f"program{suffix}", frame)  # noqa: B023
     yield "show", lambda: show_command(path, out / "page.html", quiet=True)
-
-
-def _weights_file(path: Path) -> Iterator[Use]:
-    """List and load weights, published ones too."""
-    from shapeprog.models.checkpoint import list_checkpoints, load_checkpoint
-    from shapeprog.models.published import read_published
-    from shapeprog.training.state import card_of
-
-    if path.suffix == ".safetensors":
-        yield "list_checkpoints", lambda: _raised(found for _, found in list_checkpoints([path]))
-        yield "load_checkpoint", lambda: load_checkpoint(path)
-    elif path.suffix == ".state":
-        yield "state", lambda: card_of(path.read_bytes(), str(path))
-    else:
-        yield "read_published", lambda: read_published(path)
 
 
 def _raised(found: Iterable[Any]) -> None:

@@ -11,18 +11,16 @@ from typing import Annotated
 import typer
 
 from shapeprog.cli import (
-    adapting,
     changes,
     inferring,
     libraries,
     measuring,
-    modelling,
     sampling,
     terminal,
     tidying,
-    training,
     writing,
 )
+from shapeprog.liang2022.cli import app as paper
 
 # Before torch is loaded: its idle workers would spin on the cores that the kernels of other threads want.
 os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
@@ -45,12 +43,7 @@ for name, command, help_line in (
     ("sheet", writing.sheet_command, "Draw a contact sheet of a folder of programs."),
     ("statements", writing.statements_command, "Print the manual of the language."),
     ("prepare", measuring.prepare_command, "Turn a directory of models into packs."),
-    ("sample", sampling.sample_command, "Draw synthetic furniture: a contact sheet or a data set."),
-    ("pretrain", training.pretrain_command, "Pretrain a generator on synthetic furniture."),
-    ("train-executor", training.train_executor_command, "Train the neural executor on synthetic blocks."),
-    ("adapt", adapting.adapt_command, "Adapt a generator to real shapes."),
-    ("models", modelling.models_command, "List the weights that ship, and those in folders."),
-    ("import-weights", modelling.import_weights_command, "Turn published weights into a file of this package."),
+    ("sample", sampling.sample_command, "Draw synthetic furniture: a contact sheet or a pack."),
     ("evaluate", measuring.evaluate_command, "Measure predictions against targets."),
 ):
     app.command(name, cls=changes.ChangingCommand, short_help=help_line)(terminal.guarded(command))
@@ -59,6 +52,7 @@ library = typer.Typer(no_args_is_help=True, rich_markup_mode=None)
 library.command("learn")(terminal.guarded(libraries.learn_command))
 library.command("show")(terminal.guarded(libraries.show_command))
 app.add_typer(library, name="library", help="Functions that programs may be written with.")
+app.add_typer(paper, name="paper", help="The paper: networks, training, adaptation and its table (liang2022).")
 
 
 def _version(wanted: bool) -> None:

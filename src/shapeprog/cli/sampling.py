@@ -1,4 +1,4 @@
-"""The command that draws synthetic furniture."""
+"""The command that draws synthetic furniture, and the files that samples of any prior become."""
 
 from __future__ import annotations
 
@@ -17,54 +17,72 @@ SHEET = 24
 """Shapes drawn where no number is given."""
 
 
+Count = Annotated[int, typer.Option(help="How many shapes.", min=1)]
+Out = Annotated[Path | None, typer.Option(help="A contact sheet of them, such as sheet.png.")]
+Folder = Annotated[Path | None, typer.Option(help="A folder for a .shape file of each.")]
+Pack = Annotated[Path | None, typer.Option(help="A pack of their cells and surface points, .npz.")]
+Points = Annotated[int, typer.Option(help="Surface points of each shape in the pack.", min=0)]
+Columns = Annotated[int, typer.Option(help="Pictures in a row of the sheet.", min=1)]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")]
+
+
 def sample_command(
-    prior_name: Annotated[
-        str, typer.Argument(metavar="PRIOR", help="Where they come from: narrow, wide or furniture.")
-    ],
-    count: Annotated[int, typer.Option(help="How many shapes.", min=1)] = SHEET,
+    prior: Annotated[str, typer.Argument(metavar="PRIOR", help="Where they come from: furniture.")] = "furniture",
+    count: Count = SHEET,
     seed: terminal.Seed = 0,
-    out: Annotated[Path | None, typer.Option(help="A contact sheet of them, such as sheet.png.")] = None,
-    folder: Annotated[Path | None, typer.Option(help="A folder for a .shape file of each.")] = None,
-    pack: Annotated[Path | None, typer.Option(help="A pack of their cells and surface points, .npz.")] = None,
-    programs: Annotated[Path | None, typer.Option(help="A data set of their programs, .npz: much smaller.")] = None,
-    points: Annotated[int, typer.Option(help="Surface points of each shape in the pack.", min=0)] = 0,
-    columns: Annotated[int, typer.Option(help="Pictures in a row of the sheet.", min=1)] = 6,
-    modules: terminal.With = None,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
+    out: Out = None,
+    folder: Folder = None,
+    pack: Pack = None,
+    points: Points = 0,
+    columns: Columns = 6,
+    quiet: Quiet = False,
 ) -> None:
-    """Draw synthetic furniture: as a contact sheet, as programs, or as a data set.
+    """Draw synthetic furniture: as a contact sheet, as programs, or as a pack.
 
     Without an output the programs are printed.
     """
-    import torch
+    from shapeprog.data.synthetic import FURNITURE, furniture
+    from shapeprog.errors import InputError, did_you_mean
 
-    from shapeprog.data import synthetic
+    if prior != FURNITURE:
+        raise InputError(f"there is no prior {prior!r}", did_you_mean(prior, [FURNITURE], quoted=True))
+    write_samples(
+        prior, [furniture(number, seed) for number in range(count)],
+        seed=seed, out=out, folder=folder, pack=pack, points=points, columns=columns, quiet=quiet,
+    )  # fmt: skip
 
-    terminal.load_modules(modules)
-    found = synthetic.programs(prior_name, count, seed)
-    if programs is not None:  # before anything is written: only what generators can learn from is kept as tensors
-        code = synthetic.prior(prior_name)(count, torch.Generator().manual_seed(seed))
-    names = [f"{prior_name}_{number:0{len(str(count - 1))}d}" for number in range(count)]
+
+def write_samples(
+    prior: str,
+    programs: list[Program],
+    *,
+    seed: int,
+    out: Path | None,
+    folder: Path | None,
+    pack: Path | None,
+    points: int,
+    columns: int,
+    quiet: bool,
+) -> None:
+    """Write programs of a prior as a sheet, a folder and a pack, as far as asked for; otherwise print them."""
+    names = [f"{prior}_{number:0{len(str(len(programs) - 1))}d}" for number in range(len(programs))]
     written: list[Path] = []
     if out is not None:
-        written.append(_write_sheet(names, found, out, columns, f"{prior_name}, seed {seed}"))
+        written.append(_write_sheet(names, programs, out, columns, f"{prior}, seed {seed}"))
     if folder is not None:
-        written.append(_write_folder(names, found, folder))
+        written.append(_write_folder(names, programs, folder))
     if pack is not None:
         from shapeprog.data import write_pack
 
-        write_pack(pack, _shapes(names, found, points, seed))
+        write_pack(pack, _shapes(names, programs, points, seed))
         written.append(pack)
-    if programs is not None:
-        synthetic.write_programs(programs, code)
-        written.append(programs)
     if not written:
-        for name, program in zip(names, found, strict=True):
+        for name, program in zip(names, programs, strict=True):
             terminal.output().print(f"# {name}")
             terminal.print_program(terminal.output(), program)
     if not quiet:
         for path in written:
-            terminal.output().print(f"wrote {path}: {count} shapes")
+            terminal.output().print(f"wrote {path}: {len(programs)} shapes")
 
 
 def _write_sheet(names: list[str], programs: list[Program], path: Path, columns: int, title: str) -> Path:

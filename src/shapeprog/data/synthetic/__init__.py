@@ -1,8 +1,5 @@
-"""Synthetic furniture: programs of many kinds of furniture, drawn at random and rendered as they are asked for."""
+"""Synthetic furniture in every statement, with roles: programs that inference should recover."""
 
-from shapeprog.data.synthetic.mixture import Prior
-from shapeprog.data.synthetic.priors import PRIORS, prior, programs
-from shapeprog.data.synthetic.store import read_programs, write_programs
-from shapeprog.data.synthetic.stream import Batch, Stream
+from shapeprog.data.synthetic.furniture import FURNITURE, furniture
 
-__all__ = ["PRIORS", "Batch", "Prior", "Stream", "prior", "programs", "read_programs", "write_programs"]
+__all__ = ["FURNITURE", "furniture"]

@@ -1,7 +1,6 @@
 """The prior ``furniture``: sketches in every statement that there is, with roles, mirrors and real numbers.
 
-It plants programs that inference should find again.  Generators cannot learn from it: it draws statements that they are
-not taught.
+It plants programs that inference should recover.  Generators cannot learn from it: they are not taught all statements.
 """
 
 from __future__ import annotations

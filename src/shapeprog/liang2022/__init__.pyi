@@ -1,0 +1,13 @@
+from .adapt import AdaptTask, batches_of, predicted_code
+from .decode import decode
+from .executor import NeuralExecutor
+from .generator import Generator
+from .loop import train
+from .losses import loss
+from .settings import AdaptSettings, ExecutorSettings, PretrainSettings
+from .weights import build_generator, load_executor, load_generator, save_weights
+
+__all__ = [
+    "AdaptSettings", "AdaptTask", "ExecutorSettings", "Generator", "NeuralExecutor", "PretrainSettings", "batches_of",
+    "build_generator", "decode", "load_executor", "load_generator", "loss", "predicted_code", "save_weights", "train",
+]  # fmt: skip

@@ -1,0 +1,258 @@
+"""Adaptation to real shapes, whose programs are not known (section 4.3 and Table 1).
+
+The generator decodes a program for each shape, the program is rendered, and the loss flows back through the rendering
+into the generator.  *Direct* adaptation renders analytically (the paper), *guided* adaptation through the neural
+executor (Tian et al. 2019), *hybrid* adaptation through both.  All weights learn.  In ten lines, after
+``import torch, shapeprog as sp`` and ``from shapeprog.liang2022 import *``:
+
+    generator = load_generator("fast-wide")
+    optimiser = torch.optim.Adam(generator.parameters(), lr=2e-4)
+    for cells, points in batches_of(["packs/chair_train.npz"]):  # voxels, surface points in cells
+        decoded = decode(generator, cells, decoder="argmax")
+        code = predicted_code(generator.predict(decoded.teacher_forcing(cells)))
+        sample = sp.sample(sp.unroll(code), 5000)
+        loss = sp.chamfer(sample.points, points, weights=sample.weights).mean()
+        optimiser.zero_grad()
+        loss.backward()
+        optimiser.step()
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import torch
+from jaxtyping import Float, UInt8
+from torch import Tensor, nn
+
+from shapeprog.data.packs import read_pack
+from shapeprog.errors import ShapeProgError
+from shapeprog.geometry.losses import occupancy_cross_entropy
+from shapeprog.geometry.surface import has_surface
+from shapeprog.inference.surface import points_of_cells
+from shapeprog.language.statement import EMPTY
+from shapeprog.language.tensors import Code
+from shapeprog.language.unroll import unroll
+from shapeprog.liang2022.decode import Decoded, decode
+from shapeprog.liang2022.estimators import NvilBaseline, leave_one_out_advantage, reinforce_loss
+from shapeprog.liang2022.evaluate import scores_on_packs
+from shapeprog.liang2022.generator import Generator, Prediction, TeacherForcingBatch
+from shapeprog.liang2022.loop import Record, scramble
+from shapeprog.liang2022.losses import Comparison, check_gradient, compute, empty_program_losses, parse_losses
+from shapeprog.liang2022.prior import SyntheticStream, prior
+from shapeprog.liang2022.settings import NEURAL, AdaptSettings
+from shapeprog.liang2022.teacher import Order, teacher_forcing
+from shapeprog.liang2022.weights import load_executor, load_generator, save_weights
+
+REHEARSAL_CANVASES = 3
+"""Canvases of each synthetic shape that a step rehearses."""
+
+
+class Targets(NamedTuple):
+    """Cells of targets, and points on their surfaces in cells."""
+
+    cells: UInt8[Tensor, "B 32 32 32"]
+    points: Float[Tensor, "B P 3"]
+
+
+class TargetStream:
+    """Batches of real shapes, a function of packs, seed and index; every shape once before any comes again.
+
+    Parameters
+    ----------
+    packs
+        Files of shapes.
+    batch_size, seed, points
+        Shapes of a batch, seed of their order, points of each.
+    """
+
+    def __init__(self, packs: Sequence[str | Path], batch_size: int, seed: int, points: int) -> None:
+        self._shapes = [(pack, index) for pack in map(read_pack, map(Path, packs)) for index in range(len(pack))]
+        if not self._shapes:
+            raise ShapeProgError("there are no shapes to adapt to", "give packs made with: shapeprog prepare")
+        self._batch_size, self._seed, self._points = batch_size, seed, points
+
+    def __getitem__(self, index: int) -> Targets:
+        """The batch of an index, 0 or more."""
+        count = len(self._shapes)
+        rng = np.random.default_rng((self._seed, 1, index))
+        cells, points = [], []
+        for number in range(index * self._batch_size, (index + 1) * self._batch_size):
+            order = np.random.default_rng((self._seed, 0, number // count)).permutation(count)
+            pack, row = self._shapes[order[number % count]]
+            shape = pack[row]
+            cloud = points_of_cells(shape.voxels, 5000) if shape.points is None else shape.points
+            cells.append(shape.voxels.astype(np.uint8))
+            points.append(np.resize(rng.permutation(cloud)[: self._points], (self._points, 3)))
+        return Targets(torch.from_numpy(np.stack(cells)), torch.from_numpy(np.stack(points).astype(np.float32)))
+
+
+class Learner(nn.Module):
+    """All that learns: the generator, and the baseline of NVIL."""
+
+    def __init__(self, generator: Generator, baseline: NvilBaseline | None) -> None:
+        super().__init__()
+        self.generator, self.baseline = generator, baseline
+
+
+class AdaptTask:
+    """Adaptation of a generator; a task of :func:`~shapeprog.liang2022.loop.train`.
+
+    Raises
+    ------
+    ShapeProgError
+        If weights or packs cannot be read, or no loss has a gradient.
+    """
+
+    def __init__(self, settings: AdaptSettings, command: str = "") -> None:
+        torch.manual_seed(settings.seed)
+        self._settings, self._command = settings, command
+        self._losses = parse_losses(settings.loss)
+        if settings.estimator == "none":
+            check_gradient(self._losses)
+        generator = load_generator(settings.initial)
+        self._executor = load_executor(settings.executor).requires_grad_(False) if NEURAL in self._losses else None
+        self._initial = copy.deepcopy(generator).requires_grad_(False) if settings.kl else None
+        if settings.learn == "offsets":
+            if not generator.has_offsets:
+                raise ShapeProgError(f"the design {generator.design} has no offsets", "use --learn all")
+            generator.requires_grad_(False)
+            for weight in generator.offset_weights():
+                weight.requires_grad_(True)
+        with torch.no_grad():
+            empty = Code(torch.zeros(1, 3, dtype=torch.long), torch.zeros(1, 3, 7))
+            grid = torch.zeros(1, 32, 32, 32)
+            width = generator.eval().encode(grid, grid, empty, None)[0].shape[1]
+        self.module = Learner(generator, NvilBaseline(width) if settings.estimator == "nvil" else None)
+        self._targets = TargetStream(settings.train, settings.batch_size, settings.seed, settings.points)
+        rehearsed = settings.rehearsal if settings.learn == "all" else 0
+        self._synthetic = SyntheticStream(prior(settings.prior), rehearsed, settings.seed) if rehearsed else None
+        for path in settings.val:  # a missing pack is reported now, not at the first validation
+            if not len(read_pack(Path(path))):
+                raise ShapeProgError(f"there are no shapes to validate on in {path}", "leave it out")
+
+    def batch(self, index: int) -> tuple[Targets, TeacherForcingBatch | None]:
+        """Real shapes, and synthetic ones to rehearse."""
+        if self._synthetic is None:
+            return self._targets[index], None
+        made = self._synthetic[index]
+        order: Order = "written" if self.module.generator.design == "tian2019" else "coverage"
+        rng = torch.Generator().manual_seed(scramble(self._settings.seed, 2, index))
+        return self._targets[index], teacher_forcing(made.voxels, made.code, order).subset(REHEARSAL_CANVASES, rng)
+
+    def losses(
+        self, batch: tuple[Targets, TeacherForcingBatch | None], progress: float, rng: torch.Generator
+    ) -> dict[str, Tensor]:
+        """Losses of the rendered programs, of their ids, and of the rehearsal."""
+        settings, generator = self._settings, self.module.generator.eval()  # statistics of the normalisation stay
+        targets = Targets(*(part.to(rng.device) for part in batch[0]))
+        if settings.estimator == "rloo":
+            targets = Targets(*(torch.cat([part] * settings.num_samples) for part in targets))
+        sampled = settings.estimator != "none"
+        decoded = decode(generator, targets.cells, decoder="sample-ids" if sampled else settings.decoder, rng=rng)
+        prediction = generator.predict(decoded.teacher_forcing(targets.cells))
+        with torch.autocast(rng.device.type, enabled=False):
+            per_shape = self._render_losses(prediction, targets, rng)
+            losses = {name: value.mean() for name, value in per_shape.items()}
+            losses |= self._id_losses(prediction, decoded, targets, per_shape)
+        if batch[1] is not None:
+            rehearsed = generator.predict(batch[1].to(rng.device)).losses()
+            losses |= {f"rehearsal_{name}": value for name, value in rehearsed.items()}
+        return losses
+
+    def _render_losses(
+        self, prediction: Prediction, targets: Targets, rng: torch.Generator
+    ) -> dict[str, Float[Tensor, " B"]]:
+        """Losses (B,) of predicted programs, with gradient to their numbers; those that draw nothing have none."""
+        code = predicted_code(prediction, base=self._settings.learn == "all")
+        draws = has_surface(unroll(Code(code.ids, code.parameters.detach())))
+        no_gradient = 0 * code.parameters.sum()
+        values = empty_program_losses(targets.points, targets.cells, self._losses)
+        values = {name: value + no_gradient for name, value in values.items()}
+        if bool(draws.any()):
+            whole_cells = code.parameters - prediction.scatter(prediction.offsets)
+            scene, canvas = (
+                unroll(Code(code.ids[draws], numbers[draws])) for numbers in (code.parameters, whole_cells)
+            )
+            comparison = Comparison(
+                scene, targets.points[draws], targets.cells[draws], self._settings.points, rng, canvas
+            )
+            computed = compute(comparison, self._losses)
+            values = {name: value.masked_scatter(draws, computed[name]) for name, value in values.items()}
+        if self._executor is not None:
+            soft = prediction.scatter(prediction.logits.float().exp())
+            executor = self._executor.to(soft.device)
+            logits = executor.union(soft, code.parameters, prediction.batch.live & (code.ids[..., 0] != EMPTY))
+            values[NEURAL] = self._losses[NEURAL] * occupancy_cross_entropy(logits, targets.cells)
+        return values
+
+    def _id_losses(
+        self, prediction: Prediction, decoded: Decoded, targets: Targets, per_shape: dict[str, Tensor]
+    ) -> dict[str, Tensor]:
+        """Losses that train ids: cross-entropy to the decoded ones, KL to the initial ones, or an estimator."""
+        settings, losses = self._settings, {}
+        log_prob = prediction.log_prob()
+        if settings.decoded_ids and settings.estimator == "none" and settings.learn == "all":
+            losses["decoded_ids"] = -settings.decoded_ids * log_prob.sum() / (3 * prediction.batch.live.sum())
+        if self._initial is not None:
+            with torch.no_grad():
+                before = self._initial.to(log_prob.device).eval().predict(prediction.batch).logits
+            # Ids that are not legal have log-probability -inf in both, and no weight.
+            difference = torch.where(before.isfinite(), before - prediction.logits, 0.0)
+            losses["kl"] = settings.kl * (before.exp() * difference).sum(-1).mean()
+        if settings.estimator == "none":
+            return losses
+        total = torch.stack(list(per_shape.values())).sum(0).detach()
+        costs = 1 - decoded.iou(targets.cells).to(total)
+        if settings.estimator == "rloo":
+            shape = (settings.num_samples, -1)
+            advantage = leave_one_out_advantage(costs.reshape(shape))[..., None]
+            loss = reinforce_loss(log_prob.unflatten(0, shape), advantage)
+        else:
+            assert self.module.baseline is not None
+            advantage, losses["baseline"] = self.module.baseline(prediction.feature, prediction.batch.live, costs)
+            loss = reinforce_loss(log_prob, advantage)
+        return losses | {"estimator": settings.estimator_weight * loss, "_cost": costs.mean()}
+
+    def validate(self) -> Record:
+        """IoU and CD of single-pass programs on each pack; the score is their mean IoU or minus their mean CD."""
+        settings = self._settings
+        scores = scores_on_packs(self.module.generator, settings.val, settings.val_decoder)
+        selected = [scores[f"{Path(path).stem}_{settings.select_by}"] for path in settings.val]
+        if selected:
+            scores["score"] = sum(selected) / len(selected) * (1 if settings.select_by == "iou" else -1)
+        return scores
+
+    def save(self, path: Path, samples_seen: int, scores: Record) -> None:
+        """Write the generator with its card."""
+        packs = ", ".join(Path(pack).stem for pack in self._settings.train)
+        save_weights(
+            path, self.module.generator, data=f"{Path(self._settings.initial).stem}, adapted to {packs}",
+            seed=self._settings.seed, command=self._command, samples_seen=samples_seen, scores=dict(scores),
+        )  # fmt: skip
+
+
+def predicted_code(prediction: Prediction, base: bool = True) -> Code:
+    """Decoded programs with the numbers that the network predicts for them, with gradient to its weights.
+
+    Parameters
+    ----------
+    base
+        Let gradients reach the numbers; else the offsets alone.
+    """
+    numbers = (prediction.numbers if base else prediction.given) + prediction.offsets
+    return Code(prediction.batch.code.ids, prediction.scatter(numbers.float()))
+
+
+def batches_of(
+    packs: Sequence[str | Path], batch_size: int = 32, points: int = 1000, seed: int = 0
+) -> Iterator[Targets]:
+    """Endless batches of cells and surface points of packs, for a training loop of your own."""
+    stream, index = TargetStream(packs, batch_size, seed, points), 0
+    while True:
+        yield stream[index]
+        index += 1

@@ -1,0 +1,98 @@
+"""Gradient estimators for the ids of statements, which a renderer gives no gradient (end of section 4.2).
+
+Programs are sampled, and the log-probability of their ids is weighed by the advantage, the cost above a baseline
+(REINFORCE, Williams 1992).  The baseline is a network (NVIL, Mnih and Gregor 2014) or the mean cost of the other
+samples of the same shape (leave one out, Kool et al. 2019).
+"""
+
+from __future__ import annotations
+
+import torch
+from jaxtyping import Bool, Float
+from torch import Tensor, nn
+
+from shapeprog.errors import ShapeProgError
+
+DECAY = 0.9
+"""Decay of the running mean and variance of costs, as published for NVIL."""
+
+
+class NvilBaseline(nn.Module):
+    """Predicts the cost of a program from the feature of a block (NVIL, Mnih and Gregor 2014).
+
+    Parameters
+    ----------
+    width
+        Width F of the feature of a block.
+    """
+
+    mean: Tensor
+    variance: Tensor
+
+    def __init__(self, width: int) -> None:
+        super().__init__()
+        last = nn.Linear(64, 1)
+        nn.init.zeros_(last.weight)
+        self.layers = nn.Sequential(nn.Linear(width, 64), nn.Tanh(), last)
+        self.register_buffer("mean", torch.zeros(()))
+        self.register_buffer("variance", torch.ones(()))
+
+    def forward(
+        self, feature: Float[Tensor, "M F"], live: Bool[Tensor, "B K"], costs: Float[Tensor, " B"]
+    ) -> tuple[Float[Tensor, "B K"], Float[Tensor, ""]]:
+        """The advantage of the ids of every block, and the loss that trains the baseline.
+
+        Parameters
+        ----------
+        feature
+            Features of the M live blocks, in the order of the mask.
+        live
+            Which blocks were sampled.
+        costs
+            Cost of every program.
+
+        Returns
+        -------
+        The advantage without gradient, 0 where no block was sampled: cost minus running mean minus prediction, divided
+        by the running standard deviation where that is above 1; and the mean squared error of the prediction.  The
+        running statistics change after their use, and in training alone.
+        """
+        centred = (costs - self.mean)[:, None].expand(live.shape)[live]
+        predicted = self.layers(feature.detach().to(self.mean))[:, 0]
+        with torch.no_grad():
+            advantage = (centred - predicted) / self.variance.sqrt().clamp(min=1)
+            if self.training:
+                self.mean.lerp_(costs.mean(), 1 - DECAY)
+                self.variance.lerp_((centred - predicted).square().mean(), 1 - DECAY)
+        return advantage.new_zeros(live.shape).masked_scatter(live, advantage), (predicted - centred).square().mean()
+
+
+def leave_one_out_advantage(costs: Float[Tensor, "S B"]) -> Float[Tensor, "S B"]:
+    """The cost of each of S samples minus the mean cost of the others (Kool et al. 2019).
+
+    Raises
+    ------
+    ShapeProgError
+        If there is only one sample.
+    """
+    samples = len(costs)
+    if samples < 2:
+        raise ShapeProgError(f"leave-one-out compares samples, got {samples}", "draw two or more for each shape")
+    return (costs - costs.mean(0)) * (samples / (samples - 1))
+
+
+def reinforce_loss(log_probs: Float[Tensor, "*S B K"], advantage: Float[Tensor, "*S B #K"]) -> Float[Tensor, ""]:
+    """A loss whose gradient estimates that of the expected cost (REINFORCE, Williams 1992).
+
+    Parameters
+    ----------
+    log_probs
+        Log-probability of the ids of every block, 0 where none was sampled.
+    advantage
+        Advantage of every block, or of the program; no gradient flows through it.
+
+    Returns
+    -------
+    Log-probabilities times advantages, added over blocks, as a mean over programs.
+    """
+    return (log_probs * advantage.detach()).sum(-1).mean()

@@ -1,0 +1,234 @@
+"""``fast``: a generator for few cores.
+
+Against the published network: the encoder halves the grid at once and keeps positions by reading all cells of its last
+layer; the memory from block to block is the block written before, so that all canvases of a batch are encoded at once;
+and a number is a distribution over whole values, autoregressive within a block (as in NADE, Larochelle and Murray,
+AISTATS 2011), plus a sub-cell offset.  A number's gradient passes through the mean of the distribution around its
+mode, its offset's through a plain regression; both reach all layers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import torch
+from jaxtyping import Bool, Float, Int
+from torch import Tensor, nn
+
+from shapeprog.errors import ShapeProgError
+from shapeprog.language.statement import SLOTS
+from shapeprog.language.tensors import Code
+from shapeprog.liang2022.generator import IDS, Generator, StepOutput, TeacherForcingBatch, stack_grids
+
+WINDOW = 2
+"""Values on either side of the mode over which the mean is taken."""
+
+LEAST_SMOOTHING = 0.1
+"""Cells; a whole label is as good as not smoothed."""
+
+LARGEST_OFFSET = 0.95
+"""Cells; below one, so that surface and canvas agree within a cell."""
+
+LARGEST_SIZE = 1024
+"""Bound of all sizes, so that a damaged file cannot ask for more memory than there is."""
+
+
+@dataclass(frozen=True)
+class FastSettings:
+    """Sizes of the network.
+
+    Parameters
+    ----------
+    widths
+        Channels at 16^3, 8^3 and 4^3 cells.
+    squeeze
+        Channels of the last 4^3 cells, which are read one by one.
+    feature
+        Width of the block feature, of the step LSTM and of its heads.
+    low, high
+        Smallest and largest whole value of a number.
+    smoothing
+        Standard deviation of a label in cells.  The mean of a distribution that is too sharp has next to no gradient,
+        so adaptation moves its offsets; one that is smoothed moves the numbers too.
+    """
+
+    widths: tuple[int, int, int] = (16, 32, 64)
+    squeeze: int = 48
+    feature: int = 256
+    low: int = -24
+    high: int = 40
+    smoothing: float = 0.75
+
+    def __post_init__(self) -> None:
+        sizes = (*self.widths, self.squeeze, self.feature)
+        bounds = (self.low, self.high)
+        good = all(type(size) is int and 0 < size <= LARGEST_SIZE for size in sizes)
+        good &= all(type(end) is int and abs(end) <= LARGEST_SIZE for end in bounds) and self.low < self.high
+        if not good or type(self.smoothing) not in (int, float) or not 0 <= self.smoothing <= LARGEST_SIZE:
+            raise ShapeProgError(
+                "sizes of the network fast are out of range", f"use whole numbers up to {LARGEST_SIZE}"
+            )
+
+
+class Fast(Generator):
+    """The network; see the module."""
+
+    design = "fast"
+    Settings = FastSettings
+    has_offsets = True
+    bins: Tensor
+    in_range: Tensor
+
+    def __init__(self, settings: FastSettings) -> None:
+        super().__init__(settings)
+        fine, middle, coarse = settings.widths
+        width, bins = settings.feature, settings.high - settings.low + 1
+        self.encoder = nn.Sequential(
+            _convolution(2, fine, 4, 2),
+            _convolution(fine, middle, 3, 2),
+            _convolution(middle, middle, 3, 1),
+            _convolution(middle, coarse, 3, 2),
+            _convolution(coarse, coarse, 3, 1),
+            _convolution(coarse, settings.squeeze, 1, 1),
+        )
+        self.summary = nn.Sequential(
+            nn.Linear(settings.squeeze * 64, width), nn.ReLU(), nn.Linear(width, width), nn.ReLU()
+        )
+        self.id_embedding = nn.Embedding(IDS, width)
+        self.number_embedding = nn.Embedding(SLOTS * bins, width)
+        self.block_memory = nn.Linear(width, width)
+        self.step_lstm = nn.LSTMCell(width, width)
+        self.id_head = nn.Sequential(nn.Linear(2 * width, width), nn.ReLU(), nn.Linear(width, IDS))
+        self.number_input = nn.Linear(2 * width, width)
+        self.number_id = nn.Embedding(IDS, width)
+        self.number_slot = nn.Parameter(torch.zeros(SLOTS, width))
+        self.number_link = nn.Embedding(SLOTS * bins, width)
+        self.number_head = nn.Sequential(nn.Linear(width, width), nn.ReLU(), nn.Linear(width, bins))
+        self.offset_head = nn.Sequential(nn.Linear(width, width), nn.ReLU(), nn.Linear(width, 1))
+        for weight in (*self.offset_head[-1].parameters(), *self.block_memory.parameters()):
+            nn.init.zeros_(weight)
+        for table in (self.number_embedding, self.number_link):
+            nn.init.normal_(table.weight, std=0.05)  # up to seven rows are added
+        self.register_buffer("bins", torch.arange(settings.low, settings.high + 1.0), persistent=False)
+        in_range = (self.bins >= self.low[..., None]) & (self.bins <= self.high[..., None])
+        self.register_buffer("in_range", in_range | ~in_range.any(-1, keepdim=True), persistent=False)
+
+    def encode(
+        self, target: Float[Tensor, "B 32 32 32"], canvas: Float[Tensor, "B 32 32 32"], previous: Code, state: Any
+    ) -> tuple[Float[Tensor, "B F"], Any]:
+        """The block feature; the only memory is the block written before."""
+        return self._encode(torch.stack([target, canvas], 1), previous), None
+
+    def encode_all(self, batch: TeacherForcingBatch) -> Float[Tensor, "M F"]:
+        """Features of the live blocks."""
+        previous = Code(batch.previous.ids[batch.live], batch.previous.parameters[batch.live])
+        return self._encode(stack_grids(batch, batch.live, self.bins.dtype), previous)
+
+    def _encode(self, grids: Float[Tensor, "M 2 32 32 32"], previous: Code) -> Float[Tensor, "M F"]:
+        cells = self.encoder(grids.contiguous(memory_format=torch.channels_last_3d))
+        feature: Tensor = self.summary(cells.flatten(1)).float()
+        nonempty = (previous.ids != 0)[..., None]
+        memory = (self._embed(previous) * nonempty).sum(-2).relu()
+        return feature + self.block_memory(memory)
+
+    def _embed(self, step: Code) -> Float[Tensor, "*batch F"]:
+        """Embedding of steps: their ids and numbers."""
+        numbers = self.number_embedding(self._row(step.parameters)) * self.used[step.ids][..., None]
+        return self.id_embedding(step.ids) + numbers.sum(-2)
+
+    def step(self, feature: Float[Tensor, "M F"], previous: Code | None, index: int, state: Any) -> StepOutput:
+        """One step; its hidden features join the LSTM output and the block feature."""
+        state = self.step_lstm(feature if previous is None else self._embed(previous), state)
+        hidden = torch.cat([state[0], feature], -1)
+        return StepOutput(self.legal_logits(self.id_head(hidden), previous, index), hidden, state)
+
+    def numbers(
+        self, hidden: Tensor, ids: Int[Tensor, "*batch"], given: Float[Tensor, "*batch 7"] | None = None
+    ) -> Float[Tensor, "*batch 7"]:
+        """The mean of the distribution around its mode; counts and quarter turns are the mode itself."""
+        if given is None:
+            return self._autoregressive(hidden, ids, None)
+        scores = self._scores(self._mixed(hidden, ids, given), self.in_range[ids])
+        return self._mode(scores, self.discrete[ids]) * self.used[ids]
+
+    def sample_numbers(
+        self, hidden: Tensor, ids: Int[Tensor, "*batch"], rng: torch.Generator
+    ) -> Float[Tensor, "*batch 7"]:
+        """Whole numbers sampled slot by slot."""
+        return self._autoregressive(hidden, ids, rng)
+
+    def offsets(
+        self, hidden: Tensor, ids: Int[Tensor, "*batch"], given: Float[Tensor, "*batch 7"]
+    ) -> Float[Tensor, "*batch 7"]:
+        """Offsets below one cell that keep numbers in their range; none of counts and quarter turns."""
+        free = self.used[ids] & ~self.discrete[ids]
+        offset = LARGEST_OFFSET * self.offset_head(self._mixed(hidden, ids, given))[..., 0].tanh() * free
+        low, high = (self.low[ids] - given).clamp(max=0), (self.high[ids] - given).clamp(min=0)
+        return torch.minimum(torch.maximum(offset, low), high)
+
+    def offset_weights(self) -> Iterator[nn.Parameter]:
+        """Weights of the offset head."""
+        yield from self.offset_head.parameters()
+
+    def number_loss(
+        self, hidden: Tensor, ids: Int[Tensor, "*batch"], values: Float[Tensor, "*batch 7"]
+    ) -> Float[Tensor, "*batch 7"]:
+        """Cross-entropy to a label smoothed over neighbouring whole values, given the numbers before."""
+        log_probs = self._scores(self._mixed(hidden, ids, values), self.in_range[ids]).log_softmax(-1)
+        inside = torch.minimum(torch.maximum(values, self.low[ids]), self.high[ids])
+        width = torch.where(self.discrete[ids], 0.0, self.settings.smoothing).clamp(min=LEAST_SMOOTHING)[..., None]
+        label = (-0.5 * ((self.bins - inside[..., None]) / width) ** 2).masked_fill(~self.in_range[ids], -torch.inf)
+        return -(label.softmax(-1) * log_probs.clamp(min=-1e4)).sum(-1)
+
+    def _mixed(
+        self, hidden: Tensor, ids: Int[Tensor, "*batch"], given: Float[Tensor, "*batch 7"]
+    ) -> Float[Tensor, "*batch 7 F"]:
+        """Features of each slot given the numbers of the slots before it."""
+        links = self.number_link(self._row(given)) * self.used[ids][..., None]
+        start = self.number_input(hidden) + self.number_id(ids)
+        return (start[..., None, :] + self.number_slot + links.cumsum(-2) - links).relu()
+
+    def _scores(self, mixed: Tensor, in_range: Bool[Tensor, "*batch bins"]) -> Float[Tensor, "*batch bins"]:
+        return self.number_head(mixed).float().masked_fill(~in_range, -torch.inf)
+
+    def _mode(self, scores: Float[Tensor, "*batch bins"], discrete: Bool[Tensor, "*batch"]) -> Float[Tensor, "*batch"]:
+        """The mean within the window around the mode, or the mode where the value is discrete."""
+        mode = scores.argmax(-1, keepdim=True)
+        in_window = (torch.arange(scores.shape[-1], device=scores.device) - mode).abs() <= WINDOW
+        mean = (scores.masked_fill(~in_window, -torch.inf).softmax(-1) * self.bins).sum(-1)
+        return torch.where(discrete, self.bins[mode[..., 0]], mean)
+
+    def _autoregressive(
+        self, hidden: Tensor, ids: Int[Tensor, "*batch"], rng: torch.Generator | None
+    ) -> Float[Tensor, "*batch 7"]:
+        """Numbers slot by slot: the mode, or sampled."""
+        features = self.number_input(hidden) + self.number_id(ids)
+        in_range, used, discrete = self.in_range[ids], self.used[ids], self.discrete[ids]
+        values: list[Tensor] = []
+        for slot in range(SLOTS):
+            if not bool(used[..., slot].any()):  # slots in use come first
+                values.append(torch.zeros_like(ids, dtype=self.bins.dtype))
+                continue
+            scores = self._scores((features + self.number_slot[slot]).relu(), in_range[..., slot, :])
+            if rng is None:
+                value = self._mode(scores, discrete[..., slot])
+            else:
+                sample = torch.multinomial(scores.softmax(-1).flatten(0, -2), 1, generator=rng)
+                value = self.bins[sample.reshape(scores.shape[:-1])]
+            values.append(value * used[..., slot])
+            features = features + self.number_link(self._row(values[-1], slot)) * used[..., slot, None]
+        return torch.stack(values, -1)
+
+    def _row(self, values: Tensor, slot: int | None = None) -> Int[Tensor, ...]:
+        """Row of the embeddings for values (..., 7), or for values (...) of one slot."""
+        bins = len(self.bins)
+        index = (values.detach().round() - self.settings.low).clamp(0, bins - 1).long()
+        return index + bins * (torch.arange(SLOTS, device=values.device) if slot is None else slot)
+
+
+def _convolution(inputs: int, outputs: int, kernel: int, stride: int) -> nn.Sequential:
+    """Convolution, batch norm with running statistics, ReLU."""
+    convolution = nn.Conv3d(inputs, outputs, kernel, stride, 1 if kernel > 1 else 0, bias=False)
+    return nn.Sequential(convolution, nn.BatchNorm3d(outputs, momentum=0.02), nn.ReLU(inplace=True))

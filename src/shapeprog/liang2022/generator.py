@@ -1,0 +1,305 @@
+"""Program generators: the interface that networks implement, their vocabulary, and teacher forcing.
+
+A generator reads the target and the canvas (what earlier blocks drew) and writes one block of up to J = 3 steps
+(section 4.1 of the paper).  Networks differ in how they encode the two grids and in how they predict numbers.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from typing import Any, ClassVar, NamedTuple
+
+import torch
+from jaxtyping import Bool, Float, Int, UInt8
+from torch import Tensor, nn
+
+from shapeprog.geometry.cells import unpack
+from shapeprog.language.program import PUBLISHED_DEPTH
+from shapeprog.language.statement import EMPTY, END, SLOTS, Statement, language
+from shapeprog.language.tensors import Code
+
+STEPS = PUBLISHED_DEPTH
+"""Steps J of a block: up to two loops and one drawing statement."""
+
+IDS = END + 1
+"""Number of statement ids V."""
+
+
+class Vocabulary(NamedTuple):
+    """Tables of the 22 statements of the paper; see :func:`vocabulary`.
+
+    Parameters
+    ----------
+    used, discrete
+        Slots that each id uses, and those that take whole numbers only (counts, quarter turns).
+    low, high
+        Declared range of each slot; zero where it is not used.
+    legal
+        Ids that are legal at a step after a previous id; the last row is for the first step, which has none.
+    """
+
+    used: Bool[Tensor, "V 7"]
+    discrete: Bool[Tensor, "V 7"]
+    low: Float[Tensor, "V 7"]
+    high: Float[Tensor, "V 7"]
+    legal: Bool[Tensor, "J V+1 V"]
+
+
+@lru_cache(1)
+def vocabulary() -> Vocabulary:
+    """The tables of the built-in statements.
+
+    A block is empty, or up to two translations and one drawing statement, or a rotation and a statement with an axis
+    of rotation: the legal blocks of Tian et al. 2019.
+    """
+    statements = [statement for statement in language() if 0 < statement.id < END]
+    used, discrete = (torch.zeros(IDS, SLOTS, dtype=torch.bool) for _ in range(2))
+    low, high = (torch.zeros(IDS, SLOTS) for _ in range(2))
+    for statement in statements:
+        slots = slice(statement.size)
+        used[statement.id, slots] = True
+        discrete[statement.id, slots] = torch.tensor([quantity.discrete for quantity in statement.quantities])
+        low[statement.id, slots] = torch.tensor([float(quantity.low) for quantity in statement.quantities])
+        high[statement.id, slots] = torch.tensor([float(quantity.high) for quantity in statement.quantities])
+    legal = torch.zeros(STEPS, IDS + 1, IDS, dtype=torch.bool)
+    draws = [statement for statement in statements if not statement.is_loop]
+    loops = [statement for statement in statements if statement.is_loop]
+    legal[0, IDS, [EMPTY, *(statement.id for statement in statements)]] = True
+    legal[1:, [EMPTY, *(statement.id for statement in draws)], EMPTY] = True
+    for outer in loops:
+        inside = [statement for statement in draws if statement.pivot is not None] if _rotates(outer) else draws
+        legal[1:, outer.id, [statement.id for statement in inside]] = True
+        if not _rotates(outer):
+            legal[1:-1, outer.id, [statement.id for statement in loops if not _rotates(statement)]] = True
+    return Vocabulary(used, discrete, low, high, legal)
+
+
+def _rotates(loop: Statement) -> bool:
+    return loop.name == "rotate"
+
+
+@dataclass(frozen=True)
+class TeacherForcingBatch:
+    """Targets, canvases and the block to write on each canvas.
+
+    Parameters
+    ----------
+    target
+        Cells, 1 or 0.
+    canvases
+        Packed cells drawn before each block.
+    previous
+        The block written before each canvas; empty before the first.
+    code
+        The block to write; an empty one ends the program.
+    live
+        The canvases to learn from.
+    """
+
+    target: UInt8[Tensor, "B 32 32 32"]
+    canvases: Int[Tensor, "B K 32 32"]
+    previous: Code
+    code: Code
+    live: Bool[Tensor, "B K"]
+
+    def subset(self, canvases_per_shape: int, rng: torch.Generator) -> TeacherForcingBatch:
+        """The same with at most so many live canvases of each shape, drawn at random."""
+        scores = torch.rand(self.live.shape, generator=rng, device=rng.device).to(self.live.device)
+        rank = scores.masked_fill(~self.live, 2.0).argsort(-1).argsort(-1)
+        live = self.live & (rank < canvases_per_shape)
+        return TeacherForcingBatch(self.target, self.canvases, self.previous, self.code, live)
+
+    def to(self, device: torch.device) -> TeacherForcingBatch:
+        """The same on a device."""
+        previous, code = (Code(code.ids.to(device), code.parameters.to(device)) for code in (self.previous, self.code))
+        return TeacherForcingBatch(
+            self.target.to(device), self.canvases.to(device), previous, code, self.live.to(device)
+        )
+
+
+class StepOutput(NamedTuple):
+    """Log-probabilities of the ids of one step, the features its numbers are read from, and the LSTM state."""
+
+    logits: Float[Tensor, "M V"]
+    hidden: Tensor
+    state: Any
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """Teacher-forced output for the live blocks of a batch, in row order.
+
+    Parameters
+    ----------
+    batch
+        The input.
+    logits
+        Log-probabilities of the ids.
+    hidden
+        Features that the numbers are read from.
+    feature
+        Features of the blocks.
+    generator
+        The network.
+    """
+
+    batch: TeacherForcingBatch
+    logits: Float[Tensor, "M J V"]
+    hidden: Tensor
+    feature: Float[Tensor, "M F"]
+    generator: Generator
+
+    @property
+    def ids(self) -> Int[Tensor, "M J"]:
+        """Ids of the live blocks."""
+        return self.batch.code.ids[self.batch.live]
+
+    @property
+    def given(self) -> Float[Tensor, "M J 7"]:
+        """Numbers of the live blocks in the input, without gradient."""
+        return self.batch.code.parameters[self.batch.live].detach()
+
+    @cached_property
+    def numbers(self) -> Float[Tensor, "M J 7"]:
+        """Numbers that the network predicts for the ids of the input, with gradient to all its weights."""
+        return self.generator.numbers(self.hidden, self.ids, self.given)
+
+    @cached_property
+    def offsets(self) -> Float[Tensor, "M J 7"]:
+        """Sub-cell offsets of the surface from these numbers, with gradient; zero for designs without them."""
+        return self.generator.offsets(self.hidden, self.ids, self.given)
+
+    def scatter(self, rows: Float[Tensor, "M ..."]) -> Float[Tensor, "B K ..."]:
+        """Values of live blocks at their positions in the batch, zero elsewhere."""
+        live = self.batch.live
+        full = rows.new_zeros(*live.shape, *rows.shape[1:])
+        return full.masked_scatter(live.reshape(*live.shape, *[1] * (rows.dim() - 1)), rows)
+
+    def log_prob(self) -> Float[Tensor, "B K"]:
+        """Log-probability of the ids of each block, zero where it is not live."""
+        return self.scatter(self.logits.gather(-1, self.ids[..., None])[..., 0].sum(-1))
+
+    def number_log_prob(self) -> Float[Tensor, "B K"]:
+        """Log-probability of the numbers of each block, for designs that predict a distribution."""
+        used = vocabulary().used.to(self.ids.device)[self.ids]
+        nll = self.generator.number_loss(self.hidden, self.ids, self.given)
+        return self.scatter(-(nll * used).sum((-1, -2)))
+
+    def losses(self) -> dict[str, Float[Tensor, ""]]:
+        """Supervised losses of ids and numbers; see :meth:`Generator.losses`."""
+        return self.generator.losses(self)
+
+
+class Generator(nn.Module, ABC):
+    """A network that writes programs block by block.
+
+    Parameters
+    ----------
+    settings
+        An instance of the design's ``Settings``, a frozen dataclass of JSON values.
+    """
+
+    design: ClassVar[str]
+    Settings: ClassVar[Any]
+    has_offsets: ClassVar[bool] = False
+    """Whether it predicts sub-cell offsets of surfaces."""
+
+    def __init__(self, settings: Any) -> None:
+        super().__init__()
+        self.settings = settings
+        for name, table in vocabulary()._asdict().items():
+            self.register_buffer(name, table.clone(), persistent=False)
+
+    used: Tensor
+    discrete: Tensor
+    low: Tensor
+    high: Tensor
+    legal: Tensor
+
+    @abstractmethod
+    def encode(
+        self, target: Float[Tensor, "B 32 32 32"], canvas: Float[Tensor, "B 32 32 32"], previous: Code, state: Any
+    ) -> tuple[Float[Tensor, "B F"], Any]:
+        """The feature of the next block, and the state after it; ``state`` is ``None`` before the first.
+
+        ``previous`` is the block (B, J) written before, empty before the first.
+        """
+
+    @abstractmethod
+    def encode_all(self, batch: TeacherForcingBatch) -> Float[Tensor, "M F"]:
+        """Features of all live blocks at once."""
+
+    @abstractmethod
+    def step(self, feature: Float[Tensor, "M F"], previous: Code | None, index: int, state: Any) -> StepOutput:
+        """Step ``index`` of each block after the step before it (ids (M,), numbers (M, 7)); ``None`` at the first."""
+
+    @abstractmethod
+    def numbers(
+        self, hidden: Tensor, ids: Int[Tensor, "*batch"], given: Float[Tensor, "*batch 7"] | None = None
+    ) -> Float[Tensor, "*batch 7"]:
+        """Numbers for the ids, with gradient; autoregressive designs condition on ``given`` where it is known."""
+
+    @abstractmethod
+    def number_loss(
+        self, hidden: Tensor, ids: Int[Tensor, "*batch"], values: Float[Tensor, "*batch 7"]
+    ) -> Float[Tensor, "*batch 7"]:
+        """Supervised loss of each number: negative log-likelihood, or a squared error."""
+
+    def sample_numbers(
+        self, hidden: Tensor, ids: Int[Tensor, "*batch"], rng: torch.Generator
+    ) -> Float[Tensor, "*batch 7"]:
+        """Numbers sampled from the predicted distribution; those of ``numbers`` for designs without one."""
+        return self.numbers(hidden, ids)
+
+    def offsets(
+        self, hidden: Tensor, ids: Int[Tensor, "*batch"], given: Float[Tensor, "*batch 7"]
+    ) -> Float[Tensor, "*batch 7"]:
+        """Offsets of the surface from the numbers, with gradient; the canvas is drawn without them."""
+        return torch.zeros_like(given)
+
+    def offset_weights(self) -> Iterator[nn.Parameter]:
+        """Weights of the offset head alone."""
+        yield from ()
+
+    def legal_logits(self, scores: Float[Tensor, "M V"], previous: Code | None, index: int) -> Float[Tensor, "M V"]:
+        """Log-probabilities over the ids that are legal at a step after the previous one."""
+        allowed = self.legal[index, -1:] if previous is None else self.legal[index, previous.ids]
+        return scores.float().masked_fill(~allowed, -torch.inf).log_softmax(-1)
+
+    def predict(self, batch: TeacherForcingBatch) -> Prediction:
+        """Teacher forcing: the output for given canvases and programs, with gradient."""
+        feature = self.encode_all(batch)
+        ids, values = batch.code.ids[batch.live], batch.code.parameters[batch.live].detach()
+        outputs: list[StepOutput] = []
+        for j in range(STEPS):
+            previous = Code(ids[:, j - 1], values[:, j - 1]) if j else None
+            outputs.append(self.step(feature, previous, j, outputs[-1].state if outputs else None))
+        logits = torch.stack([output.logits for output in outputs], 1)
+        return Prediction(batch, logits, torch.stack([output.hidden for output in outputs], 1), feature, self)
+
+    def losses(self, prediction: Prediction) -> dict[str, Float[Tensor, ""]]:
+        """Cross-entropy of the ids and loss of the numbers in use, as means over live steps."""
+        nll = -prediction.logits.gather(-1, prediction.ids[..., None])[..., 0]
+        off = self.number_loss(prediction.hidden, prediction.ids, prediction.given) * self.used[prediction.ids]
+        return {"ids": nll.mean(), "numbers": off.sum(-1).mean()}
+
+
+def live_blocks(ids: Int[Tensor, "B K J"]) -> Bool[Tensor, "B K"]:
+    """Blocks up to and including the first empty one, which ends the program."""
+    empty = (ids == EMPTY).all(-1)
+    return empty.long().cumsum(-1) - empty.long() == 0
+
+
+def preceding_blocks(code: Code) -> Code:
+    """The block before each block (B, K, J); an empty one before the first."""
+    pad = torch.nn.functional.pad
+    return Code(pad(code.ids[:, :-1], (0, 0, 1, 0)), pad(code.parameters[:, :-1], (0, 0, 0, 0, 1, 0)))
+
+
+def stack_grids(batch: TeacherForcingBatch, live: Bool[Tensor, "B K"], dtype: torch.dtype) -> Tensor:
+    """Target and canvas of every live block as two channels (M, 2, 32, 32, 32)."""
+    shape = live.nonzero()[:, 0]
+    return torch.stack([batch.target.to(dtype)[shape], unpack(batch.canvases[live]).to(dtype)], 1)

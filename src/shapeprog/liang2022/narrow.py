@@ -1,0 +1,138 @@
+"""The published synthetic tables and chairs: ten kinds and four (Tian et al., ICLR 2019).
+
+Every translation repeats exactly twice.  Half extents of tops are 4 to 12 cells, their thickness 1 to 5; legs are 1 to
+3 wide and 5 to 24 high; backs 1 to 3 thick and tilted by 0 to 4; supports have radii of 1 to 11, lines of 1; rotations
+make 3 to 6 copies.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+
+from shapeprog.liang2022.draft import Draft, Rng, Template
+from shapeprog.space import SPAN
+
+
+def table(rng: Rng, draft: Draft, top: str, support: str) -> None:
+    """A rectangular, square or round top on four legs, a central support, side boards or lockers."""
+    longest = rng.pick({"up": 0.25, "depth": 0.15, "side": 0.6} if top == "rectangle" else {"up": 0.4, "both": 0.6})
+    thick = rng.whole(1, 5)
+    under = SPAN - thick if longest == "up" else rng.whole(5, SPAN - thick)
+    half_depth, half_side = (12 if longest in (axis, "both") else rng.whole(4, 12) for axis in ("depth", "side"))
+    floor = -((thick + under + 1) // 2)
+    if top == "rectangle":
+        draft.add("top_rectangle", (floor + under, 0, 0), thick, half_depth, half_side)
+    else:
+        half_depth = half_side
+        draft.add(f"top_{top}", (floor + under, 0, 0), thick, half_side)
+    if support.startswith("legs"):
+        _table_legs(rng, draft, top, support, floor, under, half_depth, half_side)
+    elif support in ("column", "cross"):
+        square, radius = top == "square", rng.whole(1, half_side // 2)
+        draft.add("support_cuboid" if square else "support_cylinder", (floor, 0, 0), under, radius)
+        if support == "cross":
+            reach = max(radius + 2, half_side - rng.whole(0, 3))
+            draft.add("base_cross", (floor, 0, 0), rng.whole(1, 2), reach, 0, turns=(4, 1))
+        else:
+            reach = max(radius + 1, rng.whole(2, half_side - 1))
+            draft.add("base_square" if square else "base_circle", (floor, 0, 0), rng.whole(1, 3), reach)
+    else:
+        inset, short = (rng.whole(0, 3), rng.whole(0, 2)) if support == "boards" else (0, rng.whole(0, 1))
+        low = (floor, short - half_depth, inset - half_side)
+        if support == "boards":
+            draft.box("sideboard", low, (under, 2 * (half_depth - short), rng.whole(1, 3)), sides=True)
+        else:
+            width = min(rng.whole(3, 8), 2 * half_side // 3)
+            draft.box("locker", low, (under, 2 * half_depth - short, width), sides=True)
+        between = rng.pick({"board": 0.4, "layer": 0.4, "nothing": 0.2})
+        if between == "board":
+            tall, deep, width = rng.whole(3, under), rng.whole(1, 2), 2 * (half_side - inset)
+            low = (floor + under - tall, half_depth - deep - rng.whole(0, 4), inset - half_side)
+            draft.box("vertical_board", low, (tall, deep, width))
+        elif between == "layer":
+            draft.add("layer", (floor + rng.whole(1, under - 3), 0, 0), 1, half_depth - 1, half_side - inset)
+
+
+def _table_legs(
+    rng: Rng, draft: Draft, top: str, support: str, floor: int, under: int, half_depth: int, half_side: int
+) -> None:
+    """Four legs, and between them a layer, or bars that lead lengthwise, from front to rear, or both ways."""
+    inset = int(half_side * 0.36) if top == "circle" else rng.whole(0, 2)
+    thick = rng.whole(2 if support == "legs with bars" else 1, 3)
+    front, left_edge = inset - half_depth, inset - half_side
+    draft.box("leg", (floor, front, left_edge), (under, thick, thick), sides=True, rear=-front)
+    if support == "legs with layer":
+        draft.add("layer", (floor + rng.whole(1, under - 4), 0, 0), rng.whole(1, 2), -front, -left_edge)
+    if support == "legs with bars":
+        low = (floor + rng.whole(0, under - 3), front, left_edge)
+        bars = rng.pick({"lengthwise": 0.3, "crosswise": 0.3, "both": 0.4})
+        if bars != "crosswise":
+            draft.box("horizontal_bar", low, (2, 2, -2 * left_edge), rear=-front)
+        if bars != "lengthwise":
+            draft.box("horizontal_bar", low, (2, -2 * front, 2), sides=True)
+
+
+def chair(rng: Rng, draft: Draft, support: str) -> None:
+    """A seat on four legs, a central support on a cross or on lines, or side boards; with a back, some with arms."""
+    circle = 0.2 if support in ("cross", "star") else 0
+    seat = rng.pick({"top_rectangle": 0.6, "top_square": 0.4 - circle, "top_circle": circle})
+    floor, under, thick = -SPAN // 2, rng.whole(6, 11), rng.whole(1, 3)
+    half_depth, half_side = rng.whole(5, 10), rng.whole(5, 10)
+    if seat == "top_rectangle":
+        draft.add(seat, (floor + under, 0, 0), thick, half_depth, half_side)
+    else:
+        half_depth = half_side
+        draft.add(seat, (floor + under, 0, 0), thick, half_side)
+    front, left_edge = -half_depth, -half_side
+    if support == "legs":
+        size = (under, rng.whole(1, 3), rng.whole(1, 3))
+        if rng.chance(0.5):
+            draft.box("leg", (floor, front, left_edge), size, sides=True, rear=-front)
+        else:
+            draft.box("leg", (floor, front, left_edge), size, sides=True)
+            draft.box("leg", (floor, -front - size[1], left_edge), size, sides=True)
+        if rng.chance(0.5):
+            bar = min(size[1:])
+            low = (floor + rng.whole(1, under - 2), rng.choice((front, -front - bar)), left_edge)
+            draft.box("horizontal_bar", low, (bar, bar, 2 * half_side))
+    elif support == "boards":
+        draft.box("sideboard", (floor, front, left_edge), (under, 2 * half_depth, rng.whole(1, 3)), sides=True)
+    else:
+        reach, radius = min(half_depth, half_side), rng.whole(1, min(half_side // 2, 3))
+        draft.add("support_cylinder", (floor, 0, 0), under, radius)
+        if support == "cross":
+            reach = max(radius + 2, reach - rng.whole(0, 3))
+            draft.add("base_cross", (floor, 0, 0), rng.whole(1, 2), reach, 0, turns=(4, 1))
+        else:
+            draft.star((floor, 0, 0), rng.whole(0, 4), reach, rng.whole(3, 6))
+    _back_and_arms(rng, draft, floor + under + thick, front, left_edge)
+
+
+def _back_and_arms(rng: Rng, draft: Draft, seat: int, front: int, left_edge: int) -> None:
+    """A back that is one board, or beams with bars; some have arm rests of bars on beams.  ``seat`` is its top."""
+    thick, narrow, rise, armed = rng.whole(1, 3), rng.whole(0, 1), SPAN // 2 - seat, rng.chance(0.28)
+    low, width = (seat, -front - thick, left_edge + narrow), -2 * (left_edge + narrow)
+    if rng.chance(0.5):
+        draft.box("back", low, (rise, thick, width), tilt=rng.whole(1, 4) if rng.chance(0.5) else 0)
+    else:
+        draft.box("chair_beam", low, (rise, thick, rng.whole(1, 2)), sides=True)
+        count, bar = min(2, 6 - len(draft.rows)) if armed else rng.whole(2, 3), rng.whole(1, 2)
+        for k in range(count):
+            draft.box("horizontal_bar", (SPAN // 2 - bar - k * rise // count, *low[1:]), (bar, thick, width))
+    if armed:
+        tall, width = rng.whole(3, 6), rng.whole(1, 2)
+        draft.box("chair_beam", (seat, front, left_edge), (tall, rng.whole(1, 2), width), sides=True)
+        draft.box("horizontal_bar", (seat + tall, front, left_edge), (rng.whole(1, 2), -2 * front, width), sides=True)
+
+
+TABLES = (
+    ("rectangle", "legs"), ("square", "legs"), ("circle", "legs"), ("rectangle", "legs with layer"),
+    ("rectangle", "legs with bars"), ("circle", "column"), ("square", "column"), ("circle", "cross"),
+    ("rectangle", "boards"), ("rectangle", "lockers"),
+)  # fmt: skip
+CHAIRS = {"legs": 50000, "cross": 20000, "star": 5000, "boards": 5000}
+TEMPLATES: dict[Template, float] = {
+    **{partial(table, top=top, support=support): 4000 for top, support in TABLES},
+    **{partial(chair, support=support): count for support, count in CHAIRS.items()},
+}
+"""Templates and the number of shapes that the published data has of them."""

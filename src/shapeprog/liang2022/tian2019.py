@@ -1,0 +1,198 @@
+"""``tian2019``: the program generator of Tian et al. (ICLR 2019), which the paper uses unchanged; 1,417,404 weights.
+
+A 3D convolutional encoder reads target and canvas, a block LSTM runs from block to block and a step LSTM from step to
+step; heads on the latter give the ids and, for each id, a row of numbers.  Layers and weight names are those of the
+published network, so its checkpoints load.  Departures are settings, see :class:`Tian2019Settings`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import torch
+import torch.nn.functional as F
+from jaxtyping import Float, Int
+from torch import Tensor, nn
+
+from shapeprog.geometry.cells import unpack
+from shapeprog.language.statement import EMPTY, SLOTS
+from shapeprog.language.tensors import Code
+from shapeprog.liang2022.generator import IDS, Generator, Prediction, StepOutput, TeacherForcingBatch
+
+WIDTH = 64
+"""Width of the feature, of both LSTMs and of the heads."""
+
+LAYERS = ((2, 16, 5, 1), (16, 32, 3, 2), (32, 32, 3, 1), (32, 64, 3, 2), (64, 64, 3, 1), (64, 128, 3, 2),
+          (128, 128, 3, 1), (128, 128, 3, 1))  # fmt: skip
+"""Channels in and out, kernel and stride of each convolution; the padding is half the kernel."""
+
+INITIAL_RANGE = 0.1
+"""Heads and embedding are initialised uniformly between minus and plus this, as published."""
+
+MOMENTUM = 0.02
+"""Weight of a batch in the running statistics."""
+
+
+@dataclass(frozen=True)
+class Tian2019Settings:
+    """Departures from the published network; the defaults are ours, ``PUBLISHED`` is the original.
+
+    Parameters
+    ----------
+    running_statistics
+        Normalise by running statistics in evaluation.  The published network uses those of the batch, so that a
+        prediction depends on the other shapes in it.
+    legal
+        Give ids that no legal block has at a step zero probability.
+    padding, unused
+        Weights of empty steps, and of numbers that a statement does not use, in the losses.
+    """
+
+    running_statistics: bool = True
+    legal: bool = True
+    padding: float = 1.0
+    unused: float = 0.0
+
+
+PUBLISHED = Tian2019Settings(running_statistics=False, legal=False, padding=0.1, unused=0.1)
+"""The network and its loss as published."""
+
+
+class ShapeEncoder(nn.Module):
+    """Eight convolutions with batch norm and ReLU, the mean over the last 4^3 cells, and a linear layer.
+
+    Parameters
+    ----------
+    running_statistics
+        Keep running statistics and evaluate with them.
+    """
+
+    def __init__(self, running_statistics: bool) -> None:
+        super().__init__()
+        for n, (inputs, outputs, kernel, stride) in enumerate(LAYERS, 1):
+            convolution = nn.Conv3d(inputs, outputs, kernel, stride, kernel // 2)
+            assert convolution.bias is not None
+            convolution.bias.requires_grad_(False)  # cancelled by the normalisation; kept for the published names
+            self.add_module(f"conv{n}", convolution)
+            norm = nn.BatchNorm3d(outputs, momentum=MOMENTUM, track_running_stats=running_statistics)
+            self.add_module(f"BN{n}", norm)
+        self.fc = nn.Linear(LAYERS[-1][1], WIDTH)
+
+    def forward(self, grids: Float[Tensor, "M 2 32 32 32"]) -> Float[Tensor, "M 64"]:
+        """Features of target and canvas."""
+        return self.features(self.convolve(1, grids))
+
+    def convolve_grid(self, grid: Float[Tensor, "M 32 32 32"], channel: int) -> Float[Tensor, "M 16 32 32 32"]:
+        """The first convolution of target or canvas alone: that of the target is the same for all canvases."""
+        # A single channel must be last in memory, or torch takes the grids and all that follows for channels first.
+        return self.convolve(1, grid[..., None].movedim(-1, 1), slice(channel, channel + 1))
+
+    def convolve(self, n: int, value: Tensor, channels: slice = slice(None)) -> Tensor:
+        """Convolution ``n`` of some input channels, without its bias."""
+        convolution = self.get_submodule(f"conv{n}")
+        assert isinstance(convolution, nn.Conv3d)
+        value = value.contiguous(memory_format=torch.channels_last_3d)
+        return F.conv3d(value, convolution.weight[:, channels], None, convolution.stride, convolution.padding)
+
+    def features(self, value: Float[Tensor, "M 16 32 32 32"]) -> Float[Tensor, "M 64"]:
+        """Features from the output of the first convolution."""
+        for n in range(1, len(LAYERS) + 1):
+            value = F.relu(self.get_submodule(f"BN{n}")(value if n == 1 else self.convolve(n, value)), inplace=True)
+        return F.relu(self.fc(value.mean((2, 3, 4))))
+
+
+class StepNet(nn.Module):
+    """The step LSTM and its heads."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.pgm_embed = nn.Embedding(IDS, WIDTH)
+        self.core = nn.LSTM(WIDTH, WIDTH, bias=False)
+        self.logit1 = nn.Linear(WIDTH, WIDTH)
+        self.logit2 = nn.Linear(WIDTH, IDS)
+        self.regress1 = nn.Linear(WIDTH, WIDTH)
+        self.regress2 = nn.Linear(WIDTH + IDS, IDS * SLOTS)
+        nn.init.uniform_(self.pgm_embed.weight, -INITIAL_RANGE, INITIAL_RANGE)
+        for head in (self.logit1, self.logit2, self.regress1, self.regress2):
+            nn.init.uniform_(head.weight, -INITIAL_RANGE, INITIAL_RANGE)
+            nn.init.zeros_(head.bias)
+
+
+def lstm_step(lstm: nn.LSTM, value: Tensor, state: tuple[Tensor, Tensor] | None) -> tuple[Tensor, Tensor]:
+    """One step of a single-layer LSTM without biases; the state is output and cell, each (M, width)."""
+    if state is None:
+        zero = value.new_zeros(len(value), lstm.hidden_size)
+        state = (zero, zero)
+    input_weight, hidden_weight = lstm.all_weights[0]
+    return torch.lstm_cell(value, state, input_weight, hidden_weight)
+
+
+class Tian2019(Generator):
+    """The published network; see the module."""
+
+    design = "tian2019"
+    Settings = Tian2019Settings
+
+    def __init__(self, settings: Tian2019Settings) -> None:
+        super().__init__(settings)
+        self.shape_feat = ShapeEncoder(settings.running_statistics)
+        self.core = nn.LSTM(WIDTH, WIDTH, bias=False, batch_first=True)
+        self.inner_net = StepNet()
+
+    def encode(
+        self, target: Float[Tensor, "B 32 32 32"], canvas: Float[Tensor, "B 32 32 32"], previous: Code, state: Any
+    ) -> tuple[Float[Tensor, "B 64"], Any]:
+        """The block feature; the state holds the first convolution of the target and that of the block LSTM."""
+        encoder = self.shape_feat
+        of_target = encoder.convolve_grid(target, 0) if state is None else state[0]
+        feature = encoder.features(encoder.convolve_grid(canvas, 1) + of_target)
+        lstm = lstm_step(self.core, feature, None if state is None else state[1:])
+        return lstm[0].relu(), (of_target, *lstm)
+
+    def encode_all(self, batch: TeacherForcingBatch) -> Float[Tensor, "M 64"]:
+        """Features of the live blocks; all canvases before the last live one are encoded, as the LSTM needs them."""
+        needed = batch.live.flip(-1).cummax(-1).values.flip(-1)
+        shape, dtype = needed.nonzero()[:, 0], self.shape_feat.fc.weight.dtype
+        of_target = self.shape_feat.convolve_grid(batch.target.to(dtype), 0)
+        of_canvas = self.shape_feat.convolve_grid(unpack(batch.canvases[needed]).to(dtype), 1)
+        rows = self.shape_feat.features(of_canvas + of_target[shape])
+        features = rows.new_zeros(*needed.shape, WIDTH).masked_scatter(needed[..., None], rows)
+        return self.core(features)[0][batch.live].relu()
+
+    def step(self, feature: Float[Tensor, "M 64"], previous: Code | None, index: int, state: Any) -> StepOutput:
+        """One step; its hidden features are the numbers of every id (M, V, 7).
+
+        The heads of the numbers read the probabilities of the ids, without gradient.
+        """
+        net = self.inner_net
+        state = lstm_step(net.core, feature if previous is None else net.pgm_embed(previous.ids), state)
+        scores = net.logit2(net.logit1(state[0]).relu())
+        inputs = torch.cat([scores.detach().softmax(-1), net.regress1(state[0]).relu()], -1)
+        rows = net.regress2(inputs).unflatten(-1, (IDS, SLOTS))
+        logits = self.legal_logits(scores, previous, index) if self.settings.legal else scores.log_softmax(-1)
+        return StepOutput(logits, rows, state)
+
+    def numbers(
+        self, hidden: Tensor, ids: Int[Tensor, "*batch"], given: Float[Tensor, "*batch 7"] | None = None
+    ) -> Float[Tensor, "*batch 7"]:
+        """The row of each id."""
+        return hidden.gather(-2, ids[..., None, None].expand(*ids.shape, 1, SLOTS))[..., 0, :]
+
+    def number_loss(
+        self, hidden: Tensor, ids: Int[Tensor, "*batch"], values: Float[Tensor, "*batch 7"]
+    ) -> Float[Tensor, "*batch 7"]:
+        """Half the squared error; the target of an unused slot is zero."""
+        return 0.5 * (self.numbers(hidden, ids) - values * self.used[ids]) ** 2
+
+    def losses(self, prediction: Prediction) -> dict[str, Float[Tensor, ""]]:
+        """The published losses: weighted means over steps and over numbers."""
+        ids = prediction.ids
+        nll = -prediction.logits.gather(-1, ids[..., None])[..., 0]
+        steps = torch.where(ids == EMPTY, self.settings.padding, 1.0)
+        off = self.number_loss(prediction.hidden, ids, prediction.given)
+        slots = torch.where(self.used[ids], 1.0, self.settings.unused)
+        return {
+            "ids": (nll * steps).sum() / steps.sum().clamp(min=1e-6),
+            "numbers": (off * slots).sum() / slots.sum().clamp(min=1e-6),
+        }

@@ -1,1 +1,0 @@
-"""Networks: the program generators, the neural executor, decoding and checkpoints."""

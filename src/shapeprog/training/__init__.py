@@ -1,1 +1,0 @@
-"""Training: one visible loop, its exact state, and what is taught: pretraining, the executor, adaptation."""

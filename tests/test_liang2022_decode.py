@@ -1,0 +1,138 @@
+"""Decoding, teacher forcing on the canvases that it leaves, and measures of what it writes."""
+
+from __future__ import annotations
+
+import pytest
+import torch
+from liang2022_toys import small, targets, write_targets
+from torch import Tensor
+from torch.nn.functional import max_pool3d
+
+from shapeprog.data.packs import read_pack
+from shapeprog.geometry.cells import count, union, unpack
+from shapeprog.language import encode
+from shapeprog.language.text import parse
+from shapeprog.language.unroll import draw_blocks, unroll
+from shapeprog.liang2022.decode import EXACT_WEIGHT, Decoded, decode
+from shapeprog.liang2022.evaluate import evaluate, scores_on_packs
+from shapeprog.liang2022.generator import Generator
+from shapeprog.liang2022.prior import SyntheticStream, prior
+from shapeprog.liang2022.teacher import scheduled_sampling, teacher_forcing
+from shapeprog.liang2022.weights import load_generator
+
+pytestmark = pytest.mark.paper
+
+
+def seeded(seed: int = 0) -> torch.Generator:
+    return torch.Generator().manual_seed(seed)
+
+
+def decoded(decoder: str, seed: int = 0, generator: Generator | None = None) -> Decoded:
+    return decode(generator or small(), targets(6), decoder=decoder, rng=seeded(seed))  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("decoder", ["argmax", "novel", "select", "sample", "sample-ids"])
+def test_canvases_are_the_cells_of_the_blocks_before(decoder: str):
+    result = decoded(decoder)
+    drawn = draw_blocks(result.drawn)
+    for k in range(drawn.shape[1]):
+        assert torch.equal(result.canvases[:, k], union(drawn[:, :k]) if k else torch.zeros_like(drawn[:, 0]))
+    last = unpack(union(drawn))
+    both, either = ((part > 0).sum((1, 2, 3)) for part in (last & targets(6), last | targets(6)))
+    torch.testing.assert_close(result.iou(targets(6)).double(), both / either.double())
+    live = result.teacher_forcing(targets(6)).live
+    assert not result.code.ids[~live].any(), "nothing follows the end"
+    whole = encode(result.programs(whole=True), blocks=10)
+    assert torch.equal(union(draw_blocks(whole)), union(drawn))
+
+
+def test_novel_ends_rather_than_write_a_block_that_draws_nothing_new():
+    result = decoded("novel")
+    new = count(draw_blocks(result.drawn) & ~result.canvases) > 0
+    writes = (result.drawn.ids > 0).any(-1)
+    assert torch.equal(new, writes)
+    assert writes.any()
+    still = decoded("argmax")
+    assert ((still.drawn.ids > 0).any(-1) & (count(draw_blocks(still.drawn) & ~still.canvases) == 0)).any()
+
+
+def widened(cells: Tensor) -> Tensor:
+    """Cells that share a face with a filled one, and these."""
+    grid = cells[:, None].float()
+    ways = [max_pool3d(grid, kernel, 1, [size // 2 for size in kernel]) for kernel in ((3, 1, 1), (1, 3, 1), (1, 1, 3))]
+    return torch.stack(ways).amax(0)[:, 0].bool()
+
+
+def test_select_writes_only_blocks_that_agree_with_the_target_and_never_lowers_the_agreement():
+    target, generator = targets(6).bool(), load_generator("fast-narrow")
+    result = decoded("select", generator=generator)
+    blocks = unpack(draw_blocks(result.drawn)).bool()
+    for k in range(blocks.shape[1]):
+        canvas = unpack(result.canvases[:, k]).bool()
+        new = blocks[:, k] & ~canvas
+        exact = (new & target).sum((1, 2, 3)) - (new & ~target).sum((1, 2, 3))
+        near = (target & widened(blocks[:, k]) & ~widened(canvas)).sum((1, 2, 3))
+        near -= (new & ~widened(target)).sum((1, 2, 3))
+        writes = (result.drawn.ids[:, k] > 0).any(-1)
+        assert (EXACT_WEIGHT * exact + near > 0)[writes].all()
+    assert result.iou(targets(6)).mean() >= max(0.5, decoded("argmax", generator=generator).iou(targets(6)).mean())
+    empty = decode(generator, torch.zeros_like(targets(2)), decoder="select")
+    assert not empty.code.ids.any(), "nothing helps where there is nothing"
+
+
+def test_sampling_depends_on_its_seed_alone():
+    one, two, three = decoded("sample", 1), decoded("sample", 1), decoded("sample", 2)
+    assert torch.equal(one.code.ids, two.code.ids)
+    assert torch.equal(one.code.parameters, two.code.parameters)
+    assert not torch.equal(one.code.ids, three.code.ids)
+    assert torch.equal(one.drawn.parameters, one.drawn.parameters.round()), "sampled numbers are whole"
+
+
+def test_blocks_come_in_order_of_what_they_cover_and_those_that_add_nothing_are_dropped():
+    made = SyntheticStream(prior("wide"), 16, seed=2)[0]
+    batch = teacher_forcing(made.voxels, made.code)
+    drawn = draw_blocks(batch.code)
+    new = count(drawn & ~batch.canvases)
+    writes = (batch.code.ids > 0).any(-1)
+    assert torch.equal(new > 0, writes)
+    assert (new[:, :-1] >= new[:, 1:]).all()
+    assert torch.equal(unpack(union(drawn)), made.voxels)
+    first = count(draw_blocks(made.code)).amax(-1)
+    assert torch.equal(new[:, 0], first), "the largest block comes first"
+    twice = encode([parse("leg(at=(0, 0, 0), size=(4, 4, 4))\nleg(at=(0, 0, 0), size=(8, 8, 8))\n")])
+    cells = unroll(twice).voxels()
+    assert teacher_forcing(cells, twice).live.tolist() == [[True, True, False]]
+    written = teacher_forcing(cells, twice, "written")
+    assert torch.equal(written.code.ids[:, :2], twice.ids)
+    assert written.live.tolist() == [[True, True, True]]
+
+
+def test_scheduled_sampling_asks_for_the_block_that_adds_most_to_a_canvas_of_the_generator():
+    made = SyntheticStream(prior("narrow"), 6, seed=3)[0]
+    batch = teacher_forcing(made.voxels, made.code)
+    generator = small().train()
+    sampled = scheduled_sampling(generator, batch, seeded())
+    assert generator.training
+    assert torch.equal(sampled.target, batch.target)
+    blocks, wanted = draw_blocks(batch.code), draw_blocks(sampled.code)
+    assert count(sampled.canvases[:, 1:]).any()
+    for k in range(sampled.canvases.shape[1]):
+        canvas = sampled.canvases[:, k]
+        most = count(blocks & ~canvas[:, None]).amax(-1)
+        assert torch.equal(count(wanted[:, k] & ~canvas), most), "or the end, where nothing adds"
+        assert not sampled.code.ids[:, k][most == 0].any()
+
+
+def test_measures_are_those_of_the_written_programs_and_an_empty_one_is_a_point(tmp_path):
+    path = write_targets(tmp_path / "few.npz", 2)
+    generator = load_generator("fast-narrow")
+    rows = evaluate(generator, list(read_pack(path)), "select")
+    assert [row.iou for row in rows] == pytest.approx(decode(generator, targets(2)).iou(targets(2)).tolist())
+    scores = scores_on_packs(generator, [path], "select")
+    assert scores.keys() == {"few_iou", "few_cd", "few_blocks", "few_cd_median"}
+    assert scores["few_cd"] == pytest.approx(sum(row.cd for row in rows) / 2)
+    with torch.no_grad():
+        generator.id_head[2].bias[0] += 100
+    silent = evaluate(generator, list(read_pack(path)), "argmax")
+    assert [row.blocks for row in silent] == [0, 0]
+    assert all(0 < row.cd < 1 for row in silent)

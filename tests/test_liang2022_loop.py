@@ -1,0 +1,144 @@
+"""The training loop: it resumes exactly, on one process and on two, and says in a sentence what is wrong."""
+
+from __future__ import annotations
+
+import os
+import random
+import subprocess
+import sys
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+import torch
+from liang2022_toys import TOY, Toy, run, same
+
+from shapeprog.errors import InputError, ShapeProgError
+from shapeprog.liang2022.loop import BEST, LOG, STATE, WEIGHTS, read_log, train
+from shapeprog.liang2022.settings import TrainingSettings
+
+pytestmark = pytest.mark.paper
+SCRIPT = Path(__file__).with_name("liang2022_toys.py")
+
+
+def untimed(folder: Path) -> list[dict[str, float]]:
+    return [{name: value for name, value in each.items() if name != "seconds"} for each in read_log(folder)]
+
+
+def state(folder: Path) -> dict[str, object]:
+    return torch.load(folder / STATE, weights_only=True)
+
+
+def test_a_stopped_run_goes_on_as_if_nothing_had_happened(tmp_path: Path):
+    whole, records = run(tmp_path / "whole")
+    assert [each["step"] for each in records] == list(range(1, 21))
+    for stop_at in (3, 11):
+        assert run(tmp_path / "parts", stop_at=stop_at)[1][-1]["step"] == stop_at + 1
+    parts, rest = run(tmp_path / "parts")
+    assert [each["step"] for each in rest] == list(range(13, 21))
+    assert same(whole.module.state_dict(), parts.module.state_dict())
+    assert same(state(tmp_path / "whole"), state(tmp_path / "parts"))
+    assert untimed(tmp_path / "parts") == untimed(tmp_path / "whole") == records
+    assert run(tmp_path / "parts")[1] == [], "a finished run has nothing left to do"
+
+
+def test_two_processes_resume_exactly_with_one_set_of_running_statistics(tmp_path: Path):
+    launch = [sys.executable, "-m", "torch.distributed.run", "--nproc-per-node", "2", "--standalone", str(SCRIPT)]
+    environment = {**os.environ, "OMP_NUM_THREADS": "1", "CUDA_VISIBLE_DEVICES": ""}
+    done = subprocess.run([*launch, str(tmp_path)], capture_output=True, text=True, env=environment, check=False)
+    assert done.returncode == 0, done.stderr
+    one, two = (torch.load(tmp_path / f"rank{rank}.pt", weights_only=True) for rank in (0, 1))
+    assert same(one, two)
+    assert one["1.running_mean"].any()
+    assert same(state(tmp_path / "whole"), state(tmp_path / "parts"))
+    assert untimed(tmp_path / "parts") == untimed(tmp_path / "whole")
+    assert [each["samples_seen"] for each in read_log(tmp_path / "whole")] == list(range(8, 81, 8))
+
+
+def test_changed_settings_are_refused_by_name_and_a_longer_run_is_none(tmp_path: Path):
+    run(tmp_path)
+    with pytest.raises(ShapeProgError, match=r"batch_size was 4, is now 8; learning_rate was 0\.001, is now 0\.1"):
+        run(tmp_path, settings=replace(TOY, batch_size=8, learning_rate=0.1))
+    longer = replace(TOY, num_shapes=88, validate_every=0)
+    assert [each["step"] for each in run(tmp_path, settings=longer)[1]] == [21, 22]
+    again = list(train(Toy(), TOY, tmp_path, device="cpu", restart=True))
+    assert len(again) == len(read_log(tmp_path)) == 20
+
+
+def test_records_after_the_saved_state_are_dropped(tmp_path: Path):
+    run(tmp_path / "whole")
+    run(tmp_path / "killed", stop_at=9)
+    with (tmp_path / "killed" / LOG).open("a") as stream:  # as a process leaves it that is killed between two states
+        stream.write('{"step": 11, "loss": 7.0}\n{"step": 12, "lo')
+    run(tmp_path / "killed")
+    assert untimed(tmp_path / "killed") == untimed(tmp_path / "whole")
+
+
+def test_a_damaged_state_or_log_is_named(tmp_path: Path):
+    run(tmp_path, stop_at=5)
+    good, dice = (tmp_path / STATE).read_bytes(), random.Random(0)
+    refused = 0
+    for number in range(30):
+        content = bytearray(good)
+        for _ in range((1, 8, 64)[number % 3]):
+            content[dice.randrange(len(content))] = dice.randrange(256)
+        (tmp_path / STATE).write_bytes(content)
+        (tmp_path / LOG).write_text("")
+        try:
+            run(tmp_path, stop_at=6)
+        except ShapeProgError:
+            refused += 1
+    assert refused > 10
+    (tmp_path / STATE).write_bytes(good[:-9])
+    with pytest.raises(InputError, match=r"state\.pt is damaged\n.*--restart"):
+        run(tmp_path)
+    (tmp_path / STATE).write_bytes(good)
+    (tmp_path / LOG).write_text("{\n")
+    with pytest.raises(InputError, match=r"the log .* is damaged"):
+        run(tmp_path)
+
+
+def test_a_state_of_another_network_is_refused(tmp_path: Path):
+    run(tmp_path, stop_at=2)
+    other = Toy()
+    other.module = torch.nn.Sequential(torch.nn.Linear(8, 1))
+    with pytest.raises(InputError, match=r"state\.pt does not fit"):
+        run(tmp_path, task=other)
+
+
+def test_a_folder_belongs_to_one_process(tmp_path: Path):
+    going = train(Toy(), TOY, tmp_path, device="cpu")
+    next(going)
+    with pytest.raises(ShapeProgError, match="another process trains in"):
+        run(tmp_path)
+    going.close()
+    run(tmp_path, stop_at=1)
+
+
+def test_a_loss_that_is_not_finite_ends_the_run(tmp_path: Path):
+    toy = Toy()
+    with torch.no_grad():
+        toy.module[4].bias.fill_(torch.nan)
+    with pytest.raises(ShapeProgError, match=r"the loss of step 1 is nan.*\n.*lower the learning rate"):
+        run(tmp_path, task=toy)
+    assert not (tmp_path / WEIGHTS).exists()
+
+
+def test_weights_are_written_at_each_validation_and_the_best_kept(tmp_path: Path):
+    _, records = run(tmp_path)
+    scores = {each["samples_seen"]: each["val_score"] for each in records if "val_score" in each}
+    assert list(scores) == [20, 40, 60, 80]
+    assert int((tmp_path / BEST).read_text()) == max(scores, key=scores.__getitem__)
+    assert (tmp_path / WEIGHTS).read_text() == "80"
+    assert all({"loss", "square", "size", "worst", "gradient_norm", "learning_rate"} <= each.keys() for each in records)
+    assert records[0]["loss"] == pytest.approx(records[0]["square"] + records[0]["size"])
+
+
+@pytest.mark.parametrize(("schedule", "end"), [("cosine", 0.0), ("constant", 0.5)])
+def test_the_learning_rate_rises_from_zero_and_ends_as_its_schedule_says(schedule: str, end: float):
+    settings = TrainingSettings(num_shapes=1000, batch_size=1, learning_rate=0.5, warm_up=100, schedule=schedule)  # type: ignore[arg-type]
+    rates = [settings.learning_rate_at(seen) for seen in range(1000)]
+    assert (rates[0], rates[100], max(rates)) == (0.005, 0.5, 0.5)
+    assert rates[-1] == pytest.approx(end, abs=1e-5)
+    assert all(later <= sooner for sooner, later in pairwise(rates[100:]))

@@ -32,6 +32,7 @@ from torch import Tensor, nn
 from shapeprog.data.packs import read_pack
 from shapeprog.errors import ShapeProgError
 from shapeprog.geometry.losses import occupancy_cross_entropy
+from shapeprog.geometry.scene import Scene
 from shapeprog.geometry.surface import has_surface
 from shapeprog.inference.surface import points_of_cells
 from shapeprog.language.statement import EMPTY
@@ -78,12 +79,13 @@ class TargetStream:
 
     def __getitem__(self, index: int) -> Targets:
         """The batch of an index, 0 or more."""
-        count = len(self._shapes)
+        count, numbers = len(self._shapes), range(index * self._batch_size, (index + 1) * self._batch_size)
+        rounds = {number // count for number in numbers}
+        orders = {n: np.random.default_rng((self._seed, 0, n)).permutation(count) for n in rounds}
         rng = np.random.default_rng((self._seed, 1, index))
         cells, points = [], []
-        for number in range(index * self._batch_size, (index + 1) * self._batch_size):
-            order = np.random.default_rng((self._seed, 0, number // count)).permutation(count)
-            pack, row = self._shapes[order[number % count]]
+        for number in numbers:
+            pack, row = self._shapes[orders[number // count][number % count]]
             shape = pack[row]
             cloud = points_of_cells(shape.voxels, 5000) if shape.points is None else shape.points
             cells.append(shape.voxels.astype(np.uint8))
@@ -158,7 +160,7 @@ class AdaptTask:
         with torch.autocast(rng.device.type, enabled=False):
             per_shape = self._render_losses(prediction, targets, rng)
             losses = {name: value.mean() for name, value in per_shape.items()}
-            losses |= self._id_losses(prediction, decoded, targets, per_shape)
+            losses |= self._id_losses(prediction, decoded, targets)
         if batch[1] is not None:
             rehearsed = generator.predict(batch[1].to(rng.device)).losses()
             losses |= {f"rehearsal_{name}": value for name, value in rehearsed.items()}
@@ -171,16 +173,20 @@ class AdaptTask:
         code = predicted_code(prediction, base=self._settings.learn == "all")
         draws = has_surface(unroll(Code(code.ids, code.parameters.detach())))
         no_gradient = 0 * code.parameters.sum()
-        values = empty_program_losses(targets.points, targets.cells, self._losses)
-        values = {name: value + no_gradient for name, value in values.items()}
-        if bool(draws.any()):
-            whole_cells = code.parameters - prediction.scatter(prediction.offsets)
-            scene, canvas = (
-                unroll(Code(code.ids[draws], numbers[draws])) for numbers in (code.parameters, whole_cells)
-            )
+        values = {name: no_gradient.expand(len(draws)) for name in self._losses if name != NEURAL}
+        if not bool(draws.all()):
+            empty = empty_program_losses(targets.points[~draws], targets.cells[~draws], self._losses)
+            values = {name: value.masked_scatter(~draws, empty[name]) + no_gradient for name, value in values.items()}
+        if values and bool(draws.any()):
+            ids, numbers = code.ids[draws], code.parameters[draws]
+
+            def canvas() -> Scene:
+                return unroll(Code(ids, numbers - prediction.scatter(prediction.offsets)[draws]))
+
             comparison = Comparison(
-                scene, targets.points[draws], targets.cells[draws], self._settings.points, rng, canvas
-            )
+                unroll(Code(ids, numbers)), targets.points[draws], targets.cells[draws], self._settings.points, rng,
+                canvas,
+            )  # fmt: skip
             computed = compute(comparison, self._losses)
             values = {name: value.masked_scatter(draws, computed[name]) for name, value in values.items()}
         if self._executor is not None:
@@ -190,9 +196,7 @@ class AdaptTask:
             values[NEURAL] = self._losses[NEURAL] * occupancy_cross_entropy(logits, targets.cells)
         return values
 
-    def _id_losses(
-        self, prediction: Prediction, decoded: Decoded, targets: Targets, per_shape: dict[str, Tensor]
-    ) -> dict[str, Tensor]:
+    def _id_losses(self, prediction: Prediction, decoded: Decoded, targets: Targets) -> dict[str, Tensor]:
         """Losses that train ids: cross-entropy to the decoded ones, KL to the initial ones, or an estimator."""
         settings, losses = self._settings, {}
         log_prob = prediction.log_prob()
@@ -206,8 +210,7 @@ class AdaptTask:
             losses["kl"] = settings.kl * (before.exp() * difference).sum(-1).mean()
         if settings.estimator == "none":
             return losses
-        total = torch.stack(list(per_shape.values())).sum(0).detach()
-        costs = 1 - decoded.iou(targets.cells).to(total)
+        costs = 1 - decoded.iou(targets.cells).to(log_prob)
         if settings.estimator == "rloo":
             shape = (settings.num_samples, -1)
             advantage = leave_one_out_advantage(costs.reshape(shape))[..., None]

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, get_origin, get_type_
 import typer
 
 from shapeprog.cli import terminal
+from shapeprog.cli.sampling import write_samples
 from shapeprog.errors import InputError, ShapeProgError
 from shapeprog.liang2022.settings import METHODS, AdaptSettings, ExecutorSettings, PretrainSettings, TrainingSettings
 
@@ -83,14 +84,18 @@ def sample_command(
     Example: shapeprog paper sample narrow --out narrow.png
     """
     from shapeprog.liang2022.prior import programs
-    from shapeprog.view import Item, contact_sheet
 
-    items = [
-        Item(f"{prior}_{number}", None, program, f"{program.blocks} blocks, {program.size} parts")
-        for number, program in enumerate(programs(prior, count, seed))
-    ]
-    contact_sheet(items, out, columns=6, title=f"{prior}, seed {seed}")
-    terminal.output().print(f"wrote {out}")
+    write_samples(
+        prior,
+        programs(prior, count, seed),
+        seed=seed,
+        out=out,
+        folder=None,
+        pack=None,
+        points=0,
+        columns=6,
+        quiet=False,
+    )
 
 
 @command("models")

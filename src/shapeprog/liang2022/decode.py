@@ -130,7 +130,8 @@ def decode(
             block, chance = _one_block(generator, feature, decoder, rng)
         ids[active, k], numbers[active, k] = block.ids, block.parameters
         if generator.has_offsets:
-            offsets[active, k] = _offsets(generator, feature, block)
+            hidden = generator.steps(feature, block)[1]
+            offsets[active, k] = generator.offsets(hidden, block.ids, block.parameters)
         log_prob[active] += chance
         canvases[:, k + 1] = canvases[:, k]
         going = block.ids[:, 0] != EMPTY
@@ -154,17 +155,6 @@ def decode_all(
     )
     canvases, log_prob = torch.cat([part.canvases for part in parts]), torch.cat([part.log_prob for part in parts])
     return Decoded(code, drawn, canvases, log_prob)
-
-
-def _offsets(generator: Generator, feature: Float[Tensor, "N F"], block: Code) -> Float[Tensor, "N J 7"]:
-    """Offsets of blocks, from their own steps."""
-    hidden: list[Tensor] = []
-    state = None
-    for j in range(STEPS):
-        previous = Code(block.ids[:, j - 1], block.parameters[:, j - 1]) if j else None
-        _, features, state = generator.step(feature, previous, j, state)
-        hidden.append(features)
-    return generator.offsets(torch.stack(hidden, 1), block.ids, block.parameters)
 
 
 def _one_block(

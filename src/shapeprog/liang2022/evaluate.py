@@ -20,23 +20,19 @@ from shapeprog.liang2022.decode import Decoder, decode_all
 from shapeprog.liang2022.generator import Generator
 
 
-def evaluate(
-    generator: Generator, shapes: Sequence[Shape], decoder: Decoder, *, snap: bool = False, seed: int = 0
-) -> list[Metrics]:
-    """Measures of single-pass programs.
+def evaluate(generator: Generator, shapes: Sequence[Shape], decoder: Decoder, seed: int = 0) -> list[Metrics]:
+    """Measures of single-pass programs; IoU is of the canvas.
 
     Parameters
     ----------
     decoder
         How programs are written.
-    snap
-        Search whole numbers within one of the program for the IoU, as the protocol allows; else IoU is of the canvas.
     seed
         Seed of the samples of surfaces.
     """
     decoded = decode_all(generator, grids(shapes).to(next(generator.parameters()).device), decoder=decoder)
     rows = zip(decoded.programs(), decoded.programs(whole=True), shapes, strict=True)
-    return [measure(program, whole, shape, snap, seed) for program, whole, shape in rows]
+    return [measure(program, whole, shape, seed) for program, whole, shape in rows]
 
 
 def grids(shapes: Sequence[Shape]) -> UInt8[Tensor, "B 32 32 32"]:
@@ -44,20 +40,15 @@ def grids(shapes: Sequence[Shape]) -> UInt8[Tensor, "B 32 32 32"]:
     return torch.from_numpy(np.stack([shape.voxels for shape in shapes]).astype(np.uint8))
 
 
-def measure(program: Program, whole: Program, shape: Shape, snap: bool = False, seed: int = 0) -> Metrics:
+def measure(program: Program, whole: Program, shape: Shape, seed: int = 0) -> Metrics:
     """Measures of a program; one that draws nothing counts as a point in the centre of the grid."""
-    from shapeprog.inference.snapping import snap as snapped
-
-    best = evaluate_program(program, shape, whole, seed=seed)
-    if snap:
-        snapped_metrics = evaluate_program(program, shape, snapped(program, shape.voxels), seed=seed)
-        best = replace(best, iou=max(best.iou, snapped_metrics.iou))
-    samples = None if np.isfinite(best.cd) else target_samples(shape, 5000, seed)
+    row = evaluate_program(program, shape, whole, seed=seed)
+    samples = None if np.isfinite(row.cd) else target_samples(shape, 5000, seed)
     if samples is None:
-        return best
+        return row
     squared = (samples[0] ** 2).sum(-1) * world_scale(shape) ** 2
     forward, back = float(squared.min()), float(squared.mean())
-    return replace(best, cd=forward + back, to_target=forward, from_target=back)
+    return replace(row, cd=forward + back, to_target=forward, from_target=back)
 
 
 def scores_on_packs(generator: Generator, packs: Sequence[str | Path], decoder: Decoder) -> dict[str, Any]:

@@ -10,7 +10,7 @@ import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
 import numpy as np
 import torch
@@ -19,11 +19,15 @@ from shapeprog.data.packs import read_pack, write_pack
 from shapeprog.data.shape import Shape
 from shapeprog.errors import InputError, did_you_mean
 from shapeprog.files import append_line, make_folder
+from shapeprog.geometry.cells import voxels
+from shapeprog.geometry.surface import sample_surface
 from shapeprog.language.program import Program
+from shapeprog.language.unroll import unroll
 from shapeprog.liang2022.adapt import AdaptTask
 from shapeprog.liang2022.decode import Decoder, decode_all
 from shapeprog.liang2022.evaluate import grids, measure
 from shapeprog.liang2022.loop import BEST, STATE, read_log, train
+from shapeprog.liang2022.prior import prior
 from shapeprog.liang2022.settings import METHODS, AdaptSettings
 from shapeprog.liang2022.weights import load_generator
 
@@ -223,7 +227,7 @@ def table(results: Path, categories: Sequence[str] = CATEGORIES) -> Iterator[str
         yield "| row | paper | " + " | ".join(DECODERS) + " |"
         yield "|---" * (2 + len(DECODERS)) + "|"
         for name, row in ROWS.items():
-            cells = [_cell(measured, name, category, decoder) for decoder in get_args(Decoder)[: len(DECODERS)]]
+            cells = [_cell(measured, name, category, decoder) for decoder in DECODERS]
             if any(cells):
                 paper = f"{1000 * PAPER[name][index]:.1f}" if name in PAPER and len(categories) > 1 else ""
                 yield f"| {row.label} | {paper} | " + " | ".join(cells) + " |"
@@ -247,18 +251,12 @@ def _cell(measured: list[dict[str, Any]], row: str, category: str, decoder: str)
 
 def _synthetic_packs(folder: Path) -> Path:
     """Packs of wide synthetic furniture, which the narrow prior does not hold, as targets of the quick version."""
-    from shapeprog.geometry.surface import sample_surface
-    from shapeprog.language.unroll import unroll
-    from shapeprog.liang2022.prior import prior
-
     for split, count, seed in (("train", 320, 11), ("val", 16, 12), ("test", QUICK_SHAPES, 13)):
         path = folder / f"synthetic_{split}.npz"
         if not path.exists():
             code = prior("wide").sample(count, seed)[0]
             scene = unroll(code)
             points = sample_surface(scene, 2000, torch.Generator().manual_seed(seed)).points.numpy().astype(np.float32)
-            from shapeprog.geometry.cells import voxels
-
             cells = voxels(scene).numpy().astype(bool)
             write_pack(path, [Shape(f"{split}_{n}", cells[n], points[n]) for n in range(count)])
     return folder

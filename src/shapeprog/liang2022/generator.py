@@ -272,13 +272,17 @@ class Generator(nn.Module, ABC):
     def predict(self, batch: TeacherForcingBatch) -> Prediction:
         """Teacher forcing: the output for given canvases and programs, with gradient."""
         feature = self.encode_all(batch)
-        ids, values = batch.code.ids[batch.live], batch.code.parameters[batch.live].detach()
+        block = Code(batch.code.ids[batch.live], batch.code.parameters[batch.live].detach())
+        return Prediction(batch, *self.steps(feature, block), feature, self)
+
+    def steps(self, feature: Float[Tensor, "M F"], block: Code) -> tuple[Float[Tensor, "M J V"], Tensor]:
+        """Log-probabilities and hidden features of all steps, each after the steps of the block before it."""
         outputs: list[StepOutput] = []
         for j in range(STEPS):
-            previous = Code(ids[:, j - 1], values[:, j - 1]) if j else None
+            previous = Code(block.ids[:, j - 1], block.parameters[:, j - 1]) if j else None
             outputs.append(self.step(feature, previous, j, outputs[-1].state if outputs else None))
         logits = torch.stack([output.logits for output in outputs], 1)
-        return Prediction(batch, logits, torch.stack([output.hidden for output in outputs], 1), feature, self)
+        return logits, torch.stack([output.hidden for output in outputs], 1)
 
     def losses(self, prediction: Prediction) -> dict[str, Float[Tensor, ""]]:
         """Cross-entropy of the ids and loss of the numbers in use, as means over live steps."""

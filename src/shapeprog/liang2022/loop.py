@@ -139,12 +139,10 @@ def train(
             loss = torch.stack([value.float() for name, value in losses.items() if name[0] != "_"]).sum()
             optimiser.zero_grad()
             loss.backward()
-            gradients = [weight.grad for weight in weights if weight.grad is not None]
             stopping = torch.tensor(float(stop is not None and stop.is_set()), device=where)
             values = torch.stack([value.detach().float() for value in (loss, stopping, *losses.values())])
             if world > 1:
-                gradients = [_gradient(weight) for weight in weights]
-                _average([*gradients, *buffers, values])
+                _average([*map(_gradient, weights), *buffers, values])
             norm = float(torch.nn.utils.clip_grad_norm_(weights, settings.clip_norm or math.inf))
             if settings.clip_value:
                 torch.nn.utils.clip_grad_value_(weights, settings.clip_value)

@@ -32,10 +32,8 @@ from shapeprog.language.program import Draw, Program
 from shapeprog.language.statement import is_word
 from shapeprog.language.tensors import Code, encode
 from shapeprog.language.unroll import unroll
+from shapeprog.liang2022.settings import NEURAL
 from shapeprog.space import HALF, RESOLUTION
-
-NEURAL = "neural"
-"""Reserved name of the loss through the neural executor, which compares predictions and not scenes."""
 
 SHARPNESS = 4.0
 """Slope of the logit of a soft cell, per cell of distance."""
@@ -63,7 +61,7 @@ class Comparison:
     generator
         Source of randomness.
     canvas
-        Scenes of the numbers without offsets, whose cells are compared; ``scene`` by default.
+        Makes the scenes of the numbers without offsets, whose cells are compared; ``scene`` by default.
     """
 
     scene: Scene
@@ -71,7 +69,7 @@ class Comparison:
     cells: UInt8[Tensor, "B 32 32 32"]
     num_samples: int
     generator: torch.Generator
-    canvas: Scene | None = None
+    canvas: Callable[[], Scene] | None = None
 
     @cached_property
     def surface(self) -> SurfaceSample:
@@ -95,7 +93,7 @@ class Comparison:
         index = self.cell_sample[0]
         axes = [index.div(RESOLUTION**power, rounding_mode="floor") % RESOLUTION for power in (2, 1, 0)]
         centres = torch.stack(axes, -1).to(self.scene.centre) + 0.5 - HALF
-        cell_scene = self.scene if self.canvas is None else self.canvas
+        cell_scene = self.scene if self.canvas is None else self.canvas()
         return -SHARPNESS * signed_distance(cell_scene, centres).clamp(-1e3, 1e3)
 
     @cached_property

@@ -13,7 +13,7 @@ from typing import Any, ClassVar, Literal, get_args, get_origin, get_type_hints
 from shapeprog.errors import ShapeProgError
 
 NEURAL = "neural"
-"""Name of the loss through the neural executor."""
+"""Reserved name of the loss through the neural executor, which compares predictions and not scenes."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -53,8 +53,7 @@ that is used once needs no name; but a place, measured from the middle, stays be
 
 @dataclass(frozen=True)
 class Measure:
-    """What a name may stand for: a word for what is measured, along which axis and of which node, and its factors; of
-    an offset also the node that it is measured from."""
+    """A quantity that a name can denote: its word, axis and node, its linear factors, and the origin of an offset."""
 
     word: Word
     feature: Feature

@@ -140,7 +140,7 @@ class _Ties:
         return features(self.tunable, self.tunable.poses(self._own(self.numbers)))
 
     def impose(self, offered: list[Relation], worth: float) -> bool:
-        """Let relations hold that are worth having where a number is worth so much, and tell whether some are."""
+        """Impose the relations that pay at a price per number; returns whether any were added."""
         before, curvature = len(self.rows), self.misfit.at(self.numbers)[1]
         self.rows, optimum = worthwhile(
             offered, self.numbers, curvature, worth, fixed=self.rows, low=self.misfit.low, far=self.misfit.far

@@ -1,16 +1,15 @@
 """The same edits of programs with named numbers and of the same programs with plain numbers, side by side.
 
-    python -m benchmarks.edits docs/edits.png examples/chair_kenney.obj leg_height=12 \\
-        examples/table_polyhaven_wooden.obj 'width*=1.5'
+    python -m benchmarks.edits docs/edits.png examples/chair_kenney.obj leg_height=15 \\
+        examples/bookcase_kenney_open.obj 'height*=0.7' examples/table_polyhaven_wooden.obj 'width*=1.5'
 
-Above, each change is made to the name.  Below, it is made to the one plain number that reads the same, the first in the
-text; to a count, where the name is one.
+Above, each change is made to the name.  Below, it is made to the plain number that is nearest to the named one, the
+first in the text.
 """
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -83,24 +82,10 @@ def columns_of(mesh: str, changes: tuple[str, ...]) -> list[Column]:
 def without_names(plain: Any, before: Any, value: float) -> tuple[str, Any]:
     """What is changed in a plain program where a named number gets another value, and the program that this makes."""
     from shapeprog.language.free import free_values, multiplied
-    from shapeprog.language.program import Program
 
-    if before.whole:
-        body = tuple(recounted(plain.body, before.value, value))
-        return f"{before.value:g} -> {value:g} copies", Program(body)
     numbers = np.array(free_values(plain))
     place = int(np.abs(numbers - before.value).round(3).argmin())
     return f"{numbers[place]:g} -> {value:g}", multiplied(plain, place, value / numbers[place])
-
-
-def recounted(body: tuple[Any, ...], before: float, after: float) -> Iterator[Any]:
-    """The statements and loops of a program with another count for the first loop that has this one."""
-    from shapeprog.language.program import Loop
-
-    done = False
-    for node in body:
-        done = not done and isinstance(node, Loop) and node.count == before
-        yield Loop(node.name, (after, *node.values[1:]), node.body) if done else node
 
 
 if __name__ == "__main__":

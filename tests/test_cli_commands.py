@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -96,7 +97,7 @@ def test_a_disk_that_takes_nothing_ends_the_run(run: Run, tmp_path: Path, monkey
     ended = run("infer", "one.obj", table(tmp_path / "two.obj"))
     assert ended.code == 2
     assert ended.err.count("the disk is full") == 1
-    assert "what was finished is kept: 0 programs" in ended.err
+    assert "finished results are kept: 0 programs" in ended.err
 
 
 @pytest.mark.usefixtures("quick")
@@ -130,7 +131,7 @@ def test_an_interruption_says_what_was_kept(run: Run, tmp_path: Path, monkeypatc
     monkeypatch.setattr(inference, "infer", infer)
     ended = run("infer", table(tmp_path / "table.obj"), "--out", "res")
     assert ended.code == 130
-    assert "what was finished is kept: 0 programs in res" in ended.err
+    assert "finished results are kept: 0 programs in res" in ended.err
 
 
 def test_a_fault_of_ours_in_measuring_one_shape_stops_nothing(run: Run, tmp_path: Path, monkeypatch):
@@ -149,7 +150,7 @@ def test_a_fault_of_ours_in_measuring_one_shape_stops_nothing(run: Run, tmp_path
     monkeypatch.setattr(scoring, "measure", fails_once)
     ended = run("evaluate", "in", "in", "--json")
     assert ended.code == 1
-    assert "prediction a could not be measured: a fault of shapeprog" in ended.err
+    assert "prediction a could not be measured: internal error" in ended.err
     assert [row["name"] for row in json.loads(ended.out)["rows"]] == ["b"]
 
 
@@ -160,7 +161,7 @@ def test_a_fault_of_ours_in_one_shape_stops_nothing(run: Run, tmp_path: Path, mo
     monkeypatch.setattr(inference, "infer", infer)
     ended = run("infer", table(tmp_path / "table.obj"))
     assert ended.code == 2
-    assert "a fault of shapeprog" in ended.err
+    assert "internal error" in ended.err
     assert "RuntimeError" not in ended.err, "what Python says is for --debug"
     assert "--debug" in ended.err
     with pytest.raises(RuntimeError, match="a bug"):
@@ -171,7 +172,7 @@ def test_a_fault_of_ours_in_one_shape_stops_nothing(run: Run, tmp_path: Path, mo
 def test_the_baseline_runs_greedy_boxes(run: Run, tmp_path: Path):
     ended = run("infer", table(tmp_path / "table.obj"), "--baseline", "--blocks", 3, "--no-picture")
     assert ended.code == 0, ended.err
-    assert "greedy boxes" in ended.out
+    assert "Greedy boxes" in ended.out
     assert load_with_frame(tmp_path / "shapeprog-out" / "table.json")[0].blocks == 3
 
 
@@ -214,7 +215,7 @@ def test_export_sets_the_numbers_that_have_names(run: Run, tmp_path: Path, chang
     [
         ("widht=3", "did you mean width?"),
         ("span=3", "set width, or edit the text"),
-        ("width", "changes no number"),
+        ("width", "invalid change"),
         ("width=x", "'x' is not a number"),
         ("width/=0", "divides by zero"),
         ("n=1.5", "must be whole"),
@@ -232,7 +233,7 @@ def test_export_replaces_no_other_program(run: Run, tmp_path: Path, program: Pat
     (tmp_path / "a.shape").write_text(NAMED)
     (tmp_path / "b.shape").write_text(text)
     ended = run("export", "a.shape", "b.shape", "all.stl")  # as a shell makes of *.shape
-    assert (ended.code, "b.shape is there already" in ended.err) == (2, True), ended.err
+    assert (ended.code, "b.shape exists" in ended.err) == (2, True), ended.err
     assert (tmp_path / "b.shape").read_text() == text
     assert not (tmp_path / "all.stl").exists()
     assert run("export", "a.shape", "b.shape", "--overwrite").code == 0
@@ -269,12 +270,14 @@ def test_render_makes_pictures_cells_and_points(run: Run, tmp_path: Path, progra
     assert rows.shape == (50, 6)
     assert (rows[:, :3] > [0.99, 1.99, 2.9]).all()
     assert (rows[:, :3] < [3.01, 4.01, 4.6]).all()
-    assert "nothing is rendered to .gif" in run("render", program, "a.gif").err
+    assert "cannot render to .gif" in run("render", program, "a.gif").err
 
 
 def test_show_and_sheet_write_a_page_and_a_picture(run: Run, tmp_path: Path, program: Path):
     assert run("show", program).code == 0
-    assert "top_rectangle" in (tmp_path / "table.html").read_text()
+    page = (tmp_path / "table.html").read_text()
+    assert "top_rectangle" in page
+    assert '"frame":"# frame: {' in page, "what is copied keeps its way to the input"
     assert "pages end in .html" in run("show", program, "a.png").err
     (tmp_path / "cut.json").write_text(program.read_text()[:100])
     ended = run("sheet", ".", "sheet.png")
@@ -287,6 +290,9 @@ def test_show_and_sheet_write_a_page_and_a_picture(run: Run, tmp_path: Path, pro
 def test_statements_prints_the_manual(run: Run):
     assert "base_cross" in run("statements").out
     assert "tilt" in run("statements", "back").out
+    two = run("statements", "taper", "rod").out
+    assert two.startswith("taper(")
+    assert "\nrod(" in two
     ended = run("statements", "bak")
     assert (ended.code, "did you mean back?" in ended.err) == (2, True)
 
@@ -367,7 +373,7 @@ def test_evaluate_tells_which_targets_were_left_out(run: Run, tmp_path: Path, pr
         table(tmp_path / "targets" / f"{name}.obj")
     ended = run("evaluate", "table.json", "targets")
     assert ended.code == 0
-    assert "1 of 2 targets have no prediction and count nowhere: chair" in ended.err
+    assert "1 of 2 targets have no prediction and are not counted: chair" in ended.err
     assert json.loads(run("evaluate", "table.json", "targets", "--json").out)["missing"] == ["chair"]
 
 
@@ -405,6 +411,40 @@ def test_mistakes_are_told_without_a_traceback(run: Run, tmp_path: Path, program
 def test_seeds_out_of_range_are_told(run: Run, seed: int):
     ended = run("infer", "mesh.obj", "--seed", seed)
     assert (ended.code, "--seed" in ended.err) == (2, True)
+
+
+def test_a_package_that_is_not_installed_is_named(run: Run, program: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setitem(sys.modules, "trimesh", None)
+    ended = run("export", program, "a.ply")
+    assert (ended.code, "needs the package trimesh" in ended.err) == (2, True), ended.err
+
+
+def commands() -> list[tuple[str, Any]]:
+    """Every command but those of the paper, by the words that call it."""
+    from typer.main import get_command
+
+    from shapeprog.cli.app import app
+
+    found = {name: each for name, each in get_command(app).commands.items() if name != "paper"}  # type: ignore[attr-defined]
+    library = found.pop("library").commands
+    return [*found.items(), *((f"library {name}", each) for name, each in library.items())]
+
+
+@pytest.mark.parametrize(("words", "command"), commands())
+def test_help_has_an_example_and_a_line_for_every_option(run: Run, words: str, command: Any):
+    ended = run(*words.split(), "--help")
+    assert f"Example: shapeprog {words} " in ended.out
+    for option in command.params:
+        assert 0 < len(option.help) <= 160, option.name  # outputs of export list all suffixes
+        assert not re.search(r"\b(told|said|price|worth|stands?|whatever|beside what)\b", option.help), option.help
+
+
+def test_the_command_alone_lists_the_commands_under_headings(run: Run):
+    alone = run()
+    for words in ("Look at programs and use them:", "Example: shapeprog infer chair.glb", "export  Export a program"):
+        assert words in alone.out + alone.err
+    headings = re.findall(r"^(\w+):$", run("infer", "--help").out, re.MULTILINE)
+    assert headings == ["Arguments", "Input", "Program", "Search", "Options"]
 
 
 def test_help_and_version_load_nothing_heavy():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -52,7 +53,7 @@ def test_infer_writes_programs_in_the_unit_of_the_object(
     ended = run("infer", table(tmp_path / "table.obj"), "--unit", "cm", *options, "--out", "res", "--no-picture")
     assert ended.code == 0, ended.err
     assert "# unit: cm, " in ended.out
-    assert ("taken for a metre" in ended.out) == (not options)
+    assert ("assumed to be m, so that the longest side is 2 m" in ended.out) == (not options)
     assert "IoU 1.000" in ended.out
     program, frame = load_with_frame(tmp_path / "res" / "table.shape")
     assert program.unit == Unit("cm", per_cell)
@@ -67,6 +68,27 @@ def test_infer_writes_programs_in_the_unit_of_the_object(
     for name in ("table.shape", "table.json"):
         ended = run("evaluate", f"res/{name}", "table.obj", "--json")
         assert json.loads(ended.out)["rows"][0]["iou"] == 1, ended.err
+
+
+def test_what_is_assumed_of_the_unit_is_told_once_and_where_it_is_unlikely(run: Run, tmp_path: Path) -> None:
+    for name in ("one", "two"):
+        table(tmp_path / f"{name}.obj")
+    trimesh.load(tmp_path / "one.obj", force="mesh").apply_scale(450).export(tmp_path / "vast.obj")
+    ended = run("infer", "one.obj", "two.obj", "vast.obj", "--unit", "cm", "--no-picture")
+    assert re.findall(r"longest side is (\S+) m", ended.out) == ["2", "900"]
+
+
+def test_meshes_are_exported_in_the_unit_that_is_asked_for(run: Run, tmp_path: Path) -> None:
+    export(PROGRAM, tmp_path / "table.shape", FRAME)
+    assert run("export", "table.shape", "m.stl").code == 0
+    assert run("export", "table.shape", "mm.stl", "mm.obj", "--unit", "mm").code == 0
+    assert run("export", "table.shape", "cells.ply", "--unit", "cells").code == 0
+    in_metres = trimesh.load(tmp_path / "m.stl").bounds
+    for name, factor in (("mm.stl", 1000), ("mm.obj", 1000), ("cells.ply", 1 / FRAME.scale)):
+        found = trimesh.load(tmp_path / name, force="mesh").bounds
+        np.testing.assert_allclose(found, factor * in_metres, atol=2e-2 * factor * FRAME.scale)
+    ended = run("export", "table.shape", "a.glb", "--unit", "mm")
+    assert (ended.code, "--unit has no effect on a.glb" in ended.err) == (2, True), ended.err
 
 
 def test_baselines_are_in_the_unit_too(run: Run, tmp_path: Path) -> None:
@@ -116,13 +138,13 @@ def test_tidy_keeps_the_unit_or_takes_another(run: Run, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "told"),
     [
-        (["infer", "table.obj", "--unit", "furlong"], "--unit: no unit is called 'furlong'"),
+        (["infer", "table.obj", "--unit", "furlong"], "--unit: unknown unit 'furlong'"),
         (["infer", "table.obj", "--unit", "cm", "--file-unit", "CM"], "did you mean cm?"),
-        (["infer", "table.obj", "--file-unit", "mm"], "say --unit cm as well"),
-        (["tidy", "legs.shape", "--unit", "cm"], "legs.shape does not say how large its cells are"),
-        (["export", "legs.shape", "a.scad", "--unit", "cm"], "put its frame at its top"),
+        (["infer", "table.obj", "--file-unit", "mm"], "add --unit cm"),
+        (["tidy", "legs.shape", "--unit", "cm"], "the size of its cells is unknown"),
+        (["export", "legs.shape", "a.scad", "--unit", "cm"], "add its size at the top"),
         (["export", "mixed.shape", "a.shape", "--unit", "cm"], "n stands for a length in one place"),
-        (["export", "bad.shape", "a.stl"], "bad.shape, line 2, column 9: no unit is called 'c'"),
+        (["export", "bad.shape", "a.stl"], "bad.shape, line 2, column 9: unknown unit 'c'"),
     ],
 )
 def test_units_that_cannot_be_are_told(run: Run, tmp_path: Path, words: list[str], told: str) -> None:

@@ -11,6 +11,7 @@ import trimesh
 from shapeprog.data import Pack, Shape, load, load_all, prepare, read_pack, shape_from_mesh, write_pack
 from shapeprog.data.preparation import split_of
 from shapeprog.errors import InputError, OutputError
+from shapeprog.formats.binvox import write_binvox
 from shapeprog.space import Frame
 
 
@@ -150,8 +151,22 @@ def test_plain_folders_are_categories(tmp_path):
         trimesh.creation.box((1, 2, 3)).export(tmp_path / "in" / category / "a.stl")
         trimesh.creation.box((1, 1, 3)).export(tmp_path / "in" / category / "sub" / "b.glb")
     *_, last = prepare(tmp_path / "in", tmp_path / "out", points=50, shares=(1, 0, 0))
-    assert [(path.name, count) for path, count in last.packs] == [("desk_train.npz", 3), ("my_chairs_train.npz", 3)]
-    assert [shape.name for shape in read_pack(tmp_path / "out" / "desk_train.npz")] == ["a.obj", "a.stl", "sub/b"]
+    assert [(path.name, count) for path, count in last.packs] == [("desk_train.npz", 2), ("my_chairs_train.npz", 2)]
+    assert [shape.name for shape in read_pack(tmp_path / "out" / "desk_train.npz")] == ["a", "sub/b"]
+
+
+def test_a_folder_of_models_is_one_category_and_a_pack_without_points_is_told(tmp_path):
+    (tmp_path / "desk").mkdir()
+    for name in ("a.obj", "a.glb", "b.ply"):
+        trimesh.creation.box((1, 2, 3)).export(tmp_path / "desk" / name)
+    *_, last = prepare(tmp_path / "desk", tmp_path / "out", points=50, shares=(1, 0, 0))
+    assert (last.total, last.packs, last.failures) == (2, ((tmp_path / "out" / "desk_train.npz", 2),), ())
+    write_binvox(tmp_path / "desk" / "c.binvox", np.ones((32, 32, 32), bool))
+    write_binvox(tmp_path / "desk" / "a.binvox", np.ones((32, 32, 32), bool))
+    *_, last = prepare(tmp_path / "desk", tmp_path / "out", points=50, shares=(1, 0, 0))
+    ((path, error),) = last.failures
+    assert (last.total, path.name) == (3, "desk_train.npz")
+    assert "1 of its 3 models are voxels, as c" in error.message
 
 
 def test_old_packs_do_not_stay_beside_new_ones(tmp_path):

@@ -48,7 +48,7 @@ def test_furniture_stands_up_whatever_way_its_file_has_it(tmp_path, text, up):
     found, told = load(path, up="auto"), load(path, up=up)
     np.testing.assert_array_equal(found.voxels, told.voxels)
     assert found.frame == told.frame
-    assert f"Up is taken to be {up} of the file" in found.note
+    assert f"Estimated up axis of the file: {up} " in found.note
     assert told.note == ""
 
 
@@ -62,7 +62,7 @@ def test_points_stand_up_too(tmp_path):
     vertices, faces = solid(parse(CHAIR))
     points = trimesh.Trimesh(vertices, faces).sample(4000, seed=0)
     np.savetxt(tmp_path / "scan.xyz", points[:, [1, 2, 0]] * [1, -1, -1])  # up is -z of a format that has +z up
-    assert "-z of the file" in load(tmp_path / "scan.xyz", up="auto").note
+    assert "of the file: -z" in load(tmp_path / "scan.xyz", up="auto").note
 
 
 def test_what_is_the_same_from_all_sides_is_left_to_convention():

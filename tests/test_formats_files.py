@@ -37,7 +37,6 @@ for i in translate(2, by=(0, 0, 14)):
         leg(at=(-12, -11, -8), size=(22, 2, 2))
 line(start=(-6, -10, -8), end=(-6, 9, -8), radius=0.75)
 """
-ROOT = Path(__file__).parents[1]
 PROGRAM = parse(TEXT)
 FRAME = Frame.around([1, 2, 3], [3, 4, 4.5], grid_axes("+y", "-z"))
 MESHES = [".glb", ".obj", ".ply", ".stl"]
@@ -180,7 +179,7 @@ def test_every_program_file_reads_back_with_its_frame(tmp_path: Path):
 
 def test_files_that_hold_no_program_are_refused_in_words(tmp_path: Path):
     (tmp_path / "other.json").write_text('{"chair": 4}')
-    with pytest.raises(InputError, match="not in the form 'shapeprog'"):
+    with pytest.raises(InputError, match="holds no program"):
         sp.load(tmp_path / "other.json")
     for name in ("chair.glb", "chair"):
         with pytest.raises(InputError, match=r"holds no program.*\n.*\.shape or \.json or \.notation"):
@@ -221,8 +220,7 @@ def test_the_functions_that_a_declaration_names_are_there_and_take_its_options(e
             assert list(inspect.signature(function).parameters) == [*first, *options]
 
 
-def test_help_readme_and_errors_list_the_declared_formats(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
-    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+def test_help_and_errors_list_the_declared_formats(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
     helped = {}
     for command in ("export", "render"):
         with pytest.raises(SystemExit):
@@ -230,7 +228,6 @@ def test_help_readme_and_errors_list_the_declared_formats(tmp_path: Path, capsys
         helped[command] = " ".join(capsys.readouterr().out.replace("│", " ").split())
     assert " ".join(suffixes()) in helped["export"]
     assert " ".join(suffixes("sample")) in helped["render"]
-    assert listed() in readme
     assert listed().splitlines()[0] in str(sp.export.__doc__)
     with pytest.raises(OutputError, match=re.escape(", ".join(suffixes()))):
         export(PROGRAM, tmp_path / "table.unheard")
@@ -238,7 +235,7 @@ def test_help_readme_and_errors_list_the_declared_formats(tmp_path: Path, capsys
 
 def test_step_without_its_library_names_the_extra(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
-    with pytest.raises(OutputError, match=r"shapeprog\[step\]"):
+    with pytest.raises(OutputError, match=r"pip install build123d"):
         export(PROGRAM, tmp_path / "table.step")
 
 

@@ -96,7 +96,7 @@ def test_no_more_blocks_than_allowed_and_more_are_no_worse(most):
 def test_a_passed_deadline_still_gives_a_structure_and_says_so():
     found = search_structure(cells(TABLE), Settings(), deadline=Deadline(0.0))
     assert len(found.blocks)
-    assert "time budget ran out after 0 of" in found.reason
+    assert "0 of 400 rounds, at the time limit" in found.reason
     told = []
     done = search_structure(cells(TABLE), Settings(rounds=2), progress=lambda what, share: told.append((what, share)))
     assert "all 2 rounds" in done.reason
@@ -105,7 +105,7 @@ def test_a_passed_deadline_still_gives_a_structure_and_says_so():
 
 def test_the_search_stops_when_nothing_has_gained_for_long():
     found = search_structure(cells(TABLE), Settings(rounds=200, patience=40))
-    assert found.reason == "40 rounds of editing in a row gained nothing"
+    assert found.reason == "40 rounds without improvement"
     assert found.iou == 1
 
 

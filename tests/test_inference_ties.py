@@ -121,7 +121,7 @@ def test_tidy_writes_what_was_tied(tmp_path: Path):
     result = CliRunner().invoke(app, ["tidy", str(given), str(out)])
     assert result.exit_code == 0, result.output
     assert sp.load(out) == merged(tied_table(known=True))
-    assert "numbers are free; 18 were" in result.stderr.replace("\n", " ")
+    assert "Free numbers: 18 before" in result.stderr.replace("\n", " ")
 
 
 def test_no_minus_zero_is_written():

@@ -101,8 +101,8 @@ def backwards(at: Annotated[torch.Tensor, Quantity("length", 3, 4, 2)]) -> Solid
         ("crate", {"id": 1}, crate, "wants id 1, which belongs to leg"),
         ("crate", {"id": 0}, crate, "belongs to the language itself"),
         ("crate", {"paper": ("Leg", "Cub")}, crate, "the paper's name"),
-        ("my crate", {}, crate, "not a word of Python"),
-        ("for", {}, crate, "not a word of Python"),
+        ("my crate", {}, crate, "not a Python identifier"),
+        ("for", {}, crate, "not a Python identifier"),
         ("crate", {}, no_doc, "no docstring"),
         ("crate", {}, no_kind, "parameter 'size' of statement 'crate' has no kind"),
         ("crate", {}, too_wide, "18 numbers, but a statement has at most 16"),
@@ -161,7 +161,7 @@ def test_bad_primitives_are_refused() -> None:
     ]:
         with pytest.raises(DeclarationError, match=said):
             primitives.register(Primitive(**{**words, "name": "big", field: wrong}))
-    with pytest.raises(DeclarationError, match="known are arc, cuboid, cylinder"):
+    with pytest.raises(DeclarationError, match="known: arc, cuboid, cylinder"):
         primitives.kind("sphere")
 
 
@@ -185,7 +185,7 @@ def test_modules_load_into_any_language_once(empty: Language) -> None:
     assert len(primitives) == kinds
     assert sorted(empty.names) == ["arch", "bolster", "cone_leg", "pouf"]
     assert primitives[primitives.kind("capsule")].name == "capsule"
-    with using(Language()), pytest.raises(DeclarationError, match="no primitive is called 'capsule'"):
+    with using(Language()), pytest.raises(DeclarationError, match="unknown primitive 'capsule'"):
         primitives.kind("capsule")
     program = random_program(torch.Generator().manual_seed(0))
     assert parse(format_program(program)) == program

@@ -67,8 +67,8 @@ def test_a_number_that_is_set_moves_all_that_follows_from_it() -> None:
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"widht": 3}, "no number called 'widht'\n  hint: did you mean width"),
-        ({"long": 3}, "no number called 'long'"),
+        ({"widht": 3}, "no name 'widht'\n  hint: did you mean width"),
+        ({"long": 3}, "no name 'long'"),
         ({"span": 3}, "span follows from other numbers: span = width - thick\n  hint: set width or thick"),
         ({"width": float("inf")}, "too large"),
     ],

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 import shapeprog as sp
 from shapeprog.data.random import outside_published, random_program
 from shapeprog.formats import load, save
-from shapeprog.formats.json_form import code_from_json, code_to_json, program_from_json, program_to_json
+from shapeprog.formats.json_form import program_from_json, program_to_json
 from shapeprog.formats.notation import format_notation, parse_notation
 from shapeprog.language import Draw, Loop, Program, Statement, decode, encode, using
 from shapeprog.language.parameters import shortest, to_float32
@@ -47,11 +47,7 @@ def survives(program: Program) -> None:
     assert repr(parse_notation(format_notation(program))) == repr(program)
     assert repr(program_from_json(program_to_json(program))) == repr(program)
     flat = program.flat()
-    code = encode(program)
-    assert repr(decode(code)) == repr([flat])
-    again = code_from_json(code_to_json(code))
-    assert torch.equal(again.ids, code.ids)
-    assert torch.equal(again.parameters, code.parameters)
+    assert repr(decode(encode(program))) == repr([flat])
     assert repr(parse_notation(format_notation(flat))) == repr(flat)
 
 
@@ -192,7 +188,7 @@ def test_files(tmp_path: object) -> None:
     assert load(path) == program
     for content, words in [
         (b"leg(\xff)", "byte 4 is not UTF-8"),
-        (b"legg()", "x.shape, line 1, column 1: no statement"),
+        (b"legg()", "x.shape, line 1, column 1: unknown statement"),
     ]:
         path.write_bytes(content)
         with pytest.raises(sp.ShapeProgError, match=words):
@@ -202,7 +198,7 @@ def test_files(tmp_path: object) -> None:
             load(place)
         with pytest.raises(sp.OutputError):
             save(program, place / "z" / "x.shape")
-    with pytest.raises(sp.ShapeProgError, match="no number"):
+    with pytest.raises(sp.ShapeProgError, match="too large"):
         save(Program((Draw("leg", (math.nan,) * 6),)), path)
 
 

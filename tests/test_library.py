@@ -285,7 +285,7 @@ def test_commands_learn_show_and_draw_libraries(run: Run, tmp_path: Path) -> Non
     assert "def boxes(" in run("library", "show").out
     ended = run("library", "learn", "programs/0.shape")
     assert ended.code == 2
-    assert "no function is worth its lines in 1 program" in ended.err
+    assert "no function shortens this program" in ended.err
 
 
 def test_a_program_in_a_unit_is_written_with_a_library_and_stays_in_it() -> None:

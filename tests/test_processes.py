@@ -42,7 +42,7 @@ def test_lines_are_answered_whatever_is_printed_besides(module: Module):
     worker.close()
 
 
-@pytest.mark.parametrize(("end", "told"), [("os.kill(os.getpid(), 9)", "signal SIGKILL"), ("os._exit(7)", "code 7")])
+@pytest.mark.parametrize(("end", "told"), [("os.kill(os.getpid(), 9)", "SIGKILL"), ("os._exit(7)", "code 7")])
 def test_a_process_that_ends_is_told(module: Module, end: str, told: str):
     worker = Worker(module(end))
     with pytest.raises(ShapeProgError, match=told):

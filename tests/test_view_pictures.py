@@ -123,6 +123,8 @@ def test_pictures_are_written_with_and_without_an_input(tmp_path: Path):
     both = picture(box_shape(), PROGRAM, tmp_path / "both.png", scores={"iou": 0.9, "cd": 0.0004}, view=120)
     alone = picture(None, PROGRAM, tmp_path / "alone.jpg", view=120)
     nothing = picture(None, Program(), tmp_path / "nothing.png", view=120)
+    named = picture(None, Program(), tmp_path / "named.png", view=120, title="stool")
+    assert named.read_bytes() != nothing.read_bytes()
     sizes = [size_of(path) for path in (both, alone, nothing)]
     assert sizes[0][0] - sizes[1][0] == 120
     assert sizes[1] == sizes[2]

@@ -81,4 +81,4 @@ def did_you_mean(word: str, known: Iterable[str], otherwise: str = "", *, quoted
     near = difflib.get_close_matches(word[:_LONGEST].lower(), words, 1)
     if near:
         return f"did you mean {repr(words[near[0]]) if quoted else words[near[0]]}?"
-    return otherwise or (f"known are {', '.join(words.values())}" if words else "nothing is declared")
+    return otherwise or (f"known: {', '.join(words.values())}" if words else "none is declared")

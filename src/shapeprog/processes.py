@@ -59,7 +59,7 @@ class Worker:
             answer = ""
         if not answer.endswith("\n"):
             raise ShapeProgError(
-                f"a process that was to help ended {_ending(self._process.wait())}",
+                f"worker ended: {_ending(self._process.wait())}",
                 "it may have run out of memory",
             )
         return answer[:-1]
@@ -95,8 +95,8 @@ def serve(answer: Callable[[str], str]) -> NoReturn:
 
 
 def _ending(code: int) -> str:
-    """How a process ended, from its exit code, for the end of a sentence."""
+    """How a process ended, from its exit code."""
     if code >= 0:
-        return f"with exit code {code}"
+        return f"exit code {code}"
     names = {each.value: each.name for each in signal.Signals}
-    return f"by the signal {names.get(-code, -code)}"
+    return f"killed ({names.get(-code, -code)})"

@@ -20,6 +20,7 @@ from shapeprog.cli import (
     tidying,
     writing,
 )
+from shapeprog.cli.help import GroupedCommand, GroupedCommands
 from shapeprog.liang2022.cli import app as paper
 
 # Before torch is loaded: its idle workers would spin on the cores that the kernels of other threads want.
@@ -31,28 +32,34 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
-    context_settings={"help_option_names": ["-h", "--help"]},
+    cls=GroupedCommands,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
 )
 
-for name, command, help_line in (
-    ("infer", inferring.infer_command, "Infer a program from each mesh, point cloud or voxel grid."),
-    ("tidy", tidying.tidy_command, "Tie the numbers of a program: names for what is free."),
-    ("render", writing.render_command, "Draw a program as a picture, cells or points."),
-    ("export", writing.export_command, "Write a program for other tools: GLB, STL, OpenSCAD, STEP..."),
-    ("show", writing.show_command, "Write a page to turn a program's shape in a browser."),
-    ("sheet", writing.sheet_command, "Draw a contact sheet of a folder of programs."),
-    ("statements", writing.statements_command, "Print the manual of the language."),
-    ("prepare", measuring.prepare_command, "Turn a directory of models into packs."),
-    ("sample", sampling.sample_command, "Draw synthetic furniture: a contact sheet or a pack."),
-    ("evaluate", measuring.evaluate_command, "Measure predictions against targets."),
-):
-    app.command(name, cls=changes.ChangingCommand, short_help=help_line)(terminal.guarded(command))
+PROGRAMS, OUTPUT, RESEARCH = "From shapes to programs", "Look at programs and use them", "Data sets, scores, the paper"
+"""Headings of the list of commands."""
 
-library = typer.Typer(no_args_is_help=True, rich_markup_mode=None)
-library.command("learn")(terminal.guarded(libraries.learn_command))
-library.command("show")(terminal.guarded(libraries.show_command))
-app.add_typer(library, name="library", help="Functions that programs may be written with.")
-app.add_typer(paper, name="paper", help="The paper: networks, training, adaptation and its table (liang2022).")
+for name, command, panel in (
+    ("infer", inferring.infer_command, PROGRAMS),
+    ("tidy", tidying.tidy_command, PROGRAMS),
+    ("statements", writing.statements_command, PROGRAMS),
+    ("export", writing.export_command, OUTPUT),
+    ("render", writing.render_command, OUTPUT),
+    ("show", writing.show_command, OUTPUT),
+    ("sheet", writing.sheet_command, OUTPUT),
+    ("evaluate", measuring.evaluate_command, RESEARCH),
+    ("prepare", measuring.prepare_command, RESEARCH),
+    ("sample", sampling.sample_command, RESEARCH),
+):
+    app.command(name, cls=changes.ChangingCommand, rich_help_panel=panel)(terminal.guarded(command))
+
+library = typer.Typer(no_args_is_help=True, cls=GroupedCommands, rich_markup_mode=None)
+library.command("learn", cls=GroupedCommand)(terminal.guarded(libraries.learn_command))
+library.command("show", cls=GroupedCommand)(terminal.guarded(libraries.show_command))
+app.add_typer(library, name="library", help="Learn functions from programs, or list them.", rich_help_panel=PROGRAMS)
+app.add_typer(
+    paper, name="paper", help="Liang (2022): networks, training, adaptation and Table 1.", rich_help_panel=RESEARCH
+)
 
 
 def _version(wanted: bool) -> None:
@@ -68,9 +75,11 @@ def _options(
     version: Annotated[
         bool | None, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")
     ] = False,
-    debug: Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")] = False,
+    debug: Annotated[bool, typer.Option("--debug", help="Print the traceback of an error.")] = False,
 ) -> None:
-    """Furniture as a mesh, point cloud or voxels in; a short program that a person can read, edit and run out.
+    """Infer short, editable programs from furniture given as meshes, point clouds or voxels.
 
-    Exit codes: 0 all is well, 1 some of several inputs failed, 2 a mistake that can be mended, 130 interrupted.
+    Example: shapeprog infer chair.glb --out results
+
+    Exit codes: 0 success, 1 some of several inputs failed, 2 wrong usage or input, 130 interrupted.
     """

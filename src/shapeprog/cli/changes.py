@@ -7,8 +7,7 @@ import re
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from typer.core import TyperCommand
-
+from shapeprog.cli.help import GroupedCommand
 from shapeprog.errors import InputError
 
 if TYPE_CHECKING:
@@ -18,7 +17,7 @@ _CHANGE = re.compile(r"([^\W\d]\w*)\s*([-+*/]?)=\s*(.*)", re.DOTALL)
 _APPLY = {"+": operator.add, "-": operator.sub, "*": operator.mul, "/": operator.truediv}
 
 
-class ChangingCommand(TyperCommand):
+class ChangingCommand(GroupedCommand):
     """A command whose option ``--set`` takes all the changes that follow it."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
@@ -50,7 +49,7 @@ def changed(program: Program, changes: Sequence[str]) -> Program:
     for change in changes:
         found = _CHANGE.fullmatch(change.strip())
         if found is None:
-            raise InputError(f"{change!r} changes no number", "write name=number, or name*=number with one of + - * /")
+            raise InputError(f"invalid change {change!r}", "write name=number, or name*=number with one of + - * /")
         name, sign, text = found.groups()
         try:
             number = float(text)
@@ -66,10 +65,11 @@ def changed(program: Program, changes: Sequence[str]) -> Program:
 def vanished(before: Program, after: Program) -> list[str]:
     """What parts are called that have a volume in a program, and none with other numbers in it."""
     from shapeprog.language.program import Draw
-    from shapeprog.language.unroll import unroll
+    from shapeprog.language.unroll import on_numpy_if_shipped, unroll
 
-    scenes = [unroll(program) for program in (before, after)]
-    flat = [set(scene.block[~scene.mask].tolist()) for scene in scenes]
+    with on_numpy_if_shipped(before):
+        scenes = [unroll(program) for program in (before, after)]
+        flat = [set(scene.block[~scene.mask].tolist()) for scene in scenes]
     draws = [chain[-1] for chain in after.chains]
     words = [draw.word if isinstance(draw, Draw) else draw.name for draw in draws]
     return [words[block] for block in sorted(flat[1] - flat[0])]

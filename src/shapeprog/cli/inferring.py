@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from shapeprog.cli import terminal
+from shapeprog.cli.terminal import about_program, about_search
 from shapeprog.cli.units import AsUnit, FileUnit, asked_unit, check_units
 from shapeprog.errors import InputError, OutputError, ShapeProgError
 from shapeprog.inference.budget import BUDGET, Progress
@@ -24,6 +25,9 @@ if TYPE_CHECKING:
     from shapeprog.library import Library
 
 FOLDER = Path("shapeprog-out")
+
+LARGE = 10.0
+"""Metres from which furniture is more likely to be in another unit."""
 
 TIPPED = (".stl", ".ply", ".off", ".xyz")
 """Files of formats that say nothing of which way is up, so that many lie."""
@@ -48,38 +52,41 @@ Finish = Callable[["Program", "Shape"], "Program"]
 
 
 def infer_command(
-    inputs: Annotated[list[Path], typer.Argument(help="Meshes, point clouds, voxels, packs, or folders of them.")],
-    out: Annotated[Path, typer.Option("--out", "-o", help="Folder for the results; made if missing.")] = FOLDER,
-    blocks: Annotated[int, typer.Option(help="Most blocks of a program.", min=1)] = 10,
-    rounds: Annotated[int | None, typer.Option(help="Most rounds of search; the default suits most.", min=0)] = None,
-    budget: Annotated[float, typer.Option(help="Most seconds for each shape; a safety net.", min=0.1)] = BUDGET,
-    seed: terminal.Seed = 0,
+    inputs: Annotated[
+        list[Path],
+        typer.Argument(metavar="INPUT", help="Meshes, point clouds, voxel grids, or folders of them."),
+    ],
     up: terminal.Up = None,
     front: terminal.Front = None,
-    unit: AsUnit = None,
     file_unit: FileUnit = None,
+    blocks: Annotated[int, about_program(metavar="N", help="Maximum number of drawing statements.", min=1)] = 10,
+    detail: Annotated[
+        float, about_program(metavar="FACTOR", help="Higher: longer program, closer fit.", min=0.01, max=100)
+    ] = 1.0,
+    unit: AsUnit = None,
+    no_ties: Annotated[bool, about_program("--no-ties", help="Plain numbers, no names and expressions.")] = False,
     library: terminal.WithLibrary = False,
     modules: terminal.WithLibraries = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object per shape, one per line.")] = False,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
-    no_picture: Annotated[bool, typer.Option("--no-picture", help="Write no PNG.")] = False,
     paper: Annotated[
-        bool, typer.Option("--paper", help="The statements of the paper alone, found on cells and refined.")
+        bool, about_program("--paper", help="Only the statements of Liang (2022), on a 32^3 grid.")
     ] = False,
-    detail: Annotated[
-        float, typer.Option(help="How fine: the price of what is written is divided by it.", min=0.01, max=100)
-    ] = 1.0,
-    no_ties: Annotated[
-        bool, typer.Option("--no-ties", help="Plain numbers: no names for those that hold together.")
-    ] = False,
-    baseline: Annotated[bool, typer.Option("--baseline", help="Greedy boxes instead of the search.")] = False,
+    seed: terminal.Seed = 0,
+    rounds: Annotated[
+        int | None, about_search(metavar="N", help="Maximum number of search rounds; fewer are faster.", min=0)
+    ] = None,
+    budget: Annotated[float, about_search(metavar="SECONDS", help="Time limit per shape.", min=0.1)] = BUDGET,
+    baseline: Annotated[bool, about_search("--baseline", help="Greedy boxes instead of the search.")] = False,
+    out: Annotated[Path, typer.Option("--out", "-o", metavar="FOLDER", help="Folder for the results.")] = FOLDER,
+    no_picture: Annotated[bool, typer.Option("--no-picture", help="Do not write the PNG.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one line of JSON per shape.")] = False,
+    quiet: terminal.Quiet = False,
 ) -> None:
-    """Infer a program from each shape and write NAME.shape, NAME.json, NAME.glb and NAME.png.
+    """Infer a program from each shape; write it as .shape and .json, with a .glb and a .png.
 
-    The same --seed writes the same files, byte for byte, on a busy machine too; where --budget cuts in, the result
-    says so. To spend less on each shape, give fewer --rounds.
-    The .json and .shape files keep the place of the input, so what is exported from them later lies on it.
-    A file that cannot be read is told at the end and stops nothing.
+    Example: shapeprog infer chair.glb --unit cm --out results
+
+    The program keeps the position of the input, so later exports lie on it. The same seed gives the same files.
+    An input that cannot be read is reported at the end; the others are processed.
     """
     from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
@@ -133,14 +140,14 @@ def infer_command(
                     failures.append((path, error))
                     continue
                 except Exception as error:
-                    failures.append((path, terminal.fault("no program could be inferred", error)))
+                    failures.append((path, terminal.fault("no program was inferred", error)))
                     continue
                 written += 1
                 if as_json:
                     told = {"name": shape.name, "folder": str(folder), "seconds": found.seconds}
                     terminal.print_json(told | json.loads(_document(found, shape)))
                 elif talk:
-                    _report(console, found, shape, folder, names, file_unit, up)
+                    _report(console, found, shape, folder, names, file_unit, up, written == 1)
         except KeyboardInterrupt:
             raise terminal.Interrupted(_kept(written, folder)) from None
     for path, problem in failures:
@@ -155,7 +162,7 @@ def infer_command(
     if failures:
         raise typer.Exit(1 if written else terminal.MISTAKE)
     if not written:
-        raise InputError("there was nothing to infer from", "name files or folders that hold shapes")
+        raise InputError("no shapes to infer from", "give files or folders with meshes, point clouds or voxels")
 
 
 def _prepare(picture: bool, talk: bool) -> None:
@@ -210,7 +217,7 @@ def _baseline(finished: Finish, shape: Shape, blocks: int, budget: float, seed: 
     started = time.monotonic()
     snapped: Program = greedy_boxes(shape.voxels, blocks).snap()
     seconds = time.monotonic() - started
-    reason = "Stopped because greedy boxes place one box per block and never go back."
+    reason = "Greedy boxes: one box per block, without search."
     program = finished(snapped, shape)
     return Found(program, snapped, _scores(program, snapped, shape, {}, seed), reason, seconds)
 
@@ -255,7 +262,7 @@ def _write(found: Found, shape: Shape, folder: Path, stem: str, picture: bool) -
 
 
 def _kept(written: int, folder: Path) -> str:
-    return f"what was finished is kept: {written} program{'s' if written != 1 else ''} in {folder}"
+    return f"finished results are kept: {written} program{'s' if written != 1 else ''} in {folder}"
 
 
 def _free_stem(shape: Shape, taken: set[str], folder: Path) -> str:
@@ -299,23 +306,32 @@ def _source(shape: Shape) -> str | None:
 
 
 def _report(
-    console: Any, found: Found, shape: Shape, folder: Path, names: list[str], file_unit: str | None, up: str | None
+    console: Any,
+    found: Found,
+    shape: Shape,
+    folder: Path,
+    names: list[str],
+    file_unit: str | None,
+    up: str | None,
+    first: bool,
 ) -> None:
     from shapeprog.data.orientation import default_axes
     from shapeprog.data.placement import SCAN
+    from shapeprog.space import SPAN
     from shapeprog.view.page import scores_text
 
     console.print(shape.name, style="bold")
     if shape.kind != "mesh":
-        seen = f"a cloud; normals are estimated, of up to {SCAN:,} of its points"
+        seen = f"a point cloud; normals are estimated from up to {SCAN:,} points"
         console.print(f"Read as {'voxels' if shape.points is None else seen}.", style="dim")
     if up is None and shape.source is not None and shape.source.suffix.lower() in TIPPED:
-        said = f"Up is taken to be {default_axes(shape.source)[0]}; if it stands otherwise, give --up, or --up auto."
-        console.print(said, style="dim")
+        said = f"The format does not store the up axis: {default_axes(shape.source)[0]} is assumed."
+        console.print(f"{said} Another axis: --up +y, or --up auto", style="dim")
     terminal.print_program(console, found.program)
-    if found.program.unit and file_unit is None:
-        said = "One unit of the file is taken for a metre; where it is another, say so with --file-unit."
-        console.print(said, style="dim")
+    side = SPAN * shape.frame.scale
+    if found.program.unit and file_unit is None and (first or side > LARGE):
+        said = f"The unit of the file is assumed to be m, so that the longest side is {side:.3g} m."
+        console.print(f"{said} Another unit: --file-unit mm", style="dim")
     for line in scores_text(found.scores | {"seconds": found.seconds}, found.program):
         console.print(line, style="dim")
     console.print(found.reason, style="dim")

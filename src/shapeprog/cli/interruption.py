@@ -7,8 +7,9 @@ Where interruptions are ignored, as in the background of a script, they stay so.
 from __future__ import annotations
 
 import signal
+import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 
 INTERRUPTED = 130
 """The exit code of a command that was interrupted."""
@@ -36,3 +37,20 @@ def tidied() -> Iterator[None]:
         yield
     finally:
         signal.signal(signal.SIGINT, now)
+
+
+@contextmanager
+def stop_event() -> Iterator[threading.Event]:
+    """An event that the first Ctrl-C or SIGTERM sets; the second interrupts at once."""
+    stop = threading.Event()
+
+    def ask(*_: object) -> None:
+        if stop.is_set():
+            raise KeyboardInterrupt
+        stop.set()
+
+    with ExitStack() as restore:
+        for number in (signal.SIGINT, signal.SIGTERM):
+            if signal.getsignal(number) != signal.SIG_IGN:
+                restore.callback(signal.signal, number, signal.signal(number, ask))
+        yield stop

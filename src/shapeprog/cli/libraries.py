@@ -15,21 +15,23 @@ if TYPE_CHECKING:
     from shapeprog.library import Library
     from shapeprog.view import Item
 
-Sheet = Annotated[Path | None, typer.Option(help="A picture of its functions, such as library.png.")]
+Sheet = Annotated[Path | None, typer.Option(metavar="FILE", help="Picture of the functions, such as library.png.")]
 
 
 def learn_command(
-    folders: Annotated[list[Path], typer.Argument(help="Folders of programs, best with ties; or program files.")],
-    out: Annotated[Path, typer.Option("--out", "-o", help="Where to write the library.")] = Path("library.shape"),
-    most: Annotated[int, typer.Option(help="Most functions.", min=1, max=100)] = 12,
+    folders: Annotated[list[Path], typer.Argument(metavar="PROGRAMS", help="Program files, or folders of them.")],
+    out: Annotated[Path, typer.Option("--out", "-o", metavar="FILE", help="Library to write.")] = Path("library.shape"),
+    most: Annotated[int, typer.Option(metavar="N", help="Maximum number of functions.", min=1, max=100)] = 12,
     sheet: Sheet = None,
     modules: terminal.With = None,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
+    quiet: terminal.Quiet = False,
 ) -> None:
-    """Learn the functions that shorten many programs most, with parameters named by what they measure.
+    """Learn the functions that shorten a collection of programs most.
 
-    A comment above each tells how often it is used, and shows a typical call. Programs are written with a library by
-    infer and tidy: --library for the one that ships, --with library.shape for your own.
+    Example: shapeprog library learn results --out mine.shape
+
+    A comment above each function counts its uses and shows a typical call. Use the library with
+    'shapeprog infer --with mine.shape' and 'shapeprog tidy --with mine.shape'.
     """
     from dataclasses import replace
 
@@ -41,8 +43,8 @@ def learn_command(
     programs = [terminal.read_program_file(path)[0] for path in paths]
     library = learn(programs, most)
     if not library.functions:
-        said = f"no function is worth its lines in {len(programs)} {'program' if len(programs) == 1 else 'programs'}"
-        raise InputError(said, "give more programs, of furniture that is alike in some part")
+        said = f"no function shortens {'this program' if len(programs) == 1 else f'these {len(programs)} programs'}"
+        raise InputError(said, "give more programs, with similar parts")
     command = f"shapeprog library learn {' '.join(map(str, folders))} --out {out}"
     library = replace(library, source=Source((Comment(command), *library.source.lines)))
     save_library(library, out)
@@ -53,11 +55,17 @@ def learn_command(
 
 
 def show_command(
-    file: Annotated[Path | None, typer.Argument(help="A library; without it the one that ships.")] = None,
+    file: Annotated[
+        Path | None,
+        typer.Argument(metavar="LIBRARY", help="Library. Default: the one that comes with shapeprog."),
+    ] = None,
     sheet: Sheet = None,
     modules: terminal.With = None,
 ) -> None:
-    """Print a library, or draw a picture of it."""
+    """Print a library, or draw its functions.
+
+    Example: shapeprog library show --sheet library.png
+    """
     from shapeprog.language.text import format_source
     from shapeprog.library import load_library
 

@@ -32,15 +32,22 @@ _SIZES = ("blocks", "statements", "primitives", "numbers")
 
 
 def prepare_command(
-    directory: Annotated[Path, typer.Argument(help="ShapeNetCore v2 as distributed, or a folder per category.")],
-    output: Annotated[Path, typer.Argument(help="Folder for the packs; made if missing.")],
-    points: Annotated[int, typer.Option(help="Points on each surface.", min=1)] = 5000,
+    directory: Annotated[
+        Path, typer.Argument(metavar="FOLDER", help="ShapeNetCore v2, a folder per category, or models.")
+    ],
+    output: Annotated[Path, typer.Argument(metavar="OUTPUT", help="Folder for the packs.")],
+    points: Annotated[int, typer.Option(metavar="N", help="Points on each surface.", min=1)] = 5000,
     seed: terminal.Seed = 0,
     up: terminal.Up = None,
     front: terminal.Front = None,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
+    quiet: terminal.Quiet = False,
 ) -> None:
-    """Turn a directory of models into packs CATEGORY_SPLIT.npz; equal shapes never straddle a split."""
+    """Convert a folder of models to data sets (packs) CATEGORY_SPLIT.npz of voxels and points.
+
+    Example: shapeprog prepare ShapeNetCore.v2 packs
+
+    Shapes with equal voxels are in the same split.
+    """
     from rich.progress import Progress
 
     from shapeprog.data import prepare
@@ -55,7 +62,7 @@ def prepare_command(
                 if bar and task is not None:
                     bar.update(task, completed=last.done, total=last.total)
         except KeyboardInterrupt:
-            raise terminal.Interrupted(f"categories that were finished are kept in {output}") from None
+            raise terminal.Interrupted(f"finished categories are kept in {output}") from None
     assert last is not None
     for path, error in last.failures:
         terminal.complain(terminal.at(path, error))
@@ -67,33 +74,47 @@ def prepare_command(
 
 
 def evaluate_command(
-    predictions: Annotated[Path, typer.Argument(help="Programs, meshes, clouds or voxels: a file, pack or folder.")],
-    targets: Annotated[list[Path], typer.Argument(help="Targets of any kind: files, packs or folders.")],
+    predictions: Annotated[
+        Path,
+        typer.Argument(metavar="PREDICTIONS", help="Programs or shapes: a file or folder."),
+    ],
+    targets: Annotated[
+        list[Path],
+        typer.Argument(metavar="TARGETS", help="Target shapes: files or folders."),
+    ],
     parts: Annotated[
-        Path | None, typer.Option(help="A folder with a folder of part meshes for each target, named as it is.")
+        Path | None,
+        typer.Option(metavar="FOLDER", help="Part meshes of each target, in folders named like the targets."),
     ] = None,
-    points: Annotated[int, typer.Option(help="Points on each surface, for CD.", min=2)] = 5000,
+    points: Annotated[int, typer.Option(metavar="N", help="Points on each surface for CD.", min=2)] = 5000,
     seed: terminal.Seed = 0,
     up: terminal.Up = None,
     front: terminal.Front = None,
-    each: Annotated[bool, typer.Option("--each", help="A row for every shape as well.")] = False,
+    each: Annotated[bool, typer.Option("--each", help="Also print a row per shape.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print rows and summary as JSON.")] = False,
     as_csv: Annotated[bool, typer.Option("--csv", help="Print a row per shape as CSV.")] = False,
     modules: terminal.With = None,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Show no progress.")] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Show no progress bar.")] = False,
 ) -> None:
-    """Measure predictions against targets of the same name: what a person sees, IoU at 32^3, CD, and size.
+    """Score predictions against targets of the same name.
 
-    F1@.5% and F1@1% are of 20,000 points on each surface, at those shares of the diagonal of the target's box; normals
-    the mean absolute cosine at nearest points; silhouette the mean IoU of 12 outlines; one piece the share of programs
-    whose union is one solid; slivers that of primitives thinner than .4% of the longest side. Floors are those of the
-    target sampled twice. With --parts DIR, where DIR/Chair/bekvam holds the part meshes of the target Chair_bekvam in
-    its world, part recall and precision tell how many parts have a primitive of their own (IoU >= .5).
+    Example: shapeprog evaluate results originals --each
 
-    IoU is of the program snapped to the grid (the 'snapped' form of a .json result, else rounded); CD and F1 of the
-    program as it is, 5,000 points each, bounding box of the target scaled to diagonal 1, squared distances, both
-    directions added. The noise floor is the CD between two samplings of the target itself. Predicted meshes and
-    clouds must lie in the world of their target. One prediction and one target need not have the same name.
+    \b
+    F1@.5%, F1@1%   of 20,000 points per surface, within that share of the bounding box diagonal
+    normals         mean absolute cosine between normals at nearest points
+    silhouette      mean IoU of 12 outlines
+    one piece       share of programs whose union is one solid
+    slivers         share of primitives thinner than .4% of the longest side
+    part recall,    with --parts: parts that one primitive covers with IoU >= .5, and
+    part precision  primitives that cover one part
+    IoU@32          of voxels, the numbers of the program rounded
+    CD, F1@1cell    of 5,000 points; Chamfer distance with squared distances, both directions added, diagonal 1
+    floor           the same measure between two samplings of the target
+
+    For --parts DIR, the folder DIR/Chair/bekvam holds the part meshes of the target Chair_bekvam. Parts, predicted
+    meshes and predicted point clouds are in the coordinates of the target. A single prediction is compared with a
+    single target whatever their names.
     """
     from rich.progress import track
 
@@ -115,8 +136,8 @@ def evaluate_command(
             failures.append(ShapeProgError(f"target {path}: {shape.message}", shape.hint))
         elif shape.name in shapes:
             both = " and ".join(str(each) for each in (shapes[shape.name].source, shape.source) if each is not None)
-            cure = "name one of them, or give them different names; until then the first is the target"
-            failures.append(ShapeProgError(f"two targets are called {shape.name}: {both or path}", cure))
+            cure = "rename one of them; until then the first is used"
+            failures.append(ShapeProgError(f"duplicate target name {shape.name}: {both or path}", cure))
         else:
             shapes[shape.name] = shape
     found = list(scoring.predictions(predictions))
@@ -128,7 +149,7 @@ def evaluate_command(
         if isinstance(prediction, ShapeProgError):
             failures.append(ShapeProgError(f"prediction {name}: {prediction.message}", prediction.hint))
         elif target is None:
-            failures.append(ShapeProgError(f"prediction {name} has no target of that name", "rename one of them"))
+            failures.append(ShapeProgError(f"prediction {name} has no target", "give both the same name"))
         else:
             try:
                 row = scoring.measure(prediction, target, points, seed)
@@ -166,7 +187,8 @@ def evaluate_command(
     if missing_names:
         told = ", ".join(missing_names[:_FEW]) + (", ..." if len(missing_names) > _FEW else "")
         terminal.errors().print(
-            f"{len(missing_names)} of {len(shapes)} targets have no prediction and count nowhere: {told}", markup=False
+            f"{len(missing_names)} of {len(shapes)} targets have no prediction and are not counted: {told}",
+            markup=False,
         )
     for error in failures:
         terminal.complain(error)

@@ -10,24 +10,22 @@ import typer
 from shapeprog.cli import terminal
 
 if TYPE_CHECKING:
-    from shapeprog.data.shape import Shape
     from shapeprog.language.program import Program
 
 SHEET = 24
 """Shapes drawn where no number is given."""
 
 
-Count = Annotated[int, typer.Option(help="How many shapes.", min=1)]
-Out = Annotated[Path | None, typer.Option(help="A contact sheet of them, such as sheet.png.")]
-Folder = Annotated[Path | None, typer.Option(help="A folder for a .shape file of each.")]
-Pack = Annotated[Path | None, typer.Option(help="A pack of their cells and surface points, .npz.")]
-Points = Annotated[int, typer.Option(help="Surface points of each shape in the pack.", min=0)]
-Columns = Annotated[int, typer.Option(help="Pictures in a row of the sheet.", min=1)]
-Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")]
+Count = Annotated[int, typer.Option(metavar="N", help="Number of shapes.", min=1)]
+Out = Annotated[Path | None, typer.Option(metavar="FILE", help="Contact sheet to write, such as sheet.png.")]
+Folder = Annotated[Path | None, typer.Option(metavar="FOLDER", help="Folder for a .shape file of each.")]
+Pack = Annotated[Path | None, typer.Option(metavar="FILE", help="Data set to write: voxels and points, .npz.")]
+Points = Annotated[int, typer.Option(metavar="N", help="Surface points per shape in the data set.", min=0)]
+Columns = Annotated[int, typer.Option(metavar="N", help="Shapes per row of the contact sheet.", min=1)]
 
 
 def sample_command(
-    prior: Annotated[str, typer.Argument(metavar="PRIOR", help="Where they come from: furniture.")] = "furniture",
+    prior: Annotated[str, typer.Argument(metavar="PRIOR", help="Distribution to draw from: furniture.")] = "furniture",
     count: Count = SHEET,
     seed: terminal.Seed = 0,
     out: Out = None,
@@ -35,17 +33,19 @@ def sample_command(
     pack: Pack = None,
     points: Points = 0,
     columns: Columns = 6,
-    quiet: Quiet = False,
+    quiet: terminal.Quiet = False,
 ) -> None:
-    """Draw synthetic furniture: as a contact sheet, as programs, or as a pack.
+    """Generate synthetic furniture as a contact sheet, as programs, or as a data set.
 
-    Without an output the programs are printed.
+    Example: shapeprog sample --count 24 --out sheet.png
+
+    Without --out, --folder and --pack the programs are printed.
     """
     from shapeprog.data.synthetic import FURNITURE, furniture
     from shapeprog.errors import InputError, did_you_mean
 
     if prior != FURNITURE:
-        raise InputError(f"there is no prior {prior!r}", did_you_mean(prior, [FURNITURE], quoted=True))
+        raise InputError(f"unknown prior {prior!r}", did_you_mean(prior, [FURNITURE], quoted=True))
     write_samples(
         prior, [furniture(number, seed) for number in range(count)],
         seed=seed, out=out, folder=folder, pack=pack, points=points, columns=columns, quiet=quiet,
@@ -73,8 +73,9 @@ def write_samples(
         written.append(_write_folder(names, programs, folder))
     if pack is not None:
         from shapeprog.data import write_pack
+        from shapeprog.data.synthetic.shapes import shapes_of
 
-        write_pack(pack, _shapes(names, programs, points, seed))
+        write_pack(pack, shapes_of(dict(zip(names, programs, strict=True)), points, seed))
         written.append(pack)
     if not written:
         for name, program in zip(names, programs, strict=True):
@@ -104,20 +105,3 @@ def _write_folder(names: list[str], programs: list[Program], folder: Path) -> Pa
     for name, program in zip(names, programs, strict=True):
         save(program, made / f"{name}.shape")
     return made
-
-
-def _shapes(names: list[str], programs: list[Program], points: int, seed: int) -> list[Shape]:
-    import numpy as np
-    import torch
-
-    from shapeprog.data.shape import Shape
-    from shapeprog.geometry.cells import voxels
-    from shapeprog.geometry.surface import sample_surface
-    from shapeprog.language.unroll import unroll
-
-    scene = unroll(programs)
-    cells = voxels(scene).numpy().astype(np.bool_)
-    if not points:
-        return [Shape(name, cells[number]) for number, name in enumerate(names)]
-    places = sample_surface(scene, points, torch.Generator().manual_seed(seed)).points.numpy().astype(np.float32)
-    return [Shape(name, cells[number], places[number]) for number, name in enumerate(names)]

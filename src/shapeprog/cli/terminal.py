@@ -33,35 +33,41 @@ MISTAKE = 2
 
 Command = TypeVar("Command", bound=Callable[..., None])
 
-With = Annotated[
-    list[Path] | None,
-    typer.Option("--with", help="A Python module that declares statements of your own; may be given again."),
-]
 
+def _checked_seed(seed: int) -> int:
+    if seed >= 1 << 63:  # as a maximum of the option it would stand in every help
+        raise typer.BadParameter(f"{seed} is not below 2^63.")
+    return seed
+
+
+about_input = functools.partial(typer.Option, rich_help_panel="Input")
+"""An option under this heading of the help, as the next ones."""
+about_program = functools.partial(typer.Option, rich_help_panel="Program")
+about_search = functools.partial(typer.Option, rich_help_panel="Search")
+
+With = Annotated[
+    list[Path] | None, about_program("--with", metavar="FILE", help="Python file with your own statements; repeatable.")
+]
 WithLibraries = Annotated[
     list[Path] | None,
-    typer.Option(
-        "--with",
-        help="A Python module that declares statements of your own, or a .shape file of functions to write programs "
-        "with; may be given again.",
-    ),
+    about_program("--with", metavar="FILE", help="Your own statements (.py) or functions (.shape); repeatable."),
 ]
-
 WithLibrary = Annotated[
-    bool, typer.Option("--library", help="Write the program with the functions that ship: see 'library show'.")
+    bool, about_program("--library", help="Use the functions that come with shapeprog (list: library show).")
 ]
-
 Changes = Annotated[
     list[str] | None,
-    typer.Option("--set", help="A name of the program and its number: seat=11 or 'width*=1.2'; several may follow."),
+    about_program(
+        "--set", metavar="NAME=NUMBER", help="Change numbers: --set seat_height=11 'width*=1.2' (also += -= /=)."
+    ),
 ]
-
-Seed = Annotated[int, typer.Option(help="Seed of everything random.", min=0, max=2**63 - 1)]
 Up = Annotated[
     str | None,
-    typer.Option(help="World axis that points up, such as +y; auto: how it stands best; by default the format's."),
+    about_input(metavar="AXIS", help="Axis that points up, such as +y, or auto. Default: that of the file format."),
 ]
-Front = Annotated[str | None, typer.Option(help="World axis that the front faces, such as -z.")]
+Front = Annotated[str | None, about_input(metavar="AXIS", help="Axis that the front faces, such as -z.")]
+Seed = Annotated[int, typer.Option(metavar="N", help="Seed of all random numbers.", min=0, callback=_checked_seed)]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")]
 
 
 class Interrupted(KeyboardInterrupt):
@@ -83,13 +89,19 @@ def guarded(command: Command) -> Command:
             complain(error)
             raise typer.Exit(MISTAKE) from None
         except KeyboardInterrupt as stop:
-            kept = str(stop) if isinstance(stop, Interrupted) else "nothing was left half written"
+            kept = str(stop) if isinstance(stop, Interrupted) else "no file is incomplete"
             errors().print(f"Interrupted; {kept}.", style="yellow", markup=False, highlight=False)
             raise typer.Exit(interruption.INTERRUPTED) from None
         except BrokenPipeError:
             # The reader of a pipe has gone; keep Python from complaining about it at exit.
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
             raise typer.Exit(0) from None
+        except ModuleNotFoundError as error:
+            name = (error.name or "").partition(".")[0]
+            if debugging or name in ("", "shapeprog"):
+                raise
+            complain(InputError(f"this needs the package {name}, which is not installed", f"pip install {name}"))
+            raise typer.Exit(MISTAKE) from None
         except OSError as error:
             if debugging:
                 raise
@@ -148,7 +160,7 @@ def fault(what: str, error: Exception) -> ShapeProgError:
     """
     if debugging:
         raise error
-    return ShapeProgError(f"{what}: a fault of shapeprog, not of the file", "run it again with --debug and report it")
+    return ShapeProgError(f"{what}: internal error", "run again with --debug and report the traceback")
 
 
 def check_axes(up: str | None, front: str | None) -> None:
@@ -200,12 +212,12 @@ def read_program_file(path: Path, changes: Sequence[str] | None = None) -> tuple
             return program, frame
         other = changed(program, changes)
         if lost := vanished(program, other):
-            said = f"With these numbers parts have no volume and are left out: {', '.join(dict.fromkeys(lost))}."
+            said = f"Parts without volume at these numbers are left out: {', '.join(dict.fromkeys(lost))}."
             errors().print(said, style="yellow", markup=False)
         return other, frame
     except InputError as error:
         if path.is_file() and path.suffix.lower() not in program_suffixes():
-            raise InputError(error.message, f"make a program of it first: shapeprog infer {path}") from None
+            raise InputError(error.message, f"infer a program first: shapeprog infer {path}") from None
         raise
 
 

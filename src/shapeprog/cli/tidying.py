@@ -8,27 +8,30 @@ from typing import Annotated
 import typer
 
 from shapeprog.cli import terminal
+from shapeprog.cli.terminal import about_program
 from shapeprog.cli.units import AsUnit, FileUnit, asked_unit, check_units
 from shapeprog.errors import InputError
 
 
 def tidy_command(
-    program: Annotated[Path, typer.Argument(help="A program: .shape, .json or .notation.")],
-    out: Annotated[
-        Path | None, typer.Argument(help="Where to write it, as .shape or .json; else it is printed.")
-    ] = None,
+    program: Annotated[Path, typer.Argument(metavar="PROGRAM", help="Program file: .shape .json .notation .txt")],
+    out: Annotated[Path | None, typer.Argument(metavar="OUTPUT", help="File to write: .shape .json")] = None,
+    file_unit: FileUnit = None,
     price: Annotated[
-        float, typer.Option(help="What a number is worth, times the usual: how far parts may move.", min=0, max=1000)
+        float,
+        about_program(metavar="FACTOR", help="Higher: fewer free numbers, parts may move further.", min=0, max=1000),
     ] = 1.0,
-    seed: terminal.Seed = 0,
+    unit: AsUnit = None,
     library: terminal.WithLibrary = False,
     modules: terminal.WithLibraries = None,
-    unit: AsUnit = None,
-    file_unit: FileUnit = None,
+    seed: terminal.Seed = 0,
 ) -> None:
-    """Tie the numbers of a program: lengths that are nearly equal, faces that are flush or meet, parts in the middle.
+    """Replace numbers of a program that follow from others by names and expressions.
 
-    What is left free gets names, so that a change of one number moves all that belongs to it.
+    Example: shapeprog tidy old.shape new.shape
+
+    Nearly equal lengths become equal, nearly flush or touching faces flush or touching, nearly centred parts centred.
+    The remaining numbers get names; changing one moves every part that depends on it.
     """
     from shapeprog.formats import load_with_frame, save
     from shapeprog.inference.evidence import evidence_of_program
@@ -42,7 +45,7 @@ def tidy_command(
     libraries = terminal.load_libraries(modules, library)
     given, frame = load_with_frame(program)
     if not given.size:
-        raise InputError(f"{program} draws nothing", "name a program that draws something")
+        raise InputError(f"{program} draws nothing", "give a program with at least one drawing statement")
     wanted = asked_unit(given.unit, frame, program, unit, file_unit)
     tied = tie(given, evidence_of_program(given, seed), price=price, known=True, seed=seed)
     found = tied.program
@@ -53,4 +56,4 @@ def tidy_command(
         save(found, out, frame)
     terminal.print_program(terminal.output(), found)
     before = numbers(given)
-    terminal.errors().print(f"{numbers(found)} numbers are free; {before} were.", style="dim", markup=False)
+    terminal.errors().print(f"Free numbers: {before} before, {numbers(found)} now.", style="dim", markup=False)

@@ -5,8 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
+from shapeprog.cli.terminal import about_input, about_program
 from shapeprog.errors import InputError, ShapeProgError
 
 if TYPE_CHECKING:
@@ -17,17 +16,11 @@ CELLS = "cells"
 
 AsUnit = Annotated[
     str | None,
-    typer.Option(
-        "--unit",
-        help="Write lengths in mm, cm, m or in of the object, with the decimals that a person expects, or in cells: "
-        "24 along its longest side. By default cells, or what the program is in.",
-    ),
+    about_program("--unit", metavar="UNIT", help="Unit of lengths: mm, cm, m, in, or cells (24 = the longest side)."),
 ]
 FileUnit = Annotated[
     str | None,
-    typer.Option(
-        "--file-unit", help="What one unit of the input file is: mm, cm, m or in; by default a metre, as in glTF."
-    ),
+    about_input("--file-unit", metavar="UNIT", help="Unit of the input file: mm, cm, m or in. Default: m, as in glTF."),
 ]
 
 
@@ -42,7 +35,7 @@ def check_units(unit: str | None, file_unit: str | None) -> None:
             except ShapeProgError as mistake:
                 raise InputError(f"{option}: {mistake.message}", mistake.hint) from None
     if file_unit is not None and unit in (None, CELLS):
-        raise InputError("--file-unit changes nothing where lengths are in cells", "say --unit cm as well")
+        raise InputError("--file-unit has no effect on lengths in cells", "add --unit cm")
 
 
 def asked_unit(
@@ -64,6 +57,17 @@ def asked_unit(
     if own is not None and file_unit is None:
         return own.to(unit)
     if frame is None:
-        said = f"{path} does not say how large its cells are, so that nothing is known of it in {unit}"
-        raise InputError(said, "infer it with --unit, or put its frame at its top: see 'shapeprog export --help'")
+        said = f"cannot write {path} in {unit}: the size of its cells is unknown"
+        raise InputError(said, "infer it with --unit, or add its size at the top, as in '# unit: cm, 3.75 per cell'")
     return Unit.of(frame, unit, file_unit or "m")
+
+
+def in_unit(frame: Frame | None, unit: Unit | None) -> Frame | None:
+    """The way from the grid to the world of the input, counted in a unit of the object, or in cells."""
+    if frame is None:
+        return None
+    from shapeprog.space import Frame
+
+    per_cell = 1.0 if unit is None else unit.per_cell
+    up, depth, side = (per_cell / frame.scale * place for place in frame.centre)
+    return Frame(per_cell, (up, depth, side), frame.axes)

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from shapeprog.cli import terminal
-from shapeprog.cli.units import AsUnit, FileUnit, asked_unit, check_units
+from shapeprog.cli.terminal import about_input
+from shapeprog.cli.units import AsUnit, FileUnit, asked_unit, check_units, in_unit
 from shapeprog.errors import InputError, OutputError, ShapeProgError
 from shapeprog.formats.format import format_of, program_suffixes, suffixes
 
@@ -19,13 +20,19 @@ if TYPE_CHECKING:
 
 _SAMPLES = " ".join(suffixes("sample"))
 
-ProgramFile = Annotated[Path, typer.Argument(help=f"A program: {' '.join(program_suffixes())}.")]
+WRITTEN, SCALED = (".shape", ".json", ".scad", ".py"), (".stl", ".obj", ".ply")
+"""Files whose numbers, and meshes whose coordinates, are in the unit that is asked for."""
+
+ProgramFile = Annotated[Path, typer.Argument(metavar="PROGRAM", help=f"Program file: {' '.join(program_suffixes())}")]
 Outputs = Annotated[
-    list[Path], typer.Argument(help=f"Files to write; the suffix of each names its format: {' '.join(suffixes())}.")
+    list[Path],
+    typer.Argument(metavar="OUTPUT", help=f"Files to write; the suffix selects the format: {' '.join(suffixes())}"),
 ]
 Input = Annotated[
     Path | None,
-    typer.Option("--shape", help="The input to show beside it; by default what a .json file names in its own folder."),
+    about_input(
+        "--shape", metavar="FILE", help="Input to show beside it. Default: as named in the .json, same folder."
+    ),
 ]
 
 
@@ -36,19 +43,23 @@ def export_command(
     modules: terminal.With = None,
     unit: AsUnit = None,
     file_unit: FileUnit = None,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace other programs.")] = False,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace existing program files.")] = False,
+    quiet: terminal.Quiet = False,
 ) -> None:
-    """Write a program for other tools: as a mesh, for CAD, as cells or points, or in another form of program.
+    """Export a program as a mesh, CAD file, voxels, points, or in another program format.
 
-    Where the program file keeps its frame (every .json and .shape written by infer does), the export lies on the
-    input. A .shape file without one is exported upright, one cell one unit; to place it, put the comment
-    '# frame: {"scale": ..., "centre": [...], "axes": [[...], [...], [...]]}' at its top, with the scale in units of the
-    input per cell. --unit is for .shape, .json, .scad and .py; --set counts in the unit of the program as it was.
+    Example: shapeprog export chair.shape tall.stl tall.scad --set leg_height=14
+
+    If the program file stores its frame (all files by infer do), the export lies on the input. Otherwise one unit of
+    the export is one cell. --unit converts the numbers of .shape, .json, .scad and .py, and scales .stl, .obj
+    and .ply. --set uses the unit of the program file.
     """
     from shapeprog.formats import export
 
     check_units(unit, file_unit)
+    for path in outputs:
+        if unit is not None and path.suffix.lower() not in (*WRITTEN, *SCALED):
+            raise InputError(f"--unit has no effect on {path.name}", f"it is for {' '.join((*WRITTEN, *SCALED))}")
     terminal.load_modules(modules)
     if not overwrite:
         _refuse_programs(program, outputs)
@@ -58,7 +69,8 @@ def export_command(
 
         found = in_readable_unit(found, asked_unit(found.unit, frame, program, unit, file_unit))
     for path in outputs:
-        export(found, path, frame)
+        scaled = unit is not None and path.suffix.lower() in SCALED
+        export(found, path, in_unit(frame, found.unit) if scaled else frame)
         if not quiet:
             terminal.output().print(f"wrote {path}")
 
@@ -75,26 +87,30 @@ def _refuse_programs(program: Path, outputs: Sequence[Path]) -> None:
         same = path.suffix.lower() == program.suffix.lower() and path.suffix.lower() in program_suffixes()
         if same and path.is_file() and not path.samefile(program) and path.read_bytes() != program.read_bytes():
             raise OutputError(
-                f"{path} is there already, and export would replace it by {program}",
-                "export takes one program, then the files to write; say --overwrite if it is to be replaced",
+                f"{path} exists and is another program than {program}",
+                "give one program, then the files to write; --overwrite replaces existing programs",
             )
 
 
 def render_command(
     program: ProgramFile,
-    output: Annotated[Path, typer.Argument(help=f"A picture (.png .jpg .pdf), or cells or points ({_SAMPLES}).")],
+    output: Annotated[
+        Path, typer.Argument(metavar="OUTPUT", help=f"Picture (.png .jpg .pdf), voxels or points ({_SAMPLES}).")
+    ],
     shape: Input = None,
-    resolution: Annotated[int, typer.Option(help="Cells along each side, for .npy.", min=1, max=512)] = 32,
-    points: Annotated[int, typer.Option(help="How many points, for .xyz.", min=1)] = 5000,
+    resolution: Annotated[int, typer.Option(metavar="N", help="Voxels along each side (.npy).", min=1, max=512)] = 32,
+    points: Annotated[int, typer.Option(metavar="N", help="Number of points (.xyz).", min=1)] = 5000,
     seed: terminal.Seed = 0,
     changes: terminal.Changes = None,
     modules: terminal.With = None,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
+    quiet: terminal.Quiet = False,
 ) -> None:
-    """Draw a program: as a picture, as hard voxels, or as points on its surface.
+    """Render a program as a picture, as voxels, or as points on its surface.
 
-    Cells are those of the program snapped to whole numbers. Points come as lines 'x y z nx ny nz' in the world of the
-    input, or as a .xyz file is read, z up, where no frame is known.
+    Example: shapeprog render chair.shape chair.png
+
+    Voxels are those of the program with all numbers rounded. A .xyz file has lines 'x y z nx ny nz' in the coordinates
+    of the input; z is up if these are not known.
     """
     from shapeprog.formats import export
     from shapeprog.view.page import SUFFIXES, picture
@@ -112,32 +128,39 @@ def render_command(
         export(found, output, frame, **{name: given[name] for name in chosen.options})
     else:
         known = " ".join((*SUFFIXES, *suffixes("sample")))
-        raise OutputError(f"nothing is rendered to {suffix or 'a file without a suffix'}", f"known are {known}")
+        raise OutputError(f"cannot render to {suffix or 'a file without a suffix'}", f"known suffixes: {known}")
     if not quiet:
         terminal.output().print(f"wrote {output}")
 
 
 def show_command(
     program: ProgramFile,
-    output: Annotated[Path | None, typer.Argument(help="The page; by default NAME.html in this folder.")] = None,
+    output: Annotated[
+        Path | None, typer.Argument(metavar="OUTPUT", help="Page to write. Default: NAME.html in the current folder.")
+    ] = None,
     shape: Input = None,
-    browse: Annotated[bool, typer.Option("--open", help="Open it in the browser.")] = False,
+    browse: Annotated[bool, typer.Option("--open", help="Open the page in a browser.")] = False,
     changes: terminal.Changes = None,
     modules: terminal.With = None,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
+    quiet: terminal.Quiet = False,
 ) -> None:
-    """Write one HTML page to turn the shape and see which line draws which part; it needs no network."""
+    """Write an HTML page: turn the shape, see which line draws which part, drag its numbers.
+
+    Example: shapeprog show chair.shape --open
+
+    The page is one file and needs no network.
+    """
     from shapeprog.view import viewer
 
     terminal.load_modules(modules)
-    found, _ = terminal.read_program_file(program, changes)
+    found, frame = terminal.read_program_file(program, changes)
     page = output or Path(f"{program.stem}.html")
     if page.suffix.lower() not in (".html", ".htm"):
-        raise OutputError(f"{page} is no page", "pages end in .html; pictures are made by 'shapeprog render'")
+        raise OutputError(f"{page} is not an HTML file", "pages end in .html; for pictures use 'shapeprog render'")
     result = _result(program, changes)
     beside = _input_of(result, shape)
     _tell_hidden([result], [beside], quiet)
-    viewer(found, page, shape=beside, title=program.stem, scores=result.scores)
+    viewer(found, page, shape=beside, title=program.stem, scores=result.scores, frame=frame)
     if not quiet:
         terminal.output().print(f"wrote {page}")
     if browse:
@@ -147,20 +170,23 @@ def show_command(
 
 
 def sheet_command(
-    folder: Annotated[Path, typer.Argument(help="A folder with programs, such as infer writes.")],
-    output: Annotated[Path, typer.Argument(help="The picture, such as sheet.png.")],
-    columns: Annotated[int, typer.Option(help="Pairs in a row.", min=1)] = 4,
-    most: Annotated[int, typer.Option("--most", help="Most programs to show.", min=1)] = 96,
-    title: Annotated[str, typer.Option(help="Stands above it.")] = "",
+    folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="Folder of programs, such as the results of infer.")],
+    output: Annotated[Path, typer.Argument(metavar="OUTPUT", help="Picture to write, such as sheet.png.")],
+    columns: Annotated[int, typer.Option(metavar="N", help="Programs per row.", min=1)] = 4,
+    most: Annotated[int, typer.Option("--most", metavar="N", help="Maximum number of programs.", min=1)] = 96,
+    title: Annotated[str, typer.Option(metavar="TEXT", help="Title of the picture.")] = "",
     shape: Annotated[
-        Path | None, typer.Option("--shape", help="The folder of the inputs; by default that of the programs.")
+        Path | None,
+        about_input("--shape", metavar="FOLDER", help="Folder of the inputs. Default: that of the programs."),
     ] = None,
     modules: terminal.With = None,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
+    quiet: terminal.Quiet = False,
 ) -> None:
-    """Draw a contact sheet of a folder of programs, each beside the input that its .json file names.
+    """Draw a contact sheet of a folder of programs, each beside its input.
 
-    Inputs are looked for in the folder of the programs, or in the one that is given and deeper; nothing else is opened.
+    Example: shapeprog sheet results sheet.png --shape originals
+
+    Inputs are found by the name in the .json file, in the folder of the programs or in that of --shape and below.
     """
     from shapeprog.view import Item, contact_sheet
     from shapeprog.view.page import scores_text
@@ -191,14 +217,21 @@ def sheet_command(
 
 
 def statements_command(
-    name: Annotated[str | None, typer.Argument(help="A statement or loop; without it all are listed.")] = None,
+    names: Annotated[
+        list[str] | None,
+        typer.Argument(metavar="NAME", help="Statements, loops or roles. Default: a list of all."),
+    ] = None,
     modules: terminal.With = None,
 ) -> None:
-    """Print the manual of the language, or of one statement, drawn from the declarations."""
+    """Print the manual of the language, or of some statements.
+
+    Example: shapeprog statements box leg mirror
+    """
     from shapeprog.view.manual import manual
 
     terminal.load_modules(modules)
-    terminal.output().print(manual(name).rstrip("\n"))
+    pages = [manual(name) for name in names] if names else [manual()]
+    terminal.output().print("\n".join(pages).rstrip("\n"))
 
 
 def program_files(folder: Path) -> list[Path]:
@@ -243,12 +276,15 @@ def _input_of(result: Result, named: Path | None) -> Shape | None:
     place, mark, member = result.source.partition("#")
     try:
         home = (Path(result.name).parent if named is None else named).resolve()
-        source = (home / place).resolve()
-        inside = source.parent == home or (named is not None and source.is_relative_to(home))
-        if not inside or not source.exists():
-            return None
+        parts = Path(place).parts
+        # the inputs may have been copied with the programs: the longest end of the path that is there counts
+        ends = ((home / Path(*parts[start:])).resolve() for start in range(len(parts)))
+        allowed = (each for each in ends if each.parent == home or (named is not None and each.is_relative_to(home)))
+        source = next((each for each in allowed if each.exists()), None)
     except (OSError, ValueError, RuntimeError):
         return None  # no file can have such a name
+    if source is None:
+        return None
     try:
         found = load(f"{source}{mark}{member}")
     except ShapeProgError:
@@ -263,5 +299,5 @@ def _input_of(result: Result, named: Path | None) -> Shape | None:
 def _tell_hidden(results: list[Result], shapes: list[Shape | None], quiet: bool) -> None:
     """Say that inputs are not shown, where programs name some and none was found."""
     if any(result.source for result in results) and not any(shapes) and not quiet:
-        said = "Inputs are not shown: none lies beside its program, or can be read; name them with --shape."
+        said = "Inputs are not shown: none was found and readable. Give them with --shape."
         terminal.errors().print(said, style="dim", markup=False)

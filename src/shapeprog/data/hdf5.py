@@ -53,7 +53,7 @@ class Hdf5Grids:
             import h5py
         except ImportError:
             raise InputError(
-                f"{self.path.name} needs the library h5py, which is not installed", "pip install 'shapeprog[hdf5]'"
+                f"{self.path.name} needs the library h5py, which is not installed", "pip install h5py"
             ) from None
         with in_words(self.path, "HDF5"), h5py.File(self.path, "r") as file:
             link = file.get("data", getlink=True)

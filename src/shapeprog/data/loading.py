@@ -65,8 +65,7 @@ def load(
     return held[_number(file, index, held)]
 
 
-load_shape = load
-"""The same under the name that the package gives it, where ``load`` reads programs."""
+load_shape = load  # its name in ``shapeprog``, whose ``load`` reads programs
 
 
 def load_all(
@@ -162,7 +161,7 @@ def _placed(path: Path, up: str | None, front: str | None, make: Callable[..., S
         return make(axes=axes_of(path, up, front))
     seen = make(axes=axes_of(path, None, front))
     found = find_up(seen.voxels, np.array(seen.frame.axes), usual=default_axes(path)[0], front=front)
-    note = f"Up is taken to be {found.up} of the file, {found.probability:.0%} likely by how the shape would stand."
+    note = f"Estimated up axis of the file: {found.up} (probability {found.probability:.0%})."
     return replace(make(axes=axes_of(path, found.up, front)), note=note)
 
 

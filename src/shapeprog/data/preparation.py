@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import os
 import re
-from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from itertools import groupby
@@ -78,11 +77,13 @@ def prepare(
 ) -> Iterator[Prepared]:
     """Read every model of ``directory`` and write packs ``{category}_{split}.npz``; yields one record per model.
 
-    The directory holds a folder per category.  In the layout of ShapeNetCore v2 (``<synset>/<id>/models/...``) a model
-    is an id; elsewhere it is a file, named by its path in the category's folder.  The split of a shape follows from its
+    The directory holds a folder per category, or models of one category, which is named after it.  In the layout of
+    ShapeNetCore v2 (``<synset>/<id>/models/...``) a model is an id; elsewhere it is a path without suffix in the
+    category's folder.  Of several files of a model a mesh is read before voxels.  The split of a shape follows from its
     cells alone, so equal shapes never straddle a split, in whatever order, together or apart they are read.  Worlds
-    are scaled to a bounding box of diagonal 1, centred, with axes up, depth, left-right.  A broken model is told and
-    stops nothing.  The last record holds the packs and the failures.
+    are scaled to a bounding box of diagonal 1, centred, with axes up, depth, left-right.  A broken model, or a
+    pack without points because some of its models are voxels, is a failure that stops nothing.  The last record holds
+    the packs and the failures.
 
     Parameters
     ----------
@@ -131,6 +132,12 @@ def prepare(
             target, shapes = folder / f"{category}_{split}.npz", groups.get(split, [])
             if shapes or target.exists():  # an old pack would let duplicates straddle
                 packs.append((target, write_pack(target, sorted(shapes, key=lambda shape: shape.name))))
+            voxels = [shape.name for shape in shapes if shape.points is None]
+            if 0 < len(voxels) < len(shapes):
+                said = (
+                    f"{target.name} has no points: {len(voxels)} of its {len(shapes)} models are voxels, as {voxels[0]}"
+                )
+                failures.append((target, ShapeProgError(said, "prepare voxels in another category than meshes")))
     yield Prepared(done, len(models), folder, packs=tuple(packs), failures=tuple(failures))
 
 
@@ -145,34 +152,33 @@ def find_models(directory: Path, skipped: Skipped) -> list[tuple[str, str, Path]
         If there is no such directory, or it holds no models.
     """
     if not directory.is_dir():
-        raise InputError(f"there is no folder {directory}", "give the folder that holds one folder per category")
-    suffixes, found = readable_suffixes(), []
-    for branch in (path for path in entries(directory, skipped) if is_folder(path, skipped)):
+        raise InputError(f"there is no folder {directory}", "give the folder of the models")
+    suffixes, found = readable_suffixes(), dict[tuple[str, str], Path]()
+    folders = [path for path in entries(directory, skipped) if is_folder(path, skipped)]
+    for branch in [*folders, directory.resolve()]:
+        if found and branch not in folders:
+            break
         category = SYNSETS.get(branch.name, re.sub(r"[^\w-]+", "_", branch.name))
         closed: Skipped = []
         layout = [path for path in entries(branch, skipped) if is_folder(path / "models", closed)]
         for place in layout:
             files = [path for path in entries(place / "models", skipped) if path.suffix.lower() in suffixes]
             if files:
-                found.append((category, place.name, min(files, key=_preference)))
+                found[category, place.name] = min(files, key=_preference)
         if layout:
             skipped += closed
         else:
             for path in files_below(branch, suffixes, skipped):
-                found.append((category, path.relative_to(branch).with_suffix("").as_posix(), path))
+                model = category, path.relative_to(branch).with_suffix("").as_posix()
+                found[model] = min(path, found.get(model, path), key=_preference)
     if not found:
         if skipped:
             raise skipped[0][1]
         raise InputError(
             f"the folder {directory} holds no models",
-            "it needs a folder per category: <category>/... or <synset>/<id>/models",
+            "it needs meshes or voxels, in a folder per category or as <synset>/<id>/models",
         )
-    twice = Counter((category, name) for category, name, _ in found)
-    named = [
-        (category, name if twice[category, name] == 1 else f"{name}{path.suffix}", path)
-        for category, name, path in found
-    ]
-    return sorted(named, key=lambda model: model[:2])
+    return [(*model, path) for model, path in sorted(found.items())]
 
 
 def split_of(shape: Shape, shares: tuple[float, float, float] = (0.7, 0.1, 0.2)) -> str:

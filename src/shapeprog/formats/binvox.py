@@ -17,7 +17,7 @@ from shapeprog.files import write_bytes
 from shapeprog.space import HALF, Array, Frame
 
 _HEAD = 4096
-"""Most bytes of a head."""
+"""Most bytes of a header."""
 
 _AT_ONCE = 1 << 16
 """Runs unpacked at once: numpy takes eight bytes for the length of each."""
@@ -31,7 +31,7 @@ def read_binvox(path: str | os.PathLike[str]) -> tuple[Array, Array, float]:
     Raises
     ------
     InputError
-        If the file is no binvox file, is cut short, or holds anything but 0 and 1.
+        If the file is not a binvox file, is truncated, or has values other than 0 and 1.
     """
     name = Path(path).name
     content = Path(path).read_bytes()
@@ -64,7 +64,7 @@ def read_binvox(path: str | os.PathLike[str]) -> tuple[Array, Array, float]:
 
 
 def write_binvox(path: str | os.PathLike[str], voxels: Array, frame: Frame | None = None) -> None:
-    """Write cells of the grid as a binvox file that lies where the shape's own file lies.
+    """Write cells of the grid as a binvox file in the coordinates of the input.
 
     Parameters
     ----------

@@ -186,7 +186,7 @@ if __name__ == "__main__":
 
 
 _PLACE = "place"
-"""The parameter of functions that says where their parts go."""
+"""The parameter of functions for the placement of their parts."""
 
 
 def write_script(program: Program, path: Path, frame: Frame) -> None:
@@ -214,10 +214,10 @@ def write_step(program: Program, path: Path, frame: Frame) -> None:
     if importlib.util.find_spec("build123d") is None:
         raise OutputError(
             f"cannot write {path}: STEP needs the library build123d, which is not installed",
-            "pip install 'shapeprog[step]', or export a .py script and run it where build123d is",
+            "pip install build123d, or export a .py script and run it where build123d is",
         )
     made: dict[str, Any] = {"__name__": "shapeprog_model"}
-    # The script is made by this module from checked names and numbers; running it keeps one home for the geometry.
+    # The script consists of checked names and numbers; running it avoids a second implementation of the geometry.
     exec(compile(script_text(program, frame, path.stem), f"{path.stem}.py", "exec"), made)
     with atomic_path(path) as temporary:
         if not made["export_step"](made["model"], str(temporary)):
@@ -267,7 +267,7 @@ def _function(function: Module) -> Iterator[str]:
 
 
 def _reserved() -> set[str]:
-    """Words that mean something in these scripts."""
+    """Reserved words of these scripts."""
     script = ast.parse(_HEAD + _TOOLS + _TAIL)
     found = {*dir(builtins), "scale", "world", _PLACE}
     for node in script.body:
@@ -282,7 +282,7 @@ def _reserved() -> set[str]:
 
 
 def _note(each: Variable) -> str:
-    return "  # not used below: another value here changes nothing" if each.fixed else ""
+    return "  # not used below: changing it has no effect" if each.fixed else ""
 
 
 def _tuple(values: Any) -> str:

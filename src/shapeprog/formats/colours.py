@@ -31,7 +31,7 @@ _OTHERS = ("#66CCEE", "#EE6677", "#228833", "#CCBB44", "#AA3377", "#EE7733", "#0
 
 
 def colour(statement: int) -> Colour:
-    """The colour of the statement with this id, a user's own included."""
+    """The colour of the statement with this id, built in or a user's own."""
     text = _BUILT_IN.get(statement, _OTHERS[statement % len(_OTHERS)])
     return (int(text[1:3], 16), int(text[3:5], 16), int(text[5:7], 16))
 

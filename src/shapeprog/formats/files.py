@@ -14,20 +14,20 @@ from shapeprog.space import Frame
 
 
 def load(path: str | os.PathLike[str]) -> Program:
-    """The program in a file: program text, JSON or the notation of the paper, as its suffix says.
+    """The program in a file: program text, JSON or the notation of the paper, by its suffix.
 
     Raises
     ------
     InputError
         If the file cannot be read or is of another kind.
     ProgramError
-        If its text is not in the language.
+        If its text is not a valid program.
     """
     return load_with_frame(path)[0]
 
 
 def load_with_frame(path: str | os.PathLike[str]) -> tuple[Program, Frame | None]:
-    """The program in a file, and the way to the world of its input where the file keeps it.
+    """The program in a file, and the frame of its input if the file has one.
 
     Raises
     ------
@@ -48,7 +48,7 @@ def load_with_frame(path: str | os.PathLike[str]) -> tuple[Program, Frame | None
 
 
 def save(program: Program, path: str | os.PathLike[str], frame: Frame | None = None) -> None:
-    """Write a program so that :func:`load_with_frame` gives back exactly what is given here.
+    """Write a program so that :func:`load_with_frame` returns the same program and frame.
 
     Parameters
     ----------
@@ -57,12 +57,12 @@ def save(program: Program, path: str | os.PathLike[str], frame: Frame | None = N
     path
         Where to; ends in .shape, .json or .notation.
     frame
-        The way to the world of the input, where it shall be kept.
+        From the grid to the coordinates of the input, if it is to be stored.
 
     Raises
     ------
     OutputError
-        If the suffix is of no program file, or the file cannot be written.
+        If the suffix is not that of a program file, or the file cannot be written.
     """
     if Path(path).suffix.lower() not in suffixes("program"):
         known = " or ".join(suffixes("program"))
@@ -84,8 +84,8 @@ def export(program: Program, path: str | os.PathLike[str], frame: Frame | None =
     path
         Where to; the folder must exist.
     frame
-        The way from the grid to the world of the input, so that the export lies on it; without it the shape stands
-        upright as the format wants it, one unit of the program one of the file (:mod:`shapeprog.formats.frames`).
+        From the grid to the coordinates of the input, so that the export lies on it; without it the shape stands
+        upright in the axes of the format, one unit of the program one of the file (:mod:`shapeprog.formats.frames`).
     options
         For .npy the ``resolution`` in cells along each side (32), for .xyz how many ``points`` (5000) and their
         ``seed`` (0).
@@ -93,7 +93,7 @@ def export(program: Program, path: str | os.PathLike[str], frame: Frame | None =
     Raises
     ------
     OutputError
-        If the suffix is unknown, the program has nothing that the format can hold, or the file cannot be written.
+        If the suffix is unknown, the program draws nothing that the format can hold, or the file cannot be written.
     """
     target = Path(path)
     chosen, suffix = format_of(target), target.suffix.lower()

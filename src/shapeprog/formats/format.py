@@ -1,7 +1,7 @@
-"""The file formats: one declaration each says what it holds, its suffixes, its axes, and who reads and writes it.
+"""The file formats: each declares its contents, suffixes and axes, and the functions that read and write it.
 
-A new format is one entry of :data:`FORMATS` and the functions that it names; what commands print, what errors propose
-and what the manual lists come from here.  Nothing heavy is imported: readers and writers load when they are used.
+A new format is one entry of :data:`FORMATS` and the functions that it names; commands, errors and the manual list
+formats from here.  Readers and writers are imported when they are first used.
 """
 
 from __future__ import annotations
@@ -38,18 +38,18 @@ class Format:
     Parameters
     ----------
     name
-        What it is called.
+        Name of the format.
     kind
-        ``program`` can be read back as the program it was; ``solid`` is what it draws, for other tools; ``sample`` are
-        cells or points of it; ``shape`` is only ever read, as the shape to infer a program from.
+        ``program`` can be read back as the same program; ``solid`` is its geometry, for other tools; ``sample`` is its
+        cells or points; ``shape`` is read alone, as the shape to infer a program from.
     suffixes
-        Ends of file names, the usual one first.
+        Endings of file names, the usual one first.
     axes
-        Up and front of a file that does not say where it lies; ``None`` where a program keeps its frame or has none.
+        Up and front axes of a file without a frame; ``None`` for programs, which keep their frame or have none.
     doc
-        What is in such a file, in one line.
+        Contents of such a file, in one line.
     reader, writer
-        ``module:function`` of this room: ``(path) -> (program, frame or None)`` and ``(program, path, frame)``.
+        ``module:function`` of this package: ``(path) -> (program, frame or None)`` and ``(program, path, frame)``.
     options
         Further arguments of the writer.
     """
@@ -64,12 +64,12 @@ class Format:
     options: tuple[str, ...] = ()
 
     def read(self, path: Path) -> tuple[Program, Frame | None]:
-        """The program in a file of this format, and its frame where the file keeps one."""
+        """The program in a file of this format, and its frame if the file has one."""
         found: tuple[Program, Frame | None] = _function(self.reader)(path)
         return found
 
     def write(self, program: Program, path: Path, frame: Frame | None, **options: int) -> None:
-        """Write a program; ``frame`` leads from the grid to the world of the file."""
+        """Write a program; ``frame`` maps the grid to the coordinates of the file."""
         _function(self.writer)(program, path, frame, **options)
 
 
@@ -126,7 +126,7 @@ FORMATS = (
     ),
     Format(
         "STEP", "solid", (".step", ".stp"), Z_UP,
-        "named, coloured solids, through build123d (pip install 'shapeprog[step]')",
+        "named, coloured solids, through build123d (pip install build123d)",
         writer="build123d:write_step",
     ),
     Format(
@@ -153,7 +153,7 @@ FORMATS = (
     Format("glTF", "shape", (".gltf",), Y_UP, "a mesh and the files beside it"),
     Format("HDF5", "shape", (".h5", ".hdf5"), GRID, "many grids of cells, as published"),
 )  # fmt: skip
-"""Every format that is known by its suffix."""
+"""Every format, found by its suffix."""
 
 OTHER_MESHES: Axes = Y_UP
 """Axes of the mesh files that trimesh reads besides."""
@@ -162,7 +162,7 @@ _BY_SUFFIX = {suffix: each for each in FORMATS for suffix in each.suffixes}
 
 
 def format_of(path: str | os.PathLike[str]) -> Format | None:
-    """The format that the suffix of a path names, whatever its case."""
+    """The format of the suffix of a path, in any case."""
     return _BY_SUFFIX.get(Path(path).suffix.lower())
 
 
@@ -177,7 +177,7 @@ def program_suffixes() -> tuple[str, ...]:
 
 
 def listed() -> str:
-    """The formats that can be written, one line each with its suffixes and what is in such a file."""
+    """The formats that can be written, one line each with suffixes and contents."""
     rows = [(" ".join(each.suffixes), each.doc) for each in FORMATS if each.writer]
     width = max(len(names) for names, _ in rows)
     return "\n".join(f"{names:<{width}}  {doc}" for names, doc in rows)

@@ -5,8 +5,8 @@ A ``.shape`` file may carry its frame as a comment in its first lines, which the
     # frame: {"scale": 0.0417, "centre": [0, 0.5, 0], "axes": [[0, 0, 1], [1, 0, 0], [0, 1, 0]]}
 
 ``shapeprog infer`` writes it there, so that ``shapeprog export chair.shape chair.glb`` lies on the mesh it was
-inferred from.  Without it one unit of the file is one of the program, which is a cell if it tells no other, the grid's
-centre is the origin, and up is what the format calls up.
+inferred from.  Without it one unit of the file is one of the program (a cell unless it has another unit), the centre
+of the grid is the origin, and the axes are those of the format.
 """
 
 from __future__ import annotations
@@ -31,10 +31,10 @@ _CURE = (
 
 
 def upright(chosen: Format, unit: Unit | None = None) -> Frame | None:
-    """The frame for files of a format when none is known: lengths as they are in the unit of a program, which is one
-    unit of the file; up and front as the format says.
+    """The default frame of a format: one unit of a program is one unit of the file; up and front are those of the
+    format.
 
-    Program files go without.
+    Program files have none.
     """
     if chosen.axes is None:
         return None
@@ -65,27 +65,27 @@ def frame_from(data: Any, name: str) -> Frame:
     except (KeyError, TypeError, ValueError, OverflowError):
         good = False
     if not good:
-        raise InputError(f"{name}: the frame {shortened(data)} is no scale, centre and rotation", _CURE)
+        raise InputError(f"{name}: the frame {shortened(data)} is not a scale, a centre and a rotation", _CURE)
     return Frame(scale, (centre[0], centre[1], centre[2]), tuple((a, b, c) for a, b, c in axes))
 
 
 def frame_comment(frame: Frame | None) -> str:
-    """The line that keeps a frame in program text; nothing where there is no frame."""
+    """The comment line that stores a frame in program text; empty without a frame."""
     return "" if frame is None else f"# frame: {json.dumps(frame_dict(frame))}\n"
 
 
 def without_frame(text: str) -> str:
-    """Program text without the comment that keeps its frame; the lines keep their numbers."""
+    """Program text without the comment that stores its frame; line numbers do not change."""
     return _HEADER.sub("", text)
 
 
 def frame_in(text: str, name: str = "<program>") -> Frame | None:
-    """The frame kept in program text, or None.
+    """The frame stored in program text, or None.
 
     Raises
     ------
     InputError
-        If there is such a comment and it cannot be read.
+        If the comment cannot be read.
     """
     found = _HEADER.search(text)
     if not found:

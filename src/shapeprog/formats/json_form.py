@@ -1,11 +1,11 @@
-"""Programs and their tensors as JSON: versioned, with names, exact for every float32.
+"""Programs as JSON: versioned, with names, exact for every float32.
 
 {"format": "shapeprog", "version": 1, "program": [
   {"statement": "translate", "parameters": {"count": 2, "by": [0, 0, 18]}, "body": [
     {"statement": "leg", "parameters": {"at": [-12, -8, -10], "size": [16, 2, 2]}}]}]}
 
-Programs with names, expressions or functions are of version 2, those whose lengths are not in cells of version 3; these
-have "unit": {"name": "cm", "per_cell": 3.75} beside "program".  The entries are in :mod:`shapeprog.formats.json_lines`.
+Programs with names, expressions or functions have version 2, those whose lengths are not in cells version 3, with a key
+"unit": {"name": "cm", "per_cell": 3.75}.  The entries are in :mod:`shapeprog.formats.json_lines`.
 """
 
 from __future__ import annotations
@@ -17,8 +17,6 @@ from pathlib import Path
 from reprlib import repr as shortened
 from typing import Any, NoReturn
 
-import torch
-
 from shapeprog.errors import InputError, ProgramError, ShapeProgError
 from shapeprog.files import write_text
 from shapeprog.formats.frames import frame_dict, frame_from
@@ -27,26 +25,24 @@ from shapeprog.formats.shape import LARGEST_FILE, read_text
 from shapeprog.language.parameters import LARGEST, shortest
 from shapeprog.language.place import proper_text
 from shapeprog.language.program import Program
-from shapeprog.language.statement import SLOTS
-from shapeprog.language.tensors import Code
 from shapeprog.language.unit import Unit
 from shapeprog.space import Frame
 
-FORMAT, CODE_FORMAT = "shapeprog", "shapeprog-code"
-VERSIONS = {FORMAT: (1, 2, 3), CODE_FORMAT: (1,)}
-"""Those that can be read, by form."""
+FORMAT = "shapeprog"
+VERSIONS = (1, 2, 3)
+"""Those that can be read."""
 
 
 @dataclass(frozen=True)
 class Result:
-    """A JSON file: a program, and what else there was to say about it.
+    """A JSON file: a program and its metadata.
 
     Parameters
     ----------
     name
-        What the file is called in errors.
+        Name of the file in errors.
     content
-        Its entries, of which only the form and its version have been looked at.
+        Its entries; only the form and its version have been checked.
     """
 
     name: str
@@ -54,18 +50,18 @@ class Result:
 
     @property
     def program(self) -> Program:
-        """The program; an ``InputError`` if it is none."""
+        """The program; an ``InputError`` if it is not valid."""
         return program_from_entries(self.content.get("program"), self.name, "program", self.unit)
 
     @property
     def unit(self) -> Unit | None:
-        """The unit of the program where the file tells one; an ``InputError`` if it is none."""
+        """The unit of the program if the file has one; an ``InputError`` if it is not valid."""
         kept = self.content.get("unit")
         if kept is None:
             return None
         cure = 'write {"name": "cm", "per_cell": 3.75}, or leave it out'
         if not isinstance(kept, dict) or {*kept} != {"name", "per_cell"} or type(kept["per_cell"]) not in (int, float):
-            raise InputError(f"{self.name}: unit: {shortened(kept)} is no name and number per cell", cure)
+            raise InputError(f"{self.name}: unit: {shortened(kept)} is not a name and a number per cell", cure)
         try:
             return Unit(str(kept["name"]), kept["per_cell"])
         except ShapeProgError as mistake:
@@ -73,43 +69,43 @@ class Result:
 
     @property
     def snapped(self) -> Program | None:
-        """Its whole-numbered form, in cells, where the file holds one; an ``InputError`` if that is no program."""
+        """Its form in whole cells, if the file has one; an ``InputError`` if that is not valid."""
         body = self.content.get("snapped")
         return None if body is None else program_from_entries(body, self.name, "snapped")
 
     @property
     def frame(self) -> Frame | None:
-        """The way to the world of the input where the file keeps it; an ``InputError`` if it is none."""
+        """The frame of the input if the file has one; an ``InputError`` if it is not valid."""
         kept = self.content.get("frame")
         return None if kept is None else frame_from(kept, self.name)
 
     @property
     def scores(self) -> dict[str, float]:
-        """The measures that are finite numbers; whatever else a foreign file calls its scores is left out."""
+        """The scores that are finite numbers; other values are ignored."""
         kept = self.content.get("scores")
         named = kept.items() if isinstance(kept, dict) else ()
         return {name: value for name, value in named if type(value) in (int, float) and abs(value) <= LARGEST}
 
     @property
     def source(self) -> str | None:
-        """The file that the program was inferred from, as the file says."""
+        """The file that the program was inferred from, if recorded."""
         source = self.content.get("source")
         return source if isinstance(source, str) else None
 
 
 def read_result(path: Path) -> Result:
-    """All that a JSON file holds.
+    """The contents of a JSON file.
 
     Raises
     ------
     ProgramError, InputError
         As for :func:`program_from_json`.
     """
-    return Result(str(path), _document(read_text(path, LARGEST_FILE), str(path), FORMAT))
+    return Result(str(path), _document(read_text(path, LARGEST_FILE), str(path)))
 
 
 def read_json(path: Path) -> tuple[Program, Frame | None]:
-    """The program of a JSON file, and its frame where it keeps one."""
+    """The program of a JSON file, and its frame if it has one."""
     result = read_result(path)
     return result.program, result.frame
 
@@ -120,7 +116,7 @@ def write_json(program: Program, path: Path, frame: Frame | None) -> None:
 
 
 def result_json(program: Program, frame: Frame | None = None, **more: Any) -> str:
-    """The JSON form of a program with its frame and whatever else there is to say, such as scores."""
+    """The JSON form of a program with its frame and further entries, such as scores."""
     content = json.loads(program_to_json(program))
     if frame is not None:
         content["frame"] = frame_dict(frame)
@@ -152,57 +148,10 @@ def program_from_json(text: str, name: str = "<json>") -> Program:
     InputError
         If it is JSON of another kind, naming the entry.
     """
-    return Result(name, _document(text, name, FORMAT)).program
+    return Result(name, _document(text, name)).program
 
 
-def code_to_json(code: Code) -> str:
-    """Program tensors as JSON text, exact for float32 and float64.
-
-    Raises
-    ------
-    ShapeProgError
-        If a parameter is not finite, which JSON cannot say.
-    """
-    if not bool(torch.isfinite(code.parameters).all()):
-        raise ShapeProgError(
-            "these program tensors hold numbers that are not finite", "JSON cannot say them; mend them"
-        )
-    content = {"ids": code.ids.tolist(), "parameters": code.parameters.detach().tolist()}
-    if code.roles is not None:
-        content["roles"] = code.roles.tolist()
-    shape = {"dtype": str(code.parameters.dtype).removeprefix("torch."), "shape": list(code.ids.shape)}
-    return json.dumps({"format": CODE_FORMAT, "version": 1, **shape, **content}) + "\n"
-
-
-def code_from_json(text: str, name: str = "<json>") -> Code:
-    """The program tensors of a JSON text.
-
-    Raises
-    ------
-    ProgramError, InputError
-        As for :func:`program_from_json`.
-    """
-    content = _document(text, name, CODE_FORMAT)
-    dtype = {"float32": torch.float32, "float64": torch.float64}.get(str(content.get("dtype")))
-    try:
-        shape = [int(extent) for extent in content["shape"]]
-        ids = torch.tensor(content["ids"], dtype=torch.long).reshape(shape)
-        numbers = torch.tensor(content["parameters"], dtype=dtype)
-        parameters = numbers.reshape(*shape, numbers.shape[-1] if numbers.numel() else SLOTS)
-        roles = None
-        if "roles" in content:
-            roles = torch.tensor(content["roles"], dtype=torch.long).reshape(shape[:-1])
-    except (KeyError, TypeError, ValueError, RuntimeError, OverflowError, IndexError) as error:
-        raise InputError(
-            f"{name}: ids and parameters are no tensors of programs",
-            "ids are (..., blocks, steps), parameters as many numbers for each of them, shape that of the ids",
-        ) from error
-    if dtype is None or len(shape) < 2 or not bool(torch.isfinite(parameters).all()):
-        raise InputError(f"{name}: these program tensors are incomplete", "write them with code_to_json")
-    return Code(ids, parameters, roles)
-
-
-def _document(text: str, name: str, wanted: str) -> dict[str, Any]:
+def _document(text: str, name: str) -> dict[str, Any]:
     def refuse(constant: str) -> NoReturn:
         raise InputError(f"{name}: {constant} is not a number of a program", "write finite numbers")
 
@@ -225,13 +174,13 @@ def _document(text: str, name: str, wanted: str) -> dict[str, Any]:
         ) from None  # fmt: skip
     except RecursionError:
         raise InputError(f"{name}: this is nested too deeply to be a program", "loops nest at most 64 deep") from None
-    except ValueError as error:  # what Python says of a whole number of thousands of digits
+    except ValueError as error:  # raised by Python for integers of thousands of digits
         raise InputError(f"{name}: a number has too many digits to be read", "write shorter numbers") from error
-    if not isinstance(content, dict) or content.get("format") != wanted:
-        raise InputError(f"{name}: this JSON is not in the form {wanted!r}", f'it begins {{"format": "{wanted}", ...')
-    if content.get("version") not in VERSIONS[wanted]:
+    if not isinstance(content, dict) or content.get("format") != FORMAT:
+        raise InputError(f"{name}: this JSON holds no program", f'it begins {{"format": "{FORMAT}", ...')
+    if content.get("version") not in VERSIONS:
         raise InputError(
-            f"{name}: version {shortened(content.get('version'))} of the form {wanted!r} is not known",
-            f"this program reads version {' and '.join(map(str, VERSIONS[wanted]))}; a newer one may read it",
+            f"{name}: unknown version {shortened(content.get('version'))} of the program format",
+            f"this release reads versions {', '.join(map(str, VERSIONS))}; a newer one may read it",
         )
     return content

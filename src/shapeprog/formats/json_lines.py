@@ -36,7 +36,7 @@ _WORDS = {
     "call": ("call", "arguments", "role", "note"),
     "comment": ("comment",),
 }
-"""What may be said of a line, by the word that tells what it is."""
+"""Keys that an entry may have, by the key of its kind."""
 
 
 def entries_of(program: Program) -> list[dict[str, Any]]:
@@ -45,12 +45,12 @@ def entries_of(program: Program) -> list[dict[str, Any]]:
 
 
 def program_from_entries(entries: Any, name: str, place: str, unit: Unit | None = None) -> Program:
-    """The program of its entries, which stand at ``place`` of the file ``name``, with lengths in a unit or in cells.
+    """The program of entries at the path ``place`` of the file ``name``, with lengths in a unit or in cells.
 
     Raises
     ------
     InputError
-        If they are none, naming the entry.
+        If one is not valid, naming the entry.
     """
     reader = _Reader(name)
     source = Source(reader.body(entries, place, 0), unit)
@@ -102,7 +102,7 @@ def _plain(value: Value) -> Any:
 
 
 class _Reader:
-    """Turns entries into lines; ``places`` says which entry each line is, by its ``id``."""
+    """Turns entries into lines; ``places`` maps the ``id`` of a line to the path of its entry."""
 
     def __init__(self, name: str) -> None:
         self.name = name
@@ -111,7 +111,7 @@ class _Reader:
     def body(self, entries: Any, place: str, depth: int) -> tuple[Line, ...]:
         """The lines of a list of entries."""
         if not isinstance(entries, list):
-            raise self._error(f"{place} is not a list of statements", "write [ ... ], empty if there are none")
+            raise self._error(f"{place} is not a list of statements", "write [ ... ], or [] for an empty list")
         if depth > DEEPEST:
             raise self._error(f"loops are nested more than {DEEPEST} deep", "put some of them side by side")
         return tuple(self._line(entry, f"{place}[{number}]", depth) for number, entry in enumerate(entries))
@@ -130,7 +130,7 @@ class _Reader:
             raise self._error(said, f"it has {', '.join(sorted(allowed))}")
         note = entry.get("note", "")
         if not isinstance(note, str):
-            raise self._error(f"{place}: this note is no text", "write it in quotation marks")
+            raise self._error(f"{place}: the note is not a string", "write it in quotation marks")
         line: Line
         match kind:
             case "comment":
@@ -161,22 +161,24 @@ class _Reader:
         known = language()
         if word not in known:
             hint = did_you_mean(word, known.names)
-            raise self._error(f"{place}: no statement is called {shortened(word)}", hint)
+            raise self._error(f"{place}: unknown statement {shortened(word)}", hint)
         return known[word]
 
     def _role(self, entry: dict[str, Any], word: str, place: str) -> str:
         role, roles = entry.get("role", ""), language().roles
         if not isinstance(role, str) or (role and role not in roles):
             hint = did_you_mean(str(role), roles)
-            raise self._error(f"{place}: no role is called {shortened(role)}", hint)
+            raise self._error(f"{place}: unknown role {shortened(role)}", hint)
         if role and role == word:
-            raise self._error(f"{place}: {word} is a {word} without being called one", "leave the role out")
+            raise self._error(
+                f"{place}: redundant role: {word}(...) already has the role {word!r}", "leave the role out"
+            )
         return role
 
     def _pairs(self, given: Any, place: str) -> tuple[tuple[str, Value], ...]:
-        """Numbers by name."""
+        """Named numbers."""
         if not isinstance(given, dict):
-            raise self._error(f"{place}: there are no numbers by name", 'write {"name": number, ...}')
+            raise self._error(f"{place}: expected numbers by name", 'write {"name": number, ...}')
         found = ((name, self._number(value, shortened(name), place)) for name, value in given.items())
         try:
             return tuple((name, v if isinstance(v, Expression) else to_float32(v)) for name, v in found)
@@ -186,7 +188,7 @@ class _Reader:
             raise self._error(f"{place}: {mistake.message}", mistake.hint) from None
 
     def _number(self, given: Any, what: str, place: str) -> Value:
-        """A number as it stands, or an expression from its text."""
+        """A plain number, or an expression parsed from its text."""
         if type(given) not in (int, float, str):
             said = f"{place}: {what} holds something that is not a number"
             raise self._error(said, "write plain numbers such as 4 or -2.5, or expressions in quotation marks")
@@ -198,13 +200,13 @@ class _Reader:
             raise self._error(f"{place}: {what}: {mistake.message}", mistake.hint) from None
         if isinstance(value, Expression):
             return value
-        said = f"{place}: {what} holds {shortened(given)}, which is not a number but its text"
+        said = f"{place}: {what} holds {shortened(given)}, which is a number in quotation marks"
         raise self._error(said, "write it without quotation marks")
 
     def _values(self, declared: Statement, given: Any, place: str) -> tuple[Value, ...]:
         words = [parameter.name for parameter in declared.parameters]
         if not isinstance(given, dict):
-            raise self._error(f"{place}: {declared.name} lacks its parameters", f"they are {', '.join(words)}")
+            raise self._error(f"{place}: {declared.name} needs parameters", f"they are {', '.join(words)}")
         for word in given:
             if word not in words:
                 hint = did_you_mean(word, words)
@@ -215,7 +217,7 @@ class _Reader:
                 values.append(parameter.unsaid)
                 continue
             if parameter.name not in given:
-                raise self._error(f"{place}: {declared.name} lacks {parameter.name}", f"it has {', '.join(words)}")
+                raise self._error(f"{place}: {declared.name} needs {parameter.name}", f"it has {', '.join(words)}")
             values += self._group(declared, parameter, given[parameter.name], place)
         return tuple(values)
 
@@ -225,7 +227,7 @@ class _Reader:
         if parameter.quantity.kind == "axis":
             numbers = [float(AXES.index(each)) if each in AXES else each for each in numbers]
             if any(type(each) not in (int, float) for each in numbers):
-                raise self._error(f"{place}: {what} holds what is no axis", f"it is {parameter.quantity.range_text}")
+                raise self._error(f"{place}: {what} is not an axis", f"it is {parameter.quantity.range_text}")
         values = [self._number(each, what, place) for each in numbers]
         try:
             return checked_values(parameter, declared.name, values)

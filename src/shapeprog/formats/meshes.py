@@ -1,4 +1,4 @@
-"""Meshes out: GLB, OBJ and PLY of coloured parts, STL of the one solid they make."""
+"""Mesh export: GLB, OBJ and PLY of coloured parts, STL of their union."""
 
 from __future__ import annotations
 
@@ -90,15 +90,17 @@ def write_ply(program: Program, path: Path, frame: Frame) -> None:
 
 def write_stl(program: Program, path: Path, frame: Frame) -> None:
     """The union of all parts as one watertight solid, ready to print."""
-    import trimesh
-
     vertices, faces = solid(program, frame)
-    content: Any = trimesh.Trimesh(vertices, faces, process=False).export(file_type="stl")
-    write_bytes(path, content)
+    corners = vertices[faces]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    rows = np.zeros(len(faces), [("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+    rows["normal"] = normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
+    rows["corners"] = corners
+    write_bytes(path, b"binary STL".ljust(80) + np.uint32(len(faces)).astype("<u4").tobytes() + rows.tobytes())
 
 
 def _split(part: Part, of_corners: Vertices) -> tuple[Vertices, Vertices, Faces]:
-    """Vertices, normals and faces where corners share a vertex only if they share a normal."""
+    """Vertices, normals and faces; corners share a vertex only if they share a normal."""
     normals = of_corners.reshape(-1, 3)
     corners = part.faces.reshape(-1)
     key = np.concatenate([corners[:, None], np.rint(normals * 1e4)], 1)

@@ -26,7 +26,7 @@ from shapeprog.language.text import INDENT, checked_role, variable
 from shapeprog.space import Frame
 
 _NUMBER = r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?"
-# No pattern begins with blanks where one before it may end with them: each run of blanks is passed over once.
+# No pattern begins with blanks if the one before may end with them, so that matching stays linear.
 _VALUE = rf"\(\s*{_NUMBER}(?:\s*,\s*{_NUMBER})*\s*(?:,\s*)?\)|{_NUMBER}(?:\s*\N{{DEGREE SIGN}})?"
 _COPIES = r"(?:\s*\+\s*[a-z]\w*\s*\*\s*[a-z]\w*)*"
 _WORD = re.compile(r"\s*'([^'\n]*)'\s*(,|\)|$)")
@@ -41,7 +41,7 @@ _SHOWN = 60
 def read_notation(path: Path) -> tuple[Program, Frame | None]:
     """The program of a file in the notation of the paper, and its frame where a comment keeps it.
 
-    What the published printer leaves out is filled in without a word; :func:`parse_notation` can tell.
+    Defaults replace the numbers that the published printer omits; :func:`parse_notation` can report them.
     """
     text = read_text(path, LARGEST_FILE)
     return parse_notation(text, str(path)), frame_in(text, str(path))
@@ -66,13 +66,13 @@ def format_notation(program: Program) -> str:
 def parse_notation(text: str, name: str = "<program>", notes: list[str] | None = None) -> Program:
     """The program of a text in the notation of the paper.
 
-    Loops hold what is indented deeper, or, where the text says ``end``, everything up to there.  Text of the published
-    printer is read too.
+    The body of a loop is indented, or ends with ``end``.  Text of the published
+    printer is accepted too.
 
     Parameters
     ----------
     notes
-        Receives one sentence for each number that the published printer dropped and a default stands in for.
+        Receives one sentence for each omitted number that was replaced by a default.
 
     Raises
     ------
@@ -129,7 +129,7 @@ def _nested(node: Node, around: int = 0) -> bool:
 def _lines(node: Node, loops: list[Loop], numbered: bool) -> Iterator[str]:
     known = language()
     if node.name not in known:
-        raise ShapeProgError(f"no statement is called {node.name!r}", "load the module that declares it")
+        raise ShapeProgError(f"unknown statement {node.name!r}", "load the module that declares it")
     declared = known[node.name]
     shifts = [depth for depth, outer in enumerate(loops) if _moves(outer)]
     names = [f"u{place + 1}" if numbered else "u" for place in range(len(shifts) + 1)]
@@ -152,12 +152,12 @@ def _lines(node: Node, loops: list[Loop], numbered: bool) -> Iterator[str]:
 
 
 def _number(parameter: Parameter, value: float) -> str:
-    """A number as the notation has it, which knows no words."""
+    """A number in the notation, which has no names."""
     return f"{value:.0f}" if parameter.quantity.kind == "axis" else parameter.quantity.written(value)
 
 
 class _Reader:
-    """Reads lines and knows the place of every mistake."""
+    """Parses lines; errors have the line and column."""
 
     def __init__(self, lines: list[tuple[int, str]], name: str, notes: list[str]) -> None:
         self.lines = lines
@@ -176,22 +176,22 @@ class _Reader:
             if self.ends:
                 if _bare(line) == "end":
                     if inside is None:
-                        raise self._error("there is no loop to end here", "leave the end out")
+                        raise self._error("there is no loop to end here", "remove this end")
                     break
             elif indent <= outside:
                 break
             elif level is not None and indent != level:
-                raise self._error("this line is indented unlike the one before it", "indent with four spaces in a loop")
+                raise self._error("unexpected indentation", "indent with four spaces in a loop")
             level = indent
             nodes.append(self._node(indent, depth))
         if inside is not None and self.ends:
             if self.next == len(self.lines):
                 self.next = inside
-                raise self._error("this loop has no end", "write end after what it repeats")
+                raise self._error("missing end of this loop", "write end after its body")
             self.next += 1
         if inside is not None and not nodes:
             self.next = inside
-            raise self._error("this loop repeats nothing", "indent what it repeats by four spaces")
+            raise self._error("this loop has no body", "indent its body by four spaces")
         return tuple(nodes)
 
     def _node(self, indent: int, depth: int) -> Node:
@@ -216,7 +216,7 @@ class _Reader:
         return Loop(declared.name, values, self.body(indent, depth + 1, row))
 
     def _arguments(self, text: str, found: re.Match[str], indent: int, groups: Groups) -> tuple[list[str], Groups]:
-        """Quoted words and groups of numbers; the published printer forgets the last parenthesis of a rotation."""
+        """Quoted words and groups of numbers; the published printer omits the last parenthesis of a rotation."""
         words: list[str] = []
         at = found.end()
         last = found[0][-1] if found.re is _FOR else ","
@@ -236,14 +236,14 @@ class _Reader:
         if not last and words != ["Rot"]:
             raise self._error("the last parenthesis is missing", "write )", indent + at)
         if not _REST.match(text, at):
-            raise self._error("this line goes on after its end", "leave the rest out", indent + at)
+            raise self._error("unexpected text after the statement", "remove it", indent + at)
         return words, groups
 
     def _declared(self, words: list[str], found: Groups, is_loop: bool) -> tuple[Statement, tuple[float, ...]]:
         known = [declared for declared in language() if declared.is_loop == is_loop]
         fitting = next((declared for declared in known if _words(declared) == words), None)
         if fitting is None and not is_loop and len(words) > 1 and words[0] in language().roles:
-            solids = [declared for declared in known if declared.name != words[0]]  # a leg is not called one besides
+            solids = [declared for declared in known if declared.name != words[0]]  # leg(...) implies the role
             fitting = next((declared for declared in solids if [words[0], declared.name] == words), None)
         try:
             if is_published(words, found):

@@ -149,7 +149,7 @@ linear_extrude rotate_extrude children intersection_for assign child echo roof
 
 
 def write_scad(program: Program, path: Path, frame: Frame) -> None:
-    """Write an OpenSCAD model; the world of the input is a last transformation around it."""
+    """Write an OpenSCAD model; the outermost transformation maps it to the coordinates of the input."""
     write_text(path, scad_text(program, frame))
 
 
@@ -191,7 +191,7 @@ def _definition(each: Definition, step: float) -> Iterator[str]:
     if each.value is not None:
         far = 10 * step * np.ceil(abs(each.value) / (5 * step))
         low, high = sorted((0.0, np.copysign(far, each.value)))
-        if each.whole:  # what is shared out between copies has no meaning for one
+        if each.whole:  # a share of a span between copies is undefined for one copy
             low = min(2.0, each.value)
         slider = f" // [{number(low)}:{1 if each.whole else number(step)}:{number(max(high, 10 * step))}]"
     yield f"{each.name} = {each.text};{slider}"
@@ -208,13 +208,13 @@ def _module(function: Module) -> Iterator[str]:
 
 
 def _reserved() -> set[str]:
-    """Words that mean something in OpenSCAD, or in these scripts."""
+    """Reserved words of OpenSCAD and of these scripts."""
     return {*_KEYWORDS.split(), *re.findall(r"(?:module|function) (\w+)", _MODULES)}
 
 
 def _range(each: Variable, made: Plan) -> str:
     if each.fixed:
-        return "not used below: another value here changes nothing"
+        return "not used below: changing it has no effect"
     cell, whole = (made.cell, 10 * made.step) if each.quantity.spatial else (1.0, 1.0)
     step = 1 if each.quantity.discrete else whole / 2
     values = [float(word) for word in each.text.strip("[]").split(",")]

@@ -11,15 +11,20 @@ import numpy as np
 import numpy.typing as npt
 
 from shapeprog.errors import OutputError, ShapeProgError
+from shapeprog.geometry.mesh import part_meshes, union_mesh
 from shapeprog.language.parameters import LARGEST
 from shapeprog.language.program import Draw, Program
+from shapeprog.language.statement import language
+from shapeprog.language.tensors import encode
+from shapeprog.language.unroll import on_numpy_if_shipped, unroll
+from shapeprog.lazy_torch import torch
 from shapeprog.space import Frame
 
 Vertices = npt.NDArray[np.float64]
 Faces = npt.NDArray[np.int64]
 
 _LARGEST_FAN = 400
-"""Vertices with more corners than this keep the normals of their triangles: all pairs of corners are compared."""
+"""Vertices with more corners keep the normals of their triangles, since all pairs of corners are compared."""
 
 _AT_ONCE = 1 << 15
 """Triangles whose pairs of corners are compared together."""
@@ -64,23 +69,17 @@ def parts(program: Program, frame: Frame | None = None) -> list[Part]:
     Raises
     ------
     ShapeProgError
-        If they are too many or too far away to be meshed, see :func:`shapeprog.geometry.mesh.part_meshes`.
+        If there are too many or they are too far away, see :func:`shapeprog.geometry.mesh.part_meshes`.
     OutputError
-        If the frame leads beyond single precision, which files of meshes hold.
+        If the frame maps them beyond single precision, which mesh files store.
     """
-    import torch
-
-    from shapeprog.geometry.mesh import part_meshes
-    from shapeprog.language.statement import language
-    from shapeprog.language.tensors import encode
-    from shapeprog.language.unroll import unroll
-
-    scene = unroll(encode(program, dtype=torch.float64))
+    with on_numpy_if_shipped(program):
+        scene = unroll(encode(program, dtype=torch.float64))
+        blocks, meshes = scene.block.tolist(), part_meshes(scene)
     numbers: Counter[str] = Counter()
     found = []
-    blocks = scene.block.tolist()
     called = [language().called(chain[-1].word) for chain in program.chains if isinstance(chain[-1], Draw)]
-    for slot, vertices, faces in part_meshes(scene):
+    for slot, vertices, faces in meshes:
         block = blocks[slot]
         word = called[block].name
         numbers[word] += 1
@@ -90,12 +89,12 @@ def parts(program: Program, frame: Frame | None = None) -> list[Part]:
 
 
 def placed(points: npt.NDArray[Any], frame: Frame | None = None) -> Vertices:
-    """Points of the grid in the world of ``frame``, or as they are.
+    """Points of the grid in the world of ``frame``, or unchanged without one.
 
     Raises
     ------
     OutputError
-        If one has a coordinate that float32 cannot hold, which is what most files keep.
+        If a coordinate exceeds float32, which most files store.
     """
     found = np.asarray(points, np.float64)
     with np.errstate(over="ignore", invalid="ignore"):
@@ -107,7 +106,7 @@ def placed(points: npt.NDArray[Any], frame: Frame | None = None) -> Vertices:
 
 
 def drawn_parts(program: Program, frame: Frame | None = None) -> list[Part]:
-    """The same, for files that must hold something.
+    """The same, but never empty.
 
     Raises
     ------
@@ -126,16 +125,11 @@ def solid(program: Program, frame: Frame | None = None) -> tuple[Vertices, Faces
     Raises
     ------
     OutputError
-        If nothing in the program has a volume, it is more than can be joined, or reaches further than files can say.
+        If no part has a volume, there are too many to join, or a coordinate exceeds single precision.
     """
-    import torch
-
-    from shapeprog.geometry.mesh import union_mesh
-    from shapeprog.language.tensors import encode
-    from shapeprog.language.unroll import unroll
-
     try:
-        vertices, faces = union_mesh(unroll(encode(program, dtype=torch.float64)))
+        with on_numpy_if_shipped(program):
+            vertices, faces = union_mesh(unroll(encode(program, dtype=torch.float64)))
     except ShapeProgError as error:
         if not program.body:
             raise OutputError(

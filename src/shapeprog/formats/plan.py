@@ -1,4 +1,4 @@
-"""A program as a CAD script sees it: named numbers at the top, then loops around solids, in any script language."""
+"""The plan of a CAD script in any language: named numbers at the top, then loops around solids."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from shapeprog.language.unit import Unit
 from shapeprog.space import FloatArray
 
 NOWHERE = "[0, 0, 0]"
-"""A shift that moves nothing, as that of a mirror about the middle."""
+"""A zero shift, such as that of a mirror about the middle."""
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,7 @@ class Repetition:
 
 @dataclass(frozen=True)
 class Definition:
-    """A named number: its expression, what is said of it, and its value and kind if it depends on no other."""
+    """A named number: its expression, its comment, and its value and kind if it depends on no other."""
 
     name: str
     text: str
@@ -118,17 +118,17 @@ class Plan:
 
     @property
     def cell(self) -> float:
-        """How many of its units a cell has."""
+        """Size of a cell in its unit."""
         return 1.0 if self.unit is None else self.unit.per_cell
 
     @property
     def word(self) -> str:
-        """What lengths are in."""
+        """The unit of lengths."""
         return "cells" if self.unit is None else self.unit.name
 
     @property
     def step(self) -> float:
-        """A power of ten by which lengths may well be changed: a tenth of a cell or less."""
+        """Step by which lengths are changed: a power of ten, a tenth of a cell or less."""
         return float(10.0 ** math.floor(math.log10(self.cell / 10) + 1e-9))
 
 
@@ -136,7 +136,7 @@ class Plan:
 class Planned:
     """A statement or loop with the names of its slots and, if it draws, its steps and pivot; or a call, without a node.
 
-    ``pivoted`` tells of a call that what it draws has pivots of its own.
+    ``pivoted`` marks a call whose statements have their own pivots.
     """
 
     node: Node | None
@@ -166,7 +166,7 @@ class Planned:
 
 
 class Inexpressible(Exception):
-    """A program with names that a script cannot say with its names."""
+    """A program whose names a script cannot express."""
 
 
 def plan(program: Program) -> Plan:
@@ -210,7 +210,7 @@ def _named(node: Node, shown: Node, made: Plan, counter: Counter[str]) -> Planne
 
 
 def still_of(each: Planned) -> frozenset[int]:
-    """The slots of a loop that enter as the numbers they are."""
+    """The slots of a loop that enter as plain numbers."""
     assert each.node is not None
     declared = language()[each.node.name]
     used = [repeat(declared, each.node.values, flag)[1] for flag in {leaf.quarter for leaf in each.draws}]

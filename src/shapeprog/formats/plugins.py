@@ -1,4 +1,4 @@
-"""Statements of a user's own: a module file by path, loaded whole or not at all."""
+"""User statements: a module loaded by path; all its declarations or none."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ _loaded: dict[Path, tuple[tuple[Statement, ...], tuple[Role, ...], dict[str, int
 def load_statements(path: str | os.PathLike[str]) -> tuple[Statement, ...]:
     """Run a module of declarations and return the statements and loops that it declares.
 
-    The module is trusted: it is Python and may do anything.  If it fails, none of its declarations stays.  Loading a
-    file again changes nothing; in another language it declares the same statements there.
+    The module is trusted: it is executed as Python.  If it fails, none of its declarations remain.  Loading a file
+    again has no effect; in another language it declares the same statements there.
 
     Raises
     ------
@@ -90,4 +90,4 @@ def _in_words(path: str | os.PathLike[str], file: Path, cause: BaseException) ->
         return DeclarationError(f"{place}: {cause.message}", cause.hint)
     reason = str(cause).split("\n")[0]
     kind = type(cause).__name__
-    return DeclarationError(f"{place}: {kind}: {reason}" if reason else f"{place}: {kind}", "mend the module")
+    return DeclarationError(f"{place}: {kind}: {reason}" if reason else f"{place}: {kind}", "correct the module")

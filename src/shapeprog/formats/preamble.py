@@ -1,4 +1,4 @@
-"""What a script defines before the model: of all definitions those that the model calls, and those that these call."""
+"""Definitions before the model of a script: those that the model calls, directly or through others."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ _CALLED = re.compile(r"(\w+)\s*\(")
 
 
 def needed(pieces: Sequence[str], text: str) -> list[str]:
-    """Those of some pieces of script, in their order, that define nothing or something that a text needs."""
+    """The pieces of script, in order, that a text needs; pieces without a definition are kept."""
     named = [(found[1] if (found := _DEFINED.search(piece)) else "", piece) for piece in pieces]
     used: set[str] = {""}
     waiting = [text, *(piece for name, piece in named if not name)]

@@ -1,4 +1,4 @@
-"""What the printer published with the paper leaves out of its text, filled in again, each time with a note.
+"""Defaults for the numbers that the printer published with the paper omits, each with a note.
 
 It prints a cross arm and a turned line alike as ``draw('Base', 'Line', P1=.., P2=..)`` without thickness, quarter turn
 or radius, the tilt of a back as an angle in whole degrees, and a rotation without its step.
@@ -13,13 +13,13 @@ from shapeprog.errors import ShapeProgError
 from shapeprog.language.parameters import shortest, to_float32
 
 THICKNESS = 1.0
-"""Thickness in cells of a cross arm whose thickness was dropped."""
+"""Default thickness of a cross arm, in cells."""
 
 RADIUS = 1.0
-"""Radius in cells of a line whose radius was dropped; the published data has no other."""
+"""Default radius of a line, in cells; the published data have no other."""
 
 STEP = 1.0
-"""Quarter turns from one copy to the next where a rotation lost its step."""
+"""Default quarter turns from one copy of a rotation to the next."""
 
 COUNT = ""
 """The group that holds the count of a loop; no name of the notation can be empty."""
@@ -29,7 +29,7 @@ Groups = dict[str, list[float]]
 
 
 def is_published(words: Sequence[str], groups: Groups) -> bool:
-    """Whether a ``draw`` or ``for`` is written as only the published printer writes it."""
+    """Whether a ``draw`` or ``for`` has a form that only the published printer writes."""
     first, *rest = [*words, ""]
     if set(groups) == {"P1", "P2"}:
         return first in ("Base", "Connect") and rest == ["Line", ""]
@@ -37,12 +37,12 @@ def is_published(words: Sequence[str], groups: Groups) -> bool:
 
 
 def restored(words: Sequence[str], groups: Groups) -> tuple[str, tuple[float, ...], str]:
-    """Statement name, values and a note on what was filled in.
+    """Statement name, values and a note on the defaults used.
 
     Raises
     ------
     ShapeProgError
-        If the text is not what the published printer writes, or a number is too large.
+        If the text is not that of the published printer, or a number is too large.
     """
     for number in (number for numbers in groups.values() for number in numbers):
         to_float32(number)

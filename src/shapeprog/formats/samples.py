@@ -1,7 +1,7 @@
-"""Samples of what a program draws: its cells as binvox and NPY, points as XYZ, arrays of everything as NPZ.
+"""Samples of a program: cells as binvox and NPY, surface points as XYZ, all arrays as NPZ.
 
-Cells are those of the program snapped to the grid, as the measures of the project take them; points lie on the surface
-of the union of the program as it is.
+Cells are those of the program snapped to the grid, as in the evaluation; points lie on the surface of the union of the
+unsnapped program.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from shapeprog.language.unroll import unroll
 from shapeprog.space import RESOLUTION, Frame
 
 POINTS = 5000
-"""Points on the surface that an NPZ holds, and an XYZ unless asked for others."""
+"""Surface points of an NPZ, and the default number for an XYZ."""
 
 
 def cells(program: Program, resolution: int = RESOLUTION) -> npt.NDArray[np.bool_]:
@@ -34,14 +34,14 @@ def cells(program: Program, resolution: int = RESOLUTION) -> npt.NDArray[np.bool
 
 
 def write_cells(program: Program, path: Path, frame: Frame) -> None:
-    """Write the cells as binvox, where the input lies."""
-    placed(np.array([[-RESOLUTION] * 3, [RESOLUTION] * 3]), frame)  # the file has words for numbers alone
+    """Write the cells as binvox, in the coordinates of the input."""
+    placed(np.array([[-RESOLUTION] * 3, [RESOLUTION] * 3]), frame)  # the header holds numbers alone
     write_binvox(path, cells(program), frame)
 
 
 def write_grid(program: Program, path: Path, frame: Frame, resolution: int = RESOLUTION) -> None:
-    """Write the cells as a boolean array; it is in the grid, so the frame is not kept."""
-    content = io.BytesIO()  # numpy itself does not say so plainly when the disk is full
+    """Write the cells as a boolean array in the grid frame; the frame is not stored."""
+    content = io.BytesIO()  # numpy reports a full disk less clearly
     np.save(content, cells(program, resolution))
     write_bytes(path, content.getvalue())
 

@@ -1,4 +1,4 @@
-"""Program text in ``.shape`` files, with the frame that leads back to the input in a comment above it."""
+"""Program text in ``.shape`` files, with the frame of the input in a comment above it."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ LARGEST_FILE = 16_000_000
 
 
 def read_shape(path: Path) -> tuple[Program, Frame | None]:
-    """The program of a text file, and its frame where it keeps one."""
+    """The program of a text file, and its frame if it has one."""
     text = read_text(path, LARGEST_FILE)
     return parse(without_frame(text), str(path)), frame_in(text, str(path))
 
@@ -30,7 +30,7 @@ def write_shape(program: Program, path: Path, frame: Frame | None) -> None:
 
 
 def read_text(path: str | os.PathLike[str], largest: float = math.inf) -> str:
-    """The text of a UTF-8 file of at most so many bytes, with or without a byte order mark.
+    """The text of a UTF-8 file of limited size, with or without a byte order mark.
 
     Raises
     ------
@@ -42,7 +42,7 @@ def read_text(path: str | os.PathLike[str], largest: float = math.inf) -> str:
         if stat.S_ISDIR(kept.st_mode):
             raise InputError(f"{path} is a folder, not a file", "name a file in it")
         if not stat.S_ISREG(kept.st_mode):
-            raise InputError(f"{path} is no regular file", "name a file on a disk")
+            raise InputError(f"{path} is not a regular file", "name a file on a disk")
         if kept.st_size > largest:
             raise InputError(f"{path} is larger than {largest / 1e6:.0f} MB", "check that it is a program")
         return Path(path).read_bytes().decode("utf-8-sig")
@@ -55,4 +55,4 @@ def read_text(path: str | os.PathLike[str], largest: float = math.inf) -> str:
     except OSError as error:
         raise InputError(f"cannot read {path}: {error.strerror}", "check the path and its permissions") from error
     except ValueError as error:
-        raise InputError(f"{str(path)!r} can be the name of no file", "check the path") from error
+        raise InputError(f"{str(path)!r} is not a valid file name", "check the path") from error

@@ -1,10 +1,10 @@
-"""Parameters kept as names: what a statement draws, as linear expressions in its parameters.
+"""The solids of a statement as linear expressions in its named parameters.
 
-Nothing here knows any statement.  A declaration is evaluated in float64 at its parameters and at points around them;
-a number that moves in proportion becomes an expression such as ``leg_1_at[1] + leg_1_size[1] / 2``.  A parameter on
-which something depends in another way is *fixed*: it enters as the number it is, and exports say so.
+This works for any statement.  A declaration is evaluated in float64 at its parameters and at points around them; a
+number that is linear in them becomes an expression such as ``leg_1_at[1] + leg_1_size[1] / 2``.  A parameter with a
+nonlinear effect is *fixed*: it enters as a plain number, and exports mark it.
 
-Values are in cells; expressions are in the unit of the program, of which ``cell`` is how many a cell has.
+Values are in cells; expressions are in the unit of the program, in which a cell has the size ``cell``.
 """
 
 from __future__ import annotations
@@ -15,21 +15,21 @@ from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
-import torch
 
 from shapeprog.geometry.batch import Solids
 from shapeprog.geometry.primitive import primitives
 from shapeprog.language.parameters import shortest
 from shapeprog.language.statement import Motion, Statement
+from shapeprog.lazy_torch import Tensor, torch
 from shapeprog.space import FloatArray
 
-Measure = Callable[[torch.Tensor], "list[_Measured]"]
+Measure = Callable[[Tensor], "list[_Measured]"]
 
 Slot: TypeAlias = str | float
-"""What stands for a number of a statement: a name or expression, in parentheses if it needs them, or a plain number."""
+"""A number of a statement: a name or expression, in parentheses if needed, or a plain number."""
 
 STEP = 0.5
-"""How far in cells parameters are moved to see what they do."""
+"""Cells by which parameters are moved to find their effect."""
 
 TOLERANCE = 1e-7
 """In cells: far below anything visible, far above rounding in float64."""
@@ -74,8 +74,8 @@ class Piece:
         extents and its lean; for a cylinder both ends and its radius, for a frustum both radii; for a shell its centre
         and the half extents of its local box.
     axes
-        Its local axes as columns (3, 3), where they are not those of the grid and the groups do not tell them.  A
-        cuboid with axes has its centre in place of the corner.
+        Its local axes as columns (3, 3), if they differ from those of the grid and do not follow from the groups.  A
+        cuboid with axes has its centre instead of the corner.
     vertices, faces
         Of a shell: its mesh with the local box scaled to [-1, 1]^3.
     """
@@ -88,7 +88,7 @@ class Piece:
 
 
 def number(value: float | np.number[Any]) -> str:
-    """A number in short: 12 digits at most, no superfluous point."""
+    """A number with at most 12 digits and no trailing point."""
     return f"{value + 0.0:.12g}"
 
 
@@ -117,7 +117,7 @@ def point(
     if pivot is None:
         return None, frozenset()
 
-    def measure(rows: torch.Tensor) -> list[_Measured]:
+    def measure(rows: Tensor) -> list[_Measured]:
         place = pivot(**declared.split(rows)).numpy()
         return [_Measured("point", (3,), place, np.zeros((len(place), 0)))]
 
@@ -129,8 +129,8 @@ def point(
 class Repeat:
     """How a loop moves copy i: by a turn of ``i * turn`` degrees, or evenly over the circle, and by ``i * shift``.
 
-    Where a loop follows no such rule, ``table`` holds its degrees and shift for every copy.  Where it reflects, which
-    comes first, ``signs`` has -1 or 1 for each axis of every copy.
+    Otherwise ``table`` holds the degrees and shift of every copy.  For a loop that reflects, which is applied first,
+    ``signs`` has -1 or 1 for each axis of every copy.
     """
 
     turn: Affine | None = None
@@ -150,18 +150,18 @@ def repeat(
 ) -> tuple[Repeat, frozenset[int]]:
     """The motion of a loop as expressions in its slots, and the slots that are fixed (the count is never)."""
 
-    def motion_of(rows: torch.Tensor, copy: torch.Tensor) -> Motion:
+    def motion_of(rows: Tensor, copy: Tensor) -> Motion:
         assert declared.move is not None
         return declared.move(copy, torch.full((len(rows),), quarter), **declared.split(rows))
 
-    def moved(rows: torch.Tensor, copy: torch.Tensor) -> FloatArray:
+    def moved(rows: Tensor, copy: Tensor) -> FloatArray:
         motion = motion_of(rows, copy)
-        turn = torch.zeros(len(rows), dtype=rows.dtype) if motion.turn is None else motion.turn
-        shift = torch.zeros(len(rows), 3, dtype=rows.dtype) if motion.shift is None else motion.shift
+        turn = torch.zeros_like(rows[:, 0]) if motion.turn is None else motion.turn
+        shift = rows.new_zeros(len(rows), 3) if motion.shift is None else motion.shift
         return np.concatenate([360 * turn.numpy()[:, None], shift.numpy()], 1)
 
     def measure(columns: slice) -> Measure:
-        def around(rows: torch.Tensor) -> list[_Measured]:
+        def around(rows: Tensor) -> list[_Measured]:
             once, *others = (moved(rows, torch.full((len(rows),), float(c)).double())[:, columns] for c in (1, 2, 5))
             still = np.concatenate([other - c * once for other, c in zip(others, (2, 5), strict=True)], 1)
             return [_Measured("motion", (once.shape[1],), once, still)]
@@ -171,14 +171,14 @@ def repeat(
     slots = [slot for slot, quantity in enumerate(declared.quantities) if quantity.kind != "axis"]
     own = torch.tensor([values], dtype=torch.float64)
 
-    def each_copy() -> tuple[torch.Tensor, torch.Tensor]:
+    def each_copy() -> tuple[Tensor, Tensor]:
         count = max(0, round(values[0]))
-        return own.expand(count, -1), torch.arange(count, dtype=torch.float64)
+        return own.expand(count, len(values)), torch.arange(count, dtype=torch.float64)
 
-    reflects = motion_of(own, torch.zeros(1, dtype=torch.float64)).signs is not None
-    signs = motion_of(*each_copy()).signs if reflects else None  # what follows a rule may have millions of copies
+    reflects = motion_of(own, torch.zeros_like(own[:, 0])).signs is not None
+    signs = motion_of(*each_copy()).signs if reflects else None  # a regular loop may have millions of copies
     reflected = None if signs is None or bool((signs == 1).all()) else signs.numpy()
-    here = own.repeat(8, 1)
+    here = torch.cat([own] * 8)
     here[:, 0] = torch.arange(1, 9)
     copies = torch.tensor([0, 1, 1, 3, 4, 5, 2, 7], dtype=torch.float64)
     even = bool(np.abs(moved(here, copies)[:, 0] - 360 * (copies / here[:, 0]).numpy()).max() < TOLERANCE)
@@ -296,7 +296,7 @@ def _continuous(declared: Statement) -> list[int]:
 
 
 def _enclosed(text: str) -> bool:
-    """Whether one pair of parentheses is around all of a text."""
+    """Whether one pair of parentheses encloses a whole text."""
     depth = 0
     for place, letter in enumerate(text):
         depth += {"(": 1, ")": -1}.get(letter, 0)

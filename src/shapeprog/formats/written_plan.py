@@ -1,7 +1,7 @@
-"""Programs with names as CAD scripts see them: their numbers, expressions and functions under their own names.
+"""Plans of CAD scripts for programs with names: numbers, expressions and functions keep their names.
 
-A script can say so only where every number with a name enters its solids linearly, and alike in every call of a
-function; any other program is written out.
+This requires that every named number enters its solids linearly, and in the same way in every call of a function; any
+other program is written out.
 """
 
 from __future__ import annotations
@@ -40,20 +40,22 @@ from shapeprog.language.source import (
     names_of,
 )
 from shapeprog.language.statement import language
+from shapeprog.language.unroll import on_numpy_if_shipped
 from shapeprog.space import FloatArray
 
 _OWN = re.compile(r"\w+_\d+_(signs|turns|shifts|shell)|at_[a-z]\d*")
-"""Names that scripts give to what they need themselves."""
+"""Names that scripts define themselves."""
 
 
 def script_plan(program: Program, reserved: Collection[str]) -> Plan:
-    """The plan of a program for a script whose words are ``reserved``: numbers and functions called so get others."""
-    if program.source is None or program.source.plain:
-        return plan(program)
-    try:
-        return _Planner(program, program.source, reserved).made
-    except Inexpressible:
-        return plan(inline(program))
+    """The plan of a program; numbers and functions named by a ``reserved`` word of the script are renamed."""
+    with on_numpy_if_shipped(program):
+        if program.source is None or program.source.plain:
+            return plan(program)
+        try:
+            return _Planner(program, program.source, reserved).made
+        except Inexpressible:
+            return plan(inline(program))
 
 
 class _Planner:
@@ -93,7 +95,7 @@ class _Planner:
                     self.made.numbers.append(definition)
 
     def _planned(self, line: Line) -> list[Planned]:
-        """What a line becomes; nothing if it is a comment, or in a function that is never called."""
+        """The steps of a line; none for a comment, or in a function that is never called."""
         match line:
             case Comment() | Function():
                 return []
@@ -141,7 +143,7 @@ class _Planner:
                     raise Inexpressible
 
     def _refuse(self, slots: tuple[Slot, ...], fixed: frozenset[int]) -> None:
-        """Numbers with names cannot enter as the numbers they are."""
+        """Named numbers cannot enter as plain numbers."""
         if any(isinstance(slots[slot], str) for slot in fixed):
             raise Inexpressible
 
@@ -164,7 +166,7 @@ class _Planner:
 
 
 def _words(given: list[str], reserved: Collection[str]) -> dict[str, str]:
-    """Words of scripts for names: as they are but for letters beyond ASCII and words that mean something already."""
+    """Script names for names: unchanged except for non-ASCII letters and reserved words."""
     found: dict[str, str] = {}
     for name in given:
         word = re.sub(r"[^A-Za-z0-9_]", "_", name)

@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from functools import cache, wraps
 from typing import Any, TypeVar
 
 import numpy as np
-import torch
-from torch import Tensor
 
 from shapeprog.geometry.batch import Batch
 from shapeprog.geometry.primitive import primitives
 from shapeprog.geometry.primitives import BUILT_IN
 from shapeprog.kernels.table import CENTRE, KIND, ROTATION, SIZE, WIDTH
+from shapeprog.lazy_torch import Tensor, torch
 from shapeprog.space import Array
 
 Function = TypeVar("Function", bound=Callable[..., Any])
@@ -93,12 +93,33 @@ def _numbers() -> Array:
     return np.array([known.get(id(primitive), -1) for primitive in primitives], np.float64)
 
 
+_kernel_threads = 0
+"""Threads that kernels run in; 0 for as many as torch has."""
+
+
+@contextmanager
+def one_tensor_thread(kernels: int = 0) -> Iterator[None]:
+    """Let torch compute in one thread within: its idle ones would spin on the cores beside the work.
+
+    Kernels keep as many threads as there were, or run in ``kernels``.
+    """
+    global _kernel_threads
+    before = torch.get_num_threads(), _kernel_threads
+    torch.set_num_threads(1)
+    _kernel_threads = kernels or before[1] or before[0]
+    try:
+        yield
+    finally:
+        torch.set_num_threads(before[0])
+        _kernel_threads = before[1]
+
+
 def over_threads(work: Callable[[int, int], None], count: int, *, least: int = 1) -> None:
-    """Run ``work(first, last)`` on parts of ``range(count)``, one for each of torch's threads.
+    """Run ``work(first, last)`` on parts of ``range(count)``, one for each thread of kernels.
 
     The kernels hold no lock of the interpreter.  Fewer than ``least`` items for each thread run right here.
     """
-    threads = min(torch.get_num_threads(), count // max(least, 1))
+    threads = min(_kernel_threads or torch.get_num_threads(), count // max(least, 1))
     if threads <= 1:
         work(0, count)
         return

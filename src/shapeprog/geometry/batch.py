@@ -6,11 +6,10 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, fields
 from typing import NamedTuple, TypeVar
 
-import torch
 from jaxtyping import Bool, Float, Int
-from torch import Tensor
 
 from shapeprog.geometry.primitive import SIZES
+from shapeprog.lazy_torch import Tensor, torch
 
 Some = TypeVar("Some", bound="Batch")
 
@@ -55,7 +54,7 @@ class Batch:
 
     @property
     def batch_shape(self) -> torch.Size:
-        """Leading dimensions: one union of primitives for each of them."""
+        """Leading dimensions, with one union of primitives for each element."""
         return self.mask.shape[:-1]
 
     @property
@@ -86,7 +85,7 @@ class Batch:
 
     def detach(self: Some) -> Some:
         """The same without gradient."""
-        return self._map(Tensor.detach)
+        return self._map(lambda tensor: tensor.detach())
 
     def _map(self: Some, change: Callable[[Tensor], Tensor]) -> Some:
         return type(self)(*(change(getattr(self, field.name)) for field in fields(self)))

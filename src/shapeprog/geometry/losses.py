@@ -81,7 +81,7 @@ def coverage(scene: Batch, target: Cloud, *, surface: bool = False) -> Values:
 
     The distance to a union is equation 2, that to a cuboid equation 3, to a primitive in any pose equation 4; that to
     a cylinder is appendix A, mended.  A target point inside a primitive costs nothing, so alone it is minimised by one
-    box that fills everything: add :func:`excess` and a price.
+    box that fills everything: add :func:`shapeprog.geometry.losses.excess` and a price.
 
     Parameters
     ----------

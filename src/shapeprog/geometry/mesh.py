@@ -7,13 +7,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-import torch
 
 from shapeprog.errors import ShapeProgError
 from shapeprog.geometry.arrays import array
 from shapeprog.geometry.batch import Batch
 from shapeprog.geometry.primitive import Mesh as Triangles
 from shapeprog.geometry.primitive import primitives
+from shapeprog.lazy_torch import torch
 from shapeprog.space import Array, FloatArray
 
 FLAT = 1e-5
@@ -166,9 +166,6 @@ def _groups(parts: list[npt.NDArray[np.float32]]) -> list[list[int]]:
 
     Boxes are swept along the axis on which the fewest overlap.
     """
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
     low, high = (np.array([corner(vertices, 0) for vertices in parts]).T for corner in (np.min, np.max))
     sweeps = []
     for axis in range(3):
@@ -194,9 +191,11 @@ def _groups(parts: list[npt.NDArray[np.float32]]) -> list[list[int]]:
             )
         start = stop
     one, two = np.concatenate(pairs, 1)
-    graph = coo_matrix((np.ones(len(one), np.bool_), (one, two)), shape=(len(parts), len(parts)))
-    label = connected_components(graph, directed=False)[1]
-    groups: dict[int, list[int]] = {}
-    for number, group in enumerate(label.tolist()):
-        groups.setdefault(group, []).append(number)
-    return list(groups.values())
+    groups = [[number] for number in range(len(parts))]
+    for first, second in zip(one.tolist(), two.tolist(), strict=True):
+        small, large = sorted((groups[first], groups[second]), key=len)
+        if small is not large:
+            large += small
+            for number in small:
+                groups[number] = large
+    return [sorted(group) for group in {id(group): group for group in groups}.values()]

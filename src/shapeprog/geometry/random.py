@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from jaxtyping import Float, Int
-from torch import Tensor
 
 from shapeprog.kernels.bits import FIRST, GOLDEN, SECOND
+from shapeprog.lazy_torch import Tensor
 
 
 def uniform(seed: int | Int[Tensor, "*batch"], count: Int[Tensor, "*batch"]) -> Float[Tensor, "*batch"]:

@@ -4,14 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import torch
 from jaxtyping import Float, Int, UInt8
-from torch import Tensor
 
 from shapeprog.geometry.batch import Batch
-from shapeprog.geometry.cells import voxels
-from shapeprog.geometry.distance import signed_distance
-from shapeprog.geometry.surface import sample_surface
+from shapeprog.lazy_torch import Tensor, torch
 from shapeprog.space import RESOLUTION
 
 
@@ -25,12 +21,18 @@ class Scene(Batch):
 
     def sample(self, n: int, generator: torch.Generator | None = None) -> Float[Tensor, "*batch n 3"]:
         """Points drawn uniformly by area from the visible surface, with gradient; see ``sample_surface``."""
+        from shapeprog.geometry.surface import sample_surface
+
         return sample_surface(self, n, generator).points
 
     def distance(self, points: Float[Tensor, "*shared P 3"]) -> Float[Tensor, "*batch P"]:
         """Signed distance of points to the union, with gradient; see ``signed_distance``."""
+        from shapeprog.geometry.distance import signed_distance
+
         return signed_distance(self, points)
 
     def voxels(self, resolution: int = RESOLUTION) -> UInt8[Tensor, "*batch R R R"]:
         """The cells that the primitives occupy, 1 or 0; see ``cells.voxels``."""
+        from shapeprog.geometry.cells import voxels
+
         return voxels(self, resolution)

@@ -163,7 +163,7 @@ def area_shares(areas: Float[Tensor, "B N F"], batch: Batch) -> Float[Tensor, "B
         number = int(bare.nonzero()[0, 0])
         which = f"scene {number} of {len(bare)}" if batch.batch_shape else "the scene"
         if not bool(whole[number].isfinite()):
-            raise ShapeProgError(f"{which} has a surface whose area is no finite number", "lower sizes and positions")
+            raise ShapeProgError(f"{which} has a surface of infinite or undefined area", "lower sizes and positions")
         raise ShapeProgError(
             f"{which} has no surface to draw points from", "give the program a statement that draws something"
         )

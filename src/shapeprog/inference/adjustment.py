@@ -11,10 +11,10 @@ import torch
 from jaxtyping import Bool, Float
 from torch import Tensor
 
+from shapeprog.geometry.arrays import one_tensor_thread
 from shapeprog.inference.budget import NEVER, Deadline, Progress
 from shapeprog.inference.evidence import TOLERANCE, Evidence
 from shapeprog.inference.joints import NEARLY, Joints, find_joints, joining, moved, needs
-from shapeprog.inference.refine import single_threaded
 from shapeprog.inference.residuals import Pairs, Target, pull
 from shapeprog.inference.tunable import Poses, Tunable
 from shapeprog.language.program import Program
@@ -81,7 +81,7 @@ def adjust(
     narrow = EXPLAINED * evidence.tolerance
     ways = _ways(relations, held)
     wide = max(CAPTURE, narrow)
-    with single_threaded():
+    with one_tensor_thread(kernels=1):
         poses = tunable.poses(values)
         known = find_joints(poses.scene, _floor(evidence), generator)
         for step in range(steps):

@@ -278,12 +278,12 @@ def _seen(choice: Choice, candidates: Sequence[Part]) -> tuple[TradeOff, ...]:
 
 
 def _reason(used: int, share: float, seen: Sequence[TradeOff], allowed: int, of: str) -> str:
-    told = f"{used} block{'s' if used != 1 else ''} explain{'s' if used == 1 else ''} {share:.0%} of the {of}"
+    told = f"{used} block{'s' if used != 1 else ''} cover{'s' if used == 1 else ''} {share:.0%} of the {of}"
     if used >= allowed:
-        return f"{told} and every one of the {allowed} blocks is in use; allow more with --blocks."
+        return f"{told}; this is the maximum, raise --blocks for more."
     now = next((each for each in seen if each.blocks == used), None)
     more = next((each for each in seen if each.blocks == used + 1), None)
     if now is None or more is None or more.explained - share < LEAST_GAIN:
-        return f"{told}, and no other block that was seen would explain more."
+        return f"{told}; no other candidate would cover more."
     gain, cost = more.explained - share, max(more.numbers - now.numbers, 0)
-    return f"{told}; one more would explain {gain:.1%} for {cost} more numbers: raise --detail to have it."
+    return f"{told}; one more would cover another {gain:.1%} with {cost} more numbers: raise --detail to add it."

@@ -17,12 +17,12 @@ import torch
 from jaxtyping import Float, Int
 from torch import Tensor
 
+from shapeprog.geometry.arrays import one_tensor_thread
 from shapeprog.geometry.batch import Batch
 from shapeprog.geometry.distance import signed_distance
 from shapeprog.geometry.primitive import safe_norm
 from shapeprog.geometry.scene import Scene
 from shapeprog.geometry.surface import has_surface, sample_surface
-from shapeprog.inference.refine import single_threaded
 from shapeprog.inference.tunable import ROW, least
 from shapeprog.language.hints import Box
 from shapeprog.language.parameters import Parameter, Quantity, to_float32
@@ -235,7 +235,7 @@ def _descended(
     scale = render.table(lambda quantity: 0.1 if quantity.kind == "angle" else 1.0, 1.0)
     low = render.table(least, -math.inf)
     damping = torch.diag_embed(torch.where(free > 0, DAMPING * scale**2, 1.0))
-    with single_threaded():
+    with one_tensor_thread(kernels=1):
         for step in range(STEPS):
             width = WIDEST * (NARROWEST / WIDEST) ** (step / (STEPS - 1))
             off, weights, slopes = _linear(render, values, target, generator)

@@ -20,6 +20,7 @@ from torch import Tensor
 
 from shapeprog.data.shape import Shape
 from shapeprog.data.touched import occupied
+from shapeprog.geometry.arrays import one_tensor_thread
 from shapeprog.geometry.cells import iou, pack
 from shapeprog.geometry.distance import nearest_primitive
 from shapeprog.inference.assembly import TradeOff, assemble
@@ -82,6 +83,7 @@ class Result:
     trade_off: tuple[TradeOff, ...] = ()
 
 
+@one_tensor_thread()
 def infer(
     shape: Shape | str | Path,
     *,
@@ -144,7 +146,7 @@ def infer(
     )
     on_cells = to_program(structure.blocks)
     snapped: Program | None = on_cells
-    reason = f"Stopped because {structure.reason}"
+    reason = f"The search ended after {structure.reason}"
     reason += "." if searching.cut else _advice(on_cells.blocks, blocks)
     program = refine(
         on_cells, outer_points(target, on_cells, seed),
@@ -166,7 +168,7 @@ def infer(
         if better:
             program, snapped, trade_off = found.program, None, found.trade_off
             scores["explained"] = found.explained
-            reason = f"Stopped because {found.reason}"
+            reason = found.reason[0].upper() + found.reason[1:]
             if ties:
                 held = relations(program, calls) if (calls := recognised(program, libraries)) else None
                 tied = tie(program, found.evidence, held=held, seed=seed, progress=progress).program
@@ -184,8 +186,8 @@ def infer(
         reason += f" {target.note}"
     cut = tuple(each.cut for each in (searching, refining) if each.cut)
     if cut:
-        reason += f" The time budget of {budget:g} s cut short {' and '.join(cut)}: "
-        reason += "give it a larger --budget, and the seed alone decides."
+        reason += f" The time limit of {budget:g} s ended {' and '.join(cut)}: "
+        reason += "with a larger --budget the result depends on the seed alone."
     if snapped is not None or target.points is None:
         scores["iou"] = float(iou(occupied(program, unroll(program), snapped), pack(target.voxels)))
     scores |= {
@@ -232,5 +234,5 @@ def outer_points(target: Shape, snapped: Program, seed: int) -> Float[Tensor, "P
 
 def _advice(used: int, allowed: int) -> str:
     if used >= allowed:
-        return f" and every one of the {allowed} blocks is in use; allow more with --blocks."
-    return f"; {used} of {allowed} blocks were enough, another would not earn its price."
+        return f"; all {allowed} blocks are in use, raise --blocks for more."
+    return f"; {used} of {allowed} blocks are in use, another would improve the fit too little."

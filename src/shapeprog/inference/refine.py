@@ -8,8 +8,6 @@ grid are asked to keep touching, which no point can tell: contact faces are hidd
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,6 +17,7 @@ from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
 from shapeprog.errors import InputError
+from shapeprog.geometry.arrays import one_tensor_thread
 from shapeprog.geometry.distance import signed_distance
 from shapeprog.geometry.losses import cell_cross_entropy
 from shapeprog.geometry.nearest import squared_distance
@@ -127,7 +126,7 @@ def refine(
     generator = torch.Generator().manual_seed(seed)
     touching = _contacts(render.scene(values))
     shell = None if voxels is None else _shell(voxels)
-    with single_threaded():
+    with one_tensor_thread(kernels=1):
         for step in range(plan.steps):
             if deadline.passed(f"the refinement after {step} of {plan.steps} steps"):
                 break
@@ -219,14 +218,3 @@ def _occupancy_loss(scene: Scene, cells: Float[Tensor, "S 4"]) -> Float[Tensor, 
     """Cross-entropy of touched cells: a solid touches a cell when it comes within half a cell of its centre."""
     logits = SHARPNESS * (0.5 - signed_distance(scene, cells[:, :3]))
     return cell_cross_entropy(logits, cells[:, 3], "mean")
-
-
-@contextmanager
-def single_threaded() -> Iterator[None]:
-    """One thread for tensors too small to share; several shapes run side by side in processes instead."""
-    before = torch.get_num_threads()
-    torch.set_num_threads(1)
-    try:
-        yield
-    finally:
-        torch.set_num_threads(before)

@@ -110,13 +110,13 @@ def search_structure(
     best = max(starts, key=lambda blocks: editing.value_of(blocks, target))
     best_value = editing.value_of(best, target)
     earlier = [*rough, *starts]
-    done, gained, reason = 0, 0, f"all {settings.rounds} rounds of editing were done"
+    done, gained, reason = 0, 0, f"all {settings.rounds} rounds"
     while done < settings.rounds:
         if done - gained >= settings.patience:
-            reason = f"{done - gained} rounds of editing in a row gained nothing"
+            reason = f"{done - gained} rounds without improvement"
             break
         if deadline.passed(f"the search after {done} of {settings.rounds} rounds"):
-            reason = f"the time budget ran out after {done} of {settings.rounds} rounds of editing"
+            reason = f"{done} of {settings.rounds} rounds, at the time limit"
             break
         rounds = min(settings.chunk, settings.rounds - done)
         heat = settings.heat * (1 - done / settings.rounds)

@@ -128,7 +128,7 @@ def prepare(modules: Sequence[str], tell: Callable[[str], None] | None = None) -
             for each in list(_kernels.values()):
                 if each.function.__module__ == name and not each.load():
                     if tell and not lacking:
-                        tell("compiling kernels for this machine, once; this may take half a minute")
+                        tell("compiling kernels for this machine (first run only, up to half a minute)")
                     lacking.append(each)
                     waiting.append(each.name)
             while waiting and len(others) < min(max((os.cpu_count() or 2) - 1, 1), MOST):

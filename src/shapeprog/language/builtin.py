@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import torch
-from torch import Tensor
-
 from shapeprog.geometry.batch import Solids
 from shapeprog.language.parameters import Count, Extent, Half, Length, Position, Radius, Shift, Shift3, Turn
 from shapeprog.language.shapes import bar, box, cuboid, disc, slab
 from shapeprog.language.statement import Motion, loop, statement
+from shapeprog.lazy_torch import Tensor, torch
 
 CELL_CENTRE = 0.5  # ends of a line name cells, not boundaries: the centre lies half a cell above the boundary
 ARM_HALF_WIDTH = 1.0  # in cells, of one arm of a cross base, which is always two cells wide

@@ -64,10 +64,10 @@ def misnamed(name: str) -> tuple[str, str] | None:
     """Why no function may have this name, and the cure; ``None`` if one may."""
     known = language()
     if not is_word(name):
-        return f"{name!r} is no name of a function", WORDS
+        return f"invalid function name {name!r}", WORDS
     if name in known or name in known.roles:
         what = "role" if name not in known else "loop" if known[name].is_loop else "statement"
-        return f"{name} is a {what} of the language already", "give the function another name"
+        return f"{name} is already a {what} of the language", "give the function another name"
     return None
 
 
@@ -102,12 +102,12 @@ class _Checker:
         """Refuse names of a scope that nothing uses."""
         for name, line in scope.own.items():
             if name not in scope.used:
-                raise Fault(line, f"{name} is used by nothing", "leave it out, or write it in place of a number", name)
+                raise Fault(line, f"unused name {name!r}", "leave it out, or write it in place of a number", name)
 
     def _use(self, value: Value, line: Line, scope: _Scope) -> None:
         for name in value.names() if isinstance(value, Expression) else ():
             if name.name not in scope.own and name.name not in scope.outer:
-                raise Fault(line, f"no number is called {name.name!r}", self._cure(name, line, scope), "", name)
+                raise Fault(line, f"undefined name {name.name!r}", self._cure(name, line, scope), "", name)
             if name.name in scope.own:
                 scope.used.add(name.name)
             else:
@@ -116,34 +116,34 @@ class _Checker:
 
     def _cure(self, name: Name, line: Line, scope: _Scope) -> str:
         if name.name in self.source.numbers and not (isinstance(line, Assignment) and name.name in dict(line.numbers)):
-            return f"{name.name} is named further down: move that line up"
+            return f"{name.name} is defined further down: move that line up"
         return did_you_mean(name.name, [*scope.own, *scope.outer], f"write {name.name} = ... above this line")
 
     def _define(self, name: str, line: Line, scope: _Scope) -> None:
         if not is_word(name):
-            raise Fault(line, f"{name!r} is no name of a number", WORDS, name)
+            raise Fault(line, f"invalid name {name!r}", WORDS, name)
         if name in scope.own:
-            raise Fault(line, f"{name} is named twice", "give one of them another name", name)
+            raise Fault(line, f"{name} is defined twice", "give one of them another name", name)
         if name in scope.borrowed:
-            said = f"{name} is the number of the program above this line, and another one below"
+            said = f"{name} is a number of the program above this line and a new one below"
             raise Fault(line, said, "give one of them another name", name)
         if name in self.called:
             what = "function" if isinstance(self.called[name], Call | Function) else "statement, role or loop"
-            raise Fault(line, f"{name} is a {what} of this program already", "give the number another name", name)
+            raise Fault(line, f"{name} is already a {what} of this program", "give the number another name", name)
         scope.own[name] = line
 
     def _assignment(self, line: Assignment, scope: _Scope, loops: int) -> None:
         if loops:
-            raise Fault(line, "a number gets its name before a loop, not inside of it", "move this line above the loop")
+            raise Fault(line, "numbers cannot be named inside a loop", "move this line above the loop")
         if not line.numbers:
-            raise Fault(line, "this line names nothing", "leave it out")
+            raise Fault(line, "this line defines no name", "leave it out")
         for name, _ in line.numbers:
             self._define(name, line, scope)
 
     def _function(self, line: Function, scope: _Scope, loops: int) -> None:
         if loops or scope.function:
             cure = "move it to the top of the program"
-            raise Fault(line, "a function stands on its own, outside of loops and other functions", cure)
+            raise Fault(line, "functions cannot be defined inside loops or functions", cure)
         name = line.name
         if wrong := misnamed(name):
             raise Fault(line, *wrong)
@@ -163,16 +163,16 @@ class _Checker:
 
     def _call(self, line: Call, scope: _Scope) -> None:
         if line.role and line.role not in language().roles:
-            raise Fault(line, f"no role is called {line.role!r}", did_you_mean(line.role, language().roles))
+            raise Fault(line, f"unknown role {line.role!r}", did_you_mean(line.role, language().roles))
         if line.name == scope.function:
-            cure = "use a loop: functions call those above them alone"
+            cure = "use a loop: functions call only those defined above them"
             raise Fault(line, f"{line.name} calls itself", cure)
         if line.name not in self.functions:
             if line.name in self.source.functions:
                 cure = "move the function above this line"
                 raise Fault(line, f"the function {line.name} is defined further down", cure)
             cure = did_you_mean(line.name, self.functions)
-            raise Fault(line, f"no function is called {line.name!r}", cure)
+            raise Fault(line, f"undefined function {line.name!r}", cure)
         function = self.functions[line.name]
         parameters = dict(function.parameters)
         given: set[str] = set()
@@ -185,7 +185,7 @@ class _Checker:
             given.add(name)
         for name, default in parameters.items():
             if default is None and name not in given:
-                raise Fault(line, f"{line.name} lacks {name}", f"write {signature(function)}")
+                raise Fault(line, f"{line.name} needs {name}", f"write {signature(function)}")
 
 
 def _words(line: Line) -> Iterator[str]:
@@ -202,9 +202,9 @@ def _check_declared(line: WrittenDraw | WrittenLoop) -> None:
 
     known = language()
     if line.name not in known:
-        refuse(f"no statement is called {line.name!r}", "load the module that declares it")
+        refuse(f"unknown statement {line.name!r}", "load the module that declares it")
     declared = known[line.name]
     if declared.is_loop != isinstance(line, WrittenLoop):
         refuse(f"{line.name} is {'a' if declared.is_loop else 'no'} loop", f"write {declared.signature}")
     if len(line.values) != declared.size:
-        refuse(f"{line.name} has {len(line.values)} numbers instead of {declared.size}", "mend the program")
+        refuse(f"{line.name} has {len(line.values)} numbers instead of {declared.size}", "correct the program")

@@ -158,7 +158,7 @@ class _Powers:
                     return self._literal(value, 0)
                 self._agree(value, powers[0], powers[-1])
                 return powers[0]
-        raise TypeError(f"{value!r} is no expression")
+        raise TypeError(f"{value!r} is not an expression")
 
     def _factors(self, value: Binary, scope: Scope) -> tuple[Linear, Linear]:
         """The powers of both sides of a product or quotient."""

@@ -88,7 +88,7 @@ class Name(Expression):
         if self.name not in numbers:
             otherwise = "" if numbers else f"write {self.name} = ... above this line"
             near = did_you_mean(self.name, numbers, otherwise)
-            raise ExpressionError(self, f"no number is called {self.name!r}", near)
+            raise ExpressionError(self, f"undefined name {self.name!r}", near)
         return numbers[self.name]
 
     def names(self) -> Iterator[Name]:

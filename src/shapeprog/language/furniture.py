@@ -5,9 +5,6 @@ A solid says what a part looks like, a role what it is for: ``leg(taper(...))``,
 
 from __future__ import annotations
 
-from torch import Tensor
-from torch.nn.functional import one_hot
-
 from shapeprog.geometry.batch import Solids
 from shapeprog.language import hints, shapes
 from shapeprog.language.parameters import (
@@ -23,6 +20,7 @@ from shapeprog.language.parameters import (
     Two,
 )  # fmt: skip
 from shapeprog.language.statement import Motion, loop, role, statement
+from shapeprog.lazy_torch import Tensor
 
 
 @statement("box", id=64, taught=False, hint=hints.upright_box)
@@ -79,7 +77,7 @@ def cushion(at: Position, size: Extent, edge: Radius) -> Solids:
 def mirror(copy: Tensor, quarter: Tensor, count: Two, axis: Axis, at: Place = 0) -> Motion:  # type: ignore[assignment]
     """Repeats what is inside twice: as it is, and its mirror image along an axis, about the plane across it that lies
     at ``at``."""
-    across = one_hot(axis.long(), 3).to(at) * copy[..., None]
+    across = shapes.unit(axis.long(), at) * copy[..., None]
     return Motion(shift=2 * at[..., None] * across, signs=1 - 2 * across)
 
 

@@ -84,11 +84,11 @@ def set(program: Program, changes: Mapping[str, float] | None = None, /, **numbe
     known = source.numbers
     for name in wanted:
         if name not in known:
-            hint = did_you_mean(name, known) if known else "a plain program has none: write name = number at its top"
-            raise ShapeProgError(f"this program has no number called {name!r}", hint)
+            hint = did_you_mean(name, known) if known else "it has no names: write name = number at its top"
+            raise ShapeProgError(f"this program has no name {name!r}", hint)
         if not abs(wanted[name]) <= LARGEST:  # neither is what is no number at all
             raise ShapeProgError(
-                f"{name} = {wanted[name]:g} is too large, or no number at all", "write one such as 12.5"
+                f"{name} = {wanted[name]:g} is too large for single precision, or not finite", "write one such as 12.5"
             )
         value = known[name]
         if isinstance(value, Expression) and not _is_free(value):

@@ -30,7 +30,7 @@ def parse_number(text: str, name: str = "<number>") -> Value:
     match whole.tree().body:
         case [ast.Expr(value)]:
             return Numbers(whole).one("this", value)
-    raise whole.at(1, 1, "this is no number", _PLAIN)
+    raise whole.at(1, 1, "this is not a number", _PLAIN)
 
 
 class Numbers:
@@ -68,7 +68,7 @@ class Numbers:
             if name not in found and (silent := parameter.unsaid) is not None:
                 found[name] = [silent]
             if name not in found:
-                raise self.misused(call, f"{declared.name} lacks {name}", declared)
+                raise self.misused(call, f"{declared.name} needs {name}", declared)
         return tuple(number for name in parameters for number in found[name]), places
 
     def misused(self, node: ast.expr, message: str, declared: Statement) -> ProgramError:
@@ -93,7 +93,7 @@ class Numbers:
     def _axis(self, place: str, node: ast.expr, parameter: Parameter) -> float:
         if isinstance(node, ast.Name) and node.id in AXES:
             return float(AXES.index(node.id))
-        said = f"{place} holds {self.text.shown(node)}, which is no axis"
+        said = f"{place} holds {self.text.shown(node)}, which is not an axis"
         hint = did_you_mean(node.id, AXES) if isinstance(node, ast.Name) else ""
         raise self.text.error(node, said, hint or f"it is {parameter.quantity.range_text}")
 

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 from typing import Annotated, Literal
 
 import numpy as np
-from torch import Tensor
 
 from shapeprog.errors import ShapeProgError
+from shapeprog.lazy_torch import Tensor
 from shapeprog.space import AXES, HALF, RESOLUTION
 
 Kind = Literal["position", "length", "shift", "angle", "count", "turn", "axis"]
@@ -31,7 +31,7 @@ def to_float32(value: float) -> float:
         single = math.inf
     if not math.isfinite(single):
         limits = f"numbers go from -{LARGEST:.7e} to {LARGEST:.7e}"
-        raise ShapeProgError("this number is too large or no number at all", limits)
+        raise ShapeProgError("this number is too large for single precision, or not finite", limits)
     return single
 
 
@@ -172,7 +172,7 @@ class Parameter:
             return singles
         for number in numbers:
             if quantity.kind == "axis" and number not in range(len(AXES)):
-                raise ShapeProgError(f"{place} is {number!r}, which is no axis", f"it is {quantity.range_text}")
+                raise ShapeProgError(f"{place} is {number!r}, which is not an axis", f"it is {quantity.range_text}")
             if not quantity.written_out and number != quantity.low:
                 only = quantity.written(quantity.low)
                 raise ShapeProgError(f"{place} is {number!r}, but {owner} always has {only}", f"leave it at {only}")

@@ -10,9 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-import torch
 from jaxtyping import Float, Int
-from torch import Tensor
 
 from shapeprog.errors import ShapeProgError
 from shapeprog.language.evaluation import symbolic
@@ -22,6 +20,7 @@ from shapeprog.language.program import Program
 from shapeprog.language.source import Source
 from shapeprog.language.statement import language
 from shapeprog.language.tensors import Code, encode
+from shapeprog.lazy_torch import Tensor, torch
 
 
 class Parametric:

@@ -29,7 +29,7 @@ class Draw:
 
     @property
     def word(self) -> str:
-        """What the part is called: its role, or else its statement."""
+        """The name of the part, its role or else its statement."""
         return self.role or self.name
 
 
@@ -71,7 +71,7 @@ class Program:
 
     @property
     def chains(self) -> list[Chain]:
-        """The blocks: for each drawing statement the loops around it, outermost first, then itself.
+        """The blocks, each as the loops around a drawing statement, outermost first, then the statement.
 
         A loop around several statements is the union of that loop around each, so nothing is lost.
         """
@@ -84,7 +84,7 @@ class Program:
 
     @property
     def blocks(self) -> int:
-        """Number of blocks: drawing statements with the loops around them."""
+        """Number of drawing statements, each with the loops around it."""
         return len(self.chains)
 
     @property

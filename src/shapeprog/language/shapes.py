@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import torch
 from jaxtyping import Float, Int
-from torch import Tensor
-from torch.nn.functional import one_hot
 
 from shapeprog.geometry.batch import Form, Solids
 from shapeprog.geometry.primitive import SIZES, Primitive, primitives, safe_norm
@@ -14,6 +11,7 @@ from shapeprog.geometry.primitives.cuboid import CUBOID
 from shapeprog.geometry.primitives.cylinder import CYLINDER
 from shapeprog.geometry.primitives.frustum import FRUSTUM
 from shapeprog.geometry.primitives.rounded_box import ROUNDED_BOX
+from shapeprog.lazy_torch import Tensor, torch
 from shapeprog.space import SIDE
 
 Scalar = Float[Tensor, "*batch"]
@@ -85,8 +83,8 @@ def bar_between(start: Vector, end: Vector, section: Pair, turn: Scalar) -> Soli
     length = safe_norm((along**2).sum(-1))
     main = along.detach().abs().argmax(-1)
     first, second = torch.where(main == 0, 1, 0), torch.where(main == 2, 1, 2)
-    half = length[..., None] * one_hot(main, 3) + section[..., :1] * one_hot(first, 3)
-    half = (half + section[..., 1:] * one_hot(second, 3)) / 2
+    half = length[..., None] * unit(main, along) + section[..., :1] * unit(first, along)
+    half = (half + section[..., 1:] * unit(second, along)) / 2
     rotation = leaned(along, main) @ about_axis(main, turn)
     return solid(CUBOID, (start + end) / 2, *half.unbind(-1), rotation=rotation, form=form)
 
@@ -124,7 +122,7 @@ def align(direction: Vector) -> Float[Tensor, "*batch 3 3"]:
     up = torch.zeros_like(direction)
     up[..., 0] = 1
     first = torch.where(length > 1e-9, direction / length, up)
-    helper = one_hot(first.detach().abs().argmin(-1), 3).to(direction)
+    helper = unit(first.detach().abs().argmin(-1), direction)
     second = torch.linalg.cross(first, helper)
     second = second / safe_norm((second**2).sum(-1, keepdim=True))
     return torch.stack([first, second, torch.linalg.cross(first, second)], -1)
@@ -136,7 +134,7 @@ def leaned(direction: Vector, axis: Int[Tensor, "*batch"]) -> Float[Tensor, "*ba
     The other two columns are the other grid axes, leaned as little as can be.
     """
     length = safe_norm((direction**2).sum(-1, keepdim=True))
-    main = one_hot(axis, 3).to(direction)
+    main = unit(axis, direction)
     along = torch.where(length > 1e-9, direction / length, main)
     along = along * torch.where((along * main).sum(-1, keepdim=True) < 0, -1.0, 1.0).to(along)
     cross = _cross(torch.linalg.cross(main, along))
@@ -147,8 +145,13 @@ def leaned(direction: Vector, axis: Int[Tensor, "*batch"]) -> Float[Tensor, "*ba
 def about_axis(axis: Int[Tensor, "*batch"], degrees: Scalar) -> Float[Tensor, "*batch 3 3"]:
     """Rotation about a grid axis, counter-clockwise seen from its end."""
     angle = torch.deg2rad(degrees)[..., None, None]
-    cross = _cross(one_hot(axis, 3).to(angle))
+    cross = _cross(unit(axis, angle))
     return torch.eye(3, device=angle.device).to(angle) + angle.sin() * cross + (1 - angle.cos()) * cross @ cross
+
+
+def unit(axis: Int[Tensor, "*batch"], like: Tensor) -> Vector:
+    """The unit vector along a grid axis, in the type of another tensor."""
+    return torch.nn.functional.one_hot(axis, 3).to(like)
 
 
 def _cross(vector: Vector) -> Float[Tensor, "*batch 3 3"]:

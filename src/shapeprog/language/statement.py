@@ -19,16 +19,15 @@ from dataclasses import dataclass
 from itertools import count
 from typing import Any, get_type_hints
 
-import torch
 from jaxtyping import Float
-from torch import Tensor
 
 from shapeprog.errors import DeclarationError
 from shapeprog.geometry.batch import Solids
-from shapeprog.geometry.primitive import SIZES, primitives
+from shapeprog.geometry.primitive import SIZES, primitives, ships
 from shapeprog.geometry.primitives import built_in_names
 from shapeprog.language.hints import Box
 from shapeprog.language.parameters import Parameter, Quantity
+from shapeprog.lazy_torch import Tensor, torch
 
 SLOTS = 7  # in published tensors for the parameters of one statement
 MOST_SLOTS = 16  # tensors are as wide as the statements at hand need, up to here
@@ -110,6 +109,11 @@ class Statement:
         return self.move is not None
 
     @property
+    def ships(self) -> bool:
+        """Whether it comes with the package: it is known to work, on NumPy arrays as on tensors."""
+        return all(ships(each) for each in (self.draw, self.move, self.pivot) if each is not None)
+
+    @property
     def size(self) -> int:
         """Number of tensor slots in use."""
         return sum(parameter.quantity.width for parameter in self.parameters)
@@ -182,7 +186,8 @@ class Language:
         """Add a declaration and return it; a ``DeclarationError`` if its name or id is taken or it does not fit."""
         for message, hint in self._faults(declared):
             raise DeclarationError(message, hint)
-        _try(declared)
+        if not declared.ships:
+            _try(declared)
         self._by_id[declared.id] = declared
         self._by_name[declared.name] = declared
         return declared
@@ -195,9 +200,9 @@ class Language:
         if name in self.roles:
             raise DeclarationError(f"role {name!r} is declared twice", "give one of them another name")
         if not is_word(name):
-            raise DeclarationError(f"{name!r} is not a word of Python", WORDS)
+            raise DeclarationError(f"{name!r} is not a Python identifier", WORDS)
         if name in self and self[name].is_loop:
-            raise DeclarationError(f"{name!r} is a loop, and no role", "give the role another name")
+            raise DeclarationError(f"{name!r} is a loop", "give the role another name")
         number = max([ROLES, *self._by_id, *(role.id for role in self.roles.values())]) + 1
         self.roles[name] = Role(name, self[name].id if name in self else number, doc, label)
         return self.roles[name]
@@ -228,7 +233,7 @@ class Language:
         owners = dict.fromkeys((EMPTY, END), "the language itself") | {each.id: each.name for each in self}
         owners = {role.id: f"the role {role.name}" for role in self.roles.values()} | owners
         if not is_word(declared.name):
-            yield f"{declared.name!r} is not a word of Python", WORDS
+            yield f"{declared.name!r} is not a Python identifier", WORDS
         if declared.is_loop and [p.quantity.kind for p in declared.parameters][:1] != ["count"]:
             yield f"loop {declared.name!r} has no count", "annotate its first parameter with Count"
         if declared.size > MOST_SLOTS:

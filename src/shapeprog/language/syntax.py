@@ -71,15 +71,15 @@ class _Reader:
         key = (id(fault.line), fault.key)
         node = self.numbers.places.get(id(fault.expression)) or self.places.get(key) or self.places[key[0], ""]
         if isinstance(fault.expression, Name) and fault.expression.name in self.variables:
-            said = f"{fault.expression.name} stands for the copies of a loop, and is no number"
-            return self.text.error(node, said, "how a loop moves its copies stands in its own parameters")
+            said = f"{fault.expression.name} is the variable of a loop, not a number"
+            return self.text.error(node, said, "the parameters of the loop define how it moves its copies")
         return self.text.error(node, fault.message, fault.hint)
 
     def check_variables(self, source: Source) -> None:
         """Refuse variables of loops that are called like a number or function."""
         for name in [*names_of(source), *source.functions]:
             if name in self.variables:
-                said = f"the variable {name} of this loop is the name of something else"
+                said = f"the variable {name} of this loop has the name of a number or function"
                 raise self.text.error(self.variables[name], said, "give the variable another name, such as i")
 
     def body(self, statements: list[ast.stmt], depth: int = 0, end: float = math.inf) -> tuple[Line, ...]:
@@ -115,9 +115,9 @@ class _Reader:
     def _draw(self, statement: ast.stmt, role: str, solid: ast.expr) -> Line:
         declared, call = self._call(solid, "statement")
         if declared.is_loop:
-            raise self.numbers.misused(call, f"{declared.name} is a loop and draws nothing itself", declared)
+            raise self.numbers.misused(call, f"{declared.name} is a loop, not a drawing statement", declared)
         if declared.name == role:
-            said = f"{role} is a {role} without being called one"
+            said = f"redundant role: {role}(...) already has the role {role!r}"
             raise self.text.error(call, said, f"write {declared.signature}")
         values, places = self.numbers.of_call(declared, call)
         return self._kept(WrittenDraw(declared.name, values, role, self._note(statement)), statement, places)
@@ -132,7 +132,7 @@ class _Reader:
             return role, node.args[0]
         if role in language() and not any(isinstance(each, ast.Call) for each in node.args):
             return "", node
-        said = f"{role} is what a part is for, and stands around one solid or call of a function"
+        said = f"{role} is a role: it takes one solid or one call of a function"
         raise self.text.error(node, said, f"write {role}(box(at=(_, _, _), size=(_, _, _))), or another solid")
 
     def _loop(self, statement: ast.For, depth: int, end: float) -> Line:
@@ -142,11 +142,11 @@ class _Reader:
         if not isinstance(statement.target, ast.Name):
             raise self.text.error(statement.target, "a loop has one variable", "write for i in loop(count, ...):")
         if statement.orelse:
-            raise self.text.error(statement.orelse[0], "a loop of the language has no else", "leave it out")
+            raise self.text.error(statement.orelse[0], "loops have no else", "leave it out")
         self.variables[statement.target.id] = statement.target
         declared, call = self._call(statement.iter, "loop")
         if not declared.is_loop:
-            raise self.numbers.misused(call, f"{declared.name} draws and repeats nothing", declared)
+            raise self.numbers.misused(call, f"{declared.name} is a drawing statement, not a loop", declared)
         values, places = self.numbers.of_call(declared, call)
         note = self._note(statement.iter)
         body = self.body(statement.body, depth + 1, end)
@@ -158,15 +158,15 @@ class _Reader:
         function = node.func if isinstance(node, ast.Call) else node
         if not isinstance(function, ast.Name):
             hint = f"write the name of a {wanted} and its parameters"
-            raise self.text.error(node, f"{self.text.shown(node)} is no {wanted}", hint)
+            raise self.text.error(node, f"{self.text.shown(node)} is not a {wanted}", hint)
         if function.id not in known:
             fitting = [declared.name for declared in known if declared.is_loop == (wanted == "loop")]
             fitting += [] if wanted == "loop" else [*known.roles, *self.functions]
             hint = did_you_mean(function.id, fitting)
-            raise self.text.error(function, f"no {wanted} is called {function.id!r}", hint)
+            raise self.text.error(function, f"unknown {wanted} {function.id!r}", hint)
         declared = known[function.id]
         if not isinstance(node, ast.Call):
-            raise self.numbers.misused(node, f"{declared.name} lacks its parameters", declared)
+            raise self.numbers.misused(node, f"{declared.name} needs parameters", declared)
         return declared, node
 
     def _assignment(self, statement: ast.Assign) -> Line:
@@ -179,7 +179,7 @@ class _Reader:
             )
         for each in targets:
             if not isinstance(each, ast.Name):
-                said = f"{self.text.shown(each)} is no name of a number"
+                said = f"{self.text.shown(each)} is not a name"
                 raise self.text.error(each, said, "write name = number")
         if len(targets) != len(values):
             said = f"{_counted(len(targets), 'name')} for {_counted(len(values), 'number')}"
@@ -198,7 +198,7 @@ class _Reader:
         marks += getattr(statement, "type_params", [])  # from Python 3.12
         for odd in [*others, *marks]:
             if odd is not None:
-                said = f"{name} has {self.text.shown(odd)}, which no function of the language has"
+                said = f"{name} has {self.text.shown(odd)}, which functions of this language cannot have"
                 raise self.text.error(odd, said, f"write def {name}(parameter, parameter=number):")
         words = [each.arg for each in given.args]
         values: list[Value | None] = [None] * (len(words) - len(given.defaults))

@@ -5,15 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
-import torch
 from jaxtyping import Float, Int
-from torch import Tensor
 
 from shapeprog.errors import ShapeProgError
 from shapeprog.language.program import PUBLISHED_DEPTH, Chain, Draw, Loop, Program, nest
 from shapeprog.language.statement import EMPTY, END, SLOTS, language
+from shapeprog.lazy_torch import Tensor, torch
 from shapeprog.space import Array
 
 
@@ -28,8 +28,8 @@ class Code:
     parameters: Float[Tensor, "*batch K J slots"]
     roles: Int[Tensor, "*batch K"] | None = None
 
-    def __getitem__(self, index: int | slice) -> Code:
-        """The programs at an index of the first batch dimension."""
+    def __getitem__(self, index: Any) -> Code:
+        """The part at an index of the leading dimensions: an integer, a slice, a mask, or a tuple of these."""
         return Code(self.ids[index], self.parameters[index], None if self.roles is None else self.roles[index])
 
     def having(self, parameters: Float[Tensor, "*batch K J slots"]) -> Code:
@@ -38,7 +38,7 @@ class Code:
 
 
 def encode(
-    programs: Program | Sequence[Program], *, blocks: int | None = None, dtype: torch.dtype = torch.float32
+    programs: Program | Sequence[Program], *, blocks: int | None = None, dtype: torch.dtype | None = None
 ) -> Code:
     """Tensors of programs: (B, K, J) for a sequence, (K, J) for one program.
 
@@ -67,7 +67,7 @@ def encode(
                 if isinstance(node, Draw) and node.role:
                     roles[b, k] = known.roles[node.role].id
     played = torch.from_numpy(roles) if roles.any() else None
-    code = Code(torch.from_numpy(ids), torch.from_numpy(parameters).to(dtype), played)
+    code = Code(torch.from_numpy(ids), torch.from_numpy(parameters).to(dtype or torch.float32), played)
     return code[0] if isinstance(programs, Program) else code
 
 

@@ -77,9 +77,11 @@ def numbers_written(node: Node) -> int:
 def checked_role(node: Draw | WrittenDraw) -> str:
     """The role of a part; a ``ShapeProgError`` if it is not declared, or no other than the name of its statement."""
     if node.role and node.role not in language().roles:
-        raise ShapeProgError(f"no role is called {node.role!r}", did_you_mean(node.role, language().roles))
+        raise ShapeProgError(f"unknown role {node.role!r}", did_you_mean(node.role, language().roles))
     if node.role == node.name:
-        raise ShapeProgError(f"{node.name} is a {node.name} without being called one", "leave the role out")
+        raise ShapeProgError(
+            f"redundant role: {node.name}(...) already has the role {node.name!r}", "leave the role out"
+        )
     return node.role
 
 
@@ -87,11 +89,11 @@ def declared_of(node: Node | WrittenDraw | WrittenLoop) -> Statement:
     """The declaration of a statement or loop; a ``ShapeProgError`` if there is none of its name and size."""
     known = language()
     if node.name not in known:
-        raise ShapeProgError(f"no statement is called {node.name!r}", "load the module that declares it")
+        raise ShapeProgError(f"unknown statement {node.name!r}", "load the module that declares it")
     declared = known[node.name]
     if len(node.values) != declared.size:
         said = f"{node.name} has {len(node.values)} numbers instead of {declared.size}"
-        raise ShapeProgError(said, "mend the program")
+        raise ShapeProgError(said, "correct the program")
     return declared
 
 

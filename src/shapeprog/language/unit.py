@@ -42,8 +42,8 @@ class Unit:
         except (ShapeProgError, TypeError):
             size = 0.0
         if not size > 0:
-            said = f"a cell of {self.per_cell!r} {self.name} is no size"
-            raise ShapeProgError(said, "let it be a positive number, such as 3.75")
+            said = f"invalid cell size {self.per_cell!r} {self.name}"
+            raise ShapeProgError(said, "use a positive number, such as 3.75")
         object.__setattr__(self, "per_cell", size)
 
     @staticmethod
@@ -64,7 +64,7 @@ class Unit:
 def metres(name: str) -> float:
     """What a unit is in metres; a ``ShapeProgError`` if there is none of this name."""
     if name not in METRES:
-        raise ShapeProgError(f"no unit is called {name!r}", did_you_mean(name, METRES))
+        raise ShapeProgError(f"unknown unit {name!r}", did_you_mean(name, METRES))
     return METRES[name]
 
 
@@ -83,8 +83,8 @@ def read_unit(text: Text, first: float) -> tuple[Unit | None, Sequence[str]]:
         if header is None:
             continue
         if found is not None or row > first:
-            said = "the unit is told twice" if found is not None else "the unit stands below what is written in it"
-            raise text.at(row, 1, said, "let one line tell it, above everything else")
+            said = "duplicate unit" if found is not None else "the unit must be above all statements"
+            raise text.at(row, 1, said, "write it in one line at the top")
         found, lines[row - 1] = _unit(text, row, header), ""
     return found, lines
 
@@ -95,15 +95,15 @@ def _unit(text: Text, row: int, header: re.Match[str]) -> Unit:
 
     said = _SAID.fullmatch(header[1])
     if said is None:
-        raise wrong(0, "this does not tell how large a cell is", _FORM)
+        raise wrong(0, "missing cell size", _FORM)
     name, size = said.groups()
     try:
         metres(name)
     except ShapeProgError as mistake:
         raise wrong(1, mistake.message, mistake.hint) from None
     if size is None:
-        raise wrong(1, f"this does not tell how many {name} a cell has", _FORM)
+        raise wrong(1, f"missing number of {name} per cell", _FORM)
     try:
         return Unit(name, float(size))
     except (ShapeProgError, ValueError):
-        raise wrong(2, f"{size!r} is no size of a cell: it must be a positive number", _FORM) from None
+        raise wrong(2, f"invalid cell size {size!r}: expected a positive number", _FORM) from None

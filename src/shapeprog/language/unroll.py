@@ -8,20 +8,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
-from typing import Any
 
-import torch
 from jaxtyping import Bool, Float, Int
-from torch import Tensor
 
 from shapeprog.errors import ShapeProgError
-from shapeprog.geometry.cells import rasterise_apart
 from shapeprog.geometry.primitive import SIZES, primitives
 from shapeprog.geometry.scene import Scene
 from shapeprog.language.program import Program
 from shapeprog.language.statement import EMPTY, END, Statement, language
 from shapeprog.language.tensors import Code, encode
+from shapeprog.lazy_torch import Tensor, on_numpy, torch
 from shapeprog.space import DEPTH, SIDE
 
 MOST_COPIES = 1 << 17
@@ -56,8 +54,15 @@ def unroll(program: Program | Sequence[Program] | Code) -> Scene:
     return Plan(code).scene(code.parameters, clamp=torch.is_grad_enabled() and code.parameters.requires_grad)
 
 
+def on_numpy_if_shipped(program: Program) -> AbstractContextManager[None]:
+    """Draw without torch within, if it is not loaded yet and every statement of a program comes with the package."""
+    return on_numpy(all(language()[node.name].ships for node in program.walk()))
+
+
 def draw_blocks(code: Code) -> Int[Tensor, "*batch K 32 32"]:
     """The packed cells of every block on its own, as an executor of whole numbers draws it: parameters are rounded."""
+    from shapeprog.geometry.cells import rasterise_apart
+
     scene = unroll(Code(code.ids, code.parameters.detach().round()))
     return rasterise_apart(scene, scene.block, code.ids.shape[-2])
 
@@ -126,7 +131,9 @@ class Plan:
         values = parameters.reshape(-1, parameters.shape[-1])
         own = values.index_select(0, self._place)
         if clamp:
-            own = _ClampedLengths.apply(own, self._thinnest(own))  # type: ignore[no-untyped-call]
+            from shapeprog.language.clamping import ClampedLengths
+
+            own = ClampedLengths.apply(own, self._thinnest(own))  # type: ignore[no-untyped-call]
         pieces = own.split(self._counts)
         drawn = [declared.solids(piece) for declared, piece in zip(self._kinds, pieces, strict=True)]
         layout = self._layout(tuple(tuple(solids.kind for solids in each) for each in drawn))
@@ -233,24 +240,6 @@ class Plan:
                 point = declared.pivot(**declared.split(values.index_select(0, place)))
                 points.append(torch.cat([torch.zeros_like(point[:, :1]), point[:, 1:]], -1))
         return torch.cat(points)
-
-
-class _ClampedLengths(torch.autograd.Function):
-    """Numbers clamped to at least ``least``; where one was less, its gradient is minus its magnitude.
-
-    A straight-through clamp (Bengio et al. 2013) lets lengths run off below zero; one that passes only the gradients
-    that lengthen leaves them where momentum took them.
-    """
-
-    @staticmethod
-    def forward(ctx: Any, values: Tensor, least: Tensor) -> Tensor:
-        ctx.save_for_backward(values < least)
-        return torch.maximum(values, least)
-
-    @staticmethod
-    def backward(ctx: Any, gradient: Tensor) -> tuple[Tensor, None]:
-        (short,) = ctx.saved_tensors
-        return torch.where(short, -gradient.abs(), gradient), None
 
 
 def _are(ids: Int[Tensor, "*batch"], wanted: Callable[[Statement], bool]) -> Bool[Tensor, "*batch"]:

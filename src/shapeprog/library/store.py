@@ -91,9 +91,9 @@ def library_of(program: Program, name: str = "<library>") -> Library:
     more = next((line for line in source.lines if not isinstance(line, Comment | Function)), None)
     if more is not None:
         what = "numbers of its own" if isinstance(more, Assignment) else "statements outside of functions"
-        raise InputError(f"{name} is no library: it has {what}", "a library holds functions alone: leave out the rest")
+        raise InputError(f"{name} is not a library: it has {what}", "a library holds only functions")
     if source.unit is not None:
-        said = f"{name} is no library: its lengths are in {source.unit.name} of one object"
+        said = f"{name} is not a library: its lengths are in {source.unit.name} of one object"
         raise InputError(said, "write them in cells, and leave out the line '# unit:'; programs may be in any unit")
     if not source.functions:
         raise InputError(f"{name} holds no functions", "write def name(parameter, ...): with what it draws below")

@@ -1,4 +1,4 @@
-"""A program as coloured lines: what is beside a picture, on a page and in a terminal."""
+"""A program as coloured lines, for pictures, pages and terminals."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from shapeprog.language.text import format_source, source_of
 from shapeprog.language.unit import Unit
 
 DIGITS = 2
-"""Decimals that are shown of numbers in cells; files keep all of them."""
+"""Decimals shown of numbers in cells; files have all of them."""
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ class Shown:
     statement
         The id of that role or statement if it draws, else None.
     blocks
-        The drawing statements of the program written out, counted from 0, that it draws or repeats.
+        Indices, from 0, of the drawing statements of the expanded program that it draws or repeats.
     """
 
     text: str
@@ -52,7 +52,7 @@ class Shown:
 
 
 def listing(program: Program, digits: int | None = DIGITS) -> list[Shown]:
-    """The lines of a program as it is written, with numbers rounded for reading unless ``digits`` is None."""
+    """The lines of a program, with numbers rounded for reading unless ``digits`` is None."""
     source = source_of(program)
     if digits is not None:
         kept = digits_in(source.unit, digits)
@@ -64,12 +64,12 @@ def listing(program: Program, digits: int | None = DIGITS) -> list[Shown]:
 
 
 def digits_in(unit: Unit | None, digits: int = DIGITS) -> int:
-    """Decimals in a unit that are worth as much as so many in cells."""
+    """Decimals in a unit with the precision of ``digits`` in cells."""
     return digits if unit is None else max(0, digits - math.floor(math.log10(unit.per_cell)))
 
 
 def parted(line: Shown) -> tuple[str, str, str]:
-    """What stands before the word, the word, and what follows it."""
+    """The text before the word, the word, and the text after it."""
     if not line.word:
         return (line.text, "", "") if line.text.lstrip().startswith("#") else ("", "", line.text)
     bare = line.text.lstrip(" ")
@@ -96,7 +96,7 @@ def wrapped(line: Shown, most: int) -> list[Shown]:
 
 
 class _Drawn:
-    """The drawing statements of the program written out that each line makes, by the ``id`` of the line."""
+    """Drawing statements of the expanded program by the ``id`` of the line that makes them."""
 
     def __init__(self, source: Source) -> None:
         self.blocks: dict[int, list[int]] = defaultdict(list)

@@ -9,10 +9,11 @@ from shapeprog.formats.notation import groups
 from shapeprog.language.parameters import Parameter
 from shapeprog.language.statement import Role, Statement, language
 
-_UNITS = {
+UNITS = {
     "position": " in cells", "length": " in cells", "shift": " in cells", "angle": " in degrees", "count": " in copies",
     "turn": " in quarter turns", "axis": " of the grid",
 }  # fmt: skip
+"""Unit of each kind of parameter, as it follows the kind."""
 
 
 _NAMES = """\
@@ -44,7 +45,7 @@ def manual(name: str | None = None) -> str:
         return page(known[name])
     if name in known.roles:
         return _role_page(known.roles[name])
-    raise ShapeProgError(f"no statement is called {name!r}", did_you_mean(name, [*known.names, *known.roles]))
+    raise ShapeProgError(f"unknown statement {name!r}", did_you_mean(name, [*known.names, *known.roles]))
 
 
 def _role_page(role: Role) -> str:
@@ -81,7 +82,7 @@ def _meaning(parameter: Parameter) -> str:
     slots = f"slot {first}" if first == last else f"slots {first} to {last}"
     default = "" if parameter.default is None else f", {quantity.written(parameter.default)} unless given"
     known = quantity.range_text if quantity.written_out else f"always {quantity.written(quantity.low)}"
-    return f"{quantity.kind}{each}{_UNITS[quantity.kind]}, {known}{default}; {slots}"
+    return f"{quantity.kind}{each}{UNITS[quantity.kind]}, {known}{default}; {slots}"
 
 
 def _notation(declared: Statement) -> str:

@@ -1,4 +1,4 @@
-"""What can be drawn: triangles with normals, colours and the part that each belongs to."""
+"""Models to draw: triangles with normals, colours and part indices."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from shapeprog.formats.parts import Part, crease_normals, part_normals
 from shapeprog.space import RESOLUTION, Array
 
 INPUT_COLOUR = (212, 215, 220)
-"""Light grey of everything that was given."""
+"""Light grey of inputs."""
 
 MOST_POINTS = 2500
 """Points of a cloud that are drawn, each as a small ball."""
 
 FINE = 200_000
-"""Triangles from which a mesh is drawn with the normals of its triangles: they are smaller than the pixels."""
+"""From this number of triangles on a mesh is shaded flat: they are smaller than the pixels."""
 
 
 @dataclass(frozen=True)

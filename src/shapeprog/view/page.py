@@ -1,8 +1,7 @@
-"""Pictures for people: input beside reconstruction beside program, and contact sheets of many."""
+"""Pictures: input, reconstruction and program side by side, and contact sheets."""
 
 from __future__ import annotations
 
-import importlib.util
 import os
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -85,7 +84,7 @@ def picture(
     path
         A file that ends in .png, .jpg, .webp, .tiff or .pdf.
     title
-        Stands above the input; by default the name of the shape.
+        Title above the input; by default the name of the shape.
     scores
         Numbers to show below the program, such as ``{"iou": 0.93, "cd": 0.0004}``.
     view
@@ -103,7 +102,8 @@ def picture(
     head = 44
     width = view * len(views) + panel.width + 2 * _PAD
     page, draw = _sheet(width, view + head + 20)
-    names = [title or (shape.name if shape is not None else ""), "reconstruction"][-len(views) :]
+    name = title or (shape.name if shape is not None else "")
+    names = [name, "reconstruction"][: len(views)]
     for place, (image, name) in enumerate(zip(views, names, strict=True)):
         _paste(page, image, place * view, head)
         _text(draw, (place * view + view / 2, 16), _cut(name, 46), 19, _FAINT, anchor="ma")
@@ -115,7 +115,7 @@ def picture(
 def contact_sheet(
     items: Sequence[Item], path: str | os.PathLike[str], *, columns: int = COLUMNS, title: str = ""
 ) -> Path:
-    """Draw many reconstructions beside their inputs, with a legend of the statements in use.
+    """Draw many reconstructions next to their inputs, with a legend of the statements in use.
 
     Raises
     ------
@@ -164,7 +164,7 @@ class _Panel:
 
     def draw(self, draw: ImageDraw, x: int, y: int) -> None:
         room = self.height - 84
-        for size in range(LARGEST, SMALLEST - 1, -1):  # the largest type in which all of it fits
+        for size in range(LARGEST, SMALLEST - 1, -1):  # the largest type size in which all of it fits
             step, advance = int(size * 1.55), typeface(size, "Mono").getlength("m" * 10) / 10
             lines = [part for line in self.lines for part in wrapped(line, int((self.width - 30) / advance))]
             if len(lines) * step <= room:
@@ -247,14 +247,11 @@ def readable(statement: int) -> tuple[int, int, int]:
 
 @lru_cache(maxsize=64)
 def typeface(size: int, face: str = "", bold: bool = False) -> Any:
-    """A font that comes with matplotlib, so that it is there on every machine; ``face`` is Mono or nothing."""
+    """DejaVu Sans, reduced to European letters and signs; ``face`` is Mono or nothing."""
     from PIL import ImageFont
 
-    found = importlib.util.find_spec("matplotlib")
-    assert found is not None
-    assert found.submodule_search_locations
-    folder = Path(found.submodule_search_locations[0]) / "mpl-data" / "fonts" / "ttf"
-    return ImageFont.truetype(str(folder / f"DejaVuSans{face}{'-Bold' if bold else ''}.ttf"), size)
+    font = Path(__file__).parent / "fonts" / f"DejaVuSans{face}{'-Bold' if bold else ''}.ttf"
+    return ImageFont.truetype(str(font), size)
 
 
 def _text(
@@ -296,7 +293,7 @@ def _paste(page: Any, image: Image, x: int, y: int) -> None:
 def _checked(path: str | os.PathLike[str]) -> Path:
     target = Path(path)
     if target.suffix.lower() not in SUFFIXES:
-        raise OutputError(f"no picture ends in {target.suffix!r}", f"known are {' '.join(SUFFIXES)}")
+        raise OutputError(f"unknown picture suffix {target.suffix!r}", f"known: {' '.join(SUFFIXES)}")
     return target
 
 

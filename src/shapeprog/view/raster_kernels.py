@@ -1,6 +1,6 @@
 """Kernels over triangles and pixels: nearest triangle per pixel, depth seen from lights, light that arrives.
 
-Serial and without the interpreter lock, so that two views can be drawn in two threads.
+Serial and without the interpreter lock, so that threads can draw several views.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import numpy as np
 from shapeprog.kernels.compile import helper, kernel
 
 BACKGROUND = -1
-"""Face of a pixel that shows the ground."""
+"""Face index of a pixel that shows the ground."""
 
 
 @helper
@@ -129,7 +129,7 @@ def surface(face, depth, points, faces, normals, view, ground, everywhere, posit
 
     ``view`` holds as rows the eye and the corner, across and down of its rays: that of pixel (x, y) is
     ``corner + x * across + y * down``.  Depth is inverse, along the axis of view.  ``position`` and ``normal``
-    (H, W, 3) are written where somebody looks.
+    (H, W, 3) are written for pixels with a face or ground.
     """
     height, width = face.shape
     eye, corner, across, down = view[0], view[1], view[2], view[3]
@@ -170,7 +170,7 @@ def surface(face, depth, points, faces, normals, view, ground, everywhere, posit
 def irradiance(position, normal, skip, maps, frames, weights, radius, samples, bias, lit):
     """Share of the light of the sky that arrives at every pixel that is not to be skipped.
 
-    Each of the ``samples`` x ``samples`` pixels that are averaged later asks another share of the lights.  ``lit``
+    Each of the ``samples`` x ``samples`` pixels that are averaged later uses another share of the lights.  ``lit``
     (H, W) comes filled with 0.
     """
     height, width = lit.shape

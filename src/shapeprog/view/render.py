@@ -1,7 +1,7 @@
 """A small renderer: one camera, soft light from the sky with true shadows, thin lines along edges, all on the CPU.
 
 Every light of the sky sees the scene once (a depth map); a surface is as bright as the lights that reach it.  Each
-pixel is the mean over a square of samples, and each sample asks another share of the lights, so shadows are smooth.
+pixel is the mean over a square of samples, and each sample uses another share of the lights, so shadows are smooth.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ DIRECTION = (0.62, -1.0, -0.72)
 """From the shape to the eye: above, in front, on the viewer's right."""
 
 DISTANCE = 4.2
-"""Of the eye from the middle, in radii of what is shown: a mild perspective."""
+"""Distance of the eye from the middle, in radii of the model: a mild perspective."""
 
 MARGIN = 0.07
 """Empty border around the shape, as a share of the picture."""
@@ -34,13 +34,13 @@ LIGHTS = (27, 45)
 """Fewest and most lights: small pictures and large meshes get fewer."""
 
 MAP_SIZE = (112, 208)
-"""Pixels along each side of what a light sees, in small and in large pictures."""
+"""Pixels along each side of a depth map of a light, in small and in large pictures."""
 
 LARGE = 480
 """Width in pixels from which a picture counts as large."""
 
 WORK = 1_500_000
-"""Triangles times lights that a picture may cost."""
+"""Most triangles times lights of a picture."""
 
 KEY = np.array([0.85, -0.55, 0.45])
 """Where the sky is brightest: above, in front, on the viewer's left."""
@@ -71,12 +71,12 @@ _AT_ONCE = 1 << 18
 
 @dataclass(frozen=True)
 class Camera:
-    """A pinhole that looks at the middle of what it shows.
+    """A pinhole camera directed at the middle of the models.
 
     Parameters
     ----------
     eye
-        Its place in the grid frame.
+        Its position in the grid frame.
     right, up, ahead
         Unit axes of the view.
     focal
@@ -139,7 +139,7 @@ def render(model: Model, camera: Camera, width: int, height: int, samples: int =
     model
         What to draw, in the grid frame.
     camera
-        From where; use the same for pictures to be compared.
+        Use the same one for pictures to be compared.
     width, height
         In pixels.
     samples
@@ -200,10 +200,9 @@ def _surface(face: Array, depth: Array, solid: Sequence[Array], view: Array, low
 def _enlarged(coarse: Array, height: int, width: int) -> Array:
     """A brightness known for coarse squares at every pixel, smooth and fading to white at the border."""
     from PIL import Image as Pillow
-    from scipy.ndimage import gaussian_filter
 
     tall, wide = coarse.shape
-    large = Pillow.fromarray(gaussian_filter(coarse, BLUR, mode="nearest")).resize(
+    large = Pillow.fromarray(_blurred(_blurred(coarse).T).T).resize(
         (wide * COARSE, tall * COARSE), Pillow.Resampling.BICUBIC
     )
     field = np.clip(np.asarray(large), 0, 1)[:height, :width]
@@ -211,6 +210,14 @@ def _enlarged(coarse: Array, height: int, width: int) -> Array:
     inside = np.minimum(np.minimum.outer(down, across), 1)
     faded: Array = (1 - (1 - field) * inside**2 * (3 - 2 * inside)).astype(np.float32)
     return faded
+
+
+def _blurred(image: Array) -> Array:
+    """A Gaussian filter down the columns of an image, whose border goes on outside."""
+    offset = np.arange(-int(4 * BLUR + 0.5), int(4 * BLUR + 0.5) + 1)
+    weights = np.exp(-0.5 * (offset / BLUR) ** 2)
+    rows = np.clip(np.arange(len(image)) + offset[:, None], 0, len(image) - 1)
+    return np.tensordot(weights / weights.sum(), image[rows].astype(np.float64), 1).astype(np.float32)
 
 
 @lru_cache(maxsize=8)

@@ -1,7 +1,7 @@
-"""Numbers that can be dragged on a page: where every corner goes when a named number of a program changes.
+"""Sliders of a page: the position of every corner as a named number of a program changes.
 
-The page has no renderer of its own for statements, which may be anybody's.  It gets the meshes of a few values of each
-number and goes straight from one to the next, so it is exact wherever corners depend on a number linearly.
+The page cannot draw statements, which may be a user's own.  It has the meshes for a few values of each number and
+interpolates linearly between them, which is exact wherever corners depend linearly on a number.
 """
 
 from __future__ import annotations
@@ -21,16 +21,16 @@ from shapeprog.language.unit import Unit
 from shapeprog.space import Array
 
 SHARES = (0.5, 0.75, 1.25, 1.5)
-"""Values that are drawn, as shares of what a number is."""
+"""Values that are drawn, as multiples of the number."""
 
 LEAST = 1.0
-"""What stands for a number smaller than this, so that a zero can be dragged, too; of lengths, in cells."""
+"""Magnitude assumed for smaller numbers, so that a zero can be dragged; for lengths in cells."""
 
 STRAIGHT = 1e-3
-"""Difference in cells below which corners count as going straight."""
+"""Difference in cells below which the path of a corner is linear."""
 
 MOST = 400_000
-"""Corners of triangles in all meshes of all numbers beyond which a page has none to drag."""
+"""Most triangle corners of all meshes of a page; with more it has no sliders."""
 
 
 @dataclass(frozen=True)
@@ -40,14 +40,14 @@ class Slider:
     Parameters
     ----------
     name, value
-        What it is called, and what it is.
+        Its name and value.
     low, high
-        How far it may be dragged.
+        Range of the slider.
     unit
-        What it is in if it is a length in another unit than cells, else nothing.
+        Unit of a length that is not in cells, else empty.
     places
         For some other values the corners (F, 3, 6) of the triangles of each part, positions and normals; ``None`` for
-        parts that stay where they are.  One value is enough where all corners go straight.
+        parts that do not move.  One value suffices if all corners move linearly.
     """
 
     name: str
@@ -64,7 +64,7 @@ def sliders(program: Program, drawn: Sequence[Part]) -> list[Slider]:
     Parameters
     ----------
     drawn
-        The parts of the program as it is.
+        The parts of the unchanged program.
     """
     free = [named for named in names(program) if named.free]
     if len(free) * len(SHARES) * sum(3 * len(part.faces) for part in drawn) > MOST:
@@ -75,8 +75,8 @@ def sliders(program: Program, drawn: Sequence[Part]) -> list[Slider]:
 
 
 def pieces(text: str, movable: Sequence[str]) -> list[tuple[str, str]] | None:
-    """A line of text as what it says and, in turn, whose number this is: ``width = `` and nobody's, ``10`` and that of
-    ``width``.  ``None`` for lines that give no number to any of these names."""
+    """A line as alternating text and owner: ``width = `` has no owner, ``10`` belongs to ``width``.
+    ``None`` for lines that assign a number to none of these names."""
     try:
         (line,) = ast.parse(text.strip()).body
     except (SyntaxError, ValueError):  # the head of a loop
@@ -123,7 +123,7 @@ def _slider(program: Program, drawn: Sequence[Part], named: Named, unit: Unit | 
 def _places(
     program: Program, drawn: Sequence[Part], start: list[Array], name: str, wanted: Sequence[float]
 ) -> Iterator[tuple[float, list[Array | None]]]:
-    """For each value that can be drawn, with parts of as many triangles, the corners of those that move."""
+    """The corners of moving parts for each value that yields the same number of triangles."""
     for at in wanted:
         try:
             moved = parts(set(program, {name: at}))
@@ -141,7 +141,7 @@ def _places(
 
 
 def _straight(before: Array, there: Array | None, last: Array | None, share: float) -> bool:
-    """Whether corners are where they would be if they went straight on to their last place."""
+    """Whether corners lie on a straight path to their last position."""
     end = before if last is None else last
     now = before if there is None else there
     return bool(np.abs(before + share * (end - before) - now).max(initial=0) < STRAIGHT)

@@ -1,5 +1,5 @@
-"""An interactive view as one self-contained HTML file: turn the shape, see which line draws which part, and drag its
-numbers."""
+"""An interactive view as one self-contained HTML file: turn the shape, relate lines to parts, and drag the
+numbers of a program."""
 
 from __future__ import annotations
 
@@ -15,23 +15,44 @@ from shapeprog.data.shape import Shape
 from shapeprog.errors import OutputError
 from shapeprog.files import write_text
 from shapeprog.formats.colours import colour
+from shapeprog.formats.frames import frame_comment
 from shapeprog.formats.parts import parts
 from shapeprog.language.program import Program
-from shapeprog.space import Array
+from shapeprog.space import Array, Frame
 from shapeprog.view.listing import digits_in, listing, parted
 from shapeprog.view.model import FINE, of_cells, of_shape
 from shapeprog.view.page import readable, scores_text
 from shapeprog.view.sliders import Slider, corners_of, pieces, sliders
-from shapeprog.view.template import HTML
 
 _TO_PAGE = np.array([[0.0, 0.0, -1.0], [1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
-"""From up, depth, left-right to the page's right, up, towards the viewer."""
+"""From grid axes (up, depth, left-right) to page axes (right, up, towards the viewer)."""
 
 
 def viewer(
-    program: Program, path: str | os.PathLike[str], *, shape: Shape | None = None, title: str = "", scores: Any = None
+    program: Program,
+    path: str | os.PathLike[str],
+    *,
+    shape: Shape | None = None,
+    title: str = "",
+    scores: Any = None,
+    frame: Frame | None = None,
 ) -> Path:
-    """Write the page: the program beside its parts, and the input where there is one.
+    """Write the page: the program next to its parts, and the input if there is one.
+
+    Parameters
+    ----------
+    program
+        What is drawn.
+    path
+        The page, which ends in .html.
+    shape
+        The input.
+    title
+        Stands above the program; by default the name of the input or of the page.
+    scores
+        Scores by name, as ``picture`` takes them.
+    frame
+        The way to the world of the input, which is kept in the text that is copied from the page.
 
     Raises
     ------
@@ -44,7 +65,7 @@ def viewer(
             f"the {len(drawn)} parts of this program have {triangles} triangles: a page holds at most {FINE}",
             "lower the counts, or draw a picture",
         )
-    # A page of hundreds of megabytes opens nowhere: of such a mesh the cells are shown.
+    # No browser opens a page of hundreds of megabytes, so such a mesh is shown as cells.
     large = shape is not None and shape.faces is not None and len(shape.faces) > FINE
     model = None if shape is None else of_cells(shape.voxels) if large else of_shape(shape)
     places = [part.vertices for part in drawn] + ([] if model is None else [model.vertices])
@@ -53,6 +74,7 @@ def viewer(
     low, high = points.min(0), points.max(0)
     movable = sliders(program, drawn)
     content = {
+        "frame": frame_comment(frame),
         "title": title or (shape.name if shape is not None else Path(path).stem),
         "facts": " · ".join(scores_text(scores, program)),
         "middle": (_TO_PAGE @ ((low + high) / 2)).tolist(),
@@ -69,7 +91,7 @@ def viewer(
     }
     text = json.dumps(content, separators=(",", ":")).replace("<", "\\u003c")
     target = Path(path)
-    write_text(target, HTML.replace("@DATA@", text))
+    write_text(target, Path(__file__).with_suffix(".html").read_text(encoding="utf-8").replace("@DATA@", text))
     return target
 
 
@@ -105,7 +127,7 @@ def _turned(corners: Array) -> Array:
 
 
 def _creases(corners: Array, normals: Array) -> Array:
-    """Corners (E, 2), counted through all triangles, at the ends of the edges along which normals part."""
+    """Indices (E, 2) of the corners, over all triangles, at the ends of creases."""
     starts, ends = corners.reshape(-1, 3), np.roll(corners, -1, 1).reshape(-1, 3)
     tilt = np.asarray(normals).reshape(-1, 3) + np.roll(normals, -1, 1).reshape(-1, 3)
     extent = float(np.ptp(corners.reshape(-1, 3), axis=0).max()) if len(corners) else 1.0

@@ -14,15 +14,14 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import torch
 from jaxtyping import Float, Int
-from torch import Tensor
 
 from shapeprog.geometry.primitive import Kernels, Mesh, Points, Primitive, Scalars, Sizes, Triple, safe_norm
 from shapeprog.geometry.primitives.cylinder import SEGMENTS
 from shapeprog.kernels.compile import helper
 from shapeprog.kernels.rows import clip, fill_row, stretch
 from shapeprog.kernels.table import CENTRE, ROTATION, SIZE, local
+from shapeprog.lazy_torch import Tensor, torch
 from shapeprog.space import Array, FloatArray
 
 SHORTEST = 1e-6  # half a chord in cells below this counts as this

@@ -11,14 +11,13 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import torch
 from jaxtyping import Bool, Float, Int
-from torch import Tensor
 
 from shapeprog.geometry.primitive import Kernels, Mesh, Points, Primitive, Scalars, Sizes, Spans, Triple, safe_norm
 from shapeprog.kernels.compile import helper
 from shapeprog.kernels.rows import clip, fill_box
 from shapeprog.kernels.table import CENTRE, ROTATION, SIZE
+from shapeprog.lazy_torch import Tensor, torch
 from shapeprog.space import Array, FloatArray
 
 FACES = 6

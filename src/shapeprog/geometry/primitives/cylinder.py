@@ -8,15 +8,14 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import torch
 from jaxtyping import Float, Int
-from torch import Tensor
 
 from shapeprog.geometry.primitive import Kernels, Mesh, Points, Primitive, Scalars, Sizes, Triple, safe_norm
 from shapeprog.geometry.primitives.cuboid import corner, meet
 from shapeprog.kernels.compile import helper
 from shapeprog.kernels.rows import CAP, REACH, clip, fill_row
 from shapeprog.kernels.table import CENTRE, ROTATION, SIZE
+from shapeprog.lazy_torch import Tensor, torch
 from shapeprog.space import Array, FloatArray
 
 SEGMENTS = 48

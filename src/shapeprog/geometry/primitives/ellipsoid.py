@@ -9,15 +9,14 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import torch
 from jaxtyping import Float, Int
-from torch import Tensor
 
 from shapeprog.geometry.primitive import Kernels, Mesh, Points, Primitive, Scalars, Sizes, Triple, safe_norm
 from shapeprog.geometry.random import uniform as uniform_at
 from shapeprog.kernels.bits import uniform
 from shapeprog.kernels.compile import helper
 from shapeprog.kernels.table import SIZE
+from shapeprog.lazy_torch import Tensor, torch
 from shapeprog.space import Array, FloatArray
 
 THINNEST = 1e-6  # half axes in cells below this count as this where they divide
@@ -32,7 +31,6 @@ def _axes(size: Sizes) -> Points:
     return size[..., :3].clamp(min=0)
 
 
-@torch.no_grad()
 def foot(points: Points, size: Sizes) -> Points:
     """The place (..., 3) on the unit sphere whose image on the ellipsoid is nearest to a point.
 
@@ -40,6 +38,7 @@ def foot(points: Points, size: Sizes) -> Points:
     of sum (a p / (t + a^2))^2 = 1.  One over the root of that sum is concave in t, so Newton's steps from the left
     climb to the root without passing it.
     """
+    points, size = points.detach(), size.detach()
     a = _axes(size).double().clamp(min=THINNEST)
     a, p = torch.broadcast_tensors(a, points.double().abs().clamp(min=1e-12))
     t = (a * p - a**2).amax(-1, keepdim=True)

@@ -5,14 +5,13 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import torch
 from jaxtyping import Float, Int
-from torch import Tensor
 
 from shapeprog.geometry.primitive import Kernels, Mesh, Points, Primitive, Scalars, Sizes, Triple, safe_norm
 from shapeprog.geometry.primitives.cylinder import frustum_mesh
 from shapeprog.kernels.compile import helper
 from shapeprog.kernels.table import SIZE
+from shapeprog.lazy_torch import Tensor, torch
 from shapeprog.space import Array, FloatArray
 
 

@@ -12,12 +12,12 @@ import numpy as np
 import torch
 
 from shapeprog.errors import ShapeProgError
+from shapeprog.geometry.arrays import one_tensor_thread
 from shapeprog.geometry.scene import Scene
 from shapeprog.inference.budget import Progress
 from shapeprog.inference.connecting import afloat
 from shapeprog.inference.evidence import Evidence
 from shapeprog.inference.joints import Joints, find_joints
-from shapeprog.inference.refine import single_threaded
 from shapeprog.inference.ties.alike import alike
 from shapeprog.inference.ties.basis import Basis, simplest
 from shapeprog.inference.ties.closeness import Closeness
@@ -89,7 +89,7 @@ def tie(
     if not plain.size:
         return Tied(plain, 0)
     closeness = Closeness(evidence, seed)
-    with single_threaded():
+    with one_tensor_thread(kernels=1):
         ties = _Ties(plain, Misfit(Tunable(plain), evidence, seed, known=known), closeness, held, seed)
         worth, trusted = price * (WRITTEN_PRICE if known else PRICE), WRITTEN if known else INFERRED
         for round_ in range(ROUNDS):

@@ -34,13 +34,13 @@ def decoded(decoder: str, seed: int = 0, generator: Generator | None = None) -> 
 @pytest.mark.parametrize("decoder", ["argmax", "novel", "select", "sample", "sample-ids"])
 def test_canvases_are_the_cells_of_the_blocks_before(decoder: str):
     result = decoded(decoder)
-    drawn = draw_blocks(result.drawn)
+    drawn = draw_blocks(result.code)
     for k in range(drawn.shape[1]):
         assert torch.equal(result.canvases[:, k], union(drawn[:, :k]) if k else torch.zeros_like(drawn[:, 0]))
     last = unpack(union(drawn))
     both, either = ((part > 0).sum((1, 2, 3)) for part in (last & targets(6), last | targets(6)))
-    torch.testing.assert_close(result.iou(targets(6)).double(), both / either.double())
-    live = result.teacher_forcing(targets(6)).live
+    torch.testing.assert_close(result.iou().double(), both / either.double())
+    live = result.live
     assert not result.code.ids[~live].any(), "nothing follows the end"
     whole = encode(result.programs(whole=True), blocks=10)
     assert torch.equal(union(draw_blocks(whole)), union(drawn))
@@ -48,12 +48,12 @@ def test_canvases_are_the_cells_of_the_blocks_before(decoder: str):
 
 def test_novel_ends_rather_than_write_a_block_that_draws_nothing_new():
     result = decoded("novel")
-    new = count(draw_blocks(result.drawn) & ~result.canvases) > 0
-    writes = (result.drawn.ids > 0).any(-1)
+    new = count(draw_blocks(result.code) & ~result.canvases) > 0
+    writes = (result.code.ids > 0).any(-1)
     assert torch.equal(new, writes)
     assert writes.any()
     still = decoded("argmax")
-    assert ((still.drawn.ids > 0).any(-1) & (count(draw_blocks(still.drawn) & ~still.canvases) == 0)).any()
+    assert ((still.code.ids > 0).any(-1) & (count(draw_blocks(still.code) & ~still.canvases) == 0)).any()
 
 
 def widened(cells: Tensor) -> Tensor:
@@ -66,16 +66,16 @@ def widened(cells: Tensor) -> Tensor:
 def test_select_writes_only_blocks_that_agree_with_the_target_and_never_lowers_the_agreement():
     target, generator = targets(6).bool(), load_generator("fast-narrow")
     result = decoded("select", generator=generator)
-    blocks = unpack(draw_blocks(result.drawn)).bool()
+    blocks = unpack(draw_blocks(result.code)).bool()
     for k in range(blocks.shape[1]):
         canvas = unpack(result.canvases[:, k]).bool()
         new = blocks[:, k] & ~canvas
         exact = (new & target).sum((1, 2, 3)) - (new & ~target).sum((1, 2, 3))
         near = (target & widened(blocks[:, k]) & ~widened(canvas)).sum((1, 2, 3))
         near -= (new & ~widened(target)).sum((1, 2, 3))
-        writes = (result.drawn.ids[:, k] > 0).any(-1)
+        writes = (result.code.ids[:, k] > 0).any(-1)
         assert (EXACT_WEIGHT * exact + near > 0)[writes].all()
-    assert result.iou(targets(6)).mean() >= max(0.5, decoded("argmax", generator=generator).iou(targets(6)).mean())
+    assert result.iou().mean() >= max(0.5, decoded("argmax", generator=generator).iou().mean())
     empty = decode(generator, torch.zeros_like(targets(2)), decoder="select")
     assert not empty.code.ids.any(), "nothing helps where there is nothing"
 
@@ -85,7 +85,7 @@ def test_sampling_depends_on_its_seed_alone():
     assert torch.equal(one.code.ids, two.code.ids)
     assert torch.equal(one.code.parameters, two.code.parameters)
     assert not torch.equal(one.code.ids, three.code.ids)
-    assert torch.equal(one.drawn.parameters, one.drawn.parameters.round()), "sampled numbers are whole"
+    assert torch.equal(one.code.parameters, one.code.parameters.round()), "sampled numbers are whole"
 
 
 def test_blocks_come_in_order_of_what_they_cover_and_those_that_add_nothing_are_dropped():
@@ -127,7 +127,7 @@ def test_measures_are_those_of_the_written_programs_and_an_empty_one_is_a_point(
     path = write_targets(tmp_path / "few.npz", 2)
     generator = load_generator("fast-narrow")
     rows = evaluate(generator, list(read_pack(path)), "select")
-    assert [row.iou for row in rows] == pytest.approx(decode(generator, targets(2)).iou(targets(2)).tolist())
+    assert [row.iou for row in rows] == pytest.approx(decode(generator, targets(2)).iou().tolist())
     scores = scores_on_packs(generator, [path], "select")
     assert scores.keys() == {"few_iou", "few_cd", "few_blocks", "few_cd_median"}
     assert scores["few_cd"] == pytest.approx(sum(row.cd for row in rows) / 2)

@@ -58,12 +58,14 @@ def test_sampled_blocks_are_legal_and_their_numbers_within_range(design: str):
 def test_teacher_forcing_gives_the_numbers_and_probabilities_of_decoding(design: str):
     generator, cells = small(design), targets()
     decoded = decode(generator, cells, decoder="argmax", blocks=6)
-    prediction = generator.predict(decoded.teacher_forcing(cells))
+    prediction = generator.predict(decoded)
     code = predicted_code(prediction)
     assert torch.equal(code.ids, decoded.code.ids)
-    torch.testing.assert_close(code.parameters, decoded.code.parameters, atol=1e-3, rtol=0)
-    torch.testing.assert_close(prediction.log_prob().sum(-1), decoded.log_prob, atol=1e-3, rtol=0)
-    offsets = decoded.code.parameters - decoded.drawn.parameters
+    offsets = decoded.offsets
+    torch.testing.assert_close(code.parameters, decoded.code.parameters + offsets, atol=1e-3, rtol=0)
+    assert (prediction.logits.argmax(-1) == prediction.ids).all()
+    log_prob = prediction.logits.amax(-1).sum(-1)
+    torch.testing.assert_close(prediction.log_prob()[prediction.batch.live], log_prob)
     assert (float(offsets.abs().max()) < 1, bool(offsets.any())) == (True, design == "fast")
     assert not offsets[vocabulary().discrete[code.ids]].any()
 

@@ -10,12 +10,10 @@ import torch
 from torch import Tensor
 
 from shapeprog.errors import DeclarationError, ShapeProgError
-from shapeprog.geometry.losses import chamfer
 from shapeprog.language.text import parse
 from shapeprog.language.unroll import unroll
 from shapeprog.liang2022.estimators import NvilBaseline, leave_one_out_advantage, reinforce_loss
-from shapeprog.liang2022.losses import LOSSES, NEURAL, Comparison, Values, check_gradient, compute, loss, parse_losses
-from shapeprog.liang2022.losses import empty_program_losses as empty
+from shapeprog.liang2022.losses import LOSSES, NEURAL, Comparison, Values, compute, loss, parse_losses
 
 pytestmark = pytest.mark.paper
 
@@ -35,28 +33,16 @@ def values(compared: Comparison) -> dict[str, float]:
 def test_losses_of_a_cube_have_their_hand_computed_values():
     result = values(comparison(CUBE, [[0, 0, 0], [0, 0, 10], [0, 11, 12]]))
     assert result["coverage"] == pytest.approx((0 + 2 + 5) / 3)
-    assert result["surface"] == pytest.approx((8 + 2 + 5) / 3)
-    assert (result["volume"], result["parts"]) == (16**3, 1)
     both = values(comparison(CUBE, [[0, 0, 0]]))  # a mean of 8^2 + 2 * 8^2 / 3 over all faces; and back to the nearest
     assert both["chamfer"] == pytest.approx(64 * 5 / 3 + 64, abs=2)
-    assert both["excess"] == pytest.approx(8 * 1.2808, abs=0.1)
 
 
 def test_losses_of_cells_are_small_for_the_target_and_weights_multiply():
     same, other = (values(comparison(text, [[0, 0, 0]])) for text in (HALF_CUBE, CUBE))
-    assert same["occupancy"] < 0.1 < 0.2 < other["occupancy"]
     assert same["soft_iou"] < 0.15 < 0.42 < other["soft_iou"] < 0.58
     compared = comparison(CUBE, [[0, 0, 0]])  # samples are drawn once
     one, two = compute(compared, {"chamfer": 1.0}), compute(compared, {"chamfer": 2.5, NEURAL: 1.0})
     assert list(two) == ["chamfer"] and torch.equal(two["chamfer"], 2.5 * one["chamfer"])  # noqa: PT018
-
-
-def test_programs_that_draw_nothing_cost_as_much_as_a_point_in_the_centre():
-    cloud, cells = torch.randn(2, 500, 3) * 5, unroll([parse(CUBE), parse(HALF_CUBE)]).voxels()
-    result = empty(cloud, cells, {**dict.fromkeys(LOSSES, 1.0), "coverage": 3.0, NEURAL: 1.0})
-    torch.testing.assert_close(result["chamfer"], chamfer(torch.zeros(2, 1, 3), cloud), atol=0, rtol=1e-3)
-    torch.testing.assert_close(result["coverage"], 3 * cloud.norm(dim=-1).mean(-1), atol=0.01, rtol=0)
-    assert ((result["soft_iou"] > 0.99) & (result["occupancy"] > 10)).all()
 
 
 def test_a_users_function_is_a_loss_and_faulty_ones_are_refused(monkeypatch: pytest.MonkeyPatch):
@@ -71,7 +57,6 @@ def test_a_users_function_is_a_loss_and_faulty_ones_are_refused(monkeypatch: pyt
     assert weights == {"chamfer": 1, "reach": 0.5}
     moved = comparison("leg(at=(2, 3, 0), size=(2, 2, 0))\n", [[0, 0, 0]])
     assert float(compute(moved, weights)["reach"]) == 0.5 * 5
-    assert float(empty(moved.points, moved.cells, weights)["reach"]) < 1e-3
     with pytest.raises(ShapeProgError, match=r"'flat' returns values of shape \(\)"):
         compute(moved, {"flat": 1.0})
     for name in ("chamfer", "reach", NEURAL, "a=b"):
@@ -85,7 +70,7 @@ def test_a_users_function_is_a_loss_and_faulty_ones_are_refused(monkeypatch: pyt
         ("chamfre=1", "unknown loss 'chamfre'\n  hint: did you mean 'chamfer'?"),
         ("", "unknown loss ''\n  hint: choose from chamfer, coverage"),
         ("chamfer=1,chamfer=2", "the loss 'chamfer' is given twice"),
-        ("parts=-1", "the weight of 'parts' is '-1'"),
+        ("coverage=-1", "the weight of 'coverage' is '-1'"),
     ],
 )
 def test_the_parser_names_the_fault_and_the_nearest_loss(text: str, message: str):
@@ -94,13 +79,13 @@ def test_the_parser_names_the_fault_and_the_nearest_loss(text: str, message: str
     assert str(caught.value).startswith(message)
 
 
-def test_losses_without_a_gradient_are_refused():
-    for weights in ("parts=1,volume=2", "neural"):
-        check_gradient(parse_losses(weights))
-    with pytest.raises(
-        ShapeProgError, match=r"the loss 'parts' has no gradient\n.*such as chamfer=1.*--estimator rloo"
-    ):
-        check_gradient({"parts": 1.0})
+def test_a_loss_without_a_gradient_is_refused(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr("shapeprog.liang2022.losses.LOSSES", dict(LOSSES))
+    loss("count")(lambda compared: compared.scene.mask.sum(-1).float())
+    compared = comparison(CUBE, [[0, 0, 0]])
+    compared.scene.centre.requires_grad_(True)
+    with pytest.raises(ShapeProgError, match="the loss 'count' has no gradient"):
+        compute(compared, {"count": 1.0})
 
 
 COSTS = torch.tensor([3.0, -1.0, 0.5, 2.0], dtype=torch.float64)
@@ -124,8 +109,6 @@ def test_leave_one_out_is_unbiased(samples: int):
 
     torch.testing.assert_close(*expected(samples, estimate), atol=1e-12, rtol=0)
     assert leave_one_out_advantage(torch.tensor([[1.0], [4.0]])).tolist() == [[-3], [3]]
-    with pytest.raises(ShapeProgError, match="two or more"):
-        leave_one_out_advantage(torch.ones(1, 5))
 
 
 @pytest.mark.parametrize("variance", [0.5, 9.0])

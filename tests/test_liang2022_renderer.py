@@ -80,10 +80,10 @@ def test_sampled_points_of_the_core_and_their_chamfer_are_those_of_the_reference
     pieces, order, hidden = [], [], 0
     for index, primitive in enumerate(primitives):
         mine = (drawn.slot == index).nonzero()[:, 0]
-        offset = (drawn.points[mine] - primitive.centre).detach()
-        unit = torch.linalg.solve(primitive.axes.detach(), offset.T).T
+        axes = (primitive.transform(torch.eye(3).double()) - primitive.centre).detach()
+        unit = torch.linalg.solve(axes, (drawn.points[mine] - primitive.centre).detach(), left=False)
         hidden += int(renderer.hidden(primitives, index, unit).sum())
-        pieces.append(renderer.transform(primitive, unit))
+        pieces.append(primitive.transform(unit))
         order.append(mine)
     assert hidden <= 1, "within a thousandth of a cell below the surface of another"
     again = torch.cat(pieces)[torch.cat(order).argsort()]
@@ -108,13 +108,13 @@ def test_samples_of_the_core_and_of_the_reference_have_the_same_means_and_gradie
 
 @pytest.mark.parametrize("ids", [[0, 0, 0], [0, 1, 0], [1, 0, 2], [1, 2, 0], [19, 19, 19], [20, 1, 0], [19, 21, 1]])
 def test_blocks_outside_the_grammar_draw_nothing(ids):
-    assert renderer.unroll_block(torch.tensor(ids), torch.full((3, 7), 2.0)) == []
+    assert renderer.unroll(torch.tensor([ids]), torch.full((1, 3, 7), 2.0)) == []
 
 
 def test_loops_without_copies_and_negative_extents_draw_nothing():
     block = torch.tensor([[0, 1, 1, 1, 0, 0, 0], [0, 0, 0, 1, 1, 1, 0]]).float()
-    assert renderer.unroll_block(torch.tensor([19, 1]), block) == []
-    assert renderer.unroll_block(torch.tensor([1]), -torch.ones(1, 7)) == []
+    assert renderer.unroll(torch.tensor([[TRANSLATE, 1]]), block[None]) == []
+    assert renderer.unroll(torch.tensor([[1]]), -torch.ones(1, 1, 7)) == []
 
 
 def cuboid(*size: float, kind: str = "cuboid") -> Primitive:

@@ -14,6 +14,7 @@ import pytest
 import torch
 from liang2022_toys import SMALL, run, same, small
 from safetensors.torch import load, save
+from torch import Tensor
 
 from shapeprog.errors import InputError, OutputError, ShapeProgError
 from shapeprog.liang2022.executor import NeuralExecutor
@@ -34,6 +35,12 @@ pytestmark = pytest.mark.paper
 def write(path: Path, **options: object) -> Path:
     save_weights(path, small(), data="synthetic", seed=3, samples_seen=640, scores={"iou": 0.5}, **options)  # type: ignore[arg-type]
     return path
+
+
+def rewrite(path: Path, tensors: dict[str, Tensor] | None = None, **card: object) -> None:
+    """Write a file again with other tensors or fields of its card."""
+    text = json.dumps(asdict(read_card(path)) | card)
+    path.write_bytes(save(load(path.read_bytes()) | (tensors or {}), {"card": text}))
 
 
 @pytest.mark.parametrize("half", [False, True])
@@ -72,16 +79,18 @@ def test_a_run_without_a_validation_has_no_weights_yet_and_says_so(tmp_path: Pat
         with pytest.raises(InputError, match=r"the run in .*executor has no weights yet\n.*--validate-every"):
             load_executor(tmp_path / name)
     write(tmp_path / "executor" / "weights.safetensors")
-    with pytest.raises(InputError, match=r"executor is a folder\n.*executor.weights\.safetensors"):
+    with pytest.raises(InputError, match="executor is a folder"):
         load_executor(tmp_path / "executor")
 
 
 @pytest.mark.wrong_types
-def test_a_card_cannot_ask_for_more_than_a_network_may_have():
+def test_a_card_cannot_ask_for_more_than_a_network_may_have(tmp_path: Path):
+    path = write(tmp_path / "one.safetensors")
     large = ({"feature": 10**6}, {"squeeze": True}, {"low": 2, "high": 1}, {"low": None}, {"smoothing": "x"})
     for settings in (*large, {"widths": (1, 1)}, {"widths": 3}, {"depth": 3}):
-        with pytest.raises(ShapeProgError, match=r"out of range|do not fit"):
-            build_generator("fast", settings)
+        rewrite(path, settings=settings)
+        with pytest.raises(ShapeProgError, match=r"out of range|cannot be read as weights"):
+            load_weights(path)
 
 
 def test_weights_that_are_not_finite_are_neither_written_nor_read(tmp_path: Path):
@@ -93,9 +102,8 @@ def test_weights_that_are_not_finite_are_neither_written_nor_read(tmp_path: Path
     with pytest.raises(OutputError, match=r"block_memory\.bias is not finite"):
         save_weights(path, generator)
     assert path.read_bytes() == before
-    tensors = load(before) | {"block_memory.bias": torch.full((32,), torch.nan)}
-    path.write_bytes(save(tensors, {"card": json.dumps(asdict(read_card(path)))}))
-    with pytest.raises(InputError, match=r"block_memory\.bias holds values that are not finite"):
+    rewrite(path, {"block_memory.bias": torch.full((32,), torch.nan)})
+    with pytest.raises(InputError, match=r"block_memory\.bias is no plain tensor of finite numbers"):
         load_weights(path)
 
 
@@ -104,7 +112,14 @@ def other_headers(content: bytes) -> list[bytes]:
     length = int.from_bytes(content[:8], "little")
     header, body = json.loads(content[8 : 8 + length]), content[8 + length :]
     card, name = json.loads(header["__metadata__"]["card"]), max(header)
-    changes = ({"design": "none"}, {"design": 3}, {"settings": []}, {"settings": {"feature": 10**12}}, {"scores": "x"})
+    changes = (
+        {"design": "none"},
+        {"design": 3},
+        {"settings": []},
+        {"settings": {"feature": 10**12}},
+        {"scores": "x"},
+        {"scores": {"iou": "x"}},
+    )
     cards = [*(json.dumps({**card, **change}) for change in changes), "[" * 9999, "null"]
     changed = [{**header, "__metadata__": {"card": text}} for text in cards]
     for entry in ({"dtype": "F8_E4M3"}, {"dtype": "I64"}, {"shape": [1, 1 << 62]}, {"data_offsets": [0, 1 << 40]}):

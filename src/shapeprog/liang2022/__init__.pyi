@@ -1,4 +1,4 @@
-from .adapt import AdaptTask, batches_of, predicted_code
+from .adapt import AdaptTask, TargetStream, predicted_code
 from .decode import decode
 from .executor import NeuralExecutor
 from .generator import Generator
@@ -8,6 +8,6 @@ from .settings import AdaptSettings, ExecutorSettings, PretrainSettings
 from .weights import build_generator, load_executor, load_generator, save_weights
 
 __all__ = [
-    "AdaptSettings", "AdaptTask", "ExecutorSettings", "Generator", "NeuralExecutor", "PretrainSettings", "batches_of",
+    "AdaptSettings", "AdaptTask", "ExecutorSettings", "Generator", "NeuralExecutor", "PretrainSettings", "TargetStream",
     "build_generator", "decode", "load_executor", "load_generator", "loss", "predicted_code", "save_weights", "train",
 ]  # fmt: skip

@@ -7,9 +7,9 @@ executor (Tian et al. 2019), *hybrid* adaptation through both.  All weights lear
 
     generator = load_generator("fast-wide")
     optimiser = torch.optim.Adam(generator.parameters(), lr=2e-4)
-    for cells, points in batches_of(["packs/chair_train.npz"]):  # voxels, surface points in cells
+    for cells, points in TargetStream(["packs/chair_train.npz"]):  # voxels, surface points in cells
         decoded = decode(generator, cells, decoder="argmax")
-        code = predicted_code(generator.predict(decoded.teacher_forcing(cells)))
+        code = predicted_code(generator.predict(decoded))
         sample = sp.sample(sp.unroll(code), 5000)
         loss = sp.chamfer(sample.points, points, weights=sample.weights).mean()
         optimiser.zero_grad()
@@ -20,6 +20,7 @@ executor (Tian et al. 2019), *hybrid* adaptation through both.  All weights lear
 from __future__ import annotations
 
 import copy
+import itertools
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -32,18 +33,18 @@ from torch import Tensor, nn
 from shapeprog.data.packs import read_pack
 from shapeprog.errors import ShapeProgError
 from shapeprog.geometry.losses import occupancy_cross_entropy
-from shapeprog.geometry.scene import Scene
 from shapeprog.geometry.surface import has_surface
 from shapeprog.inference.surface import points_of_cells
+from shapeprog.language.program import Draw, Program
 from shapeprog.language.statement import EMPTY
-from shapeprog.language.tensors import Code
+from shapeprog.language.tensors import Code, encode
 from shapeprog.language.unroll import unroll
 from shapeprog.liang2022.decode import Decoded, decode
 from shapeprog.liang2022.estimators import NvilBaseline, leave_one_out_advantage, reinforce_loss
 from shapeprog.liang2022.evaluate import scores_on_packs
-from shapeprog.liang2022.generator import Generator, Prediction, TeacherForcingBatch
+from shapeprog.liang2022.generator import IDS, Generator, Prediction, TeacherForcingBatch
 from shapeprog.liang2022.loop import Record, scramble
-from shapeprog.liang2022.losses import Comparison, check_gradient, compute, empty_program_losses, parse_losses
+from shapeprog.liang2022.losses import Comparison, compute, parse_losses
 from shapeprog.liang2022.prior import SyntheticStream, prior
 from shapeprog.liang2022.settings import NEURAL, AdaptSettings
 from shapeprog.liang2022.teacher import Order, teacher_forcing
@@ -51,6 +52,12 @@ from shapeprog.liang2022.weights import load_executor, load_generator, save_weig
 
 REHEARSAL_CANVASES = 3
 """Canvases of each synthetic shape that a step rehearses."""
+
+RLOO_SAMPLES = 4
+"""Programs sampled for each shape by the leave-one-out estimator."""
+
+DOT = Program((Draw("leg", (-0.1,) * 3 + (0.2,) * 3),))
+"""The smallest part, in the centre of the grid; stands for programs that draw nothing."""
 
 
 class Targets(NamedTuple):
@@ -61,21 +68,24 @@ class Targets(NamedTuple):
 
 
 class TargetStream:
-    """Batches of real shapes, a function of packs, seed and index; every shape once before any comes again.
+    """Endless batches of real shapes, a function of packs, seed and index; all shapes once before any comes again.
 
     Parameters
     ----------
     packs
         Files of shapes.
-    batch_size, seed, points
-        Shapes of a batch, seed of their order, points of each.
+    batch_size, points, seed
+        Shapes of a batch, points of each, seed of their order.
     """
 
-    def __init__(self, packs: Sequence[str | Path], batch_size: int, seed: int, points: int) -> None:
+    def __init__(self, packs: Sequence[str | Path], batch_size: int = 32, points: int = 1000, seed: int = 0) -> None:
         self._shapes = [(pack, index) for pack in map(read_pack, map(Path, packs)) for index in range(len(pack))]
         if not self._shapes:
             raise ShapeProgError("there are no shapes to adapt to", "give packs made with: shapeprog prepare")
         self._batch_size, self._seed, self._points = batch_size, seed, points
+
+    def __iter__(self) -> Iterator[Targets]:
+        return map(self.__getitem__, itertools.count())
 
     def __getitem__(self, index: int) -> Targets:
         """The batch of an index, 0 or more."""
@@ -107,30 +117,24 @@ class AdaptTask:
     Raises
     ------
     ShapeProgError
-        If weights or packs cannot be read, or no loss has a gradient.
+        If weights or packs cannot be read, or a loss is unknown.
     """
 
     def __init__(self, settings: AdaptSettings, command: str = "") -> None:
         torch.manual_seed(settings.seed)
         self._settings, self._command = settings, command
         self._losses = parse_losses(settings.loss)
-        if settings.estimator == "none":
-            check_gradient(self._losses)
         generator = load_generator(settings.initial)
         self._executor = load_executor(settings.executor).requires_grad_(False) if NEURAL in self._losses else None
         self._initial = copy.deepcopy(generator).requires_grad_(False) if settings.kl else None
         if settings.learn == "offsets":
-            if not generator.has_offsets:
+            if generator.offset_head is None:
                 raise ShapeProgError(f"the design {generator.design} has no offsets", "use --learn all")
             generator.requires_grad_(False)
-            for weight in generator.offset_weights():
-                weight.requires_grad_(True)
-        with torch.no_grad():
-            empty = Code(torch.zeros(1, 3, dtype=torch.long), torch.zeros(1, 3, 7))
-            grid = torch.zeros(1, 32, 32, 32)
-            width = generator.eval().encode(grid, grid, empty, None)[0].shape[1]
-        self.module = Learner(generator, NvilBaseline(width) if settings.estimator == "nvil" else None)
-        self._targets = TargetStream(settings.train, settings.batch_size, settings.seed, settings.points)
+            generator.offset_head.requires_grad_(True)
+        baseline = NvilBaseline(generator.feature_width) if settings.estimator == "nvil" else None
+        self.module = Learner(generator, baseline)
+        self._targets = TargetStream(settings.train, settings.batch_size, settings.points, settings.seed)
         rehearsed = settings.rehearsal if settings.learn == "all" else 0
         self._synthetic = SyntheticStream(prior(settings.prior), rehearsed, settings.seed) if rehearsed else None
         for path in settings.val:  # a missing pack is reported now, not at the first validation
@@ -153,14 +157,14 @@ class AdaptTask:
         settings, generator = self._settings, self.module.generator.eval()  # statistics of the normalisation stay
         targets = Targets(*(part.to(rng.device) for part in batch[0]))
         if settings.estimator == "rloo":
-            targets = Targets(*(torch.cat([part] * settings.num_samples) for part in targets))
+            targets = Targets(*(torch.cat([part] * RLOO_SAMPLES) for part in targets))
         sampled = settings.estimator != "none"
         decoded = decode(generator, targets.cells, decoder="sample-ids" if sampled else settings.decoder, rng=rng)
-        prediction = generator.predict(decoded.teacher_forcing(targets.cells))
+        prediction = generator.predict(decoded)
         with torch.autocast(rng.device.type, enabled=False):
             per_shape = self._render_losses(prediction, targets, rng)
             losses = {name: value.mean() for name, value in per_shape.items()}
-            losses |= self._id_losses(prediction, decoded, targets)
+            losses |= self._id_losses(prediction, decoded)
         if batch[1] is not None:
             rehearsed = generator.predict(batch[1].to(rng.device)).losses()
             losses |= {f"rehearsal_{name}": value for name, value in rehearsed.items()}
@@ -169,34 +173,23 @@ class AdaptTask:
     def _render_losses(
         self, prediction: Prediction, targets: Targets, rng: torch.Generator
     ) -> dict[str, Float[Tensor, " B"]]:
-        """Losses (B,) of predicted programs, with gradient to their numbers; those that draw nothing have none."""
+        """Losses of predicted programs, with gradient to their numbers; those that draw nothing cost, without one."""
         code = predicted_code(prediction, base=self._settings.learn == "all")
-        draws = has_surface(unroll(Code(code.ids, code.parameters.detach())))
-        no_gradient = 0 * code.parameters.sum()
-        values = {name: no_gradient.expand(len(draws)) for name in self._losses if name != NEURAL}
-        if not bool(draws.all()):
-            empty = empty_program_losses(targets.points[~draws], targets.cells[~draws], self._losses)
-            values = {name: value.masked_scatter(~draws, empty[name]) + no_gradient for name, value in values.items()}
-        if values and bool(draws.any()):
-            ids, numbers = code.ids[draws], code.parameters[draws]
-
-            def canvas() -> Scene:
-                return unroll(Code(ids, numbers - prediction.scatter(prediction.offsets)[draws]))
-
-            comparison = Comparison(
-                unroll(Code(ids, numbers)), targets.points[draws], targets.cells[draws], self._settings.points, rng,
-                canvas,
-            )  # fmt: skip
-            computed = compute(comparison, self._losses)
-            values = {name: value.masked_scatter(draws, computed[name]) for name, value in values.items()}
+        draws = has_surface(unroll(code.having(code.parameters.detach())))[:, None, None]
+        dot = encode([DOT] * len(draws), blocks=code.ids.shape[1])
+        ids = torch.where(draws, code.ids, dot.ids.to(code.ids))
+        numbers = torch.where(draws[..., None], code.parameters, dot.parameters.to(code.parameters))
+        canvas = Code(ids, numbers - draws[..., None] * prediction.scatter(prediction.offsets))
+        scene, num_samples = unroll(Code(ids, numbers)), self._settings.points
+        comparison = Comparison(scene, targets.points, targets.cells, num_samples, rng, canvas)
+        values = compute(comparison, self._losses)
         if self._executor is not None:
-            soft = prediction.scatter(prediction.logits.float().exp())
-            executor = self._executor.to(soft.device)
-            logits = executor.union(soft, code.parameters, prediction.batch.live & (code.ids[..., 0] != EMPTY))
+            executor, one_hot = self._executor.to(rng.device), torch.nn.functional.one_hot(code.ids, IDS).float()
+            logits = executor.union(one_hot, code.parameters, prediction.batch.live & (code.ids[..., 0] != EMPTY))
             values[NEURAL] = self._losses[NEURAL] * occupancy_cross_entropy(logits, targets.cells)
         return values
 
-    def _id_losses(self, prediction: Prediction, decoded: Decoded, targets: Targets) -> dict[str, Tensor]:
+    def _id_losses(self, prediction: Prediction, decoded: Decoded) -> dict[str, Tensor]:
         """Losses that train ids: cross-entropy to the decoded ones, KL to the initial ones, or an estimator."""
         settings, losses = self._settings, {}
         log_prob = prediction.log_prob()
@@ -210,25 +203,22 @@ class AdaptTask:
             losses["kl"] = settings.kl * (before.exp() * difference).sum(-1).mean()
         if settings.estimator == "none":
             return losses
-        costs = 1 - decoded.iou(targets.cells).to(log_prob)
+        costs = 1 - decoded.iou().to(log_prob)
         if settings.estimator == "rloo":
-            shape = (settings.num_samples, -1)
+            shape = (RLOO_SAMPLES, -1)
             advantage = leave_one_out_advantage(costs.reshape(shape))[..., None]
             loss = reinforce_loss(log_prob.unflatten(0, shape), advantage)
         else:
             assert self.module.baseline is not None
             advantage, losses["baseline"] = self.module.baseline(prediction.feature, prediction.batch.live, costs)
             loss = reinforce_loss(log_prob, advantage)
-        return losses | {"estimator": settings.estimator_weight * loss, "_cost": costs.mean()}
+        return losses | {"estimator": loss, "_cost": costs.mean()}
 
     def validate(self) -> Record:
-        """IoU and CD of single-pass programs on each pack; the score is their mean IoU or minus their mean CD."""
-        settings = self._settings
-        scores = scores_on_packs(self.module.generator, settings.val, settings.val_decoder)
-        selected = [scores[f"{Path(path).stem}_{settings.select_by}"] for path in settings.val]
-        if selected:
-            scores["score"] = sum(selected) / len(selected) * (1 if settings.select_by == "iou" else -1)
-        return scores
+        """IoU and CD of the programs of each pack; the score is minus the sum of these CD."""
+        packs = self._settings.val
+        scores = scores_on_packs(self.module.generator, packs, self._settings.decoder)
+        return scores | ({"score": -sum(scores[f"{Path(path).stem}_cd"] for path in packs)} if packs else {})
 
     def save(self, path: Path, samples_seen: int, scores: Record) -> None:
         """Write the generator with its card."""
@@ -249,13 +239,3 @@ def predicted_code(prediction: Prediction, base: bool = True) -> Code:
     """
     numbers = (prediction.numbers if base else prediction.given) + prediction.offsets
     return Code(prediction.batch.code.ids, prediction.scatter(numbers.float()))
-
-
-def batches_of(
-    packs: Sequence[str | Path], batch_size: int = 32, points: int = 1000, seed: int = 0
-) -> Iterator[Targets]:
-    """Endless batches of cells and surface points of packs, for a training loop of your own."""
-    stream, index = TargetStream(packs, batch_size, seed, points), 0
-    while True:
-        yield stream[index]
-        index += 1

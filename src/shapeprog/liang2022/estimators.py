@@ -11,20 +11,12 @@ import torch
 from jaxtyping import Bool, Float
 from torch import Tensor, nn
 
-from shapeprog.errors import ShapeProgError
-
 DECAY = 0.9
 """Decay of the running mean and variance of costs, as published for NVIL."""
 
 
 class NvilBaseline(nn.Module):
-    """Predicts the cost of a program from the feature of a block (NVIL, Mnih and Gregor 2014).
-
-    Parameters
-    ----------
-    width
-        Width F of the feature of a block.
-    """
+    """Predicts the cost of a program from the feature, of width F, of a block (NVIL, Mnih and Gregor 2014)."""
 
     mean: Tensor
     variance: Tensor
@@ -68,31 +60,14 @@ class NvilBaseline(nn.Module):
 
 
 def leave_one_out_advantage(costs: Float[Tensor, "S B"]) -> Float[Tensor, "S B"]:
-    """The cost of each of S samples minus the mean cost of the others (Kool et al. 2019).
-
-    Raises
-    ------
-    ShapeProgError
-        If there is only one sample.
-    """
-    samples = len(costs)
-    if samples < 2:
-        raise ShapeProgError(f"leave-one-out compares samples, got {samples}", "draw two or more for each shape")
-    return (costs - costs.mean(0)) * (samples / (samples - 1))
+    """The cost of each of S > 1 samples minus the mean cost of the others (Kool et al. 2019)."""
+    return (costs - costs.mean(0)) * (len(costs) / (len(costs) - 1))
 
 
 def reinforce_loss(log_probs: Float[Tensor, "*S B K"], advantage: Float[Tensor, "*S B #K"]) -> Float[Tensor, ""]:
     """A loss whose gradient estimates that of the expected cost (REINFORCE, Williams 1992).
 
-    Parameters
-    ----------
-    log_probs
-        Log-probability of the ids of every block, 0 where none was sampled.
-    advantage
-        Advantage of every block, or of the program; no gradient flows through it.
-
-    Returns
-    -------
-    Log-probabilities times advantages, added over blocks, as a mean over programs.
+    Log-probabilities of the ids of every block times the advantage of the block or the program, which gets no gradient;
+    added over blocks, as a mean over programs.
     """
     return (log_probs * advantage.detach()).sum(-1).mean()

@@ -20,19 +20,10 @@ from shapeprog.liang2022.decode import Decoder, decode_all
 from shapeprog.liang2022.generator import Generator
 
 
-def evaluate(generator: Generator, shapes: Sequence[Shape], decoder: Decoder, seed: int = 0) -> list[Metrics]:
-    """Measures of single-pass programs; IoU is of the canvas.
-
-    Parameters
-    ----------
-    decoder
-        How programs are written.
-    seed
-        Seed of the samples of surfaces.
-    """
+def evaluate(generator: Generator, shapes: Sequence[Shape], decoder: Decoder) -> list[Metrics]:
+    """Measures of the programs that a decoder writes; IoU is of the canvas."""
     decoded = decode_all(generator, grids(shapes).to(next(generator.parameters()).device), decoder=decoder)
-    rows = zip(decoded.programs(), decoded.programs(whole=True), shapes, strict=True)
-    return [measure(program, whole, shape, seed) for program, whole, shape in rows]
+    return list(map(measure, decoded.programs(), decoded.programs(whole=True), shapes))
 
 
 def grids(shapes: Sequence[Shape]) -> UInt8[Tensor, "B 32 32 32"]:
@@ -43,20 +34,18 @@ def grids(shapes: Sequence[Shape]) -> UInt8[Tensor, "B 32 32 32"]:
 def measure(program: Program, whole: Program, shape: Shape, seed: int = 0) -> Metrics:
     """Measures of a program; one that draws nothing counts as a point in the centre of the grid."""
     row = evaluate_program(program, shape, whole, seed=seed)
-    samples = None if np.isfinite(row.cd) else target_samples(shape, 5000, seed)
-    if samples is None:
+    if np.isfinite(row.cd) or (samples := target_samples(shape, 5000, seed)) is None:
         return row
     squared = (samples[0] ** 2).sum(-1) * world_scale(shape) ** 2
-    forward, back = float(squared.min()), float(squared.mean())
-    return replace(row, cd=forward + back, to_target=forward, from_target=back)
+    to_target, from_target = float(squared.min()), float(squared.mean())
+    return replace(row, cd=to_target + from_target, to_target=to_target, from_target=from_target)
 
 
 def scores_on_packs(generator: Generator, packs: Sequence[str | Path], decoder: Decoder) -> dict[str, Any]:
     """Mean IoU and CD, median CD and mean number of blocks of the shapes of each pack."""
     scores: dict[str, float] = {}
-    for path in packs:
+    for path in map(Path, packs):
         summary = summarise(evaluate(generator, list(read_pack(path)), decoder))
-        name = Path(path).stem
-        scores |= {f"{name}_{key}": summary[key].mean for key in ("iou", "cd", "blocks")}
-        scores[f"{name}_cd_median"] = summary["cd"].median
+        scores |= {f"{path.stem}_{key}": summary[key].mean for key in ("iou", "cd", "blocks")}
+        scores[f"{path.stem}_cd_median"] = summary["cd"].median
     return scores

@@ -20,24 +20,17 @@ EMPTY_LOGIT = -20.0
 
 
 class NeuralExecutor(nn.Module):
-    """Draws a block: 862,272 weights, layers and names as published.
+    """Draws a block: 862,272 weights, layers and names as published."""
 
-    Parameters
-    ----------
-    width
-        Width of the LSTM and of the decoder's input.
-    """
-
-    def __init__(self, width: int = 128) -> None:
+    def __init__(self) -> None:
         super().__init__()
-        self.pgm_embed = nn.Linear(IDS, width // 2)
-        self.param_embed = nn.Linear(SLOTS, width - width // 2)
+        self.pgm_embed, self.param_embed = nn.Linear(IDS, 64), nn.Linear(SLOTS, 64)
         with torch.no_grad():
             self.param_embed.weight *= INITIAL_SCALE
-        self.lstm = nn.LSTM(width, width, bias=False, batch_first=True)
-        self.pgm_param_feat = nn.Linear(width, width)
+        self.lstm = nn.LSTM(128, 128, bias=False, batch_first=True)
+        self.pgm_param_feat = nn.Linear(128, 128)
         self.decoder = nn.Sequential(
-            nn.ConvTranspose3d(width, 64, 4, 1, 0, bias=False), nn.BatchNorm3d(64), nn.ReLU(inplace=True),
+            nn.ConvTranspose3d(128, 64, 4, 1, 0, bias=False), nn.BatchNorm3d(64), nn.ReLU(inplace=True),
             nn.Conv3d(64, 64, 3, 1, 1, bias=False), nn.BatchNorm3d(64), nn.ReLU(inplace=True),
             nn.ConvTranspose3d(64, 16, 4, 2, 1, bias=False), nn.BatchNorm3d(16), nn.ReLU(inplace=True),
             nn.Conv3d(16, 16, 3, 1, 1, bias=False), nn.BatchNorm3d(16), nn.ReLU(inplace=True),

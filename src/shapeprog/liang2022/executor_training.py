@@ -15,7 +15,7 @@ from jaxtyping import Float, Int, UInt8
 from torch import Tensor
 from torch.nn.functional import one_hot
 
-from shapeprog.geometry.cells import unpack
+from shapeprog.geometry.cells import iou, pack, unpack
 from shapeprog.geometry.losses import cell_cross_entropy
 from shapeprog.language.tensors import Code
 from shapeprog.language.unroll import draw_blocks
@@ -60,11 +60,10 @@ class ExecutorTask:
     def _blocks(self, stream: SyntheticStream, index: int, share: float) -> Blocks:
         code = stream[index].code
         rng = torch.Generator().manual_seed(scramble(self._settings.seed, 1, index))
-        row = torch.arange(len(code.ids))
         block = torch.multinomial((code.ids > 0).any(-1).float(), 1, generator=rng)[:, 0]
+        row, widened = torch.arange(len(block)), round(share * len(block))
         ids, numbers = code.ids[row, block], code.parameters[row, block]
-        moved = _widened(ids, numbers, rng)
-        numbers = torch.where((row < round(share * len(row)))[:, None, None], moved, numbers)
+        numbers[:widened] = _widened(ids, numbers, rng)[:widened]
         return Blocks(ids, numbers, unpack(draw_blocks(Code(ids[:, None], numbers[:, None]))[:, 0]))
 
     def losses(self, batch: Blocks, progress: float, rng: torch.Generator) -> dict[str, Tensor]:
@@ -87,14 +86,8 @@ class ExecutorTask:
         """Mean IoU of blocks of the prior (``iou``) and of widened ones, where they draw something."""
         scores = {}
         for name, blocks in self._validation.items():
-            parts = zip(*(part.split(64) for part in blocks), strict=True)
-            predicted = torch.cat([self._logits(Blocks(*part)) > 0 for part in parts]).cpu()
-            cells = blocks.cells.bool()
-            overlap_count, either = (
-                grid.flatten(1).sum(-1).double() for grid in (predicted & cells, predicted | cells)
-            )
-            nonempty = cells.flatten(1).any(-1)
-            scores[name] = float((overlap_count[nonempty] / either[nonempty]).mean())
+            overlap = iou(pack(self._logits(blocks).cpu() > 0), pack(blocks.cells))
+            scores[name] = float(overlap[blocks.cells.flatten(1).amax(-1) > 0].mean())
         return {**scores, "score": scores["iou"]}
 
     def save(self, path: Path, samples_seen: int, scores: Record) -> None:

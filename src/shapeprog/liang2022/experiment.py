@@ -17,17 +17,17 @@ import torch
 
 from shapeprog.data.packs import read_pack, write_pack
 from shapeprog.data.shape import Shape
+from shapeprog.data.synthetic.shapes import shapes_of
 from shapeprog.errors import InputError, did_you_mean
 from shapeprog.files import append_line, make_folder
-from shapeprog.geometry.cells import voxels
-from shapeprog.geometry.surface import sample_surface
+from shapeprog.inference import greedy_boxes, refine
+from shapeprog.inference.refine import REACH
 from shapeprog.language.program import Program
-from shapeprog.language.unroll import unroll
 from shapeprog.liang2022.adapt import AdaptTask
 from shapeprog.liang2022.decode import Decoder, decode_all
 from shapeprog.liang2022.evaluate import grids, measure
 from shapeprog.liang2022.loop import BEST, STATE, read_log, train
-from shapeprog.liang2022.prior import prior
+from shapeprog.liang2022.prior import programs
 from shapeprog.liang2022.settings import METHODS, AdaptSettings
 from shapeprog.liang2022.weights import load_generator
 
@@ -49,7 +49,7 @@ class Row:
     label
         Description of the row.
     initial
-        Weights that it starts from.
+        Weights that it starts from, or ``{row}`` for those of another row; none for greedy boxes.
     method
         ``direct``, ``guided`` or ``hybrid``; no adaptation by default.
     options
@@ -61,48 +61,40 @@ class Row:
     """
 
     label: str
-    initial: str
+    initial: str = ""
     method: str = ""
     options: Mapping[str, Any] = field(default_factory=dict)
     decoders: tuple[Decoder, ...] = ("select",)
     refine: bool = False
 
 
-NARROW: dict[str, Any] = {"prior": "narrow"}
-AS_PUBLISHED: dict[str, Any] = {"decoder": "argmax", "decoded_ids": 0.0}
-TIAN: dict[str, Any] = NARROW | AS_PUBLISHED | {"num_shapes": 480, "batch_size": 8, "rehearsal": 4, "warm_up": 48}
+PUBLISHED: dict[str, Any] = {"prior": "narrow", "decoder": "argmax", "decoded_ids": 0.0, "kl": 1.0}
+"""The published way: programs by arg-max, no loss of the ids but one that keeps them near those of the start."""
+
+TIAN: dict[str, Any] = PUBLISHED | {"num_shapes": 480, "batch_size": 8, "rehearsal": 4, "warm_up": 48}
+GUIDED: dict[str, Any] = {"learning_rate": 3e-5}
 
 ROWS: dict[str, Row] = {
-    "none": Row("narrow prior, no adaptation", "fast-narrow", decoders=DECODERS),
-    "guided": Row("narrow prior, guided with self-training", "fast-narrow", "guided", NARROW, DECODERS),
-    "direct": Row("narrow prior, direct with self-training", "fast-narrow", "direct", NARROW, DECODERS),
-    "published-ids": Row(
-        "narrow prior, direct by arg-max, KL", "fast-narrow", "direct", NARROW | AS_PUBLISHED | {"kl": 1.0}, DECODERS
-    ),
-    "published-guided": Row(
-        "narrow prior, guided by arg-max, KL, rate 1e-4", "fast-narrow", "guided",
-        NARROW | AS_PUBLISHED | {"kl": 1.0, "learning_rate": 1e-4}, DECODERS,
-    ),
-    "no-rehearsal": Row("narrow prior, no rehearsal", "fast-narrow", "direct", NARROW | {"rehearsal": 0}, DECODERS),
-    "tian2019-none": Row("tian2019, no adaptation", "tian2019-narrow", decoders=DECODERS),
-    "tian2019-guided": Row("tian2019, guided by arg-max, 480 shapes", "tian2019-narrow", "guided", TIAN, DECODERS),
-    "tian2019-direct": Row("tian2019, direct by arg-max, 480 shapes", "tian2019-narrow", "direct", TIAN, DECODERS),
-    "wide-none": Row("wide prior, no adaptation", "fast-wide", decoders=DECODERS),
+    "boxes": Row("greedy boxes"),
+    "boxes-refined": Row("greedy boxes, refined at test time", refine=True),
+    "none": Row("`fast`, narrow prior", "fast-narrow", decoders=DECODERS),
+    "guided": Row("`fast`, narrow prior, guided", "fast-narrow", "guided", PUBLISHED | GUIDED, DECODERS),
+    "direct": Row("`fast`, narrow prior, direct", "fast-narrow", "direct", PUBLISHED, DECODERS),
+    "tian2019-none": Row("`tian2019`", "tian2019-narrow", decoders=DECODERS),
+    "tian2019-guided": Row("`tian2019`, guided, 480 shapes", "tian2019-narrow", "guided", TIAN | GUIDED, DECODERS),
+    "tian2019-direct": Row("`tian2019`, direct, 480 shapes", "tian2019-narrow", "direct", TIAN, DECODERS),
+    "wide-none": Row("wide prior", "fast-wide", decoders=DECODERS),
     "wide-guided": Row("wide prior, guided", "fast-wide", "guided", {}, DECODERS),
     "wide-direct": Row("wide prior, direct", "fast-wide", "direct", {}, DECODERS),
-    "soft-iou": Row("direct, + soft IoU", "fast-wide", "direct", {"loss": "chamfer=1,soft_iou=3"}, DECODERS),
-    "wide-argmax": Row(
-        "direct by arg-max, + KL, + soft IoU", "fast-wide", "direct",
-        AS_PUBLISHED | {"kl": 1.0, "loss": "chamfer=1,soft_iou=3"}, DECODERS,
-    ),
-    "coverage": Row("+ coverage and excess", "fast-wide", "direct", {"loss": "chamfer=1,surface=1,excess=1"}),
+    "soft-iou": Row("+ soft IoU", "fast-wide", "direct", {"loss": "chamfer=1,soft_iou=3"}, DECODERS),
+    "coverage": Row("+ coverage", "fast-wide", "direct", {"loss": "chamfer=1,coverage=1"}),
+    "no-rehearsal": Row("without rehearsal", "fast-wide", "direct", {"rehearsal": 0}),
     "hybrid": Row("hybrid", "fast-wide", "hybrid"),
     "offsets": Row("offsets alone", "fast-wide", "direct", {"learn": "offsets", "learning_rate": 1e-3}),
-    "nvil": Row("direct, ids by NVIL", "fast-wide", "direct", {"estimator": "nvil", "num_shapes": 800}),
-    "rloo": Row("direct, ids by leave-one-out", "fast-wide", "direct", {"estimator": "rloo", "num_shapes": 400}),
+    "nvil": Row("ids by NVIL", "fast-wide", "direct", {"estimator": "nvil", "num_shapes": 800}),
+    "rloo": Row("ids by leave-one-out", "fast-wide", "direct", {"estimator": "rloo", "num_shapes": 400}),
     "refined": Row("wide prior, direct, refined at test time", "{wide-direct}", refine=True),
-}  # fmt: skip
-"""All rows; ``{row}`` starts from the weights of another."""
+}
 
 QUICK: dict[str, Any] = {"num_shapes": 640, "batch_size": 16, "warm_up": 80, "points": 500}
 QUICK_ROWS, QUICK_SHAPES = ("none", "guided", "direct"), 48
@@ -144,33 +136,26 @@ def run_table(
                 "the table needs packs of ShapeNet shapes", "make them with 'shapeprog prepare', or --quick"
             )
         packs, categories = _synthetic_packs(make_folder(results / "packs")), ("synthetic",)
-    selected = only or (QUICK_ROWS if quick else tuple(ROWS))
     for category in categories:
-        for name in selected:
+        for name in only or (QUICK_ROWS if quick else ROWS):
             for seed in range(seeds if ROWS[name].method else 1):
-                weights = adapted(name, category, packs, results, seed, quick, measure)
+                weights = _adapted(name, category, packs, results, seed, quick, measure)
                 if weights is not None:
                     yield from _measured(name, category, packs, results, seed, weights, quick)
     yield from table(results, categories)
 
 
-def adapted(
-    name: str, category: str, packs: Path, results: Path, seed: int, quick: bool = False, measure: bool = False
-) -> str | None:
+def _adapted(name: str, category: str, packs: Path, results: Path, seed: int, quick: bool, measure: bool) -> str | None:
     """The weights of a row, trained where they are missing; ``None`` if nothing shall be trained."""
-    row = ROWS[name]
-    initial = row.initial
+    row, initial = ROWS[name], ROWS[name].initial
     if initial.startswith("{"):
-        parent = adapted(initial.strip("{}"), category, packs, results, seed, quick, measure)
-        if parent is None:
-            return None
-        initial = parent
+        return _adapted(initial.strip("{}"), category, packs, results, seed, quick, measure)
     if not row.method:
         return initial
     folder = results / "runs" / f"{name}-{category}-{seed}"
     settings = AdaptSettings(
         train=(str(packs / f"{category}_train.npz"),), val=(str(packs / f"{category}_val.npz"),), initial=initial,
-        seed=seed, validate_every=800, **{**METHODS[row.method], **row.options, **(QUICK if quick else {})},
+        seed=seed, validate_every=400, **{**METHODS[row.method], **row.options, **(QUICK if quick else {})},
     )  # fmt: skip
     log = read_log(folder) if (folder / STATE).exists() else []
     if not log or log[-1]["samples_seen"] < settings.num_shapes:
@@ -187,30 +172,26 @@ def _measured(
     """Measure a row on the test shapes, one line of JSON a shape, where that is missing."""
     row, path = ROWS[name], make_folder(results) / "rows.jsonl"
     known = {(record["row"], record["category"], record["seed"], record["decoder"]) for record in rows_of(results)}
-    missing = [decoder for decoder in row.decoders if (name, category, seed, decoder) not in known]
-    if not missing:
-        return
-    generator = load_generator(weights)
     count = QUICK_SHAPES if quick else REFINED_SHAPES if row.refine else None
-    shapes = list(read_pack(packs / f"{category}_test.npz"))[:count]
-    for decoder in missing:
-        decoded = decode_all(generator, grids(shapes), decoder=decoder)
-        key = {"row": name, "category": category, "seed": seed, "decoder": decoder}
-        made = []
-        for program, whole, shape in zip(decoded.programs(), decoded.programs(whole=True), shapes, strict=True):
-            program = _refined(program, shape, seed) if row.refine else program
+    for decoder in [decoder for decoder in row.decoders if (name, category, seed, decoder) not in known]:
+        shapes, made = list(read_pack(packs / f"{category}_test.npz"))[:count], []
+        for program, whole, shape in zip(*_programs(weights, shapes, decoder), shapes, strict=True):
+            if row.refine:
+                program = refine(program, torch.from_numpy(np.array(shape.points)), reach=REACH, seed=seed)
+            key = {"row": name, "category": category, "seed": seed, "decoder": decoder}
             made.append(key | asdict(measure(program, whole, shape, seed=seed)))
         for line in made:
-            append_line(path, json.dumps({k: v for k, v in line.items() if v == v}))
+            append_line(path, json.dumps({key: value for key, value in line.items() if value == value}))
         yield f"{name}, {category}, seed {seed}, {decoder}: CD {np.mean([record['cd'] for record in made]):.5f}"
 
 
-def _refined(program: Program, shape: Shape, seed: int) -> Program:
-    from shapeprog.inference import refine
-    from shapeprog.inference.refine import REACH
-
-    assert shape.points is not None
-    return refine(program, torch.from_numpy(np.asarray(shape.points, np.float32)), reach=REACH, seed=seed)
+def _programs(weights: str, shapes: Sequence[Shape], decoder: Decoder) -> tuple[list[Program], list[Program]]:
+    """Programs of a generator, or greedy boxes where there are no weights; and with whole numbers."""
+    if not weights:
+        boxes = [greedy_boxes(shape.voxels) for shape in shapes]
+        return boxes, boxes
+    decoded = decode_all(load_generator(weights), grids(shapes), decoder=decoder)
+    return decoded.programs(), decoded.programs(whole=True)
 
 
 def rows_of(results: Path) -> list[dict[str, Any]]:
@@ -223,40 +204,32 @@ def table(results: Path, categories: Sequence[str] = CATEGORIES) -> Iterator[str
     """The table as Markdown: CD x 1000 (mean and standard error, median) and IoU by decoder, and the paper's CD."""
     measured = rows_of(results)
     for index, category in enumerate(categories):
-        yield f"\n**{category}** CD x 1000 (median), IoU"
-        yield "| row | paper | " + " | ".join(DECODERS) + " |"
-        yield "|---" * (2 + len(DECODERS)) + "|"
+        yield f"\n**{category}** CD x 1000 (median), IoU\n"
+        yield "| row | seeds | paper | " + " | ".join(DECODERS) + " |"
+        yield "|---" * (3 + len(DECODERS)) + "|"
         for name, row in ROWS.items():
-            cells = [_cell(measured, name, category, decoder) for decoder in DECODERS]
-            if any(cells):
+            records = [record for record in measured if (record["row"], record["category"]) == (name, category)]
+            if records:
                 paper = f"{1000 * PAPER[name][index]:.1f}" if name in PAPER and len(categories) > 1 else ""
-                yield f"| {row.label} | {paper} | " + " | ".join(cells) + " |"
+                cells = [_cell([r for r in records if r["decoder"] == decoder]) for decoder in DECODERS]
+                yield f"| {row.label} | {len({r['seed'] for r in records})} | {paper} | {' | '.join(cells)} |"
 
 
-def _cell(measured: list[dict[str, Any]], row: str, category: str, decoder: str) -> str:
-    """Mean over shapes of each seed, averaged over seeds, with its standard error; median CD; IoU."""
-    matching = [
-        record
-        for record in measured
-        if (record["row"], record["category"], record["decoder"]) == (row, category, decoder)
-    ]
-    if not matching:
+def _cell(records: list[dict[str, Any]]) -> str:
+    """CD as a mean with its standard error, over seeds if there are several, else over shapes; median CD; IoU."""
+    if not records:
         return ""
-    seeds = sorted({record["seed"] for record in matching})
-    means = [np.mean([record["cd"] for record in matching if record["seed"] == seed]) for seed in seeds]
-    cd, iou = (np.array([record[key] for record in matching]) for key in ("cd", "iou"))
-    error = np.std(means, ddof=1) / len(means) ** 0.5 if len(means) > 1 else np.std(cd, ddof=1) / len(cd) ** 0.5
+    cd, iou, seeds = (np.array([record[key] for record in records]) for key in ("cd", "iou", "seed"))
+    means = [cd[seeds == seed].mean() for seed in np.unique(seeds)]
+    spread = np.array(means if len(means) > 1 else cd)
+    error = spread.std(ddof=1) / len(spread) ** 0.5
     return f"{1000 * np.mean(means):.2f} ± {1000 * error:.2f} ({1000 * np.median(cd):.2f}), {iou.mean():.3f}"
 
 
 def _synthetic_packs(folder: Path) -> Path:
-    """Packs of wide synthetic furniture, which the narrow prior does not hold, as targets of the quick version."""
+    """Packs of wide synthetic furniture, most of which the narrow prior does not hold, for the quick version."""
     for split, count, seed in (("train", 320, 11), ("val", 16, 12), ("test", QUICK_SHAPES, 13)):
-        path = folder / f"synthetic_{split}.npz"
-        if not path.exists():
-            code = prior("wide").sample(count, seed)[0]
-            scene = unroll(code)
-            points = sample_surface(scene, 2000, torch.Generator().manual_seed(seed)).points.numpy().astype(np.float32)
-            cells = voxels(scene).numpy().astype(bool)
-            write_pack(path, [Shape(f"{split}_{n}", cells[n], points[n]) for n in range(count)])
+        if not (folder / f"synthetic_{split}.npz").exists():
+            named = {f"{split}_{n}": program for n, program in enumerate(programs("wide", count, seed))}
+            write_pack(folder / f"synthetic_{split}.npz", shapes_of(named, 2000, seed))
     return folder

@@ -1,15 +1,15 @@
 """``fast``: a generator for few cores.
 
 Against the published network: the encoder halves the grid at once and keeps positions by reading all cells of its last
-layer; the memory from block to block is the block written before, so that all canvases of a batch are encoded at once;
-and a number is a distribution over whole values, autoregressive within a block (as in NADE, Larochelle and Murray,
-AISTATS 2011), plus a sub-cell offset.  A number's gradient passes through the mean of the distribution around its
-mode, its offset's through a plain regression; both reach all layers.
+layer.  The memory from block to block is a sum over the blocks before, so that all canvases of a batch are encoded at
+once, and arg-max decoding does not stand still on a block that draws nothing new.  A number is a distribution over
+whole values, autoregressive within a block (as in NADE, Larochelle and Murray, AISTATS 2011), plus a sub-cell offset:
+the gradient of a number passes through the mean of the distribution around its mode, that of an offset through a plain
+regression; both reach all layers.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,9 +18,10 @@ from jaxtyping import Bool, Float, Int
 from torch import Tensor, nn
 
 from shapeprog.errors import ShapeProgError
+from shapeprog.geometry.cells import unpack
 from shapeprog.language.statement import SLOTS
 from shapeprog.language.tensors import Code
-from shapeprog.liang2022.generator import IDS, Generator, StepOutput, TeacherForcingBatch, stack_grids
+from shapeprog.liang2022.generator import IDS, Generator, Grid, Ids, Slots, StepOutput, TeacherForcingBatch
 
 WINDOW = 2
 """Values on either side of the mode over which the mean is taken."""
@@ -62,14 +63,10 @@ class FastSettings:
     smoothing: float = 0.75
 
     def __post_init__(self) -> None:
-        sizes = (*self.widths, self.squeeze, self.feature)
-        bounds = (self.low, self.high)
-        good = all(type(size) is int and 0 < size <= LARGEST_SIZE for size in sizes)
-        good &= all(type(end) is int and abs(end) <= LARGEST_SIZE for end in bounds) and self.low < self.high
-        if not good or type(self.smoothing) not in (int, float) or not 0 <= self.smoothing <= LARGEST_SIZE:
-            raise ShapeProgError(
-                "sizes of the network fast are out of range", f"use whole numbers up to {LARGEST_SIZE}"
-            )
+        sizes = (*self.widths, self.squeeze, self.feature, self.high - self.low)
+        whole = all(type(size) is int and 0 < size <= LARGEST_SIZE for size in sizes) and type(self.low) is int
+        if not whole or abs(self.low) > LARGEST_SIZE or not 0 <= self.smoothing <= LARGEST_SIZE:
+            raise ShapeProgError("sizes of the network fast are out of range", f"use numbers up to {LARGEST_SIZE}")
 
 
 class Fast(Generator):
@@ -77,36 +74,31 @@ class Fast(Generator):
 
     design = "fast"
     Settings = FastSettings
-    has_offsets = True
+    offset_head: nn.Sequential
     bins: Tensor
     in_range: Tensor
 
     def __init__(self, settings: FastSettings) -> None:
         super().__init__(settings)
         fine, middle, coarse = settings.widths
-        width, bins = settings.feature, settings.high - settings.low + 1
+        self.feature_width = width = settings.feature
+        bins = settings.high - settings.low + 1
         self.encoder = nn.Sequential(
-            _convolution(2, fine, 4, 2),
-            _convolution(fine, middle, 3, 2),
-            _convolution(middle, middle, 3, 1),
-            _convolution(middle, coarse, 3, 2),
-            _convolution(coarse, coarse, 3, 1),
+            _convolution(2, fine, 4, 2), _convolution(fine, middle, 3, 2), _convolution(middle, middle, 3, 1),
+            _convolution(middle, coarse, 3, 2), _convolution(coarse, coarse, 3, 1),
             _convolution(coarse, settings.squeeze, 1, 1),
-        )
-        self.summary = nn.Sequential(
-            nn.Linear(settings.squeeze * 64, width), nn.ReLU(), nn.Linear(width, width), nn.ReLU()
-        )
+        )  # fmt: skip
+        self.summary = nn.Sequential(*_perceptron(settings.squeeze * 64, width, width), nn.ReLU())
         self.id_embedding = nn.Embedding(IDS, width)
         self.number_embedding = nn.Embedding(SLOTS * bins, width)
         self.block_memory = nn.Linear(width, width)
         self.step_lstm = nn.LSTMCell(width, width)
-        self.id_head = nn.Sequential(nn.Linear(2 * width, width), nn.ReLU(), nn.Linear(width, IDS))
+        self.id_head = _perceptron(2 * width, width, IDS)
         self.number_input = nn.Linear(2 * width, width)
         self.number_id = nn.Embedding(IDS, width)
         self.number_slot = nn.Parameter(torch.zeros(SLOTS, width))
         self.number_link = nn.Embedding(SLOTS * bins, width)
-        self.number_head = nn.Sequential(nn.Linear(width, width), nn.ReLU(), nn.Linear(width, bins))
-        self.offset_head = nn.Sequential(nn.Linear(width, width), nn.ReLU(), nn.Linear(width, 1))
+        self.number_head, self.offset_head = _perceptron(width, width, bins), _perceptron(width, width, 1)
         for weight in (*self.offset_head[-1].parameters(), *self.block_memory.parameters()):
             nn.init.zeros_(weight)
         for table in (self.number_embedding, self.number_link):
@@ -115,23 +107,25 @@ class Fast(Generator):
         in_range = (self.bins >= self.low[..., None]) & (self.bins <= self.high[..., None])
         self.register_buffer("in_range", in_range | ~in_range.any(-1, keepdim=True), persistent=False)
 
-    def encode(
-        self, target: Float[Tensor, "B 32 32 32"], canvas: Float[Tensor, "B 32 32 32"], previous: Code, state: Any
-    ) -> tuple[Float[Tensor, "B F"], Any]:
-        """The block feature; the only memory is the block written before."""
-        return self._encode(torch.stack([target, canvas], 1), previous), None
+    def encode(self, target: Grid, canvas: Grid, previous: Code, state: Any) -> tuple[Float[Tensor, "B F"], Any]:
+        """The block feature; the state is the memory."""
+        memory = self._remember(previous) + (0 if state is None else state)
+        return self._encode(torch.stack([target, canvas], 1), memory), memory
 
     def encode_all(self, batch: TeacherForcingBatch) -> Float[Tensor, "M F"]:
         """Features of the live blocks."""
-        previous = Code(batch.previous.ids[batch.live], batch.previous.parameters[batch.live])
-        return self._encode(stack_grids(batch, batch.live, self.bins.dtype), previous)
+        target = batch.target[batch.live.nonzero()[:, 0]]
+        grids = torch.stack([target, unpack(batch.canvases[batch.live])], 1).to(self.bins.dtype)
+        return self._encode(grids, self._remember(batch.previous).cumsum(1)[batch.live])
 
-    def _encode(self, grids: Float[Tensor, "M 2 32 32 32"], previous: Code) -> Float[Tensor, "M F"]:
+    def _encode(self, grids: Float[Tensor, "M 2 32 32 32"], memory: Float[Tensor, "M F"]) -> Float[Tensor, "M F"]:
         cells = self.encoder(grids.contiguous(memory_format=torch.channels_last_3d))
         feature: Tensor = self.summary(cells.flatten(1)).float()
-        nonempty = (previous.ids != 0)[..., None]
-        memory = (self._embed(previous) * nonempty).sum(-2).relu()
         return feature + self.block_memory(memory)
+
+    def _remember(self, block: Code) -> Float[Tensor, "*batch F"]:
+        """What a block adds to the memory; an empty one adds nothing."""
+        return (self._embed(block) * (block.ids != 0)[..., None]).sum(-2).relu()
 
     def _embed(self, step: Code) -> Float[Tensor, "*batch F"]:
         """Embedding of steps: their ids and numbers."""
@@ -144,37 +138,25 @@ class Fast(Generator):
         hidden = torch.cat([state[0], feature], -1)
         return StepOutput(self.legal_logits(self.id_head(hidden), previous, index), hidden, state)
 
-    def numbers(
-        self, hidden: Tensor, ids: Int[Tensor, "*batch"], given: Float[Tensor, "*batch 7"] | None = None
-    ) -> Float[Tensor, "*batch 7"]:
+    def numbers(self, hidden: Tensor, ids: Ids, given: Slots | None = None) -> Slots:
         """The mean of the distribution around its mode; counts and quarter turns are the mode itself."""
         if given is None:
             return self._autoregressive(hidden, ids, None)
         scores = self._scores(self._mixed(hidden, ids, given), self.in_range[ids])
         return self._mode(scores, self.discrete[ids]) * self.used[ids]
 
-    def sample_numbers(
-        self, hidden: Tensor, ids: Int[Tensor, "*batch"], rng: torch.Generator
-    ) -> Float[Tensor, "*batch 7"]:
+    def sample_numbers(self, hidden: Tensor, ids: Ids, rng: torch.Generator) -> Slots:
         """Whole numbers sampled slot by slot."""
         return self._autoregressive(hidden, ids, rng)
 
-    def offsets(
-        self, hidden: Tensor, ids: Int[Tensor, "*batch"], given: Float[Tensor, "*batch 7"]
-    ) -> Float[Tensor, "*batch 7"]:
+    def offsets(self, hidden: Tensor, ids: Ids, given: Slots) -> Slots:
         """Offsets below one cell that keep numbers in their range; none of counts and quarter turns."""
         free = self.used[ids] & ~self.discrete[ids]
         offset = LARGEST_OFFSET * self.offset_head(self._mixed(hidden, ids, given))[..., 0].tanh() * free
         low, high = (self.low[ids] - given).clamp(max=0), (self.high[ids] - given).clamp(min=0)
         return torch.minimum(torch.maximum(offset, low), high)
 
-    def offset_weights(self) -> Iterator[nn.Parameter]:
-        """Weights of the offset head."""
-        yield from self.offset_head.parameters()
-
-    def number_loss(
-        self, hidden: Tensor, ids: Int[Tensor, "*batch"], values: Float[Tensor, "*batch 7"]
-    ) -> Float[Tensor, "*batch 7"]:
+    def number_loss(self, hidden: Tensor, ids: Ids, values: Slots) -> Slots:
         """Cross-entropy to a label smoothed over neighbouring whole values, given the numbers before."""
         log_probs = self._scores(self._mixed(hidden, ids, values), self.in_range[ids]).log_softmax(-1)
         inside = torch.minimum(torch.maximum(values, self.low[ids]), self.high[ids])
@@ -182,9 +164,7 @@ class Fast(Generator):
         label = (-0.5 * ((self.bins - inside[..., None]) / width) ** 2).masked_fill(~self.in_range[ids], -torch.inf)
         return -(label.softmax(-1) * log_probs.clamp(min=-1e4)).sum(-1)
 
-    def _mixed(
-        self, hidden: Tensor, ids: Int[Tensor, "*batch"], given: Float[Tensor, "*batch 7"]
-    ) -> Float[Tensor, "*batch 7 F"]:
+    def _mixed(self, hidden: Tensor, ids: Ids, given: Slots) -> Float[Tensor, "*batch 7 F"]:
         """Features of each slot given the numbers of the slots before it."""
         links = self.number_link(self._row(given)) * self.used[ids][..., None]
         start = self.number_input(hidden) + self.number_id(ids)
@@ -200,9 +180,7 @@ class Fast(Generator):
         mean = (scores.masked_fill(~in_window, -torch.inf).softmax(-1) * self.bins).sum(-1)
         return torch.where(discrete, self.bins[mode[..., 0]], mean)
 
-    def _autoregressive(
-        self, hidden: Tensor, ids: Int[Tensor, "*batch"], rng: torch.Generator | None
-    ) -> Float[Tensor, "*batch 7"]:
+    def _autoregressive(self, hidden: Tensor, ids: Ids, rng: torch.Generator | None) -> Slots:
         """Numbers slot by slot: the mode, or sampled."""
         features = self.number_input(hidden) + self.number_id(ids)
         in_range, used, discrete = self.in_range[ids], self.used[ids], self.discrete[ids]
@@ -226,6 +204,10 @@ class Fast(Generator):
         bins = len(self.bins)
         index = (values.detach().round() - self.settings.low).clamp(0, bins - 1).long()
         return index + bins * (torch.arange(SLOTS, device=values.device) if slot is None else slot)
+
+
+def _perceptron(inputs: int, width: int, outputs: int) -> nn.Sequential:
+    return nn.Sequential(nn.Linear(inputs, width), nn.ReLU(), nn.Linear(width, outputs))
 
 
 def _convolution(inputs: int, outputs: int, kernel: int, stride: int) -> nn.Sequential:

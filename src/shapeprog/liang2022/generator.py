@@ -2,23 +2,24 @@
 
 A generator reads the target and the canvas (what earlier blocks drew) and writes one block of up to J = 3 steps
 (section 4.1 of the paper).  Networks differ in how they encode the two grids and in how they predict numbers.
+
+Shapes: B programs of K blocks, M live blocks of a batch in row order, J steps, V ids, 7 slots for numbers, F features.
 """
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from typing import Any, ClassVar, NamedTuple
 
 import torch
 from jaxtyping import Bool, Float, Int, UInt8
 from torch import Tensor, nn
+from torch.nn.functional import pad
 
-from shapeprog.geometry.cells import unpack
 from shapeprog.language.program import PUBLISHED_DEPTH
-from shapeprog.language.statement import EMPTY, END, SLOTS, Statement, language
+from shapeprog.language.statement import EMPTY, END, SLOTS, language
 from shapeprog.language.tensors import Code
 
 STEPS = PUBLISHED_DEPTH
@@ -27,9 +28,13 @@ STEPS = PUBLISHED_DEPTH
 IDS = END + 1
 """Number of statement ids V."""
 
+Ids = Int[Tensor, "*batch"]
+Slots = Float[Tensor, "*batch 7"]
+Grid = Float[Tensor, "B 32 32 32"]
+
 
 class Vocabulary(NamedTuple):
-    """Tables of the 22 statements of the paper; see :func:`vocabulary`.
+    """Tables of the 22 statements of the paper.
 
     Parameters
     ----------
@@ -59,26 +64,19 @@ def vocabulary() -> Vocabulary:
     used, discrete = (torch.zeros(IDS, SLOTS, dtype=torch.bool) for _ in range(2))
     low, high = (torch.zeros(IDS, SLOTS) for _ in range(2))
     for statement in statements:
-        slots = slice(statement.size)
-        used[statement.id, slots] = True
-        discrete[statement.id, slots] = torch.tensor([quantity.discrete for quantity in statement.quantities])
-        low[statement.id, slots] = torch.tensor([float(quantity.low) for quantity in statement.quantities])
-        high[statement.id, slots] = torch.tensor([float(quantity.high) for quantity in statement.quantities])
+        for slot, quantity in enumerate(statement.quantities):
+            used[statement.id, slot], discrete[statement.id, slot] = True, quantity.discrete
+            low[statement.id, slot], high[statement.id, slot] = quantity.low, quantity.high
+    draws = [statement.id for statement in statements if not statement.is_loop]
+    turning = [statement.id for statement in statements if not statement.is_loop and statement.pivot is not None]
+    translate, rotate = (language()[name].id for name in ("translate", "rotate"))
     legal = torch.zeros(STEPS, IDS + 1, IDS, dtype=torch.bool)
-    draws = [statement for statement in statements if not statement.is_loop]
-    loops = [statement for statement in statements if statement.is_loop]
     legal[0, IDS, [EMPTY, *(statement.id for statement in statements)]] = True
-    legal[1:, [EMPTY, *(statement.id for statement in draws)], EMPTY] = True
-    for outer in loops:
-        inside = [statement for statement in draws if statement.pivot is not None] if _rotates(outer) else draws
-        legal[1:, outer.id, [statement.id for statement in inside]] = True
-        if not _rotates(outer):
-            legal[1:-1, outer.id, [statement.id for statement in loops if not _rotates(statement)]] = True
+    legal[1:, [EMPTY, *draws], EMPTY] = True
+    legal[1:, translate, draws] = True
+    legal[1:-1, translate, translate] = True
+    legal[1:, rotate, turning] = True
     return Vocabulary(used, discrete, low, high, legal)
-
-
-def _rotates(loop: Statement) -> bool:
-    return loop.name == "rotate"
 
 
 @dataclass(frozen=True)
@@ -109,8 +107,7 @@ class TeacherForcingBatch:
         """The same with at most so many live canvases of each shape, drawn at random."""
         scores = torch.rand(self.live.shape, generator=rng, device=rng.device).to(self.live.device)
         rank = scores.masked_fill(~self.live, 2.0).argsort(-1).argsort(-1)
-        live = self.live & (rank < canvases_per_shape)
-        return TeacherForcingBatch(self.target, self.canvases, self.previous, self.code, live)
+        return replace(self, live=self.live & (rank < canvases_per_shape))
 
     def to(self, device: torch.device) -> TeacherForcingBatch:
         """The same on a device."""
@@ -130,27 +127,13 @@ class StepOutput(NamedTuple):
 
 @dataclass(frozen=True)
 class Prediction:
-    """Teacher-forced output for the live blocks of a batch, in row order.
+    """Teacher-forced output for the live blocks of a batch: log-probabilities, and features of numbers and blocks."""
 
-    Parameters
-    ----------
-    batch
-        The input.
-    logits
-        Log-probabilities of the ids.
-    hidden
-        Features that the numbers are read from.
-    feature
-        Features of the blocks.
-    generator
-        The network.
-    """
-
+    generator: Generator
     batch: TeacherForcingBatch
     logits: Float[Tensor, "M J V"]
     hidden: Tensor
     feature: Float[Tensor, "M F"]
-    generator: Generator
 
     @property
     def ids(self) -> Int[Tensor, "M J"]:
@@ -184,9 +167,8 @@ class Prediction:
 
     def number_log_prob(self) -> Float[Tensor, "B K"]:
         """Log-probability of the numbers of each block, for designs that predict a distribution."""
-        used = vocabulary().used.to(self.ids.device)[self.ids]
         nll = self.generator.number_loss(self.hidden, self.ids, self.given)
-        return self.scatter(-(nll * used).sum((-1, -2)))
+        return self.scatter(-(nll * self.generator.used[self.ids]).sum((-1, -2)))
 
     def losses(self) -> dict[str, Float[Tensor, ""]]:
         """Supervised losses of ids and numbers; see :meth:`Generator.losses`."""
@@ -204,25 +186,22 @@ class Generator(nn.Module, ABC):
 
     design: ClassVar[str]
     Settings: ClassVar[Any]
-    has_offsets: ClassVar[bool] = False
-    """Whether it predicts sub-cell offsets of surfaces."""
-
-    def __init__(self, settings: Any) -> None:
-        super().__init__()
-        self.settings = settings
-        for name, table in vocabulary()._asdict().items():
-            self.register_buffer(name, table.clone(), persistent=False)
-
+    feature_width: int
     used: Tensor
     discrete: Tensor
     low: Tensor
     high: Tensor
     legal: Tensor
 
+    def __init__(self, settings: Any) -> None:
+        super().__init__()
+        self.settings = settings
+        self.offset_head: nn.Module | None = None  # of designs that predict offsets
+        for name, table in vocabulary()._asdict().items():
+            self.register_buffer(name, table.clone(), persistent=False)
+
     @abstractmethod
-    def encode(
-        self, target: Float[Tensor, "B 32 32 32"], canvas: Float[Tensor, "B 32 32 32"], previous: Code, state: Any
-    ) -> tuple[Float[Tensor, "B F"], Any]:
+    def encode(self, target: Grid, canvas: Grid, previous: Code, state: Any) -> tuple[Float[Tensor, "B F"], Any]:
         """The feature of the next block, and the state after it; ``state`` is ``None`` before the first.
 
         ``previous`` is the block (B, J) written before, empty before the first.
@@ -237,32 +216,20 @@ class Generator(nn.Module, ABC):
         """Step ``index`` of each block after the step before it (ids (M,), numbers (M, 7)); ``None`` at the first."""
 
     @abstractmethod
-    def numbers(
-        self, hidden: Tensor, ids: Int[Tensor, "*batch"], given: Float[Tensor, "*batch 7"] | None = None
-    ) -> Float[Tensor, "*batch 7"]:
+    def numbers(self, hidden: Tensor, ids: Ids, given: Slots | None = None) -> Slots:
         """Numbers for the ids, with gradient; autoregressive designs condition on ``given`` where it is known."""
 
     @abstractmethod
-    def number_loss(
-        self, hidden: Tensor, ids: Int[Tensor, "*batch"], values: Float[Tensor, "*batch 7"]
-    ) -> Float[Tensor, "*batch 7"]:
+    def number_loss(self, hidden: Tensor, ids: Ids, values: Slots) -> Slots:
         """Supervised loss of each number: negative log-likelihood, or a squared error."""
 
-    def sample_numbers(
-        self, hidden: Tensor, ids: Int[Tensor, "*batch"], rng: torch.Generator
-    ) -> Float[Tensor, "*batch 7"]:
+    def sample_numbers(self, hidden: Tensor, ids: Ids, rng: torch.Generator) -> Slots:
         """Numbers sampled from the predicted distribution; those of ``numbers`` for designs without one."""
         return self.numbers(hidden, ids)
 
-    def offsets(
-        self, hidden: Tensor, ids: Int[Tensor, "*batch"], given: Float[Tensor, "*batch 7"]
-    ) -> Float[Tensor, "*batch 7"]:
+    def offsets(self, hidden: Tensor, ids: Ids, given: Slots) -> Slots:
         """Offsets of the surface from the numbers, with gradient; the canvas is drawn without them."""
         return torch.zeros_like(given)
-
-    def offset_weights(self) -> Iterator[nn.Parameter]:
-        """Weights of the offset head alone."""
-        yield from ()
 
     def legal_logits(self, scores: Float[Tensor, "M V"], previous: Code | None, index: int) -> Float[Tensor, "M V"]:
         """Log-probabilities over the ids that are legal at a step after the previous one."""
@@ -271,15 +238,14 @@ class Generator(nn.Module, ABC):
 
     def predict(self, batch: TeacherForcingBatch) -> Prediction:
         """Teacher forcing: the output for given canvases and programs, with gradient."""
-        feature = self.encode_all(batch)
-        block = Code(batch.code.ids[batch.live], batch.code.parameters[batch.live].detach())
-        return Prediction(batch, *self.steps(feature, block), feature, self)
+        feature, block = self.encode_all(batch), batch.code[batch.live]
+        return Prediction(self, batch, *self.steps(feature, block.having(block.parameters.detach())), feature)
 
     def steps(self, feature: Float[Tensor, "M F"], block: Code) -> tuple[Float[Tensor, "M J V"], Tensor]:
         """Log-probabilities and hidden features of all steps, each after the steps of the block before it."""
         outputs: list[StepOutput] = []
         for j in range(STEPS):
-            previous = Code(block.ids[:, j - 1], block.parameters[:, j - 1]) if j else None
+            previous = block[:, j - 1] if j else None
             outputs.append(self.step(feature, previous, j, outputs[-1].state if outputs else None))
         logits = torch.stack([output.logits for output in outputs], 1)
         return logits, torch.stack([output.hidden for output in outputs], 1)
@@ -299,11 +265,4 @@ def live_blocks(ids: Int[Tensor, "B K J"]) -> Bool[Tensor, "B K"]:
 
 def preceding_blocks(code: Code) -> Code:
     """The block before each block (B, K, J); an empty one before the first."""
-    pad = torch.nn.functional.pad
     return Code(pad(code.ids[:, :-1], (0, 0, 1, 0)), pad(code.parameters[:, :-1], (0, 0, 0, 0, 1, 0)))
-
-
-def stack_grids(batch: TeacherForcingBatch, live: Bool[Tensor, "B K"], dtype: torch.dtype) -> Tensor:
-    """Target and canvas of every live block as two channels (M, 2, 32, 32, 32)."""
-    shape = live.nonzero()[:, 0]
-    return torch.stack([batch.target.to(dtype)[shape], unpack(batch.canvases[live]).to(dtype)], 1)

@@ -18,6 +18,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
@@ -34,9 +35,6 @@ STATE, WEIGHTS, BEST, LOG = "state.pt", "weights.safetensors", "best.safetensors
 
 SAVE_SECONDS = 120.0
 """Time between saved states."""
-
-PREFETCH = 2
-"""Batches made ahead of their step."""
 
 Record = dict[str, float]
 """Values of one step by name, ``step`` and ``samples_seen`` among them."""
@@ -110,31 +108,17 @@ def train(
     together = settings.batch_size * world
     steps, step, best = math.ceil(settings.num_shapes / together), 0, -math.inf
     with _locked(folder, rank == 0):
-        saved = None if restart else _read_state(folder / STATE)
-        if saved is not None:
-            settings.check_resumable(saved["settings"], str(folder))
-            step, best = _restore(saved, module, optimiser, folder / STATE)
+        if (folder / STATE).exists() and not restart:
+            step, best = _resume(folder / STATE, settings, module, optimiser)
         if rank == 0:
             _trim_log(folder / LOG, step)
-
-        def save_state() -> None:
-            content = io.BytesIO()
-            torch.save(
-                {
-                    "module": module.state_dict(), "optimiser": optimiser.state_dict(), "step": step, "best": best,
-                    "settings": settings.to_json(),
-                },
-                content,
-            )  # fmt: skip
-            write_bytes(folder / STATE, content.getvalue())
 
         saved_at = clock = time.monotonic()
         for batch in _prefetch(task.batch, range(step * world + rank, steps * world, world)):
             for group in optimiser.param_groups:
                 group["lr"] = settings.learning_rate_at(step * together)
             rng = _rng(settings.seed, step, rank, where)
-            bf16 = settings.precision == "bf16"
-            with torch.autocast(where.type, dtype=torch.bfloat16) if bf16 else contextlib.nullcontext():
+            with torch.autocast(where.type, torch.bfloat16, enabled=settings.precision == "bf16"):
                 losses = task.losses(batch, step / steps, rng)
             loss = torch.stack([value.float() for name, value in losses.items() if name[0] != "_"]).sum()
             optimiser.zero_grad()
@@ -144,8 +128,6 @@ def train(
             if world > 1:
                 _average([*map(_gradient, weights), *buffers, values])
             norm = float(torch.nn.utils.clip_grad_norm_(weights, settings.clip_norm or math.inf))
-            if settings.clip_value:
-                torch.nn.utils.clip_grad_value_(weights, settings.clip_value)
             total, stopped, *parts = values.tolist()
             if not math.isfinite(total + norm):
                 raise ShapeProgError(
@@ -168,7 +150,7 @@ def train(
                         task.save(folder / BEST, step * together, scores)
                 append_line(folder / LOG, json.dumps({k: v for k, v in record.items() if math.isfinite(v)}))
                 if last or stopped or time.monotonic() - saved_at >= SAVE_SECONDS:
-                    save_state()
+                    _save(folder / STATE, settings, module, optimiser, step, best)
                     saved_at = time.monotonic()
             yield record
             if stopped:
@@ -245,19 +227,14 @@ def _validate(task: Task) -> Record:
 
 
 def _prefetch(make: Callable[[int], Made], indices: Iterable[int]) -> Iterator[Made]:
-    """Batches of indices in order, made in another thread."""
-    waiting: deque[Future[Made]] = deque()
+    """Batches of indices in order; the next is made in another thread."""
     with ThreadPoolExecutor(1) as pool:
-        try:
-            for index in indices:
-                waiting.append(pool.submit(make, index))
-                if len(waiting) > PREFETCH:
-                    yield waiting.popleft().result()
-            while waiting:
-                yield waiting.popleft().result()
-        finally:
-            for future in waiting:
-                future.cancel()
+        coming: deque[Future[Made]] = deque()
+        for index in indices:
+            coming.append(pool.submit(make, index))
+            if len(coming) > 1:
+                yield coming.popleft().result()
+        yield from (batch.result() for batch in coming)
 
 
 @contextlib.contextmanager
@@ -272,27 +249,30 @@ def _locked(folder: Path, writes: bool) -> Iterator[None]:
         yield
 
 
-def _read_state(path: Path) -> dict[str, Any] | None:
-    """The state of a run, by torch's reader that runs no code; ``None`` where there is none."""
-    if not path.exists():
-        return None
+def _save(
+    path: Path, settings: TrainingSettings, module: nn.Module, optimiser: torch.optim.Optimizer, step: int, best: float
+) -> None:
+    content, progress = io.BytesIO(), {"settings": asdict(settings), "step": step, "best": best}
+    torch.save({"module": module.state_dict(), "optimiser": optimiser.state_dict(), **progress}, content)
+    write_bytes(path, content.getvalue())
+
+
+def _resume(
+    path: Path, settings: TrainingSettings, module: nn.Module, optimiser: torch.optim.Optimizer
+) -> tuple[int, float]:
+    """Load the state of a run, by torch's reader that runs no code; its step and best score."""
     try:
         state = torch.load(path, map_location="cpu", weights_only=True)
-        return {name: state[name] for name in ("module", "optimiser", "step", "best", "settings")}
+        saved, step, best = state["settings"], int(state["step"]), float(state["best"])
     except Exception as error:  # no list of what torch raises for a damaged file
         raise InputError(f"{path} is damaged", "start over with --restart") from error
-
-
-def _restore(
-    saved: dict[str, Any], module: nn.Module, optimiser: torch.optim.Optimizer, path: Path
-) -> tuple[int, float]:
-    """Take over a saved state; its step and best score."""
+    settings.check_resumable(saved, str(path.parent))
     try:
-        module.load_state_dict(saved["module"])
-        optimiser.load_state_dict(saved["optimiser"])
-        return int(saved["step"]), float(saved["best"])
+        module.load_state_dict(state["module"])
+        optimiser.load_state_dict(state["optimiser"])
     except Exception as error:  # no list of what torch raises for a state that does not fit
         raise InputError(f"{path} does not fit the network, or is damaged", "start over with --restart") from error
+    return step, best
 
 
 def _trim_log(path: Path, step: int) -> None:

@@ -14,7 +14,7 @@ from shapeprog.liang2022.generator import Generator, TeacherForcingBatch
 from shapeprog.liang2022.loop import Record
 from shapeprog.liang2022.prior import SyntheticStream, prior
 from shapeprog.liang2022.settings import PretrainSettings
-from shapeprog.liang2022.teacher import supervised_losses, teacher_forcing
+from shapeprog.liang2022.teacher import scheduled_sampling, teacher_forcing
 from shapeprog.liang2022.weights import build_generator, load_generator, save_weights
 
 VALIDATION_BATCHES = 4
@@ -44,11 +44,14 @@ class PretrainTask:
 
     def losses(self, batch: TeacherForcingBatch, progress: float, rng: torch.Generator) -> dict[str, Tensor]:
         """Losses of ids and numbers."""
-        settings = self._settings
-        losses = supervised_losses(
-            self.module, batch.to(rng.device), canvases_per_shape=settings.canvases_per_shape, rng=rng,
-            scheduled_sampling_prob=settings.scheduled_sampling * min(1.0, 2 * progress),
-        )  # fmt: skip
+        settings, batch = self._settings, batch.to(rng.device)
+        if float(torch.rand((), generator=rng, device=rng.device)) < settings.scheduled_sampling * min(
+            1.0, 2 * progress
+        ):
+            batch = scheduled_sampling(self.module, batch, rng)
+        if settings.canvases_per_shape:
+            batch = batch.subset(settings.canvases_per_shape, rng)
+        losses = self.module.predict(batch).losses()
         return {"ids": losses["ids"], "numbers": settings.number_weight * losses["numbers"]}
 
     def validate(self) -> Record:
@@ -80,5 +83,5 @@ def teacher_forcing_scores(generator: Generator, batches: list[TeacherForcingBat
         right += float((prediction.logits.argmax(-1) == prediction.ids).sum())
         error += float(((prediction.numbers - prediction.given).abs() * used).sum())
         steps, slots = steps + prediction.ids.numel(), slots + float(used.sum())
-        overlaps.append(decode_all(generator, batch.target, decoder="argmax").iou(batch.target))
+        overlaps.append(decode_all(generator, batch.target, decoder="argmax").iou())
     return {"ids": right / steps, "numbers": error / slots, "iou": float(torch.cat(overlaps).mean())}

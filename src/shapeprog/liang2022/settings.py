@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, field
 from typing import Any, ClassVar, Literal, get_args, get_origin, get_type_hints
 
 from shapeprog.errors import ShapeProgError
@@ -16,229 +16,125 @@ NEURAL = "neural"
 """Reserved name of the loss through the neural executor, which compares predictions and not scenes."""
 
 
+def option(default: Any, meaning: str) -> Any:
+    """A field of settings with its meaning, which is the help of its option on the command line."""
+    return field(default=default, metadata={"help": meaning})
+
+
 @dataclass(frozen=True, kw_only=True)
 class TrainingSettings:
-    """Settings of every kind of training.
+    """Settings of every kind of training."""
 
-    Parameters
-    ----------
-    num_shapes
-        Shapes to learn from.
-    batch_size
-        Shapes of one step in each process.
-    learning_rate
-        Largest learning rate of Adam.
-    schedule
-        cosine: to zero at the end; constant.
-    warm_up
-        Shapes over which the learning rate rises from zero.
-    weight_decay
-        Decoupled weight decay.
-    beta1
-        Decay rate of the first moment of Adam; that of the second is 0.999.
-    clip_norm
-        Bound of the norm of the gradient; 0 for none.
-    clip_value
-        Bound of each element of the gradient; 0 for none.
-    precision
-        float32, or bf16 for convolutions and matrix products.
-    seed
-        Seed of the initial weights, the data and every sample.
-    validate_every
-        Shapes between validations; 0 for one at the end.
-    """
+    num_shapes: int = option(100_000, "Shapes to learn from.")
+    batch_size: int = option(32, "Shapes of one step in each process.")
+    learning_rate: float = option(1e-3, "Largest learning rate of Adam; it falls to zero by half a cosine.")
+    warm_up: int = option(0, "Shapes over which the learning rate rises from zero.")
+    weight_decay: float = option(0.0, "Decoupled weight decay.")
+    beta1: float = option(0.9, "Decay rate of the first moment of Adam; that of the second is 0.999.")
+    clip_norm: float = option(0.0, "Bound of the norm of the gradient; 0 for none.")
+    precision: Literal["float32", "bf16"] = option("float32", "float32, or bf16 for convolutions and matrix products.")
+    seed: int = option(0, "Seed of the initial weights, the data and every sample.")
+    validate_every: int = option(0, "Shapes between validations; 0 for one at the end.")
 
-    num_shapes: int = 100_000
-    batch_size: int = 32
-    learning_rate: float = 1e-3
-    schedule: Literal["cosine", "constant"] = "cosine"
-    warm_up: int = 0
-    weight_decay: float = 0.0
-    beta1: float = 0.9
-    clip_norm: float = 0.0
-    clip_value: float = 0.0
-    precision: Literal["float32", "bf16"] = "float32"
-    seed: int = 0
-    validate_every: int = 0
-
-    MAY_CHANGE: ClassVar[frozenset[str]] = frozenset({"num_shapes", "validate_every"})
+    MAY_CHANGE: ClassVar[frozenset[str]] = frozenset({"num_shapes", "validate_every", "val"})
     """Settings that a resumed run may change."""
 
     def __post_init__(self) -> None:
         hints = get_type_hints(type(self))
-        for field in fields(self):
-            value = getattr(self, field.name)
-            if get_origin(hints[field.name]) is Literal and value not in get_args(hints[field.name]):
-                choices = ", ".join(get_args(hints[field.name]))
-                raise ShapeProgError(f"unknown {field.name} {value!r}", f"choose one of {choices}")
+        for name, value in asdict(self).items():
+            if get_origin(hints[name]) is Literal and value not in get_args(hints[name]):
+                raise ShapeProgError(f"unknown {name} {value!r}", f"choose one of {', '.join(get_args(hints[name]))}")
             if isinstance(value, (int, float)) and not (math.isfinite(value) and value >= 0):
-                raise ShapeProgError(f"{field.name} is {value}", "give a number that is not negative")
-        for name in ("num_shapes", "batch_size"):
-            if getattr(self, name) < 1:
-                raise ShapeProgError(f"{name} is {getattr(self, name)}", "give 1 or more")
+                raise ShapeProgError(f"{name} is {value}", "give a number that is not negative")
+            if name in ("num_shapes", "batch_size") and value < 1:
+                raise ShapeProgError(f"{name} is {value}", "give 1 or more")
 
     def learning_rate_at(self, samples_seen: int) -> float:
         """Learning rate after so many shapes."""
         if samples_seen < self.warm_up:
             return self.learning_rate * (samples_seen + 1) / self.warm_up
-        if self.schedule == "constant":
-            return self.learning_rate
         progress = min(1.0, (samples_seen - self.warm_up) / max(1, self.num_shapes - self.warm_up))
         return self.learning_rate * 0.5 * (1 + math.cos(math.pi * progress))
 
-    def to_json(self) -> dict[str, Any]:
-        """All settings as JSON."""
-        return {name: list(value) if isinstance(value, tuple) else value for name, value in asdict(self).items()}
-
     def check_resumable(self, saved: Mapping[str, Any], folder: str) -> None:
         """Raise a ``ShapeProgError`` that names the settings which differ from those of a saved run."""
-        current = self.to_json()
-        changed = [name for name in current if name not in self.MAY_CHANGE and saved.get(name) != current[name]]
+        current = {name: value for name, value in asdict(self).items() if name not in self.MAY_CHANGE}
+        changed = [f"{k} was {saved.get(k)!r}, is now {v!r}" for k, v in current.items() if saved.get(k) != v]
         if changed:
-            detail = "; ".join(f"{name} was {saved.get(name)!r}, is now {current[name]!r}" for name in changed)
             raise ShapeProgError(
-                f"the run in {folder} has other settings: {detail}",
+                f"the run in {folder} has other settings: {'; '.join(changed)}",
                 "give the same settings, choose another folder, or start over with --restart",
             )
 
 
 @dataclass(frozen=True, kw_only=True)
 class PretrainSettings(TrainingSettings):
-    """Settings of supervised pretraining on synthetic shapes.
+    """Settings of supervised pretraining on synthetic shapes."""
 
-    Parameters
-    ----------
-    design
-        Network: fast or tian2019.
-    prior
-        Synthetic shapes: narrow (the published ones) or wide.
-    initial
-        Weights to start from; random ones by default.
-    order
-        Order of the blocks: coverage or written.
-    canvases_per_shape
-        Canvases learned from in each shape, drawn at random; 0 for all.
-    scheduled_sampling
-        Probability of canvases that the generator draws itself, reached halfway.
-    number_weight
-        Weight of the loss of numbers against that of ids.
-    val
-        Packs of real shapes to validate on.
-    """
-
-    batch_size: int = 48
-    learning_rate: float = 2e-3
-    warm_up: int = 4800
-    weight_decay: float = 0.01
-    clip_norm: float = 1.0
-    validate_every: int = 20_000
-    design: Literal["fast", "tian2019"] = "fast"
-    prior: Literal["narrow", "wide"] = "narrow"
-    initial: str = ""
-    order: Literal["coverage", "written"] = "coverage"
-    canvases_per_shape: int = 3
-    scheduled_sampling: float = 0.3
-    number_weight: float = 1.0
-    val: tuple[str, ...] = ()
-
-    MAY_CHANGE = TrainingSettings.MAY_CHANGE | {"val"}
+    num_shapes: int = option(45_000, "Shapes to learn from.")
+    batch_size: int = option(24, "Shapes of one step in each process.")
+    learning_rate: float = option(2e-3, "Largest learning rate of Adam; it falls to zero by half a cosine.")
+    warm_up: int = option(2400, "Shapes over which the learning rate rises from zero.")
+    weight_decay: float = option(0.01, "Decoupled weight decay.")
+    clip_norm: float = option(1.0, "Bound of the norm of the gradient; 0 for none.")
+    validate_every: int = option(15_000, "Shapes between validations; 0 for one at the end.")
+    design: Literal["fast", "tian2019"] = option("fast", "Network: fast or tian2019.")
+    prior: Literal["narrow", "wide"] = option("narrow", "Synthetic shapes: narrow (the published ones) or wide.")
+    initial: str = option("", "Weights to start from; random ones by default.")
+    order: Literal["coverage", "written"] = option("coverage", "Order of the blocks: coverage or written.")
+    canvases_per_shape: int = option(3, "Canvases learned from in each shape, drawn at random; 0 for all.")
+    scheduled_sampling: float = option(0.3, "Probability of canvases that the generator draws, reached halfway.")
+    number_weight: float = option(1.0, "Weight of the loss of numbers against that of ids.")
+    val: tuple[str, ...] = option((), "Packs of real shapes to validate on.")
 
 
 @dataclass(frozen=True, kw_only=True)
 class ExecutorSettings(TrainingSettings):
-    """Settings of the neural executor's training; a shape is one block.
+    """Settings of the neural executor's training; a shape is one block."""
 
-    Parameters
-    ----------
-    prior
-        Synthetic shapes whose blocks are drawn.
-    widened
-        Share of the blocks whose numbers are moved at random.
-    """
-
-    num_shapes: int = 120_000
-    batch_size: int = 16
-    learning_rate: float = 3e-3
-    warm_up: int = 3200
-    beta1: float = 0.5
-    validate_every: int = 20_000
-    prior: Literal["narrow", "wide"] = "narrow"
-    widened: float = 0.5
+    num_shapes: int = option(200_000, "Shapes to learn from.")
+    batch_size: int = option(16, "Shapes of one step in each process.")
+    learning_rate: float = option(3e-3, "Largest learning rate of Adam; it falls to zero by half a cosine.")
+    warm_up: int = option(3200, "Shapes over which the learning rate rises from zero.")
+    beta1: float = option(0.5, "Decay rate of the first moment of Adam; that of the second is 0.999.")
+    validate_every: int = option(20_000, "Shapes between validations; 0 for one at the end.")
+    prior: Literal["narrow", "wide"] = option("narrow", "Synthetic shapes whose blocks are drawn.")
+    widened: float = option(0.5, "Share of the blocks whose numbers are moved at random.")
 
 
 @dataclass(frozen=True, kw_only=True)
 class AdaptSettings(TrainingSettings):
-    """Settings of adaptation to real shapes.
+    """Settings of adaptation to real shapes."""
 
-    Parameters
-    ----------
-    train
-        Packs of the shapes to adapt to.
-    val
-        Packs to validate on.
-    initial
-        Weights to start from: a file or the name of weights that ship.
-    loss
-        Losses and weights, such as chamfer=1,occupancy=0.3.
-    executor
-        Weights of the neural executor, for the loss neural.
-    learn
-        all weights; offsets: the sub-cell offsets alone, a shortcut that is not the paper's.
-    decoder
-        How programs are written in training: argmax, novel or select.
-    decoded_ids
-        Weight of the cross-entropy to the ids of the decoded programs, as in self-training.
-    kl
-        Weight of the KL divergence of the ids from those of the initial weights.
-    rehearsal
-        Synthetic shapes in every step, so that pretraining is not forgotten.
-    prior
-        Where these come from.
-    estimator
-        Gradient estimator of the ids: none, nvil or rloo.
-    estimator_weight
-        Weight of its loss.
-    num_samples
-        Programs that rloo samples for each shape.
-    points
-        Points on each surface in one step.
-    select_by
-        What the best weights have on the validation packs: cd or iou.
-    val_decoder
-        How programs are written in validation.
-    """
-
-    num_shapes: int = 1_600
-    batch_size: int = 16
-    learning_rate: float = 3e-4
-    warm_up: int = 160
-    clip_norm: float = 1.0
-    train: tuple[str, ...] = ()
-    val: tuple[str, ...] = ()
-    initial: str = "fast-wide"
-    loss: str = "chamfer"
-    executor: str = "executor"
-    learn: Literal["all", "offsets"] = "all"
-    decoder: Literal["argmax", "novel", "select"] = "select"
-    decoded_ids: float = 1.0
-    kl: float = 0.0
-    rehearsal: int = 8
-    prior: Literal["narrow", "wide"] = "wide"
-    estimator: Literal["none", "nvil", "rloo"] = "none"
-    estimator_weight: float = 1.0
-    num_samples: int = 4
-    points: int = 1000
-    select_by: Literal["cd", "iou"] = "cd"
-    val_decoder: Literal["argmax", "novel", "select"] = "novel"
-
-    MAY_CHANGE = TrainingSettings.MAY_CHANGE | {"val", "select_by", "val_decoder"}
+    num_shapes: int = option(1_600, "Shapes to learn from.")
+    batch_size: int = option(16, "Shapes of one step in each process.")
+    learning_rate: float = option(3e-4, "Largest learning rate of Adam; it falls to zero by half a cosine.")
+    warm_up: int = option(160, "Shapes over which the learning rate rises from zero.")
+    clip_norm: float = option(1.0, "Bound of the norm of the gradient; 0 for none.")
+    train: tuple[str, ...] = option((), "Packs of the shapes to adapt to.")
+    val: tuple[str, ...] = option((), "Packs to validate on; the best weights have the least CD there.")
+    initial: str = option("fast-wide", "Weights to start from: a file or the name of weights that ship.")
+    loss: str = option("chamfer", "Losses and weights, such as chamfer=1,soft_iou=3.")
+    executor: str = option("executor", "Weights of the neural executor, for the loss neural.")
+    learn: Literal["all", "offsets"] = option(
+        "all", "all weights, or offsets alone: a shortcut that is not the paper's."
+    )
+    decoder: Literal["argmax", "novel", "select"] = option(
+        "select", "How programs are written in training and validation: argmax, novel or select."
+    )
+    decoded_ids: float = option(1.0, "Weight of the cross-entropy to the ids of the decoded programs (self-training).")
+    kl: float = option(0.0, "Weight of the KL divergence of the ids from those of the initial weights.")
+    rehearsal: int = option(8, "Synthetic shapes in every step, so that pretraining is not forgotten.")
+    prior: Literal["narrow", "wide"] = option("wide", "Where these come from.")
+    estimator: Literal["none", "nvil", "rloo"] = option(
+        "none", "Gradient estimator of the ids: none, nvil, or rloo with four programs sampled for each shape."
+    )
+    points: int = option(1000, "Points on each surface in one step.")
 
     def __post_init__(self) -> None:
         super().__post_init__()
         if not self.train:
             raise ShapeProgError("there are no shapes to adapt to", "give a pack: --train bench_train.npz")
-        if self.estimator == "rloo" and self.num_samples < 2:
-            raise ShapeProgError("rloo needs two samples or more", "give --num-samples 4")
         if self.learn == "offsets" and self.estimator != "none":
             raise ShapeProgError("ids cannot learn where offsets alone do", "use --learn all")
 

@@ -12,6 +12,7 @@ from typing import Literal
 import torch
 from jaxtyping import Bool, Int, UInt8
 from torch import Tensor
+from torch.nn.functional import pad
 
 from shapeprog.geometry.cells import count, preceding
 from shapeprog.language.tensors import Code
@@ -23,22 +24,16 @@ Order = Literal["coverage", "written"]
 
 
 def teacher_forcing(target: UInt8[Tensor, "B 32 32 32"], code: Code, order: Order = "coverage") -> TeacherForcingBatch:
-    """Programs on the canvases that their own blocks leave; room for the end is added after the last block.
+    """Whole-numbered programs (B, K, J) of targets on the canvases that their own blocks leave, followed by their end.
 
-    Parameters
-    ----------
-    target
-        Cells to rebuild.
-    code
-        Programs (B, K, J) in whole numbers.
-    order
-        ``coverage`` sorts the blocks and drops those that add nothing; ``written`` keeps them.
+    The order of ``coverage`` drops blocks that add nothing; blocks as ``written`` all stay.
     """
-    code = _with_end(code)
+    code = Code(pad(code.ids, (0, 0, 0, 1)), pad(code.parameters, (0, 0, 0, 0, 0, 1)))
     drawn = draw_blocks(code)
+    canvases = preceding(drawn)
     if order == "coverage":
-        code, drawn = _by_coverage(code, drawn)
-    return TeacherForcingBatch(target, preceding(drawn), preceding_blocks(code), code, live_blocks(code.ids))
+        code, canvases = _by_coverage(code, drawn)
+    return TeacherForcingBatch(target, canvases, preceding_blocks(code), code, live_blocks(code.ids))
 
 
 def scheduled_sampling(generator: Generator, batch: TeacherForcingBatch, rng: torch.Generator) -> TeacherForcingBatch:
@@ -46,50 +41,21 @@ def scheduled_sampling(generator: Generator, batch: TeacherForcingBatch, rng: to
     training = generator.training
     decoded = decode(generator.eval(), batch.target, blocks=batch.code.ids.shape[1], decoder="sample", rng=rng)
     generator.train(training)
-    block, enough = _best(draw_blocks(batch.code), decoded.canvases)
-    end = torch.full_like(block, batch.code.ids.shape[1] - 1)
-    code = _take(batch.code, torch.where(enough, block, end))
-    live = live_blocks(decoded.drawn.ids)
-    return TeacherForcingBatch(batch.target, decoded.canvases, preceding_blocks(decoded.drawn), code, live)
-
-
-def supervised_losses(
-    generator: Generator,
-    batch: TeacherForcingBatch,
-    *,
-    scheduled_sampling_prob: float,
-    canvases_per_shape: int,
-    rng: torch.Generator,
-) -> dict[str, Tensor]:
-    """Losses of ids and numbers on the canvases of the program, or by chance on the generator's own.
-
-    Parameters
-    ----------
-    scheduled_sampling_prob
-        Probability of the generator's own canvases, for the whole batch.
-    canvases_per_shape
-        Canvases learned from in each shape, drawn at random; 0 for all.
-    """
-    if float(torch.rand((), generator=rng, device=rng.device)) < scheduled_sampling_prob:
-        batch = scheduled_sampling(generator, batch, rng)
-    if canvases_per_shape:
-        batch = batch.subset(canvases_per_shape, rng)
-    return generator.predict(batch).losses()
+    code = _take(batch.code, *_best(draw_blocks(batch.code), decoded.canvases))
+    live = live_blocks(decoded.code.ids)
+    return TeacherForcingBatch(batch.target, decoded.canvases, preceding_blocks(decoded.code), code, live)
 
 
 def _by_coverage(code: Code, drawn: Int[Tensor, "B K 32 32"]) -> tuple[Code, Int[Tensor, "B K 32 32"]]:
-    """Programs with their blocks in order of coverage, and the cells of each; blocks that add nothing are emptied."""
-    canvas = torch.zeros_like(drawn[:, :1])
-    order = []
-    for _ in range(code.ids.shape[1]):
-        block, enough = _best(drawn, canvas)
-        order.append(torch.where(enough, block, -1))
+    """Blocks in order of coverage, emptied where they add nothing, and the canvas before each."""
+    canvas, canvases, blocks, added = torch.zeros_like(drawn[:, :1]), [], [], []
+    for _ in range(drawn.shape[1]):
+        block, adds = _best(drawn, canvas)
+        canvases.append(canvas)
+        blocks.append(block)
+        added.append(adds)
         canvas = canvas | drawn.gather(1, block[..., None, None].expand_as(canvas))
-    index = torch.cat(order, 1)
-    written, index = index >= 0, index.clamp(min=0)
-    ordered = _take(code, index)
-    cells = drawn.gather(1, index[..., None, None].expand_as(drawn)) * written[..., None, None]
-    return Code(ordered.ids * written[..., None], ordered.parameters * written[..., None, None]), cells
+    return _take(code, torch.cat(blocks, 1), torch.cat(added, 1)), torch.cat(canvases, 1)
 
 
 def _best(
@@ -103,11 +69,7 @@ def _best(
     return block, new.gather(-1, block[..., None])[..., 0] > 0
 
 
-def _with_end(code: Code) -> Code:
-    pad = torch.nn.functional.pad
-    return Code(pad(code.ids, (0, 0, 0, 1)), pad(code.parameters, (0, 0, 0, 0, 0, 1)))
-
-
-def _take(code: Code, block: Int[Tensor, "B L"]) -> Code:
+def _take(code: Code, block: Int[Tensor, "B L"], keep: Bool[Tensor, "B L"]) -> Code:
+    """Blocks of programs in another order, emptied where not kept."""
     row = torch.arange(len(block), device=block.device)[:, None]
-    return Code(code.ids[row, block], code.parameters[row, block])
+    return Code(code.ids[row, block] * keep[..., None], code.parameters[row, block] * keep[..., None, None])

@@ -2,7 +2,7 @@
 
 A 3D convolutional encoder reads target and canvas, a block LSTM runs from block to block and a step LSTM from step to
 step; heads on the latter give the ids and, for each id, a row of numbers.  Layers and weight names are those of the
-published network, so its checkpoints load.  Departures are settings, see :class:`Tian2019Settings`.
+published network, so its checkpoints load.  For departures see :class:`Tian2019Settings`.
 """
 
 from __future__ import annotations
@@ -12,13 +12,13 @@ from typing import Any
 
 import torch
 import torch.nn.functional as F
-from jaxtyping import Float, Int
+from jaxtyping import Float
 from torch import Tensor, nn
 
 from shapeprog.geometry.cells import unpack
 from shapeprog.language.statement import EMPTY, SLOTS
 from shapeprog.language.tensors import Code
-from shapeprog.liang2022.generator import IDS, Generator, Prediction, StepOutput, TeacherForcingBatch
+from shapeprog.liang2022.generator import IDS, Generator, Grid, Ids, Prediction, Slots, StepOutput, TeacherForcingBatch
 
 WIDTH = 64
 """Width of the feature, of both LSTMs and of the heads."""
@@ -36,37 +36,24 @@ MOMENTUM = 0.02
 
 @dataclass(frozen=True)
 class Tian2019Settings:
-    """Departures from the published network; the defaults are ours, ``PUBLISHED`` is the original.
+    """Whether to depart from the published network.
 
     Parameters
     ----------
-    running_statistics
-        Normalise by running statistics in evaluation.  The published network uses those of the batch, so that a
-        prediction depends on the other shapes in it.
-    legal
-        Give ids that no legal block has at a step zero probability.
-    padding, unused
-        Weights of empty steps, and of numbers that a statement does not use, in the losses.
+    published
+        As published: normalise by the statistics of the batch in evaluation too, so that a prediction depends on the
+        other shapes in it; allow illegal blocks, which draw nothing; weigh empty steps and unused numbers by .1 in the
+        losses.  Otherwise running statistics, legal blocks, and weights of 1 for empty steps and 0 for unused numbers.
     """
 
-    running_statistics: bool = True
-    legal: bool = True
-    padding: float = 1.0
-    unused: float = 0.0
+    published: bool = False
 
 
-PUBLISHED = Tian2019Settings(running_statistics=False, legal=False, padding=0.1, unused=0.1)
-"""The network and its loss as published."""
+PUBLISHED = Tian2019Settings(published=True)
 
 
 class ShapeEncoder(nn.Module):
-    """Eight convolutions with batch norm and ReLU, the mean over the last 4^3 cells, and a linear layer.
-
-    Parameters
-    ----------
-    running_statistics
-        Keep running statistics and evaluate with them.
-    """
+    """Eight convolutions with batch norm and ReLU, the mean over the last 4^3 cells, and a linear layer."""
 
     def __init__(self, running_statistics: bool) -> None:
         super().__init__()
@@ -79,17 +66,12 @@ class ShapeEncoder(nn.Module):
             self.add_module(f"BN{n}", norm)
         self.fc = nn.Linear(LAYERS[-1][1], WIDTH)
 
-    def forward(self, grids: Float[Tensor, "M 2 32 32 32"]) -> Float[Tensor, "M 64"]:
-        """Features of target and canvas."""
-        return self.features(self.convolve(1, grids))
-
     def convolve_grid(self, grid: Float[Tensor, "M 32 32 32"], channel: int) -> Float[Tensor, "M 16 32 32 32"]:
         """The first convolution of target or canvas alone: that of the target is the same for all canvases."""
         # A single channel must be last in memory, or torch takes the grids and all that follows for channels first.
-        return self.convolve(1, grid[..., None].movedim(-1, 1), slice(channel, channel + 1))
+        return self._convolve(1, grid[..., None].movedim(-1, 1), slice(channel, channel + 1))
 
-    def convolve(self, n: int, value: Tensor, channels: slice = slice(None)) -> Tensor:
-        """Convolution ``n`` of some input channels, without its bias."""
+    def _convolve(self, n: int, value: Tensor, channels: slice = slice(None)) -> Tensor:
         convolution = self.get_submodule(f"conv{n}")
         assert isinstance(convolution, nn.Conv3d)
         value = value.contiguous(memory_format=torch.channels_last_3d)
@@ -98,7 +80,7 @@ class ShapeEncoder(nn.Module):
     def features(self, value: Float[Tensor, "M 16 32 32 32"]) -> Float[Tensor, "M 64"]:
         """Features from the output of the first convolution."""
         for n in range(1, len(LAYERS) + 1):
-            value = F.relu(self.get_submodule(f"BN{n}")(value if n == 1 else self.convolve(n, value)), inplace=True)
+            value = F.relu(self.get_submodule(f"BN{n}")(value if n == 1 else self._convolve(n, value)), inplace=True)
         return F.relu(self.fc(value.mean((2, 3, 4))))
 
 
@@ -133,16 +115,15 @@ class Tian2019(Generator):
 
     design = "tian2019"
     Settings = Tian2019Settings
+    feature_width = WIDTH
 
     def __init__(self, settings: Tian2019Settings) -> None:
         super().__init__(settings)
-        self.shape_feat = ShapeEncoder(settings.running_statistics)
+        self.shape_feat = ShapeEncoder(running_statistics=not settings.published)
         self.core = nn.LSTM(WIDTH, WIDTH, bias=False, batch_first=True)
         self.inner_net = StepNet()
 
-    def encode(
-        self, target: Float[Tensor, "B 32 32 32"], canvas: Float[Tensor, "B 32 32 32"], previous: Code, state: Any
-    ) -> tuple[Float[Tensor, "B 64"], Any]:
+    def encode(self, target: Grid, canvas: Grid, previous: Code, state: Any) -> tuple[Float[Tensor, "B 64"], Any]:
         """The block feature; the state holds the first convolution of the target and that of the block LSTM."""
         encoder = self.shape_feat
         of_target = encoder.convolve_grid(target, 0) if state is None else state[0]
@@ -170,28 +151,24 @@ class Tian2019(Generator):
         scores = net.logit2(net.logit1(state[0]).relu())
         inputs = torch.cat([scores.detach().softmax(-1), net.regress1(state[0]).relu()], -1)
         rows = net.regress2(inputs).unflatten(-1, (IDS, SLOTS))
-        logits = self.legal_logits(scores, previous, index) if self.settings.legal else scores.log_softmax(-1)
+        logits = scores.log_softmax(-1) if self.settings.published else self.legal_logits(scores, previous, index)
         return StepOutput(logits, rows, state)
 
-    def numbers(
-        self, hidden: Tensor, ids: Int[Tensor, "*batch"], given: Float[Tensor, "*batch 7"] | None = None
-    ) -> Float[Tensor, "*batch 7"]:
+    def numbers(self, hidden: Tensor, ids: Ids, given: Slots | None = None) -> Slots:
         """The row of each id."""
         return hidden.gather(-2, ids[..., None, None].expand(*ids.shape, 1, SLOTS))[..., 0, :]
 
-    def number_loss(
-        self, hidden: Tensor, ids: Int[Tensor, "*batch"], values: Float[Tensor, "*batch 7"]
-    ) -> Float[Tensor, "*batch 7"]:
+    def number_loss(self, hidden: Tensor, ids: Ids, values: Slots) -> Slots:
         """Half the squared error; the target of an unused slot is zero."""
         return 0.5 * (self.numbers(hidden, ids) - values * self.used[ids]) ** 2
 
     def losses(self, prediction: Prediction) -> dict[str, Float[Tensor, ""]]:
         """The published losses: weighted means over steps and over numbers."""
-        ids = prediction.ids
+        ids, published = prediction.ids, self.settings.published
         nll = -prediction.logits.gather(-1, ids[..., None])[..., 0]
-        steps = torch.where(ids == EMPTY, self.settings.padding, 1.0)
+        steps = torch.where(ids == EMPTY, 0.1 if published else 1.0, 1.0)
         off = self.number_loss(prediction.hidden, ids, prediction.given)
-        slots = torch.where(self.used[ids], 1.0, self.settings.unused)
+        slots = torch.where(self.used[ids], 1.0, 0.1 if published else 0.0)
         return {
             "ids": (nll * steps).sum() / steps.sum().clamp(min=1e-6),
             "numbers": (off * slots).sum() / slots.sum().clamp(min=1e-6),

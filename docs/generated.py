@@ -9,6 +9,7 @@ from typing import Any
 import typer
 
 from shapeprog.cli.app import app
+from shapeprog.cli.help import help_record
 from shapeprog.language import Statement, language
 from shapeprog.language.parameters import Parameter
 from shapeprog.language.statement import END
@@ -61,7 +62,7 @@ def _command(command: Any, context: Any) -> Iterator[str]:
     for paragraph in command.help.split("\n\n"):
         example = re.fullmatch(r"Examples?:\s*(.*)", paragraph, re.DOTALL)
         yield f"```sh\n{' '.join(example[1].split())}\n```\n" if example else f"{_plain(paragraph)}\n"
-    records = [option.get_help_record(context) for option in command.get_params(context) if option.name != "help"]
+    records = [help_record(option, context) for option in command.get_params(context) if option.name != "help"]
     rows = [(f"`{names}`", _plain(text)) for names, text in records]
     yield from _table("argument or option", "meaning", rows=rows) if rows else ()
     for name in command.list_commands(context) if hasattr(command, "list_commands") else ():

@@ -219,6 +219,7 @@ def test_export_sets_the_numbers_that_have_names(run: Run, tmp_path: Path, chang
         ("width=x", "'x' is not a number"),
         ("width/=0", "divides by zero"),
         ("n=1.5", "must be whole"),
+        ("width=-3", "width would be -3"),
     ],
 )
 def test_changes_that_cannot_be_made_are_told(run: Run, tmp_path: Path, change: str, words: str):
@@ -226,6 +227,14 @@ def test_changes_that_cannot_be_made_are_told(run: Run, tmp_path: Path, change: 
     for command in (["export", "legs.shape", "a.stl"], ["render", "legs.shape", "a.png"], ["show", "legs.shape"]):
         ended = run(*command, "--set", change)
         assert (ended.code, words in ended.err) == (2, True), ended.err
+
+
+@pytest.mark.parametrize("words", ["width 14", "width = 14", "width =14", "width= 14"])
+def test_a_change_with_spaces_is_proposed_without(run: Run, tmp_path: Path, words: str):
+    (tmp_path / "legs.shape").write_text(NAMED)
+    for command in (["export", "legs.shape", "a.stl"], ["show", "legs.shape"]):
+        ended = run(*command, "--set", *words.split())
+        assert (ended.code, "write --set width=14" in ended.err) == (2, True), ended.err
 
 
 def test_export_replaces_no_other_program(run: Run, tmp_path: Path, program: Path):
@@ -331,8 +340,9 @@ def test_evaluate_measures_programs_and_meshes_alike(run: Run, tmp_path: Path, p
         assert found[kind]["f1"] > 0.95
     assert (found["programs"]["blocks"], found["meshes"]["blocks"]) == (2, 0)
     shown = run("evaluate", "programs", "targets", "--each")
-    assert "IoU@32" in shown.out
     assert "noise floor" in shown.out
+    assert "IoU@32" not in shown.out
+    assert "IoU@32" in run("evaluate", "programs", "targets", "--all").out
     rows = list(csv.DictReader(io.StringIO(run("evaluate", "programs", "targets", "--csv").out)))
     assert rows[0]["name"] == "table"
 

@@ -303,7 +303,7 @@ def test_inference_tells_what_it_explains_and_what_more_would_cost():
     found = sp.infer(shape)
     assert found.snapped is None
     assert found.scores["explained"] > 0.95
-    assert found.reason.startswith(f"{found.program.blocks} blocks cover")
+    assert found.reason.startswith(f"{found.program.blocks} drawing statements cover")
     numbers = [each.numbers for each in found.trade_off]
     assert [each.blocks for each in found.trade_off] == list(range(len(numbers)))
     assert {node.word for node in found.program.walk() if isinstance(node, Draw)} >= {"leg"}

@@ -7,6 +7,9 @@ import re
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
+import typer
+
+from shapeprog.cli import terminal
 from shapeprog.cli.help import GroupedCommand
 from shapeprog.errors import InputError
 
@@ -14,6 +17,7 @@ if TYPE_CHECKING:
     from shapeprog.language.program import Program
 
 _CHANGE = re.compile(r"([^\W\d]\w*)\s*([-+*/]?)=\s*(.*)", re.DOTALL)
+_SPACED = re.compile(r"([^\W\d]\w*)\b ?(?:([-+*/]?)= ?)?(-?[\d.]+)(?: .*)?", re.DOTALL)
 _APPLY = {"+": operator.add, "-": operator.sub, "*": operator.mul, "/": operator.truediv}
 
 
@@ -23,7 +27,12 @@ class ChangingCommand(GroupedCommand):
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Read the words of the command line, with the option before each change."""
         words: list[str] = []
-        for word in args:
+        for index, word in enumerate(args):
+            spaced = _SPACED.fullmatch(" ".join(args[index + 1 : index + 4]))
+            if word == "--set" and spaced and not re.search("=.", args[index + 1]):
+                name, sign, number = spaced.groups(default="")
+                terminal.complain(InputError(f"--set {name} lacks its number", f"write --set {name}{sign}={number}"))
+                raise typer.Exit(terminal.MISTAKE)
             following = len(words) > 1 and words[-2] == "--set" and _CHANGE.fullmatch(word)
             words += ["--set", word] if following else [word]
         return super().parse_args(ctx, words)

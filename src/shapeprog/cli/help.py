@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from typing import Any
 
 from typer.core import TyperCommand, TyperGroup
 
 LAST = "Options"
-"""The heading of what has no other."""
+"""The heading of options without a heading; it comes last."""
 
 
 class GroupedCommand(TyperCommand):
@@ -16,8 +17,8 @@ class GroupedCommand(TyperCommand):
 
     def format_options(self, ctx: Any, formatter: Any) -> None:
         """Write the options."""
-        records = ((each, each.get_help_record(ctx)) for each in self.get_params(ctx))
-        _write(formatter, ((_heading(each), record) for each, record in records if record is not None))
+        records = ((_heading(parameter), help_record(parameter, ctx)) for parameter in self.get_params(ctx))
+        _write(formatter, ((heading, record) for heading, record in records if record is not None))
 
 
 class GroupedCommands(TyperGroup):
@@ -25,13 +26,19 @@ class GroupedCommands(TyperGroup):
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
         """Write the commands."""
-        named = ((name, self.get_command(ctx, name)) for name in self.list_commands(ctx))
-        _write(formatter, ((_heading(each), (name, each.get_short_help_str(90))) for name, each in named if each))
+        commands = ((name, self.get_command(ctx, name)) for name in self.list_commands(ctx))
+        _write(formatter, ((_heading(item), (name, item.get_short_help_str(90))) for name, item in commands if item))
 
 
-def _heading(each: Any) -> str:
-    heading = getattr(each, "rich_help_panel", None)
-    return heading or ("Arguments" if getattr(each, "param_type_name", "") == "argument" else LAST)
+def help_record(parameter: Any, ctx: Any) -> tuple[str, str] | None:
+    """Name and help of a parameter, without the Python type that Typer appends to the name of an argument."""
+    record = parameter.get_help_record(ctx)
+    return record and (re.sub(r" <.*>$", "", record[0]), record[1])
+
+
+def _heading(item: Any) -> str:
+    heading = getattr(item, "rich_help_panel", None)
+    return heading or ("Arguments" if getattr(item, "param_type_name", "") == "argument" else LAST)
 
 
 def _write(formatter: Any, records: Iterable[tuple[str, tuple[str, str]]]) -> None:

@@ -217,7 +217,7 @@ def _baseline(finished: Finish, shape: Shape, blocks: int, budget: float, seed: 
     started = time.monotonic()
     snapped: Program = greedy_boxes(shape.voxels, blocks).snap()
     seconds = time.monotonic() - started
-    reason = "Greedy boxes: one box per block, without search."
+    reason = "Greedy boxes: one box per drawing statement, without search."
     program = finished(snapped, shape)
     return Found(program, snapped, _scores(program, snapped, shape, {}, seed), reason, seconds)
 

@@ -25,8 +25,12 @@ _LABELS = {
     "silhouette": "silhouette", "one_piece": "one piece", "slivers": "slivers",
     "part_recall": "part recall", "part_precision": "part precision",
     "iou": "IoU@32", "cd": "CD", "noise_floor": "CD noise floor", "f1": "F1@1cell",
-    "blocks": "blocks", "statements": "statements", "primitives": "primitives", "numbers": "numbers",
+    "blocks": "drawing statements", "statements": "statements", "primitives": "parts", "numbers": "free numbers",
 }  # fmt: skip
+_MAIN = (
+    "f1_percent", "f1_percent_floor", "silhouette", "one_piece", "part_recall", "part_precision", "cd", "noise_floor",
+    "numbers",
+)  # fmt: skip
 _FEW = 5
 _SIZES = ("blocks", "statements", "primitives", "numbers")
 
@@ -91,6 +95,7 @@ def evaluate_command(
     up: terminal.Up = None,
     front: terminal.Front = None,
     each: Annotated[bool, typer.Option("--each", help="Also print a row per shape.")] = False,
+    every: Annotated[bool, typer.Option("--all", help="Print all measures, not only the main ones.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print rows and summary as JSON.")] = False,
     as_csv: Annotated[bool, typer.Option("--csv", help="Print a row per shape as CSV.")] = False,
     modules: terminal.With = None,
@@ -101,7 +106,7 @@ def evaluate_command(
     Example: shapeprog evaluate results originals --each
 
     \b
-    F1@.5%, F1@1%   of 20,000 points per surface, within that share of the bounding box diagonal
+    F1@1%, F1@.5%   of 20,000 points per surface, within that share of the bounding box diagonal
     normals         mean absolute cosine between normals at nearest points
     silhouette      mean IoU of 12 outlines
     one piece       share of programs whose union is one solid
@@ -183,7 +188,7 @@ def evaluate_command(
         writer.writeheader()
         writer.writerows(asdict(row) for row in rows)
     else:
-        _table(rows, summary, each, seed)
+        _table(rows, summary if every else {name: summary[name] for name in _MAIN if name in summary}, each, seed)
     if missing_names:
         told = ", ".join(missing_names[:_FEW]) + (", ..." if len(missing_names) > _FEW else "")
         terminal.errors().print(
@@ -210,7 +215,7 @@ def _table(rows: Sequence[Metrics], summary: dict[str, Summary], each: bool, see
         for row in rows:
             table.add_row(row.name, *(_number(name, getattr(row, name)) for name in shown))
         console.print(table)
-    table = Table(f"{len(rows)} shapes, seed {seed}", box=box.SIMPLE_HEAD)
+    table = Table(f"{len(rows)} shape{'s' if len(rows) != 1 else ''}, seed {seed}", box=box.SIMPLE_HEAD)
     for heading in ("mean", "standard error", "median"):
         table.add_column(heading, justify="right")
     for name in names:

@@ -90,7 +90,7 @@ def _write_sheet(names: list[str], programs: list[Program], path: Path, columns:
     from shapeprog.view import Item, contact_sheet
 
     items = [
-        Item(name, None, program, f"{program.blocks} blocks, {program.size} parts")
+        Item(name, None, program, f"{program.size} parts, {program.blocks} drawing statements")
         for name, program in zip(names, programs, strict=True)
     ]
     contact_sheet(items, path, columns=columns, title=title)

@@ -205,12 +205,16 @@ def read_program_file(path: Path, changes: Sequence[str] | None = None) -> tuple
     """
     from shapeprog.cli.changes import changed, vanished
     from shapeprog.formats import load_with_frame, program_suffixes
+    from shapeprog.language.named import names
 
     try:
         program, frame = load_with_frame(path)
         if not changes:
             return program, frame
         other = changed(program, changes)
+        for named in names(other):
+            if named.name in ("width", "depth", "height") and named.value <= 0:
+                raise InputError(f"{named.name} would be {named.value:g}", "give a positive size")
         if lost := vanished(program, other):
             said = f"Parts without volume at these numbers are left out: {', '.join(dict.fromkeys(lost))}."
             errors().print(said, style="yellow", markup=False)

@@ -278,7 +278,7 @@ def _seen(choice: Choice, candidates: Sequence[Part]) -> tuple[TradeOff, ...]:
 
 
 def _reason(used: int, share: float, seen: Sequence[TradeOff], allowed: int, of: str) -> str:
-    told = f"{used} block{'s' if used != 1 else ''} cover{'s' if used == 1 else ''} {share:.0%} of the {of}"
+    told = f"{used} drawing statement{'s cover' if used != 1 else ' covers'} {share:.0%} of the {of}"
     if used >= allowed:
         return f"{told}; this is the maximum, raise --blocks for more."
     now = next((each for each in seen if each.blocks == used), None)

@@ -234,5 +234,5 @@ def outer_points(target: Shape, snapped: Program, seed: int) -> Float[Tensor, "P
 
 def _advice(used: int, allowed: int) -> str:
     if used >= allowed:
-        return f"; all {allowed} blocks are in use, raise --blocks for more."
-    return f"; {used} of {allowed} blocks are in use, another would improve the fit too little."
+        return f"; all {allowed} drawing statements are in use, raise --blocks for more."
+    return f"; {used} of {allowed} drawing statements are in use, another would improve the fit too little."

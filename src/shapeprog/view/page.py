@@ -188,7 +188,7 @@ class _Panel:
 
 def scores_text(scores: Mapping[str, float] | None, program: Program) -> list[str]:
     """Scores and size of a program as one or two short lines."""
-    size = f"{program.blocks} blocks · {program.statements} statements · {program.size} primitives"
+    size = f"{program.size} parts · {program.blocks} drawing statements"
     if not scores:
         return [size]
     labels = {"iou": "IoU", "cd": "CD", "f1": "F1", "seconds": "time"}

@@ -451,7 +451,7 @@ def test_help_has_an_example_and_a_line_for_every_option(run: Run, words: str, c
 
 def test_the_command_alone_lists_the_commands_under_headings(run: Run):
     alone = run()
-    for words in ("Look at programs and use them:", "Example: shapeprog infer chair.glb", "export  Export a program"):
+    for words in ("View and export programs:", "Example: shapeprog infer chair.glb", "export  Export a program"):
         assert words in alone.out + alone.err
     headings = re.findall(r"^(\w+):$", run("infer", "--help").out, re.MULTILINE)
     assert headings == ["Arguments", "Input", "Program", "Search", "Options"]

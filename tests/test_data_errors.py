@@ -141,9 +141,9 @@ def test_a_gltf_reads_nothing_from_elsewhere(tmp_path):
         if name != "model.gltf":
             buffer = name
     text = (inner / "a.gltf").read_text()
-    refused(inner / "a.gltf", "not beside the file")
+    refused(inner / "a.gltf", "not in its folder")
     (inner / "a.gltf").write_text(text.replace(buffer, f"../{buffer}"))
-    refused(inner / "a.gltf", "not beside the file")
+    refused(inner / "a.gltf", "not in its folder")
 
 
 def test_bad_packs(tmp_path):

@@ -1,4 +1,4 @@
-"""What can go wrong, in words: every error a user can cause names the cause and the cure."""
+"""The errors: every error that a user can cause names its cause and the remedy."""
 
 from __future__ import annotations
 
@@ -10,20 +10,20 @@ _WIDEST = 200
 """Letters of a line that are shown."""
 
 _LONGEST = 200
-"""Letters of a word that are compared with known ones, which takes as long as the word has letters."""
+"""Letters of a word that are compared with the known words; the time grows with the letters."""
 
 _MOST = 800
 """Letters of a message."""
 
 _UNPRINTABLE = re.compile("[\0-\t\x0b-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069\ud800-\udfff]")
-"""What commands a terminal, turns its lines round, or cannot be shown; a new line is none."""
+"""Control characters of terminals, marks of text direction, and half characters; not the line feed."""
 
 
 class ShapeProgError(Exception):
-    """A mistake that the user can mend: ``message`` says what is wrong, ``hint`` in a line of its own what to do.
+    """A mistake that the user can correct: ``message`` names the problem, ``hint`` the remedy, on a separate line.
 
-    They may repeat what a file holds: what cannot be printed is told as its escape, such as ``\\x1b``; what is too long
-    is told without its middle.
+    Both may quote a file. Unprintable characters are replaced by escapes such as ``\\x1b``; long texts lose their
+    middle.
     """
 
     def __init__(self, message: str, hint: str = "") -> None:
@@ -47,10 +47,10 @@ class OutputError(ShapeProgError):
 
 
 class ProgramError(ShapeProgError):
-    """A program text that is not in the language; points at the place.
+    """A program text that is not in the language; points at the position.
 
-    ``line`` and ``column`` count from 1; ``source`` is the line of text, of which no more is shown than a terminal
-    can; ``name`` is what the text is called.
+    ``line`` and ``column`` count from 1; ``source`` is the line of text, shortened for display; ``name`` is the name of
+    the text.
     """
 
     def __init__(
@@ -69,15 +69,15 @@ class ProgramError(ShapeProgError):
 def _shown(text: str) -> str:
     if len(text) > _MOST:
         text = f"{text[: _MOST // 2]} ... {text[-_MOST // 2 :]}"
-    return _UNPRINTABLE.sub(lambda found: found[0].encode("unicode_escape").decode(), text)
+    return _UNPRINTABLE.sub(lambda match: match[0].encode("unicode_escape").decode(), text)
 
 
 def did_you_mean(word: str, known: Iterable[str], otherwise: str = "", *, quoted: bool = False) -> str:
-    """A hint that proposes the known word nearest to ``word``, whatever its case, in quotation marks if ``quoted``.
+    """A hint that proposes the known word nearest to ``word``, ignoring case, in quotation marks if ``quoted``.
 
-    Where none is near, the hint is ``otherwise``; by default it lists all that are known.
+    If none is near, the hint is ``otherwise``; by default a list of all known words.
     """
-    words = {each.lower(): each for each in known}
+    words = {word.lower(): word for word in known}
     near = difflib.get_close_matches(word[:_LONGEST].lower(), words, 1)
     if near:
         return f"did you mean {repr(words[near[0]]) if quoted else words[near[0]]}?"

@@ -1,6 +1,6 @@
-"""Files that are either whole or not there: every output is written beside its place and moved in.
+"""Atomic files: every output is written to a temporary file in the same folder, then renamed.
 
-This holds when the machine stops too: what is written reaches the disk before it takes its place.
+This holds after a power failure, too: the content reaches the disk before the file is renamed.
 """
 
 from __future__ import annotations
@@ -37,21 +37,21 @@ _CURES = {
 
 
 _UNFINISHED = ".????????~*"
-"""What names of files that are being written look like."""
+"""Pattern of the names of temporary files."""
 
 
 @contextlib.contextmanager
 def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
-    """A temporary file beside ``path`` that takes its place if the block succeeds and vanishes if it fails.
+    """A temporary file in the folder of ``path`` that replaces it if the block succeeds and is removed if it fails.
 
     Readers see the old file or the whole new one, never a part.  The folder must exist.  The temporary name keeps the
-    suffix, so that writers which look at it behave alike.  The file is locked while it is written: one that is not is
-    of a process that was killed, and :func:`make_folder` removes it.
+    suffix, because some writers depend on it.  The file is locked while it is written: an unlocked one belongs to a
+    process that was killed, and :func:`make_folder` removes it.
 
     Raises
     ------
     OutputError
-        If the file cannot be written (full disk, no permission, missing folder...), naming cause and cure.
+        If the file cannot be written (full disk, no permission, missing folder...), with cause and remedy.
     """
     target = Path(path)
     temporary = target.parent / f".{secrets.token_hex(4)}~{target.name[-200:]}"
@@ -85,24 +85,24 @@ def write_bytes(path: str | os.PathLike[str], content: bytes) -> None:
 def write_text(path: str | os.PathLike[str], content: str) -> None:
     """Write ``content`` to ``path`` as UTF-8 with plain newlines, whole or not at all.
 
-    Names of files that are no text, as any is where the locale knows ASCII alone, are written byte for byte.
+    File names that are not valid text, as all others than ASCII in an ASCII locale, are written byte for byte.
     """
     write_bytes(path, content.encode("utf-8", "surrogateescape"))
 
 
 def append_line(path: str | os.PathLike[str], line: str) -> None:
-    """Add a line to a file; one that was added in part, because the disk became full, has no end.
+    """Add a line to a file; a line that was added in part, because the disk became full, lacks its line feed.
 
     Raises
     ------
     OutputError
-        If the disk does not take it.
+        If it cannot be written.
     """
-    left = f"{line}\n".encode()
+    remaining = f"{line}\n".encode()
     try:
-        with Path(path).open("ab", buffering=0) as stream:  # no buffer whose rest would fail again when it is closed
-            while left:
-                left = left[stream.write(left) :]
+        with Path(path).open("ab", buffering=0) as stream:  # a buffer would fail again when it is closed
+            while remaining:
+                remaining = remaining[stream.write(remaining) :]
     except OSError as error:
         raise output_error(Path(path), error) from error
 
@@ -151,7 +151,7 @@ def lock(file: int) -> bool:
 
 
 def sync(path: Path) -> None:
-    """See to it that a file, or the names in a folder, are on the disk, where the system can tell."""
+    """Flush a file, or the names in a folder, to the disk, where the system supports it."""
     with contextlib.suppress(OSError):
         file = os.open(path, os.O_RDONLY)
         try:

@@ -1,4 +1,4 @@
-"""torch, imported when it is first used; and in its place NumPy, where one program is drawn without gradient.
+"""torch, imported on first use, or NumPy instead of it where one program is drawn without gradient.
 
 Importing torch takes longer than drawing a program.  If it is loaded when this module is, the names ``torch`` and
 ``Tensor`` here are its own.  Otherwise ``torch.stack`` and the like import it when they are called, except within
@@ -28,7 +28,7 @@ def on_numpy(possible: bool) -> Iterator[None]:
     Parameters
     ----------
     possible
-        Whether nothing but declarations that ship is called within.  What is computed there may not leave as a tensor.
+        Whether only built-in declarations are called in the block.  No tensor may be returned from it.
     """
     token = _without_torch.set(possible and "torch" not in sys.modules)
     try:
@@ -38,9 +38,9 @@ def on_numpy(possible: bool) -> Iterator[None]:
 
 
 def _copied(array: Any, dim: int, index: Any, source: Any) -> Any:
-    found = array.copy()
-    found[index] = source
-    return found
+    result = array.copy()
+    result[index] = source
+    return result
 
 
 _METHODS: dict[str, Any] = {
@@ -82,9 +82,10 @@ def _of_tensors(function: Callable[..., Any]) -> Callable[..., Any]:
     """A function of NumPy that returns arrays with these methods, wherever they are asked to be."""
 
     def call(*arguments: Any, device: object = None, **named: Any) -> Any:
-        found = function(*arguments, **named)
-        each: list[Any] = [np.asarray(array).view(_Array) for array in (found if type(found) is tuple else (found,))]
-        return each if type(found) is tuple else each[0]
+        result = function(*arguments, **named)
+        if type(result) is tuple:
+            return [np.asarray(array).view(_Array) for array in result]
+        return np.asarray(result).view(_Array)
 
     return call
 
@@ -115,13 +116,13 @@ _NUMPY = SimpleNamespace(
 
 
 class _Torch:
-    """The module, with what was asked for kept."""
+    """The module; its attributes are cached on first access."""
 
     def __getattr__(self, name: str) -> Any:
         if _without_torch.get():
             return getattr(_NUMPY, name)
-        found = self.__dict__[name] = getattr(importlib.import_module("torch"), name)
-        return found
+        value = self.__dict__[name] = getattr(importlib.import_module("torch"), name)
+        return value
 
 
 if TYPE_CHECKING or "torch" in sys.modules:

@@ -1,7 +1,7 @@
-"""Other Python processes that answer lines with lines, and end with the process that asks, however that ends.
+"""Worker processes that answer lines with lines and end with their parent process, however that ends.
 
-The one that asks holds a module's standard input and output; the module calls :func:`serve`.  When the input ends,
-because the asking process closed it or was killed, so does the other, whatever it is at.
+The parent holds the standard input and output of a module that calls :func:`serve`.  When the input ends, because the
+parent closed it or was killed, the worker exits at once.
 """
 
 from __future__ import annotations
@@ -19,18 +19,18 @@ from shapeprog.errors import ShapeProgError
 
 
 class Worker:
-    """Another process, which runs a module that calls :func:`serve`; an interruption of this one does not reach it.
+    """A process that runs a module which calls :func:`serve`; an interruption of the parent does not reach it.
 
     Parameters
     ----------
     module
         Full name of the module.
     quiet
-        Whether what it writes on the standard error is dropped.
+        Whether its standard error is dropped.
     """
 
     def __init__(self, module: str, quiet: bool = False) -> None:
-        path = os.pathsep.join(str(each) for each in sys.path if each)
+        path = os.pathsep.join(str(entry) for entry in sys.path if entry)
         try:
             self._process = subprocess.Popen(
                 [sys.executable, "-m", module], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
@@ -48,12 +48,12 @@ class Worker:
         ShapeProgError
             If it ends instead.
         """
-        asked, answers = self._process.stdin, self._process.stdout
-        assert asked is not None
+        requests, answers = self._process.stdin, self._process.stdout
+        assert requests is not None
         assert answers is not None
         try:
-            asked.write(f"{line}\n")
-            asked.flush()
+            requests.write(f"{line}\n")
+            requests.flush()
             answer = answers.readline()
         except OSError:  # it has closed its input
             answer = ""
@@ -65,7 +65,7 @@ class Worker:
         return answer[:-1]
 
     def close(self) -> None:
-        """End it and give back what it held; nobody may be asking any more."""
+        """Kill the process and release its memory; no other thread may be waiting for an answer."""
         self._process.kill()
         self._process.communicate()
 
@@ -73,15 +73,15 @@ class Worker:
 def serve(answer: Callable[[str], str]) -> NoReturn:
     """Answer each line of the standard input with one on the standard output, until the input ends.
 
-    What else is printed goes to the standard error.
+    All other output goes to the standard error.
     """
-    asked, told = sys.stdin.buffer, os.fdopen(os.dup(sys.stdout.fileno()), "wb", buffering=0)
+    requests, replies = sys.stdin.buffer, os.fdopen(os.dup(sys.stdout.fileno()), "wb", buffering=0)
     os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # where there are no sessions, a terminal interrupts all processes
     lines: SimpleQueue[bytes] = SimpleQueue()
 
     def read() -> None:
-        for line in asked:
+        for line in requests:
             lines.put(line)
         os._exit(0)
 
@@ -89,7 +89,7 @@ def serve(answer: Callable[[str], str]) -> NoReturn:
     while True:
         reply = answer(lines.get().decode().rstrip("\n"))
         try:
-            told.write(f"{reply}\n".encode())
+            replies.write(f"{reply}\n".encode())
         except OSError:  # nobody listens any more
             os._exit(0)
 
@@ -98,5 +98,5 @@ def _ending(code: int) -> str:
     """How a process ended, from its exit code."""
     if code >= 0:
         return f"exit code {code}"
-    names = {each.value: each.name for each in signal.Signals}
+    names = {number.value: number.name for number in signal.Signals}
     return f"killed ({names.get(-code, -code)})"

@@ -1,6 +1,6 @@
-"""The commands of ``shapeprog``: what they are called, and where they are.
+"""The list of the commands of ``shapeprog``.
 
-Nothing heavy is imported here or by the modules of this room: commands import what they need when they run.
+Neither this module nor the others of this package import heavy modules: commands import them when they run.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
 )
 
-PROGRAMS, OUTPUT, RESEARCH = "From shapes to programs", "Look at programs and use them", "Data sets, scores, the paper"
+PROGRAMS, OUTPUT, RESEARCH = "From shapes to programs", "View and export programs", "Data sets, scores, the paper"
 """Headings of the list of commands."""
 
 for name, command, panel in (
@@ -62,8 +62,8 @@ app.add_typer(
 )
 
 
-def _version(wanted: bool) -> None:
-    if wanted:
+def _version(requested: bool) -> None:
+    if requested:
         from shapeprog import __version__
 
         print(f"shapeprog {__version__}")

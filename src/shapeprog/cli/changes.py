@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from shapeprog.cli import terminal
 from shapeprog.cli.help import GroupedCommand
 from shapeprog.errors import InputError
 
@@ -31,8 +30,7 @@ class ChangingCommand(GroupedCommand):
             spaced = _SPACED.fullmatch(" ".join(args[index + 1 : index + 4]))
             if word == "--set" and spaced and not re.search("=.", args[index + 1]):
                 name, sign, number = spaced.groups(default="")
-                terminal.complain(InputError(f"--set {name} lacks its number", f"write --set {name}{sign}={number}"))
-                raise typer.Exit(terminal.MISTAKE)
+                raise typer.BadParameter(f"--set {name} lacks its number; write --set {name}{sign}={number}", ctx)
             following = len(words) > 1 and words[-2] == "--set" and _CHANGE.fullmatch(word)
             words += ["--set", word] if following else [word]
         return super().parse_args(ctx, words)

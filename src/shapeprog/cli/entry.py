@@ -38,11 +38,10 @@ def _run(words: Sequence[str]) -> None:
 
 
 def _leave(stop: SystemExit) -> None:
-    """End the process without taking torch apart, which takes longer than many a command.
+    """End the process without tearing down torch, which takes longer than many a command.
 
-    What is registered to be done at the end is done; only the modules are not torn down.  Someone who watches the
-    process, such as a profiler, gets the usual end.  An interruption that came amid an ``exec`` is not forgotten by
-    Python, which would end itself by a signal in the place of the exit code.
+    Registered exit functions run; only the modules are not torn down.  With a profiler or tracer the process ends as
+    usual.  After an interruption within an ``exec`` Python would end itself by a signal instead of the exit code.
     """
     watched = sys.gettrace() or sys.getprofile()
     quick = "torch" in sys.modules or stop.code == interruption.INTERRUPTED
@@ -52,6 +51,6 @@ def _leave(stop: SystemExit) -> None:
         sys.stdout.flush()
         sys.stderr.flush()
     except OSError:
-        return  # the interpreter knows what to say
+        return  # the interpreter reports it
     atexit._run_exitfuncs()
     os._exit(stop.code or 0)

@@ -1,4 +1,4 @@
-"""``shapeprog infer``: shapes in, programs out, one after another; what is broken stops nothing."""
+"""``shapeprog infer``: a program from each shape; broken inputs do not stop the others."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ LARGE = 10.0
 """Metres from which furniture is more likely to be in another unit."""
 
 TIPPED = (".stl", ".ply", ".off", ".xyz")
-"""Files of formats that say nothing of which way is up, so that many lie."""
+"""Formats that do not store the up axis."""
 
 _SUFFIXES = (".json", ".shape", ".glb", ".png")
 _LONGEST = 120
@@ -104,7 +104,7 @@ def infer_command(
     folder = make_folder(out)
     failures: list[tuple[Path, ShapeProgError]] = []
     stopped: OutputError | None = None
-    written, taken = 0, set[str]()
+    written, stems = 0, set[str]()
     talk = not (quiet or as_json)
     console = terminal.output()
     columns = (
@@ -130,9 +130,9 @@ def infer_command(
                         bar.update(task, completed=share, description=f"{name}: {stage}")
 
                 try:
-                    found = infer_one(shape, blocks, budget, seed, progress)
-                    stem = _free_stem(shape, taken, folder)
-                    names = _write(found, shape, folder, stem, not no_picture)
+                    result = infer_one(shape, blocks, budget, seed, progress)
+                    stem = _free_stem(shape, stems, folder)
+                    names = _write(result, shape, folder, stem, not no_picture)
                 except OutputError as error:
                     stopped = error  # a disk that took nothing now takes nothing later
                     break
@@ -144,16 +144,16 @@ def infer_command(
                     continue
                 written += 1
                 if as_json:
-                    told = {"name": shape.name, "folder": str(folder), "seconds": found.seconds}
-                    terminal.print_json(told | json.loads(_document(found, shape)))
+                    report = {"name": shape.name, "folder": str(folder), "seconds": result.seconds}
+                    terminal.print_json(report | json.loads(_document(result, shape)))
                 elif talk:
-                    _report(console, found, shape, folder, names, file_unit, up, written == 1)
+                    _report(console, result, shape, folder, names, file_unit, up, written == 1)
         except KeyboardInterrupt:
             raise terminal.Interrupted(_kept(written, folder)) from None
     for path, problem in failures:
         if as_json:
-            told = {"name": path.name, "source": str(path), "error": problem.message, "hint": problem.hint}
-            terminal.print_json(told)
+            report = {"name": path.name, "source": str(path), "error": problem.message, "hint": problem.hint}
+            terminal.print_json(report)
         terminal.complain(terminal.at(path, problem))
     if len(failures) + written > 1 and failures and not quiet:
         terminal.errors().print(f"{len(failures)} of {len(failures) + written} inputs failed.", markup=False)
@@ -166,14 +166,14 @@ def infer_command(
 
 
 def _prepare(picture: bool, talk: bool) -> None:
-    """Make the kernels ready that all inference needs, and say so where that takes a while."""
+    """Prepare the kernels of inference, with a message if they must be compiled."""
     from shapeprog.kernels.compile import prepare
     from shapeprog.kernels.modules import INFERENCE, PICTURES, READING
 
-    def tell(sentence: str) -> None:
+    def report(sentence: str) -> None:
         terminal.errors().print(f"{sentence.capitalize()}.", style="dim", markup=False)
 
-    prepare([*INFERENCE, *READING, *(PICTURES if picture else ())], tell if talk else None)
+    prepare([*INFERENCE, *READING, *(PICTURES if picture else ())], report if talk else None)
 
 
 def _in_unit(program: Program, shape: Shape, unit: str | None, file_unit: str | None) -> Program:
@@ -192,12 +192,12 @@ def _chosen(
     ties: bool,
     libraries: Sequence[Library],
 ) -> Inference:
-    """Inference with what was asked for, which is looked at before any shape is; programs are ``finished`` last."""
+    """Inference with the options of the command, which are checked before the first shape is read."""
     from shapeprog.inference import Settings, infer
 
     settings = None if rounds is None else Settings(rounds=rounds)
 
-    def one(shape: Shape, blocks: int, budget: float, seed: int, progress: Progress) -> Found:
+    def infer_one(shape: Shape, blocks: int, budget: float, seed: int, progress: Progress) -> Found:
         result = infer(
             shape, blocks=blocks, budget=budget, seed=seed, settings=settings,
             statements="paper" if paper else "all", detail=detail, ties=ties, libraries=libraries, progress=progress,
@@ -206,7 +206,7 @@ def _chosen(
         scores = _scores(program, result.snapped, shape, result.scores, seed)
         return Found(program, result.snapped, scores, result.reason, result.seconds)
 
-    return one
+    return infer_one
 
 
 def _baseline(finished: Finish, shape: Shape, blocks: int, budget: float, seed: int, progress: Progress) -> Found:
@@ -223,40 +223,40 @@ def _baseline(finished: Finish, shape: Shape, blocks: int, budget: float, seed: 
 
 
 def _scores(
-    program: Program, snapped: Program | None, shape: Shape, known: dict[str, float], seed: int
+    program: Program, snapped: Program | None, shape: Shape, given_scores: dict[str, float], seed: int
 ) -> dict[str, float]:
-    """Everything that was said about the program, and how close it comes to the input."""
+    """The scores of inference, the distance to the input, and the size of the program."""
     from shapeprog.evaluation.metrics import evaluate_program
 
-    measured = evaluate_program(program, shape, snapped, seed=seed, iou=known.get("iou"))
-    found = {"iou": measured.iou, "cd": measured.cd, "noise_floor": measured.noise_floor, "f1": measured.f1}
+    measured = evaluate_program(program, shape, snapped, seed=seed, iou=given_scores.get("iou"))
+    fit = {"iou": measured.iou, "cd": measured.cd, "noise_floor": measured.noise_floor, "f1": measured.f1}
     sizes = {"blocks": measured.blocks, "statements": measured.statements, "primitives": measured.primitives}
-    return terminal.plain({**known, **found, **sizes})
+    return terminal.plain({**given_scores, **fit, **sizes})
 
 
-def _document(found: Found, shape: Shape) -> str:
+def _document(result: Found, shape: Shape) -> str:
     from shapeprog.formats.json_form import program_to_json, result_json
 
-    whole = {} if found.snapped is None else {"snapped": json.loads(program_to_json(found.snapped))["program"]}
+    rounded = {} if result.snapped is None else {"snapped": json.loads(program_to_json(result.snapped))["program"]}
     return result_json(
-        found.program, shape.frame, scores=found.scores, reason=found.reason, source=_source(shape), **whole
+        result.program, shape.frame, scores=result.scores, reason=result.reason, source=_source(shape), **rounded
     )
 
 
-def _write(found: Found, shape: Shape, folder: Path, stem: str, picture: bool) -> list[str]:
+def _write(result: Found, shape: Shape, folder: Path, stem: str, picture: bool) -> list[str]:
     from shapeprog.files import write_text
     from shapeprog.formats import export
 
-    write_text(folder / f"{stem}.json", _document(found, shape))
+    write_text(folder / f"{stem}.json", _document(result, shape))
     names = [f"{stem}.json", f"{stem}.shape"]
-    export(found.program, folder / f"{stem}.shape", shape.frame)
-    if found.program.size:
-        export(found.program, folder / f"{stem}.glb", shape.frame)
+    export(result.program, folder / f"{stem}.shape", shape.frame)
+    if result.program.size:
+        export(result.program, folder / f"{stem}.glb", shape.frame)
         names.append(f"{stem}.glb")
     if picture:
         from shapeprog.view import picture as draw
 
-        draw(shape, found.program, folder / f"{stem}.png", scores=found.scores)
+        draw(shape, result.program, folder / f"{stem}.png", scores=result.scores)
         names.append(f"{stem}.png")
     return names
 
@@ -265,22 +265,22 @@ def _kept(written: int, folder: Path) -> str:
     return f"finished results are kept: {written} program{'s' if written != 1 else ''} in {folder}"
 
 
-def _free_stem(shape: Shape, taken: set[str], folder: Path) -> str:
-    """A file name that no other shape has, of this run or an earlier one, and that spares what is no result of ours.
+def _free_stem(shape: Shape, stems: set[str], folder: Path) -> str:
+    """A file name that neither another shape, of this run or an earlier one, nor another file has.
 
     The same input may replace its own results.
     """
     base = re.sub(r"[^\w.\-]+", "_", shape.name).strip("._")[:_LONGEST] or "shape"
     stem, number = base, 1
-    while stem in taken or not _replaceable(shape, folder, stem):
+    while stem in stems or not _replaceable(shape, folder, stem):
         number += 1
         stem = f"{base}_{number}"
-    taken.add(stem)
+    stems.add(stem)
     return stem
 
 
 def _replaceable(shape: Shape, folder: Path, stem: str) -> bool:
-    """Whether nothing of that name is there, or only what was inferred from the same shape before."""
+    """Whether there are no files of that name, or only earlier results of the same shape."""
     from shapeprog.formats.json_form import read_result
 
     if shape.source is not None and shape.source.resolve() == (folder / f"{stem}{shape.source.suffix}").resolve():
@@ -299,15 +299,15 @@ def _source(shape: Shape) -> str | None:
 
     if shape.source is None:
         return None
-    place = str(shape.source.absolute())
+    path = str(shape.source.absolute())
     if shape.source.suffix.lower() not in ARRAY_SUFFIXES or shape.name == shape.source.stem:
-        return place
-    return f"{place}#{shape.name.removeprefix(f'{shape.source.stem}#')}"
+        return path
+    return f"{path}#{shape.name.removeprefix(f'{shape.source.stem}#')}"
 
 
 def _report(
     console: Any,
-    found: Found,
+    result: Found,
     shape: Shape,
     folder: Path,
     names: list[str],
@@ -322,18 +322,18 @@ def _report(
 
     console.print(shape.name, style="bold")
     if shape.kind != "mesh":
-        seen = f"a point cloud; normals are estimated from up to {SCAN:,} points"
-        console.print(f"Read as {'voxels' if shape.points is None else seen}.", style="dim")
+        kind = f"a point cloud; normals are estimated from up to {SCAN:,} points"
+        console.print(f"Read as {'voxels' if shape.points is None else kind}.", style="dim")
     if up is None and shape.source is not None and shape.source.suffix.lower() in TIPPED:
-        said = f"The format does not store the up axis: {default_axes(shape.source)[0]} is assumed."
-        console.print(f"{said} Another axis: --up +y, or --up auto", style="dim")
-    terminal.print_program(console, found.program)
+        note = f"The format does not store the up axis: {default_axes(shape.source)[0]} is assumed."
+        console.print(f"{note} Another axis: --up +y, or --up auto", style="dim")
+    terminal.print_program(console, result.program)
     side = SPAN * shape.frame.scale
-    if found.program.unit and file_unit is None and (first or side > LARGE):
-        said = f"The unit of the file is assumed to be m, so that the longest side is {side:.3g} m."
-        console.print(f"{said} Another unit: --file-unit mm", style="dim")
-    for line in scores_text(found.scores | {"seconds": found.seconds}, found.program):
+    if result.program.unit and file_unit is None and (first or side > LARGE):
+        note = f"The unit of the file is assumed to be m, so that the longest side is {side:.3g} m."
+        console.print(f"{note} Another unit: --file-unit mm", style="dim")
+    for line in scores_text(result.scores | {"seconds": result.seconds}, result.program):
         console.print(line, style="dim")
-    console.print(found.reason, style="dim")
+    console.print(result.reason, style="dim")
     console.print(f"Wrote {', '.join(names)} in {folder}; the files keep every digit.", style="dim")
     console.print()

@@ -1,6 +1,6 @@
-"""Interruptions: Ctrl-C ends a command in a line at any moment, and in words of its own while it works.
+"""Interruptions: Ctrl-C ends a command at any moment with one line instead of a traceback.
 
-Python would print a traceback instead, so ``shapeprog.__main__`` sets what ends the process before it imports anything.
+Python would print a traceback, so ``shapeprog.__main__`` sets a handler before it imports anything.
 Where interruptions are ignored, as in the background of a script, they stay so.
 """
 
@@ -15,28 +15,28 @@ INTERRUPTED = 130
 """The exit code of a command that was interrupted."""
 
 _ending: object = None
-"""What ends the process at once, where the command is the whole of it."""
+"""The handler that ends the process at once, if the command is the whole process."""
 
 
 def adopt() -> None:
-    """Take what an interruption does now for what ends the process at once, unless that is what Python does."""
+    """Keep the present handler, which ends the process at once, unless it is that of Python."""
     global _ending
-    now = signal.getsignal(signal.SIGINT)
-    _ending = now if callable(now) and now is not signal.default_int_handler else None
+    handler = signal.getsignal(signal.SIGINT)
+    _ending = handler if callable(handler) and handler is not signal.default_int_handler else None
 
 
 @contextmanager
 def tidied() -> Iterator[None]:
-    """What is inside is interrupted by an exception, so that it can tidy up."""
-    now = signal.getsignal(signal.SIGINT)
-    if now is None or now is not _ending:
+    """In this block an interruption is an exception, so that the block can clean up."""
+    handler = signal.getsignal(signal.SIGINT)
+    if handler is None or handler is not _ending:
         yield
         return
     signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, now)
+        signal.signal(signal.SIGINT, handler)
 
 
 @contextmanager

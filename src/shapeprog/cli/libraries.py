@@ -43,8 +43,8 @@ def learn_command(
     programs = [terminal.read_program_file(path)[0] for path in paths]
     library = learn(programs, most)
     if not library.functions:
-        said = f"no function shortens {'this program' if len(programs) == 1 else f'these {len(programs)} programs'}"
-        raise InputError(said, "give more programs, with similar parts")
+        message = f"no function shortens {'this program' if len(programs) == 1 else f'these {len(programs)} programs'}"
+        raise InputError(message, "give more programs, with similar parts")
     command = f"shapeprog library learn {' '.join(map(str, folders))} --out {out}"
     library = replace(library, source=Source((Comment(command), *library.source.lines)))
     save_library(library, out)

@@ -94,7 +94,7 @@ def evaluate_command(
     seed: terminal.Seed = 0,
     up: terminal.Up = None,
     front: terminal.Front = None,
-    each: Annotated[bool, typer.Option("--each", help="Also print a row per shape.")] = False,
+    per_shape: Annotated[bool, typer.Option("--each", help="Also print a row per shape.")] = False,
     every: Annotated[bool, typer.Option("--all", help="Print all measures, not only the main ones.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print rows and summary as JSON.")] = False,
     as_csv: Annotated[bool, typer.Option("--csv", help="Print a row per shape as CSV.")] = False,
@@ -140,17 +140,17 @@ def evaluate_command(
         if isinstance(shape, ShapeProgError):
             failures.append(ShapeProgError(f"target {path}: {shape.message}", shape.hint))
         elif shape.name in shapes:
-            both = " and ".join(str(each) for each in (shapes[shape.name].source, shape.source) if each is not None)
+            sources = " and ".join(str(source) for source in (shapes[shape.name].source, shape.source) if source)
             cure = "rename one of them; until then the first is used"
-            failures.append(ShapeProgError(f"duplicate target name {shape.name}: {both or path}", cure))
+            failures.append(ShapeProgError(f"duplicate target name {shape.name}: {sources or path}", cure))
         else:
             shapes[shape.name] = shape
-    found = list(scoring.predictions(predictions))
+    listed = list(scoring.predictions(predictions))
     rows: list[Metrics] = []
     console = terminal.errors()
     silent = quiet or as_json or as_csv
-    for name, prediction in track(found, "measuring", console=console, transient=True, disable=silent):
-        target = next(iter(shapes.values())) if len(shapes) == len(found) == 1 else shapes.get(name)
+    for name, prediction in track(listed, "measuring", console=console, transient=True, disable=silent):
+        target = next(iter(shapes.values())) if len(shapes) == len(listed) == 1 else shapes.get(name)
         if isinstance(prediction, ShapeProgError):
             failures.append(ShapeProgError(f"prediction {name}: {prediction.message}", prediction.hint))
         elif target is None:
@@ -188,11 +188,11 @@ def evaluate_command(
         writer.writeheader()
         writer.writerows(asdict(row) for row in rows)
     else:
-        _table(rows, summary if every else {name: summary[name] for name in _MAIN if name in summary}, each, seed)
+        _table(rows, summary if every else {name: summary[name] for name in _MAIN if name in summary}, per_shape, seed)
     if missing_names:
-        told = ", ".join(missing_names[:_FEW]) + (", ..." if len(missing_names) > _FEW else "")
+        names = ", ".join(missing_names[:_FEW]) + (", ..." if len(missing_names) > _FEW else "")
         terminal.errors().print(
-            f"{len(missing_names)} of {len(shapes)} targets have no prediction and are not counted: {told}",
+            f"{len(missing_names)} of {len(shapes)} targets have no prediction and are not counted: {names}",
             markup=False,
         )
     for error in failures:
@@ -201,13 +201,13 @@ def evaluate_command(
         raise typer.Exit(1)
 
 
-def _table(rows: Sequence[Metrics], summary: dict[str, Summary], each: bool, seed: int) -> None:
+def _table(rows: Sequence[Metrics], summary: dict[str, Summary], per_shape: bool, seed: int) -> None:
     from rich import box
     from rich.table import Table
 
     console = terminal.output()
     names = [name for name in _LABELS if name in summary and summary[name].count]
-    if each:
+    if per_shape:
         table = Table("shape", box=box.SIMPLE_HEAD)
         shown = [name for name in names if not name.endswith("floor")]
         for name in shown:
@@ -220,7 +220,7 @@ def _table(rows: Sequence[Metrics], summary: dict[str, Summary], each: bool, see
         table.add_column(heading, justify="right")
     for name in names:
         value = summary[name]
-        table.add_row(_LABELS[name], *(_number(name, each) for each in (value.mean, value.error, value.median)))
+        table.add_row(_LABELS[name], *(_number(name, number) for number in (value.mean, value.error, value.median)))
     console.print(table)
 
 

@@ -44,18 +44,18 @@ def predictions(path: Path) -> Iterator[tuple[str, Prediction | ShapeProgError]]
     for file in files:
         try:
             with in_words(file, "a program"):
-                found = _program(file)
+                prediction = _program(file)
         except ShapeProgError as error:
             yield file.stem, error
         else:
-            yield file.stem, found
+            yield file.stem, prediction
     if not files:
         for file, shape in load_all([path]):
             yield (file.stem if isinstance(shape, ShapeProgError) else shape.name), shape
 
 
 def measure(prediction: Prediction, target: Shape, points: int, seed: int) -> Metrics:
-    """The measures of one prediction; sizes are 0 for what is no program."""
+    """The measures of one prediction; sizes are 0 for shapes."""
     if isinstance(prediction, Shape):
         return _measure_shape(prediction, target, points, seed)
     return evaluate_program(prediction[0], target, prediction[1], points, seed, looks=True)
@@ -89,38 +89,40 @@ def _program(path: Path) -> tuple[Program, Program | None]:
 
 
 def _measure_shape(prediction: Shape, target: Shape, points: int, seed: int) -> Metrics:
-    """A predicted mesh or cloud lies where its file says, in the world of the target; cells lie in the grid."""
+    """A predicted mesh or cloud is in the coordinates of the target; cells are in the grid."""
     import torch
 
     cells, mesh = prediction.voxels, None
-    drawn = None if prediction.points is None else torch.from_numpy(prediction.points.astype(np.float64))
+    sampled = None if prediction.points is None else torch.from_numpy(prediction.points.astype(np.float64))
     if prediction.vertices is not None and prediction.faces is not None:
         from shapeprog.data.sampling import sample_surface
 
         placed = target.frame.to_grid(prediction.frame.to_world(prediction.vertices))
         cells, mesh = voxelise_mesh(placed, prediction.faces), Triangles(placed, prediction.faces)
-        drawn = torch.from_numpy(np.asarray(sample_surface(placed, prediction.faces, points, seed), np.float64))
+        sampled = torch.from_numpy(np.asarray(sample_surface(placed, prediction.faces, points, seed), np.float64))
     elif prediction.kind == "points" and prediction.points is not None:
         placed = target.frame.to_grid(prediction.frame.to_world(prediction.points))
-        cells, drawn = voxelise_points(placed), torch.from_numpy(placed)
+        cells, sampled = voxelise_points(placed), torch.from_numpy(placed)
     union = int((cells | target.voxels).sum())
     iou = float((cells & target.voxels).sum() / union) if union else 1.0
-    distances = _distances(drawn, target, points, seed)
+    distances = _distances(sampled, target, points, seed)
     row = Metrics(target.name, *distances, iou=iou, blocks=0, statements=0, primitives=0)
     return row if mesh is None else with_likeness(row, mesh, target, seed)
 
 
-def _distances(drawn: Tensor | None, target: Shape, points: int, seed: int) -> tuple[float, float, float, float, float]:
+def _distances(
+    sampled: Tensor | None, target: Shape, points: int, seed: int
+) -> tuple[float, float, float, float, float]:
     """CD, its two halves, the noise floor, and F1, as :mod:`shapeprog.evaluation.metrics` measures programs."""
     samples = target_samples(target, points, seed)
     unknown = float("nan")
-    if samples is None or drawn is None or not len(drawn):
+    if samples is None or sampled is None or not len(sampled):
         return unknown, unknown, unknown, unknown, unknown
     surface = samples[0]
     square = world_scale(target) ** 2
-    there, back = squared_distance(drawn, surface), squared_distance(surface, drawn)
+    to_target, from_target = squared_distance(sampled, surface), squared_distance(surface, sampled)
     floor = float(squared_distance(*samples).mean() + squared_distance(*reversed(samples)).mean()) * square
-    near: list[Any] = [float((each <= CELL**2).double().mean()) for each in (there, back)]
-    f1 = 2 * near[0] * near[1] / sum(near) if sum(near) else 0.0
-    one, two = float(there.mean()) * square, float(back.mean()) * square
-    return one + two, one, two, floor, f1
+    close: list[Any] = [float((squares <= CELL**2).double().mean()) for squares in (to_target, from_target)]
+    f1 = 2 * close[0] * close[1] / sum(close) if sum(close) else 0.0
+    forward, backward = float(to_target.mean()) * square, float(from_target.mean()) * square
+    return forward + backward, forward, backward, floor, f1

@@ -1,4 +1,4 @@
-"""What commands say: results on the standard output, progress and errors beside it."""
+"""Output of the commands: results on the standard output, progress and messages on the standard error."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ Command = TypeVar("Command", bound=Callable[..., None])
 
 
 def _checked_seed(seed: int) -> int:
-    if seed >= 1 << 63:  # as a maximum of the option it would stand in every help
+    if seed >= 1 << 63:  # as a maximum of the option it would be printed in every help
         raise typer.BadParameter(f"{seed} is not below 2^63.")
     return seed
 
@@ -71,11 +71,11 @@ Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")
 
 
 class Interrupted(KeyboardInterrupt):
-    """An interruption by the user, with a sentence on what was kept."""
+    """An interruption by the user, with a sentence on the results that are kept."""
 
 
 def guarded(command: Command) -> Command:
-    """The command with every mistake told in words: no traceback, and an exit code that scripts can rely on."""
+    """The command with errors as messages instead of tracebacks, and with defined exit codes."""
 
     @functools.wraps(command)
     def run(*args: Any, **kwargs: Any) -> None:
@@ -89,8 +89,8 @@ def guarded(command: Command) -> Command:
             complain(error)
             raise typer.Exit(MISTAKE) from None
         except KeyboardInterrupt as stop:
-            kept = str(stop) if isinstance(stop, Interrupted) else "no file is incomplete"
-            errors().print(f"Interrupted; {kept}.", style="yellow", markup=False, highlight=False)
+            note = str(stop) if isinstance(stop, Interrupted) else "no file is incomplete"
+            errors().print(f"Interrupted; {note}.", style="yellow", markup=False, highlight=False)
             raise typer.Exit(interruption.INTERRUPTED) from None
         except BrokenPipeError:
             # The reader of a pipe has gone; keep Python from complaining about it at exit.
@@ -112,7 +112,7 @@ def guarded(command: Command) -> Command:
 
 
 def write_anything() -> None:
-    """Let both outputs show letters that the terminal does not know as escapes, such as ``\\xb7``, not as an error."""
+    """Let both outputs print letters that the terminal cannot encode as escapes, such as ``\\xb7``, not as an error."""
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
@@ -151,7 +151,7 @@ def at(path: Path, error: ShapeProgError) -> ShapeProgError:
 
 
 def fault(what: str, error: Exception) -> ShapeProgError:
-    """The error for what the user cannot mend, so that a command goes on with the next file; --debug stops at it.
+    """The message for an internal error, so that a command continues with the next file; --debug stops at it.
 
     Raises
     ------
@@ -187,12 +187,12 @@ def load_modules(modules: list[Path] | None) -> None:
 
 
 def load_libraries(files: list[Path] | None, shipped: bool) -> list[Library]:
-    """The libraries among what was given with ``--with``, then the one that ships; modules are loaded as well."""
+    """The libraries given with ``--with``, then the built-in one if ``shipped``; modules are loaded as well."""
     from shapeprog.library import load_library
 
-    given = files or []
-    load_modules([file for file in given if file.suffix.lower() != ".shape"])
-    return [*(load_library(f) for f in given if f.suffix.lower() == ".shape"), *([load_library()] if shipped else [])]
+    paths = files or []
+    load_modules([file for file in paths if file.suffix.lower() != ".shape"])
+    return [*(load_library(f) for f in paths if f.suffix.lower() == ".shape"), *([load_library()] if shipped else [])]
 
 
 def read_program_file(path: Path, changes: Sequence[str] | None = None) -> tuple[Program, Any]:
@@ -211,14 +211,14 @@ def read_program_file(path: Path, changes: Sequence[str] | None = None) -> tuple
         program, frame = load_with_frame(path)
         if not changes:
             return program, frame
-        other = changed(program, changes)
-        for named in names(other):
+        edited = changed(program, changes)
+        for named in names(edited):
             if named.name in ("width", "depth", "height") and named.value <= 0:
                 raise InputError(f"{named.name} would be {named.value:g}", "give a positive size")
-        if lost := vanished(program, other):
-            said = f"Parts without volume at these numbers are left out: {', '.join(dict.fromkeys(lost))}."
-            errors().print(said, style="yellow", markup=False)
-        return other, frame
+        if missing := vanished(program, edited):
+            note = f"Parts without volume at these numbers are left out: {', '.join(dict.fromkeys(missing))}."
+            errors().print(note, style="yellow", markup=False)
+        return edited, frame
     except InputError as error:
         if path.is_file() and path.suffix.lower() not in program_suffixes():
             raise InputError(error.message, f"infer a program first: shapeprog infer {path}") from None

@@ -253,7 +253,7 @@ def program_files(folder: Path) -> list[Path]:
 
 
 def _result(path: Path, changes: Sequence[str] | None = None) -> Result:
-    """What a .json file says beside its program; other programs say nothing, nor do those that are changed."""
+    """Scores and input of a .json file; empty for other formats and for programs changed by ``--set``."""
     from shapeprog.formats.json_form import Result, read_result
 
     return Result(str(path), {}) if changes or path.suffix.lower() != ".json" else read_result(path)

@@ -1,6 +1,6 @@
 """Points and voxels out of array files: XYZ text, NPY and NPZ.  Pickles are never opened.
 
-The head of every array is looked at before memory is taken for it, and of an archive only what is wanted is unpacked.
+The header of every array is checked before memory is allocated, and only the arrays asked for are unpacked.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ def read_array(path: Path) -> Array:
 
 @ANY_NUMBERS
 def checked(array: Array, name: str) -> Array:
-    """``array`` as points (P, 3) in float64, or as voxel grids (N, R, R, R) whose values are not looked at yet.
+    """``array`` as points (P, 3) in float64, or as voxel grids (N, R, R, R) whose values are not checked yet.
 
     Raises
     ------
@@ -71,7 +71,7 @@ def checked(array: Array, name: str) -> Array:
 
 
 def check_shape(name: str, dtype: np.dtype[Any], shape: tuple[int, ...]) -> None:
-    """Refuse what is neither points nor voxels, or more of them than can be read, by its head alone."""
+    """Refuse other arrays than points and voxels, or too large ones, by their header alone."""
     if dtype.kind not in "biuf":
         raise InputError(f"{name} holds {few([dtype])} where numbers are needed", SHAPES_OF_ARRAYS)
     if len(shape) == 2 and shape[1] == 3:
@@ -110,7 +110,7 @@ def _read_text(path: Path) -> Array:
     check_count(path.name, "lines", content.count(b"\n"), POINTS)
     text = content.decode("utf-8-sig", "replace")  # comments may be in any encoding
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # that there are no points is told later, as an error
+        warnings.simplefilter("ignore")  # an empty file is an error later
         try:
             rows = np.loadtxt(io.StringIO(text), np.float64, comments=("#", "//"), ndmin=2, usecols=(0, 1, 2))
         except ValueError as error:
@@ -133,13 +133,13 @@ def _bad_line(text: str) -> str:
     return "its lines hold no numbers"
 
 
-def read_numpy(path: Path, wanted: Collection[str]) -> dict[str, Array]:
-    """The array of an NPY file (named ``""``), or those of an NPZ file that are wanted and there.
+def read_numpy(path: Path, names: Collection[str]) -> dict[str, Array]:
+    """The array of an NPY file (named ``""``), or those of an NPZ file that are in ``names``.
 
     Raises
     ------
     InputError
-        If the file is damaged, or what is wanted of it holds Python objects or is too large.
+        If the file is damaged, or one of the arrays holds Python objects or is too large.
     """
     check_file(path)
     with in_words(path), path.open("rb") as stream:
@@ -147,8 +147,8 @@ def read_numpy(path: Path, wanted: Collection[str]) -> dict[str, Array]:
             stream.seek(0)
             return {"": _read_npy(stream, path.name, path.stat().st_size)}
         with zipfile.ZipFile(stream) as archive:
-            found = {name: _member(archive, name, path.name) for name in members(archive) if name in wanted}
-    return found
+            arrays = {name: _member(archive, name, path.name) for name in members(archive) if name in names}
+    return arrays
 
 
 def members(archive: zipfile.ZipFile) -> list[str]:
@@ -157,8 +157,8 @@ def members(archive: zipfile.ZipFile) -> list[str]:
 
 
 def _member(archive: zipfile.ZipFile, name: str, file: str) -> Array:
-    place = f"{name}.npy" if f"{name}.npy" in archive.NameToInfo else name
-    entry = archive.getinfo(place)
+    member = f"{name}.npy" if f"{name}.npy" in archive.NameToInfo else name
+    entry = archive.getinfo(member)
     if entry.flag_bits & 1:
         raise InputError(f"{file}: {name} is encrypted", "save it without a password")
     with archive.open(entry) as stream:
@@ -206,7 +206,7 @@ def _chosen(path: Path) -> Array:
             return read_numpy(path, ())[""]
         with zipfile.ZipFile(path) as archive:
             held = members(archive)
-    name = next((each for each in ("voxels", "points") if each in held), held[0] if len(held) == 1 else None)
+    name = next((name for name in ("voxels", "points") if name in held), held[0] if len(held) == 1 else None)
     if name is None:
         raise InputError(f"{path.name} holds {few(held)}", "name the array to be read 'points' or 'voxels'")
     return read_numpy(path, (name,))[name]

@@ -1,4 +1,4 @@
-"""What is in folders: files by their suffix, with folders that may not be read named instead of ending everything."""
+"""Files in folders by their suffix; unreadable folders are listed instead of raising an error."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Skipped = list[tuple[Path, ShapeProgError]]
 
 
 def entries(folder: Path, skipped: Skipped) -> list[Path]:
-    """What is in a folder, in the order of the names."""
+    """The entries of a folder, sorted by name."""
     try:
         return sorted(folder / name for name in os.listdir(folder))
     except OSError as error:
@@ -35,20 +35,20 @@ def is_folder(path: Path, skipped: Skipped) -> bool:
 
 
 def files_below(folder: Path, suffixes: Collection[str], skipped: Skipped) -> list[Path]:
-    """Every file in a folder and in those within, whose suffix in lower case is wanted, in the order of the names.
+    """Every file in a folder and in those within, whose suffix in lower case is in ``suffixes``, sorted by name.
 
     Links to folders are not followed, and links to nothing are left out.
     """
-    found: list[Path] = []
+    files: list[Path] = []
 
     def skip(error: OSError) -> None:
-        place = Path(error.filename or folder)
-        skipped.append((place, unreadable(place, error)))
+        folder_path = Path(error.filename or folder)
+        skipped.append((folder_path, unreadable(folder_path, error)))
 
-    for place, _, names in os.walk(folder, onerror=skip):
-        wanted = (Path(place, name) for name in names if os.path.splitext(name)[1].lower() in suffixes)
-        found += [path for path in wanted if not _leads_nowhere(path)]
-    return sorted(found)
+    for folder_path, _, names in os.walk(folder, onerror=skip):
+        candidates = (Path(folder_path, name) for name in names if os.path.splitext(name)[1].lower() in suffixes)
+        files += [path for path in candidates if not _leads_nowhere(path)]
+    return sorted(files)
 
 
 def _leads_nowhere(path: Path) -> bool:

@@ -1,7 +1,7 @@
-"""glTF 2.0, binary (GLB) or as text with files beside it: the triangles and points of its nodes, placed.
+"""glTF 2.0, binary (GLB) or text with further files: the triangles and points of its nodes, transformed.
 
-Materials, skins and animations are left out.  The format is Khronos' glTF 2.0 Specification (2021); everything that it
-announces is compared with what is there before it is used.
+Materials, skins and animations are left out.  The format is Khronos' glTF 2.0 Specification (2021); all sizes in
+the file are checked against its content before they are used.
 """
 
 from __future__ import annotations
@@ -29,29 +29,29 @@ _POINTS, _TRIANGLES, _STRIP, _FAN = 0, 4, 5, 6
 _AGAIN = "write the file again"
 
 
-def read_gltf(name: str, content: bytes, beside: Callable[[str], bytes]) -> list[tuple[FloatArray, Part]]:
+def read_gltf(name: str, content: bytes, read_other: Callable[[str], bytes]) -> list[tuple[FloatArray, Part]]:
     """Every primitive of the scene with the matrix (4, 4) that places it.
 
     Parameters
     ----------
     name
-        What the file is called, for errors.
+        Name of the file, for errors.
     content
         The file, GLB or JSON.
     beside
-        The bytes of another file that it names.
+        Returns the bytes of another file that it refers to.
 
     Raises
     ------
     InputError
-        If the file is cut short, or what it announces is not there.
+        If the file is cut short or incomplete.
     """
     text, chunk = _chunks(name, content) if content[:4] == b"glTF" else (content, None)
     head = json.loads(text.decode("utf-8-sig", "replace").rstrip("\0"))  # names may be in any encoding
     version = str(head.get("asset", {}).get("version", "2.0"))
     if not version.startswith("2."):
         raise InputError(f"{name} is glTF {version[:20]}; only glTF 2 is read", "convert it to glTF 2")
-    return _Document(name, head, chunk, beside).placed()
+    return _Document(name, head, chunk, read_other).placed()
 
 
 def _chunks(name: str, content: bytes) -> tuple[bytes, bytes | None]:
@@ -77,30 +77,32 @@ def _chunks(name: str, content: bytes) -> tuple[bytes, bytes | None]:
 class _Document:
     """The lists of a glTF file; buffers and accessors are read once, when they are first named."""
 
-    def __init__(self, name: str, head: dict[str, Any], chunk: bytes | None, beside: Callable[[str], bytes]) -> None:
-        self.name, self._head, self._chunk, self._beside = name, head, chunk, beside
+    def __init__(
+        self, name: str, head: dict[str, Any], chunk: bytes | None, read_other: Callable[[str], bytes]
+    ) -> None:
+        self.name, self._head, self._chunk, self._beside = name, head, chunk, read_other
         self._files: dict[str, bytes] = {}
         self._arrays: dict[int, Array] = {}
 
     def placed(self) -> list[tuple[FloatArray, Part]]:
-        found: list[tuple[FloatArray, Part]] = []
+        placed: list[tuple[FloatArray, Part]] = []
         total = 0
         waiting = [(node, np.eye(4)) for node in self._roots()]
-        seen = set()
+        visited = set()
         while waiting:
             node, above = waiting.pop()
-            if node in seen:
+            if node in visited:
                 raise InputError(f"{self.name}: node {node} hangs below itself or two others", _AGAIN)
-            seen.add(node)
+            visited.add(node)
             entry = self._entry("nodes", node)
             matrix = above @ _matrix(entry)
             waiting += [(child, matrix) for child in entry.get("children", [])]
             for primitive in self._entry("meshes", entry["mesh"])["primitives"] if "mesh" in entry else ():
                 vertices, faces = self._primitive(primitive)
-                found.append((matrix, (vertices, faces)))
+                placed.append((matrix, (vertices, faces)))
                 total += max(len(vertices) // 3, len(faces))
                 check_count(self.name, "triangles, all parts placed,", total, POINTS)
-        return found
+        return placed
 
     def _roots(self) -> list[int]:
         if self._head.get("scenes"):
@@ -187,11 +189,11 @@ def _whole(value: Any) -> int:
 
 
 def _matrix(node: dict[str, Any]) -> FloatArray:
-    """The matrix (4, 4) that leads from a node to what it hangs below."""
+    """The matrix (4, 4) from the coordinates of a node to those of its parent."""
     if "matrix" in node:
         return np.array(node["matrix"], np.float64).reshape(4, 4).T
     matrix = np.eye(4)
-    x, y, z, w = (float(each) for each in node.get("rotation", (0, 0, 0, 1)))
+    x, y, z, w = (float(number) for number in node.get("rotation", (0, 0, 0, 1)))
     size = math.hypot(x, y, z, w)
     if size > 0:
         x, y, z, w = x / size, y / size, z / size, w / size

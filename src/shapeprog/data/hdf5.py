@@ -42,8 +42,10 @@ class Hdf5Grids:
         """The grid (R, R, R) numbered ``number``."""
         if not self._first <= number < self._first + len(self._block):
             first = number // self._rows * self._rows
-            many = len(self._shape) == 4
-            self._block = self._read(lambda data: data[first : first + self._rows] if many else np.asarray(data)[None])
+            is_stack = len(self._shape) == 4
+            self._block = self._read(
+                lambda data: data[first : first + self._rows] if is_stack else np.asarray(data)[None]
+            )
             self._first = first
         grid: Array = self._block[number - self._first]
         return grid

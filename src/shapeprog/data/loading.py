@@ -42,7 +42,7 @@ def load(
         0, of a file that holds many; ``file.npz#name`` the one of that name.
     up, front
         World axes such as ``+y`` and ``-z``; by default those of the format (:mod:`shapeprog.data.orientation`).  With
-        ``auto`` up is what the shape seems to stand along (:mod:`shapeprog.data.uprightness`); its note says what.
+        ``auto`` up is estimated from the shape (:mod:`shapeprog.data.uprightness`); ``Shape.note`` names it.
     points
         How many points to draw from a mesh, or to keep of a cloud, at most.
     seed
@@ -76,7 +76,7 @@ def load_all(
     points: int = 5000,
     seed: int = 0,
 ) -> Iterator[tuple[Path, Shape | ShapeProgError]]:
-    """Every shape of files, of folders with all within, and of files with many; what is broken comes as its error.
+    """Every shape of files, of folders with all within, and of files with many; a broken one as its error.
 
     The order is that of ``paths``, and within a folder that of the names.  A broken file never stops the others.
 
@@ -94,15 +94,15 @@ def load_all(
         except ShapeProgError as error:
             yield Path(path), error
             continue
-        for each in files:
+        for file_path in files:
             try:
-                held = _open(each, up, front, points, seed)
-                chosen = range(len(held)) if index is None else [_number(each, index, held)]
+                held = _open(file_path, up, front, points, seed)
+                numbers = range(len(held)) if index is None else [_number(file_path, index, held)]
             except ShapeProgError as error:
-                yield each, error
+                yield file_path, error
                 continue
-            for number in chosen:
-                label = each if len(held) == 1 else Path(f"{each}#{number}")
+            for number in numbers:
+                label = file_path if len(held) == 1 else Path(f"{file_path}#{number}")
                 yield label, _made(held, number)
         yield from skipped
 
@@ -120,7 +120,7 @@ def readable_suffixes() -> set[str]:
 
 
 class _Held:
-    """The shapes of one file, each made when asked for; whatever its reader raises comes in words."""
+    """The shapes of one file, made on access; all errors of readers become messages."""
 
     def __init__(self, path: Path, names: list[str], make: Callable[[int], Shape]) -> None:
         self.path, self.names, self._make = path, names, make
@@ -138,49 +138,51 @@ def _open(path: Path, up: str | None, front: str | None, points: int, seed: int)
     with in_words(path):
         check_file(path)
         if suffix.removeprefix(".") not in COMMON and suffix not in readable_suffixes():
-            known = ", ".join(sorted(readable_suffixes()))
+            suffixes = ", ".join(sorted(readable_suffixes()))
             ending = f"that end in {suffix!r}" if suffix else "without a suffix"
-            raise InputError(f"{path.name}: no shapes are read from files {ending}", f"known: {known}")
-        axes_of(path, up, front)  # what is wrong with them is said before anything is read
-        place, name = partial(_placed, path, up, front), _name(path)
+            raise InputError(f"{path.name}: no shapes are read from files {ending}", f"known: {suffixes}")
+        axes_of(path, up, front)  # wrong axes are reported before the file is read
+        make_shape, name = partial(_placed, path, up, front), _name(path)
         if suffix in ARRAY_SUFFIXES:
-            return _open_array(path, name, place, points, seed)
+            return _open_array(path, name, make_shape, points, seed)
         if suffix == ".binvox":
-            shape = _read_binvox(path, name, place)
+            shape = _read_binvox(path, name, make_shape)
         else:
-            shape = _shape_of(*read_mesh(path), path, name, place, points, seed)
+            shape = _shape_of(*read_mesh(path), path, name, make_shape, points, seed)
     return _Held(path, [name], lambda _: shape)
 
 
 Place = Callable[[Callable[..., Shape]], Shape]
-"""Makes a shape with the axes that are wanted, from a function of its ``axes``."""
+"""Makes a shape with the requested axes from a function of ``axes``."""
 
 
 def _placed(path: Path, up: str | None, front: str | None, make: Callable[..., Shape]) -> Shape:
     if up != AUTO:
         return make(axes=axes_of(path, up, front))
-    seen = make(axes=axes_of(path, None, front))
-    found = find_up(seen.voxels, np.array(seen.frame.axes), usual=default_axes(path)[0], front=front)
-    note = f"Estimated up axis of the file: {found.up} (probability {found.probability:.0%})."
-    return replace(make(axes=axes_of(path, found.up, front)), note=note)
+    default_shape = make(axes=axes_of(path, None, front))
+    estimate = find_up(
+        default_shape.voxels, np.array(default_shape.frame.axes), usual=default_axes(path)[0], front=front
+    )
+    note = f"Estimated up axis of the file: {estimate.up} (probability {estimate.probability:.0%})."
+    return replace(make(axes=axes_of(path, estimate.up, front)), note=note)
 
 
-def _read_binvox(path: Path, name: str, place: Place) -> Shape:
+def _read_binvox(path: Path, name: str, make_shape: Place) -> Shape:
     from shapeprog.formats.binvox import read_binvox
 
     check_count(path.name, "bytes", path.stat().st_size, BYTES)
     cells, corner, cell = read_binvox(path)
-    return place(partial(shape_from_voxels, cells, name=name, corner=corner, cell=cell, source=path))
+    return make_shape(partial(shape_from_voxels, cells, name=name, corner=corner, cell=cell, source=path))
 
 
-def _shape_of(vertices: Array, faces: Array, path: Path, name: str, place: Place, points: int, seed: int) -> Shape:
+def _shape_of(vertices: Array, faces: Array, path: Path, name: str, make_shape: Place, points: int, seed: int) -> Shape:
     if len(faces):
-        return place(partial(shape_from_mesh, vertices, faces, name=name, points=points, seed=seed, source=path))
+        return make_shape(partial(shape_from_mesh, vertices, faces, name=name, points=points, seed=seed, source=path))
     check_count(path.name, "points", len(vertices), POINTS)
-    return place(partial(shape_from_points, vertices, name=name, points=points, seed=seed, source=path))
+    return make_shape(partial(shape_from_points, vertices, name=name, points=points, seed=seed, source=path))
 
 
-def _open_array(path: Path, name: str, place: Place, points: int, seed: int) -> _Held:
+def _open_array(path: Path, name: str, make_shape: Place, points: int, seed: int) -> _Held:
     from shapeprog.data.arrays import occupied, read_array
     from shapeprog.data.hdf5 import Hdf5Grids
     from shapeprog.data.packs import is_pack, read_pack
@@ -190,22 +192,22 @@ def _open_array(path: Path, name: str, place: Place, points: int, seed: int) -> 
         return _Held(path, pack.ids.tolist(), pack.__getitem__)
     array = Hdf5Grids(path) if path.suffix.lower() in (".h5", ".hdf5") else read_array(path)
     if not isinstance(array, Hdf5Grids) and array.ndim == 2:
-        cloud = place(partial(shape_from_points, array, name=name, points=points, seed=seed, source=path))
+        cloud = make_shape(partial(shape_from_points, array, name=name, points=points, seed=seed, source=path))
         return _Held(path, [name], lambda _: cloud)
     names = [name] if len(array) == 1 else [f"{name}#{number}" for number in range(len(array))]
 
     def make(number: int) -> Shape:
         cells = occupied(array[number], names[number])
-        return place(partial(shape_from_voxels, cells, name=names[number], source=path))
+        return make_shape(partial(shape_from_voxels, cells, name=names[number], source=path))
 
     return _Held(path, names, make)
 
 
 def _split_index(path: str | os.PathLike[str]) -> tuple[Path, str | None]:
-    whole = Path(path)
+    whole_path = Path(path)
     text = os.fspath(path)
-    if os.path.exists(whole) or "#" not in text:
-        return whole, None
+    if os.path.exists(whole_path) or "#" not in text:
+        return whole_path, None
     file, _, index = text.rpartition("#")
     return Path(file), index
 
@@ -222,15 +224,15 @@ def _number(path: Path, index: str, held: _Held) -> int:
 
 
 def _files_in(folder: Path) -> tuple[list[Path], Skipped]:
-    """The files to read in a folder and below, and what of it cannot be looked into."""
+    """The files to read in a folder and below, and the folders that cannot be read."""
     skipped: Skipped = []
-    found = files_below(folder, readable_suffixes(), skipped)
-    # ShapeNet lays the voxels of each object beside its mesh: one shape, read from the mesh.
-    meshes = {path.parent for path in found if path.suffix.lower() != ".binvox" and in_shapenet_layout(path)}
-    found = [path for path in found if not (path.suffix.lower() == ".binvox" and path.parent in meshes)]
-    if not found and not skipped:
+    files = files_below(folder, readable_suffixes(), skipped)
+    # ShapeNet has voxels and mesh of an object in one folder: one shape, read from the mesh.
+    meshes = {path.parent for path in files if path.suffix.lower() != ".binvox" and in_shapenet_layout(path)}
+    files = [path for path in files if not (path.suffix.lower() == ".binvox" and path.parent in meshes)]
+    if not files and not skipped:
         raise InputError(f"the folder {folder} holds no file that can be read as a shape", "name another folder")
-    return found, skipped
+    return files, skipped
 
 
 def _name(path: Path) -> str:

@@ -1,4 +1,4 @@
-"""Triangles (or bare points) of a mesh file, with nothing but geometry read and nothing fetched.
+"""Triangles (or points) of a mesh file; only geometry is read, and only from local files.
 
 The common formats are read here, in time and memory linear in the file however many parts it has; what trimesh reads
 besides, through trimesh.
@@ -47,7 +47,7 @@ def read_mesh(path: Path) -> tuple[Array, Array]:
     Raises
     ------
     InputError
-        If the file cannot be read as what its suffix says, or names vertices that it does not hold.
+        If the file cannot be read as its suffix declares, or refers to vertices that it does not hold.
     """
     suffix, name, content = path.suffix.lower().lstrip("."), path.name, read_whole(path)
     if suffix in _TEXTS and b"\0" in content:
@@ -74,12 +74,12 @@ def _joined(parts: Sequence[tuple[FloatArray, Part]]) -> Part:
     vertices: list[Array] = [np.zeros((0, 3))]
     faces: list[Array] = [np.zeros((0, 3), np.int64)]
     count = 0
-    for matrix, (own, listed) in solid or parts:
+    for matrix, (corners, listed) in solid or parts:
         still = np.array_equal(matrix, np.eye(4))
-        vertices.append(own if still else own @ matrix[:3, :3].T + matrix[:3, 3])
-        known = (listed >= 0) & (listed < len(own))  # a face names no vertex of another part
-        faces.append(np.where(known, listed + count, -1))
-        count += len(own)
+        vertices.append(corners if still else corners @ matrix[:3, :3].T + matrix[:3, 3])
+        valid = (listed >= 0) & (listed < len(corners))  # a face names no vertex of another part
+        faces.append(np.where(valid, listed + count, -1))
+        count += len(corners)
     return np.concatenate(vertices), np.concatenate(faces)
 
 
@@ -92,8 +92,8 @@ def _through_trimesh(suffix: str, content: bytes) -> list[tuple[FloatArray, Part
             io.BytesIO(content), file_type=suffix, process=False, maintain_order=True, skip_materials=True
         )
     scene = loaded if isinstance(loaded, trimesh.Scene) else trimesh.Scene([loaded])
-    places = (scene.graph[node] for node in scene.graph.nodes_geometry)
-    return [(np.asarray(matrix), _part(scene.geometry[each])) for matrix, each in places]
+    nodes = (scene.graph[node] for node in scene.graph.nodes_geometry)
+    return [(np.asarray(matrix), _part(scene.geometry[geometry])) for matrix, geometry in nodes]
 
 
 def _part(part: Any) -> Part:
@@ -103,9 +103,9 @@ def _part(part: Any) -> Part:
 
 
 def _beside(path: Path, name: str) -> bytes:
-    """What a GLTF may read besides itself: plain files of its own folder or below, and nothing over a network."""
+    """The further files of a GLTF: regular files in the same folder or below, nothing over a network."""
     folder = path.resolve().parent
-    place = (folder / name.strip()).resolve()
-    if not place.is_relative_to(folder) or not place.is_file():
-        raise InputError(f"{path.name} needs the file {name!r}, which is not beside the file", "put it there")
-    return read_whole(place)
+    file = (folder / name.strip()).resolve()
+    if not file.is_relative_to(folder) or not file.is_file():
+        raise InputError(f"{path.name} needs the file {name!r}, which is not in its folder", "put it there")
+    return read_whole(file)

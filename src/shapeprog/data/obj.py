@@ -35,7 +35,7 @@ def read_obj(name: str, content: bytes) -> tuple[Array, Array]:
     if b"\r" in content:
         content = content.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
     if b"\\\n" in content:
-        content = content.replace(b"\\\n", b" ")  # a line that goes on
+        content = content.replace(b"\\\n", b" ")  # a continued line
     rows = _VERTEX.findall(content)
     if b"" in rows:
         raise InputError(f"{name}: vertex {rows.index(b'') + 1} has fewer than three coordinates", _CURE)
@@ -51,13 +51,13 @@ def _triangles(name: str, content: bytes, count: int) -> Array:
     corners = numbers(name, _TEXTURE.sub(b"", text) if b"/" in text else text, np.int64)
     if len(corners) != widths.sum():
         raise InputError(f"{name} has a corner of a face that names no vertex", _CURE)
-    known: Array = np.full(len(corners), count)
+    count_above: Array = np.full(len(corners), count)
     if (corners < 0).any():  # counted back from the vertices above the face
         kinds = np.array(_KIND.findall(content))
-        known = np.repeat(np.cumsum(kinds == b"v")[kinds == b"f"], widths)
-    places = np.where(corners < 0, known + corners, corners - 1)
-    wrong = np.flatnonzero((places < 0) | (places >= count))
+        count_above = np.repeat(np.cumsum(kinds == b"v")[kinds == b"f"], widths)
+    corner_index = np.where(corners < 0, count_above + corners, corners - 1)
+    wrong = np.flatnonzero((corner_index < 0) | (corner_index >= count))
     if len(wrong):
         face = int(np.searchsorted(np.cumsum(widths), wrong[0], side="right"))
         raise InputError(f"{name}: face {face + 1} names vertex {corners[wrong[0]]} of {count}, counted from 1", _CURE)
-    return fans(places, widths)
+    return fans(corner_index, widths)

@@ -33,12 +33,12 @@ def read_off(name: str, content: bytes) -> tuple[Array, Array]:
     if len(rows) < vertices + faces:
         held = f"{min(len(rows), vertices):,} vertices of {vertices:,}, {max(len(rows) - vertices, 0):,} faces"
         raise InputError(f"{name} is cut short: {held} of {faces:,}", _AGAIN)
-    places = [row.split(None, 3)[:3] for row in rows[:vertices]]
+    coordinates = [row.split(None, 3)[:3] for row in rows[:vertices]]
     polygons = [row.split() for row in rows[vertices : vertices + faces]]
     widths = numbers(name, b" ".join(row[0] for row in polygons), np.int64)
     corners = [row[1 : width + 1] for row, width in zip(polygons, widths.tolist(), strict=True)]
-    if any(len(row) < 3 for row in places) or [len(row) for row in corners] != widths.tolist():
+    if any(len(row) < 3 for row in coordinates) or [len(row) for row in corners] != widths.tolist():
         raise InputError(f"{name} has a line with fewer numbers than it needs: it is cut short or damaged", _AGAIN)
-    positions = numbers(name, b" ".join(word for row in places for word in row))
+    positions = numbers(name, b" ".join(word for row in coordinates for word in row))
     named = numbers(name, b" ".join(word for row in corners for word in row), np.int64)
     return positions.reshape(-1, 3), fans(named, widths)

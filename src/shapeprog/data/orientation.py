@@ -1,4 +1,4 @@
-"""Which way is up: the axes of a file by its format, unless the user says otherwise.
+"""The axes of a file: those of its format, unless the user gives others.
 
 The axes of every format stand with its declaration (:mod:`shapeprog.formats.format`): mesh files are mostly +y up with
 the front towards +z, STL and XYZ +z up with the front towards -y, and arrays lie in the grid already.  Files in the
@@ -38,7 +38,7 @@ def in_shapenet_layout(path: Path) -> bool:
 
 
 def axes_of(path: Path, up: str | None, front: str | None) -> Array:
-    """World directions of the grid axes, columns (3, 3), with the file's defaults for what is not given.
+    """World directions of the grid axes, columns (3, 3), with the file's defaults for missing axes.
 
     Where one axis is given and lies on the line of the other's default, the shape is taken to be tipped over: the
     default pair is turned together until the given axis fits.  ``auto`` counts as not given.

@@ -34,12 +34,12 @@ from shapeprog.space import LEAST_SIDE, MOST_SIDE, RESOLUTION, SPAN, Array, Fram
 _BYTES = RESOLUTION**3 // 8
 _LEVELS = 65535
 _ARRAYS = ("ids", "voxels", "points", "longest_side", "split")
-_CURE = "make packs with 'shapeprog prepare'; the manual of shapeprog.data.packs says what they hold"
+_CURE = "make packs with 'shapeprog prepare'; the module shapeprog.data.packs documents their content"
 
 
 @dataclass(frozen=True)
 class Pack(Sequence[Shape]):
-    """The shapes of a pack, each unpacked when asked for.
+    """The shapes of a pack, unpacked on access.
 
     Parameters
     ----------
@@ -95,11 +95,11 @@ class Pack(Sequence[Shape]):
     def __iter__(self) -> Iterator[Shape]:
         return (self[index] for index in range(len(self)))
 
-    def take(self, places: npt.ArrayLike) -> Pack:
+    def take(self, indices: npt.ArrayLike) -> Pack:
         """The pack of the shapes at ``places`` (numbers, or a mask)."""
-        chosen = np.asarray(places)
+        rows = np.asarray(indices)
         parts = (self.points, self.longest_side, self.split)
-        return Pack(self.source, self.ids[chosen], self.voxels[chosen], *(p if p is None else p[chosen] for p in parts))
+        return Pack(self.source, self.ids[rows], self.voxels[rows], *(p if p is None else p[rows] for p in parts))
 
     def only(self, split: str) -> Pack:
         """The shapes of one split: train, val or test.
@@ -107,7 +107,7 @@ class Pack(Sequence[Shape]):
         Raises
         ------
         InputError
-            If the pack does not tell splits apart, or has none of that name.
+            If the pack has no splits, or none of that name.
         """
         if self.split is None:
             raise InputError(f"{self.source.name} has no splits", "read the whole pack, or the file of that split")
@@ -119,7 +119,7 @@ class Pack(Sequence[Shape]):
 
 
 def is_pack(path: Path) -> bool:
-    """Whether an NPZ file is a pack, by the shape of its ``voxels``; reads no more than that array's head."""
+    """Whether an NPZ file is a pack, by the shape of its ``voxels``; reads only the header of that array."""
     import zipfile
 
     if path.suffix.lower() != ".npz" or not zipfile.is_zipfile(path):
@@ -131,7 +131,7 @@ def is_pack(path: Path) -> bool:
             with archive.open("voxels.npy") as stream:
                 shape, dtype = read_head(stream)
         except Exception:
-            return True  # a damaged pack: reading it says so
+            return True  # a damaged pack: reading it raises the error
         return len(shape) == 2 and shape[1] == _BYTES and dtype == np.uint8
 
 
@@ -145,7 +145,7 @@ def read_pack(path: str | os.PathLike[str], split: str | None = None, *, whole: 
     split
         Only the shapes of this split: train, val or test.
     whole
-        Whether a single shape without cells or of no usable size spoils the pack; else it is refused when asked for.
+        Whether a single shape without cells or of no usable size is an error; otherwise it is one on access.
 
     Raises
     ------
@@ -165,7 +165,7 @@ def read_pack(path: str | os.PathLike[str], split: str | None = None, *, whole: 
     if whole:
         good = pack.voxels.any(1) & (True if pack.longest_side is None else _usable(pack.longest_side))
         for index in np.flatnonzero(~good)[:1]:
-            pack[int(index)]  # which says what is wrong with it
+            pack[int(index)]  # raises the error
     return pack if split is None else pack.only(split)
 
 
@@ -194,7 +194,7 @@ def _check(name: str, arrays: dict[str, Array]) -> None:
 
 
 def _usable(side: Array | float) -> Any:
-    """Whether longest sides can be those of shapes; what is no number is not."""
+    """Whether longest sides are within the bounds; False for NaN."""
     exact = np.asarray(side, np.float64)  # the bounds are beyond float16
     return (exact > LEAST_SIDE) & (exact < MOST_SIDE)
 

@@ -24,16 +24,16 @@ def part_files(root: Path) -> dict[str, list[Path]]:
     InputError
         If there is no mesh file below it, or a folder below it may not be read.
     """
-    found: dict[str, list[Path]] = {}
+    objects: dict[str, list[Path]] = {}
     skipped: Skipped = []
     for file in files_below(root, {f".{suffix}" for suffix in COMMON}, skipped):
         name = "_".join(file.parent.relative_to(root).parts) or root.name
-        found.setdefault(name, []).append(file)
+        objects.setdefault(name, []).append(file)
     if skipped:  # parts that are left out would be missed as if the object lacked them
         raise skipped[0][1]
-    if not found:
+    if not objects:
         raise InputError(f"{root} holds no parts", "name a folder with a folder of part meshes for each object")
-    return found
+    return objects
 
 
 def read_parts(files: list[Path]) -> list[Part]:
@@ -44,10 +44,10 @@ def read_parts(files: list[Path]) -> list[Part]:
     InputError
         If one cannot be read.
     """
-    found = []
+    parts = []
     for file in files:
         with in_words(file):
             vertices, faces = read_mesh(file)
         if len(faces):
-            found.append((vertices, faces))
-    return found
+            parts.append((vertices, faces))
+    return parts

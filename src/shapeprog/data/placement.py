@@ -12,10 +12,10 @@ from shapeprog.errors import InputError
 from shapeprog.space import HALF, LEAST_SIDE, MOST_SIDE, RESOLUTION, SPAN, Array, Frame
 
 SCAN = 20_000
-"""Most points of a cloud that inference may look at."""
+"""Maximum number of points of a cloud that inference uses."""
 
 _NEAREST = 1e-12
-"""Least longest side of a shape as a part of its distance from the origin: below, float64 tells no cells apart."""
+"""Minimum longest side of a shape as a share of its distance from the origin: below, float64 cannot resolve cells."""
 
 
 def shape_from_mesh(
@@ -78,10 +78,10 @@ def shape_from_points(
 
     frame = _frame(cloud, name, axes)
     placed = frame.to_grid(cloud)
-    kept, scan = _some(placed, points, seed), _some(placed, SCAN, seed)
+    sample, scan = _some(placed, points, seed), _some(placed, SCAN, seed)
     return Shape(
-        name, voxelise_points(placed), kept, frame, source=source, kind="points",
-        scan=scan if len(scan) > len(kept) else None,
+        name, voxelise_points(placed), sample, frame, source=source, kind="points",
+        scan=scan if len(scan) > len(sample) else None,
     )  # fmt: skip
 
 
@@ -103,7 +103,7 @@ def shape_from_voxels(
 ) -> Shape:
     """The shape of a voxel grid (R, R, R) whose corner lies at ``corner`` of the world, with cells of side ``cell``.
 
-    A grid of 32^3 that already is as the grid frame asks (within a cell or two, as published data are) is kept cell for
+    A grid of 32^3 that fits the grid frame already (within a cell or two, as published data do) is kept cell for
     cell; every other one is fitted into the grid, where a cell is occupied that an occupied cell touches.
 
     Raises
@@ -125,8 +125,8 @@ def shape_from_voxels(
     middle, longest = (low + high) / 2 - HALF, (high - low).max()
     if size == RESOLUTION and abs(longest - SPAN) <= 2 and np.abs(middle).max() <= 1.5:
         centre = start + cell * HALF
-        kept = Frame(cell, (float(centre[0]), float(centre[1]), float(centre[2])), frame.axes)
-        return Shape(name, np.ascontiguousarray(turned), frame=kept, source=source)
+        same_frame = Frame(cell, (float(centre[0]), float(centre[1]), float(centre[2])), frame.axes)
+        return Shape(name, np.ascontiguousarray(turned), frame=same_frame, source=source)
     ends = frame.to_grid([start, start + cell * size])
     return Shape(name, resample_voxels(turned, ends.min(0), cell / frame.scale), frame=frame, source=source)
 
@@ -143,7 +143,7 @@ def _frame(positions: Array, name: str, axes: Array | None) -> Frame:
 
 
 def _around(low: Array, high: Array, name: str, axes: Array | None) -> Frame:
-    """The frame around a box of the world, if numbers can tell its sides apart."""
+    """The frame around a box of the world."""
     with np.errstate(over="ignore", invalid="ignore"):
         longest, farthest = float((high - low).max()), float(np.maximum(np.abs(low), np.abs(high)).max())
     if not LEAST_SIDE < longest < MOST_SIDE:

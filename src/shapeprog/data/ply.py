@@ -52,7 +52,7 @@ def read_ply(name: str, content: bytes) -> tuple[Array, Array]:
                 raise InputError(f"{name} has vertices without x, y and z", "export the model again")
             vertices = np.stack([columns[axis][0] for axis in "xyz"], axis=1).astype(np.float64)
         elif element.name == "face" and element.count:
-            corners, widths = next((columns[each] for each in _CORNERS if each in columns), (None, None))
+            corners, widths = next((columns[key] for key in _CORNERS if key in columns), (None, None))
             if corners is None or widths is None:
                 raise InputError(f"{name} has faces without vertex_indices", "export the model again")
             faces = fans(corners.astype(np.int64), widths)
@@ -86,7 +86,7 @@ def _head(name: str, content: bytes) -> tuple[list[_Element], bytes]:
 
 def _type(name: str, word: str, form: str) -> np.dtype[Any]:
     if word not in _TYPES:
-        raise InputError(f"{name} has numbers of the type {word[:40]!r}, which PLY does not know", _AGAIN)
+        raise InputError(f"{name} has numbers of the type {word[:40]!r}, which is not one of PLY", _AGAIN)
     if form == "ascii":
         return np.dtype(np.float64)
     return np.dtype(_TYPES[word]).newbyteorder(">" if form == "binary_big_endian" else "<")
@@ -95,7 +95,7 @@ def _type(name: str, word: str, form: str) -> np.dtype[Any]:
 def _rows(name: str, element: _Element, body: bytes, at: int) -> tuple[dict[str, tuple[Array, Array]], int]:
     """The columns of an element by name, each as its numbers and how many belong to each row, and where it ends."""
     check_count(name, f"{element.name} rows", element.count, 3 * POINTS)
-    lists = [each for each in element.properties if each[2] is not None]
+    lists = [listed for listed in element.properties if listed[2] is not None]
     widths = {} if element.count == 0 else _first_widths(name, element, body, at)
     fields = list[tuple[str, np.dtype[Any]] | tuple[str, np.dtype[Any], tuple[int]]]()
     for label, kind, length in element.properties:
@@ -116,15 +116,16 @@ def _rows(name: str, element: _Element, body: bytes, at: int) -> tuple[dict[str,
 
 def _ragged(name: str, element: _Element, body: bytes, at: int) -> tuple[dict[str, tuple[Array, Array]], int]:
     """The same where rows differ in length, as those of triangles among quads do."""
-    found: dict[str, list[Array]] = {label: [] for label, _, _ in element.properties}
+    columns: dict[str, list[Array]] = {label: [] for label, _, _ in element.properties}
     for _ in range(element.count):
         for label, kind, length in element.properties:
             width = 1
             if length is not None:
                 width, at = int(_at(name, element, body, at, length, 1)[0]), at + length.itemsize
-            found[label].append(_at(name, element, body, at, kind, width))
+            columns[label].append(_at(name, element, body, at, kind, width))
             at += kind.itemsize * width
-    return {label: (np.concatenate(each), np.array([len(one) for one in each])) for label, each in found.items()}, at
+    full = {label: (np.concatenate(rows), np.array([*map(len, rows)])) for label, rows in columns.items()}
+    return full, at
 
 
 def _first_widths(name: str, element: _Element, body: bytes, at: int) -> dict[str, int]:

@@ -1,4 +1,4 @@
-"""A directory of models into packs with splits: ShapeNetCore v2 as it is distributed, or plain folders by category."""
+"""Packs with splits from a directory of models: ShapeNetCore v2 as distributed, or plain folders by category."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ SYNSETS = {
 
 @dataclass(frozen=True)
 class Prepared:
-    """What :func:`prepare` made of one model, or of the whole directory.
+    """The result of :func:`prepare` for one model, or for the whole directory.
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ def prepare(
     points, seed, up, front
         As for :func:`shapeprog.data.load`.
     read
-        What reads a model.
+        The function that reads a model.
 
     Raises
     ------
@@ -112,7 +112,7 @@ def prepare(
     folder = make_folder(output)
     packs: list[tuple[Path, int]] = []
     done = 0
-    # A category is written as soon as it is read: what is in memory stays small, and a stop loses one category at most.
+    # A category is written as soon as it is read: this limits memory, and a stop loses one category at most.
     for category, branch in groupby(models, key=lambda model: model[0]):
         groups: dict[str, list[Shape]] = {}
         for _, name, path in branch:
@@ -125,8 +125,8 @@ def prepare(
                 failures.append((path, error))
             else:
                 split = split_of(shape, shares)
-                kept = Shape(name, shape.voxels, shape.points, _unit_frame(shape), split=split)
-                groups.setdefault(split, []).append(kept)
+                record = Shape(name, shape.voxels, shape.points, _unit_frame(shape), split=split)
+                groups.setdefault(split, []).append(record)
             yield Prepared(done, len(models), path, problem)
         for split in SPLITS:
             target, shapes = folder / f"{category}_{split}.npz", groups.get(split, [])
@@ -134,10 +134,10 @@ def prepare(
                 packs.append((target, write_pack(target, sorted(shapes, key=lambda shape: shape.name))))
             voxels = [shape.name for shape in shapes if shape.points is None]
             if 0 < len(voxels) < len(shapes):
-                said = (
+                message = (
                     f"{target.name} has no points: {len(voxels)} of its {len(shapes)} models are voxels, as {voxels[0]}"
                 )
-                failures.append((target, ShapeProgError(said, "prepare voxels in another category than meshes")))
+                failures.append((target, ShapeProgError(message, "prepare voxels in another category than meshes")))
     yield Prepared(done, len(models), folder, packs=tuple(packs), failures=tuple(failures))
 
 
@@ -153,39 +153,39 @@ def find_models(directory: Path, skipped: Skipped) -> list[tuple[str, str, Path]
     """
     if not directory.is_dir():
         raise InputError(f"there is no folder {directory}", "give the folder of the models")
-    suffixes, found = readable_suffixes(), dict[tuple[str, str], Path]()
+    suffixes, models = readable_suffixes(), dict[tuple[str, str], Path]()
     folders = [path for path in entries(directory, skipped) if is_folder(path, skipped)]
     for branch in [*folders, directory.resolve()]:
-        if found and branch not in folders:
+        if models and branch not in folders:
             break
         category = SYNSETS.get(branch.name, re.sub(r"[^\w-]+", "_", branch.name))
         closed: Skipped = []
         layout = [path for path in entries(branch, skipped) if is_folder(path / "models", closed)]
-        for place in layout:
-            files = [path for path in entries(place / "models", skipped) if path.suffix.lower() in suffixes]
+        for model_folder in layout:
+            files = [path for path in entries(model_folder / "models", skipped) if path.suffix.lower() in suffixes]
             if files:
-                found[category, place.name] = min(files, key=_preference)
+                models[category, model_folder.name] = min(files, key=_preference)
         if layout:
             skipped += closed
         else:
             for path in files_below(branch, suffixes, skipped):
                 model = category, path.relative_to(branch).with_suffix("").as_posix()
-                found[model] = min(path, found.get(model, path), key=_preference)
-    if not found:
+                models[model] = min(path, models.get(model, path), key=_preference)
+    if not models:
         if skipped:
             raise skipped[0][1]
         raise InputError(
             f"the folder {directory} holds no models",
             "it needs meshes or voxels, in a folder per category or as <synset>/<id>/models",
         )
-    return [(*model, path) for model, path in sorted(found.items())]
+    return [(*model, path) for model, path in sorted(models.items())]
 
 
 def split_of(shape: Shape, shares: tuple[float, float, float] = (0.7, 0.1, 0.2)) -> str:
     """train, val or test, drawn from the cells of a shape alone: equal cells, equal split."""
     digest = hashlib.sha256(np.packbits(shape.voxels).tobytes()).digest()
-    drawn = int.from_bytes(digest[:8], "big") / 2**64
-    return SPLITS[0] if drawn < shares[0] else SPLITS[1] if drawn < shares[0] + shares[1] else SPLITS[2]
+    number = int.from_bytes(digest[:8], "big") / 2**64
+    return SPLITS[0] if number < shares[0] else SPLITS[1] if number < shares[0] + shares[1] else SPLITS[2]
 
 
 def _preference(path: Path) -> tuple[bool, bool, str]:

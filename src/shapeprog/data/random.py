@@ -26,7 +26,7 @@ def random_program(
     generator
         Where the randomness comes from, or the seed of a new generator; the same state gives the same program.
     blocks
-        How many drawing statements; each gets loops of its own.
+        How many drawing statements; loops are drawn for each.
     depth
         How many steps a block may have: one statement and up to ``depth - 1`` loops around it.
     copies

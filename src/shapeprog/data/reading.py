@@ -1,4 +1,4 @@
-"""What stands around every reader of shapes: regular files only, limits on what is read, and every failure in words."""
+"""Common parts of the readers of shapes: regular files only, size limits, and messages for all failures."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ SHAPES = 1_000_000
 """Most shapes in one file."""
 
 ANY_NUMBERS = np.errstate(invalid="ignore", over="ignore")
-"""Around the numbers of a file, which may be any: those that are not finite are told by name when a shape is made."""
+"""Context for arbitrary numbers of a file; numbers that are not finite are reported when a shape is made."""
 
 _FEW = 5
 
@@ -43,7 +43,7 @@ _UNREADABLE = {
 
 
 def check_file(path: Path) -> None:
-    """Refuse what is no regular file (a pipe or a device may never end) before it is opened.
+    """Refuse everything but regular files (a pipe or a device may never end) before it is opened.
 
     Raises
     ------
@@ -59,7 +59,7 @@ def check_file(path: Path) -> None:
     if stat.S_ISDIR(kind):
         raise InputError(f"{path} is a folder", "name a file in it, or read the whole folder with load_all")
     if not stat.S_ISREG(kind):
-        raise InputError(f"{path} is a pipe, a socket or a device, no file", "copy what it gives into a file first")
+        raise InputError(f"{path} is a pipe, a socket or a device, no file", "copy its content to a file first")
 
 
 def read_whole(path: Path) -> bytes:
@@ -86,7 +86,7 @@ def check_count(name: str, what: str, count: int, most: int) -> None:
 
 @contextlib.contextmanager
 def in_words(path: Path, kind: str = "") -> Iterator[None]:
-    """Everything that a reader may raise, as an ``InputError`` that keeps its cause; ``kind`` is what it reads.
+    """Turn every exception of a reader into an ``InputError`` with its cause; ``kind`` names the format.
 
     The readers of the libraries raise whatever the bytes of a damaged file lead them to, so that no list of
     exceptions is complete.

@@ -34,16 +34,16 @@ def sample_with_faces(
     seed
         Seed of the generator.
     """
-    places, listed = np.asarray(vertices, np.float64), np.asarray(faces, np.int64)
-    weight = np.cumsum(np.concatenate([_areas(places, listed[at : at + _AT_ONCE]) for at in _starts(len(listed))]))
+    positions, listed = np.asarray(vertices, np.float64), np.asarray(faces, np.int64)
+    weight = np.cumsum(np.concatenate([_areas(positions, listed[at : at + _AT_ONCE]) for at in _starts(len(listed))]))
     if weight[-1] <= 0:
         weight = np.arange(1.0, len(listed) + 1)
-    drawn = np.random.default_rng(seed).random((count, 3))
-    face = np.minimum(np.searchsorted(weight, drawn[:, 0] * weight[-1], side="right"), len(listed) - 1)
-    corners = places[listed[face]]
+    random = np.random.default_rng(seed).random((count, 3))
+    face = np.minimum(np.searchsorted(weight, random[:, 0] * weight[-1], side="right"), len(listed) - 1)
+    corners = positions[listed[face]]
     first, along, across = corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     # The square root keeps the density even from the first corner to the opposite edge.
-    root, share = np.sqrt(drawn[:, 1:2]), drawn[:, 2:3]
+    root, share = np.sqrt(random[:, 1:2]), random[:, 2:3]
     points: Array = first + root * ((1 - share) * along + share * across)
     return points.astype(np.float32), face
 

@@ -1,4 +1,4 @@
-"""A shape as everything above sees it: touched cells, surface points and the way back to its file."""
+"""A shape: touched cells, surface points and the frame of its file."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class Shape:
     Parameters
     ----------
     name
-        What it is called: the stem of its file, or its id in a pack.
+        Its name: the stem of its file, or its id in a pack.
     voxels
         Cells (32, 32, 32) that its surface touches or its solid contains.
     points
@@ -33,11 +33,11 @@ class Shape:
     source
         The file it was read from.
     kind
-        What the file held.
+        Kind of the file.
     split
-        train, val or test, where its pack says so.
+        train, val or test, if its pack has splits.
     note
-        What was concluded in reading it, as a sentence.
+        A sentence on the estimated up axis, if it was estimated.
     """
 
     name: str

@@ -16,7 +16,7 @@ _AGAIN = "write the file again"
 
 
 def read_stl(name: str, content: bytes) -> tuple[Array, Array]:
-    """Vertices (3F, 3) and triangles (F, 3) of an STL file; every triangle has vertices of its own.
+    """Vertices (3F, 3) and triangles (F, 3) of an STL file; no two triangles share a vertex.
 
     Raises
     ------
@@ -41,7 +41,7 @@ def _read_text(name: str, content: bytes) -> Array:
         raise InputError(f"{name} ends before its 'endsolid': it is cut short", _AGAIN)
     rows = _VERTEX.findall(content)
     facets = content.count(b"endfacet")
-    found = numbers(name, b" ".join(rows))
-    if len(found) != 9 * facets:
+    values = numbers(name, b" ".join(rows))
+    if len(values) != 9 * facets:
         raise InputError(f"{name} has {len(rows)} vertices in {facets} facets of three", _AGAIN)
-    return found.reshape(-1, 3, 3)
+    return values.reshape(-1, 3, 3)

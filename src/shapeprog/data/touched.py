@@ -1,4 +1,4 @@
-"""The cells of a program, as they are compared with the touched cells of a shape."""
+"""The cells of a program that are compared with the touched cells of a shape."""
 
 from __future__ import annotations
 

@@ -32,10 +32,10 @@ WEIGHTS = {
     "mirrored_beside": 2.12,
     "mirrored_across": 1.67,
 }
-"""What one unit of each measure adds to the logarithm of the odds of a direction."""
+"""Weights of the measures in the logarithm of the odds of a direction."""
 
 USUAL = 0.5
-"""Probability that the usual up of a format is right, before the shape is looked at."""
+"""Probability that the usual up of a format is right, before any measure."""
 
 Cells = npt.NDArray[np.bool_]
 
@@ -50,14 +50,14 @@ class Upright(NamedTuple):
 def find_up(
     cells: Cells, axes: FloatArray | None = None, *, usual: str | None = None, front: str | None = None
 ) -> Upright:
-    """The likeliest up of a shape that is known by its cells (R, R, R), of which some are occupied.
+    """The likeliest up axis of a shape given as cells (R, R, R), not all empty.
 
     Parameters
     ----------
     axes
         World directions of the axes of the cells, as columns (3, 3); x, y and z by default.
     usual
-        What is up by convention, if there is one.
+        Up axis by convention, if there is one.
     front
         Where the front is, if that is known: up is along another axis.
     """
@@ -87,28 +87,28 @@ def measures(cells: Cells) -> FloatArray:
     mirrored = [float((tight & np.flip(tight, axis)).sum() / (tight | np.flip(tight, axis)).sum()) for axis in range(3)]
     rows = []
     for axis in range(3):
-        beside = [mirrored[other] for other in range(3) if other != axis]
+        symmetries = [mirrored[other] for other in range(3) if other != axis]
         for sign in (1, -1):
             standing = _standing(np.moveaxis(tight, axis, 0)[::sign])
-            rows.append([*standing, mirrored[axis], max(beside), min(beside)])
+            rows.append([*standing, mirrored[axis], max(symmetries), min(symmetries)])
     return np.array(rows)
 
 
 def _standing(cells: Cells) -> list[float]:
-    """Measures of cells (H, W, D) that stand on the floor below their first layer."""
+    """Measures of cells (H, W, D) whose first layer is at the bottom."""
     area, middle = cells[0].size, np.argwhere(cells).mean(0)[1:] + 0.5
-    found = [len(cells) / max(cells.shape)]
+    values = [len(cells) / max(cells.shape)]
     for end in (cells[0], cells[-1]):
         touching = np.argwhere(end)
         first, last = touching.min(0), touching.max(0) + 1
         inside = np.minimum(middle - first, last - middle) / np.array(end.shape)
-        found += [len(touching) / area, float((last - first).prod()) / area, float(inside.min())]
+        values += [len(touching) / area, float((last - first).prod()) / area, float(inside.min())]
     padded = np.pad(cells, ((1, 1), (0, 0), (0, 0)))
     above = np.logical_or.accumulate(padded[2:][::-1], 0)[::-1]
     below = np.logical_or.accumulate(padded[:-2], 0)
     height = np.arange(0.5, len(cells))[:, None, None] / len(cells)
     for faces, hidden in ((cells & ~padded[2:], above), (cells & ~padded[:-2], below)):
-        seen = faces & ~hidden
-        found += [float((seen * height).sum() / seen.sum()), float(seen.sum() / faces.sum())]
-    found.append(float((cells & ~padded[:-2]).sum((1, 2)).max()) / area)
-    return found
+        visible = faces & ~hidden
+        values += [float((visible * height).sum() / visible.sum()), float(visible.sum() / faces.sum())]
+    values.append(float((cells & ~padded[:-2]).sum((1, 2)).max()) / area)
+    return values

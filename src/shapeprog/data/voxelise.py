@@ -60,7 +60,7 @@ def voxelise_points(points: Array, resolution: int = RESOLUTION) -> BoolArray:
     """Every cell that holds a point, and those that the points enclose, (R, R, R).
 
     Views along the six axes are stopped by the cells with points, and by holes between them no wider than about four
-    times the spacing of the points; what no view sees is inside.
+    times the spacing of the points; cells that no view reaches are inside.
 
     Parameters
     ----------
@@ -123,15 +123,15 @@ def occupied_bounds(voxels: Array, name: str = "the voxel grid") -> tuple[Array,
     voxels
         Occupied cells (A, B, C).
     name
-        What an error calls them.
+        Their name, for errors.
 
     Raises
     ------
     InputError
         If no cell is occupied.
     """
-    layer: Array = np.any(voxels, 0)  # then only a layer is left to look at, however large the grid
-    sides = [np.flatnonzero(each) for each in (np.any(voxels, (1, 2)), layer.any(1), layer.any(0))]
+    layer: Array = np.any(voxels, 0)  # reduces a large grid to a layer
+    sides = [np.flatnonzero(line) for line in (np.any(voxels, (1, 2)), layer.any(1), layer.any(0))]
     if len(sides[0]) == 0:
         raise InputError(f"{name} has no occupied cell", "give a grid in which at least one is")
     return np.array([side[0] for side in sides]), np.array([side[-1] + 1 for side in sides])
@@ -157,7 +157,7 @@ def _mark_boundary_sheets(triangles: Array, cells: BoolArray) -> None:
     size = len(cells)
     for axis in range(3):
         first = triangles[:, 0, axis]
-        near_one = triangles[np.abs(first - np.rint(first)) <= SHRINK]  # few are, so the rest is quick
+        near_one = triangles[np.abs(first - np.rint(first)) <= SHRINK]  # usually few
         planes = np.rint(near_one[:, 0, axis])
         flat = np.abs(near_one[:, :, axis] - planes[:, None]).max(1) <= SHRINK
         for plane in np.unique(planes[flat]).astype(int):
@@ -167,7 +167,7 @@ def _mark_boundary_sheets(triangles: Array, cells: BoolArray) -> None:
                 continue
             sheet = near_one[flat & (planes == plane)]
             sheet[:, :, axis] = near + 0.5
-            drawn = np.zeros_like(cells)
-            mark_triangles(sheet, 0.5 - SHRINK, drawn)
-            layers, own = np.moveaxis(cells, axis, 0), np.moveaxis(drawn, axis, 0)[near]
-            layers[near] |= own & ~layers[far] if 0 <= far < size else own
+            marked = np.zeros_like(cells)
+            mark_triangles(sheet, 0.5 - SHRINK, marked)
+            layers, layer = np.moveaxis(cells, axis, 0), np.moveaxis(marked, axis, 0)[near]
+            layers[near] |= layer & ~layers[far] if 0 <= far < size else layer

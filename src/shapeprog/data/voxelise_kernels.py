@@ -92,7 +92,7 @@ def mark_triangles(triangles, half, cells):
                     z = k + 0.5
                     if abs(normal[0] * x + normal[1] * y + normal[2] * z - offset) > reach:
                         continue
-                    apart = False
+                    separated = False
                     for side in range(3):
                         p = edge[side, 1] * z - edge[side, 2] * y
                         q = edge[side, 2] * x - edge[side, 0] * z
@@ -103,9 +103,9 @@ def mark_triangles(triangles, half, cells):
                             or (q < least[m + 1] or q > most[m + 1])
                             or (r < least[m + 2] or r > most[m + 2])
                         ):
-                            apart = True
+                            separated = True
                             break
-                    if not apart:
+                    if not separated:
                         cells[i, j, k] = True
 
 

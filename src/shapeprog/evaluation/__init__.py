@@ -1,1 +1,1 @@
-"""How well programs, points and meshes rebuild a target: distances, what a person sees, and parts."""
+"""How well programs, points and meshes rebuild a target: distances, visual similarity, and parts."""

@@ -4,7 +4,7 @@ Contacts
     Share of the pairs of primitives that touch which still do.
 Symmetry
     Whether a program that is its own mirror image, left for right, still is: the share of its surface whose image lies
-    on it falls by no more than 1 %.
+    on it falls by 1 % or less.
 One piece
     Whether a program that is one connected solid still is.
 
@@ -53,26 +53,28 @@ class EditScores(NamedTuple):
 
 
 def edit_scores(program: Program) -> EditScores:
-    """What is kept of a program when its free numbers are changed, one at a time; see the module."""
+    """The share of a program that survives changes of its free numbers, one at a time; see the module."""
     before = unroll(program)
     touching = _contacts(before)
-    mirrored, whole = _mirrored(before), _one_piece(before)
-    kept: list[tuple[float, float, float]] = []
+    mirrored, one_solid = _mirrored(before), _one_piece(before)
+    results: list[tuple[float, float, float]] = []
     free = free_numbers(program)
-    for place, factor in product(range(free), FACTORS):
+    for index, factor in product(range(free), FACTORS):
         try:
-            after = unroll(multiplied(program, place, factor))
+            after = unroll(multiplied(program, index, factor))
         except ShapeProgError:  # such as a division by zero
-            kept.append((0.0, 0.0, 0.0))
+            results.append((0.0, 0.0, 0.0))
             continue
-        kept.append((
+        results.append((
             len(touching & _contacts(after)) / len(touching) if touching else np.nan,
             float(_mirrored(after) >= mirrored - STRAY) if mirrored >= 1 - STRAY else np.nan,
-            float(_one_piece(after)) if whole else np.nan,
+            float(_one_piece(after)) if one_solid else np.nan,
         ))  # fmt: skip
-    scores = np.array(kept).reshape(-1, 3)
-    one, two, three = (float(np.nanmean(column)) if np.isfinite(column).any() else float("nan") for column in scores.T)
-    return EditScores(one, two, three, free)
+    scores = np.array(results).reshape(-1, 3)
+    contacts, symmetry, pieces_kept = (
+        float(np.nanmean(column)) if np.isfinite(column).any() else float("nan") for column in scores.T
+    )
+    return EditScores(contacts, symmetry, pieces_kept, free)
 
 
 def _contacts(scene: Scene) -> set[tuple[int, int]]:
@@ -87,7 +89,7 @@ def _mirrored(scene: Scene) -> float:
     """The share of the surface whose mirror image lies on it."""
     try:
         points = sample_surface(scene, LOOKED, torch.Generator().manual_seed(0)).points.detach()
-    except ShapeProgError:  # nothing is drawn
+    except ShapeProgError:  # no primitives
         return 0.0
     image = points.clone()
     image[:, SIDE] *= -1

@@ -84,17 +84,20 @@ def sampled(mesh: Triangles, seed: int, count: int = POINTS) -> Samples:
 
 def likeness(predicted: Samples, target: Samples, diagonal: float) -> Likeness:
     """F-scores and agreement of normals of two sampled surfaces, ``diagonal`` being that of the target's box."""
-    to_target, there = _nearest(predicted.points, target.points)
-    to_predicted, back = _nearest(target.points, predicted.points)
+    to_target, target_index = _nearest(predicted.points, target.points)
+    to_predicted, predicted_index = _nearest(target.points, predicted.points)
 
     def f1(reach: float) -> float:
-        precision, recall = ((each <= reach * diagonal).mean() for each in (to_target, to_predicted))
+        precision, recall = ((distance <= reach * diagonal).mean() for distance in (to_target, to_predicted))
         return float(2 * precision * recall / (precision + recall)) if precision + recall else 0.0
 
     agreement = math.nan
     if predicted.normals is not None and target.normals is not None:
-        cosines = (predicted.normals * target.normals[there]).sum(1), (target.normals * predicted.normals[back]).sum(1)
-        agreement = float(np.mean([np.abs(each).mean() for each in cosines]))
+        cosines = (
+            (predicted.normals * target.normals[target_index]).sum(1),
+            (target.normals * predicted.normals[predicted_index]).sum(1),
+        )
+        agreement = float(np.mean([np.abs(cosine).mean() for cosine in cosines]))
     return Likeness(f1(HALF_PERCENT), f1(PERCENT), agreement)
 
 
@@ -102,22 +105,22 @@ def silhouette(predicted: Triangles, target: Triangles) -> float:
     """Mean IoU of the outlines of two meshes from all ``VIEWS``; axis 0 is up."""
     used = np.asarray(target.vertices, np.float64)[np.unique(target.faces)]
     centre, diagonal = box(used)
-    found = []
+    ratios = []
     for turn, rise in VIEWS:
         towards = np.array([math.sin(rise), math.cos(rise) * math.cos(turn), math.cos(rise) * math.sin(turn)])
         across = np.cross([1.0, 0.0, 0.0], towards)
         across /= np.linalg.norm(across)
         axes = np.stack([across, np.cross(towards, across)], 1)
-        one, two = (_outline(mesh, centre, axes, diagonal) for mesh in (predicted, target))
-        found.append((one & two).sum() / max((one | two).sum(), 1))
-    return float(np.mean(found))
+        first, second = (_outline(mesh, centre, axes, diagonal) for mesh in (predicted, target))
+        ratios.append((first & second).sum() / max((first | second).sum(), 1))
+    return float(np.mean(ratios))
 
 
 def _outline(mesh: Triangles, centre: Array, axes: Array, diagonal: float) -> Array:
     scale = (PIXELS / 2 - MARGIN) / max(diagonal / 2, 1e-30)
-    places = (np.asarray(mesh.vertices, np.float64) - centre) @ axes * scale + PIXELS / 2
+    pixel_positions = (np.asarray(mesh.vertices, np.float64) - centre) @ axes * scale + PIXELS / 2
     pixels = np.zeros((PIXELS, PIXELS), np.uint8)
-    draw_outline(np.ascontiguousarray(places), np.ascontiguousarray(mesh.faces, np.int64), pixels)
+    draw_outline(np.ascontiguousarray(pixel_positions), np.ascontiguousarray(mesh.faces, np.int64), pixels)
     return pixels
 
 

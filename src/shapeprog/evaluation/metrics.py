@@ -4,7 +4,7 @@ World frame
     The bounding box of the target has its centre at the origin and diagonal 1.
 CD
     Mean squared distance to the nearest neighbour, prediction to target plus target to prediction, between points
-    drawn uniformly by area from the surface of the predicted union and from the target; of the program as it is.
+    drawn uniformly by area from the surface of the predicted union and from the target; numbers are not rounded.
 F1
     F-score of the same points at a distance of one grid cell.
 IoU
@@ -59,14 +59,14 @@ Cloud = Float[Tensor, "P 3"]
 
 @runtime_checkable
 class Target(Protocol):
-    """What a target must have; ``shapeprog.data.Shape`` does.
+    """The attributes of a target; ``shapeprog.data.Shape`` has them.
 
     Positions are in the grid frame.  Where there is neither a mesh nor points, distances are not a number.
     """
 
     @property
     def name(self) -> str:
-        """What it is called."""
+        """Its name."""
 
     @property
     def voxels(self) -> npt.NDArray[np.bool_]:
@@ -112,7 +112,7 @@ class Metrics:
     f1_half_percent_floor, f1_percent_floor, normals_floor
         What the target reads against itself, sampled twice.
     part_recall, part_precision
-        Parts with a primitive of their own, over parts and over primitives: see :mod:`shapeprog.evaluation.parts`.
+        Parts that one primitive covers, over parts and over primitives: see :mod:`shapeprog.evaluation.parts`.
     """
 
     name: str
@@ -164,7 +164,7 @@ def evaluate_program(
     Parameters
     ----------
     program
-        The program as it is; its CD and F1 are measured.  One that draws nothing has an infinite CD and F1 0.
+        The program, whose CD and F1 are measured without rounding.  An empty one has an infinite CD and F1 0.
     target
         The shape it should be.
     snapped
@@ -177,7 +177,7 @@ def evaluate_program(
     iou
         The IoU where it has been measured already, as inference has.
     looks
-        Whether to measure what a person sees, too: likeness and structure, which take a good part of a second.
+        Whether to measure likeness and structure, too; they take most of a second.
     """
     scene = unroll(program)
     if iou is None:
@@ -206,24 +206,24 @@ def with_likeness(row: Metrics, predicted: Triangles | None, target: Target, see
         mesh = Triangles(target.vertices, target.faces)
         diagonal = likeness.box(np.asarray(mesh.vertices, np.float64)[np.unique(mesh.faces)])[1]
         seeds = np.random.SeedSequence((seed, 1)).generate_state(3).tolist()
-        one, two = (likeness.sampled(mesh, each, count) for each in seeds[:2])
+        first, second = (likeness.sampled(mesh, sample_seed, count) for sample_seed in seeds[:2])
     elif target.points is not None and len(target.points) > 1:
         mixed = np.asarray(target.points, np.float64)[np.random.default_rng(seed).permutation(len(target.points))]
         mesh, diagonal, seeds = None, likeness.box(mixed)[1], [0, 0, seed]
-        one, two = Samples(mixed[: len(mixed) // 2]), Samples(mixed[len(mixed) // 2 :])
+        first, second = Samples(mixed[: len(mixed) // 2]), Samples(mixed[len(mixed) // 2 :])
     else:
         return row
-    floor = likeness.likeness(one, two, diagonal)
+    floor = likeness.likeness(first, second, diagonal)
     if predicted is None:
-        found, outlines = likeness.NOTHING, 0.0
+        scores, outlines = likeness.NOTHING, 0.0
     else:
-        surface = one if mesh is not None else Samples(np.concatenate([one.points, two.points]))
-        found = likeness.likeness(likeness.sampled(predicted, seeds[2], count), surface, diagonal)
+        surface = first if mesh is not None else Samples(np.concatenate([first.points, second.points]))
+        scores = likeness.likeness(likeness.sampled(predicted, seeds[2], count), surface, diagonal)
         outlines = likeness.silhouette(predicted, mesh) if mesh is not None else math.nan
     if mesh is None:
-        outlines, found = math.nan, found._replace(normals=math.nan)
+        outlines, scores = math.nan, scores._replace(normals=math.nan)
     return replace(
-        row, f1_half_percent=found.f1_half_percent, f1_percent=found.f1_percent, normals=found.normals,
+        row, f1_half_percent=scores.f1_half_percent, f1_percent=scores.f1_percent, normals=scores.normals,
         silhouette=outlines, f1_half_percent_floor=floor.f1_half_percent, f1_percent_floor=floor.f1_percent,
         normals_floor=floor.normals,
     )  # fmt: skip
@@ -231,7 +231,7 @@ def with_likeness(row: Metrics, predicted: Triangles | None, target: Target, see
 
 def summarise(rows: Sequence[Metrics]) -> dict[str, Summary]:
     """Mean, standard error and median of every measure over shapes; those that are not a number are left out."""
-    found = {}
+    summary = {}
     columns: dict[str, list[Any]] = {}
     for row in rows:
         for name, value in asdict(row).items():
@@ -239,14 +239,14 @@ def summarise(rows: Sequence[Metrics]) -> dict[str, Summary]:
     for name, values in columns.items():
         if name == "name":
             continue
-        known = np.asarray(values, np.float64)
-        known = known[~np.isnan(known)]
-        count = len(known)
-        finite = bool(count) and bool(np.isfinite(known).all())
-        error = float(known.std(ddof=1) / np.sqrt(count)) if finite and count > 1 else float("nan")
-        mean, median = (float(known.mean()), float(np.median(known))) if count else (float("nan"), float("nan"))
-        found[name] = Summary(mean, error, median, count)
-    return found
+        numbers = np.asarray(values, np.float64)
+        numbers = numbers[~np.isnan(numbers)]
+        count = len(numbers)
+        finite = bool(count) and bool(np.isfinite(numbers).all())
+        error = float(numbers.std(ddof=1) / np.sqrt(count)) if finite and count > 1 else float("nan")
+        mean, median = (float(numbers.mean()), float(np.median(numbers))) if count else (float("nan"), float("nan"))
+        summary[name] = Summary(mean, error, median, count)
+    return summary
 
 
 def world_scale(target: Target) -> float:
@@ -273,8 +273,8 @@ def target_samples(target: Target, points: int, seed: int) -> tuple[Cloud, Cloud
     """
     if target.vertices is not None and target.faces is not None and len(target.faces):
         mesh, seeds = (target.vertices, target.faces), np.random.SeedSequence(seed).generate_state(2).tolist()
-        one, two = (np.asarray(sample_triangles(*mesh, points, each), np.float64) for each in seeds)
-        return torch.from_numpy(one), torch.from_numpy(two)
+        first, second = (np.asarray(sample_triangles(*mesh, points, sample_seed), np.float64) for sample_seed in seeds)
+        return torch.from_numpy(first), torch.from_numpy(second)
     if target.points is None or len(target.points) < 2:
         return None
     mixed = np.asarray(target.points, np.float64)[np.random.default_rng(seed).permutation(len(target.points))]
@@ -291,13 +291,13 @@ def _distances(scene: Scene, target: Target, points: int, seed: int) -> tuple[fl
     floor = float(squared_distance(*samples).mean() + squared_distance(*reversed(samples)).mean()) * square
     surface = samples[0] if target.vertices is not None and target.faces is not None else _all_points(target, points)
     try:
-        drawn = sample_surface(scene, points, torch.Generator().manual_seed(seed)).points.double()
-    except ShapeProgError:  # nothing is drawn, or nothing that has a surface
+        sampled = sample_surface(scene, points, torch.Generator().manual_seed(seed)).points.double()
+    except ShapeProgError:  # no primitive has a surface
         return float("inf"), float("inf"), 0.0, floor
-    there, back = squared_distance(drawn, surface), squared_distance(surface, drawn)
-    precision, recall = float((there <= CELL**2).double().mean()), float((back <= CELL**2).double().mean())
+    to_target, from_target = squared_distance(sampled, surface), squared_distance(surface, sampled)
+    precision, recall = float((to_target <= CELL**2).double().mean()), float((from_target <= CELL**2).double().mean())
     f1 = 2 * precision * recall / (precision + recall) if precision + recall > 0 else 0.0
-    return float(there.mean()) * square, float(back.mean()) * square, f1, floor
+    return float(to_target.mean()) * square, float(from_target.mean()) * square, f1, floor
 
 
 def _all_points(target: Target, points: int) -> Cloud:

@@ -24,14 +24,14 @@ def widened(low, high, a, b, bottom, top):
 
 
 @kernel("void(f8[:, ::1], i8[:, ::1], u1[:, ::1])")
-def draw_outline(places, faces, pixels):
+def draw_outline(points, faces, pixels):
     """Mark every pixel of ``pixels`` (H, W) that a triangle touches.
 
-    ``places`` (V, 2) are across and down; pixel (y, x) is the square of side 1 about (x, y).
+    ``points`` (V, 2) are across and down; pixel (y, x) is the square of side 1 about (x, y).
     """
     height, width = pixels.shape
     for f in range(len(faces)):
-        a, b, c = places[faces[f, 0]], places[faces[f, 1]], places[faces[f, 2]]
+        a, b, c = points[faces[f, 0]], points[faces[f, 1]], points[faces[f, 2]]
         first = max(0, math.floor(min(a[1], b[1], c[1]) + 0.5))
         last = min(height - 1, math.floor(max(a[1], b[1], c[1]) + 0.5))
         for y in range(first, last + 1):

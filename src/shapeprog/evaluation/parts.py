@@ -20,7 +20,7 @@ from shapeprog.geometry.scene import Scene
 from shapeprog.space import Array
 
 ENOUGH = 0.5
-"""IoU with which a primitive stands for a part."""
+"""IoU from which a primitive counts as a part."""
 
 THINNEST = 0.1
 """Half extents in cells that the box of a part has at least, so that sheets have a volume."""
@@ -30,7 +30,7 @@ POINTS = 20_000
 
 
 class PartScores(NamedTuple):
-    """How many parts have a primitive of their own, over the parts and over the primitives."""
+    """How many parts are covered by one primitive, over the parts and over the primitives."""
 
     part_recall: float
     part_precision: float
@@ -55,30 +55,30 @@ def oriented_box(part: Triangles) -> Box:
 
 def overlaps(parts: Sequence[Box], scene: Scene, seed: int = 0) -> npt.NDArray[np.float64]:
     """IoU (parts, primitives) of boxes with the primitives of one scene, by sampling the boxes."""
-    here = scene.mask.nonzero()[:, 0]
+    slots = scene.mask.nonzero()[:, 0]
     volume = torch.zeros(len(scene.mask), dtype=torch.float64)
     for kind in scene.kinds:
         of_kind = scene.mask & (scene.kind == kind)
         volume[of_kind] = primitives[kind].volume(scene.size[of_kind].double())
-    drawn = np.random.default_rng(seed).uniform(-1, 1, (POINTS, 3))
-    found = np.zeros((len(parts), len(here)))
+    sampled = np.random.default_rng(seed).uniform(-1, 1, (POINTS, 3))
+    table = np.zeros((len(parts), len(slots)))
     for row, part in enumerate(parts):
-        points = torch.from_numpy(part.centre + (drawn * part.half) @ part.axes.T)
-        inside = (each_distance(scene, points.to(scene.size.dtype)) <= 0).double().mean(0)[here].numpy()
-        own = float(np.prod(2 * part.half))
-        shared = inside * own
-        found[row] = shared / np.maximum(own + volume[here].numpy() - shared, 1e-12)
-    return found
+        points = torch.from_numpy(part.centre + (sampled * part.half) @ part.axes.T)
+        inside = (each_distance(scene, points.to(scene.size.dtype)) <= 0).double().mean(0)[slots].numpy()
+        box_volume = float(np.prod(2 * part.half))
+        shared = inside * box_volume
+        table[row] = shared / np.maximum(box_volume + volume[slots].numpy() - shared, 1e-12)
+    return table
 
 
 def best_pairs(table: npt.NDArray[np.float64]) -> list[tuple[int, int]]:
     """Rows and columns of overlaps that belong together, best pairs first, each once; enough of them overlaps."""
-    rest, found = table.copy(), []
-    while rest.size and rest.max() >= ENOUGH:
-        row, column = (int(place) for place in np.unravel_index(rest.argmax(), rest.shape))
-        rest[row], rest[:, column] = -1, -1
-        found.append((row, column))
-    return found
+    remaining, pairs = table.copy(), []
+    while remaining.size and remaining.max() >= ENOUGH:
+        row, column = (int(index) for index in np.unravel_index(remaining.argmax(), remaining.shape))
+        remaining[row], remaining[:, column] = -1, -1
+        pairs.append((row, column))
+    return pairs
 
 
 def part_scores(parts: Sequence[Triangles], scene: Scene, seed: int = 0) -> PartScores:

@@ -1,4 +1,4 @@
-"""What a program is made of, as a person who edits it sees it: slivers, pieces."""
+"""The structure of a program that matters in editing: slivers, pieces."""
 
 from __future__ import annotations
 

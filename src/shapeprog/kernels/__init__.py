@@ -1,1 +1,1 @@
-"""What every compiled loop stands on: how kernels are compiled and kept, and words of 32 cells."""
+"""Infrastructure of the compiled loops: how kernels are compiled and cached, and words of 32 cells."""

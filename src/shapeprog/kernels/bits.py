@@ -24,7 +24,7 @@ def span(first, last):
 
 @helper
 def ones(word):
-    """Number of set bits of an unsigned word of 64 bits; the compiler knows these steps and takes one instruction."""
+    """Number of set bits of an unsigned word of 64 bits; compiles to one instruction."""
     word = word - ((word >> np.uint64(1)) & np.uint64(0x5555555555555555))
     word = (word & np.uint64(0x3333333333333333)) + ((word >> np.uint64(2)) & np.uint64(0x3333333333333333))
     word = (word + (word >> np.uint64(4))) & np.uint64(0x0F0F0F0F0F0F0F0F)

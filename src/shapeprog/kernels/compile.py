@@ -9,8 +9,8 @@
         for k in range(len(values)):
             out[k] = square(values[k])
 
-A *kernel* is called from Python and has the one signature it declares, so nothing is ever compiled twice; a call with
-other types is an error.  A *helper* is a plain Python function that kernels call.  Neither needs numba to be imported:
+A *kernel* is called from Python and has the one signature that it declares, so it is compiled once; a call with other
+types is an error.  A *helper* is a plain Python function that kernels call.  Neither needs numba to be imported:
 it is loaded when the first kernel is called.  Compiled kernels are kept in numba's cache; a kernel counts as changed
 when its own code, that of any helper it reaches, or a constant that these read has changed, in whatever file.
 
@@ -41,7 +41,7 @@ OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "no_cfunc_wrap
 """Kernels run without the interpreter's lock, and divide as numpy does, without a check before each division."""
 
 MOST = 3
-"""Processes that compile beside this one, at most, where there are as many cores."""
+"""Maximum number of further processes that compile, if there are as many cores."""
 
 _lock = threading.RLock()
 _helpers: dict[Function, dict[str, Any]] = {}
@@ -51,7 +51,7 @@ _kernels: dict[str, Kernel] = {}
 def helper(function: Function | None = None, **options: Any) -> Any:
     """Declare a function that only kernels call; it stays a plain one.  Options are numba's, such as ``inline``."""
     if function is None:
-        return lambda wanted: helper(wanted, **options)
+        return lambda decorated: helper(decorated, **options)
     plain = inspect.unwrap(function)
     _helpers[plain] = options
     return plain
@@ -101,7 +101,7 @@ class Kernel:
     def _dispatcher(self) -> Any:
         numba: Any = importlib.import_module("numba")
         dispatcher = numba.njit(cache=True, **OPTIONS, **self._options)(_linked(self.function))
-        # numba looks at the file of the kernel alone; what is compiled is the kernel with all helpers in it
+        # numba only checks the file of the kernel, but the compiled code includes all helpers
         stamp = _digest(self.function, f"{numba.__version__}, bounds checked: {numba.config.BOUNDSCHECK}")
         dispatcher._cache._cache_file._source_stamp = stamp
         return dispatcher
@@ -111,39 +111,39 @@ class Kernel:
         return sigutils.normalize_signature(self.signature)[0]
 
 
-def prepare(modules: Sequence[str], tell: Callable[[str], None] | None = None) -> None:
-    """Make all kernels of some modules, given by full name, ready, so that nobody waits for them later.
+def prepare(modules: Sequence[str], report: Callable[[str], None] | None = None) -> None:
+    """Load or compile all kernels of some modules, given by full name, before they are needed.
 
-    What the cache lacks is compiled by several processes at once: the others take kernels from the front, this one from
-    the back, so name first what is quickly imported and last what is not.  ``tell`` is called with a sentence before
-    anything is compiled, which takes seconds.
+    Kernels that are missing in the cache are compiled by several processes at once.  The others take kernels from the
+    front, this one from the back, so list modules that import quickly first.  ``report`` is called with a sentence
+    before the first compilation, which takes seconds.
     """
     lacking: list[Kernel] = []
     waiting: deque[str] = deque()
     complete = threading.Event()
-    others: list[threading.Thread] = []
+    threads: list[threading.Thread] = []
     try:
         for name in modules:
             importlib.import_module(name)
-            for each in list(_kernels.values()):
-                if each.function.__module__ == name and not each.load():
-                    if tell and not lacking:
-                        tell("compiling kernels for this machine (first run only, up to half a minute)")
-                    lacking.append(each)
-                    waiting.append(each.name)
-            while waiting and len(others) < min(max((os.cpu_count() or 2) - 1, 1), MOST):
-                others.append(threading.Thread(target=_serve, args=(waiting, complete), daemon=True))
-                others[-1].start()
+            for item in list(_kernels.values()):
+                if item.function.__module__ == name and not item.load():
+                    if report and not lacking:
+                        report("compiling kernels for this machine (first run only, up to half a minute)")
+                    lacking.append(item)
+                    waiting.append(item.name)
+            while waiting and len(threads) < min(max((os.cpu_count() or 2) - 1, 1), MOST):
+                threads.append(threading.Thread(target=_serve, args=(waiting, complete), daemon=True))
+                threads[-1].start()
         while waiting:
             with suppress(IndexError):  # another process took the last one
                 _kernels[waiting.pop()].compile()
     finally:
         waiting.clear()
         complete.set()
-    for other in others:
-        other.join()
-    for each in lacking:  # from the cache now; compiled here should another process have failed
-        each.compile()
+    for thread in threads:
+        thread.join()
+    for item in lacking:  # from the cache now; compiled here should another process have failed
+        item.compile()
 
 
 def _serve(waiting: deque[str], complete: threading.Event) -> None:
@@ -167,10 +167,11 @@ def _next(waiting: deque[str], complete: threading.Event) -> str:
 
 
 def _linked(function: Function) -> FunctionType:
-    """A copy of a function whose helpers are compiled ones; the function itself stays as it is."""
+    """A copy of a function whose helpers are compiled ones; the function itself is unchanged."""
     assert isinstance(function, FunctionType)
-    found = {name: _compiled_helper(value) for name, value in _read(function).items() if _is_helper(value)}
-    copy = FunctionType(function.__code__, {**function.__globals__, **found}, function.__name__, function.__defaults__)
+    helpers = {name: _compiled_helper(value) for name, value in _read(function).items() if _is_helper(value)}
+    names = {**function.__globals__, **helpers}
+    copy = FunctionType(function.__code__, names, function.__name__, function.__defaults__)
     copy.__qualname__, copy.__module__ = function.__qualname__, function.__module__
     return copy
 
@@ -190,9 +191,9 @@ def _compiled_helper(function: Function) -> Any:
 
 
 def _read(function: FunctionType) -> dict[str, Any]:
-    """What a function reads of its module, by name."""
-    known = function.__globals__
-    return {name: known[name] for name in function.__code__.co_names if name in known}
+    """The module-level values that a function uses, by name."""
+    module = function.__globals__
+    return {name: module[name] for name in function.__code__.co_names if name in module}
 
 
 def _is_helper(value: Any) -> bool:
@@ -201,23 +202,23 @@ def _is_helper(value: Any) -> bool:
 
 def _digest(function: Function, compiler: str) -> str:
     """Changes with the code of a kernel, of the helpers it reaches, and with every number or text that these read."""
-    found, seen, stack = sha256(compiler.encode()), set[Function](), [function]
+    digest, visited, stack = sha256(compiler.encode()), set[Function](), [function]
     while stack:
         current = stack.pop()
-        if current in seen or not isinstance(current, FunctionType):
+        if current in visited or not isinstance(current, FunctionType):
             continue
-        seen.add(current)
+        visited.add(current)
         code, values = current.__code__, _read(current)
         read = sorted((name, repr(value)) for name, value in values.items() if isinstance(value, (int, float, str)))
         constants = [value.co_code if isinstance(value, CodeType) else value for value in code.co_consts]
-        found.update(repr((code.co_name, code.co_code, constants, code.co_names, read)).encode())
+        digest.update(repr((code.co_name, code.co_code, constants, code.co_names, read)).encode())
         stack += [value for value in values.values() if isinstance(value, FunctionType)]
-    return found.hexdigest()
+    return digest.hexdigest()
 
 
 @contextmanager
 def _without_collector() -> Iterator[None]:
-    """The compiler makes objects faster than anything else, and the collector only looks through them in vain."""
+    """The compiler creates many objects that stay alive, so garbage collection only costs time."""
     before = gc.isenabled()
     gc.disable()
     try:
@@ -228,7 +229,7 @@ def _without_collector() -> Iterator[None]:
 
 
 def _compile(name: str) -> str:
-    """What another process does: compile a kernel into the cache, given its name."""
+    """The work of another process: compile a kernel into the cache, given its name."""
     from shapeprog.kernels import compile as room  # not the copy of this module that runs as a script
 
     importlib.import_module(name.partition(":")[0])

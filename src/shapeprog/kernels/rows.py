@@ -39,7 +39,7 @@ def fill_box(planes, plane, low, high):
 @helper
 def stretch(table, row, half, x, y, reach):
     """Where along left-right the row of cells through (x, y) can be inside the local box, relative to the centre."""
-    near, far = -reach - 1e-6, reach + 1e-6
+    low, high = -reach - 1e-6, reach + 1e-6
     for axis in range(3):
         start = table[row, ROTATION + axis] * x + table[row, ROTATION + 3 + axis] * y
         slope = table[row, ROTATION + 6 + axis]
@@ -47,6 +47,6 @@ def stretch(table, row, half, x, y, reach):
             if abs(start) > half[axis] + 1e-9:
                 return 1.0, -1.0
         else:
-            one, two = (-half[axis] - start) / slope, (half[axis] - start) / slope
-            near, far = max(near, min(one, two)), min(far, max(one, two))
-    return near, far
+            first, second = (-half[axis] - start) / slope, (half[axis] - start) / slope
+            low, high = max(low, min(first, second)), min(high, max(first, second))
+    return low, high

@@ -48,7 +48,7 @@ class _Scope:
 
 
 def check(source: Source) -> None:
-    """Look at every name, function and argument of a program; a :class:`Fault` says what is wrong first."""
+    """Check every name, function and argument of a program; the first error is raised as a :class:`Fault`."""
     checker = _Checker(source)
     checker.block(source.lines, checker.outermost, 0)
     checker.end(checker.outermost)

@@ -82,13 +82,13 @@ def of_cells(cells: Array) -> Model:
     for axis in range(3):
         for sign in (-1, 1):
             open_side = padded & ~np.roll(padded, -sign, axis)
-            place = np.argwhere(open_side).astype(np.float64) - 1
-            place[:, axis] += (sign + 1) / 2
-            one, two = np.zeros(3), np.zeros(3)
-            one[(axis + 1) % 3], two[(axis + 2) % 3] = 1, 1
-            quad = np.stack([place, place + one, place + one + two, place + two], 1)
+            corner = np.argwhere(open_side).astype(np.float64) - 1
+            corner[:, axis] += (sign + 1) / 2
+            first_edge, second_edge = np.zeros(3), np.zeros(3)
+            first_edge[(axis + 1) % 3], second_edge[(axis + 2) % 3] = 1, 1
+            quad = np.stack([corner, corner + first_edge, corner + first_edge + second_edge, corner + second_edge], 1)
             corners.append(quad if sign > 0 else quad[:, ::-1])
-            normals.append(np.tile(sign * np.eye(3)[axis], (2 * len(place), 3, 1)))
+            normals.append(np.tile(sign * np.eye(3)[axis], (2 * len(corner), 3, 1)))
     vertices = np.concatenate(corners).reshape(-1, 3) * size - RESOLUTION / 2
     first = 4 * np.arange(len(vertices) // 4)[:, None]
     faces = (first + np.array([0, 1, 2, 0, 2, 3])).reshape(-1, 3)
@@ -99,15 +99,15 @@ def of_points(points: Array) -> Model:
     """A cloud (P, 3) as small balls."""
     import trimesh
 
-    kept = np.asarray(points, np.float64)
-    kept = kept[:: max(1, -(-len(kept) // MOST_POINTS))]
+    sample = np.asarray(points, np.float64)
+    sample = sample[:: max(1, -(-len(sample) // MOST_POINTS))]
     ball: Any = trimesh.creation.icosahedron()
     unit, faces = np.asarray(ball.vertices), np.asarray(ball.faces)
     unit = unit / np.linalg.norm(unit, axis=1, keepdims=True)
-    radius = 0.2 * np.sqrt(MOST_POINTS / max(len(kept), MOST_POINTS / 4))
-    vertices = (kept[:, None] + radius * unit).reshape(-1, 3)
-    all_faces = (len(unit) * np.arange(len(kept))[:, None, None] + faces).reshape(-1, 3)
-    return _plain(vertices, all_faces, np.tile(unit[faces], (len(kept), 1, 1)))
+    radius = 0.2 * np.sqrt(MOST_POINTS / max(len(sample), MOST_POINTS / 4))
+    vertices = (sample[:, None] + radius * unit).reshape(-1, 3)
+    all_faces = (len(unit) * np.arange(len(sample))[:, None, None] + faces).reshape(-1, 3)
+    return _plain(vertices, all_faces, np.tile(unit[faces], (len(sample), 1, 1)))
 
 
 def _plain(vertices: Array, faces: Array, normals: Array | None = None) -> Model:

@@ -74,9 +74,9 @@ def nearest_faces(points, faces, tolerance, face, depth):
             first, last = covered(wb, wc, step_b, step_c, left, right)
             start = a[2] + wb * (b[2] - a[2]) + wc * (c[2] - a[2])
             for x in range(first, last + 1):
-                near = start + x * slope
-                if near > depth[y, x] * (1 + tolerance):
-                    depth[y, x] = near
+                value = start + x * slope
+                if value > depth[y, x] * (1 + tolerance):
+                    depth[y, x] = value
                     face[y, x] = f
 
 
@@ -133,7 +133,7 @@ def surface(face, depth, points, faces, normals, view, ground, everywhere, posit
     """
     height, width = face.shape
     eye, corner, across, down = view[0], view[1], view[2], view[3]
-    ray, here = np.empty(3), np.empty(3)
+    ray, direction = np.empty(3), np.empty(3)
     for y in range(height):
         for x in range(width):
             if face[y, x] == BACKGROUND and not everywhere:
@@ -156,14 +156,14 @@ def surface(face, depth, points, faces, normals, view, ground, everywhere, posit
             length, facing = 0.0, 0.0
             for axis in range(3):
                 position[y, x, axis] = eye[axis] + ray[axis] / depth[y, x]
-                here[axis] = (wa * normals[f, 0, axis] + wb * normals[f, 1, axis] + wc * normals[f, 2, axis]) / depth[
-                    y, x
-                ]
-                length += here[axis] ** 2
-                facing += here[axis] * ray[axis]
+                direction[axis] = (
+                    wa * normals[f, 0, axis] + wb * normals[f, 1, axis] + wc * normals[f, 2, axis]
+                ) / depth[y, x]
+                length += direction[axis] ** 2
+                facing += direction[axis] * ray[axis]
             scale = (-1.0 if facing > 0 else 1.0) / max(math.sqrt(length), 1e-12)
             for axis in range(3):
-                normal[y, x, axis] = here[axis] * scale
+                normal[y, x, axis] = direction[axis] * scale
 
 
 @kernel("void(f4[:, :, ::1], f4[:, :, ::1], i4[:, ::1], f4[:, :, ::1], f8[:, :, ::1], f8[::1], f8, i8, f8, f4[:, ::1])")
@@ -206,17 +206,17 @@ def edges(face, groups, position, normal, reach, gap, lines):
     height, width = face.shape
     for y in range(height):
         for x in range(width):
-            mine, found = face[y, x], 0
+            mine, line = face[y, x], 0
             for dy in range(-reach, reach + 1):
                 for dx in range(-reach, reach + 1):
                     yy, xx = y + dy, x + dx
-                    if dx * dx + dy * dy > reach * reach + 0.5 or found == 2:
+                    if dx * dx + dy * dy > reach * reach + 0.5 or line == 2:
                         continue
                     if yy < 0 or xx < 0 or yy >= height or xx >= width or face[yy, xx] == mine:
                         continue
-                    other = face[yy, xx]
-                    if other < 0 or mine < 0 or groups[other] != groups[mine]:
-                        found = 2
+                    neighbour = face[yy, xx]
+                    if neighbour < 0 or mine < 0 or groups[neighbour] != groups[mine]:
+                        line = 2
                         continue
                     cosine, off, away = 0.0, 0.0, 0.0
                     for axis in range(3):
@@ -225,10 +225,10 @@ def edges(face, groups, position, normal, reach, gap, lines):
                         off += step * normal[y, x, axis]
                         away += step * normal[yy, xx, axis]
                     if abs(off) > gap and abs(away) > gap:
-                        found = 2
+                        line = 2
                     elif cosine < 0.8:
-                        found = max(found, 1)
-            lines[y, x] = found
+                        line = max(line, 1)
+            lines[y, x] = line
 
 
 @kernel("void(i4[:, ::1], f4[:, ::1], f4[:, ::1], u1[:, ::1], f8[::1], f8, f4[:, ::1], i8, f4[:, :, ::1])")

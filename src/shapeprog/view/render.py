@@ -173,9 +173,9 @@ def render(model: Model, camera: Camera, width: int, height: int, samples: int =
     few = np.full((height // COARSE + 1, width // COARSE + 1), kernels.BACKGROUND, np.int32)
     step = COARSE * samples
     coarse = np.stack([camera.eye, corner, across * step, down * step])
-    place, upward = _surface(few, few.astype(np.float64), solid, coarse, camera.low, True)
+    ground_position, upward = _surface(few, few.astype(np.float64), solid, coarse, camera.low, True)
     sunlit = np.zeros(few.shape, np.float32)
-    kernels.irradiance(place, upward, -few, *sky, 1, bias, sunlit)
+    kernels.irradiance(ground_position, upward, -few, *sky, 1, bias, sunlit)
     ground = (1 - SHADOW * (1 - _enlarged(sunlit, height, width))).astype(np.float32)
     lines = np.zeros((tall, wide), np.uint8)
     groups = np.asarray(model.group, np.int64)
@@ -213,7 +213,7 @@ def _enlarged(coarse: Array, height: int, width: int) -> Array:
 
 
 def _blurred(image: Array) -> Array:
-    """A Gaussian filter down the columns of an image, whose border goes on outside."""
+    """A Gaussian filter down the columns of an image, whose border is repeated outside."""
     offset = np.arange(-int(4 * BLUR + 0.5), int(4 * BLUR + 0.5) + 1)
     weights = np.exp(-0.5 * (offset / BLUR) ** 2)
     rows = np.clip(np.arange(len(image)) + offset[:, None], 0, len(image) - 1)
@@ -230,8 +230,8 @@ def _sky(count: int) -> tuple[Array, Array]:
     towards = np.stack([rise, flat * np.cos(angle), flat * np.sin(angle)], 1)
     # Neighbouring shares of the lights must each cover the whole sky.
     towards = towards[np.random.default_rng(0).permutation(count)]
-    one = np.cross(towards, [0.3, 0.9, 0.1])
-    one /= np.linalg.norm(one, axis=1, keepdims=True)
-    frames = np.stack([one, np.cross(towards, one), towards], 1)
+    across = np.cross(towards, [0.3, 0.9, 0.1])
+    across /= np.linalg.norm(across, axis=1, keepdims=True)
+    frames = np.stack([across, np.cross(towards, across), towards], 1)
     weights = 0.55 + 2.6 * np.exp(5 * (towards @ (KEY / np.linalg.norm(KEY)) - 1))
     return np.ascontiguousarray(frames), weights / (weights * towards[:, 0]).sum()

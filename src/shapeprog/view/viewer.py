@@ -42,7 +42,7 @@ def viewer(
     Parameters
     ----------
     program
-        What is drawn.
+        The program to draw.
     path
         The page, which ends in .html.
     shape
@@ -59,20 +59,20 @@ def viewer(
     OutputError
         If the file cannot be written, or the program has more than ``FINE`` triangles.
     """
-    drawn = parts(program)
-    if (triangles := sum(len(part.faces) for part in drawn)) > FINE:
+    shown_parts = parts(program)
+    if (triangles := sum(len(part.faces) for part in shown_parts)) > FINE:
         raise OutputError(
-            f"the {len(drawn)} parts of this program have {triangles} triangles: a page holds at most {FINE}",
+            f"the {len(shown_parts)} parts of this program have {triangles} triangles: a page holds at most {FINE}",
             "lower the counts, or draw a picture",
         )
     # No browser opens a page of hundreds of megabytes, so such a mesh is shown as cells.
     large = shape is not None and shape.faces is not None and len(shape.faces) > FINE
     model = None if shape is None else of_cells(shape.voxels) if large else of_shape(shape)
-    places = [part.vertices for part in drawn] + ([] if model is None else [model.vertices])
-    points = np.concatenate([*places, np.zeros((0, 3))])
+    vertices = [part.vertices for part in shown_parts] + ([] if model is None else [model.vertices])
+    points = np.concatenate([*vertices, np.zeros((0, 3))])
     points = points if len(points) else np.zeros((1, 3))
     low, high = points.min(0), points.max(0)
-    movable = sliders(program, drawn)
+    movable = sliders(program, shown_parts)
     content = {
         "frame": frame_comment(frame),
         "title": title or (shape.name if shape is not None else Path(path).stem),
@@ -83,7 +83,7 @@ def viewer(
         "parts": [
             {"name": part.name, "block": part.block, "colour": [channel / 255 for channel in colour(part.statement)]}
             | _buffers(corners)
-            for part, corners in zip(drawn, corners_of(drawn), strict=True)
+            for part, corners in zip(shown_parts, corners_of(shown_parts), strict=True)
         ],
         "sliders": [_slider(slider) for slider in movable],
         "digits": digits_in(program.unit),
@@ -97,20 +97,20 @@ def viewer(
 
 def _line(line: Any, movable: list[str]) -> dict[str, Any]:
     before, word, after = parted(line)
-    found = {"before": before, "word": word, "after": after, "blocks": list(line.blocks), "colour": None, "ink": None}
+    record = {"before": before, "word": word, "after": after, "blocks": list(line.blocks), "colour": None, "ink": None}
     if line.statement is not None:
-        found["colour"] = "rgb({}, {}, {})".format(*colour(line.statement))
-        found["ink"] = "rgb({}, {}, {})".format(*readable(line.statement))
-    return found | {"pieces": pieces(line.text, movable)}
+        record["colour"] = "rgb({}, {}, {})".format(*colour(line.statement))
+        record["ink"] = "rgb({}, {}, {})".format(*readable(line.statement))
+    return record | {"pieces": pieces(line.text, movable)}
 
 
 def _slider(slider: Slider) -> dict[str, Any]:
-    places = [
-        {"at": at, "parts": [None if part is None else _packed(_turned(part)) for part in found]}
-        for at, found in sorted(slider.places.items())
+    steps = [
+        {"at": at, "parts": [None if part is None else _packed(_turned(part)) for part in meshes]}
+        for at, meshes in sorted(slider.places.items())
     ]
     ends = {"low": slider.low, "high": slider.high, "unit": slider.unit}
-    return {"name": slider.name, "value": slider.value, **ends, "places": places}
+    return {"name": slider.name, "value": slider.value, **ends, "places": steps}
 
 
 def _buffers(corners: Array) -> dict[str, str]:
@@ -133,17 +133,17 @@ def _creases(corners: Array, normals: Array) -> Array:
     extent = float(np.ptp(corners.reshape(-1, 3), axis=0).max()) if len(corners) else 1.0
     inside = np.stack([starts, ends], 1) - corners.reshape(-1, 3).min(0, initial=np.inf)
     keys = np.rint(inside / max(extent, 1e-30) * 1e5).astype(np.int64)
-    swap = [tuple(one) > tuple(two) for one, two in keys.tolist()]
+    swap = [tuple(start) > tuple(end) for start, end in keys.tolist()]
     keys[swap] = keys[swap][:, ::-1]
-    _, first, place, count = np.unique(
+    _, first, edge, count = np.unique(
         keys.reshape(-1, 6), axis=0, return_index=True, return_inverse=True, return_counts=True
     )
     total = np.zeros((len(first), 3))
-    np.add.at(total, place.reshape(-1), tilt / np.maximum(np.linalg.norm(tilt, axis=1, keepdims=True), 1e-12))
+    np.add.at(total, edge.reshape(-1), tilt / np.maximum(np.linalg.norm(tilt, axis=1, keepdims=True), 1e-12))
     sharp = (count == 1) | (np.linalg.norm(total, axis=1) < 0.94 * count)
     sharp &= (keys[first, 0] != keys[first, 1]).any(1)
-    chosen = first[sharp]
-    return np.stack([chosen, chosen - chosen % 3 + (chosen % 3 + 1) % 3], 1)
+    corner = first[sharp]
+    return np.stack([corner, corner - corner % 3 + (corner % 3 + 1) % 3], 1)
 
 
 def _packed(values: Array, kind: str = "<f4") -> str:

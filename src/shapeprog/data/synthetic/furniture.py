@@ -35,7 +35,7 @@ SKETCHES: tuple[tuple[Callable[[Sketch], None], float], ...] = (
     (cases.bookshelf, 0.05),
     (cases.bed, 0.04),
 )
-"""What it is mixed from, and the weight of each."""
+"""The sketches of the mixture with their weights."""
 
 
 def furniture(number: int, seed: int = 0, measures: int | None = None) -> Program:
@@ -62,8 +62,8 @@ def furniture(number: int, seed: int = 0, measures: int | None = None) -> Progra
     low, high = _bounds(program)
     shift = -(low + high) / 2
     if any(isinstance(node, Loop) and node.name == "rotate" for node in program.walk()):
-        shift[UP + 1 :] = 0  # what is turned stays around the axis of the grid
-    return Program(tuple(_moved(node, [tidy(each) for each in shift.tolist()]) for node in program.body))
+        shift[UP + 1 :] = 0  # rotated copies stay centred on the axis of the grid
+    return Program(tuple(_moved(node, [tidy(value) for value in shift.tolist()]) for node in program.body))
 
 
 def _bounds(program: Program) -> tuple[FloatArray, FloatArray]:

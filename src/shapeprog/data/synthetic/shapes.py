@@ -30,5 +30,5 @@ def shapes_of(programs: Mapping[str, Program], points: int = 0, seed: int = 0) -
     cells = voxels(scene).numpy().astype(np.bool_)
     if not points:
         return [Shape(name, grid) for name, grid in zip(programs, cells, strict=True)]
-    places = sample_surface(scene, points, torch.Generator().manual_seed(seed)).points.numpy().astype(np.float32)
-    return [Shape(name, *arrays) for name, *arrays in zip(programs, cells, places, strict=True)]
+    clouds = sample_surface(scene, points, torch.Generator().manual_seed(seed)).points.numpy().astype(np.float32)
+    return [Shape(name, *arrays) for name, *arrays in zip(programs, cells, clouds, strict=True)]

@@ -1,7 +1,7 @@
 """A sketch: one piece of furniture, part by part, in centimetres that become cells.
 
-Heights count from the floor, depth from the middle to the rear, left-right from the middle.  Lengths are tidy as soon
-as they are cells, so parts that share a plane share its number.
+Heights count from the floor, depth from the middle to the rear, left-right from the middle.  Lengths in
+cells are rounded at once, so parts that share a plane share its number.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ class Sketch:
 
     @property
     def program(self) -> Program:
-        """What was added."""
+        """The program of all added parts."""
         return Program(tuple(self._body))
 
     def cm(self, low: float, high: float | None = None) -> float:
@@ -59,8 +59,8 @@ class Sketch:
 
     def any(self, low: float, high: float) -> float:
         """A number between two."""
-        drawn = self._random.uniform(low, high)
-        return float(drawn if self._measures is None else self._measures.uniform(low, high))
+        value = self._random.uniform(low, high)
+        return float(value if self._measures is None else self._measures.uniform(low, high))
 
     def whole(self, low: int, high: int) -> int:
         """A whole number between two, both included."""
@@ -85,9 +85,9 @@ class Sketch:
             ``count`` of copies and the step between them, ``up_step``, ``depth_step``, ``side_step``; or ``turns``,
             copies around the vertical axis.
         """
-        flat = [number for each in numbers for number in (each if isinstance(each, Sequence) else [each])]
-        rest = [each.default for each in language()[solid].parameters if each.start >= len(flat)]
-        values = tuple(to_float32(tidy(number or 0.0)) for number in [*flat, *rest])
+        flat = [number for item in numbers for number in (item if isinstance(item, Sequence) else [item])]
+        defaults = [item.default for item in language()[solid].parameters if item.start >= len(flat)]
+        values = tuple(to_float32(tidy(number or 0.0)) for number in [*flat, *defaults])
         if (role, solid) == ("leg", "box"):
             solid = "leg"
         node: Node = Draw(solid, values, "" if role == solid else role)
@@ -113,7 +113,7 @@ class Sketch:
         self, role: str, solid: str, foot: Point, head: Point, *numbers: float | Sequence[float], thick: float = 0.0,
         mirror: str = "", **repeat: float,
     ) -> None:  # fmt: skip
-        """A part between two points; one with a thickness at its foot is raised until that stands on its edge."""
+        """A part between two points; ``thick`` raises it by the lowest edge of its foot."""
         along = np.subtract(head, foot)
         lean = math.hypot(along[1], along[2]) / max(float(np.linalg.norm(along)), 1e-9)
         raised = (tidy(foot[0] + thick / 2 * lean), *foot[1:])

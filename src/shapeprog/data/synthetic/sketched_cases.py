@@ -1,4 +1,4 @@
-"""Sketches of what one puts things on or in, and lies on: tables, desks, cabinets, shelves, beds."""
+"""Sketches of tables, desks, cabinets, shelves and beds."""
 
 from __future__ import annotations
 
@@ -194,18 +194,18 @@ def bed(s: Sketch) -> None:
     )
     if s.chance(0.7):
         pillows = 2 if half > s.cm(60) else 1
-        each = tidy(2 * inner / pillows)
+        pillow_width = tidy(2 * inner / pillows)
         edge = s.cm(4, 7)
         s.box(
             "pillow", (tidy(mattress - s.cm(1)), tidy(mattress + s.cm(9, 13))),
-            (tidy(deep - s.cm(38, 45)), tidy(deep - s.cm(2))), (tidy(edge - inner), tidy(each - edge - inner)),
+            (tidy(deep - s.cm(38, 45)), tidy(deep - s.cm(2))), (tidy(edge - inner), tidy(pillow_width - edge - inner)),
             solid="cushion", more=[s.cm(3.5, 4.4)], count=pillows,
-            side_step=each,
+            side_step=pillow_width,
         )  # fmt: skip
 
 
 def _splayed(s: Sketch, under: float, thick: float, deep: float, half: float, turns: int = 0) -> None:
-    """Splayed legs, tapered or square, that end in what they carry."""
+    """Splayed legs, tapered or square, that end inside the part above."""
     wide = s.cm(2, 3.2)
     out = tidy(under * s.any(0.05, 0.22))
     up = tidy(under + min(thick / 2, wide))
@@ -287,7 +287,7 @@ def _trestles(s: Sketch, under: float, deep: float, half: float) -> None:
 
 
 def _feet(s: Sketch, feet: float, half: float, deep: float) -> None:
-    """What a case stands on: tapered legs, splayed or upright, round feet, or a plinth."""
+    """The base of a case: tapered legs, splayed or upright, round feet, or a plinth."""
     kind = s.pick("splayed", "splayed", "round", "plinth")
     if kind == "plinth":
         s.box(

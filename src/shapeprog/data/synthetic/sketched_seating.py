@@ -1,4 +1,4 @@
-"""Sketches of what one sits on: chairs, stools, benches, sofas."""
+"""Sketches of chairs, stools, benches and sofas."""
 
 from __future__ import annotations
 
@@ -119,23 +119,23 @@ def sofa(s: Sketch) -> None:
     back = s.cm(14, 20)
     rear = tidy(deep - back)
     s.box("base", (feet, floor), (-deep, deep), (-inner, inner))
-    each = tidy(2 * inner / seats)
+    seat_width = tidy(2 * inner / seats)
     s.box(
-        "cushion", (floor, tidy(floor + cushion)), (-deep, rear), (-inner, tidy(each - inner)), solid="cushion",
-        more=[s.cm(2.5, 4.5)], count=seats, side_step=each,
+        "cushion", (floor, tidy(floor + cushion)), (-deep, rear), (-inner, tidy(seat_width - inner)), solid="cushion",
+        more=[s.cm(2.5, 4.5)], count=seats, side_step=seat_width,
     )  # fmt: skip
     high = tidy(floor + cushion + s.cm(30, 42))
     s.box("back", (feet, high), (rear, deep), (-half, half), solid="cushion", more=[s.cm(1.5, 4)])
     if seats > 1 and s.chance(0.5):
         low = tidy(floor + cushion)
         s.box(
-            "pillow", (low, tidy(low + s.cm(24, 29))), (tidy(rear - s.cm(9, 12)), rear), (-inner, tidy(each - inner)),
-            solid="cushion", more=[s.cm(2.5, 4)], count=seats, side_step=each,
+            "pillow", (low, tidy(low + s.cm(24, 29))), (tidy(rear - s.cm(9, 12)), rear),
+            (-inner, tidy(seat_width - inner)), solid="cushion", more=[s.cm(2.5, 4)], count=seats, side_step=seat_width,
         )  # fmt: skip
-    rest = tidy(floor + cushion + s.cm(10, 18))
+    arm_top = tidy(floor + cushion + s.cm(10, 18))
     s.box(
         "arm",
-        (feet, rest),
+        (feet, arm_top),
         (-deep, rear),
         (inner, half),
         solid=s.pick("cushion", "cushion"),

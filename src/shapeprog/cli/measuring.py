@@ -208,13 +208,14 @@ def _table(rows: Sequence[Metrics], summary: dict[str, Summary], per_shape: bool
     console = terminal.output()
     names = [name for name in _LABELS if name in summary and summary[name].count]
     if per_shape:
-        table = Table("shape", box=box.SIMPLE_HEAD)
+        table = Table(box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0))
+        table.add_column("shape", min_width=12, overflow="fold")
         shown = [name for name in names if not name.endswith("floor")]
         for name in shown:
-            table.add_column(_LABELS[name], justify="right")
+            table.add_column(_LABELS[name], justify="right", min_width=7, overflow="fold")
         for row in rows:
             table.add_row(row.name, *(_number(name, getattr(row, name)) for name in shown))
-        console.print(table)
+        console.print(table, crop=False)
     table = Table(f"{len(rows)} shape{'s' if len(rows) != 1 else ''}, seed {seed}", box=box.SIMPLE_HEAD)
     for heading in ("mean", "standard error", "median"):
         table.add_column(heading, justify="right")

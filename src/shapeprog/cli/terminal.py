@@ -205,12 +205,13 @@ def read_program_file(path: Path, changes: Sequence[str] | None = None) -> tuple
     """
     from shapeprog.cli.changes import changed, vanished
     from shapeprog.formats import load_with_frame, program_suffixes
-    from shapeprog.language.named import names
 
     try:
         program, frame = load_with_frame(path)
         if not changes:
             return program, frame
+        from shapeprog.language.named import names
+
         edited = changed(program, changes)
         for named in names(edited):
             if named.name in ("width", "depth", "height") and named.value <= 0:

@@ -60,8 +60,12 @@ def _command(command: Any, context: Any) -> Iterator[str]:
     usage = " ".join((context.command_path, *command.collect_usage_pieces(context)))
     yield from (f"## {context.command_path}", "", f"```text\n{usage}\n```", "")
     for paragraph in command.help.split("\n\n"):
-        example = re.fullmatch(r"Examples?:\s*(.*)", paragraph, re.DOTALL)
-        yield f"```sh\n{' '.join(example[1].split())}\n```\n" if example else f"{_plain(paragraph)}\n"
+        if example := re.fullmatch(r"Examples?:\s*(.*)", paragraph, re.DOTALL):
+            yield f"```sh\n{' '.join(example[1].split())}\n```\n"
+        elif paragraph.startswith("\b"):  # lines that are not to be joined
+            yield f"```text{paragraph[1:]}\n```\n"
+        else:
+            yield f"{_plain(paragraph)}\n"
     records = [help_record(option, context) for option in command.get_params(context) if option.name != "help"]
     rows = [(f"`{names}`", _plain(text)) for names, text in records]
     yield from _table("argument or option", "meaning", rows=rows) if rows else ()

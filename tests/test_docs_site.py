@@ -47,7 +47,10 @@ def test_every_statement_and_role_is_in_a_table():
 def test_every_command_has_a_section():
     groups = (("shapeprog", app), ("shapeprog library", library), ("shapeprog paper", paper))
     names = [f"{prefix} {each.name}" for prefix, group in groups for each in group.registered_commands]
-    assert set(names) <= set(re.findall(r"^## (.+)$", "\n".join(commands()), re.MULTILINE))
+    text = "\n".join(commands())
+    assert set(names) <= set(re.findall(r"^## (.+)$", text, re.MULTILINE))
+    assert "```text\nF1@1%" in text
+    assert "\b" not in text
 
 
 def test_every_loss_is_on_the_page_of_training():

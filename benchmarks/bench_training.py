@@ -18,8 +18,8 @@ from shapeprog.liang2022.decode import decode
 from shapeprog.liang2022.fast import Fast, FastSettings
 from shapeprog.liang2022.generator import Generator, TeacherForcingBatch
 from shapeprog.liang2022.loop import tune_allocator
+from shapeprog.liang2022.pretrain import teacher_forcing
 from shapeprog.liang2022.prior import SyntheticStream, prior
-from shapeprog.liang2022.teacher import teacher_forcing
 from shapeprog.liang2022.tian2019 import PUBLISHED, Tian2019, Tian2019Settings
 
 BATCH, BLOCKS, REPEATS = 32, 10, 3

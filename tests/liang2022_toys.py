@@ -59,7 +59,8 @@ class Toy:
     def __init__(self) -> None:
         torch.manual_seed(0)
         layers = nn.Linear(8, 16), nn.BatchNorm1d(16), nn.ReLU(), nn.Dropout(0.2), nn.Linear(16, 1)
-        self.module = nn.Sequential(*layers)
+        self.module = self.network = nn.Sequential(*layers)
+        self.data = "noise"
 
     def batch(self, index: int) -> Tensor:
         return torch.randn(4, 8, generator=torch.Generator().manual_seed(index))
@@ -72,16 +73,13 @@ class Toy:
         batch = self.batch(10**6)
         return {"score": -float((self.module(batch)[:, 0] - batch.sum(-1)).square().mean())}
 
-    def save(self, path: Path, samples_seen: int, scores: Record) -> None:
-        path.write_text(str(samples_seen))
-
 
 def run(
-    folder: Path, *, stop_at: int = 0, task: Any = None, settings: TrainingSettings = TOY
+    folder: Path, *, stop_at: int = 0, task: Any = None, settings: TrainingSettings = TOY, command: str = ""
 ) -> tuple[Any, list[Record]]:
     """Train, asking to stop after a step; the task, and the records without times."""
     task, stop, records = task or Toy(), threading.Event(), []
-    for record in train(task, settings, folder, device="cpu", stop=stop):
+    for record in train(task, settings, folder, device="cpu", stop=stop, command=command):
         if record["step"] == stop_at:
             stop.set()
         records.append({name: value for name, value in record.items() if name != "seconds"})

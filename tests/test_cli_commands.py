@@ -321,6 +321,7 @@ def test_prepare_writes_packs(run: Run, tmp_path: Path):
     assert ended.code == 1
     assert "1 shapes" in ended.out
     assert "two.obj" in ended.err
+    assert "Few shapes, so scores on them say little: table_" in ended.err
 
 
 def test_evaluate_measures_programs_and_meshes_alike(run: Run, tmp_path: Path, program: Path):

@@ -14,15 +14,15 @@ from torch import nn
 from shapeprog.data.packs import write_pack
 from shapeprog.errors import ShapeProgError
 from shapeprog.language import encode
-from shapeprog.liang2022 import adapt, executor_training, pretrain
+from shapeprog.liang2022 import adapt, executor, pretrain
 from shapeprog.liang2022.adapt import AdaptTask, TargetStream
 from shapeprog.liang2022.decode import Decoded
 from shapeprog.liang2022.executor import EMPTY_LOGIT, NeuralExecutor
 from shapeprog.liang2022.fast import Fast
 from shapeprog.liang2022.generator import vocabulary
 from shapeprog.liang2022.loop import BEST, WEIGHTS
-from shapeprog.liang2022.settings import METHODS, AdaptSettings, ExecutorSettings, PretrainSettings
-from shapeprog.liang2022.teacher import teacher_forcing
+from shapeprog.liang2022.pretrain import teacher_forcing
+from shapeprog.liang2022.settings import AdaptSettings, ExecutorSettings, PretrainSettings
 from shapeprog.liang2022.weights import load_executor, load_generator, read_card, save_weights
 
 pytestmark = pytest.mark.paper
@@ -50,7 +50,7 @@ def task(room: Path, method: str = "direct", **options: Any) -> AdaptTask:
         "train": (str(room / "few.npz"),), "batch_size": 2, "rehearsal": 0, "points": 200, "learning_rate": 3e-3,
         "num_shapes": 16, "warm_up": 0, "decoded_ids": 0.0,
     }  # fmt: skip
-    return AdaptTask(AdaptSettings(**{**values, **METHODS[method], **options}))  # type: ignore[arg-type]
+    return AdaptTask(AdaptSettings(**{**values, "method": method, **options}))  # type: ignore[arg-type]
 
 
 def table() -> Decoded:
@@ -73,7 +73,7 @@ def write_parts_of_some_size(module: nn.Module) -> None:
 
 def gradients(adaptation: AdaptTask, monkeypatch: pytest.MonkeyPatch) -> dict[str, float]:
     """Norm of the gradient of each weight in a step on the table."""
-    generator = adaptation.module.generator
+    generator = adaptation.network
     write_parts_of_some_size(generator)
     monkeypatch.setattr(adapt, "decode", lambda *_, **__: table())
     losses = adaptation.losses(adaptation.batch(0), 0.5, torch.Generator().manual_seed(0))
@@ -97,7 +97,7 @@ def test_estimators_give_ids_a_gradient(estimator: str, room: Path):
     adaptation = task(room, estimator=estimator)
     losses = adaptation.losses(adaptation.batch(0), 0.5, torch.Generator().manual_seed(0))
     losses["estimator"].backward()
-    assert all(float(weight.grad.norm()) > 0 for weight in adaptation.module.generator.id_head.parameters())
+    assert all(float(weight.grad.norm()) > 0 for weight in adaptation.network.id_head.parameters())
     assert ("baseline" in losses) == (estimator == "nvil")
     assert 0 <= losses["_cost"] <= 1
 
@@ -145,7 +145,7 @@ def test_pretraining_learns_and_says_what_its_weights_are(room: Path, tmp_path: 
     monkeypatch.setattr(pretrain, "VALIDATION_BATCHES", 1)
     options = {"initial": str(room / "fast.safetensors"), "batch_size": 8, "warm_up": 0}
     settings = PretrainSettings(**options, num_shapes=160, learning_rate=0.01)  # type: ignore[arg-type]
-    _, records = run(tmp_path, task=pretrain.PretrainTask(settings, "the command"), settings=settings)
+    _, records = run(tmp_path, task=pretrain.PretrainTask(settings), settings=settings, command="the command")
     for name in ("ids", "numbers"):
         assert sum(each[name] for each in records[-4:]) < sum(each[name] for each in records[:4])
     assert {"val_ids", "val_numbers", "val_iou", "val_score"} <= records[-1].keys()
@@ -157,9 +157,9 @@ def test_pretraining_learns_and_says_what_its_weights_are(room: Path, tmp_path: 
 
 
 def test_the_executor_learns_single_blocks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(executor_training, "VALIDATION_BLOCKS", 16)
+    monkeypatch.setattr(executor, "VALIDATION_BLOCKS", 16)
     settings = ExecutorSettings(num_shapes=48, batch_size=8, warm_up=0, learning_rate=3e-3)
-    training = executor_training.ExecutorTask(settings)
+    training = executor.ExecutorTask(settings)
     blocks = training.batch(0)
     assert (blocks.ids > 0).any(-1).all()
     assert not blocks.numbers[~vocabulary().used[blocks.ids]].any()
@@ -223,20 +223,16 @@ def test_what_cannot_be_adapted_is_said_before_it_begins(room: Path, tmp_path: P
     refuse(room, "has no weights yet", "guided", executor=str(tmp_path / "executor" / WEIGHTS))
     refuse(room, "not of the neural executor", "guided", executor=str(room / "fast.safetensors"))
     refuse(room, r"unknown loss 'chamfr'", loss="chamfr")
-    refuse(
-        room,
-        r"the design tian2019 has no offsets\n.*--learn all",
-        learn="offsets",
-        initial=str(room / "tian2019.safetensors"),
-    )
+    tian2019 = str(room / "tian2019.safetensors")
+    refuse(room, r"the design tian2019 has no offsets\n.*--learn all", learn="offsets", initial=tian2019)
     refuse(room, "ids cannot learn", learn="offsets", estimator="rloo")
 
 
 def test_programs_that_draw_nothing_cost_but_have_no_gradient(room: Path):
     adaptation = task(room)
     with torch.no_grad():
-        adaptation.module.generator.id_head[2].bias[0] += 100
+        adaptation.network.id_head[2].bias[0] += 100
     losses = adaptation.losses(adaptation.batch(0), 0.0, torch.Generator().manual_seed(0))
     assert losses["chamfer"] > 10
     losses["chamfer"].backward()
-    assert not any(weight.grad.any() for weight in adaptation.module.generator.parameters() if weight.grad is not None)
+    assert not any(weight.grad.any() for weight in adaptation.network.parameters() if weight.grad is not None)

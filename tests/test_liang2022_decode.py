@@ -16,8 +16,8 @@ from shapeprog.language.unroll import draw_blocks, unroll
 from shapeprog.liang2022.decode import EXACT_WEIGHT, Decoded, decode
 from shapeprog.liang2022.evaluate import evaluate, scores_on_packs
 from shapeprog.liang2022.generator import Generator
+from shapeprog.liang2022.pretrain import scheduled_sampling, teacher_forcing
 from shapeprog.liang2022.prior import SyntheticStream, prior
-from shapeprog.liang2022.teacher import scheduled_sampling, teacher_forcing
 from shapeprog.liang2022.weights import load_generator
 
 pytestmark = pytest.mark.paper

@@ -17,6 +17,7 @@ from liang2022_toys import TOY, Toy, run, same
 from shapeprog.errors import InputError, ShapeProgError
 from shapeprog.liang2022.loop import BEST, LOG, STATE, WEIGHTS, read_log, train
 from shapeprog.liang2022.settings import TrainingSettings
+from shapeprog.liang2022.weights import read_card
 
 pytestmark = pytest.mark.paper
 SCRIPT = Path(__file__).with_name("liang2022_toys.py")
@@ -129,8 +130,8 @@ def test_weights_are_written_at_each_validation_and_the_best_kept(tmp_path: Path
     _, records = run(tmp_path)
     scores = {each["samples_seen"]: each["val_score"] for each in records if "val_score" in each}
     assert list(scores) == [20, 40, 60, 80]
-    assert int((tmp_path / BEST).read_text()) == max(scores, key=scores.__getitem__)
-    assert (tmp_path / WEIGHTS).read_text() == "80"
+    assert read_card(tmp_path / BEST).samples_seen == max(scores, key=scores.__getitem__)
+    assert read_card(tmp_path / WEIGHTS).samples_seen == 80
     assert all({"loss", "square", "size", "worst", "gradient_norm", "learning_rate"} <= each.keys() for each in records)
     assert records[0]["loss"] == pytest.approx(records[0]["square"] + records[0]["size"])
 

@@ -8,6 +8,7 @@ import pytest
 import torch
 from torch import Tensor
 
+from shapeprog.errors import ShapeProgError
 from shapeprog.geometry import losses
 from shapeprog.geometry.distance import each_distance
 from shapeprog.geometry.surface import sample_surface
@@ -139,6 +140,27 @@ def cuboid(*size: float, kind: str = "cuboid") -> Primitive:
 def test_distances_have_their_known_values(primitive, point, expected):
     result = renderer.distance(primitive, torch.tensor([point], dtype=torch.float64))
     torch.testing.assert_close(result, torch.tensor([expected], dtype=torch.float64))
+
+
+def test_the_distance_to_a_rotated_cuboid_and_to_a_union_have_their_hand_computed_values():
+    """A long bar is turned from depth to side by 30 degrees, (0, 2, 0) to (0, 3^.5, 1), and moved up by one."""
+    bar = renderer.turned(cuboid(0.5, 2, 0.25), torch.zeros(3).double(), math.pi / 6)
+    bar = bar._replace(centre=torch.tensor([1.0, 0, 0]).double())
+    end = torch.tensor([1, math.sqrt(3), 1]).double()
+    along, across = torch.tensor([[0, math.sqrt(3) / 2, 1 / 2], [0, -1 / 2, math.sqrt(3) / 2]]).double()
+    where = torch.stack(
+        [end, end + 3 * along, end + across, end + 3 * along + 4.25 * across, end + 2 * torch.eye(3)[0]]
+    )
+    torch.testing.assert_close(renderer.distance(bar, where), torch.tensor([0, 3, 0.75, 5, 1.5]).double())
+    cube = cuboid(1, 1, 1)._replace(centre=torch.tensor([1.0, 0, 20]).double())
+    both = renderer.union_distance([bar, cube], torch.cat([where, torch.tensor([[1.0, 0, 18], [4, 5, 20]]).double()]))
+    torch.testing.assert_close(both, torch.tensor([0, 3, 0.75, 5, 1.5, 1, math.hypot(2, 4)]).double())
+    assert renderer.union_distance([], where).isinf().all()
+
+
+def test_nothing_has_no_surface_to_sample():
+    with pytest.raises(ShapeProgError, match="has no surface to sample"):
+        renderer.sample([], 10)
 
 
 def test_the_gradient_of_the_distance_to_a_cylinder_is_finite_on_its_axis():

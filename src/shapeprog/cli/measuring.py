@@ -73,6 +73,9 @@ def prepare_command(
     if not quiet:
         for path, count in last.packs:
             terminal.output().print(f"wrote {path}: {count} shapes")
+        small = ", ".join(path.name for path, count in last.packs if count < _FEW)
+        if small:
+            terminal.errors().print(f"Few shapes, so scores on them say little: {small}", style="yellow", markup=False)
     if last.failures:
         raise typer.Exit(1)
 

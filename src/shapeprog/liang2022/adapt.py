@@ -42,19 +42,15 @@ from shapeprog.language.unroll import unroll
 from shapeprog.liang2022.decode import Decoded, decode
 from shapeprog.liang2022.estimators import NvilBaseline, leave_one_out_advantage, reinforce_loss
 from shapeprog.liang2022.evaluate import scores_on_packs
-from shapeprog.liang2022.generator import IDS, Generator, Prediction, TeacherForcingBatch
-from shapeprog.liang2022.loop import Record, scramble
+from shapeprog.liang2022.generator import IDS, STEPS, Prediction, TeacherForcingBatch
 from shapeprog.liang2022.losses import Comparison, compute, parse_losses
-from shapeprog.liang2022.prior import SyntheticStream, prior
-from shapeprog.liang2022.settings import NEURAL, AdaptSettings
-from shapeprog.liang2022.teacher import Order, teacher_forcing
-from shapeprog.liang2022.weights import load_executor, load_generator, save_weights
+from shapeprog.liang2022.pretrain import Order, teacher_forcing
+from shapeprog.liang2022.prior import SyntheticStream, prior, scramble
+from shapeprog.liang2022.settings import METHODS, NEURAL, AdaptSettings
+from shapeprog.liang2022.weights import load_executor, load_generator
 
-REHEARSAL_CANVASES = 3
-"""Canvases of each synthetic shape that a step rehearses."""
-
-RLOO_SAMPLES = 4
-"""Programs sampled for each shape by the leave-one-out estimator."""
+REHEARSAL_CANVASES = 3  # canvases of each synthetic shape that a step rehearses
+RLOO_SAMPLES = 4  # programs sampled for each shape by the leave-one-out estimator
 
 DOT = Program((Draw("leg", (-0.1,) * 3 + (0.2,) * 3),))
 """The smallest part, in the centre of the grid; stands for programs that draw nothing."""
@@ -68,15 +64,7 @@ class Targets(NamedTuple):
 
 
 class TargetStream:
-    """Endless batches of real shapes, a function of packs, seed and index; all shapes once before any comes again.
-
-    Parameters
-    ----------
-    packs
-        Files of shapes.
-    batch_size, points, seed
-        Shapes of a batch, points of each, seed of their order.
-    """
+    """Endless batches of real shapes, a function of packs, seed and index; all shapes once before any comes again."""
 
     def __init__(self, packs: Sequence[str | Path], batch_size: int = 32, points: int = 1000, seed: int = 0) -> None:
         self._shapes = [(pack, index) for pack in map(read_pack, map(Path, packs)) for index in range(len(pack))]
@@ -103,27 +91,14 @@ class TargetStream:
         return Targets(torch.from_numpy(np.stack(cells)), torch.from_numpy(np.stack(points).astype(np.float32)))
 
 
-class Learner(nn.Module):
-    """All that learns: the generator, and the baseline of NVIL."""
-
-    def __init__(self, generator: Generator, baseline: NvilBaseline | None) -> None:
-        super().__init__()
-        self.generator, self.baseline = generator, baseline
-
-
 class AdaptTask:
-    """Adaptation of a generator; a task of :func:`~shapeprog.liang2022.loop.train`.
+    """Adaptation of a generator; a task of :func:`~shapeprog.liang2022.loop.train`."""
 
-    Raises
-    ------
-    ShapeProgError
-        If weights or packs cannot be read, or a loss is unknown.
-    """
-
-    def __init__(self, settings: AdaptSettings, command: str = "") -> None:
+    def __init__(self, settings: AdaptSettings) -> None:
         torch.manual_seed(settings.seed)
-        self._settings, self._command = settings, command
-        self._losses = parse_losses(settings.loss)
+        self._settings, self._losses = settings, parse_losses(settings.loss or METHODS[settings.method])
+        packs = ", ".join(Path(pack).stem for pack in settings.train)
+        self.data = f"{Path(settings.initial).stem}, adapted to {packs}"
         generator = load_generator(settings.initial)
         self._executor = load_executor(settings.executor).requires_grad_(False) if NEURAL in self._losses else None
         self._initial = copy.deepcopy(generator).requires_grad_(False) if settings.kl else None
@@ -132,8 +107,10 @@ class AdaptTask:
                 raise ShapeProgError(f"the design {generator.design} has no offsets", "use --learn all")
             generator.requires_grad_(False)
             generator.offset_head.requires_grad_(True)
-        baseline = NvilBaseline(generator.feature_width) if settings.estimator == "nvil" else None
-        self.module = Learner(generator, baseline)
+        self._baseline = NvilBaseline(generator.feature_width) if settings.estimator == "nvil" else None
+        learning = {"generator": generator, "baseline": self._baseline}
+        self.module = nn.ModuleDict({name: part for name, part in learning.items() if part is not None})
+        self.network = generator
         self._targets = TargetStream(settings.train, settings.batch_size, settings.points, settings.seed)
         rehearsed = settings.rehearsal if settings.learn == "all" else 0
         self._synthetic = SyntheticStream(prior(settings.prior), rehearsed, settings.seed) if rehearsed else None
@@ -146,7 +123,7 @@ class AdaptTask:
         if self._synthetic is None:
             return self._targets[index], None
         made = self._synthetic[index]
-        order: Order = "written" if self.module.generator.design == "tian2019" else "coverage"
+        order: Order = "written" if self.network.design == "tian2019" else "coverage"
         rng = torch.Generator().manual_seed(scramble(self._settings.seed, 2, index))
         return self._targets[index], teacher_forcing(made.voxels, made.code, order).subset(REHEARSAL_CANVASES, rng)
 
@@ -154,26 +131,28 @@ class AdaptTask:
         self, batch: tuple[Targets, TeacherForcingBatch | None], progress: float, rng: torch.Generator
     ) -> dict[str, Tensor]:
         """Losses of the rendered programs, of their ids, and of the rehearsal."""
-        settings, generator = self._settings, self.module.generator.eval()  # statistics of the normalisation stay
+        settings, generator = self._settings, self.network.eval()  # statistics of the normalisation stay
         targets = Targets(*(part.to(rng.device) for part in batch[0]))
         if settings.estimator == "rloo":
             targets = Targets(*(torch.cat([part] * RLOO_SAMPLES) for part in targets))
         sampled = settings.estimator != "none"
         decoded = decode(generator, targets.cells, decoder="sample-ids" if sampled else settings.decoder, rng=rng)
         prediction = generator.predict(decoded)
-        with torch.autocast(rng.device.type, enabled=False):
-            per_shape = self._render_losses(prediction, targets, rng)
-            losses = {name: value.mean() for name, value in per_shape.items()}
-            losses |= self._id_losses(prediction, decoded)
+        losses = {name: value.mean() for name, value in self._render_losses(prediction, targets, rng).items()}
+        losses |= self._id_losses(prediction, decoded)
         if batch[1] is not None:
-            rehearsed = generator.predict(batch[1].to(rng.device)).losses()
+            rehearsed = generator.losses(generator.predict(batch[1].to(rng.device)))
             losses |= {f"rehearsal_{name}": value for name, value in rehearsed.items()}
         return losses
 
     def _render_losses(
         self, prediction: Prediction, targets: Targets, rng: torch.Generator
     ) -> dict[str, Float[Tensor, " B"]]:
-        """Losses of predicted programs, with gradient to their numbers; those that draw nothing cost, without one."""
+        """Losses of predicted programs, with gradient to their numbers.
+
+        A program without a surface is rendered as a dot without gradient; the executor reads it as it is, and leaves
+        out its empty blocks.
+        """
         code = predicted_code(prediction, base=self._settings.learn == "all")
         draws = has_surface(unroll(code.having(code.parameters.detach())))[:, None, None]
         dot = encode([DOT] * len(draws), blocks=code.ids.shape[1])
@@ -194,7 +173,7 @@ class AdaptTask:
         settings, losses = self._settings, {}
         log_prob = prediction.log_prob()
         if settings.decoded_ids and settings.estimator == "none" and settings.learn == "all":
-            losses["decoded_ids"] = -settings.decoded_ids * log_prob.sum() / (3 * prediction.batch.live.sum())
+            losses["decoded_ids"] = -settings.decoded_ids * log_prob.sum() / (STEPS * prediction.batch.live.sum())
         if self._initial is not None:
             with torch.no_grad():
                 before = self._initial.to(log_prob.device).eval().predict(prediction.batch).logits
@@ -209,33 +188,19 @@ class AdaptTask:
             advantage = leave_one_out_advantage(costs.reshape(shape))[..., None]
             loss = reinforce_loss(log_prob.unflatten(0, shape), advantage)
         else:
-            assert self.module.baseline is not None
-            advantage, losses["baseline"] = self.module.baseline(prediction.feature, prediction.batch.live, costs)
+            assert self._baseline is not None
+            advantage, losses["baseline"] = self._baseline(prediction.feature, prediction.batch.live, costs)
             loss = reinforce_loss(log_prob, advantage)
         return losses | {"estimator": loss, "_cost": costs.mean()}
 
-    def validate(self) -> Record:
+    def validate(self) -> dict[str, float]:
         """IoU and CD of the programs of each pack; the score is minus the sum of these CD."""
         packs = self._settings.val
-        scores = scores_on_packs(self.module.generator, packs, self._settings.decoder)
+        scores = scores_on_packs(self.network, packs, self._settings.decoder)
         return scores | ({"score": -sum(scores[f"{Path(path).stem}_cd"] for path in packs)} if packs else {})
-
-    def save(self, path: Path, samples_seen: int, scores: Record) -> None:
-        """Write the generator with its card."""
-        packs = ", ".join(Path(pack).stem for pack in self._settings.train)
-        save_weights(
-            path, self.module.generator, data=f"{Path(self._settings.initial).stem}, adapted to {packs}",
-            seed=self._settings.seed, command=self._command, samples_seen=samples_seen, scores=dict(scores),
-        )  # fmt: skip
 
 
 def predicted_code(prediction: Prediction, base: bool = True) -> Code:
-    """Decoded programs with the numbers that the network predicts for them, with gradient to its weights.
-
-    Parameters
-    ----------
-    base
-        Let gradients reach the numbers; else the offsets alone.
-    """
+    """Decoded programs with the predicted numbers, with gradient to all weights, or without ``base`` to offsets."""
     numbers = (prediction.numbers if base else prediction.given) + prediction.offsets
     return Code(prediction.batch.code.ids, prediction.scatter(numbers.float()))

@@ -7,7 +7,7 @@ import pkgutil
 import runpy
 import shlex
 import sys
-from dataclasses import fields
+from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal, get_origin, get_type_hints
 
@@ -15,8 +15,8 @@ import typer
 
 from shapeprog.cli import interruption, terminal
 from shapeprog.cli.sampling import write_samples
-from shapeprog.errors import InputError, ShapeProgError, did_you_mean
-from shapeprog.liang2022.settings import METHODS, AdaptSettings, ExecutorSettings, PretrainSettings, TrainingSettings
+from shapeprog.errors import InputError, ShapeProgError
+from shapeprog.liang2022.settings import BEST, WEIGHTS, AdaptSettings, ExecutorSettings, PretrainSettings
 
 app = typer.Typer(no_args_is_help=True, rich_markup_mode=None)
 
@@ -31,7 +31,6 @@ def infer_command(
     weights: Annotated[str, typer.Option(help="A file, or the name of weights that ship (see: models).")] = "fast-wide",
     decoder: Annotated[str, typer.Option(help="argmax, novel or select.")] = "select",
     blocks: Annotated[int, typer.Option(help="Largest number of blocks.", min=1)] = 10,
-    device: Annotated[str, typer.Option(help="cpu or cuda.")] = "cpu",
 ) -> None:
     """Write the program of each shape block by block with a generator.
 
@@ -39,8 +38,6 @@ def infer_command(
 
     Example: shapeprog paper infer examples/bench_kenney.obj
     """
-    import torch
-
     from shapeprog.data import load_all
     from shapeprog.files import make_folder
     from shapeprog.formats import save
@@ -48,15 +45,13 @@ def infer_command(
     from shapeprog.liang2022.evaluate import grids
     from shapeprog.liang2022.weights import load_generator
 
-    if device not in ("cpu", "cuda") or (device == "cuda" and not torch.cuda.is_available()):
-        raise InputError(f"there is no device {device!r}", "use --device cpu")
-    generator, failed = load_generator(weights).to(device), False
+    generator, failed = load_generator(weights), False
     for _, shape in load_all(inputs):
         if isinstance(shape, ShapeProgError):
             terminal.complain(shape)
             failed = True
             continue
-        decoded = decode(generator, grids([shape]).to(device), decoder=decoder, blocks=blocks)  # type: ignore[arg-type]
+        decoded = decode(generator, grids([shape]), decoder=decoder, blocks=blocks)  # type: ignore[arg-type]
         (program,) = decoded.programs()
         terminal.output().print(f"# {shape.name}: canvas IoU {float(decoded.iou()):.3f}")
         terminal.print_program(terminal.output(), program)
@@ -105,16 +100,22 @@ def models_command(
 @app.command("import")
 @terminal.guarded
 def import_command(
-    file: Annotated[Path, typer.Argument(help="Published checkpoint of Tian et al. 2019 (.t7).")],
+    file: Annotated[Path, typer.Argument(help="Published checkpoint of Tian et al. 2019 (.t7), or weights of a run.")],
     out: Annotated[Path, typer.Option("--out", "-o", help="File to write, NAME.safetensors.")],
+    half: Annotated[bool, typer.Option("--half", help="Store float16, as in the files that ship.")] = False,
 ) -> None:
     """Turn published weights into a file of this package; nothing else in the checkpoint is run.
 
     Example: shapeprog paper import program_generator_chair.t7 --out chair.safetensors
     """
-    from shapeprog.liang2022.weights import read_published, save_weights
+    from shapeprog.liang2022.weights import SUFFIX, load_weights, read_published, save_weights
 
-    save_weights(out, read_published(file), data="as published by Tian et al. 2019", command=COMMAND_LINE)
+    if file.suffix == SUFFIX:
+        module, card = load_weights(file)
+        fields = {name: value for name, value in vars(card).items() if name not in ("design", "settings", "version")}
+    else:
+        module, fields = read_published(file), {"data": "as published by Tian et al. 2019", "command": COMMAND_LINE}
+    save_weights(out, module, half=half, **fields)
     terminal.output().print(f"wrote {out}")
 
 
@@ -133,12 +134,14 @@ def table_command(
     Example: shapeprog paper table --quick
     """
     from shapeprog.liang2022.experiment import run_table
+    from shapeprog.liang2022.loop import tune_allocator
 
+    tune_allocator()
     for line in run_table(packs, results, quick=quick, only=only, seeds=seeds, measure=measure):
         terminal.output().print(line)
 
 
-def _add_training(name: str, kind: type[TrainingSettings], task: str, doc: str) -> None:
+def _add_training(name: str, kind: type[Any], task: str, doc: str) -> None:
     """Add a command that trains a task of this package, with an option for each field of its settings."""
 
     def run(
@@ -146,20 +149,16 @@ def _add_training(name: str, kind: type[TrainingSettings], task: str, doc: str) 
         device: Annotated[str, typer.Option(help="auto, cpu or cuda.")] = "auto",
         restart: Annotated[bool, typer.Option("--restart", help="Start over if the folder holds a run.")] = False,
         quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
-        method: Annotated[str, typer.Option(help="direct, guided or hybrid.")] = "direct",
         files: Annotated[list[Path] | None, typer.Option("--with", help="Python files that declare losses.")] = None,
         **options: Any,
     ) -> None:
         from rich.progress import Progress
 
-        from shapeprog.liang2022.loop import BEST, WEIGHTS, train, tune_allocator
+        from shapeprog.liang2022.loop import train, tune_allocator
 
         tune_allocator()
-        if method not in METHODS:
-            raise InputError(f"unknown method {method!r}", did_you_mean(method, METHODS))
-        values = {key: tuple(value) if isinstance(value, list) else value for key, value in options.items()}
-        values = {key: value for key, value in values.items() if value not in (None, ())}
-        settings = kind(**{**(METHODS[method] if kind is AdaptSettings else {}), **values})
+        values: dict[str, Any] = {key: value for key, value in options.items() if value not in (None, [])}
+        settings = kind(**values | {key: tuple(value) for key, value in values.items() if isinstance(value, list)})
         _load_losses(files or [], options.get("loss") or "")
         console, last = terminal.errors(), {"samples_seen": 0.0}
         with (
@@ -167,8 +166,10 @@ def _add_training(name: str, kind: type[TrainingSettings], task: str, doc: str) 
             Progress(console=console, disable=quiet or not console.is_terminal) as bar,
         ):
             progress = bar.add_task("training", total=settings.num_shapes)
-            made = pkgutil.resolve_name(f"shapeprog.liang2022.{task}")(settings, COMMAND_LINE)
-            for last in train(made, settings, folder, device=device, restart=restart, stop=stop):
+            made = pkgutil.resolve_name(f"shapeprog.liang2022.{task}")(settings)
+            for last in train(
+                made, settings, folder, device=device, restart=restart, stop=stop, command=COMMAND_LINE
+            ):  # fmt: skip
                 bar.update(progress, completed=last["samples_seen"], description=f"loss {last['loss']:.3f}")
                 scores = [f"{key[4:]} {value:.4g}" for key, value in last.items() if key.startswith("val_")]
                 if scores and not quiet:
@@ -179,13 +180,14 @@ def _add_training(name: str, kind: type[TrainingSettings], task: str, doc: str) 
             best = f"; the best on validation: {folder / BEST}" if (folder / BEST).exists() else ""
             terminal.output().print(f"the weights are {folder / WEIGHTS}{best}")
 
-    omitted = {"options", *(() if kind is AdaptSettings else ("method", "files"))}
+    omitted = {"options"} if kind is AdaptSettings else {"options", "files"}
     signature = [each for each in inspect.signature(run, eval_str=True).parameters.values() if each.name not in omitted]
-    hints = get_type_hints(kind)
+    hints, bases = get_type_hints(kind), [base for base in reversed(kind.__mro__) if is_dataclass(base)]
+    meanings = {field.name: field.metadata["help"] for base in bases for field in fields(base) if field.metadata}
     for field in fields(kind):
         hint: Any = {Literal: str, tuple: list[str]}.get(get_origin(hints[field.name]), hints[field.name])
         default = f" [{field.default}]" if field.default else ""
-        option = Annotated[hint | None, typer.Option(help=field.metadata.get("help", "") + default)]
+        option = Annotated[hint | None, typer.Option(help=meanings[field.name] + default)]
         signature.append(inspect.Parameter(field.name, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=option))
     run.__signature__ = inspect.Signature(signature)  # type: ignore[attr-defined]
     run.__annotations__ = {each.name: each.annotation for each in signature}
@@ -215,7 +217,7 @@ _add_training("pretrain", PretrainSettings, "pretrain.PretrainTask", """Pretrain
 
     Example: shapeprog paper pretrain runs/narrow --prior narrow --num-shapes 40000""")  # fmt: skip
 
-_add_training("train-executor", ExecutorSettings, "executor_training.ExecutorTask", """Train the neural executor.
+_add_training("train-executor", ExecutorSettings, "executor.ExecutorTask", """Train the neural executor.
 
     Guided and hybrid adaptation differentiate through it.
 

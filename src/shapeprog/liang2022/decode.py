@@ -18,7 +18,7 @@ from dataclasses import dataclass, fields
 from typing import Any, Literal, get_args
 
 import torch
-from jaxtyping import Bool, Float, Int, UInt8
+from jaxtyping import Float, Int, UInt8
 from torch import Tensor
 
 from shapeprog.errors import ShapeProgError, did_you_mean
@@ -28,29 +28,21 @@ from shapeprog.language.statement import EMPTY, SLOTS
 from shapeprog.language.tensors import Code
 from shapeprog.language.tensors import decode as programs_of
 from shapeprog.language.unroll import draw_blocks, unroll
-from shapeprog.liang2022.generator import STEPS, Generator, TeacherForcingBatch, live_blocks, preceding_blocks
+from shapeprog.liang2022.generator import STEPS, Generator, TeacherForcingBatch, live_blocks, preceding_blocks, take
+from shapeprog.liang2022.settings import Decoder
 from shapeprog.space import HALF
 
-Decoder = Literal["argmax", "novel", "select", "sample", "sample-ids"]
+AnyDecoder = Literal[Decoder, "sample", "sample-ids"]
 
-NUM_CANDIDATES = 8
-"""Blocks that ``novel`` and ``select`` choose from; chosen on validation shapes."""
-
-EXACT_WEIGHT = 0.5
-"""Weight of exact cells against cells within a tolerance of one in ``select``; chosen on validation shapes."""
+NUM_CANDIDATES = 8  # blocks that novel and select choose from; chosen on validation shapes
+EXACT_WEIGHT = 0.5  # of exact cells against cells within a tolerance of one in select; chosen on validation shapes
 
 
 @dataclass(frozen=True)
 class Decoded(TeacherForcingBatch):
-    """Programs of a generator, on their own canvases: input of :meth:`Generator.predict`.
+    """Programs of a generator, on their own canvases: input of :meth:`Generator.predict`."""
 
-    Parameters
-    ----------
-    offsets
-        Sub-cell offsets of the surfaces from the numbers of ``code``, which are drawn on the canvas without them.
-    """
-
-    offsets: Float[Tensor, "B K J 7"]
+    offsets: Float[Tensor, "B K J 7"]  # sub-cell offsets of the surfaces from the numbers, which the canvas has not
 
     def programs(self, whole: bool = False) -> list[Program]:
         """Programs with numbers to a hundredth of a cell, or ``whole`` numbers as drawn on the canvas."""
@@ -64,35 +56,16 @@ class Decoded(TeacherForcingBatch):
 
 @torch.no_grad()
 def decode(
-    generator: Generator,
-    target: UInt8[Tensor, "B 32 32 32"],
-    *,
-    blocks: int = 10,
-    decoder: Decoder = "select",
+    generator: Generator, target: UInt8[Tensor, "B 32 32 32"], *, blocks: int = 10, decoder: AnyDecoder = "select",
     rng: torch.Generator | None = None,
-) -> Decoded:
-    """Decode a program for each target.
+) -> Decoded:  # fmt: skip
+    """Decode a program of at most so many blocks K for each target, by a generator in evaluation mode.
 
-    Parameters
-    ----------
-    generator
-        The network, in evaluation mode.
-    target
-        Cells, 1 or 0.
-    blocks
-        Largest number of blocks K.
-    decoder
-        How blocks are chosen; see the module.
-    rng
-        Source of randomness for sampling; a fixed one by default.
-
-    Raises
-    ------
-    ShapeProgError
-        If there is no such decoder.
+    ``rng`` is the source of randomness for sampling, a fixed one by default.  Raises a ``ShapeProgError`` if there is
+    no such decoder.
     """
-    if decoder not in get_args(Decoder):
-        raise ShapeProgError(f"unknown decoder {decoder!r}", did_you_mean(decoder, get_args(Decoder)))
+    if decoder not in get_args(AnyDecoder):
+        raise ShapeProgError(f"unknown decoder {decoder!r}", did_you_mean(decoder, get_args(AnyDecoder)))
     size, device = len(target), target.device
     rng = (rng or torch.Generator(device)) if decoder.startswith("sample") else None
     ids = torch.zeros(size, blocks, STEPS, dtype=torch.long, device=device)
@@ -139,7 +112,7 @@ def decode_all(
 
 
 def _candidates(
-    generator: Generator, feature: Float[Tensor, "N F"], decoder: Decoder, rng: torch.Generator | None
+    generator: Generator, feature: Float[Tensor, "N F"], decoder: AnyDecoder, rng: torch.Generator | None
 ) -> tuple[Code, Float[Tensor, "N W"]]:
     """The likeliest blocks (N, W, J) by a beam over their steps, likeliest first, or one block by arg-max or sampling.
 
@@ -173,18 +146,15 @@ def _candidates(
 
 
 def _choose(
-    candidates: Code,
-    log_prob: Float[Tensor, "B W"],
-    canvas: Int[Tensor, "B 32 32"],
+    candidates: Code, log_prob: Float[Tensor, "B W"], canvas: Int[Tensor, "B 32 32"],
     target_cells: Int[Tensor, "B 32 32"] | None,
-) -> Code:
+) -> Code:  # fmt: skip
     """The likeliest candidate that draws a new cell or ends; with a target, the one that agrees best with it.
 
     Agreement counts new cells inside the target minus those outside, exactly and with a tolerance of one cell, so that
     a part which is a little off is better than none.  Blocks with a copy outside the grid do not qualify.
     """
-    single_blocks = candidates[:, :, None]
-    drawn, before = draw_blocks(single_blocks)[:, :, 0], canvas[:, None]
+    drawn, before = draw_blocks(candidates[:, :, None])[:, :, 0], canvas[:, None]
     new = drawn & ~before
     ends = candidates.ids[..., 0] == EMPTY
     if target_cells is None:
@@ -194,19 +164,14 @@ def _choose(
         target = target_cells[:, None]
         exact = 2 * count(new & target) - count(new)
         nearby = count(target & widen(drawn) & ~widen(before)) - count(new & ~widen(target))
-        qualifies = _inside_grid(single_blocks)[..., 0] & log_prob.isfinite() & ~ends
+        scene = unroll(Code(candidates.ids.flatten(0, 1)[:, None], candidates.parameters.flatten(0, 1)[:, None]))
+        inside = ((scene.centre.abs() <= HALF).all(-1) | ~scene.mask).all(-1).reshape(ends.shape)
+        qualifies = inside & log_prob.isfinite() & ~ends
         score = (EXACT_WEIGHT * exact + nearby).masked_fill(~qualifies, 0.0)
         best = score.argmax(-1)  # the likeliest of equals
         qualifies = score > 0
-    row = torch.arange(len(best), device=best.device)
-    good, block = qualifies[row, best], candidates[row, best]
-    return Code(block.ids * good[:, None], block.parameters * good[:, None, None])
-
-
-def _inside_grid(code: Code) -> Bool[Tensor, "*batch K"]:
-    """Blocks whose every copy has its centre within the grid."""
-    scene = unroll(Code(code.ids.flatten(0, -2)[:, None], code.parameters.detach().flatten(0, -3)[:, None]))
-    return ((scene.centre.abs() <= HALF).all(-1) | ~scene.mask).all(-1).reshape(code.ids.shape[:-1])
+    best = best[:, None]
+    return take(candidates, best, qualifies.gather(1, best))[:, 0]
 
 
 def _rows(state: Any, index: Tensor) -> Any:

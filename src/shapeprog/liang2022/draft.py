@@ -10,8 +10,7 @@ from shapeprog.language.program import Draw, Loop, Node, nest
 from shapeprog.space import UP
 
 T = TypeVar("T")
-Triple = tuple[int, ...]
-"""Three numbers along up, depth and left-right."""
+Triple = tuple[int, ...]  # three numbers along up, depth and left-right
 Repeats = Sequence[tuple[int, Triple]]
 """Translations, outermost first: number of copies, and the shift from one to the next."""
 
@@ -94,5 +93,4 @@ def _along(axis: int, value: int, others: Triple) -> Triple:
     return (*others[:axis], value, *others[axis + 1 :])
 
 
-Template = Callable[[Rng, Draft], None]
-"""A kind of furniture: it adds the blocks of one program to a draft."""
+Template = Callable[[Rng, Draft], None]  # a kind of furniture: it adds the blocks of one program to a draft

@@ -1,8 +1,8 @@
 """Gradient estimators for the ids of statements, which a renderer gives no gradient (end of section 4.2).
 
 Programs are sampled, and the log-probability of their ids is weighed by the advantage, the cost above a baseline
-(REINFORCE, Williams 1992).  The baseline is a network (NVIL, Mnih and Gregor 2014) or the mean cost of the other
-samples of the same shape (leave one out, Kool et al. 2019).
+(REINFORCE, Williams 1992).  The cost in adaptation is 1 - IoU of the canvas.  The baseline is a network (NVIL, Mnih and
+Gregor 2014) or the mean cost of the other samples of the same shape (leave one out, Kool et al. 2019).
 """
 
 from __future__ import annotations
@@ -11,8 +11,7 @@ import torch
 from jaxtyping import Bool, Float
 from torch import Tensor, nn
 
-DECAY = 0.9
-"""Decay of the running mean and variance of costs, as published for NVIL."""
+DECAY = 0.9  # decay of the running mean and variance of costs, as published for NVIL
 
 
 class NvilBaseline(nn.Module):
@@ -32,22 +31,12 @@ class NvilBaseline(nn.Module):
     def forward(
         self, feature: Float[Tensor, "M F"], live: Bool[Tensor, "B K"], costs: Float[Tensor, " B"]
     ) -> tuple[Float[Tensor, "B K"], Float[Tensor, ""]]:
-        """The advantage of the ids of every block, and the loss that trains the baseline.
+        """The advantage of the ids of every block, without gradient, and the loss that trains the baseline.
 
-        Parameters
-        ----------
-        feature
-            Features of the M live blocks, in the order of the mask.
-        live
-            Which blocks were sampled.
-        costs
-            Cost of every program.
-
-        Returns
-        -------
-        The advantage without gradient, 0 where no block was sampled: cost minus running mean minus prediction, divided
-        by the running standard deviation where that is above 1; and the mean squared error of the prediction.  The
-        running statistics change after their use, and in training alone.
+        From the features of the M live blocks and the cost of every program.  The advantage is the cost minus running
+        mean and prediction, divided by the running standard deviation where that is above 1, and 0 where no block was
+        sampled; the loss is the mean squared error of the prediction.  The running statistics change after their use,
+        in training alone.
         """
         centred = (costs - self.mean)[:, None].expand(live.shape)[live]
         predicted = self.layers(feature.detach().to(self.mean))[:, 0]

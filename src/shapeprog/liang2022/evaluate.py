@@ -16,8 +16,9 @@ from shapeprog.data.packs import read_pack
 from shapeprog.data.shape import Shape
 from shapeprog.evaluation.metrics import Metrics, evaluate_program, summarise, target_samples, world_scale
 from shapeprog.language.program import Program
-from shapeprog.liang2022.decode import Decoder, decode_all
+from shapeprog.liang2022.decode import decode_all
 from shapeprog.liang2022.generator import Generator
+from shapeprog.liang2022.settings import Decoder
 
 
 def evaluate(generator: Generator, shapes: Sequence[Shape], decoder: Decoder) -> list[Metrics]:

@@ -10,62 +10,43 @@ import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, get_args
 
 import numpy as np
 import torch
 
 from shapeprog.data.packs import read_pack, write_pack
-from shapeprog.data.shape import Shape
 from shapeprog.data.synthetic.shapes import shapes_of
 from shapeprog.errors import InputError, did_you_mean
 from shapeprog.files import append_line, make_folder
 from shapeprog.inference import greedy_boxes, refine
 from shapeprog.inference.refine import REACH
-from shapeprog.language.program import Program
 from shapeprog.liang2022.adapt import AdaptTask
-from shapeprog.liang2022.decode import Decoder, decode_all
+from shapeprog.liang2022.decode import decode_all
 from shapeprog.liang2022.evaluate import grids, measure
-from shapeprog.liang2022.loop import BEST, STATE, read_log, train
+from shapeprog.liang2022.loop import read_log, train
 from shapeprog.liang2022.prior import programs
-from shapeprog.liang2022.settings import METHODS, AdaptSettings
+from shapeprog.liang2022.settings import BEST, STATE, AdaptSettings, Decoder
 from shapeprog.liang2022.weights import load_generator
 
 CATEGORIES = ("bench", "cabinet")
-DECODERS: tuple[Decoder, ...] = ("argmax", "novel", "select")
+DECODERS: tuple[Decoder, ...] = get_args(Decoder)
 PAPER = {"tian2019-none": (0.0135, 0.0104), "tian2019-guided": (0.0078, 0.0092), "tian2019-direct": (0.0035, 0.0043)}
 """CD of Table 1 as published: bench, cabinet."""
 
-REFINED_SHAPES = 40
-"""Test shapes of rows with test-time refinement, which takes seconds a shape."""
+REFINED_SHAPES = 40  # test shapes of rows with test-time refinement, which takes seconds a shape
 
 
 @dataclass(frozen=True)
 class Row:
-    """A row of the table.
-
-    Parameters
-    ----------
-    label
-        Description of the row.
-    initial
-        Weights that it starts from, or ``{row}`` for those of another row; none for greedy boxes.
-    method
-        ``direct``, ``guided`` or ``hybrid``; no adaptation by default.
-    options
-        Settings of the adaptation.
-    decoders
-        How programs are written when they are measured.
-    refine
-        Refine the numbers of each program by chamfer at test time.
-    """
+    """A row of the table."""
 
     label: str
-    initial: str = ""
-    method: str = ""
-    options: Mapping[str, Any] = field(default_factory=dict)
-    decoders: tuple[Decoder, ...] = ("select",)
-    refine: bool = False
+    initial: str = ""  # weights that it starts from, or {row} for those of another row; none for greedy boxes
+    method: Literal["", "direct", "guided", "hybrid"] = ""  # no adaptation by default
+    options: Mapping[str, Any] = field(default_factory=dict)  # settings of the adaptation
+    decoders: tuple[Decoder, ...] = ("select",)  # how programs are written when they are measured
+    refine: bool = False  # refine the numbers of each program by chamfer at test time
 
 
 PUBLISHED: dict[str, Any] = {"prior": "narrow", "decoder": "argmax", "decoded_ids": 0.0, "kl": 1.0}
@@ -106,25 +87,10 @@ def run_table(
 ) -> Iterator[str]:  # fmt: skip
     """Train and measure rows, then yield the table as lines of Markdown.
 
-    Parameters
-    ----------
-    packs
-        Folder of ``{bench,cabinet}_{train,val,test}.npz``; synthetic targets if ``None``, for the quick version.
-    results
-        Folder of all that is made.
-    quick
-        Three rows, one category, few shapes: five minutes on two cores.
-    only
-        Rows to make.
-    seeds
-        Seeds of rows with adaptation.
-    measure
-        Train nothing.
-
-    Raises
-    ------
-    InputError
-        If there is no such row, or no packs.
+    ``packs`` is a folder of ``{bench,cabinet}_{train,val,test}.npz``, ``None`` for synthetic targets in the ``quick``
+    version of three rows, one category and few shapes; ``results`` gets all that is made; ``only`` names the rows to
+    make; ``seeds`` counts those of rows with adaptation; with ``measure`` nothing is trained.  Raises an ``InputError``
+    if there is no such row, or no packs.
     """
     for name in only or ():
         if name not in ROWS:
@@ -132,9 +98,8 @@ def run_table(
     categories: tuple[str, ...] = CATEGORIES
     if packs is None:
         if not quick:
-            raise InputError(
-                "the table needs packs of ShapeNet shapes", "make them with 'shapeprog prepare', or --quick"
-            )
+            cure = "make them with 'shapeprog prepare', or give --quick"
+            raise InputError("the table needs packs of ShapeNet shapes", cure)
         packs, categories = _synthetic_packs(make_folder(results / "packs")), ("synthetic",)
     for category in categories:
         for name in only or (QUICK_ROWS if quick else ROWS):
@@ -155,13 +120,13 @@ def _adapted(name: str, category: str, packs: Path, results: Path, seed: int, qu
     folder = results / "runs" / f"{name}-{category}-{seed}"
     settings = AdaptSettings(
         train=(str(packs / f"{category}_train.npz"),), val=(str(packs / f"{category}_val.npz"),), initial=initial,
-        seed=seed, validate_every=400, **{**METHODS[row.method], **row.options, **(QUICK if quick else {})},
+        seed=seed, validate_every=400, method=row.method, **{**row.options, **(QUICK if quick else {})},
     )  # fmt: skip
     log = read_log(folder) if (folder / STATE).exists() else []
     if not log or log[-1]["samples_seen"] < settings.num_shapes:
         if measure:
             return None
-        for _ in train(AdaptTask(settings, f"shapeprog paper table --only {name}"), settings, folder):
+        for _ in train(AdaptTask(settings), settings, folder, command=f"shapeprog paper table --only {name}"):
             pass
     return str(folder / BEST)
 
@@ -175,23 +140,19 @@ def _measured(
     count = QUICK_SHAPES if quick else REFINED_SHAPES if row.refine else None
     for decoder in [decoder for decoder in row.decoders if (name, category, seed, decoder) not in known]:
         shapes, made = list(read_pack(packs / f"{category}_test.npz"))[:count], []
-        for program, whole, shape in zip(*_programs(weights, shapes, decoder), shapes, strict=True):
+        if weights:
+            decoded = decode_all(load_generator(weights), grids(shapes), decoder=decoder)
+            programs, whole = decoded.programs(), decoded.programs(whole=True)
+        else:
+            programs = whole = [greedy_boxes(shape.voxels) for shape in shapes]
+        for program, on_canvas, shape in zip(programs, whole, shapes, strict=True):
             if row.refine:
                 program = refine(program, torch.from_numpy(np.array(shape.points)), reach=REACH, seed=seed)
             key = {"row": name, "category": category, "seed": seed, "decoder": decoder}
-            made.append(key | asdict(measure(program, whole, shape, seed=seed)))
+            made.append(key | asdict(measure(program, on_canvas, shape, seed=seed)))
         for line in made:
             append_line(path, json.dumps({key: value for key, value in line.items() if value == value}))
         yield f"{name}, {category}, seed {seed}, {decoder}: CD {np.mean([record['cd'] for record in made]):.5f}"
-
-
-def _programs(weights: str, shapes: Sequence[Shape], decoder: Decoder) -> tuple[list[Program], list[Program]]:
-    """Programs of a generator, or greedy boxes where there are no weights; and with whole numbers."""
-    if not weights:
-        boxes = [greedy_boxes(shape.voxels) for shape in shapes]
-        return boxes, boxes
-    decoded = decode_all(load_generator(weights), grids(shapes), decoder=decoder)
-    return decoded.programs(), decoded.programs(whole=True)
 
 
 def rows_of(results: Path) -> list[dict[str, Any]]:

@@ -23,44 +23,26 @@ from shapeprog.language.statement import SLOTS
 from shapeprog.language.tensors import Code
 from shapeprog.liang2022.generator import IDS, Generator, Grid, Ids, Slots, StepOutput, TeacherForcingBatch
 
-WINDOW = 2
-"""Values on either side of the mode over which the mean is taken."""
-
-LEAST_SMOOTHING = 0.1
-"""Cells; a whole label is as good as not smoothed."""
-
-LARGEST_OFFSET = 0.95
-"""Cells; below one, so that surface and canvas agree within a cell."""
-
-LARGEST_SIZE = 1024
-"""Bound of all sizes, so that a damaged file cannot ask for more memory than there is."""
+WINDOW = 2  # values on either side of the mode over which the mean is taken
+LEAST_SMOOTHING = 0.1  # cells; a whole label is as good as not smoothed
+LARGEST_OFFSET = 0.95  # cells; below one, so that surface and canvas agree within a cell
+LARGEST_SIZE = 1024  # bound of all sizes, so that a damaged file cannot ask for more memory than there is
 
 
 @dataclass(frozen=True)
 class FastSettings:
-    """Sizes of the network.
+    """Sizes of the network, and the smoothing of its labels.
 
-    Parameters
-    ----------
-    widths
-        Channels at 16^3, 8^3 and 4^3 cells.
-    squeeze
-        Channels of the last 4^3 cells, which are read one by one.
-    feature
-        Width of the block feature, of the step LSTM and of its heads.
-    low, high
-        Smallest and largest whole value of a number.
-    smoothing
-        Standard deviation of a label in cells.  The mean of a distribution that is too sharp has next to no gradient,
-        so adaptation moves its offsets; one that is smoothed moves the numbers too.
+    The mean of a distribution that is too sharp has next to no gradient, so adaptation moves its offsets; one that is
+    smoothed moves the numbers too.
     """
 
-    widths: tuple[int, int, int] = (16, 32, 64)
-    squeeze: int = 48
-    feature: int = 256
-    low: int = -24
+    widths: tuple[int, int, int] = (16, 32, 64)  # channels at 16^3, 8^3 and 4^3 cells
+    squeeze: int = 48  # channels of the last 4^3 cells, which are read one by one
+    feature: int = 256  # width of the block feature, of the step LSTM and of its heads
+    low: int = -24  # smallest and largest whole value of a number
     high: int = 40
-    smoothing: float = 0.75
+    smoothing: float = 0.75  # standard deviation of a label in cells
 
     def __post_init__(self) -> None:
         sizes = (*self.widths, self.squeeze, self.feature, self.high - self.low)

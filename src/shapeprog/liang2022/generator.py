@@ -22,11 +22,8 @@ from shapeprog.language.program import PUBLISHED_DEPTH
 from shapeprog.language.statement import EMPTY, END, SLOTS, language
 from shapeprog.language.tensors import Code
 
-STEPS = PUBLISHED_DEPTH
-"""Steps J of a block: up to two loops and one drawing statement."""
-
-IDS = END + 1
-"""Number of statement ids V."""
+STEPS = PUBLISHED_DEPTH  # steps J of a block: up to two loops and one drawing statement
+IDS = END + 1  # number of statement ids V
 
 Ids = Int[Tensor, "*batch"]
 Slots = Float[Tensor, "*batch 7"]
@@ -34,23 +31,13 @@ Grid = Float[Tensor, "B 32 32 32"]
 
 
 class Vocabulary(NamedTuple):
-    """Tables of the 22 statements of the paper.
+    """Tables of the 22 statements of the paper."""
 
-    Parameters
-    ----------
-    used, discrete
-        Slots that each id uses, and those that take whole numbers only (counts, quarter turns).
-    low, high
-        Declared range of each slot; zero where it is not used.
-    legal
-        Ids that are legal at a step after a previous id; the last row is for the first step, which has none.
-    """
-
-    used: Bool[Tensor, "V 7"]
-    discrete: Bool[Tensor, "V 7"]
-    low: Float[Tensor, "V 7"]
+    used: Bool[Tensor, "V 7"]  # slots that each id uses
+    discrete: Bool[Tensor, "V 7"]  # those that take whole numbers only: counts, quarter turns
+    low: Float[Tensor, "V 7"]  # declared range of each slot; zero where it is not used
     high: Float[Tensor, "V 7"]
-    legal: Bool[Tensor, "J V+1 V"]
+    legal: Bool[Tensor, "J V+1 V"]  # ids that are legal at a step after a previous id; last row: at the first step
 
 
 @lru_cache(1)
@@ -81,27 +68,13 @@ def vocabulary() -> Vocabulary:
 
 @dataclass(frozen=True)
 class TeacherForcingBatch:
-    """Targets, canvases and the block to write on each canvas.
+    """Targets, canvases and the block to write on each canvas."""
 
-    Parameters
-    ----------
-    target
-        Cells, 1 or 0.
-    canvases
-        Packed cells drawn before each block.
-    previous
-        The block written before each canvas; empty before the first.
-    code
-        The block to write; an empty one ends the program.
-    live
-        The canvases to learn from.
-    """
-
-    target: UInt8[Tensor, "B 32 32 32"]
-    canvases: Int[Tensor, "B K 32 32"]
-    previous: Code
-    code: Code
-    live: Bool[Tensor, "B K"]
+    target: UInt8[Tensor, "B 32 32 32"]  # cells, 1 or 0
+    canvases: Int[Tensor, "B K 32 32"]  # packed cells drawn before each block
+    previous: Code  # the block written before each canvas; empty before the first
+    code: Code  # the block to write; an empty one ends the program
+    live: Bool[Tensor, "B K"]  # the canvases to learn from
 
     def subset(self, canvases_per_shape: int, rng: torch.Generator) -> TeacherForcingBatch:
         """The same with at most so many live canvases of each shape, drawn at random."""
@@ -112,9 +85,8 @@ class TeacherForcingBatch:
     def to(self, device: torch.device) -> TeacherForcingBatch:
         """The same on a device."""
         previous, code = (Code(code.ids.to(device), code.parameters.to(device)) for code in (self.previous, self.code))
-        return TeacherForcingBatch(
-            self.target.to(device), self.canvases.to(device), previous, code, self.live.to(device)
-        )
+        target, canvases, live = (part.to(device) for part in (self.target, self.canvases, self.live))
+        return TeacherForcingBatch(target, canvases, previous, code, live)
 
 
 class StepOutput(NamedTuple):
@@ -170,19 +142,9 @@ class Prediction:
         nll = self.generator.number_loss(self.hidden, self.ids, self.given)
         return self.scatter(-(nll * self.generator.used[self.ids]).sum((-1, -2)))
 
-    def losses(self) -> dict[str, Float[Tensor, ""]]:
-        """Supervised losses of ids and numbers; see :meth:`Generator.losses`."""
-        return self.generator.losses(self)
-
 
 class Generator(nn.Module, ABC):
-    """A network that writes programs block by block.
-
-    Parameters
-    ----------
-    settings
-        An instance of the design's ``Settings``, a frozen dataclass of JSON values.
-    """
+    """A network that writes programs block by block; its settings are a frozen dataclass of JSON values."""
 
     design: ClassVar[str]
     Settings: ClassVar[Any]
@@ -266,3 +228,9 @@ def live_blocks(ids: Int[Tensor, "B K J"]) -> Bool[Tensor, "B K"]:
 def preceding_blocks(code: Code) -> Code:
     """The block before each block (B, K, J); an empty one before the first."""
     return Code(pad(code.ids[:, :-1], (0, 0, 1, 0)), pad(code.parameters[:, :-1], (0, 0, 0, 0, 1, 0)))
+
+
+def take(code: Code, block: Int[Tensor, "B L"], keep: Bool[Tensor, "B L"]) -> Code:
+    """Blocks of programs in another order, emptied where not kept."""
+    row = torch.arange(len(block), device=block.device)[:, None]
+    return Code(code.ids[row, block] * keep[..., None], code.parameters[row, block] * keep[..., None, None])

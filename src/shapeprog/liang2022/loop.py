@@ -15,6 +15,7 @@ import os
 import sys
 import threading
 import time
+import zipfile
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -22,22 +23,18 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
-import numpy as np
 import torch
 import torch.distributed as dist
 from torch import Tensor, nn
 
 from shapeprog.errors import InputError, ShapeProgError
 from shapeprog.files import append_line, lock, make_folder, write_bytes, write_text
-from shapeprog.liang2022.settings import TrainingSettings
+from shapeprog.liang2022.prior import scramble
+from shapeprog.liang2022.settings import BEST, LOG, STATE, WEIGHTS, TrainingSettings
+from shapeprog.liang2022.weights import save_weights
 
-STATE, WEIGHTS, BEST, LOG = "state.pt", "weights.safetensors", "best.safetensors", "log.jsonl"
-
-SAVE_SECONDS = 120.0
-"""Time between saved states."""
-
-Record = dict[str, float]
-"""Values of one step by name, ``step`` and ``samples_seen`` among them."""
+SAVE_SECONDS = 120.0  # time between saved states
+Record = dict[str, float]  # values of one step by name, step and samples_seen among them
 
 Made = TypeVar("Made")
 
@@ -49,6 +46,14 @@ class Task(Protocol):
     def module(self) -> nn.Module:
         """All that learns."""
 
+    @property
+    def network(self) -> nn.Module:
+        """The part that is saved."""
+
+    @property
+    def data(self) -> str:
+        """What it learns from, for the card of the weights."""
+
     def batch(self, index: int) -> Any:
         """The batch of an index, always the same; called from another thread."""
 
@@ -58,45 +63,20 @@ class Task(Protocol):
     def validate(self) -> Record:
         """Scores by name, ``score`` among them, the larger the better."""
 
-    def save(self, path: Path, samples_seen: int, scores: Record) -> None:
-        """Write the weights."""
-
 
 def train(
-    task: Task,
-    settings: TrainingSettings,
-    folder: Path,
-    *,
-    device: str = "auto",
-    restart: bool = False,
-    stop: threading.Event | None = None,
-) -> Iterator[Record]:
-    """Train, yielding one record per step; a run in the folder is resumed.
+    task: Task, settings: TrainingSettings, folder: Path, *, device: str = "auto", restart: bool = False,
+    stop: threading.Event | None = None, command: str = "",
+) -> Iterator[Record]:  # fmt: skip
+    """Train, yielding one record per step.
 
     The folder gets ``state.pt`` (weights, optimiser, step, settings), ``log.jsonl``, and after each validation
-    ``weights.safetensors``, and ``best.safetensors`` where the score is the best so far.
+    ``weights.safetensors``, and ``best.safetensors`` where the score is the best so far.  A run in it is resumed, or
+    with ``restart`` overwritten.  The device is ``auto``, ``cpu`` or ``cuda``.  Once ``stop`` is set, the state is
+    saved after the current step and training ends.  The card of the weights holds ``command``.
 
-    Parameters
-    ----------
-    task
-        Network, data and losses.
-    settings
-        Saved with the state.
-    folder
-        Of the run; made if missing.
-    device
-        ``auto``, ``cpu`` or ``cuda``.
-    restart
-        Start over even if the folder holds a run.
-    stop
-        Once set, the state is saved after the current step and training ends.
-
-    Raises
-    ------
-    ShapeProgError
-        If the saved run has other settings, another process trains there, or the loss is not finite.
-    OutputError
-        If a file cannot be written; the last state stays.
+    Raises a ``ShapeProgError`` if the saved run has other settings, another process trains there, or the loss is not
+    finite; an ``OutputError`` if a file cannot be written; the last state stays.
     """
     rank, world, where = _processes(device)
     module = task.module.to(where).to(memory_format=torch.channels_last_3d).train()  # type: ignore[call-overload]
@@ -111,22 +91,25 @@ def train(
         if (folder / STATE).exists() and not restart:
             step, best = _resume(folder / STATE, settings, module, optimiser)
         if rank == 0:
-            _trim_log(folder / LOG, step)
-
+            records = [record for record in read_log(folder) if record["step"] <= step] if step else []
+            write_text(folder / LOG, "".join(f"{json.dumps(record)}\n" for record in records))
         saved_at = clock = time.monotonic()
         for batch in _prefetch(task.batch, range(step * world + rank, steps * world, world)):
             for group in optimiser.param_groups:
                 group["lr"] = settings.learning_rate_at(step * together)
-            rng = _rng(settings.seed, step, rank, where)
-            with torch.autocast(where.type, torch.bfloat16, enabled=settings.precision == "bf16"):
-                losses = task.losses(batch, step / steps, rng)
-            loss = torch.stack([value.float() for name, value in losses.items() if name[0] != "_"]).sum()
+            seed = scramble(settings.seed, step, rank)
+            torch.manual_seed(seed)
+            rng = torch.Generator(where).manual_seed(seed)
+            losses = task.losses(batch, step / steps, rng)
+            loss = torch.stack([value for name, value in losses.items() if name[0] != "_"]).sum()
             optimiser.zero_grad()
             loss.backward()
             stopping = torch.tensor(float(stop is not None and stop.is_set()), device=where)
-            values = torch.stack([value.detach().float() for value in (loss, stopping, *losses.values())])
+            values = torch.stack([value.detach() for value in (loss, stopping, *losses.values())])
             if world > 1:
-                _average([*map(_gradient, weights), *buffers, values])
+                for weight in weights:
+                    weight.grad = torch.zeros_like(weight) if weight.grad is None else weight.grad
+                _average([*(weight.grad for weight in weights if weight.grad is not None), *buffers, values])
             norm = float(torch.nn.utils.clip_grad_norm_(weights, settings.clip_norm or math.inf))
             total, stopped, *parts = values.tolist()
             if not math.isfinite(total + norm):
@@ -142,15 +125,24 @@ def train(
             if rank == 0:
                 every, last = settings.validate_every, step == steps
                 if last or (every and step * together // every > (step - 1) * together // every):
-                    scores = _validate(task)
+                    module.eval()
+                    with torch.no_grad():
+                        scores = {name: value for name, value in task.validate().items() if math.isfinite(value)}
+                    module.train()
                     record |= {f"val_{name}": value for name, value in scores.items()}
-                    task.save(folder / WEIGHTS, step * together, scores)
-                    if scores.get("score", -math.inf) > best:
-                        best = scores["score"]
-                        task.save(folder / BEST, step * together, scores)
+                    improved = scores.get("score", -math.inf) > best
+                    for name in (WEIGHTS, BEST) if improved else (WEIGHTS,):
+                        save_weights(
+                            folder / name, task.network, data=task.data, seed=settings.seed, command=command,
+                            samples_seen=step * together, scores=scores,
+                        )  # fmt: skip
+                    best = max(best, scores.get("score", -math.inf))
                 append_line(folder / LOG, json.dumps({k: v for k, v in record.items() if math.isfinite(v)}))
                 if last or stopped or time.monotonic() - saved_at >= SAVE_SECONDS:
-                    _save(folder / STATE, settings, module, optimiser, step, best)
+                    state: dict[str, Any] = {"settings": asdict(settings), "step": step, "best": best}
+                    state |= {"module": module.state_dict(), "optimiser": optimiser.state_dict()}
+                    torch.save(state, content := io.BytesIO())
+                    write_bytes(folder / STATE, content.getvalue())
                     saved_at = time.monotonic()
             yield record
             if stopped:
@@ -166,12 +158,6 @@ def read_log(folder: Path) -> list[Record]:
         return [json.loads(line) for line in lines if line.endswith("\n")]
     except ValueError as error:
         raise InputError(f"the log {path} is damaged", "move it away, or start over with --restart") from error
-
-
-def scramble(*numbers: int) -> int:
-    """One seed of 63 bits from several numbers, unrelated for nearby ones."""
-    words = np.random.SeedSequence([number % 2**63 for number in numbers]).generate_state(1, np.uint64)
-    return int(words[0] >> np.uint64(1))
 
 
 def tune_allocator() -> None:
@@ -198,32 +184,12 @@ def _processes(device: str) -> tuple[int, int, torch.device]:
     return dist.get_rank(), dist.get_world_size(), torch.device(f"cuda:{local}" if gpu else "cpu")
 
 
-def _gradient(weight: Tensor) -> Tensor:
-    if weight.grad is None:
-        weight.grad = torch.zeros_like(weight)
-    return weight.grad
-
-
 def _average(tensors: Sequence[Tensor]) -> None:
     """Replace tensors by their mean over the processes."""
     flat = torch.cat([tensor.flatten().float() for tensor in tensors])
     dist.all_reduce(flat)
     for tensor, mean in zip(tensors, flat.split([tensor.numel() for tensor in tensors]), strict=True):
         tensor.copy_(mean.view(tensor.shape) / dist.get_world_size())
-
-
-def _rng(seed: int, step: int, rank: int, device: torch.device) -> torch.Generator:
-    number = scramble(seed, step, rank)
-    torch.manual_seed(number)
-    return torch.Generator(device).manual_seed(number)
-
-
-def _validate(task: Task) -> Record:
-    module = task.module.eval()
-    with torch.no_grad():
-        scores = task.validate()
-    module.train()
-    return {name: value for name, value in scores.items() if math.isfinite(value)}
 
 
 def _prefetch(make: Callable[[int], Made], indices: Iterable[int]) -> Iterator[Made]:
@@ -249,19 +215,13 @@ def _locked(folder: Path, writes: bool) -> Iterator[None]:
         yield
 
 
-def _save(
-    path: Path, settings: TrainingSettings, module: nn.Module, optimiser: torch.optim.Optimizer, step: int, best: float
-) -> None:
-    content, progress = io.BytesIO(), {"settings": asdict(settings), "step": step, "best": best}
-    torch.save({"module": module.state_dict(), "optimiser": optimiser.state_dict(), **progress}, content)
-    write_bytes(path, content.getvalue())
-
-
 def _resume(
     path: Path, settings: TrainingSettings, module: nn.Module, optimiser: torch.optim.Optimizer
 ) -> tuple[int, float]:
     """Load the state of a run, by torch's reader that runs no code; its step and best score."""
     try:
+        if zipfile.ZipFile(path).testzip():  # torch does not compare the checksums
+            raise ValueError
         state = torch.load(path, map_location="cpu", weights_only=True)
         saved, step, best = state["settings"], int(state["step"]), float(state["best"])
     except Exception as error:  # no list of what torch raises for a damaged file
@@ -273,9 +233,3 @@ def _resume(
     except Exception as error:  # no list of what torch raises for a state that does not fit
         raise InputError(f"{path} does not fit the network, or is damaged", "start over with --restart") from error
     return step, best
-
-
-def _trim_log(path: Path, step: int) -> None:
-    """Drop the records after the step that training resumes from."""
-    records = [record for record in read_log(path.parent) if record["step"] <= step] if step else []
-    write_text(path, "".join(f"{json.dumps(record)}\n" for record in records))

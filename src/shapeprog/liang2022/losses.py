@@ -1,14 +1,7 @@
-"""Losses of adaptation (section 4.3), each declared by a decorator.
+"""Losses of adaptation (section 4.3), each a function of a :class:`Comparison` declared by :func:`loss`.
 
-    import torch
-    from shapeprog.liang2022 import loss
-
-    @loss("huber")
-    def huber(comparison):
-        distance = comparison.scene.distance(comparison.points)
-        return torch.nn.functional.huber_loss(distance, torch.zeros_like(distance), reduction="none").mean(-1)
-
-A loss is one value for each shape of the batch; lengths are in cells, and ``scene.distance`` is 0 inside.
+A loss is one value for each shape of the batch; lengths are in cells, and ``scene.distance`` is 0 inside.  README.md
+has an example.
 """
 
 from __future__ import annotations
@@ -33,36 +26,19 @@ from shapeprog.language.unroll import unroll
 from shapeprog.liang2022.settings import NEURAL
 from shapeprog.space import HALF, RESOLUTION
 
-SHARPNESS = 4.0
-"""Slope of the logit of a soft cell, per cell of distance."""
+SHARPNESS = 4.0  # slope of the logit of a soft cell, per cell of distance
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """Predicted scenes and their targets.
+    """Predicted scenes and their targets."""
 
-    Parameters
-    ----------
-    scene
-        Predictions (B, N), each with a surface.
-    points
-        Points on the surfaces of the targets, in cells.
-    cells
-        Cells of the targets, 1 or 0.
-    num_samples
-        S, points drawn on each predicted surface.
-    generator
-        Source of randomness.
-    canvas
-        The programs without their sub-cell offsets, as drawn on the canvas; for losses of cells.
-    """
-
-    scene: Scene
-    points: Float[Tensor, "B P 3"]
-    cells: UInt8[Tensor, "B 32 32 32"]
-    num_samples: int
-    generator: torch.Generator
-    canvas: Code | None = None
+    scene: Scene  # predictions (B, N), each with a surface
+    points: Float[Tensor, "B P 3"]  # on the surfaces of the targets, in cells
+    cells: UInt8[Tensor, "B 32 32 32"]  # of the targets, 1 or 0
+    num_samples: int  # points drawn on each predicted surface
+    generator: torch.Generator  # source of randomness
+    canvas: Code | None = None  # programs without sub-cell offsets, as drawn on the canvas; for losses of cells
 
     @cached_property
     def surface(self) -> SurfaceSample:
@@ -73,17 +49,13 @@ class Comparison:
 Values = Float[Tensor, " B"]
 Loss = Callable[[Comparison], Values]
 
-LOSSES: dict[str, Loss] = {}
-"""Declared losses by name."""
+LOSSES: dict[str, Loss] = {}  # declared losses by name
 
 
 def loss(name: str) -> Callable[[Loss], Loss]:
     """Declare the decorated function as a loss, called by its name in settings such as ``chamfer=1``.
 
-    Raises
-    ------
-    DeclarationError
-        If the name is taken, or cannot be written in settings.
+    Raises a ``DeclarationError`` if the name is taken, or cannot be written in settings.
     """
     if name in LOSSES or name == NEURAL:
         raise DeclarationError(f"the loss {name!r} is declared twice", "give one of them another name")
@@ -132,10 +104,7 @@ def soft_iou(comparison: Comparison) -> Values:
 def parse_losses(text: str) -> dict[str, float]:
     """Weights by name from text such as ``chamfer=1,soft_iou=3``; a name alone weighs 1.
 
-    Raises
-    ------
-    ShapeProgError
-        If a name is unknown or given twice, or a weight is not a positive number.
+    Raises a ``ShapeProgError`` if a name is unknown or given twice, or a weight is not a positive number.
     """
     weights: dict[str, float] = {}
     known = [*LOSSES, NEURAL]
@@ -158,10 +127,7 @@ def parse_losses(text: str) -> dict[str, float]:
 def compute(comparison: Comparison, weights: Mapping[str, float]) -> dict[str, Values]:
     """Weighted losses by name, all but that of the neural executor.
 
-    Raises
-    ------
-    ShapeProgError
-        If a loss fails, does not return one value for each shape, or has no gradient.
+    Raises a ``ShapeProgError`` if a loss fails, does not return one value for each shape, or has no gradient.
     """
     values = {}
     for name in [name for name in weights if name != NEURAL]:

@@ -1,33 +1,45 @@
-"""Pretraining: a generator learns from synthetic shapes, whose programs are known, by teacher forcing."""
+"""Pretraining: a generator learns from synthetic shapes, whose programs are known, by teacher forcing.
+
+Blocks that draw the same shape may come in any order.  In order of *coverage* each block is the one that newly covers
+most cells, so that there is a right block on every canvas, those that the generator drew itself included: scheduled
+sampling (Bengio et al. 2015) with the labels of dataset aggregation (Ross et al. 2011).
+"""
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Literal
 
 import torch
+from jaxtyping import Bool, Int, UInt8
 from torch import Tensor
+from torch.nn.functional import pad
 
 from shapeprog.errors import ShapeProgError
-from shapeprog.liang2022.decode import decode_all
-from shapeprog.liang2022.evaluate import scores_on_packs
-from shapeprog.liang2022.generator import Generator, TeacherForcingBatch
-from shapeprog.liang2022.loop import Record
+from shapeprog.geometry.cells import count, preceding
+from shapeprog.language.tensors import Code
+from shapeprog.language.unroll import draw_blocks
+from shapeprog.liang2022.decode import decode, decode_all
+from shapeprog.liang2022.generator import Generator, TeacherForcingBatch, live_blocks, preceding_blocks, take
 from shapeprog.liang2022.prior import SyntheticStream, prior
 from shapeprog.liang2022.settings import PretrainSettings
-from shapeprog.liang2022.teacher import scheduled_sampling, teacher_forcing
-from shapeprog.liang2022.weights import build_generator, load_generator, save_weights
+from shapeprog.liang2022.weights import build_generator, load_generator
 
-VALIDATION_BATCHES = 4
-"""Batches of synthetic shapes that validation measures."""
+Order = Literal["coverage", "written"]
+
+VALIDATION_BATCHES = 4  # batches of synthetic shapes that validation measures
 
 
 class PretrainTask:
     """Supervised training of a generator; a task of :func:`~shapeprog.liang2022.loop.train`."""
 
-    def __init__(self, settings: PretrainSettings, command: str = "") -> None:
+    def __init__(self, settings: PretrainSettings) -> None:
         torch.manual_seed(settings.seed)
-        self._settings, self._command = settings, command
+        self._settings = settings
+        origin = f", from {Path(settings.initial).stem}" if settings.initial else ""
+        self.data = f"synthetic, prior {settings.prior}{origin}"
         self.module = load_generator(settings.initial) if settings.initial else build_generator(settings.design)
+        self.network = self.module
         if self.module.design != settings.design:
             raise ShapeProgError(
                 f"{settings.initial} holds the design {self.module.design}", f"give --design {self.module.design}"
@@ -45,43 +57,63 @@ class PretrainTask:
     def losses(self, batch: TeacherForcingBatch, progress: float, rng: torch.Generator) -> dict[str, Tensor]:
         """Losses of ids and numbers."""
         settings, batch = self._settings, batch.to(rng.device)
-        if float(torch.rand((), generator=rng, device=rng.device)) < settings.scheduled_sampling * min(
-            1.0, 2 * progress
-        ):
+        probability = settings.scheduled_sampling * min(1.0, 2 * progress)
+        if float(torch.rand((), generator=rng, device=rng.device)) < probability:
             batch = scheduled_sampling(self.module, batch, rng)
         if settings.canvases_per_shape:
             batch = batch.subset(settings.canvases_per_shape, rng)
-        losses = self.module.predict(batch).losses()
+        losses = self.module.losses(self.module.predict(batch))
         return {"ids": losses["ids"], "numbers": settings.number_weight * losses["numbers"]}
 
-    def validate(self) -> Record:
-        """Share of ids that are right and error of numbers in cells, by teacher forcing; IoU by arg-max; packs."""
-        scores = teacher_forcing_scores(self.module, self._validation)
-        scores |= scores_on_packs(self.module, self._settings.val, "argmax")
-        real = [value for name, value in scores.items() if name.endswith("_iou")]
-        return {**scores, "score": sum(real) / len(real) if real else scores["iou"]}
-
-    def save(self, path: Path, samples_seen: int, scores: Record) -> None:
-        """Write the generator with its card."""
-        data = f"synthetic, prior {self._settings.prior}"
-        if self._settings.initial:
-            data += f", from {Path(self._settings.initial).stem}"
-        save_weights(
-            path, self.module, data=data, seed=self._settings.seed, command=self._command, samples_seen=samples_seen,
-            scores=dict(scores),
-        )  # fmt: skip
+    def validate(self) -> dict[str, float]:
+        """Accuracy of ids, mean error of numbers in cells, and IoU of programs decoded by arg-max: the score."""
+        generator, right, steps, error, slots = self.module, 0.0, 0.0, 0.0, 0.0
+        overlaps: list[Tensor] = []
+        device = next(generator.parameters()).device
+        for batch in (held_out.to(device) for held_out in self._validation):
+            prediction = generator.predict(batch)
+            used = generator.used[prediction.ids]
+            right += float((prediction.logits.argmax(-1) == prediction.ids).sum())
+            error += float(((prediction.numbers - prediction.given).abs() * used).sum())
+            steps, slots = steps + prediction.ids.numel(), slots + float(used.sum())
+            overlaps.append(decode_all(generator, batch.target, decoder="argmax").iou())
+        iou = float(torch.cat(overlaps).mean())
+        return {"ids": right / steps, "numbers": error / slots, "iou": iou, "score": iou}
 
 
-def teacher_forcing_scores(generator: Generator, batches: list[TeacherForcingBatch]) -> Record:
-    """Accuracy of ids, mean error of numbers in cells, and IoU of programs decoded by arg-max."""
-    right = steps = error = slots = 0.0
-    overlaps: list[Tensor] = []
-    device = next(generator.parameters()).device
-    for batch in (held_out.to(device) for held_out in batches):
-        prediction = generator.predict(batch)
-        used = generator.used[prediction.ids]
-        right += float((prediction.logits.argmax(-1) == prediction.ids).sum())
-        error += float(((prediction.numbers - prediction.given).abs() * used).sum())
-        steps, slots = steps + prediction.ids.numel(), slots + float(used.sum())
-        overlaps.append(decode_all(generator, batch.target, decoder="argmax").iou())
-    return {"ids": right / steps, "numbers": error / slots, "iou": float(torch.cat(overlaps).mean())}
+def teacher_forcing(target: UInt8[Tensor, "B 32 32 32"], code: Code, order: Order = "coverage") -> TeacherForcingBatch:
+    """Whole-numbered programs (B, K, J) of targets on the canvases that their own blocks leave, followed by their end.
+
+    The order of ``coverage`` drops blocks that add nothing; blocks as ``written`` all stay.
+    """
+    code = Code(pad(code.ids, (0, 0, 0, 1)), pad(code.parameters, (0, 0, 0, 0, 0, 1)))
+    drawn = draw_blocks(code)
+    if order == "coverage":
+        canvas, chosen = torch.zeros_like(drawn[:, :1]), []
+        for _ in range(drawn.shape[1]):
+            chosen.append(_best(drawn, canvas))
+            canvas = canvas | drawn.gather(1, chosen[-1][0][..., None, None].expand_as(canvas))
+        block, adds = (torch.cat(part, 1) for part in zip(*chosen, strict=True))
+        code, drawn = take(code, block, adds), drawn.gather(1, block[..., None, None].expand_as(drawn))
+    return TeacherForcingBatch(target, preceding(drawn), preceding_blocks(code), code, live_blocks(code.ids))
+
+
+def scheduled_sampling(generator: Generator, batch: TeacherForcingBatch, rng: torch.Generator) -> TeacherForcingBatch:
+    """The same targets on canvases that the generator draws by sampling, with the right block on each."""
+    training = generator.training
+    decoded = decode(generator.eval(), batch.target, blocks=batch.code.ids.shape[1], decoder="sample", rng=rng)
+    generator.train(training)
+    code = take(batch.code, *_best(draw_blocks(batch.code), decoded.canvases))
+    live = live_blocks(decoded.code.ids)
+    return TeacherForcingBatch(batch.target, decoded.canvases, preceding_blocks(decoded.code), code, live)
+
+
+def _best(
+    drawn: Int[Tensor, "B K 32 32"], canvases: Int[Tensor, "B L 32 32"]
+) -> tuple[Int[Tensor, "B L"], Bool[Tensor, "B L"]]:
+    """The block that newly covers most cells of each canvas, the lowest of equals, and whether it covers any."""
+    new = count(drawn[:, None] & ~canvases[:, :, None])
+    words = drawn.flatten(2) != 0
+    score = new * words.shape[-1] - words.int().argmax(-1)[:, None]
+    block = score.argmax(-1)
+    return block, new.gather(-1, block[..., None])[..., 0] > 0

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import NamedTuple
 
+import numpy as np
 import torch
 from jaxtyping import Bool, Int, UInt8
 from torch import Tensor
@@ -17,22 +18,18 @@ from shapeprog.language.tensors import Code, decode, encode
 from shapeprog.language.unroll import draw_blocks
 from shapeprog.liang2022 import narrow, wide
 from shapeprog.liang2022.draft import Draft, Rng, Template
+from shapeprog.liang2022.generator import take
 
-BLOCKS = 10
-"""Largest number of blocks K of a program."""
+BLOCKS = 10  # largest number of blocks K of a program
 
 
 @dataclass(frozen=True)
 class Prior:
-    """A distribution over programs: a mixture of templates with their weights.
-
-    A share ``off_centre`` is moved by up to a cell along each axis; a share ``details`` gets small parts beyond its
-    template.
-    """
+    """A distribution over programs: a mixture of templates with their weights."""
 
     templates: dict[Template, float]
-    off_centre: float = 0.0
-    details: float = 0.0
+    off_centre: float = 0.0  # share that is moved by up to a cell along each axis
+    details: float = 0.0  # share that gets small parts beyond its template
 
     def sample(self, count: int, seed: int) -> tuple[Code, Cells]:
         """Programs (count, K, 3) and their packed cells (count, 32, 32), the same for the same seed.
@@ -43,9 +40,8 @@ class Prior:
         code = encode([self._program(rng) for _ in range(count)], blocks=BLOCKS)
         cells = draw_blocks(code)
         keep = own_cells(cells)
-        row, order = torch.arange(count)[:, None], torch.argsort(~keep, stable=True)
-        ids, parameters = code.ids * keep[..., None], code.parameters * keep[..., None, None]
-        return Code(ids[row, order], parameters[row, order]), union(cells * keep[..., None, None])
+        order = torch.argsort(~keep, stable=True)
+        return take(code, order, keep.gather(1, order)), union(cells * keep[..., None, None])
 
     def _program(self, rng: Rng) -> Program:
         moved = rng.chance(self.off_centre)
@@ -89,6 +85,12 @@ class SyntheticStream:
         """The batch of an index, 0 or more."""
         code, cells = self.prior.sample(self.batch_size, (self.seed * GOLDEN + index * FIRST + 1) % 2**63)
         return SyntheticBatch(code, unpack(cells))
+
+
+def scramble(*numbers: int) -> int:
+    """One seed of 63 bits from several numbers, unrelated for nearby ones."""
+    words = np.random.SeedSequence([number % 2**63 for number in numbers]).generate_state(1, np.uint64)
+    return int(words[0] >> np.uint64(1))
 
 
 def own_cells(blocks: Int[Tensor, "B K 32 32"]) -> Bool[Tensor, "B K"]:

@@ -14,12 +14,13 @@ import torch
 from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
+from shapeprog.errors import ShapeProgError
+
 RECTANGLE, SQUARE, ROUND = (2, 5), (3, 7, 9), (4, 6, 8)
 CROSS, SIDEBOARD, BACK, LINE, TRANSLATE, ROTATE, END = 10, 11, 15, 17, 19, 20, 21
 """Ids of statements; those not named here are cuboids by corner and extents."""
 
-SKIN = 1e-4
-"""Share of its size by which a point is moved off its primitive to see whether another one hides it."""
+SKIN = 1e-4  # share of its size by which a point is moved off its primitive to see whether another one hides it
 
 Points = Float[Tensor, "P 3"]
 Distances = Float[Tensor, " P"]
@@ -197,6 +198,8 @@ def sample(primitives: Sequence[Primitive], n: int, rng: torch.Generator | None 
     Of the n points those that another primitive hides are dropped, which the paper leaves out.  With them come weights
     of value 1 whose gradient is that of the logarithm of the area of the face: the number of points on it carries none.
     """
+    if not primitives:
+        raise ShapeProgError("a program that draws nothing has no surface to sample", "sample programs that draw parts")
     areas = [face_areas(primitive) for primitive in primitives]
     faces = torch.multinomial(torch.cat(areas).detach(), n, replacement=True, generator=rng)
     counts = faces.bincount(minlength=sum(map(len, areas))).split([len(area) for area in areas])

@@ -12,12 +12,17 @@ from typing import Any, ClassVar, Literal, get_args, get_origin, get_type_hints
 
 from shapeprog.errors import ShapeProgError
 
-NEURAL = "neural"
-"""Reserved name of the loss through the neural executor, which compares predictions and not scenes."""
+NEURAL = "neural"  # reserved name of the loss through the neural executor, which compares predictions and not scenes
+
+METHODS = {"direct": "chamfer", "guided": f"{NEURAL}=30", "hybrid": f"chamfer=1,{NEURAL}=10"}
+"""Losses of each method of adaptation: through the renderer, the neural executor, or both."""
+
+STATE, WEIGHTS, BEST, LOG = "state.pt", "weights.safetensors", "best.safetensors", "log.jsonl"  # files of a run
+Decoder = Literal["argmax", "novel", "select"]  # how programs are written; see decode.py
 
 
 def option(default: Any, meaning: str) -> Any:
-    """A field of settings with its meaning, which is the help of its option on the command line."""
+    """A field of settings with its meaning, the help of its option, which a class keeps that changes the default."""
     return field(default=default, metadata={"help": meaning})
 
 
@@ -32,7 +37,6 @@ class TrainingSettings:
     weight_decay: float = option(0.0, "Decoupled weight decay.")
     beta1: float = option(0.9, "Decay rate of the first moment of Adam; that of the second is 0.999.")
     clip_norm: float = option(0.0, "Bound of the norm of the gradient; 0 for none.")
-    precision: Literal["float32", "bf16"] = option("float32", "float32, or bf16 for convolutions and matrix products.")
     seed: int = option(0, "Seed of the initial weights, the data and every sample.")
     validate_every: int = option(0, "Shapes between validations; 0 for one at the end.")
 
@@ -71,13 +75,13 @@ class TrainingSettings:
 class PretrainSettings(TrainingSettings):
     """Settings of supervised pretraining on synthetic shapes."""
 
-    num_shapes: int = option(45_000, "Shapes to learn from.")
-    batch_size: int = option(24, "Shapes of one step in each process.")
-    learning_rate: float = option(2e-3, "Largest learning rate of Adam; it falls to zero by half a cosine.")
-    warm_up: int = option(2400, "Shapes over which the learning rate rises from zero.")
-    weight_decay: float = option(0.01, "Decoupled weight decay.")
-    clip_norm: float = option(1.0, "Bound of the norm of the gradient; 0 for none.")
-    validate_every: int = option(15_000, "Shapes between validations; 0 for one at the end.")
+    num_shapes: int = 45_000
+    batch_size: int = 24
+    learning_rate: float = 2e-3
+    warm_up: int = 2400
+    weight_decay: float = 0.01
+    clip_norm: float = 1.0
+    validate_every: int = 15_000
     design: Literal["fast", "tian2019"] = option("fast", "Network: fast or tian2019.")
     prior: Literal["narrow", "wide"] = option("narrow", "Synthetic shapes: narrow (the published ones) or wide.")
     initial: str = option("", "Weights to start from; random ones by default.")
@@ -85,19 +89,18 @@ class PretrainSettings(TrainingSettings):
     canvases_per_shape: int = option(3, "Canvases learned from in each shape, drawn at random; 0 for all.")
     scheduled_sampling: float = option(0.3, "Probability of canvases that the generator draws, reached halfway.")
     number_weight: float = option(1.0, "Weight of the loss of numbers against that of ids.")
-    val: tuple[str, ...] = option((), "Packs of real shapes to validate on.")
 
 
 @dataclass(frozen=True, kw_only=True)
 class ExecutorSettings(TrainingSettings):
     """Settings of the neural executor's training; a shape is one block."""
 
-    num_shapes: int = option(200_000, "Shapes to learn from.")
-    batch_size: int = option(16, "Shapes of one step in each process.")
-    learning_rate: float = option(3e-3, "Largest learning rate of Adam; it falls to zero by half a cosine.")
-    warm_up: int = option(3200, "Shapes over which the learning rate rises from zero.")
-    beta1: float = option(0.5, "Decay rate of the first moment of Adam; that of the second is 0.999.")
-    validate_every: int = option(20_000, "Shapes between validations; 0 for one at the end.")
+    num_shapes: int = 200_000
+    batch_size: int = 16
+    learning_rate: float = 3e-3
+    warm_up: int = 3200
+    beta1: float = 0.5
+    validate_every: int = 20_000
     prior: Literal["narrow", "wide"] = option("narrow", "Synthetic shapes whose blocks are drawn.")
     widened: float = option(0.5, "Share of the blocks whose numbers are moved at random.")
 
@@ -106,29 +109,26 @@ class ExecutorSettings(TrainingSettings):
 class AdaptSettings(TrainingSettings):
     """Settings of adaptation to real shapes."""
 
-    num_shapes: int = option(1_600, "Shapes to learn from.")
-    batch_size: int = option(16, "Shapes of one step in each process.")
-    learning_rate: float = option(3e-4, "Largest learning rate of Adam; it falls to zero by half a cosine.")
-    warm_up: int = option(160, "Shapes over which the learning rate rises from zero.")
-    clip_norm: float = option(1.0, "Bound of the norm of the gradient; 0 for none.")
+    num_shapes: int = 1_600
+    batch_size: int = 16
+    learning_rate: float = 3e-4
+    warm_up: int = 160
+    clip_norm: float = 1.0
     train: tuple[str, ...] = option((), "Packs of the shapes to adapt to.")
     val: tuple[str, ...] = option((), "Packs to validate on; the best weights have the least CD there.")
     initial: str = option("fast-wide", "Weights to start from: a file or the name of weights that ship.")
-    loss: str = option("chamfer", "Losses and weights, such as chamfer=1,soft_iou=3.")
+    method: Literal["direct", "guided", "hybrid"] = option("direct", "direct, guided or hybrid.")
+    loss: str = option("", "Losses and weights, such as chamfer=1,soft_iou=3; by default those of the method.")
     executor: str = option("executor", "Weights of the neural executor, for the loss neural.")
     learn: Literal["all", "offsets"] = option(
         "all", "all weights, or offsets alone: a shortcut that is not the paper's."
     )
-    decoder: Literal["argmax", "novel", "select"] = option(
-        "select", "How programs are written in training and validation: argmax, novel or select."
-    )
-    decoded_ids: float = option(1.0, "Weight of the cross-entropy to the ids of the decoded programs (self-training).")
+    decoder: Decoder = option("select", "argmax, novel or select; with an estimator in validation alone.")  # noqa: RUF009
+    decoded_ids: float = option(1.0, "Weight of the cross-entropy to decoded ids (self-training); 0 with an estimator.")
     kl: float = option(0.0, "Weight of the KL divergence of the ids from those of the initial weights.")
     rehearsal: int = option(8, "Synthetic shapes in every step, so that pretraining is not forgotten.")
     prior: Literal["narrow", "wide"] = option("wide", "Where these come from.")
-    estimator: Literal["none", "nvil", "rloo"] = option(
-        "none", "Gradient estimator of the ids: none, nvil, or rloo with four programs sampled for each shape."
-    )
+    estimator: Literal["none", "nvil", "rloo"] = option("none", "Gradient estimator of the ids: none, nvil or rloo.")
     points: int = option(1000, "Points on each surface in one step.")
 
     def __post_init__(self) -> None:
@@ -137,11 +137,3 @@ class AdaptSettings(TrainingSettings):
             raise ShapeProgError("there are no shapes to adapt to", "give a pack: --train bench_train.npz")
         if self.learn == "offsets" and self.estimator != "none":
             raise ShapeProgError("ids cannot learn where offsets alone do", "use --learn all")
-
-
-METHODS: Mapping[str, Mapping[str, Any]] = {
-    "direct": {},
-    "guided": {"loss": f"{NEURAL}=30"},
-    "hybrid": {"loss": f"chamfer=1,{NEURAL}=10"},
-}
-"""Settings of each method; others are the defaults of :class:`AdaptSettings`."""

@@ -20,30 +20,23 @@ from shapeprog.language.statement import EMPTY, SLOTS
 from shapeprog.language.tensors import Code
 from shapeprog.liang2022.generator import IDS, Generator, Grid, Ids, Prediction, Slots, StepOutput, TeacherForcingBatch
 
-WIDTH = 64
-"""Width of the feature, of both LSTMs and of the heads."""
+WIDTH = 64  # width of the feature, of both LSTMs and of the heads
 
 LAYERS = ((2, 16, 5, 1), (16, 32, 3, 2), (32, 32, 3, 1), (32, 64, 3, 2), (64, 64, 3, 1), (64, 128, 3, 2),
           (128, 128, 3, 1), (128, 128, 3, 1))  # fmt: skip
 """Channels in and out, kernel and stride of each convolution; the padding is half the kernel."""
 
-INITIAL_RANGE = 0.1
-"""Heads and embedding are initialised uniformly between minus and plus this, as published."""
-
-MOMENTUM = 0.02
-"""Weight of a batch in the running statistics."""
+INITIAL_RANGE = 0.1  # heads and embedding are initialised uniformly between minus and plus this, as published
+MOMENTUM = 0.02  # weight of a batch in the running statistics
 
 
 @dataclass(frozen=True)
 class Tian2019Settings:
-    """Whether to depart from the published network.
+    """Whether to follow the published network in everything.
 
-    Parameters
-    ----------
-    published
-        As published: normalise by the statistics of the batch in evaluation too, so that a prediction depends on the
-        other shapes in it; allow illegal blocks, which draw nothing; weigh empty steps and unused numbers by .1 in the
-        losses.  Otherwise running statistics, legal blocks, and weights of 1 for empty steps and 0 for unused numbers.
+    It normalises by the statistics of the batch in evaluation too, so that a prediction depends on the other shapes in
+    it; it allows illegal blocks, which draw nothing; its losses weigh empty steps and unused numbers by .1.  Otherwise
+    running statistics, legal blocks, and weights of 1 for empty steps and 0 for unused numbers.
     """
 
     published: bool = False

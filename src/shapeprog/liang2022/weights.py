@@ -26,7 +26,7 @@ from shapeprog.files import write_bytes
 from shapeprog.liang2022.executor import NeuralExecutor
 from shapeprog.liang2022.fast import Fast
 from shapeprog.liang2022.generator import Generator
-from shapeprog.liang2022.loop import STATE, WEIGHTS
+from shapeprog.liang2022.settings import STATE, WEIGHTS
 from shapeprog.liang2022.tian2019 import PUBLISHED, Tian2019
 
 SUFFIX = ".safetensors"

@@ -44,9 +44,9 @@ from shapeprog.liang2022.estimators import NvilBaseline, leave_one_out_advantage
 from shapeprog.liang2022.evaluate import scores_on_packs
 from shapeprog.liang2022.generator import IDS, STEPS, Prediction, TeacherForcingBatch
 from shapeprog.liang2022.losses import Comparison, compute, parse_losses
-from shapeprog.liang2022.pretrain import Order, teacher_forcing
+from shapeprog.liang2022.pretrain import teacher_forcing
 from shapeprog.liang2022.prior import SyntheticStream, prior, scramble
-from shapeprog.liang2022.settings import METHODS, NEURAL, AdaptSettings
+from shapeprog.liang2022.settings import METHODS, NEURAL, AdaptSettings, Order
 from shapeprog.liang2022.weights import load_executor, load_generator
 
 REHEARSAL_CANVASES = 3  # canvases of each synthetic shape that a step rehearses

@@ -8,7 +8,6 @@ sampling (Bengio et al. 2015) with the labels of dataset aggregation (Ross et al
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Literal
 
 import torch
 from jaxtyping import Bool, Int, UInt8
@@ -22,10 +21,8 @@ from shapeprog.language.unroll import draw_blocks
 from shapeprog.liang2022.decode import decode, decode_all
 from shapeprog.liang2022.generator import Generator, TeacherForcingBatch, live_blocks, preceding_blocks, take
 from shapeprog.liang2022.prior import SyntheticStream, prior
-from shapeprog.liang2022.settings import PretrainSettings
+from shapeprog.liang2022.settings import Order, PretrainSettings
 from shapeprog.liang2022.weights import build_generator, load_generator
-
-Order = Literal["coverage", "written"]
 
 VALIDATION_BATCHES = 4  # batches of synthetic shapes that validation measures
 

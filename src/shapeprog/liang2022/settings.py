@@ -19,6 +19,7 @@ METHODS = {"direct": "chamfer", "guided": f"{NEURAL}=30", "hybrid": f"chamfer=1,
 
 STATE, WEIGHTS, BEST, LOG = "state.pt", "weights.safetensors", "best.safetensors", "log.jsonl"  # files of a run
 Decoder = Literal["argmax", "novel", "select"]  # how programs are written; see decode.py
+Order = Literal["coverage", "written"]  # of the blocks in teacher forcing; see pretrain.py
 
 
 def option(default: Any, meaning: str) -> Any:
@@ -85,7 +86,7 @@ class PretrainSettings(TrainingSettings):
     design: Literal["fast", "tian2019"] = option("fast", "Network: fast or tian2019.")
     prior: Literal["narrow", "wide"] = option("narrow", "Synthetic shapes: narrow (the published ones) or wide.")
     initial: str = option("", "Weights to start from; random ones by default.")
-    order: Literal["coverage", "written"] = option("coverage", "Order of the blocks: coverage or written.")
+    order: Order = option("coverage", "Order of the blocks: coverage or written.")  # noqa: RUF009  # it is a field
     canvases_per_shape: int = option(3, "Canvases learned from in each shape, drawn at random; 0 for all.")
     scheduled_sampling: float = option(0.3, "Probability of canvases that the generator draws, reached halfway.")
     number_weight: float = option(1.0, "Weight of the loss of numbers against that of ids.")

@@ -16,7 +16,7 @@ from jaxtyping import Float
 from torch import Tensor, nn
 
 from shapeprog.geometry.cells import unpack
-from shapeprog.language.statement import EMPTY, SLOTS
+from shapeprog.language.statement import SLOTS
 from shapeprog.language.tensors import Code
 from shapeprog.liang2022.generator import IDS, Generator, Grid, Ids, Prediction, Slots, StepOutput, TeacherForcingBatch
 
@@ -35,8 +35,7 @@ class Tian2019Settings:
     """Whether to follow the published network in everything.
 
     It normalises by the statistics of the batch in evaluation too, so that a prediction depends on the other shapes in
-    it; it allows illegal blocks, which draw nothing; its losses weigh empty steps and unused numbers by .1.  Otherwise
-    running statistics, legal blocks, and weights of 1 for empty steps and 0 for unused numbers.
+    it, and it allows illegal blocks, which draw nothing.  Otherwise running statistics and legal blocks.
     """
 
     published: bool = False
@@ -156,13 +155,7 @@ class Tian2019(Generator):
         return 0.5 * (self.numbers(hidden, ids) - values * self.used[ids]) ** 2
 
     def losses(self, prediction: Prediction) -> dict[str, Float[Tensor, ""]]:
-        """The published losses: weighted means over steps and over numbers."""
-        ids, published = prediction.ids, self.settings.published
-        nll = -prediction.logits.gather(-1, ids[..., None])[..., 0]
-        steps = torch.where(ids == EMPTY, 0.1 if published else 1.0, 1.0)
-        off = self.number_loss(prediction.hidden, ids, prediction.given)
-        slots = torch.where(self.used[ids], 1.0, 0.1 if published else 0.0)
-        return {
-            "ids": (nll * steps).sum() / steps.sum().clamp(min=1e-6),
-            "numbers": (off * slots).sum() / slots.sum().clamp(min=1e-6),
-        }
+        """The published losses, as means over steps and over the numbers in use."""
+        used = self.used[prediction.ids]
+        off = self.number_loss(prediction.hidden, prediction.ids, prediction.given) * used
+        return super().losses(prediction) | {"numbers": off.sum() / used.sum().clamp(min=1)}

@@ -14,7 +14,7 @@ Each block is drawn on the canvas, with rounded numbers, before the next is writ
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any, Literal, get_args
 
 import torch
@@ -94,21 +94,6 @@ def decode(
             break
         canvases[active, k + 1] |= draw_blocks(block[going][:, None])[:, 0]
     return Decoded(target, canvases[:, :-1], preceding_blocks(code), code, live_blocks(ids), offsets)
-
-
-def decode_all(
-    generator: Generator, target: UInt8[Tensor, "B 32 32 32"], batch_size: int = 64, **options: Any
-) -> Decoded:
-    """As :func:`decode`, in batches; ``options`` are its keywords."""
-    parts = [decode(generator, part, **options) for part in target.split(batch_size)]
-
-    def joined(name: str) -> Any:
-        values = [getattr(part, name) for part in parts]
-        if isinstance(values[0], Tensor):
-            return torch.cat(values)
-        return Code(torch.cat([code.ids for code in values]), torch.cat([code.parameters for code in values]))
-
-    return Decoded(*(joined(field.name) for field in fields(Decoded)))
 
 
 def _candidates(

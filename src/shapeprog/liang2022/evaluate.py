@@ -16,15 +16,24 @@ from shapeprog.data.packs import read_pack
 from shapeprog.data.shape import Shape
 from shapeprog.evaluation.metrics import Metrics, evaluate_program, summarise, target_samples, world_scale
 from shapeprog.language.program import Program
-from shapeprog.liang2022.decode import decode_all
+from shapeprog.liang2022.decode import decode
 from shapeprog.liang2022.generator import Generator
 from shapeprog.liang2022.settings import Decoder
+
+BATCH_SIZE = 64
 
 
 def evaluate(generator: Generator, shapes: Sequence[Shape], decoder: Decoder) -> list[Metrics]:
     """Measures of the programs that a decoder writes; IoU is of the canvas."""
-    decoded = decode_all(generator, grids(shapes).to(next(generator.parameters()).device), decoder=decoder)
-    return list(map(measure, decoded.programs(), decoded.programs(whole=True), shapes))
+    return list(map(measure, *decode_all(generator, shapes, decoder), shapes))
+
+
+def decode_all(generator: Generator, shapes: Sequence[Shape], decoder: Decoder) -> tuple[list[Program], list[Program]]:
+    """Programs with numbers to a hundredth of a cell, and with whole numbers as drawn on the canvas."""
+    target = grids(shapes).to(next(generator.parameters()).device)
+    parts = [decode(generator, part, decoder=decoder) for part in target.split(BATCH_SIZE)]
+    fine, whole = ([program for part in parts for program in part.programs(whole)] for whole in (False, True))
+    return fine, whole
 
 
 def grids(shapes: Sequence[Shape]) -> UInt8[Tensor, "B 32 32 32"]:

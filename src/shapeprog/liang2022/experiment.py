@@ -22,8 +22,7 @@ from shapeprog.files import append_line, make_folder
 from shapeprog.inference import greedy_boxes, refine
 from shapeprog.inference.refine import REACH
 from shapeprog.liang2022.adapt import AdaptTask
-from shapeprog.liang2022.decode import decode_all
-from shapeprog.liang2022.evaluate import grids, measure
+from shapeprog.liang2022.evaluate import decode_all, measure
 from shapeprog.liang2022.loop import read_log, train
 from shapeprog.liang2022.prior import programs
 from shapeprog.liang2022.settings import BEST, STATE, AdaptSettings, Decoder
@@ -141,11 +140,10 @@ def _measured(
     for decoder in [decoder for decoder in row.decoders if (name, category, seed, decoder) not in known]:
         shapes, made = list(read_pack(packs / f"{category}_test.npz"))[:count], []
         if weights:
-            decoded = decode_all(load_generator(weights), grids(shapes), decoder=decoder)
-            programs, whole = decoded.programs(), decoded.programs(whole=True)
+            fine, whole = decode_all(load_generator(weights), shapes, decoder)
         else:
-            programs = whole = [greedy_boxes(shape.voxels) for shape in shapes]
-        for program, on_canvas, shape in zip(programs, whole, shapes, strict=True):
+            fine = whole = [greedy_boxes(shape.voxels) for shape in shapes]
+        for program, on_canvas, shape in zip(fine, whole, shapes, strict=True):
             if row.refine:
                 program = refine(program, torch.from_numpy(np.array(shape.points)), reach=REACH, seed=seed)
             key = {"row": name, "category": category, "seed": seed, "decoder": decoder}

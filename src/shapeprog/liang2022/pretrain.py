@@ -18,7 +18,7 @@ from shapeprog.errors import ShapeProgError
 from shapeprog.geometry.cells import count, preceding
 from shapeprog.language.tensors import Code
 from shapeprog.language.unroll import draw_blocks
-from shapeprog.liang2022.decode import decode, decode_all
+from shapeprog.liang2022.decode import decode
 from shapeprog.liang2022.generator import Generator, TeacherForcingBatch, live_blocks, preceding_blocks, take
 from shapeprog.liang2022.prior import SyntheticStream, prior
 from shapeprog.liang2022.settings import Order, PretrainSettings
@@ -73,7 +73,7 @@ class PretrainTask:
             right += float((prediction.logits.argmax(-1) == prediction.ids).sum())
             error += float(((prediction.numbers - prediction.given).abs() * used).sum())
             steps, slots = steps + prediction.ids.numel(), slots + float(used.sum())
-            overlaps.append(decode_all(generator, batch.target, decoder="argmax").iou())
+            overlaps.append(decode(generator, batch.target, decoder="argmax").iou())
         iou = float(torch.cat(overlaps).mean())
         return {"ids": right / steps, "numbers": error / slots, "iou": iou, "score": iou}
 

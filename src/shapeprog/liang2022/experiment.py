@@ -179,10 +179,10 @@ def _cell(records: list[dict[str, Any]]) -> str:
     if not records:
         return ""
     cd, iou, seeds = (np.array([record[key] for record in records]) for key in ("cd", "iou", "seed"))
-    means = [cd[seeds == seed].mean() for seed in np.unique(seeds)]
-    spread = np.array(means if len(means) > 1 else cd)
-    error = spread.std(ddof=1) / len(spread) ** 0.5
-    return f"{1000 * np.mean(means):.2f} ± {1000 * error:.2f} ({1000 * np.median(cd):.2f}), {iou.mean():.3f}"
+    by_seed = [1000 * cd[seeds == seed] for seed in np.unique(seeds)]
+    means, median = [part.mean() for part in by_seed], np.mean([np.median(part) for part in by_seed])
+    spread = np.array(means if len(means) > 1 else by_seed[0])
+    return f"{np.mean(means):.2f} ± {spread.std(ddof=1) / len(spread) ** 0.5:.2f} ({median:.2f}), {iou.mean():.3f}"
 
 
 def _synthetic_packs(folder: Path) -> Path:

@@ -101,11 +101,11 @@ def train(
             torch.manual_seed(seed)
             rng = torch.Generator(where).manual_seed(seed)
             losses = task.losses(batch, step / steps, rng)
-            loss = torch.stack([value for name, value in losses.items() if name[0] != "_"]).sum()
+            loss = torch.stack([value.float() for name, value in losses.items() if name[0] != "_"]).sum()
             optimiser.zero_grad()
             loss.backward()
             stopping = torch.tensor(float(stop is not None and stop.is_set()), device=where)
-            values = torch.stack([value.detach() for value in (loss, stopping, *losses.values())])
+            values = torch.stack([value.detach().float() for value in (loss, stopping, *losses.values())])
             if world > 1:
                 for weight in weights:
                     weight.grad = torch.zeros_like(weight) if weight.grad is None else weight.grad

@@ -118,13 +118,13 @@ class AdaptSettings(TrainingSettings):
     train: tuple[str, ...] = option((), "Packs of the shapes to adapt to.")
     val: tuple[str, ...] = option((), "Packs to validate on; the best weights have the least CD there.")
     initial: str = option("fast-wide", "Weights to start from: a file or the name of weights that ship.")
-    method: Literal["direct", "guided", "hybrid"] = option("direct", "direct, guided or hybrid.")
+    method: Literal["direct", "guided", "hybrid"] = option("direct", "Adaptation: direct, guided or hybrid.")
     loss: str = option("", "Losses and weights, such as chamfer=1,soft_iou=3; by default those of the method.")
     executor: str = option("executor", "Weights of the neural executor, for the loss neural.")
     learn: Literal["all", "offsets"] = option(
         "all", "all weights, or offsets alone: a shortcut that is not the paper's."
     )
-    decoder: Decoder = option("select", "argmax, novel or select; with an estimator in validation alone.")  # noqa: RUF009
+    decoder: Decoder = option("select", "Decoder: argmax, novel or select; with an estimator in validation alone.")  # noqa: RUF009
     decoded_ids: float = option(1.0, "Weight of the cross-entropy to decoded ids (self-training); 0 with an estimator.")
     kl: float = option(0.0, "Weight of the KL divergence of the ids from those of the initial weights.")
     rehearsal: int = option(8, "Synthetic shapes in every step, so that pretraining is not forgotten.")

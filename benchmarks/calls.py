@@ -118,7 +118,8 @@ def measure(task: Task) -> dict[str, Any]:
     from shapeprog.evaluation.likeness import Triangles
     from shapeprog.evaluation.metrics import evaluate_program
     from shapeprog.inference import infer
-    from shapeprog.language.text import format_program, parse
+    from shapeprog.language.parser import parse
+    from shapeprog.language.printer import format_program
     from shapeprog.library import library_of, load_library, with_library
     from shapeprog.library.length import statements
 
@@ -152,7 +153,7 @@ def _apart(text: str) -> tuple[list[Any], Any]:
     """The parts of a program, and the shape that they make together."""
     from shapeprog.data.placement import shape_from_mesh
     from shapeprog.formats.parts import parts
-    from shapeprog.language.text import parse
+    from shapeprog.language.parser import parse
 
     drawn = [(part.vertices, part.faces) for part in parts(parse(text))]
     starts = np.cumsum([0, *(len(vertices) for vertices, _ in drawn)])
@@ -162,22 +163,26 @@ def _apart(text: str) -> tuple[list[Any], Any]:
 
 def called(program: Any) -> list[tuple[str, Any]]:
     """The parts of a program as it is written: which function is called, if any, and the scene of what is drawn."""
-    from shapeprog.language.evaluation import expanded
+    from shapeprog.language.ast import Assignment, Call, Comment, Function, body_of
+    from shapeprog.language.evaluate import expanded
+    from shapeprog.language.printer import source_of
     from shapeprog.language.program import Program
-    from shapeprog.language.source import Assignment, Call, Comment, Function, Source, WrittenLoop
-    from shapeprog.language.text import source_of
     from shapeprog.language.unroll import unroll
 
-    lines = source_of(program).lines
+    source = source_of(program)
+    lines = source.lines
     named = tuple(line for line in lines if isinstance(line, Assignment | Function))
     found = []
     for line in lines:
         if not isinstance(line, Assignment | Function | Comment):
             inner = line
-            while isinstance(inner, WrittenLoop) and len(inner.body) == 1:
-                inner = inner.body[0]
+            while len(body_of(inner)) == 1:
+                (inner,) = body_of(inner)
             found.append(
-                (inner.name if isinstance(inner, Call) else "", unroll(Program(expanded(Source((*named, line))))))
+                (
+                    inner.name if isinstance(inner, Call) else "",
+                    unroll(Program(expanded(replace(source, lines=(*named, line))))),
+                )
             )
     return found
 

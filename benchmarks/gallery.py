@@ -40,7 +40,7 @@ def draw(rows: list[dict[str, Any]], tasks: dict[tuple[str, str], Task], out: Pa
     from PIL import Image, ImageDraw
 
     from shapeprog.formats.parts import parts
-    from shapeprog.language.syntax import parse
+    from shapeprog.language.parser import parse
     from shapeprog.view.model import of_parts, of_shape
     from shapeprog.view.page import typeface
     from shapeprog.view.render import camera_for, render

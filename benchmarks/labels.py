@@ -39,7 +39,7 @@ def measure(task: tuple[Path, int, str, int]) -> dict[str, Any]:
     from shapeprog.data import read_pack
     from shapeprog.geometry.distance import nearest_primitive
     from shapeprog.inference import infer
-    from shapeprog.language.text import format_program
+    from shapeprog.language.printer import format_program
     from shapeprog.language.unroll import unroll
 
     path, number, method, seed = task

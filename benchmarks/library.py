@@ -22,11 +22,11 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from shapeprog.formats import load
+from shapeprog.language.ast import Draw, Line, Loop
 from shapeprog.language.expression import Binary, Name, Negative, Value, text_of
+from shapeprog.language.printer import source_of
 from shapeprog.language.program import Program
-from shapeprog.language.source import Line, WrittenDraw, WrittenLoop
 from shapeprog.language.statement import language
-from shapeprog.language.text import source_of
 from shapeprog.library import learn, with_library
 from shapeprog.library.length import statements
 from shapeprog.space import AXES
@@ -45,21 +45,21 @@ print(json.dumps({
 
 def expression(lines: Sequence[Line], whole: bool) -> str:
     """The lines of a program or loop as one expression of Stitch; named numbers are left to their names."""
-    parts = [_line(line, whole) for line in lines if isinstance(line, WrittenDraw | WrittenLoop)]
+    parts = [_line(line, whole) for line in lines if isinstance(line, Draw | Loop)]
     found = parts.pop() if parts else "nothing"
     while parts:
         found = f"(seq {parts.pop()} {found})"
     return found
 
 
-def _line(line: WrittenDraw | WrittenLoop, whole: bool) -> str:
+def _line(line: Draw | Loop, whole: bool) -> str:
     declared = language()[line.name]
     words = [
         AXES[int(value)] if quantity.kind == "axis" and isinstance(value, float)
         else re.sub(r"[\s()]", "", text_of(value)) if whole else _number(value)
         for value, quantity in zip(line.values, declared.quantities, strict=True)
     ]  # fmt: skip
-    if isinstance(line, WrittenLoop):
+    if isinstance(line, Loop):
         return f"({line.name} {' '.join(words)} {expression(line.body, whole)})"
     drawn = f"({line.name} {' '.join(words)})"
     return f"({line.role}_of {drawn})" if line.role else drawn
@@ -121,7 +121,7 @@ def measure_ours(learned: Sequence[Program], val: Sequence[Program], most: int) 
     seconds = time.perf_counter() - started
     counts = [sum(statements(with_library(each, library)) for each in part) for part in (learned, val)]
     _row("shapeprog", learned, val, (counts[0], counts[1]), seconds)
-    for function in library.functions:
+    for function in library.source.functions.values():
         print(f"    {function.name}({', '.join(name for name, _ in function.parameters)})")
 
 

@@ -73,7 +73,8 @@ def measure(task: Task) -> dict[str, Any]:
     from shapeprog.evaluation.parts import part_scores
     from shapeprog.formats.parts import parts
     from shapeprog.inference import infer
-    from shapeprog.language.text import format_program, numbers_written, parse
+    from shapeprog.language.parser import parse
+    from shapeprog.language.printer import format_program, numbers_written
     from shapeprog.language.unroll import unroll
 
     torch.set_num_threads(1)

@@ -112,7 +112,7 @@ def measure(task: Task) -> dict[str, Any]:
     from shapeprog.evaluation.likeness import Triangles
     from shapeprog.evaluation.metrics import evaluate_program
     from shapeprog.evaluation.parts import part_scores
-    from shapeprog.language.text import format_program
+    from shapeprog.language.printer import format_program
     from shapeprog.language.unroll import unroll
 
     torch.set_num_threads(1)
@@ -141,7 +141,7 @@ def inferred(task: Task, shape: Any) -> tuple[Any, Any]:
     from shapeprog.inference.evidence import evidence_of
     from shapeprog.inference.ties.tying import tie
     from shapeprog.language.merging import merged
-    from shapeprog.language.text import parse
+    from shapeprog.language.parser import parse
 
     if task.method == "tied":
         evidence = evidence_of(shape, task.seed)

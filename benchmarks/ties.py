@@ -94,7 +94,7 @@ def of_furniture(task: Task) -> dict[str, Any]:
     from shapeprog.inference.evidence import evidence_of_program
     from shapeprog.inference.ties.leaning import between_ends
     from shapeprog.inference.ties.tying import tie
-    from shapeprog.language.text import format_program
+    from shapeprog.language.printer import format_program
 
     planted = between_ends(furniture(task.number, task.seed))
     noisy = with_noise(planted, np.random.default_rng((task.seed, task.number)))
@@ -174,10 +174,10 @@ def ways_of(program: Any, planted: Any) -> Any:
     """What each number of a program follows from, by how much: the free numbers (F, Z); of those numbers (F) that may
     move in what was planted, since what is zero now may not."""
     from shapeprog.inference.tunable import Tunable
-    from shapeprog.language.evaluation import symbolic
+    from shapeprog.language.evaluate import symbolic
     from shapeprog.language.expression import Linear
     from shapeprog.language.named import names
-    from shapeprog.language.text import source_of
+    from shapeprog.language.printer import source_of
 
     free = {each.name: Linear.of(each.name) for each in names(program) if each.free and not each.whole}
     nodes = [node for each in symbolic(source_of(program), free) for node in walked(each)]
@@ -197,7 +197,7 @@ def ways_of(program: Any, planted: Any) -> Any:
 def walked(node: Any) -> Iterator[Any]:
     """A statement, or a loop and all that is in it, in the order of the text."""
     yield node
-    for inner in node.body or ():
+    for inner in getattr(node, "body", ()):
         yield from walked(inner)
 
 
@@ -212,7 +212,7 @@ def of_chair(task: Task) -> dict[str, Any]:
     from shapeprog.evaluation.parts import best_pairs, overlaps
     from shapeprog.inference import infer
     from shapeprog.language.named import inline
-    from shapeprog.language.text import format_program
+    from shapeprog.language.printer import format_program
     from shapeprog.language.unroll import unroll
 
     assert task.pack is not None

@@ -1,186 +1,104 @@
-"""A small twin of the scripts for CAD: it runs the expressions of a plan, to be compared with what unrolling draws."""
+"""What scripts for CAD draw: the solids of an OpenSCAD model, of a build123d script, and of the meshes of a program."""
 
 from __future__ import annotations
 
-import math
+import json
+import re
+import subprocess
+from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
-import torch
+from scipy.optimize import linear_sum_assignment
+from scipy.spatial import ConvexHull
 
-from shapeprog.formats.plan import Definition, Invocation, Repetition
-from shapeprog.geometry.primitive import primitives
-from shapeprog.language import unroll
-from shapeprog.language.tensors import encode
+from shapeprog.formats.parts import parts
 
 
-def matrix(linear=None, shift=(0, 0, 0)):
-    out = np.eye(4)
-    out[:3, :3], out[:3, 3] = np.eye(3) if linear is None else linear, shift
-    return out
+def of_meshes(program, frame):
+    """Bounds and volume of every part, a row each."""
+    return [(*part.vertices.min(0), *part.vertices.max(0), part.volume) for part in parts(program, frame)]
 
 
-def move(i, by):
-    return matrix(shift=i * np.array(by))
+def of_build123d(script):
+    """The same of the solids of a script."""
+    scope = {"__name__": "model"}
+    exec(compile(script, "script", "exec"), scope)
+    boxes = [(part.bounding_box(optimal=True), part.volume) for part in scope["parts"]]
+    return [(*tuple(box.min), *tuple(box.max), volume) for box, volume in boxes]
 
 
-def turn(degrees, about):
-    axis = np.array([0, *about[1:]])
-    return matrix(shift=axis) @ matrix(spin(np.eye(3)[0], degrees)) @ matrix(shift=-axis)
-
-
-def spin(axis, degrees):
-    """The rotation about an axis of any length, by Rodrigues."""
-    length = np.linalg.norm(axis)
-    cross = np.cross(np.eye(3), axis / max(length, 1e-12))
-    angle = math.radians(degrees)
-    return np.eye(3) + math.sin(angle) * cross + (1 - math.cos(angle)) * cross @ cross
-
-
-CORNERS = np.array([[a, b, c] for a in (0, 1) for b in (0, 1) for c in (0, 1)])
-
-
-def cuboid(low, size, lean=0.0):
-    return low + CORNERS * size + CORNERS[:, :1] * [0, lean, 0]
-
-
-def tilted_box(at, size, tilt):
-    return at + CORNERS * size @ spin(np.eye(3)[2], tilt).T
-
-
-def bar_between(start, end, section, turn):
-    along = end - start
-    main = int(np.abs(along).argmax())
-    size = np.insert(section, main, np.linalg.norm(along))
-    axis, upright = np.eye(3)[main], along * np.sign(along[main])
-    lean = math.degrees(math.acos(min(1, upright[main] / size[main])))
-    rotation = spin(np.cross(axis, upright), lean) @ spin(axis, turn)
-    return (start + end) / 2 + (CORNERS - 0.5) * size @ rotation.T
-
-
-def cylinder_between(start, end, *radii):
-    along = (end - start) / max(np.linalg.norm(end - start), 1e-12)
-    return np.stack([start, end]), np.array([radii[0], radii[-1]]), np.stack([along, along])
-
-
-WAYS = np.linspace(0, 1, 2001)
-
-
-def arc_through(start, through, end, radius):
-    """By the centre of the circle through three points, and angles from the first."""
-    one, two = through - start, end - start
-    axis = np.cross(one, two)
-    square = axis @ axis
-    reach = np.cross(one @ one * two - two @ two * one, axis) / (2 * square)
-    centre, axis = start + reach, axis / math.sqrt(square)
-    ring = np.linalg.norm(reach)
-    first = -reach / ring
-    second = np.cross(axis, first)
-    whole = math.atan2((end - centre) @ second, (end - centre) @ first) % (2 * math.pi)
-    angle = (WAYS * whole)[:, None]
-    points = centre + ring * (np.cos(angle) * first + np.sin(angle) * second)
-    return points, np.full(len(WAYS), min(radius, ring)), np.cos(angle) * second - np.sin(angle) * first
-
-
-def rounded_box(at, size, edge):
-    radius = min(edge, size.min() / 2)
-    return at + radius + CORNERS * (size - 2 * radius), np.full(8, radius), np.zeros((8, 3))
-
-
-REFERENCES = (cuboid, tilted_box, bar_between, cylinder_between, arc_through, rounded_box)
-
-
-def described(points, radius=None, along=None, place=None):
-    """Bounding box and second moments: of points that are corners, or of discs across ``along`` or balls about them.
-
-    The place is a rigid motion, or a reflection, and a change of scale.
-    """
-    place = np.eye(4) if place is None else place
-    world = points @ place[:3, :3].T + place[:3, 3]
-    spread = np.zeros_like(world)
-    if radius is not None:
-        scale = np.linalg.norm(place[0, :3])
-        spread = scale * np.array(radius)[:, None] * np.sqrt(np.maximum(0, 1 - (along @ place[:3, :3].T / scale) ** 2))
-    bounds = [(world - spread).min(0), (world + spread).max(0)]
-    return (np.round(np.concatenate([*bounds, (world.T @ world / len(world)).ravel()]), 5) + 0.0).tolist()
-
-
-def evaluate(made, changed=None):
-    """What the solids of a plan are in cells, by its expressions alone, see :func:`described`; numbers may be changed
-    first."""
-    names = {v.name: eval(v.text) for heading in made.headings for v in heading.variables}
-    names |= {name: table.tolist() for name, table in made.tables.items()} | (changed or {})
-    for number in made.numbers:
-        if number.name not in names:
-            names[number.name] = eval(number.text, {}, names)
-    functions = {function.name: function for function in made.functions}
-    references = {function.__name__: function for function in REFERENCES}
+def of_openscad(text, folder: Path, changes=None):
+    """The same of an OpenSCAD model, from the tree of primitives that it comes to; warnings are errors."""
+    (folder / "model.scad").write_text(text)
+    given = [word for name, value in (changes or {}).items() for word in ("-D", f"{name}={value}")]
+    ended = subprocess.run(
+        ["openscad", "-o", "model.csg", *given, "model.scad"], cwd=folder, check=True, capture_output=True, text=True
+    )
+    assert "WARNING" not in ended.stderr, ended.stderr
     found = []
-
-    def run(steps, place, scope):
-        for step in steps:
-            if isinstance(step, Definition):
-                scope = scope | {step.name: eval(step.text, {}, scope)}
-                continue
-            if isinstance(step, Invocation):
-                function = functions[step.name]
-                given = {name: eval(text, {}, names) for name, text in function.parameters if text is not None}
-                given |= {name: eval(text, {}, scope) for name, text in step.arguments}
-                run(function.body, place, names | given)
-                continue
-            if isinstance(step, Repetition):
-                for copy in range(eval(step.count, {}, scope)):
-                    inner = scope | {step.letter: copy}
-                    here = place
-                    if step.shift:
-                        here = here @ move(*(eval(word, {}, inner) for word in step.shift))
-                    if step.turn:
-                        here = here @ turn(*(eval(word, {}, inner) for word in step.turn))
-                    if step.signs:
-                        here = here @ np.diag([*eval(step.signs, {}, inner), 1])
-                    run(step.body, here, inner)
-                continue
-            arguments = [np.array(eval(word, {}, scope), float) for word in step.arguments]
-            here = place
-            if step.axes is not None:
-                here = place @ matrix(step.axes, arguments[0])
-                arguments[0] = np.zeros(3)
-                if step.kind == "cuboid":
-                    arguments[0] = -arguments[1] / 2 - [0, float(arguments[2]) / 2 if len(arguments) > 2 else 0, 0]
-            if step.kind == "shell":
-                found.append(described(made.shells[step.shell][0] * arguments[1] + arguments[0], place=here))
-                continue
-            drawn = references[step.kind](*arguments)
-            found.append(described(*(drawn if isinstance(drawn, tuple) else (drawn,)), place=here))
-
-    run(made.body, np.diag([*np.full(3, 1 / made.cell), 1]), names)
-    return sorted(found)
+    _read(re.findall(r"-?\d[\d.e+-]*|[\w$]+|[\[\](){},;=-]", (folder / "model.csg").read_text()), np.eye(4), found)
+    return [(*vertices.min(0), *vertices.max(0), volume) for vertices, volume in found if volume > 0]
 
 
-def expected(program):
-    """The same from the sizes and poses of the unrolled program."""
-    scene = unroll(encode(program, dtype=torch.float64))
-    found = []
-    for slot in torch.nonzero(scene.mask)[:, 0].tolist():
-        size, centre, rotation = (t[slot].numpy() for t in (scene.size, scene.centre, scene.rotation))
-        kind, place = primitives[int(scene.kind[slot])], matrix(rotation, centre)
-        if kind.name in ("cylinder", "frustum"):
-            ends, axis = np.array([[-size[0], 0, 0], [size[0], 0, 0]]), np.eye(3)[[0, 0]]
-            found.append(described(ends, size[[1, 1 if kind.name == "cylinder" else 2]], axis, place))
-        elif kind.name == "rounded_box":
-            inner = size[:3] - min(size[3], size[:3].min())
-            found.append(described((2 * CORNERS - 1) * inner, np.full(8, size[0] - inner[0]), np.zeros((8, 3)), place))
-        elif kind.name == "arc":
-            half, radius, rise = size[:3]
-            ring = (half**2 + rise**2) / (2 * rise)
-            sine, cosine = (f((2 * WAYS - 1) * 2 * math.atan2(rise, half)) for f in (np.sin, np.cos))
-            points = np.stack([ring * sine, rise / 2 - ring * (1 - cosine), 0 * sine], 1)
-            along = np.stack([cosine, -sine, 0 * sine], 1)
-            found.append(described(points, np.full(len(WAYS), min(radius, ring)), along, place))
-        else:
-            found.append(described(kind.mesh(size)[0], place=place))
-    return sorted(found)
+def same(found, wanted, tolerance=3e-3):
+    """Whether solids are alike, in any order: bounds within a share of the size of all, volumes within 0.5 %."""
+    assert len(found) == len(wanted)
+    one, two = np.array(found), np.array(wanted)
+    apart = np.abs(one[:, None, :6] - two[None, :, :6]).max(-1) / np.ptp(two[:, :6])
+    apart += 0.1 * np.abs(np.log(one[:, None, 6] / two[None, :, 6]))
+    pairs = linear_sum_assignment(apart)
+    np.testing.assert_allclose(apart[pairs], 0, atol=tolerance)
 
 
-def same(one, two):
-    assert len(one) == len(two)
-    np.testing.assert_allclose(one, two, atol=2e-4)
+def _read(tokens, place, found):
+    """Read statements until a brace closes: ``name(arguments) { ... }`` or ``name(arguments);``."""
+    while tokens and tokens[0] != "}":
+        name, depth, words = tokens.pop(0), 0, []
+        while not words or depth:
+            depth += {"(": 1, ")": -1}.get(tokens[0], 0)
+            words.append(tokens.pop(0))
+        arguments = _arguments("".join(words[1:-1]))
+        block = tokens.pop(0) == "{"
+        if name == "rotate_extrude":
+            profile = []
+            _read(tokens, np.eye(4), profile)
+            found.append(_extruded(profile[0][0], arguments, place))
+        elif block:
+            _read(tokens, place @ np.array(arguments[0]) if name == "multmatrix" else place, found)
+        elif name in ("cube", "cylinder", "polyhedron", "circle"):  # others have nothing inside
+            points = _points(name, arguments) @ place[:3, :3].T + place[:3, 3]
+            found.append((points, 0 if name == "circle" else ConvexHull(points).volume))  # all others are convex
+        if block:
+            tokens.pop(0)
+
+
+def _arguments(text):
+    named = re.sub(r"([$\w]*[$a-z]\w*)=", r'"\1":', text)
+    if named == text:
+        return json.loads(f"[{text}]")
+    return json.loads(f"{{{named}}}")
+
+
+def _points(name, arguments):
+    if name == "cube":
+        low = -0.5 if arguments["center"] else 0
+        return (np.array(list(np.ndindex(2, 2, 2))) + low) * arguments["size"]
+    if name == "polyhedron":
+        return np.array(arguments["points"])
+    angles = np.arange(arguments["$fn"]) * 2 * np.pi / arguments["$fn"]
+    circle = np.stack([np.cos(angles), np.sin(angles), 0 * angles], 1)
+    if name == "circle":
+        return circle * arguments["r"]
+    return np.concatenate([circle * arguments["r1"], circle * arguments["r2"] + [0, 0, arguments["h"]]])
+
+
+def _extruded(profile, arguments, place):
+    """A profile turned about z: its points, and the sum of its convex slices."""
+    steps = round(arguments["$fn"] * arguments["angle"] / 360)
+    angles = np.radians(arguments["angle"]) * np.arange(steps + 1) / steps
+    ways = np.stack([np.cos(angles), np.sin(angles), 0 * angles], 1)
+    points = profile[None, :, :1] * ways[:, None] + profile[None, :, 1:2] * [0, 0, 1]
+    points = points @ place[:3, :3].T + place[:3, 3]
+    volume = sum(ConvexHull(np.concatenate(pair)).volume for pair in pairwise(points))
+    return points.reshape(-1, 3), volume

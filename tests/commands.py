@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from shapeprog.formats import export
-from shapeprog.language.text import parse
+from shapeprog.language.parser import parse
 from shapeprog.space import Frame, grid_axes
 
 PROGRAM = parse(
@@ -33,4 +33,4 @@ Run = Callable[..., Ended]
 
 def table(path: Path) -> Path:
     """A mesh of the table, as somebody would have it on the disk."""
-    return export(PROGRAM, path, FRAME)
+    return export(PROGRAM, path, FRAME, on_input=True)

@@ -27,7 +27,7 @@ import torch
 
 from shapeprog.data.preparation import prepare
 from shapeprog.formats import export
-from shapeprog.language.text import parse
+from shapeprog.language.parser import parse
 
 TEXTS = (
     "leg(at=(-12, -4, -6), size=(24, 8, 12))\n",

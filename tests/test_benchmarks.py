@@ -12,7 +12,8 @@ from declared import LANGUAGE
 import shapeprog as sp
 from benchmarks import labels, library, planted, ties
 from shapeprog.language import standard, using
-from shapeprog.language.text import parse, source_of
+from shapeprog.language.parser import parse
+from shapeprog.language.printer import source_of
 
 TABLE = """\
 box(at=(6, -9, -12), size=(2, 18, 24))

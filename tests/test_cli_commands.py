@@ -118,7 +118,7 @@ def test_json_is_one_object_a_line_and_quiet_says_nothing(run: Run, tmp_path: Pa
     ended = run("infer", "good.obj", "broken.ply", "--json", "--no-picture")
     lines = [json.loads(line) for line in ended.out.splitlines()]
     assert lines[0]["name"] == "good"
-    assert lines[0]["program"][0]["statement"] == "top_rectangle"
+    assert lines[0]["text"].splitlines()[1].startswith("top_rectangle(")
     assert "broken" in lines[1]["error"]
     quiet = run("infer", "good.obj", "--quiet", "--no-picture")
     assert (quiet.code, quiet.out, quiet.err) == (0, "", "")
@@ -210,11 +210,40 @@ def test_export_sets_the_numbers_that_have_names(run: Run, tmp_path: Path, chang
     assert run("export", "legs.shape", *changes, "--quiet", "again.shape").code == 0
 
 
+PLACED = """\
+# a table
+width, depth, height = 80, 60, 74
+thick = 2
+plinth = 3
+overhang = thick * 2
+
+def leg_pair(gap, unused=1):
+    for _ in mirror(x=0):
+        leg(left=gap, width=5)
+
+top(top=0, height=thick)
+leg_pair(gap=overhang, top=thick)
+"""
+
+
+def test_names_of_placed_text_are_set_and_what_it_does_not_use_is_a_warning(run: Run, tmp_path: Path):
+    (tmp_path / "table.shape").write_text(PLACED)
+    ended = run("export", "table.shape", "other.shape", "table.obj", "--set", "overhang*=2", "height=148")
+    assert ended.code == 0, ended.err
+    assert "warning: table.shape, line 4: unused name 'plinth'" in ended.err
+    assert "warning: table.shape, line 7: unused name 'unused'" in ended.err
+    text = PLACED.replace("thick * 2", "8").replace("60, 74", "60, 148")
+    assert (tmp_path / "other.shape").read_text() == text
+    assert "no name 'leg_pair'" in run("export", "table.shape", "a.stl", "--set", "leg_pair=3").err
+    for words in (["render", "table.shape", "a.png"], ["show", "table.shape"], ["sheet", ".", "sheet.png"]):
+        assert "unused name 'plinth'" in run(*words).err
+    assert (tmp_path / "table.html").read_text().count("leg_pair") > 1
+
+
 @pytest.mark.parametrize(
     ("change", "words"),
     [
         ("widht=3", "did you mean width?"),
-        ("span=3", "set width, or edit the text"),
         ("width", "invalid change"),
         ("width=x", "'x' is not a number"),
         ("width/=0", "divides by zero"),
@@ -302,6 +331,8 @@ def test_statements_prints_the_manual(run: Run):
     two = run("statements", "taper", "rod").out
     assert two.startswith("taper(")
     assert "\nrod(" in two
+    assert "width, depth, height = " in run("statements").out
+    assert run("statements", "divide").out.startswith("for _ in divide(")
     ended = run("statements", "bak")
     assert (ended.code, "did you mean back?" in ended.err) == (2, True)
 

@@ -20,7 +20,8 @@ from shapeprog.geometry.distance import each_distance
 from shapeprog.geometry.mesh import part_meshes
 from shapeprog.geometry.surface import sample_surface
 from shapeprog.language import Draw, Loop, Program, language
-from shapeprog.language.text import format_program, parse
+from shapeprog.language.parser import parse
+from shapeprog.language.printer import format_program
 
 SEED, COUNT = 3, 60
 TOUCHING = 0.02

@@ -12,7 +12,7 @@ from shapeprog.data import load
 from shapeprog.data.orientation import AUTO, axes_of
 from shapeprog.data.uprightness import find_up, measures
 from shapeprog.formats.parts import solid
-from shapeprog.language.text import parse
+from shapeprog.language.parser import parse
 from shapeprog.space import grid_axes
 
 CHAIR = """\

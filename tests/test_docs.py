@@ -25,7 +25,8 @@ from shapeprog.formats.format import suffixes
 
 ROOT = Path(__file__).parents[1]
 README, DOCS = ROOT / "README.md", ROOT / "docs"
-PAGES = ("tutorial", "language", "names", "units", "formats", "libraries", "extending")
+PAGES = ("tutorial", "language", "statements", "names", "units", "formats", "libraries", "extending")
+WHOLE = "width, depth, height = 120, 60, 75"  # examples of the page of the language stand below it
 BLOCK = re.compile(r"(<!-- not run: [^\n]* -->\n)?^```(sh|python|py)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 
 
@@ -93,7 +94,14 @@ def test_the_blocks_of_a_page_run(name, folder):
 def test_the_programs_of_a_page_are_programs(page):
     for language, code in blocks(page):
         if language == "py":
-            assert sp.unroll(sp.encode(sp.parse(code, page.name))).mask.any()
+            below = page.stem == "language" and "width, depth, height" not in code
+            program = sp.parse(f"{WHOLE}\n{code}" if below else code, page.name)
+            assert sp.unroll(sp.encode(program)).mask.any()
+            assert program.source is None or program.source.warnings == ()
+
+
+def test_the_page_of_the_language_says_what_its_examples_stand_below():
+    assert f"stand below `{WHOLE}`" in (DOCS / "language.md").read_text(encoding="utf-8")
 
 
 def test_the_readme_is_short():

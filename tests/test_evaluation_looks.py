@@ -15,7 +15,7 @@ from shapeprog.evaluation.structure import one_piece, slivers
 from shapeprog.geometry.mesh import part_meshes, union_mesh
 from shapeprog.language import unroll
 from shapeprog.language.free import numbers
-from shapeprog.language.syntax import parse
+from shapeprog.language.parser import parse
 
 TABLE = """
 top_rectangle(at=(8, 0, 0), thickness=2, half=(9, 11))

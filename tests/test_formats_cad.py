@@ -1,292 +1,348 @@
-"""CAD scripts: the expressions they share are evaluated by a small twin and compared with unrolling."""
+"""Scripts for CAD keep the program and draw what the program draws; files for makers stand upright in millimetres."""
 
 from __future__ import annotations
 
+import ast
 import importlib.util
 import math
 import shutil
-import subprocess
-from dataclasses import replace
+import xml.etree.ElementTree as xml
+import zipfile
 from pathlib import Path
 
 import numpy as np
 import pytest
-import torch
 import trimesh
-from cad_twin import evaluate, expected, same
+from cad_twin import of_build123d, of_meshes, of_openscad, same
 
-from shapeprog.formats import export
+import shapeprog as sp
+from shapeprog.cli import main
+from shapeprog.errors import InputError
+from shapeprog.formats import export, format_of
 from shapeprog.formats.build123d import script_text
+from shapeprog.formats.cuts import cut_list
+from shapeprog.formats.frames import placement
 from shapeprog.formats.openscad import scad_text
-from shapeprog.formats.parts import parts, solid
-from shapeprog.formats.plan import plan
-from shapeprog.formats.symbolic import repeat
 from shapeprog.geometry.primitive import Primitive, primitives
-from shapeprog.geometry.primitives.cuboid import CUBOID
-from shapeprog.language import Draw, Language, Loop, Program, language, loop, statement, using
-from shapeprog.language.converting import in_unit
-from shapeprog.language.parameters import Count, Extent, Length, Position, Radius, Shift
-from shapeprog.language.shapes import disc
+from shapeprog.language import Language, statement, using
+from shapeprog.language.parameters import Extent, Position
+from shapeprog.language.parser import parse
 from shapeprog.language.shapes import solid as draw_solid
-from shapeprog.language.statement import Motion
-from shapeprog.language.text import parse
-from shapeprog.language.unit import Unit
 from shapeprog.space import Frame, grid_axes
 
-CHAIR = """
-top_rectangle(at=(0, 0, 0), thickness=2, half=(8, 9))
-for i in translate(2, by=(0, 0, 16)):
-    for j in translate(2, by=(0, 14, 0)):
-        leg(at=(-12, -8, -9), size=(12, 2, 2))
-back(at=(2, 6, -9), size=(10, 2, 18), tilt=3.25)
-for i in translate(2, by=(0, 0, 16)):
-    chair_beam(at=(2, -6, -9), size=(4.5, 2, 2))
-    chair_beam(at=(6.5, -6, -9), size=(2, 13, 2))
-line(start=(-8, -7, -8), end=(-8, 6.5, 8), radius=0.75)
+FORMS = """
+# Every form of the language.
+# unit: cm
+width, depth, height = 50, 30, 2 * 20
+gap, radius, n = 0.5, 1, 3  # between doors
+inset = radius * 2
+
+def tray(rim, floor_thickness=radius / 2):  # with a loose floor
+    inner = width - 2 * rim
+    shelf(height=floor_thickness)
+    box(x=1, width=inner / 2, y=-1, depth=depth - 2 * rim, z=0, height=floor_thickness, lean=rim)
+
+box(left=inset)
+# Leaning parts.
+back(rear=3, depth=1, bottom=20, lean=2.5, tilt=8)
+seat(cushion(left=5, width=15, height=5, edge=1.5, tilt=5))
+cushion(right=5, width=15, height=n, edge=25)
+top_circle(cylinder(right=2.5, depth=10, height=2))
+base_circle(cylinder(x=-10, rear=5, radius=inset, height=2, tilt=15))
+cylinder(left=10, right=30, y=1.5, height=1.5)
+post(rod(left=2, front=2, radius=radius, bottom=3))
+leg(taper(left=6, front=2, radius=(0.5, radius), height=15))
+leg(taper(start=at(left=1.5, front=1.5), end=at(x=0, y=0, z=0), radius=(0, 2)))
+rail(bent_rod(start=at(left=5, rear=2, bottom=15), through=at(x=0, bottom=30), end=at(right=5), radius=radius))
+rail(bent_rod(start=at(left=5), through=at(x=0), end=at(right=5), radius=radius))
+brace(bar(start=at(left=5, bottom=5), end=at(right=5, bottom=15), depth=1.5, height=3, turn=20))
+brace(bar(start=at(rear=1, bottom=25), end=at(front=1, bottom=10), width=1.5, height=3, turn=-20))
+brace(bar(start=at(left=2, front=2, top=1), end=at(x=2, bottom=2), width=1.5, depth=3, turn=30))
+drawer(tray(rim=2, left=5, width=20, bottom=10, height=10, tilt=3))
+with inside(right=0, width=25, top=0, height=15, tilt=12):
+    panel(left=width / 10, front=depth / 10, top=height / 10)
+    tray(rim=width / 10, left=width / 5)
+    for _ in mirror(x=2, rear=5):
+        foot(left=0, width=1.5, front=2, depth=1.5, height=height / 10)
+for _ in mirror(z=0):
+    slat(height=1)
+for _ in rotate(n + 2, left=10, y=1):
+    foot(bar(start=at(left=10, front=15, bottom=1), end=at(front=5), width=1.5, height=1))
+for _ in rotate(3, step=30):
+    handle(width=2, front=0, depth=1, height=2)
+for _ in translate(n, x=5, y=-0.5, z=1.25):
+    block(left=0, width=2.5, front=0, depth=2.5, height=2.5)
+for _ in row(n, last=at(top=1.5, x=5)):
+    for _ in row(3, last=at(right=1)):
+        slat(rod(start=at(left=2, bottom=5), end=at(top=15), radius=0.5))
+for _ in row(2, last=at(right=0, rear=1)):
+    for _ in mirror(y=0):
+        foot(taper(left=inset, front=3, radius=(0.5, 1), height=4))
+for _ in row(3, last=at(x=15)):
+    foot(cylinder(left=3, front=20, rear=4, height=2))
+for _ in row(0, last=at(top=0)):
+    apron(height=2)
+for _ in divide(2.5, x, gap=gap, bottom=25, top=5, tilt=4):
+    for _ in divide(n, z):
+        door(front=0, depth=gap)
 """
 
-SPIN = """
-top_circle(at=(2, 1, 0), thickness=2, radius=10)
-for i in rotate(5, step=1):
-    line(start=(-9, 1, 0), end=(-12, 9, 3), radius=1)
-    leg(at=(-3, 5, -1), size=(3, 2, 2))
-for i in rotate(4, step=1):
-    base_cross(at=(-11, 1, 0), thickness=1.5, length=9, turn=0)
-for i in translate(2, by=(4, 0, 0)):
-    for j in rotate(3, step=2):
-        for k in translate(2, by=(0, 3, 1)):
-            line(start=(-2, 1.5, 0), end=(-1, 5, 2), radius=0.5)
-            base_cross(at=(-4, 1, 2), thickness=1.5, length=5, turn=3)
+CHANGES = {"width": 60, "depth": 26, "height": 45, "gap": 0.75, "radius": 1.25, "n": 4, "inset": 3}
+
+STOOL = """
+# unit: m
+width, depth, height = 0.36, 0.36, 0.45
+seat(top=0, height=0.03)
+for _ in mirror(x=0, y=0):
+    leg(left=0.02, width=0.04, front=0.02, depth=0.04, top=0.03)
 """
 
-LOUNGE = """
-seat(cushion(at=(0, -8, -9), size=(3, 16, 18), edge=1))
-cushion(at=(3, -8, -9), size=(2, 4, 18), edge=0)
-pillow(cushion(at=(3, 0, -3), size=(5, 3, 6), edge=9))
-back(board(at=(2, 6, -9), size=(10, 2, 18), tilt=15))
-for i in mirror(axis=side):
-    for j in translate(2, by=(0, 12, 0)):
-        leg(bar(start=(0, -6, -8), end=(-11, -8, -10), section=(1.5, 1), turn=20))
-        post(taper(start=(0, -3, -5), end=(-11, -4, -6), radius=(1, 0)))
-    arm(bent_rod(start=(1, -8, -10), through=(7, 0, -11), end=(3, 8, -10), radius=0.75))
-    bar(start=(-4, -8, -10), end=(-4.5, 8, -9), section=(2, 0.5), turn=-35)
-    board(at=(-6, 2, 5), size=(4, 1, 3), tilt=-30)
-for i in mirror(axis=depth, at=1):
-    handle(bent_rod(start=(2, -9, 1), through=(2.5, -13, 0), end=(2, -9, -1), radius=0.25))
-for i in rotate(3, step=1):
-    bent_rod(start=(-10, 2, 1), through=(-9.99, 5, 1), end=(-10, 8, 1), radius=0.5)
-    bar(start=(-11, 4, 3), end=(-9, 4, -5), section=(1, 2))
-"""
+FRAME = Frame.around([1, 2, 3], [30, 40, 45], grid_axes("+y", "-z"))
+
+needs_openscad = pytest.mark.skipif(shutil.which("openscad") is None, reason="needs OpenSCAD")
+needs_build123d = pytest.mark.skipif(importlib.util.find_spec("build123d") is None, reason="needs build123d")
 
 
-def changed_program(program, generator):
-    """The program with every continuous number and every count changed, and the variables of its plan to match."""
-    variables = {}
-    made = iter(plan(program).headings)
-
-    def change(node):
-        heading, declared = next(made), language()[node.name]
-        values = list(node.values)
-        shown = [p for p in declared.parameters if p.quantity.kind != "axis" and p.quantity.written_out]
-        for parameter, variable in zip(shown, heading.variables, strict=True):
-            for slot in range(parameter.slots.start, parameter.slots.stop):
-                if parameter.quantity.kind == "count":
-                    values[slot] += 1
-                elif not parameter.quantity.discrete:
-                    values[slot] = float(np.float32(values[slot] + generator.integers(1, 5) / 4))
-            group = values[parameter.slots]
-            variables[variable.name] = group if len(group) > 1 else group[0]
-            if parameter.quantity.discrete:
-                variables[variable.name] = round(group[0])
-        if isinstance(node, Loop):
-            return Loop(node.name, tuple(values), tuple(change(inner) for inner in node.body))
-        return Draw(node.name, tuple(values))
-
-    return Program(tuple(change(node) for node in program.body)), variables
+def changed(name):
+    """The program with another value of a name, and that value."""
+    if not name:
+        return parse(FORMS), {}
+    value = {name: CHANGES[name]}
+    if name == "inset":  # an expression
+        return parse(FORMS.replace("radius * 2", str(CHANGES[name]))), value
+    return sp.set(parse(FORMS), value), value
 
 
-@pytest.mark.parametrize("text", [CHAIR, SPIN, LOUNGE])
-@pytest.mark.parametrize("unit", [None, Unit("cm", 3.75), Unit("m", 0.0375)])
-def test_expressions_draw_what_unrolling_draws(text, unit):
-    program = in_unit(parse(text), unit)
-    made = plan(program)
-    same(evaluate(made), expected(program))
-    shown = [v for heading in made.headings for v in heading.variables if v.quantity.kind == "length"]
-    written = [eval(each.text) for each in shown]
-    cells = [eval(v.text) for h in plan(parse(text)).headings for v in h.variables if v.quantity.kind == "length"]
-    np.testing.assert_allclose(np.hstack(written), np.hstack(cells) * made.cell, rtol=1e-5)
+def upright(program, name="a.scad", **asked):
+    chosen = format_of(name)
+    assert chosen is not None
+    frame = placement(chosen, program, **asked).frame
+    assert frame is not None
+    return frame
 
 
-@pytest.mark.parametrize("text", [CHAIR, SPIN, LOUNGE])
-def test_numbers_at_the_top_stay_live(text):
+@needs_openscad
+@pytest.mark.parametrize("name", ["", *CHANGES])
+def test_openscad_draws_the_parts_and_its_customizer_changes_what_set_changes(name, tmp_path: Path):
+    program, (other, changes) = parse(FORMS), changed(name)
+    frame = upright(program)
+    same(of_openscad(scad_text(program, frame), tmp_path, changes), of_meshes(other, frame))
+
+
+@needs_openscad
+def test_openscad_draws_where_a_frame_says(tmp_path: Path):
+    program = parse(FORMS)
+    same(of_openscad(scad_text(program, FRAME), tmp_path), of_meshes(program, FRAME))
+
+
+@needs_build123d
+@pytest.mark.parametrize("name", ["", *CHANGES])
+def test_build123d_draws_the_parts_and_its_numbers_change_what_set_changes(name):
+    program, (other, _) = parse(FORMS), changed(name)
+    frame = upright(program)
+    lines = script_text(program, frame).splitlines()
+    if name:
+        (place,) = (row for row, line in enumerate(lines) if line.startswith(f"{name} = "))
+        lines[place] = f"{name} = {CHANGES[name]}"
+    same(of_build123d("\n".join(lines)), of_meshes(other, frame))
+
+
+@needs_build123d
+def test_build123d_draws_where_a_frame_says_and_writes_named_solids(tmp_path: Path):
+    import build123d
+
+    program = parse(FORMS)
+    same(of_build123d(script_text(program, FRAME)), of_meshes(program, FRAME))
+    read = build123d.import_step(export(parse(STOOL), tmp_path / "a.step"))
+    assert [part.label for part in read.children] == ["seat_1", "leg_1", "leg_2", "leg_3", "leg_4"]
+    np.testing.assert_allclose(tuple(read.bounding_box().size), (360, 360, 450), rtol=1e-5)
+
+
+def test_scripts_keep_loops_names_functions_roles_and_comments():
+    scad, script = scad_text(parse(FORMS), FRAME).splitlines(), script_text(parse(FORMS), FRAME).splitlines()
+    for line in (
+        "// Every form of the language.",
+        "width = 50; // [0:1:100]",
+        "// between doors",
+        "n = 3; // [1:1:10]",
+        "inset = radius * 2;",
+        "module tray(rim, floor_thickness = radius / 2) { // with a loose floor",
+        "  inner = $width - 2 * rim;",
+        "  // Leaning parts.",
+        '  part("leg") upright("taper", left = 6, front = 2, radius = [0.5, radius], height = 15);',
+        '  part("drawer") inside(left = 5, width = 20, bottom = 10, height = 10, tilt = 3) tray(rim = 2);',
+        "    let ($given_rim = $width / 10) inside(left = $width / 5) tray(rim = $given_rim);",
+        '  divide(2.5, "x", gap = gap, bottom = 25, top = 5, tilt = 4) {',
+        "  rotated(n + 2, left = 10, y = 1) {",
+    ):
+        assert line in scad
+    for line in (
+        "# Every form of the language.",
+        "width = 50",
+        "gap = 0.5  # between doors",
+        "@function",
+        "def tray(rim, floor_thickness=radius / 2):  # with a loose floor",
+        "    inner = here.width - 2 * rim",
+        'leg = role("leg")',
+        "leg(taper(left=6, front=2, radius=(0.5, radius), height=15))",
+        "    tray(rim=here.width / 10, left=here.width / 5)",
+        "for _ in divide(2.5, x, gap=gap, bottom=25, top=5, tilt=4):",
+    ):
+        assert line in script
+    assert scad.count("// between doors") == script.count("gap = 0.5  # between doors") == 1
+    assert "module bent_rod" not in scad_text(parse(STOOL), FRAME)  # no more is defined than what is called
+
+
+def test_words_of_a_script_are_no_names_of_numbers(tmp_path: Path):
+    text = "width, depth, height = 4, 5, 6\ncube, scale, h\u00f6he, len = 1, 2, 3, 4\n"
+    text += "def union(parts):\n    box(left=parts, height=len)\nbox(left=cube, bottom=scale)\nunion(parts=h\u00f6he)\n"
     program = parse(text)
-    other, variables = changed_program(program, np.random.default_rng(0))
-    same(evaluate(plan(program), variables), expected(other))
-
-
-@pytest.mark.parametrize("declared", [each for each in language() if not each.is_loop], ids=lambda each: each.name)
-@pytest.mark.parametrize("around", ["", "translate", "rotate"])
-def test_every_statement_keeps_its_parameters(declared, around):
-    generator = np.random.default_rng(declared.id)
-    low = {"length": 1, "turn": 0}
-    values = tuple(float(generator.integers(low.get(q.kind, -8), 6)) for q in declared.quantities)
-    node = Draw(declared.name, values)
-    if around:
-        motion = language()[around]
-        node = Loop(around, tuple(float(v) for v in (3, 2, -1, 4)[: motion.size]), (node,))
-    program = Program((node,))
-    other, variables = changed_program(program, generator)
-    same(evaluate(plan(program)), expected(program))
-    same(evaluate(plan(program), variables), expected(other))
-    fixed = [v.name for h in plan(program).headings for v in h.variables if v.fixed]
-    discrete = {
-        p.name
-        for each in (declared, *([language()[around]] if around else []))
-        for p in each.parameters
-        if p.quantity.discrete
-    }
-    assert all(name.rpartition("_")[2] in discrete for name in fixed)
+    scad, script = scad_text(program, FRAME), script_text(program, FRAME)
+    assert "\ncube_ = 1;" in scad
+    assert "\nh_he = 3;" in scad
+    assert "module union_(parts)" in scad
+    assert "\ncube = 1\nscale_ = 2\nh_he = 3\nlen_ = 4\n" in script
+    ast.parse(script)
+    if shutil.which("openscad"):
+        same(of_openscad(scad, tmp_path), of_meshes(program, FRAME))
 
 
 @pytest.fixture
 def own():
-    """A language with statements of a user's own: another primitive, a turned box, a curve, a loop without a rule."""
+    """A program with a statement of a user's own, whose primitive is not built in."""
+
+    def mesh(size):
+        sphere = trimesh.creation.icosphere(1)
+        return np.asarray(sphere.vertices) * size[:3], np.asarray(sphere.faces)
+
+    unused = {"distance": lambda points, size: points[..., 0], "areas": lambda size: size[..., :1]}
+    unused |= {"sample": lambda size, face, u: u, "place": lambda size, unit: unit}
+    unused |= {"normal": lambda size, unit, f: unit, "volume": lambda size: size[..., 0]}
     with using(Language()):
-        ball = primitives.register(_ball())
+        ball = primitives.register(
+            Primitive("test_ball", ("a", "b", "c"), 3, bound=lambda size: size[..., :3], mesh=mesh, **unused)
+        )
 
         @statement("puff")
         def puff(at: Position, half: Extent):
             """A soft cushion."""
             return draw_solid(ball, at, *half.unbind(-1))
 
-        @statement("tipped")
-        def tipped(at: Position, size: Extent):
-            """A box tipped about the side axis, its top leaning."""
-            c, s = math.cos(0.5), math.sin(0.5)
-            axes = torch.tensor([[c, -s, 0], [s, c, 0], [0, 0, 1]]).to(at).expand(*at.shape[:-1], 3, 3)
-            return draw_solid(CUBOID, at, *(size / 2).unbind(-1), size[..., 0] / 4, rotation=axes)
-
-        @statement("posts")
-        def posts(at: Position, radius: Radius, angle: Length):
-            """Two posts on a circle."""
-            zero = torch.zeros_like(angle)
-            place = torch.stack([zero, radius * angle.cos(), radius * angle.sin()], -1)
-            return [disc(at, radius, radius / 4), disc(at + place, radius, radius / 4)]
-
-        @loop("spiral")
-        def spiral(copy, quarter, count: Count, rise: Shift):
-            """Copies that rise ever faster while turning, the slower the more there are."""
-            zero = torch.zeros_like(copy)
-            return Motion(turn=copy / 9, shift=torch.stack([copy**2 * rise / (2 * count), zero, zero], -1))
-
-        yield parse(
-            "puff(at=(3, 0, 0), half=(2, 5, 6))\n"
-            "for i in spiral(4, rise=2):\n"
-            "    tipped(at=(-4, 6, -3), size=(4, 3, 2))\n    puff(at=(-4, 0, 5), half=(2, 1, 1))\n"
-            "posts(at=(-12, 0, 0), radius=4, angle=1.25)\n"
-        )
+        yield parse("puff(at=(3, 0, 0), half=(2, 5, 6))\npuff(at=(-4, 1, 5), half=(2, 1, 1))\n")
 
 
-def _ball():
-    def mesh(size):
-        sphere = trimesh.creation.icosphere(1)
-        return np.asarray(sphere.vertices) * size[:3], np.asarray(sphere.faces)
+def test_what_cannot_be_placed_is_a_mesh(own, tmp_path: Path):
+    frame = upright(own)
+    scad, script = scad_text(own, frame), script_text(own, frame)
+    assert 'painted("puff") polyhedron(' in scad
+    assert 'mesh("puff", ' in script
+    ast.parse(script)
+    wanted = of_meshes(own, frame)
+    assert min(row[2] for row in wanted) == pytest.approx(0, abs=1e-6)
+    if shutil.which("openscad"):
+        same(of_openscad(scad, tmp_path), wanted)
+    if importlib.util.find_spec("build123d"):
+        same(of_build123d(script), wanted)
 
-    unused = {"distance": lambda points, size: points[..., 0], "areas": lambda size: size[..., :1]}
-    unused |= {
-        "sample": lambda size, face, u: u,
-        "place": lambda size, unit: unit,
-        "normal": lambda size, unit, f: unit,
+
+def read_3mf(path: Path):
+    """The unit, and the vertices of all objects by name, of a 3MF file."""
+    with zipfile.ZipFile(path) as package:
+        root = xml.fromstring(package.read("3D/3dmodel.model"))
+    kind = "{http://schemas.microsoft.com/3dmanufacturing/core/2015/02}"
+    objects = {
+        each.get("name"): np.array([[float(v.get(axis)) for axis in "xyz"] for v in each.iter(f"{kind}vertex")])
+        for each in root.iter(f"{kind}object")
     }
-    unused |= {"volume": lambda size: size[..., 0]}
-    return Primitive("test_ball", ("a", "b", "c"), 3, bound=lambda size: size[..., :3], mesh=mesh, **unused)
+    return root.get("unit"), objects
 
 
-def test_statements_of_a_users_own_are_exported_too(own):
-    made = plan(own)
-    same(evaluate(made), expected(own))
-    fixed = {v.name for heading in made.headings for v in heading.variables if v.fixed}
-    assert fixed == {"spiral_1_rise", "posts_1_angle"}
-    assert "polyhedron" in scad_text(own, Frame())
-    compile(script_text(own, Frame()), "script", "exec")
+def bounds_of(path: Path):
+    if path.suffix == ".3mf":
+        every = np.concatenate([*read_3mf(path)[1].values()])
+        return [every.min(0), every.max(0)]
+    return trimesh.load(path, force="mesh").bounds
 
 
-def test_loops_that_follow_a_rule_are_looked_at_for_few_copies_however_many_they_have():
-    seen = []
-
-    def move(copy, quarter, **values):
-        seen.append(len(copy))
-        return language()["translate"].move(copy, quarter, **values)
-
-    found, fixed = repeat(replace(language()["translate"], move=move), (2.0**24, 0, 0, 1), quarter=False)
-    assert [axis.text(["count", "up", "depth", "side"]) for axis in found.shift] == ["up", "depth", "side"]
-    assert fixed == frozenset()
-    assert max(seen) < 100
+STANDING = [[-180, -180, 0], [180, 180, 450]]
 
 
-def test_loops_are_loops_and_numbers_have_names():
-    text = scad_text(parse(CHAIR), Frame())
-    assert "leg_1_size = [12, 2, 2]; // [0:0.5:32]" in text
-    assert "for (j = [0 : 1 : translate_2_count - 1]) move(j, translate_2_by) {" in text
-    assert "cuboid(leg_1_at, leg_1_size); // leg_1" in text
-    assert "cuboid(back_1_at, back_1_size, back_1_tilt)" in text
-    script = script_text(parse(CHAIR), Frame(), 'a "chair"')
-    assert "for j in range(translate_2_count):" in script
-    compile(script, "script", "exec")
+@pytest.mark.parametrize("suffix", [".stl", ".3mf"])
+def test_a_stool_in_metres_and_one_inferred_from_millimetres_stand_450_mm_high(suffix, tmp_path: Path):
+    stool = parse(STOOL)
+    np.testing.assert_allclose(bounds_of(export(stool, tmp_path / f"m{suffix}")), STANDING, atol=0.01)
+    bare = parse(STOOL.replace("# unit: m\n", ""))  # an STL in millimetres that lies on its back
+    frame = Frame(450 / 24, (700, -50, 20), tuple(map(tuple, grid_axes("-y", "+z"))))
+    made = export(bare, tmp_path / f"mm{suffix}", frame, file_unit="mm")
+    np.testing.assert_allclose(bounds_of(made), STANDING, atol=0.01)
+    lying = np.array([frame.to_world(np.array(STANDING) * 0)[0]])
+    assert np.abs(bounds_of(export(bare, tmp_path / f"on{suffix}", frame, on_input=True)) - lying).max() < 250
 
 
-def test_a_pointed_leg_is_drawn_by_scripts_and_as_a_part():
-    program = parse("leg(taper(start=(0, 0, 0), end=(-6, 0, 0), radius=(2, 0)))")
-    (part,) = parts(program)
-    assert trimesh.Trimesh(part.vertices, part.faces).volume == pytest.approx(np.pi * 2**2 * 6 / 3, rel=1e-5)
-    same(evaluate(plan(program)), expected(program))
-    for text in (scad_text(program, Frame()), script_text(program, Frame())):
-        assert "cylinder_between(leg_1_start, leg_1_end, leg_1_radius[0], leg_1_radius[1])" in text
+def test_units_and_axes_of_files(tmp_path: Path):
+    stool = parse(STOOL)
+    for name, asked, high in (
+        ("a.glb", {}, [0.36, 0.45, 0.36]),
+        ("b.glb", {"unit": "cm", "up": "z"}, [36, 36, 45]),
+        ("a.obj", {}, [0.36, 0.45, 0.36]),
+        ("a.ply", {"unit": "in"}, [0.36 / 0.0254, 0.45 / 0.0254, 0.36 / 0.0254]),
+        ("a.stl", {"unit": "cm", "up": "y"}, [36, 45, 36]),
+        ("b.stl", {"unit": "cells"}, [19.2, 19.2, 24]),
+        ("a.3mf", {"unit": "in"}, [0.36 / 0.0254, 0.36 / 0.0254, 0.45 / 0.0254]),
+    ):
+        low, far = bounds_of(export(stool, tmp_path / name, **asked))
+        np.testing.assert_allclose(far - low, high, rtol=1e-4)
+    assert read_3mf(tmp_path / "a.3mf")[0] == "inch"
+    assert {*read_3mf(tmp_path / "a.3mf")[1]} == {"seat_1", "leg_1", "leg_2", "leg_3", "leg_4"}
+    assert "scale(1000) whole" in scad_text(stool, upright(stool))
+    bare = parse(STOOL.replace("# unit: m\n", ""))
+    assert "\nwhole(" in scad_text(bare, upright(bare))  # one unit of the text is one of the file
+    with pytest.raises(InputError, match="the size of the object is unknown"):
+        export(bare, tmp_path / "a.stl", unit="mm")
+    with pytest.raises(InputError, match="does not say how its input lies"):
+        export(bare, tmp_path / "a.stl", on_input=True)
 
 
-def test_a_turning_loop_is_written_once_for_each_axis():
-    body = ["line(start=(0, 0, 0), end=(3, 3, 3), radius=1)", "leg(at=(0, 4, 0), size=(1, 1, 1))"]
-    body += ["layer(at=(0, 6, 0), thickness=1, half=(1, 1))"]
-    made = plan(parse("\n    ".join(["for i in rotate(3, step=1):", *body])))
-    assert [step.turn[1] for step in made.body].count("[0, 0, 0]") == 2
-    assert len(made.body) == 3
+CABINET = """
+# unit: cm
+width, depth, height = 80, 40, 60
+for _ in mirror(x=0):
+    side(left=0, width=1.8)
+    panel(left=2, right=2, rear=0, depth=0.8)
+    knob = 0
+shelf(left=1.8, right=1.8, z=0, height=1.8)
+for _ in mirror(x=0, y=0):
+    foot(cylinder(left=4, front=4, radius=2, top=60, bottom=-10))
+    foot(taper(left=12, front=4, radius=(1, 2), height=8))
+seat(cushion(top=-6, height=6, edge=2, tilt=3))
+back(rear=0, depth=2, lean=5)
+rail(bent_rod(start=at(left=0), through=at(x=0, bottom=40), end=at(right=0), radius=1))
+""".replace("    knob = 0\n", "")
 
 
-FRAME = Frame.around([1, 2, 3], [30, 40, 45], grid_axes("+y", "-z"))
-
-
-@pytest.mark.skipif(shutil.which("openscad") is None, reason="needs OpenSCAD")
-@pytest.mark.parametrize("text", [CHAIR, LOUNGE])
-def test_openscad_makes_the_same_solid(text, tmp_path: Path):
-    program = parse(text)
-    export(program, tmp_path / "chair.scad", FRAME)
-    subprocess.run(["openscad", "-q", "-o", "chair.stl", "chair.scad"], cwd=tmp_path, check=True, capture_output=True)
-    made, wanted = trimesh.load(tmp_path / "chair.stl"), trimesh.Trimesh(*solid(program, FRAME))
-    np.testing.assert_allclose(made.volume, wanted.volume, rtol=1e-3)
-    np.testing.assert_allclose(made.bounds, wanted.bounds, atol=1e-2)
-
-
-@pytest.mark.skipif(importlib.util.find_spec("build123d") is None, reason="needs build123d")
-def test_build123d_makes_the_same_parts():
-    program = parse(LOUNGE)
-    scope = {"__name__": "model"}
-    exec(script_text(program, FRAME), scope)
-    made, wanted = {part.label: part for part in scope["parts"]}, {part.name: part for part in parts(program, FRAME)}
-    assert made.keys() == wanted.keys()
-    for name, mesh in wanted.items():
-        part, box = made[name], made[name].bounding_box()
-        np.testing.assert_allclose(part.volume, trimesh.Trimesh(mesh.vertices, mesh.faces).volume, rtol=1e-4)
-        bounds = [mesh.vertices.min(0), mesh.vertices.max(0)]
-        np.testing.assert_allclose([tuple(box.min), tuple(box.max)], bounds, atol=2e-2)
-
-
-@pytest.mark.skipif(importlib.util.find_spec("build123d") is None, reason="needs build123d")
-def test_build123d_makes_the_same_solid(tmp_path: Path):
-    program = parse(CHAIR)
-    scope = {"__name__": "model"}
-    exec(script_text(program, FRAME), scope)
-    wanted = trimesh.Trimesh(*solid(program, FRAME))
-    np.testing.assert_allclose(scope["union"]().volume, wanted.volume, rtol=1e-4)
-    assert [part.label for part in scope["parts"]] == [part.name for part in parts(program)]
-    export(program, tmp_path / "chair.step", FRAME)
-    assert b"leg_4" in (tmp_path / "chair.step").read_bytes()
+def test_a_cut_list_has_each_distinct_part_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    program = parse(CABINET)
+    found = cut_list(program, upright(program, "a.csv"), "cm")
+    rows = {(count, cut.role, cut.size, cut.shape) for cut, count in found.cuts}
+    arc = 2 * 40 * math.atan2(40, 40) * 2
+    assert rows == {
+        (2, "side", "60 x 40 x 1.8", "board"),
+        (1, "panel", "76 x 60 x 0.8", "board"),
+        (1, "shelf", "76.4 x 40 x 1.8", "board"),
+        (4, "foot", "⌀ 4 x 10", "round"),
+        (4, "foot", "⌀ 4 x 8", "tapered from 2 to 4"),
+        (1, "seat", "80 x 40 x 6", "rounded edges 2"),
+        (1, "back", "80 x 60 x 2", "leaning by 5"),
+        (1, "rail", f"⌀ 2 x {round(arc, 2):g}", "bent"),
+    }
+    assert found.coinciding == 1
+    assert found.area == "1.24 m²"  # two sides, a panel, a shelf
+    program_file = tmp_path / "cabinet.shape"
+    program_file.write_text(CABINET.lstrip())
+    with pytest.raises(SystemExit, match="0"):
+        main(["export", str(program_file), str(tmp_path / "cuts.csv"), "--unit", "mm"])
+    assert "1 copies lie where others lie" in capsys.readouterr().out
+    lines = (tmp_path / "cuts.csv").read_text().splitlines()
+    assert lines[0] == "count,role,length (mm),width (mm),thickness (mm),diameter (mm),shape"
+    assert "2,side,600,400,18,,board" in lines
+    assert "4,foot,100,,,40,round" in lines

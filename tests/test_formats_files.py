@@ -8,11 +8,14 @@ import inspect
 import json
 import os
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 import trimesh
+from hypothesis import given
+from hypothesis import strategies as st
 
 import shapeprog as sp
 from shapeprog.cli import main
@@ -21,13 +24,16 @@ from shapeprog.data.loading import ARRAY_SUFFIXES
 from shapeprog.errors import InputError, OutputError, ProgramError
 from shapeprog.formats import FORMATS, Format, export, format_of, listed, load_with_frame, suffixes
 from shapeprog.formats.colours import colour
-from shapeprog.formats.frames import frame_comment, frame_in
-from shapeprog.formats.frames import upright as upright_in
-from shapeprog.formats.json_form import result_json
+from shapeprog.formats.frames import frame_comment, frame_in, frame_of_grid, placement, scale_of
+from shapeprog.formats.json_form import Result, result_json
 from shapeprog.formats.parts import crease_normals, parts, solid
+from shapeprog.formats.shape import program_in, program_text
 from shapeprog.geometry.primitives.cylinder import mesh as cylinder_mesh
+from shapeprog.language.ast import Scale
+from shapeprog.language.evaluate import evaluated
+from shapeprog.language.parser import parse
+from shapeprog.language.printer import format_program
 from shapeprog.language.program import Program
-from shapeprog.language.text import format_program, parse
 from shapeprog.space import Frame, grid_axes
 
 TEXT = """
@@ -42,12 +48,13 @@ FRAME = Frame.around([1, 2, 3], [3, 4, 4.5], grid_axes("+y", "-z"))
 MESHES = [".glb", ".obj", ".ply", ".stl"]
 
 
-def upright(suffix: str) -> Frame:
+def lies(suffix: str, frame: Frame | None = None) -> Frame:
+    """Where the table is in a file."""
     chosen = format_of(f"a{suffix}")
     assert chosen is not None
-    frame = upright_in(chosen)
-    assert frame is not None
-    return frame
+    found = placement(chosen, PROGRAM, frame).frame
+    assert found is not None
+    return found
 
 
 @pytest.mark.parametrize("suffix", MESHES)
@@ -55,10 +62,10 @@ def upright(suffix: str) -> Frame:
 def test_meshes_agree_with_the_parts(tmp_path: Path, suffix: str, frame: Frame | None):
     path = export(PROGRAM, tmp_path / f"table{suffix}", frame)
     read = trimesh.load(path, force="mesh")
-    each = parts(PROGRAM, frame or upright(suffix))
+    each = parts(PROGRAM, lies(suffix, frame))
     stacked = np.concatenate([part.vertices for part in each])
     np.testing.assert_allclose(read.bounds, [stacked.min(0), stacked.max(0)], atol=1e-5)
-    union = trimesh.Trimesh(*solid(PROGRAM, frame or upright(suffix)))
+    union = trimesh.Trimesh(*solid(PROGRAM, lies(suffix, frame)))
     wanted = union.volume if suffix == ".stl" else sum(part.volume for part in each)
     np.testing.assert_allclose(read.volume, wanted, rtol=1e-5)
 
@@ -67,7 +74,7 @@ def test_stl_is_one_watertight_solid_without_inner_walls(tmp_path: Path):
     read = trimesh.load(export(PROGRAM, tmp_path / "table.stl", FRAME))
     assert read.is_watertight
     assert read.body_count == 1
-    overlap = sum(part.volume for part in parts(PROGRAM, FRAME)) - read.volume
+    overlap = sum(part.volume for part in parts(PROGRAM, lies(".stl", FRAME))) - read.volume
     assert overlap > 0
 
 
@@ -216,7 +223,7 @@ def test_the_functions_that_a_declaration_names_are_there_and_take_its_options(e
         if place:
             module, _, name = place.partition(":")
             function = getattr(importlib.import_module(f"shapeprog.formats.{module}"), name)
-            options = each.options if place == each.writer else ()
+            options = (*each.options, *["unit"] * each.takes_unit) if place == each.writer else ()
             assert list(inspect.signature(function).parameters) == [*first, *options]
 
 
@@ -243,6 +250,118 @@ def test_frames_survive_as_a_comment():
     assert frame_in(frame_comment(FRAME) + TEXT) == FRAME
     assert parse(frame_comment(FRAME) + TEXT) == PROGRAM
     assert frame_in(TEXT) is None
+
+
+PLACED = """\
+# unit: cm
+width, depth, height = 44, 42, 90
+leg_width = 4
+
+def backrest(slats):
+    for _ in row(slats, last=at(top=3)):
+        slat(left=leg_width, depth=2, bottom=12, height=6)
+
+for _ in mirror(x=0, y=0):
+    leg(left=0, width=leg_width, front=0, depth=leg_width, top=45)
+arm(cylinder(right=0, radius=2, bottom=50, height=4))
+backrest(slats=3, rear=0, depth=leg_width, bottom=45, tilt=11)
+"""
+SIGNED = [f"{sign}{axis}" for sign in ("", "-") for axis in "xyz"]
+ALIGNED = [(up, front) for up in SIGNED for front in SIGNED if up[-1] != front[-1]]
+
+
+def turned(seed: int) -> list[list[float]]:
+    """A rotation along no axis."""
+    axes, _ = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))
+    return (axes * [1, 1, np.linalg.det(axes)]).tolist()
+
+
+@pytest.mark.parametrize("suffix", [".shape", ".json"])
+@given(
+    st.sampled_from([*ALIGNED, None]),
+    st.floats(1e-4, 1e4),
+    st.tuples(*[st.floats(-100, 100)] * 3),
+    st.floats(0.5, 2),
+    st.integers(0, 99),
+)
+def test_what_is_saved_and_loaded_lies_at_the_same_place_in_the_world(
+    suffix: str, axes: tuple[str, str] | None, scale: float, middle: tuple[float, float, float], grid: float, seed: int
+):
+    source = parse(PLACED).source
+    assert source is not None
+    assert source.scale is not None
+    # inference has a grid of its own, in which the longest side of the whole need not be 24 cells
+    other = Scale(source.scale.cells_per_unit * grid, source.scale.floor + grid)
+    program = evaluated(replace(source, scale=other))
+    rotation = turned(seed) if axes is None else grid_axes(*axes).tolist()
+    frame = Frame(scale, tuple(scale * value for value in middle), tuple(map(tuple, rotation)))
+    text = program_text(program, frame)
+    assert text.startswith("# frame: {" if axes is None else f"# placed: up {axes[0]}, front {axes[1]}, origin ")
+    read, kept = program_in(text, "x") if suffix == ".shape" else both(result_json(program, frame))
+    assert kept is not None
+    for one, two in zip(parts(program), parts(read), strict=True):
+        there, back = frame.to_world(one.vertices), kept.to_world(two.vertices)
+        np.testing.assert_allclose(back, there, rtol=0, atol=24e-6 * scale)
+    assert program_text(read, kept).splitlines()[1:] == text.splitlines()[1:]
+
+
+def both(text: str) -> tuple[Program, Frame | None]:
+    result = Result("x", json.loads(text))
+    return result.program, result.frame
+
+
+def test_the_frame_of_a_placed_text_is_a_line_to_read():
+    scale = scale_of(parse(PLACED))
+    metres = frame_of_grid(Frame(0.01, (0, 0.5, 0), ((1, 0, 0), (0, 0, 1), (0, -1, 0))), scale)
+    line = "# placed: up y, front z, origin 0 0.5 0, 1 unit = 0.01 m"
+    assert program_text(parse(PLACED), metres) == f"{line}\n{PLACED}"
+    assert program_text(parse(PLACED), None) == PLACED
+    read, frame = program_in(f"# a chair\r\n{line}\r\n" + PLACED.replace("\n", "\r\n"), "x")
+    assert format_program(read) == PLACED.replace("\nwidth", "\n# a chair\n\nwidth", 1)
+    assert frame is not None
+    np.testing.assert_allclose(frame.centre, metres.centre, atol=1e-12)
+    assert program_in(PLACED + line, "x")[1] is None, "below the first statement it is a comment"
+
+
+@pytest.mark.parametrize(
+    ("entries", "column", "words"),
+    [
+        ("up y, front -y, origin 0 0 0, 1 unit = 1", 11, "perpendicular"),
+        ("up y", 11, "no frame of a text"),
+        ("up w, front z, origin 0 0 0, 1 unit = 1", 11, "no frame of a text"),
+        ("up y, front z, origin 0 a 0, 1 unit = 1 m", 35, "'a' is not a number"),
+        ("up y, front z, origin 0 1e999 0, 1 unit = 1", 35, "'1e999' is not a number"),
+        ("up y, front z, origin 0 0 0, 1 unit = 0", 49, "'0' is not a positive number"),
+    ],
+)
+def test_a_wrong_frame_of_a_placed_text_has_its_place(entries: str, column: int, words: str):
+    with pytest.raises(ProgramError, match=words) as caught:
+        program_in(f"# a chair\n# placed: {entries}\n{PLACED}", "x")
+    assert (caught.value.line, caught.value.column) == (2, column)
+    assert "write it as # placed: up y" in caught.value.hint
+
+
+def test_json_lists_the_solids_with_their_lines_and_bounds():
+    content = json.loads(result_json(parse(PLACED), lies(".stl"), scores={"iou": 0.5}))
+    lines = content["text"].splitlines()
+    assert (content["unit"], content["scores"], "frame" in content) == ("cm", {"iou": 0.5}, True)
+    found = [(lines[each["line"] - 1].strip(), each["role"], each["kind"]) for each in content["solids"]]
+    leg = "leg(left=0, width=leg_width, front=0, depth=leg_width, top=45)"
+    assert found[:4] == [(leg, "leg", "box")] * 4
+    assert found[4] == ("arm(cylinder(right=0, radius=2, bottom=50, height=4))", "arm", "cylinder")
+    assert {(role, kind) for _, role, kind in found[5:]} == {("slat", "box")}
+    bounds = [(each["low"], each["high"]) for each in content["solids"]]
+    assert ([-22, -21, 0], [-18, -17, 45]) in bounds[:4]
+    assert ([18, 17, 0], [22, 21, 45]) in bounds[:4]
+    assert bounds[4] == ([18, -2, 50], [22, 2, 54])
+    in_cells = json.loads(result_json(PROGRAM))
+    assert (in_cells["unit"], in_cells["solids"][0]["kind"]) == ("cells", "top_rectangle")
+    assert in_cells["solids"][1] | {"role": "leg", "low": [6, -11, -12], "high": [8, -9, 10]} == in_cells["solids"][1]
+
+
+def test_json_of_very_many_solids_has_no_list_of_them():
+    program = parse("for i in translate(20000, by=(0.001, 0, 0)):\n    leg(at=(0, 0, 0), size=(1, 1, 1))\n")
+    assert "solids" not in json.loads(result_json(program))
 
 
 def test_creases_are_sharp_and_rounds_are_smooth():

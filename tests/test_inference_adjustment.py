@@ -17,8 +17,8 @@ from shapeprog.inference.budget import Deadline
 from shapeprog.inference.evidence import Evidence, evidence_of
 from shapeprog.inference.joints import find_joints, needs
 from shapeprog.inference.tunable import THINNEST, Tunable
+from shapeprog.language.parser import parse
 from shapeprog.language.program import Program
-from shapeprog.language.syntax import parse
 from shapeprog.language.tensors import encode
 from shapeprog.language.unroll import Plan, unroll
 

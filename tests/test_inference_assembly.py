@@ -26,9 +26,9 @@ from shapeprog.inference.tunable import bounds
 from shapeprog.language import Draw, Language, Loop, Program, language, standard, statement, using
 from shapeprog.language.hints import Box
 from shapeprog.language.parameters import Length, Position, Radius
+from shapeprog.language.parser import parse
 from shapeprog.language.program import Node
 from shapeprog.language.shapes import disc
-from shapeprog.language.text import parse
 from shapeprog.language.unroll import unroll
 
 EXAMPLES = Path(__file__).parent.parent / "examples"

@@ -27,10 +27,11 @@ from shapeprog.inference.evidence import evidence_of_program
 from shapeprog.inference.recognition import proposed
 from shapeprog.inference.ties.tying import tie
 from shapeprog.inference.tunable import Tunable
+from shapeprog.language.ast import Call
 from shapeprog.language.free import numbers, numbers_outside
+from shapeprog.language.parser import parse
+from shapeprog.language.printer import format_program, source_of
 from shapeprog.language.program import Draw, Loop, Program
-from shapeprog.language.source import Call
-from shapeprog.language.text import format_program, parse, source_of
 from shapeprog.library import library_of, with_library
 from shapeprog.library.matching import Pattern
 

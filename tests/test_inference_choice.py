@@ -29,8 +29,8 @@ from shapeprog.inference.coverage import (
 )  # fmt: skip
 from shapeprog.inference.coverage_kernels import TURNED
 from shapeprog.inference.evidence import Evidence, evidence_of
+from shapeprog.language.parser import parse
 from shapeprog.language.program import Program
-from shapeprog.language.syntax import parse
 from shapeprog.language.unroll import unroll
 from tests.geometry_helpers import random_scene
 

@@ -21,7 +21,7 @@ from shapeprog.inference.pieces import Pieces, find_pieces
 from shapeprog.language import Draw, Language, Program, Statement, standard, using
 from shapeprog.language.hints import Box
 from shapeprog.language.parameters import Extent
-from shapeprog.language.text import parse
+from shapeprog.language.parser import parse
 
 SOLIDS = {
     "box": (-5.0, -3.0, -4.0, 8.0, 2.0, 6.0),

@@ -16,8 +16,8 @@ from shapeprog.inference.coverage import Prices, covers
 from shapeprog.inference.evidence import Evidence, evidence_of
 from shapeprog.inference.neighbours import neighbours
 from shapeprog.language import Draw, Loop, Program
+from shapeprog.language.parser import parse
 from shapeprog.language.program import Node
-from shapeprog.language.text import parse
 from shapeprog.language.unroll import unroll
 
 SEAT = "box(at=(2, -8, -12), size=(1, 16, 24))\n"

@@ -11,8 +11,9 @@ from shapeprog.data.random import random_program
 from shapeprog.inference.connecting import floating
 from shapeprog.inference.readable import COARSE, DRIFT, in_readable_unit
 from shapeprog.language import language
+from shapeprog.language.parser import parse
+from shapeprog.language.printer import format_program
 from shapeprog.language.program import Loop
-from shapeprog.language.text import format_program, parse
 from shapeprog.language.unit import METRES, Unit
 
 CHAIR = "width, height = 10.213, 24.004\nseat(box(at=(0, -5, -width / 2), size=(height / 9, 10.1, width)))\n"

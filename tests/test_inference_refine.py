@@ -14,8 +14,8 @@ from shapeprog.geometry.surface import sample_surface
 from shapeprog.inference import Schedule, Settings, infer, refine, snap, snapped_from
 from shapeprog.inference.budget import Deadline
 from shapeprog.inference.tunable import THINNEST
+from shapeprog.language.parser import parse
 from shapeprog.language.tensors import Code, decode, encode
-from shapeprog.language.text import parse
 from shapeprog.language.unroll import unroll
 
 TABLE = """
@@ -116,4 +116,4 @@ def test_inference_survives_full_grids_single_cells_and_flat_sheets(kind):
     result = infer(Shape(kind, solid), blocks=1, settings=QUICK, schedule=Schedule(steps=4), statements="paper")
     check(result, 1)
     assert result.scores["iou"] == 1
-    assert "all 1 blocks are in use" in result.reason
+    assert "the limit of --blocks 1 is reached" in result.reason

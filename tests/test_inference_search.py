@@ -16,7 +16,7 @@ from shapeprog.inference.descent_kernels import moves, statements, valid
 from shapeprog.inference.drawing import draw_all
 from shapeprog.inference.families import families
 from shapeprog.inference.structure import MOST_COPIES, PLANES, Settings, search_structure
-from shapeprog.language.text import parse
+from shapeprog.language.parser import parse
 from shapeprog.language.unroll import unroll
 
 TABLE = """

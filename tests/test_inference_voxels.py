@@ -20,7 +20,8 @@ from shapeprog.inference.evidence import evidence_of
 from shapeprog.inference.residuals import Target
 from shapeprog.inference.tunable import Tunable
 from shapeprog.language import Program
-from shapeprog.language.text import numbers_written, parse
+from shapeprog.language.parser import parse
+from shapeprog.language.printer import numbers_written
 
 TABLE = """\
 box(at=(6.3, -7.7, -11.7), size=(1.4, 15.4, 23.4))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import os
 import shutil
+import subprocess
 import sys
 from pathlib import Path
 from types import FunctionType
@@ -100,6 +101,16 @@ def test_prepare_compiles_what_is_missing_and_then_loads_it(declare, monkeypatch
     again(first)
     compiling.prepare([name], told.append)
     assert len(told) == 1
+
+
+def test_another_process_ends_with_the_one_that_started_it(tmp_path):
+    (tmp_path / "endless.py").write_text("import sys, time\nprint('at work', file=sys.stderr)\ntime.sleep(60)\n")
+    words = [sys.executable, "-m", "shapeprog.kernels.compile", "0/1", "endless"]
+    env = {**os.environ, "PYTHONPATH": os.pathsep.join([str(tmp_path), str(ROOT / "src")])}
+    with subprocess.Popen(words, stdin=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=env) as other:
+        assert other.stderr.readline() == "at work\n"
+        other.stdin.close()  # as the system does when a process is killed
+        assert other.wait(timeout=30) == 0
 
 
 def test_every_module_of_kernels_is_named_and_none_compiles_by_itself():

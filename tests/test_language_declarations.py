@@ -18,9 +18,10 @@ from shapeprog.geometry import Primitive, Solids, primitives
 from shapeprog.geometry.primitives import built_in_names
 from shapeprog.language import Language, decode, encode, loop, standard, statement, unroll, using
 from shapeprog.language.parameters import Count, Extent, Length, Position, Quantity, Shift3
+from shapeprog.language.parser import parse
+from shapeprog.language.printer import format_program
 from shapeprog.language.shapes import box
 from shapeprog.language.statement import Motion
-from shapeprog.language.text import format_program, parse
 from shapeprog.view.manual import manual
 
 

@@ -9,10 +9,10 @@ import pytest
 from written import written_program
 
 import shapeprog as sp
-from shapeprog.language.evaluation import evaluated
+from shapeprog.language.evaluate import evaluated
 from shapeprog.language.merging import apart, merged
+from shapeprog.language.printer import format_program, source_of
 from shapeprog.language.program import Program
-from shapeprog.language.text import format_program, source_of
 
 CHAIR = """\
 width, depth = 12, 10

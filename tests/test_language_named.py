@@ -10,7 +10,8 @@ from written import written_program
 
 import shapeprog as sp
 from shapeprog.language import Draw
-from shapeprog.language.text import format_program, parse
+from shapeprog.language.parser import parse
+from shapeprog.language.printer import format_program
 
 CHAIR = """\
 width, thick = 10, 2
@@ -64,12 +65,72 @@ def test_a_number_that_is_set_moves_all_that_follows_from_it() -> None:
     assert sp.set(parse("w = 6 / 4\nleg(at=(0, 0, 0), size=(w, 1, 1))"), w=2).body == (Draw("leg", (0, 0, 0, 2, 1, 1)),)
 
 
+TABLE = """\
+# unit: cm
+diameter, ratio = 100, 2
+width, depth, height = diameter, diameter, 74
+leg_width = diameter / 20
+inset = leg_width * ratio  # from both sides
+
+def corner(size):
+    leg(width=size, depth=size, top=3)
+
+top(cylinder(top=0, height=3))
+for _ in mirror(x=0, y=0):
+    corner(size=leg_width, left=inset, front=inset)
+"""
+
+
+def test_a_number_replaces_an_expression_in_a_program_of_placed_parts() -> None:
+    program = parse(TABLE)
+    changed = sp.set(program, inset=4, height=148)
+    text = TABLE.replace("leg_width * ratio", "4").replace("diameter, 74", "diameter, 148")
+    assert format_program(changed) == text
+    assert program.source is not None
+    assert changed.source is not None
+    assert changed.source.scale == program.source.scale, "the scale is that of the text as it was read"
+    assert changed.body[0].values == pytest.approx((145 * 0.24 - 74 * 0.12, 0, 0, 0.72, 12))
+    values = {each.name: each.value for each in sp.names(sp.set(changed, leg_width=6, diameter=90))}
+    assert values == {
+        "diameter": 90, "ratio": 2, "width": 90, "depth": 90, "height": 148, "leg_width": 6, "inset": 4,
+    }  # fmt: skip
+
+
+def test_names_of_placed_text_know_the_lines_that_use_them() -> None:
+    text = TABLE + (
+        "with inside(bottom=20, height=height / 2):\n    for _ in divide(ratio, z, gap=inset / 4):\n"
+        "        shelf(height=height / 9)\n        shelf(rod(start=at(left=inset), end=at(right=0), radius=1))\n"
+        "for _ in row(ratio, last=at(right=inset)):\n    foot(left=0, width=3)\n"
+    )
+    found = {each.name: each for each in sp.names(parse(text))}
+    lines = text.splitlines()
+    shown = {name: [lines[row - 1].split("(")[0].strip() for row in each.lines] for name, each in found.items()}
+    assert shown["inset"] == ["corner", "for _ in divide", "shelf", "for _ in row"]
+    assert shown["ratio"] == ["inset = leg_width * ratio  # from both sides", "for _ in divide", "for _ in row"]
+    assert shown["height"] == ["with inside"], "height within the group is another one"
+    assert [name for name, each in found.items() if each.whole] == ["ratio"]
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"corner": 3}, "no name 'corner'"),
+        ({"size": 3}, "no name 'size'"),
+        ({"height": -1}, "the height of the whole is -1"),
+        ({"leg_width": 0}, "width"),
+    ],
+)
+def test_what_cannot_be_set_in_a_program_of_placed_parts_is_told(changes: dict[str, float], words: str) -> None:
+    with pytest.raises(sp.ShapeProgError) as caught:
+        sp.set(parse(TABLE), changes)
+    assert words in str(caught.value)
+
+
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
         ({"widht": 3}, "no name 'widht'\n  hint: did you mean width"),
         ({"long": 3}, "no name 'long'"),
-        ({"span": 3}, "span follows from other numbers: span = width - thick\n  hint: set width or thick"),
         ({"width": float("inf")}, "too large"),
     ],
 )

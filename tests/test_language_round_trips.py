@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator
 
 import pytest
@@ -18,7 +19,9 @@ from shapeprog.formats.json_form import program_from_json, program_to_json
 from shapeprog.formats.notation import format_notation, parse_notation
 from shapeprog.language import Draw, Loop, Program, Statement, decode, encode, using
 from shapeprog.language.parameters import shortest, to_float32
-from shapeprog.language.text import format_program, parse
+from shapeprog.language.parser import parse
+from shapeprog.language.placement import BETWEEN, BOX, GROUPS, IN_BOX
+from shapeprog.language.printer import format_program
 from shapeprog.view.manual import manual, page
 
 
@@ -156,8 +159,25 @@ def test_the_manual_shows_text_that_parses(declared: Statement) -> None:
     assert all(parameter.name in shown for parameter in declared.parameters)
     filled = " ".join(declared.signature.replace("(_", "(1").replace("=_", "=1").replace(" _", " 1").split())
     assert parse(filled + ("\n    pass" if declared.is_loop else "")).statements == 1
-    assert manual(declared.name) == shown
+    assert manual(declared.name).endswith(shown)
     assert declared.name in manual()
+
+
+def test_the_manual_has_every_word_of_placed_text_and_comes_first_with_it() -> None:
+    for name, needs in (*IN_BOX.items(), *BETWEEN.items()):
+        shown = manual(name)
+        assert shown.startswith(f"{name}(")
+        assert all(re.search(rf"^  {word}\b|^  left .*\b{word}\b", shown, re.MULTILINE) for word in needs.required)
+        assert all(re.search(rf"\b{word}\b", shown) for word in needs.optional)
+    for name, group in GROUPS.items():
+        assert manual(name).startswith(group.example)
+        assert all(re.search(rf"\b{word}\b", manual(name)) for word in group.keywords)
+        assert group.example in manual()
+        inner = "\n    leg(height=2)\n"
+        assert parse(f"width, depth, height = 40, 40, 40\n{group.example.replace('...', '5')}{inner}").blocks == 1
+    for word in (*BOX, "gap", "tilt", "radius"):
+        assert word in manual(word)
+    assert manual().index("Solids") < manual().index("Roles") < manual().index("Statements in cells")
 
 
 def test_random_programs_stay_in_range_and_repeat_with_their_seed() -> None:
@@ -188,7 +208,7 @@ def test_files(tmp_path: object) -> None:
     assert load(path) == program
     for content, words in [
         (b"leg(\xff)", "byte 4 is not UTF-8"),
-        (b"legg()", "x.shape, line 1, column 1: unknown statement"),
+        (b"legg(at=1)", "x.shape, line 1, column 1: unknown statement"),
     ]:
         path.write_bytes(content)
         with pytest.raises(sp.ShapeProgError, match=words):

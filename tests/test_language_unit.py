@@ -15,12 +15,13 @@ import shapeprog as sp
 from shapeprog.data.random import random_program
 from shapeprog.formats.notation import format_notation, parse_notation
 from shapeprog.language import Program, evaluated, language
-from shapeprog.language.converting import in_unit, lengths
+from shapeprog.language.ast import Assignment, Draw, Line, Source
+from shapeprog.language.dimensions import in_unit, lengths
 from shapeprog.language.expression import Binary, Name, Negative, Value
 from shapeprog.language.free import free_numbers, multiplied
+from shapeprog.language.parser import parse
+from shapeprog.language.printer import format_program, source_of
 from shapeprog.language.program import Loop
-from shapeprog.language.source import Assignment, Line, Source, WrittenDraw, WrittenLoop
-from shapeprog.language.text import format_program, parse, source_of
 from shapeprog.language.unit import METRES, Unit
 from shapeprog.space import Frame
 
@@ -84,8 +85,8 @@ def named(program: Program) -> Program:
             for value, quantity in zip(node.values, quantities, strict=True)
         )
         if isinstance(node, Loop):
-            return WrittenLoop(node.name, values, tuple(map(line, node.body)))
-        return WrittenDraw(node.name, values, node.role)
+            return Loop(node.name, values, tuple(map(line, node.body)))
+        return Draw(node.name, values, node.role)
 
     body = [line(node) for node in program.body]
     return evaluated(Source((*header, *body)))
@@ -251,26 +252,8 @@ def test_a_wrong_unit_is_told_with_its_place(text: str, line: int, column: int, 
     assert words in str(caught.value)
 
 
-@pytest.mark.parametrize(
-    ("unit", "words"),
-    [
-        ("cm", "not a name and a number"),
-        ({"name": "cm"}, "not a name and a number"),
-        ({"name": "cm", "per_cell": "3"}, "not a name and a number"),
-        ({"name": "cm", "per_cell": True}, "not a name and a number"),
-        ({"name": "el", "per_cell": 3}, "unknown unit 'el'"),
-        ({"name": "cm", "per_cell": 0}, "invalid cell size"),
-    ],
-)
-def test_a_wrong_unit_in_json_is_told(unit: object, words: str) -> None:
-    import json
-
-    with pytest.raises(sp.InputError, match=words):
-        sp.program_from_json(json.dumps({"format": "shapeprog", "version": 3, "unit": unit, "program": []}))
-
-
 def test_a_comment_that_reads_like_a_unit_is_not_written() -> None:
-    from shapeprog.language.source import Comment
+    from shapeprog.language.ast import Comment
 
     with pytest.raises(sp.ShapeProgError, match="read as the unit"):
         format_program(evaluated(Source((Comment("unit: the left one"),), Unit("cm", 4))))

@@ -13,7 +13,7 @@ from shapeprog.data.random import random_program
 from shapeprog.errors import ShapeProgError
 from shapeprog.geometry.scene import Scene
 from shapeprog.language import Code, Draw, Loop, Program, Statement, encode, unroll, using
-from shapeprog.language.text import parse
+from shapeprog.language.parser import parse
 
 
 @pytest.fixture(autouse=True)

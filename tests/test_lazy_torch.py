@@ -23,6 +23,7 @@ BOTH_WAYS = """
 import sys
 import numpy as np
 from shapeprog.errors import ShapeProgError
+from shapeprog.formats.cuts import cut_list
 from shapeprog.formats.openscad import write_scad
 from shapeprog.formats.parts import parts, solid
 from shapeprog.language import Draw, Loop, Program, language
@@ -55,6 +56,7 @@ def drawn():
             yield error.message, np.zeros(0), np.zeros(0)
         write_scad(program, Path("a.scad"), Frame())
         yield Path("a.scad").read_text(), np.zeros(0), np.zeros(0)
+        yield str(cut_list(program, Frame())), np.zeros(0), np.zeros(0)
 
 light = list(drawn())
 assert "torch" not in sys.modules
@@ -79,7 +81,7 @@ def test_every_statement_that_ships_draws_alike_without_torch(tmp_path: Path) ->
         [
             "export",
             "a.shape",
-            *(f"b.{suffix}" for suffix in ("shape", "json", "stl", "glb", "obj", "ply", "scad", "py")),
+            *(f"b.{suffix}" for suffix in ("shape", "json", "stl", "3mf", "glb", "obj", "ply", "scad", "py", "csv")),
         ],
         ["export", "a.shape", "b.stl", "--set", "width=7"],
         ["show", "a.shape"],

@@ -11,7 +11,7 @@ from torch.nn.functional import max_pool3d
 from shapeprog.data.packs import read_pack
 from shapeprog.geometry.cells import count, union, unpack
 from shapeprog.language import encode
-from shapeprog.language.text import parse
+from shapeprog.language.parser import parse
 from shapeprog.language.unroll import draw_blocks, unroll
 from shapeprog.liang2022.decode import EXACT_WEIGHT, Decoded, decode
 from shapeprog.liang2022.evaluate import evaluate, scores_on_packs

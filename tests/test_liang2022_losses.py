@@ -10,7 +10,7 @@ import torch
 from torch import Tensor
 
 from shapeprog.errors import DeclarationError, ShapeProgError
-from shapeprog.language.text import parse
+from shapeprog.language.parser import parse
 from shapeprog.language.unroll import unroll
 from shapeprog.liang2022.estimators import NvilBaseline, leave_one_out_advantage, reinforce_loss
 from shapeprog.liang2022.losses import LOSSES, NEURAL, Comparison, Values, compute, loss, parse_losses

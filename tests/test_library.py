@@ -13,16 +13,19 @@ from commands import Run
 from shapeprog import inference
 from shapeprog.data.synthetic.furniture import furniture
 from shapeprog.errors import InputError, OutputError
-from shapeprog.language.converting import in_unit
+from shapeprog.language.ast import Call, Source
+from shapeprog.language.convert import placed
+from shapeprog.language.dimensions import in_unit
 from shapeprog.language.named import inline, names
 from shapeprog.language.named import set as set_numbers
+from shapeprog.language.parser import parse
+from shapeprog.language.printer import format_program, format_source, source_of
 from shapeprog.language.program import Draw, Loop, Program
-from shapeprog.language.source import Call, Source
-from shapeprog.language.text import format_program, format_source, parse, source_of
 from shapeprog.language.unit import Unit
 from shapeprog.language.unroll import unroll
 from shapeprog.library import Library, learn, library_of, load_library, save_library, with_library
 from shapeprog.library.blocks import Kind, blocks_of
+from shapeprog.library.groups import PARAMETERS
 from shapeprog.library.length import statements
 from shapeprog.library.matching import TOLERANCE
 from shapeprog.library.rewriting import offers
@@ -216,9 +219,9 @@ def planted(number: int) -> Program:
 def test_a_function_that_is_planted_in_five_programs_is_found_with_its_relations() -> None:
     programs = [planted(number) for number in range(5)]
     found = learn(programs)
-    (function,) = found.functions
-    assert {line.name for line in Source(function.body).walk()} == {"mirror", "bar", "box"}
-    assert len(function.parameters) == 5, "as many numbers as it was drawn from"
+    (function,) = found.source.functions.values()
+    assert {line.kind for line in Source(function.body).walk()} == {"mirror", "bar", "box"}
+    assert [name for name, _ in function.parameters] == ["thickness"], "all else follows from its box"
     for program in programs:
         written = with_library(program, found)
         assert len(calls(written)) == 1
@@ -248,6 +251,7 @@ def test_programs_that_share_nothing_give_an_empty_library() -> None:
 def test_the_library_that_ships_holds_at_most_twelve_functions_each_with_a_call_that_draws() -> None:
     shipped = load_library()
     assert 1 <= len(shipped.functions) <= 12
+    assert max(len(function.parameters) for function in shipped.source.functions.values()) <= PARAMETERS
     for pattern in shipped.patterns:
         assert pattern.example is not None
         program = parse(format_source(Source((*pattern.others, pattern.function, pattern.example))))
@@ -282,7 +286,7 @@ def test_commands_learn_show_and_draw_libraries(run: Run, tmp_path: Path) -> Non
     shown = run("library", "show", "mine.shape")
     assert "# shapeprog library learn programs --out mine.shape" in shown.out
     assert shown.out == (tmp_path / "mine.shape").read_text()
-    assert "def boxes(" in run("library", "show").out
+    assert "def left_to_right(" in run("library", "show").out
     ended = run("library", "learn", "programs/0.shape")
     assert ended.code == 2
     assert "no function shortens this program" in ended.err
@@ -324,7 +328,7 @@ def test_tidy_and_infer_write_programs_with_a_library(
     run("export", "table.shape", "table.obj")
     ended = run("infer", "table.obj", "--no-picture", "--with", "posts.shape", "--library")
     assert ended.code == 0, ended.err
-    assert given == ["posts", "boxes"]
+    assert given == ["posts", "left_to_right"]
 
 
 GRID = """\
@@ -449,65 +453,73 @@ def blocks(program: Program) -> list[Kind]:
     return [next(blocks_of(chain, rows)).kind for rows in ((), (0, 1, 2))]
 
 
-def test_grids_are_learned_where_many_programs_repeat_boxes_along_different_axes() -> None:
-    texts = [
-        "for i in mirror(side):\n    side(box(at=(-8, -4, {0}), size=(16, 8, 1)))",
-        "for i in mirror(depth):\n    panel(box(at=(-{0}, 6, -4), size=(9, 1, 8)))",
-        "for i in translate({1}, by=(3.5, 0, 0)):\n    shelf(box(at=(-9, -4, -{0}), size=(1, 8, 12)))",
-        "for i in mirror(depth):\n    for j in mirror(side):\n        leg(at=(-8, {0}, 6), size=(6, 1, 1))",
-    ]
-    programs = [parse(text.format(3 + number, 3 + number % 3)) for number in range(5) for text in texts]
-    (function,) = learn(programs).functions
-    assert function.name == "boxes"
-    assert {"levels", "rows", "columns"} <= {name for name, _ in function.parameters}
-    written = [with_library(program, learn(programs)) for program in programs]
-    assert sum(map(statements, written)) == len(programs)
-    assert all(away(*pair) < TOLERANCE for pair in zip(programs, written, strict=True))
+ALIKE = {
+    "sides": "for i in mirror(side):\n    side(box(at=(-8, -4, {0}), size=(16, 8, 1)))",
+    "shelves": "for i in translate({1}, by=(3.5, 0, 0)):\n    shelf(box(at=(-9, -4, -{0}), size=(1, 8, 12)))",
+    "legs": "for i in mirror(depth):\n    for j in mirror(side):\n        leg(at=(-8, {0}, 6), size=(6, 1, 1))",
+    "slanting_posts": "for i in mirror(side):\n    post(bar(start=(-8, {0}, 7), end=(4, 5, 6), section=(1, 2)))",
+}
+"""What many programs repeat, by the function that is learned from it."""
 
 
-def test_grids_in_steps_are_learned_where_some_programs_have_stairs() -> None:
-    texts = [
-        "for i in mirror(side):\n    side(box(at=(-8, -4, {0}), size=(16, 8, 1)))",
-        "for i in translate(3, by=(3.5, 0, 0)):\n    shelf(box(at=(-9, -4, -{0}), size=(1, 8, 12)))",
-        "for i in translate(4, by=(2, {0}, 0)):\n    for j in mirror(side):\n        "
-        "panel(box(at=(-9, -4, {0}), size=(1, 2, 1)))",
-        "for i in mirror(side):\n    for j in mirror(side, at={0}):\n        "
-        "door(box(at=(-9, -4, {0}), size=(9, 1, 1)))",
-    ]
-    programs = [parse(text.format(3 + number)) for number in range(5) for text in texts]
+@pytest.mark.parametrize("name", ALIKE)
+def test_repeated_parts_become_placed_functions_in_a_box_of_their_own(name: str) -> None:
+    programs = [parse(ALIKE[name].format(3 + number / 2, 3 + number % 3)) for number in range(6)]
     found = learn(programs)
-    (function,) = found.functions
-    assert {"levels", "columns", "steps", "step_up", "step_back"} <= {name for name, _ in function.parameters}
-    written = [with_library(program, found) for program in programs]
-    assert sum(map(statements, written)) == len(programs)
-    assert all(away(*pair) < TOLERANCE for pair in zip(programs, written, strict=True))
-
-
-def test_mirrored_rows_of_slanting_bars_are_learned_with_the_mirror_around_their_steps() -> None:
-    text = dedent("""
-    for i in mirror(side):
-        for j in translate({1}, by=({2}, {0}, 0)):
-            slat(bar(start=(-6, -3, 9), end=(-4, -3, {0}), section=(0.4, 1)))
-    """)
-    programs = [parse(text.format(3 + number / 2, 3 + number % 2, 2 - number / 4)) for number in range(6)]
-    found = learn(programs)
-    for program in programs:
+    (function,) = found.source.functions.values()
+    assert found.placed
+    assert function.name == name
+    assert len(function.parameters) <= PARAMETERS
+    for program in map(placed, programs):
         written = with_library(program, found)
+        (call,) = calls(written)
+        assert call.name == name
         assert statements(written) == 1
         assert away(program, written) < TOLERANCE
 
 
-def test_steps_along_several_axes_are_learned_with_their_steps() -> None:
-    slat = "slat(bar(start=(-6, -3, -{0}), end=(-6, -3, {0}), section=(0.4, 1)))"
-    text = "for i in translate({1}, by=(1.5, {2}, 0)):\n    " + slat
-    programs = [parse(text.format(5 + number, 3 + number % 2, 0.4 + 0.1 * number)) for number in range(6)]
-    library = learn(programs)
-    (function,) = library.functions
-    assert {"step_up", "step_back"} & {name for name, _ in function.parameters}
-    for program in programs:
-        written = with_library(program, library)
-        assert statements(written) == 1
-        assert away(program, written) < TOLERANCE
+def test_more_copies_of_a_row_share_the_box_of_a_call() -> None:
+    mine = library(
+        "width, depth, height = 1, 1, 1",
+        "def boards(count, thickness):\n    for _ in row(count, last=at(top=0)):\n        shelf(height=thickness)",
+    )
+    text = (
+        "width, depth, height = 80, 30, 200\n"
+        "for _ in row({0}, last=at(top=10)):\n    shelf(left=2, right=2, bottom=10, height=2)\n"
+    )
+    for count in (2, 5):
+        written = with_library(parse(text.format(count)), mine)
+        (call,) = calls(written)
+        assert dict(call.arguments)["count"] == count
+        assert dict(call.arguments).keys() == {"left", "right", "bottom", "top", "count", "thickness"}
+        assert away(parse(text.format(count)), written) < TOLERANCE
+
+
+def test_a_placed_program_keeps_its_unit_and_its_numbers() -> None:
+    mine = library(
+        "width, depth, height = 1, 1, 1",
+        "def pull_out(grip):\n    drawer()\n    handle(width=width / 2, z=0, height=grip, front=-grip, depth=grip)",
+    )
+    program = parse(
+        "# unit: cm\nwidth, depth, height = 60, 50, 80\nbody()\nfor _ in row(3, last=at(top=2)):\n"
+        "    drawer(left=1, right=1, bottom=2, height=24, front=-2, depth=2)\n"
+        "    handle(left=15.5, width=29, bottom=13, height=2, front=-4, depth=2)\n"
+    )
+    written = with_library(program, mine)
+    (call,) = calls(written)
+    assert dict(call.arguments)["grip"] == 2
+    assert {each.name: each.value for each in names(written)} == {"width": 60, "depth": 50, "height": 80}
+    assert written.unit == program.unit
+    assert away(program, written) < TOLERANCE
+
+
+def test_calls_that_make_placed_text_no_shorter_are_left_out() -> None:
+    both = parse(
+        "width, depth, height = 10, 10, 20\n"
+        "for _ in mirror(x=0):\n    side(left=0, width=1)\n    bar(start=at(left=0), end=at(top=2), width=1, depth=1)\n"
+    )
+    pair = "def pair(thickness):\n    for _ in mirror(x=0):\n        box(left=0, width=thickness)"
+    assert with_library(both, library("width, depth, height = 1, 1, 1", pair)) is both, "the loop stays for the bar"
 
 
 def test_a_cushion_in_a_function_has_the_role_around_its_call() -> None:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import base64
+import io
+import itertools
 import json
 import re
 from pathlib import Path
@@ -13,14 +15,18 @@ from PIL import Image
 
 from shapeprog.data import shape_from_mesh
 from shapeprog.data.shape import Shape
+from shapeprog.data.synthetic import furniture
 from shapeprog.errors import OutputError
 from shapeprog.formats.colours import colour
 from shapeprog.formats.parts import parts
 from shapeprog.geometry.primitives.cuboid import mesh as box_mesh
-from shapeprog.language.converting import in_unit
+from shapeprog.inference.infer import Result
+from shapeprog.language.dimensions import in_unit
 from shapeprog.language.named import set as set_names
-from shapeprog.language.program import Program
-from shapeprog.language.text import format_program, parse
+from shapeprog.language.parser import parse
+from shapeprog.language.printer import format_program
+from shapeprog.language.program import Loop, Program
+from shapeprog.language.statement import language
 from shapeprog.language.unit import Unit
 from shapeprog.view import Item, contact_sheet, picture, viewer
 from shapeprog.view import raster_kernels as kernels
@@ -37,6 +43,27 @@ for i in translate(2, by=(0, 0, 18)):
     horizontal_bar(at=(-8, -7, -10), size=(1.237, 14, 1))
 """
 PROGRAM = parse(TEXT)
+
+PLACED = """\
+# unit: cm
+width, depth, height = 140, 60.12345, 74
+drawers = 3  # in the pedestal
+
+def upright(size):
+    box(width=size, top=2)
+
+top(top=0, height=2)
+for _ in mirror(y=0):
+    leg(cylinder(left=0, radius=3, front=0, top=2))
+leg(upright(size=4))
+upright(size=2, tilt=3)
+with inside(right=0, width=40):
+    for _ in divide(drawers, z, gap=0.5):
+        box(tilt=3)
+        bar(start=at(left=0), end=at(top=0), width=1, depth=1)
+for _ in row(0, last=at(top=0)):
+    handle(height=1)
+"""
 
 
 def size_of(path: Path) -> tuple[int, int]:
@@ -131,6 +158,20 @@ def test_pictures_are_written_with_and_without_an_input(tmp_path: Path):
     assert not list(tmp_path.glob(".*"))
 
 
+def test_programs_and_results_show_themselves_in_text_and_in_notebooks():
+    program = parse(PLACED)
+    assert f"{program}\n" == PLACED
+    scores = {"explained": 0.934, "numbers": 12.0}
+    result = Result(program, None, scores, "The search ended: nothing more to gain.", (), seconds=2.5)
+    assert str(result) == (
+        "7 blocks, 11 statements, 11 solids, 12 free numbers, 93.4% of the surface explained\n"
+        "The search ended: nothing more to gain.\n2.5 s; its program is .program"
+    )
+    for shown in (program, result, Program()):
+        with Image.open(io.BytesIO(shown._repr_png_())) as image:
+            assert image.size[0] > image.size[1] > 400
+
+
 def test_a_long_program_still_fits(tmp_path: Path):
     path = picture(None, parse("leg(at=(0, 0, 0), size=(1, 1, 1))\n" * 90), tmp_path / "long.png", view=120)
     assert size_of(path)[1] == 184
@@ -161,7 +202,56 @@ def test_listing_knows_which_line_draws_what():
     assert ["".join(parted(line)) for line in lines] == [line.text for line in lines]
     assert all(parted(line)[1] == line.word for line in lines)
     assert "size=(1.24, 14, 1)" in listing(PROGRAM)[-1].text
-    assert [line.blocks for line in listing(parse("for i in rotate(2, step=1):\n    pass"))] == [()]
+    empty = Program((Loop("rotate", (2.0, 1.0), ()),))
+    assert [line.blocks for line in listing(empty)] == [(), ()]
+
+
+def test_rows_of_placed_text_know_what_they_draw_and_in_which_colour():
+    program = parse(PLACED)
+    rows, drawn = listing(program, None), parts(program)
+    assert "\n".join(row.text for row in rows) + "\n" == format_program(program) == PLACED
+    assert ["".join(parted(row)) for row in rows] == [row.text for row in rows]
+    assert all(parted(row)[1] == row.word for row in rows)
+    found = [(row.word, row.blocks, row.statement is not None) for row in rows if row.word]
+    assert found == [
+        ("upright", (2, 3), False), ("box", (2, 3), True), ("top", (0,), True), ("mirror", (1,), False),
+        ("leg", (1,), True), ("leg", (2,), True), ("upright", (3,), False), ("inside", (4, 5), False),
+        ("divide", (4, 5), False), ("box", (4,), True), ("bar", (5,), True), ("row", (6,), False),
+        ("handle", (6,), True),
+    ]  # fmt: skip
+    for row in rows:
+        if row.statement is not None:
+            colours = {part.statement for part in drawn if part.block in row.blocks[:1]}
+            assert colours <= {row.statement}, "a line has the colour of its parts"
+    assert "60.12," in listing(program)[1].text
+
+
+TOGETHER = (
+    "seat back leg arm arm_post post slat rail stretcher apron brace cushion foot base pedestal block",
+    "headboard footboard mattress pillow cushion side slat rail leg post foot panel drawer base",
+    "top side panel shelf drawer door handle body base foot leg apron block back",
+    "top leg apron stretcher brace foot pedestal base block drawer handle shelf panel",
+    "seat back arm cushion pillow base foot leg body side block apron",
+)
+"""Roles that occur together in chairs, beds, cabinets, tables and sofas."""
+
+
+def lab(rgb: tuple[int, int, int]) -> np.ndarray:
+    """CIE Lab coordinates of a colour in sRGB, under D65."""
+    channels = np.asarray(rgb) / 255
+    linear = np.where(channels <= 0.04045, channels / 12.92, ((channels + 0.055) / 1.055) ** 2.4)
+    to_xyz = [[0.4124564, 0.3575761, 0.1804375], [0.2126729, 0.7151522, 0.072175], [0.0193339, 0.119192, 0.9503041]]
+    x, y, z = np.cbrt(to_xyz @ linear / [0.95047, 1, 1.08883])  # none of the colours is nearly black
+    return np.array([116 * y - 16, 500 * (x - y), 200 * (y - z)])
+
+
+def test_roles_that_occur_together_have_distinct_colours():
+    families = [words.split() for words in TOGETHER]
+    drawn = [[part.word for part in parts(furniture(number, 0))] for number in range(20)]
+    for words in (*families, *drawn):
+        for one, two in itertools.combinations(sorted(set(words)), 2):
+            apart = np.linalg.norm(lab(colour(language().called(one).id)) - lab(colour(language().called(two).id)))
+            assert apart > 25, (one, two, apart)
 
 
 def test_the_page_needs_nothing_else_and_escapes_what_it_is_told(tmp_path: Path):

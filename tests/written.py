@@ -9,20 +9,20 @@ import torch
 
 from shapeprog.data.random import random_program
 from shapeprog.errors import ShapeProgError
-from shapeprog.language import Draw, Loop, Program, evaluated, language
-from shapeprog.language.expression import Binary, Expression, Name, Negative, Value, value_at
-from shapeprog.language.parameters import Quantity, to_float32
-from shapeprog.language.source import (
+from shapeprog.language import Program, evaluated, language
+from shapeprog.language.ast import (
     Assignment,
     Call,
     Comment,
+    Draw,
     Function,
     Line,
+    Loop,
     Source,
-    WrittenDraw,
-    WrittenLoop,
     values,
 )
+from shapeprog.language.expression import Binary, Expression, Name, Negative, Value, value_at
+from shapeprog.language.parameters import Quantity, to_float32
 
 WORDS = ("width", "depth", "height", "thick", "gap", "i", "at", "up", "span_2", "n", "größe", "_")
 REMARKS = ("the floor", "# twice", "frame", "ties: a = b", "übung  mit   Lücken", "def legs():")
@@ -90,10 +90,10 @@ class Writer:
         found: list[Line] = []
         if isinstance(node, Draw):
             roles = ["", *(role for role in ("seat", "handle", "rail") if role not in WORDS)]
-            found.append(WrittenDraw(node.name, self.mixed(node, scope), self.choice.choice(roles), self.note()))
+            found.append(Draw(node.name, self.mixed(node, scope), self.choice.choice(roles), self.note()))
         else:
             body = [line for inner in node.body for line in self.lines(inner, scope, functions)]
-            found.append(WrittenLoop(node.name, self.mixed(node, scope), tuple(self.remarked(body)), self.note()))
+            found.append(Loop(node.name, self.mixed(node, scope), tuple(self.remarked(body)), self.note()))
         if functions and self.chance(0.4):
             called = self.choice.choice(functions)
             arguments = [  # what a number is inside of a function decides whether it divides by zero
@@ -106,7 +106,7 @@ class Writer:
         return found
 
     def draw(self, scope: dict[str, float], value: Value) -> Line:
-        return WrittenDraw("top_square", (value, 0.0, 1.5, 2.0, self.expression(scope, 1)), "", self.note())
+        return Draw("top_square", (value, 0.0, 1.5, 2.0, self.expression(scope, 1)), "", self.note())
 
     def mixed(self, node: Draw | Loop, scope: dict[str, float]) -> tuple[Value, ...]:
         quantities = language()[node.name].quantities
@@ -164,7 +164,7 @@ def used_in(lines: Sequence[Line]) -> set[str]:
     found: set[str] = set()
     for line in lines:
         found |= {name.name for value in values(line) if isinstance(value, Expression) for name in value.names()}
-        if isinstance(line, WrittenLoop):
+        if isinstance(line, Loop):
             found |= used_in(line.body)
         if isinstance(line, Function):
             own = {name for name, _ in line.parameters}

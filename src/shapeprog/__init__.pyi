@@ -12,16 +12,17 @@ from .geometry.scene import Scene
 from .geometry.surface import sample
 from .inference.infer import infer
 from .inference.refine import refine
-from .language.converting import in_unit
-from .language.evaluation import evaluated
+from .language.ast import Source
+from .language.dimensions import in_unit
+from .language.evaluate import evaluated
 from .language.expression import Expression, Linear, Name
 from .language.named import Named, inline, names, set
 from .language.parametric import Parametric
+from .language.parser import parse
+from .language.printer import format_program
 from .language.program import Draw, Loop, Program
-from .language.source import Source
 from .language.statement import loop, statement, using
 from .language.tensors import Code, decode, encode
-from .language.text import format_program, parse
 from .language.unit import Unit
 from .language.unroll import unroll
 from .library import Library, learn, load_library, save_library, with_library

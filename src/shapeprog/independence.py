@@ -14,10 +14,10 @@ DEPENDENT = 1e-6
 
 def beside(row: FloatArray, axes: FloatArray) -> FloatArray | None:
     """The direction (V,) of what orthonormal axes (M, V) leave of a row; none if they leave nothing."""
-    rest = row - axes.T @ (axes @ row)
-    rest = rest - axes.T @ (axes @ rest)
-    size = float(np.linalg.norm(rest))
-    return rest / size if size > DEPENDENT * float(np.linalg.norm(row)) else None
+    residual = row - axes.T @ (axes @ row)
+    residual = residual - axes.T @ (axes @ residual)
+    size = float(np.linalg.norm(residual))
+    return residual / size if size > DEPENDENT * float(np.linalg.norm(row)) else None
 
 
 def independent(rows: FloatArray, order: Iterable[int] | None = None) -> list[int]:
@@ -25,10 +25,10 @@ def independent(rows: FloatArray, order: Iterable[int] | None = None) -> list[in
 
     Each that can be kept is, so as many are as the rows have dimensions.
     """
-    kept: list[int] = []
+    accepted: list[int] = []
     axes: FloatArray = np.zeros((0, rows.shape[1]))
-    for place in range(len(rows)) if order is None else order:
-        if (new := beside(rows[place], axes)) is not None:
-            kept.append(place)
+    for index in range(len(rows)) if order is None else order:
+        if (new := beside(rows[index], axes)) is not None:
+            accepted.append(index)
             axes = np.vstack([axes, new])
-    return kept
+    return accepted

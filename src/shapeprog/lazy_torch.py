@@ -56,6 +56,7 @@ _METHODS: dict[str, Any] = {
     "detach": lambda array: array,
     "div": lambda array, other, rounding_mode: {"floor": array // other}[rounding_mode],
     "double": lambda array: array.astype(np.float64),
+    "clone": lambda array: array.copy(),
     "expand": lambda array, *shape: np.broadcast_to(array, shape, subok=True),
     "flatten": lambda array, start=0: array.reshape(*array.shape[:start], math.prod(array.shape[start:])),
     "gather": lambda array, dim, index: np.take_along_axis(array, index, dim),

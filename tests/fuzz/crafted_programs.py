@@ -18,7 +18,7 @@ COPIES = (
 def crafted() -> Iterator[tuple[str, bytes]]:
     """Names and contents of such files."""
     from shapeprog.formats.json_form import result_json
-    from shapeprog.language.text import parse
+    from shapeprog.language.parser import parse
     from shapeprog.space import Frame
 
     deep = 100_000
@@ -45,7 +45,7 @@ def crafted() -> Iterator[tuple[str, bytes]]:
         ("latin", "leg(at=(1, 2, 3), size=(1, 2, 3))  # \u00e9"),
     ):
         yield f"{name}.shape", text.encode("latin-1" if name == "latin" else "utf-8")
-    start = '{"format": "shapeprog", "version": 1, "program": '
+    start = '{"format": "shapeprog", "version": 4, "text": '
     good = result_json(parse(LEG), Frame(0.25, (1.0, -2.0, 3.5)))[:-2]
     for name, text in (
         ("deep-lists", start + "[" * deep),
@@ -53,11 +53,13 @@ def crafted() -> Iterator[tuple[str, bytes]]:
         ("deep-frame", f'{good}, "frame": {"[" * 980}{"]" * 980}}}'),
         ("deep-snapped", f'{good}, "snapped": {"[" * 980}{"]" * 980}}}'),
         ("deep-scores", f'{good}, "scores": {{"iou": {"[" * 980}{"]" * 980}}}}}'),
-        ("long-integer", start + '[{"statement": "leg", "parameters": {"at": [' + "9" * 400 + "]}}]}"),
-        ("longer-integer", start + '[{"statement": "leg", "parameters": {"at": [' + "9" * 5000 + "]}}]}"),
-        ("long-frame-integer", good.replace('"scale": 0.25', f'"scale": {"9" * 400}') + "}"),
-        ("many-keys", start[:-12] + ", ".join(f'"{n}": 0' for n in range(200_000)) + ', "7": 1}'),
-        ("long-key", start + '[{"statement": "' + "a" * 1_000_000 + '"}]}'),
+        ("long-integer", f'{good}, "snapped": {"9" * 400}}}'),
+        ("longer-integer", f'{good}, "snapped": {"9" * 5000}}}'),
+        ("text-of-mistakes", start + '"leg(at=(1, 2, 3), size=(' + "9" * 400 + ', 1, 1))"}'),
+        ("text-deep", start + '"leg(at=' + "(" * 990 + ')"}'),
+        ("text-half", start + '"\\ud800"}'),
+        ("many-keys", start[:-9] + ", ".join(f'"{n}": 0' for n in range(200_000)) + ', "7": 1}'),
+        ("long-key", f'{good}, "{"a" * 1_000_000}": 0}}'),
         ("scores-text", f'{good}, "scores": "good"}}'),
         ("scores-list", f'{good}, "scores": [1, 2]}}'),
         ("scores-odd", f'{good}, "scores": {{"iou": "x", "cd": null, "f1": [1], "seconds": 1e999}}}}'),

@@ -121,8 +121,8 @@ def seeds() -> dict[str, bytes]:
         "every": Program(tuple(every.values())),
     }
     for name, program in {**furniture, **some}.items():
-        more = {"snapped": [], "scores": {"iou": 0.5}, "reason": "done", "source": "stool.obj"}
+        more = {"snapped": "", "scores": {"iou": 0.5}, "reason": "done", "source": "stool.obj"}
         found[f"{name}.json"] = result_json(program, frame, **more).encode()
-        found[f"{name}.shape"] = (frame_comment(frame) + sp.format_program(program)).encode()
+        found[f"{name}.shape"] = (frame_comment(frame, program) + sp.format_program(program)).encode()
         found[f"{name}.notation"] = sp.format_notation(program).encode()
     return found

@@ -10,16 +10,7 @@ from typing import Annotated
 
 import typer
 
-from shapeprog.cli import (
-    changes,
-    inferring,
-    libraries,
-    measuring,
-    sampling,
-    terminal,
-    tidying,
-    writing,
-)
+from shapeprog.cli import changes, inferring, libraries, measuring, sampling, terminal, tidying, writing
 from shapeprog.cli.help import GroupedCommand, GroupedCommands
 from shapeprog.liang2022.cli import app as paper
 
@@ -40,7 +31,7 @@ PROGRAMS, OUTPUT, RESEARCH = "From shapes to programs", "View and export program
 """Headings of the list of commands."""
 
 for name, command, panel in (
-    ("infer", inferring.infer_command, PROGRAMS),
+    ("infer", terminal.with_options(inferring.infer_command, inferring.InferOptions), PROGRAMS),
     ("tidy", tidying.tidy_command, PROGRAMS),
     ("statements", writing.statements_command, PROGRAMS),
     ("export", writing.export_command, OUTPUT),

@@ -54,10 +54,10 @@ def changed(program: Program, changes: Sequence[str]) -> Program:
     values = {named.name: named.value for named in names(program)}
     wanted: dict[str, float] = {}
     for change in changes:
-        found = _CHANGE.fullmatch(change.strip())
-        if found is None:
+        match = _CHANGE.fullmatch(change.strip())
+        if match is None:
             raise InputError(f"invalid change {change!r}", "write name=number, or name*=number with one of + - * /")
-        name, sign, text = found.groups()
+        name, sign, text = match.groups()
         try:
             number = float(text)
             before = wanted.get(name, values.get(name, number))
@@ -71,12 +71,10 @@ def changed(program: Program, changes: Sequence[str]) -> Program:
 
 def vanished(before: Program, after: Program) -> list[str]:
     """What parts are called that have a volume in a program, and none with other numbers in it."""
-    from shapeprog.language.program import Draw
     from shapeprog.language.unroll import on_numpy_if_shipped, unroll
 
     with on_numpy_if_shipped(before):
         scenes = [unroll(program) for program in (before, after)]
         flat = [set(scene.block[~scene.mask].tolist()) for scene in scenes]
-    draws = [chain[-1] for chain in after.chains]
-    words = [draw.word if isinstance(draw, Draw) else draw.name for draw in draws]
-    return [words[block] for block in sorted(flat[1] - flat[0])]
+    draws = after.draws
+    return [draws[block].word for block in sorted(flat[1] - flat[0])]

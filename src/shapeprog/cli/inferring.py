@@ -4,30 +4,26 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable, Sequence
-from contextlib import nullcontext
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
 from shapeprog.cli import terminal
 from shapeprog.cli.terminal import about_program, about_search
-from shapeprog.cli.units import AsUnit, FileUnit, asked_unit, check_units
+from shapeprog.cli.units import LARGE, AsUnit, FileUnit, asked_unit, assumed, check_units
 from shapeprog.errors import InputError, OutputError, ShapeProgError
 from shapeprog.inference.budget import BUDGET, Progress
 
 if TYPE_CHECKING:
     from shapeprog.data.shape import Shape
+    from shapeprog.inference import Result
     from shapeprog.language.program import Program
-    from shapeprog.library import Library
 
 FOLDER = Path("shapeprog-out")
-
-LARGE = 10.0
-"""Metres from which furniture is more likely to be in another unit."""
 
 TIPPED = (".stl", ".ply", ".off", ".xyz")
 """Formats that do not store the up axis."""
@@ -37,50 +33,56 @@ _LONGEST = 120
 
 
 @dataclass(frozen=True)
-class Found:
-    """A program for one shape.  Its files leave the seconds out: the same seed writes the same bytes."""
+class InferOptions:
+    """The arguments and options of the command."""
 
-    program: Program
-    snapped: Program | None
-    scores: dict[str, float]
-    reason: str
-    seconds: float
-
-
-Inference = Callable[["Shape", int, float, int, Progress], Found]
-Finish = Callable[["Program", "Shape"], "Program"]
-
-
-def infer_command(
     inputs: Annotated[
-        list[Path],
-        typer.Argument(metavar="INPUT", help="Meshes, point clouds, voxel grids, or folders of them."),
-    ],
-    up: terminal.Up = None,
-    front: terminal.Front = None,
-    file_unit: FileUnit = None,
-    blocks: Annotated[int, about_program(metavar="N", help="Maximum number of drawing statements.", min=1)] = 10,
+        list[Path], typer.Argument(metavar="INPUT", help="Meshes, point clouds, voxel grids, or folders of them.")
+    ]
+    up: terminal.Up = None
+    front: terminal.Front = None
+    file_unit: FileUnit = None
+    blocks: Annotated[int, about_program(metavar="N", help="Maximum number of drawing statements.", min=1)] = 10
     detail: Annotated[
         float, about_program(metavar="FACTOR", help="Higher: longer program, closer fit.", min=0.01, max=100)
-    ] = 1.0,
-    unit: AsUnit = None,
-    no_ties: Annotated[bool, about_program("--no-ties", help="Plain numbers, no names and expressions.")] = False,
-    library: terminal.WithLibrary = False,
-    modules: terminal.WithLibraries = None,
-    paper: Annotated[
-        bool, about_program("--paper", help="Only the statements of Liang (2022), on a 32^3 grid.")
-    ] = False,
-    seed: terminal.Seed = 0,
+    ] = 1.0
+    unit: AsUnit = None
+    no_ties: Annotated[bool, about_program("--no-ties", help="Plain numbers, no names and expressions.")] = False
+    library: terminal.WithLibrary = False
+    modules: terminal.WithLibraries = None
+    paper: Annotated[bool, about_program("--paper", help="Only the statements of Liang (2022), on 32^3 cells.")] = False
+    seed: terminal.Seed = 0
     rounds: Annotated[
         int | None, about_search(metavar="N", help="Maximum number of search rounds; fewer are faster.", min=0)
-    ] = None,
-    budget: Annotated[float, about_search(metavar="SECONDS", help="Time limit per shape.", min=0.1)] = BUDGET,
-    baseline: Annotated[bool, about_search("--baseline", help="Greedy boxes instead of the search.")] = False,
-    out: Annotated[Path, typer.Option("--out", "-o", metavar="FOLDER", help="Folder for the results.")] = FOLDER,
-    no_picture: Annotated[bool, typer.Option("--no-picture", help="Do not write the PNG.")] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print one line of JSON per shape.")] = False,
-    quiet: terminal.Quiet = False,
-) -> None:
+    ] = None
+    budget: Annotated[float, about_search(metavar="SECONDS", help="Time limit per shape.", min=0.1)] = BUDGET
+    baseline: Annotated[bool, about_search("--baseline", help="Greedy boxes instead of the search.")] = False
+    out: Annotated[Path, typer.Option("--out", "-o", metavar="FOLDER", help="Folder for the results.")] = FOLDER
+    no_picture: Annotated[bool, typer.Option("--no-picture", help="Do not write the PNG.")] = False
+    as_json: Annotated[bool, typer.Option("--json", help="Print one line of JSON per shape.")] = False
+    quiet: terminal.Quiet = False
+
+    @property
+    def talks(self) -> bool:
+        """Whether programs and progress are printed for people."""
+        return not (self.quiet or self.as_json)
+
+
+class Written(NamedTuple):
+    """A shape, what was inferred from it, and the names of the files.
+
+    Files leave the seconds out: the same seed writes the same bytes.
+    """
+
+    shape: Shape
+    result: Result
+    names: list[str]
+
+
+Inference = Callable[["Shape", Progress], "Result"]
+
+
+def infer_command(options: InferOptions) -> None:
     """Infer a program from each shape; write it as .shape and .json, with a .glb and a .png.
 
     Example: shapeprog infer chair.glb --unit cm --out results
@@ -88,74 +90,37 @@ def infer_command(
     The program keeps the position of the input, so later exports lie on it. The same seed gives the same files.
     An input that cannot be read is reported at the end; the others are processed.
     """
-    from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
-
-    from shapeprog.data import load_all
     from shapeprog.files import make_folder
 
-    terminal.check_axes(up, front)
-    check_units(unit, file_unit)
-    _prepare(picture=not no_picture, talk=not (quiet or as_json))
-    libraries = terminal.load_libraries(modules, library)
-    finished = partial(_in_unit, unit=unit, file_unit=file_unit)
-    infer_one = (
-        partial(_baseline, finished) if baseline else _chosen(finished, rounds, paper, detail, not no_ties, libraries)
-    )
-    folder = make_folder(out)
+    terminal.check_axes(options.up, options.front)
+    check_units(options.unit, options.file_unit)
+    _prepare(options)
+    infer_one = partial(_greedy, options) if options.baseline else _search(options)
+    folder, console = make_folder(options.out), terminal.output()
     failures: list[tuple[Path, ShapeProgError]] = []
     stopped: OutputError | None = None
-    written, stems = 0, set[str]()
-    talk = not (quiet or as_json)
-    console = terminal.output()
-    columns = (
-        SpinnerColumn("line"),
-        TextColumn("{task.description}", markup=False),
-        BarColumn(24),
-        TimeElapsedColumn(),
-    )
-    bar = Progress(*columns, console=terminal.errors(), transient=True) if talk else None
-    with bar or nullcontext():
-        task = bar.add_task("reading", total=1.0) if bar else None
-        shapes = iter(load_all(inputs, up=up, front=front, seed=seed))
-        try:
-            for path, shape in shapes:
-                if isinstance(shape, ShapeProgError):
-                    failures.append((path, shape))
-                    continue
-                if bar and task is not None:
-                    bar.reset(task, description=shape.name, total=1.0)
-
-                def progress(stage: str, share: float, name: str = shape.name) -> None:
-                    if bar and task is not None:
-                        bar.update(task, completed=share, description=f"{name}: {stage}")
-
-                try:
-                    result = infer_one(shape, blocks, budget, seed, progress)
-                    stem = _free_stem(shape, stems, folder)
-                    names = _write(result, shape, folder, stem, not no_picture)
-                except OutputError as error:
-                    stopped = error  # a disk that took nothing now takes nothing later
-                    break
-                except ShapeProgError as error:
-                    failures.append((path, error))
-                    continue
-                except Exception as error:
-                    failures.append((path, terminal.fault("no program was inferred", error)))
-                    continue
-                written += 1
-                if as_json:
-                    report = {"name": shape.name, "folder": str(folder), "seconds": result.seconds}
-                    terminal.print_json(report | json.loads(_document(result, shape)))
-                elif talk:
-                    _report(console, result, shape, folder, names, file_unit, up, written == 1)
-        except KeyboardInterrupt:
-            raise terminal.Interrupted(_kept(written, folder)) from None
+    written = 0
+    try:
+        for path, outcome in _results(options, infer_one, folder):
+            if isinstance(outcome, ShapeProgError):
+                failures.append((path, outcome))
+                continue
+            written += 1
+            if options.as_json:
+                report = {"name": outcome.shape.name, "folder": str(folder), "seconds": outcome.result.seconds}
+                terminal.print_json(report | json.loads(_document(outcome.result, outcome.shape)))
+            elif options.talks:
+                _report(console, outcome, options, written == 1)
+    except OutputError as error:
+        stopped = error  # a disk that took nothing now takes nothing later
+    except KeyboardInterrupt:
+        raise terminal.Interrupted(_kept(written, folder)) from None
     for path, problem in failures:
-        if as_json:
+        if options.as_json:
             report = {"name": path.name, "source": str(path), "error": problem.message, "hint": problem.hint}
             terminal.print_json(report)
         terminal.complain(terminal.at(path, problem))
-    if len(failures) + written > 1 and failures and not quiet:
+    if len(failures) + written > 1 and failures and not options.quiet:
         terminal.errors().print(f"{len(failures)} of {len(failures) + written} inputs failed.", markup=False)
     if stopped:
         raise OutputError(stopped.message, f"{stopped.hint}; {_kept(written, folder)}")
@@ -165,7 +130,32 @@ def infer_command(
         raise InputError("no shapes to infer from", "give files or folders with meshes, point clouds or voxels")
 
 
-def _prepare(picture: bool, talk: bool) -> None:
+def _results(
+    options: InferOptions, infer_one: Inference, folder: Path
+) -> Iterator[tuple[Path, Written | ShapeProgError]]:
+    """Infer and write one shape after another; an ``OutputError`` where a file cannot be written."""
+    from shapeprog.data import load_all
+
+    stems = set[str]()
+    with terminal.progress(options.talks) as begin:
+        for path, shape in load_all(options.inputs, up=options.up, front=options.front, seed=options.seed):
+            if isinstance(shape, ShapeProgError):
+                yield path, shape
+                continue
+            try:
+                result = infer_one(shape, begin(shape.name))
+                names = _write(result, shape, folder, _free_stem(shape, stems, folder), not options.no_picture)
+            except OutputError:
+                raise
+            except ShapeProgError as error:
+                yield path, error
+            except Exception as error:
+                yield path, terminal.fault("no program was inferred", error)
+            else:
+                yield path, Written(shape, result, names)
+
+
+def _prepare(options: InferOptions) -> None:
     """Prepare the kernels of inference, with a message if they must be compiled."""
     from shapeprog.kernels.compile import prepare
     from shapeprog.kernels.modules import INFERENCE, PICTURES, READING
@@ -173,53 +163,48 @@ def _prepare(picture: bool, talk: bool) -> None:
     def report(sentence: str) -> None:
         terminal.errors().print(f"{sentence.capitalize()}.", style="dim", markup=False)
 
-    prepare([*INFERENCE, *READING, *(PICTURES if picture else ())], report if talk else None)
+    prepare([*INFERENCE, *READING, *(() if options.no_picture else PICTURES)], report if options.talks else None)
 
 
-def _in_unit(program: Program, shape: Shape, unit: str | None, file_unit: str | None) -> Program:
-    if unit is None:
+def _in_unit(program: Program, shape: Shape, options: InferOptions) -> Program:
+    if options.unit is None:
         return program
     from shapeprog.inference.readable import in_readable_unit
 
-    return in_readable_unit(program, asked_unit(None, shape.frame, shape.name, unit, file_unit))
+    return in_readable_unit(program, asked_unit(None, shape.frame, shape.name, options.unit, options.file_unit))
 
 
-def _chosen(
-    finished: Finish,
-    rounds: int | None,
-    paper: bool,
-    detail: float,
-    ties: bool,
-    libraries: Sequence[Library],
-) -> Inference:
+def _search(options: InferOptions) -> Inference:
     """Inference with the options of the command, which are checked before the first shape is read."""
     from shapeprog.inference import Settings, infer
 
-    settings = None if rounds is None else Settings(rounds=rounds)
+    settings = None if options.rounds is None else Settings(rounds=options.rounds)
+    libraries = terminal.load_libraries(options.modules, options.library)
 
-    def infer_one(shape: Shape, blocks: int, budget: float, seed: int, progress: Progress) -> Found:
+    def infer_one(shape: Shape, progress: Progress) -> Result:
         result = infer(
-            shape, blocks=blocks, budget=budget, seed=seed, settings=settings,
-            statements="paper" if paper else "all", detail=detail, ties=ties, libraries=libraries, progress=progress,
+            shape, blocks=options.blocks, budget=options.budget, seed=options.seed, settings=settings,
+            statements="paper" if options.paper else "all", detail=options.detail, ties=not options.no_ties,
+            libraries=libraries, progress=progress,
         )  # fmt: skip
-        program = finished(result.program, shape)
-        scores = _scores(program, result.snapped, shape, result.scores, seed)
-        return Found(program, result.snapped, scores, result.reason, result.seconds)
+        program = _in_unit(result.program, shape, options)
+        scores = _scores(program, result.snapped, shape, result.scores, options.seed)
+        return replace(result, program=program, scores=scores)
 
     return infer_one
 
 
-def _baseline(finished: Finish, shape: Shape, blocks: int, budget: float, seed: int, progress: Progress) -> Found:
+def _greedy(options: InferOptions, shape: Shape, progress: Progress) -> Result:
     import time
 
-    from shapeprog.inference import greedy_boxes
+    from shapeprog.inference import Result, greedy_boxes
 
     started = time.monotonic()
-    snapped: Program = greedy_boxes(shape.voxels, blocks).snap()
+    snapped: Program = greedy_boxes(shape.voxels, options.blocks).snap()
     seconds = time.monotonic() - started
     reason = "Greedy boxes: one box per drawing statement, without search."
-    program = finished(snapped, shape)
-    return Found(program, snapped, _scores(program, snapped, shape, {}, seed), reason, seconds)
+    program = _in_unit(snapped, shape, options)
+    return Result(program, snapped, _scores(program, snapped, shape, {}, options.seed), reason, (), seconds)
 
 
 def _scores(
@@ -234,16 +219,17 @@ def _scores(
     return terminal.plain({**given_scores, **fit, **sizes})
 
 
-def _document(result: Found, shape: Shape) -> str:
-    from shapeprog.formats.json_form import program_to_json, result_json
+def _document(result: Result, shape: Shape) -> str:
+    from shapeprog.formats.json_form import result_json
+    from shapeprog.language.printer import format_program
 
-    rounded = {} if result.snapped is None else {"snapped": json.loads(program_to_json(result.snapped))["program"]}
+    whole = {} if result.snapped is None else {"snapped": format_program(result.snapped)}
     return result_json(
-        result.program, shape.frame, scores=result.scores, reason=result.reason, source=_source(shape), **rounded
+        result.program, shape.frame, scores=result.scores, reason=result.reason, source=_source(shape), **whole
     )
 
 
-def _write(result: Found, shape: Shape, folder: Path, stem: str, picture: bool) -> list[str]:
+def _write(result: Result, shape: Shape, folder: Path, stem: str, picture: bool) -> list[str]:
     from shapeprog.files import write_text
     from shapeprog.formats import export
 
@@ -305,35 +291,27 @@ def _source(shape: Shape) -> str | None:
     return f"{path}#{shape.name.removeprefix(f'{shape.source.stem}#')}"
 
 
-def _report(
-    console: Any,
-    result: Found,
-    shape: Shape,
-    folder: Path,
-    names: list[str],
-    file_unit: str | None,
-    up: str | None,
-    first: bool,
-) -> None:
+def _report(console: Any, written: Written, options: InferOptions, first: bool) -> None:
     from shapeprog.data.orientation import default_axes
     from shapeprog.data.placement import SCAN
     from shapeprog.space import SPAN
     from shapeprog.view.page import scores_text
 
+    shape, result, names = written
     console.print(shape.name, style="bold")
     if shape.kind != "mesh":
         kind = f"a point cloud; normals are estimated from up to {SCAN:,} points"
         console.print(f"Read as {'voxels' if shape.points is None else kind}.", style="dim")
-    if up is None and shape.source is not None and shape.source.suffix.lower() in TIPPED:
+    if options.up is None and shape.source is not None and shape.source.suffix.lower() in TIPPED:
         note = f"The format does not store the up axis: {default_axes(shape.source)[0]} is assumed."
         console.print(f"{note} Another axis: --up +y, or --up auto", style="dim")
     terminal.print_program(console, result.program)
     side = SPAN * shape.frame.scale
-    if result.program.unit and file_unit is None and (first or side > LARGE):
-        note = f"The unit of the file is assumed to be m, so that the longest side is {side:.3g} m."
-        console.print(f"{note} Another unit: --file-unit mm", style="dim")
+    named = result.program.unit is not None and result.program.unit.name
+    if named and options.file_unit is None and (first or side > LARGE):
+        console.print(assumed(side), style="dim")
     for line in scores_text(result.scores | {"seconds": result.seconds}, result.program):
         console.print(line, style="dim")
     console.print(result.reason, style="dim")
-    console.print(f"Wrote {', '.join(names)} in {folder}; the files keep every digit.", style="dim")
+    console.print(f"Wrote {', '.join(names)} in {options.out}; the files keep every digit.", style="dim")
     console.print()

@@ -35,7 +35,7 @@ def learn_command(
     """
     from dataclasses import replace
 
-    from shapeprog.language.source import Comment, Source
+    from shapeprog.language.ast import Comment
     from shapeprog.library import learn, save_library
 
     terminal.load_modules(modules)
@@ -46,7 +46,7 @@ def learn_command(
         message = f"no function shortens {'this program' if len(programs) == 1 else f'these {len(programs)} programs'}"
         raise InputError(message, "give more programs, with similar parts")
     command = f"shapeprog library learn {' '.join(map(str, folders))} --out {out}"
-    library = replace(library, source=Source((Comment(command), *library.source.lines)))
+    library = replace(library, source=replace(library.source, lines=(Comment(command), *library.source.lines)))
     save_library(library, out)
     _draw(library, sheet)
     if not quiet:
@@ -56,8 +56,7 @@ def learn_command(
 
 def show_command(
     file: Annotated[
-        Path | None,
-        typer.Argument(metavar="LIBRARY", help="Library. Default: the one that comes with shapeprog."),
+        Path | None, typer.Argument(metavar="LIBRARY", help="Library. Default: the one that comes with shapeprog.")
     ] = None,
     sheet: Sheet = None,
     modules: terminal.With = None,
@@ -66,7 +65,7 @@ def show_command(
 
     Example: shapeprog library show --sheet library.png
     """
-    from shapeprog.language.text import format_source
+    from shapeprog.language.printer import format_source
     from shapeprog.library import load_library
 
     terminal.load_modules(modules)
@@ -93,8 +92,8 @@ def _draw(library: Library, sheet: Path | None) -> None:
 
 def _items(library: Library) -> Iterator[Item]:
     """Each function as its typical call draws it."""
-    from shapeprog.language.evaluation import evaluated
-    from shapeprog.language.source import Call, Source
+    from shapeprog.language.ast import Call, Source
+    from shapeprog.language.evaluate import evaluated
     from shapeprog.view import Item
 
     for pattern in library.patterns:

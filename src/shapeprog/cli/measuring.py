@@ -13,10 +13,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from shapeprog.cli import terminal
-from shapeprog.errors import InputError, ShapeProgError
+from shapeprog.errors import InputError
 
 if TYPE_CHECKING:
-    from shapeprog.data.shape import Shape
     from shapeprog.evaluation.metrics import Metrics, Summary
 
 _LABELS = {
@@ -81,14 +80,8 @@ def prepare_command(
 
 
 def evaluate_command(
-    predictions: Annotated[
-        Path,
-        typer.Argument(metavar="PREDICTIONS", help="Programs or shapes: a file or folder."),
-    ],
-    targets: Annotated[
-        list[Path],
-        typer.Argument(metavar="TARGETS", help="Target shapes: files or folders."),
-    ],
+    predictions: Annotated[Path, typer.Argument(metavar="PREDICTIONS", help="Programs or shapes: a file or folder.")],
+    targets: Annotated[list[Path], typer.Argument(metavar="TARGETS", help="Target shapes: files or folders.")],
     parts: Annotated[
         Path | None,
         typer.Option(metavar="FOLDER", help="Part meshes of each target, in folders named like the targets."),
@@ -127,58 +120,29 @@ def evaluate_command(
     from rich.progress import track
 
     from shapeprog.cli import scoring
-    from shapeprog.data import load_all
     from shapeprog.data.parts import part_files
     from shapeprog.evaluation.metrics import summarise
 
     terminal.load_modules(modules)
     terminal.check_axes(up, front)
-    missing = [path for path in [predictions, *targets] if not Path(str(path).split("#")[0]).exists()]
-    if missing:
-        raise InputError(f"there is no file or folder {missing[0]}", "check the path")
+    absent = [path for path in [predictions, *targets] if not Path(str(path).split("#")[0]).exists()]
+    if absent:
+        raise InputError(f"there is no file or folder {absent[0]}", "check the path")
     files = part_files(parts) if parts else {}
-    failures: list[ShapeProgError] = []
-    shapes: dict[str, Shape] = {}
-    for path, shape in load_all(targets, up=up, front=front, points=2 * points, seed=seed):
-        if isinstance(shape, ShapeProgError):
-            failures.append(ShapeProgError(f"target {path}: {shape.message}", shape.hint))
-        elif shape.name in shapes:
-            sources = " and ".join(str(source) for source in (shapes[shape.name].source, shape.source) if source)
-            cure = "rename one of them; until then the first is used"
-            failures.append(ShapeProgError(f"duplicate target name {shape.name}: {sources or path}", cure))
-        else:
-            shapes[shape.name] = shape
+    shapes, failures = scoring.read_targets(targets, up, front, points, seed)
     listed = list(scoring.predictions(predictions))
     rows: list[Metrics] = []
-    console = terminal.errors()
     silent = quiet or as_json or as_csv
-    for name, prediction in track(listed, "measuring", console=console, transient=True, disable=silent):
+    for name, prediction in track(listed, "measuring", console=terminal.errors(), transient=True, disable=silent):
         target = next(iter(shapes.values())) if len(shapes) == len(listed) == 1 else shapes.get(name)
-        if isinstance(prediction, ShapeProgError):
-            failures.append(ShapeProgError(f"prediction {name}: {prediction.message}", prediction.hint))
-        elif target is None:
-            failures.append(ShapeProgError(f"prediction {name} has no target", "give both the same name"))
-        else:
-            try:
-                row = scoring.measure(prediction, target, points, seed)
-            except ShapeProgError as refused:
-                failures.append(ShapeProgError(f"prediction {name}: {refused.message}", refused.hint))
-                continue
-            except Exception as fault:
-                failures.append(terminal.fault(f"prediction {name} could not be measured", fault))
-                continue
-            try:
-                of_target = files.get(target.name)
-                rows.append(scoring.with_parts(row, prediction, target, of_target, seed) if of_target else row)
-            except InputError as mistake:
-                failures.append(ShapeProgError(f"parts of {name}: {mistake.message}", mistake.hint))
-                rows.append(row)
-    used = {row.name for row in rows}
-    missing_names = [name for name in shapes if name not in used]
+        row, failure = scoring.score(name, prediction, target, files, points, seed)
+        rows += [row] if row else []
+        failures += [failure] if failure else []
     if not rows:
         for error in failures:
             terminal.complain(error)
         raise InputError("no prediction could be measured", "predictions and targets are matched by name")
+    missing_names = [name for name in shapes if name not in {row.name for row in rows}]
     summary = summarise(rows)
     if not any(row.blocks for row in rows):
         summary = {name: value for name, value in summary.items() if name not in _SIZES}

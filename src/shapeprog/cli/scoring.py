@@ -2,31 +2,32 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from shapeprog.cli.terminal import read_program_file
+from shapeprog.cli.terminal import fault, read_program_file, warn
 from shapeprog.cli.writing import program_files
 from shapeprog.data import load_all
 from shapeprog.data.reading import in_words
 from shapeprog.data.shape import Shape
 from shapeprog.data.voxelise import voxelise_mesh, voxelise_points
-from shapeprog.errors import ShapeProgError
+from shapeprog.errors import InputError, ShapeProgError
 from shapeprog.evaluation.likeness import Triangles
 from shapeprog.evaluation.metrics import (
-    CELL,
     Metrics,
+    cloud_distances,
     evaluate_program,
+    noise_floor,
     target_samples,
     with_likeness,
     world_scale,
 )
 from shapeprog.formats.format import suffixes
-from shapeprog.geometry.nearest import squared_distance
 from shapeprog.language.program import Program
 
 if TYPE_CHECKING:
@@ -52,6 +53,50 @@ def predictions(path: Path) -> Iterator[tuple[str, Prediction | ShapeProgError]]
     if not files:
         for file, shape in load_all([path]):
             yield (file.stem if isinstance(shape, ShapeProgError) else shape.name), shape
+
+
+def read_targets(
+    paths: list[Path], up: str | None, front: str | None, points: int, seed: int
+) -> tuple[dict[str, Shape], list[ShapeProgError]]:
+    """The target shapes by name, and what cannot be read or has the name of another."""
+    shapes: dict[str, Shape] = {}
+    failures = []
+    for path, shape in load_all(paths, up=up, front=front, points=2 * points, seed=seed):
+        if isinstance(shape, ShapeProgError):
+            failures.append(ShapeProgError(f"target {path}: {shape.message}", shape.hint))
+        elif shape.name in shapes:
+            sources = " and ".join(str(source) for source in (shapes[shape.name].source, shape.source) if source)
+            cure = "rename one of them; until then the first is used"
+            failures.append(ShapeProgError(f"duplicate target name {shape.name}: {sources or path}", cure))
+        else:
+            shapes[shape.name] = shape
+    return shapes, failures
+
+
+def score(
+    name: str,
+    prediction: Prediction | ShapeProgError,
+    target: Shape | None,
+    part_files: dict[str, list[Path]],
+    points: int,
+    seed: int,
+) -> tuple[Metrics | None, ShapeProgError | None]:
+    """The measures of a prediction if it can be measured, and what failed; ``part_files`` are by name of target."""
+    if isinstance(prediction, ShapeProgError):
+        return None, ShapeProgError(f"prediction {name}: {prediction.message}", prediction.hint)
+    if target is None:
+        return None, ShapeProgError(f"prediction {name} has no target", "give both the same name")
+    try:
+        row = measure(prediction, target, points, seed)
+    except ShapeProgError as refused:
+        return None, ShapeProgError(f"prediction {name}: {refused.message}", refused.hint)
+    except Exception as error:
+        return None, fault(f"prediction {name} could not be measured", error)
+    try:
+        files = part_files.get(target.name)
+        return (with_parts(row, prediction, target, files, seed) if files else row), None
+    except InputError as mistake:
+        return row, ShapeProgError(f"parts of {name}: {mistake.message}", mistake.hint)
 
 
 def measure(prediction: Prediction, target: Shape, points: int, seed: int) -> Metrics:
@@ -85,6 +130,7 @@ def _program(path: Path) -> tuple[Program, Program | None]:
     if path.suffix.lower() != ".json":
         return read_program_file(path)[0], None
     result = read_result(path)
+    warn(path, result.program)
     return result.program, result.snapped
 
 
@@ -115,14 +161,8 @@ def _distances(
 ) -> tuple[float, float, float, float, float]:
     """CD, its two halves, the noise floor, and F1, as :mod:`shapeprog.evaluation.metrics` measures programs."""
     samples = target_samples(target, points, seed)
-    unknown = float("nan")
     if samples is None or sampled is None or not len(sampled):
-        return unknown, unknown, unknown, unknown, unknown
-    surface = samples[0]
+        return math.nan, math.nan, math.nan, math.nan, math.nan
     square = world_scale(target) ** 2
-    to_target, from_target = squared_distance(sampled, surface), squared_distance(surface, sampled)
-    floor = float(squared_distance(*samples).mean() + squared_distance(*reversed(samples)).mean()) * square
-    close: list[Any] = [float((squares <= CELL**2).double().mean()) for squares in (to_target, from_target)]
-    f1 = 2 * close[0] * close[1] / sum(close) if sum(close) else 0.0
-    forward, backward = float(to_target.mean()) * square, float(from_target.mean()) * square
-    return forward + backward, forward, backward, floor, f1
+    forward, backward, f1 = cloud_distances(sampled, samples[0], square)
+    return forward + backward, forward, backward, noise_floor(samples, square), f1

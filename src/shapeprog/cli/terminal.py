@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import functools
+import inspect
 import io
 import json
 import os
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import MISSING, fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar, get_type_hints
 
 import typer
 
@@ -111,6 +114,21 @@ def guarded(command: Command) -> Command:
     return run  # type: ignore[return-value]
 
 
+def with_options(run: Callable[[Any], None], kind: type[Any]) -> Callable[..., None]:
+    """The command that calls ``run`` with an instance of a dataclass, with an argument or option for each field."""
+
+    @functools.wraps(run)
+    def command(**values: Any) -> None:
+        run(kind(**values))
+
+    hints, keyword = get_type_hints(kind, include_extras=True), inspect.Parameter.KEYWORD_ONLY
+    defaults = [(f.name, inspect.Parameter.empty if f.default is MISSING else f.default) for f in fields(kind)]
+    options = [inspect.Parameter(n, keyword, default=default, annotation=hints[n]) for n, default in defaults]
+    command.__signature__ = inspect.Signature(options)  # type: ignore[attr-defined]
+    command.__annotations__ = {option.name: option.annotation for option in options}
+    return command
+
+
 def write_anything() -> None:
     """Let both outputs print letters that the terminal cannot encode as escapes, such as ``\\xb7``, not as an error."""
     for stream in (sys.stdout, sys.stderr):
@@ -130,6 +148,23 @@ def errors() -> Console:
     from rich.console import Console
 
     return Console(stderr=True, highlight=False, soft_wrap=True)
+
+
+@contextmanager
+def progress(shown: bool) -> Iterator[Callable[[str], Callable[[str, float], None]]]:
+    """A bar for one thing after another: a function of a name, which returns one of the stage and the share done."""
+    from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+    text = TextColumn("{task.description}", markup=False)
+    columns = SpinnerColumn("line"), text, BarColumn(24), TimeElapsedColumn()
+    with Progress(*columns, console=errors(), transient=True, disable=not shown) as bar:
+        task = bar.add_task("reading", total=1.0)
+
+        def begin(name: str) -> Callable[[str, float], None]:
+            bar.reset(task, description=name, total=1.0)
+            return lambda stage, share: bar.update(task, completed=share, description=f"{name}: {stage}")
+
+        yield begin
 
 
 def complain(error: ShapeProgError) -> None:
@@ -164,13 +199,8 @@ def fault(what: str, error: Exception) -> ShapeProgError:
 
 
 def check_axes(up: str | None, front: str | None) -> None:
-    """Refuse axes that are none before the first file is read.
-
-    Raises
-    ------
-    InputError
-        If a name is not an axis, or both lie on one line.
-    """
+    """Refuse axes that are none before the first file is read; an ``InputError`` if a name is not an axis, or both lie
+    on one line."""
     from shapeprog.data.orientation import axes_of
 
     axes_of(Path("--up and --front"), up, front)
@@ -196,7 +226,7 @@ def load_libraries(files: list[Path] | None, shipped: bool) -> list[Library]:
 
 
 def read_program_file(path: Path, changes: Sequence[str] | None = None) -> tuple[Program, Any]:
-    """The program and frame of a file, with other numbers for its names as ``--set`` has them.
+    """The program and frame of a file, with other numbers for its names as ``--set`` has them; prints its warnings.
 
     Raises
     ------
@@ -208,6 +238,7 @@ def read_program_file(path: Path, changes: Sequence[str] | None = None) -> tuple
 
     try:
         program, frame = load_with_frame(path)
+        warn(path, program)
         if not changes:
             return program, frame
         from shapeprog.language.named import names
@@ -224,6 +255,12 @@ def read_program_file(path: Path, changes: Sequence[str] | None = None) -> tuple
         if path.is_file() and path.suffix.lower() not in program_suffixes():
             raise InputError(error.message, f"infer a program first: shapeprog infer {path}") from None
         raise
+
+
+def warn(path: Path, program: Program) -> None:
+    """Print what is legal in the program of a file and probably a mistake."""
+    for warning in program.source.warnings if program.source else ():
+        errors().print(f"warning: {path}, {warning}", style="yellow", markup=False)
 
 
 def print_program(console: Console, program: Program) -> None:

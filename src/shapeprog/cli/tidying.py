@@ -33,27 +33,34 @@ def tidy_command(
     Nearly equal lengths become equal, nearly flush or touching faces flush or touching, nearly centred parts centred.
     The remaining numbers get names; changing one moves every part that depends on it.
     """
-    from shapeprog.formats import load_with_frame, save
+    from shapeprog.formats import save
     from shapeprog.inference.evidence import evidence_of_program
     from shapeprog.inference.readable import in_readable_unit
     from shapeprog.inference.ties.tying import tie
+    from shapeprog.language.ast import Function
+    from shapeprog.language.convert import in_cells, placed_if_possible
     from shapeprog.language.free import numbers
     from shapeprog.language.merging import merged
     from shapeprog.library import with_library
 
     check_units(unit, file_unit)
     libraries = terminal.load_libraries(modules, library)
-    given, frame = load_with_frame(program)
+    given, frame = terminal.read_program_file(program)
     if not given.size:
         raise InputError(f"{program} draws nothing", "give a program with at least one drawing statement")
+    lines = [] if given.source is None or not given.source.placed else [*given.source.walk()]
+    if any(isinstance(line, Function) or getattr(line, "kind", "") in ("inside", "divide") for line in lines):
+        cure = "tidy is for programs of plain numbers; edit this one by hand"
+        raise InputError(f"{program} has groups or functions already, which tidy would write out", cure)
     wanted = asked_unit(given.unit, frame, program, unit, file_unit)
-    tied = tie(given, evidence_of_program(given, seed), price=price, known=True, seed=seed)
-    found = tied.program
+    result = in_cells(given)
+    result = tie(result, evidence_of_program(result, seed), price=price, known=True, seed=seed).program
+    result = placed_if_possible(merged(result))
     for each in libraries:
-        found = with_library(found, each)
-    found = in_readable_unit(merged(found), wanted, seed)
+        result = with_library(result, each)
+    result = in_readable_unit(result, wanted, seed)
     if out is not None:
-        save(found, out, frame)
-    terminal.print_program(terminal.output(), found)
+        save(result, out, frame)
+    terminal.print_program(terminal.output(), result)
     before = numbers(given)
-    terminal.errors().print(f"Free numbers: {before} before, {numbers(found)} now.", style="dim", markup=False)
+    terminal.errors().print(f"Free numbers: {before} before, {numbers(result)} now.", style="dim", markup=False)

@@ -2,26 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from shapeprog.cli import terminal
 from shapeprog.cli.terminal import about_input
-from shapeprog.cli.units import AsUnit, FileUnit, asked_unit, check_units, in_unit
+from shapeprog.cli.units import LARGE, AsUnit, FileUnit, asked_unit, assumed, check_units
 from shapeprog.errors import InputError, OutputError, ShapeProgError
 from shapeprog.formats.format import format_of, program_suffixes, suffixes
 
 if TYPE_CHECKING:
     from shapeprog.data.shape import Shape
     from shapeprog.formats.json_form import Result
+    from shapeprog.language.program import Program
+    from shapeprog.space import Frame
 
 _SAMPLES = " ".join(suffixes("sample"))
 
-WRITTEN, SCALED = (".shape", ".json", ".scad", ".py"), (".stl", ".obj", ".ply")
-"""Files whose numbers, and meshes whose coordinates, are in the unit that is asked for."""
+WRITTEN, WITHOUT_UNIT = (".shape", ".json"), (".notation", ".npy")
+"""Files whose numbers are written in the unit that is asked for, and files whose lengths are in cells always."""
 
 ProgramFile = Annotated[Path, typer.Argument(metavar="PROGRAM", help=f"Program file: {' '.join(program_suffixes())}")]
 Outputs = Annotated[
@@ -43,6 +45,13 @@ def export_command(
     modules: terminal.With = None,
     unit: AsUnit = None,
     file_unit: FileUnit = None,
+    up: Annotated[
+        str, terminal.about_program("--up", metavar="AXIS", help="Axis of the file that points up: x, y or z.")
+    ] = "",
+    on_input: Annotated[
+        bool | None,
+        terminal.about_input("--on-input/--upright", help="Lie on the input. Default: .glb .obj .ply and samples."),
+    ] = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace existing program files.")] = False,
     quiet: terminal.Quiet = False,
 ) -> None:
@@ -50,39 +59,53 @@ def export_command(
 
     Example: shapeprog export chair.shape tall.stl tall.scad --set leg_height=14
 
-    If the program file stores its frame (all files by infer do), the export lies on the input. Otherwise one unit of
-    the export is one cell. --unit converts the numbers of .shape, .json, .scad and .py, and scales .stl, .obj
-    and .ply. --set uses the unit of the program file.
+    .stl, .3mf, .scad, .py and .step are in millimetres, z up, on the floor; .glb is in metres, y up. If the program
+    file stores its frame (all files by infer do), .glb, .obj and .ply lie on the input. --unit, --up, --on-input and
+    --upright change that. A .csv is a cut list, which is printed too. --set uses the unit of the program file.
     """
     from shapeprog.formats import export
+    from shapeprog.space import SPAN
 
-    check_units(unit, file_unit)
+    check_units(unit, file_unit, needed=False)
     for path in outputs:
-        if unit is not None and path.suffix.lower() not in (*WRITTEN, *SCALED):
-            raise InputError(f"--unit has no effect on {path.name}", f"it is for {' '.join((*WRITTEN, *SCALED))}")
+        if unit is not None and path.suffix.lower() in WITHOUT_UNIT:
+            raise InputError(f"--unit has no effect on {path.name}", "its lengths are in cells")
     terminal.load_modules(modules)
     if not overwrite:
         _refuse_programs(program, outputs)
-    found, frame = terminal.read_program_file(program, changes)
-    if unit is not None:
-        from shapeprog.inference.readable import in_readable_unit
-
-        found = in_readable_unit(found, asked_unit(found.unit, frame, program, unit, file_unit))
+    loaded, frame = terminal.read_program_file(program, changes)
+    unknown = loaded.unit is None or not loaded.unit.name
+    makers = any(chosen.maker for path in outputs if (chosen := format_of(path)) is not None)
+    if frame is not None and unknown and makers and not (file_unit or quiet) and SPAN * frame.scale > LARGE:
+        terminal.errors().print(assumed(SPAN * frame.scale), style="dim", markup=False)
     for path in outputs:
-        scaled = unit is not None and path.suffix.lower() in SCALED
-        export(found, path, in_unit(frame, found.unit) if scaled else frame)
+        written = loaded
+        if unit is not None and path.suffix.lower() in WRITTEN:
+            from shapeprog.inference.readable import in_readable_unit
+
+            written = in_readable_unit(loaded, asked_unit(loaded.unit, frame, program, unit, file_unit))
+        asked: dict[str, Any] = {"unit": unit or "", "file_unit": file_unit or "", "up": up, "on_input": on_input}
+        export(written, path, frame, **asked)
         if not quiet:
             terminal.output().print(f"wrote {path}")
+            if path.suffix.lower() == ".csv":
+                terminal.output().print(_cut_table(loaded, path, frame, asked), markup=False, highlight=False)
+
+
+def _cut_table(program: Program, path: Path, frame: Frame | None, asked: Mapping[str, Any]) -> str:
+    from shapeprog.formats.cuts import cut_list
+    from shapeprog.formats.frames import placement
+
+    chosen = format_of(path)
+    assert chosen is not None
+    lies = placement(chosen, program, frame, **asked)
+    assert lies.frame is not None
+    return cut_list(program, lies.frame, lies.unit).table
 
 
 def _refuse_programs(program: Path, outputs: Sequence[Path]) -> None:
-    """Refuse to replace another program with the same suffix as the one that is read: ``*.json`` may have named both.
-
-    Raises
-    ------
-    OutputError
-        If one of the files to write is another program.
-    """
+    """Refuse to replace another program with the same suffix as the one that is read: ``*.json`` may have named both;
+    an ``OutputError`` if one of the files to write is another program."""
     for path in outputs:
         same = path.suffix.lower() == program.suffix.lower() and path.suffix.lower() in program_suffixes()
         if same and path.is_file() and not path.samefile(program) and path.read_bytes() != program.read_bytes():
@@ -116,16 +139,16 @@ def render_command(
     from shapeprog.view.page import SUFFIXES, picture
 
     terminal.load_modules(modules)
-    found, frame = terminal.read_program_file(program, changes)
+    loaded, frame = terminal.read_program_file(program, changes)
     suffix, chosen = output.suffix.lower(), format_of(output)
     if suffix in SUFFIXES:
         result = _result(program, changes)
         beside = _input_of(result, shape)
         _tell_hidden([result], [beside], quiet)
-        picture(beside, found, output, title=program.stem, scores=result.scores)
+        picture(beside, loaded, output, title=program.stem, scores=result.scores)
     elif chosen is not None and chosen.kind == "sample":
-        given = {"resolution": resolution, "points": points, "seed": seed}
-        export(found, output, frame, **{name: given[name] for name in chosen.options})
+        given: dict[str, Any] = {"resolution": resolution, "points": points, "seed": seed}
+        export(loaded, output, frame, **{name: given[name] for name in chosen.options})
     else:
         known = " ".join((*SUFFIXES, *suffixes("sample")))
         raise OutputError(f"cannot render to {suffix or 'a file without a suffix'}", f"known suffixes: {known}")
@@ -153,14 +176,14 @@ def show_command(
     from shapeprog.view import viewer
 
     terminal.load_modules(modules)
-    found, frame = terminal.read_program_file(program, changes)
+    loaded, frame = terminal.read_program_file(program, changes)
     page = output or Path(f"{program.stem}.html")
     if page.suffix.lower() not in (".html", ".htm"):
         raise OutputError(f"{page} is not an HTML file", "pages end in .html; for pictures use 'shapeprog render'")
     result = _result(program, changes)
     beside = _input_of(result, shape)
     _tell_hidden([result], [beside], quiet)
-    viewer(found, page, shape=beside, title=program.stem, scores=result.scores, frame=frame)
+    viewer(loaded, page, shape=beside, title=program.stem, scores=result.scores, frame=frame)
     if not quiet:
         terminal.output().print(f"wrote {page}")
     if browse:
@@ -199,13 +222,13 @@ def sheet_command(
         if len(items) == most:
             break
         try:
-            found, _ = terminal.read_program_file(path)
+            loaded, _ = terminal.read_program_file(path)
         except ShapeProgError as error:
             failures.append(error)
             continue
         results.append(_result(path))
-        note = scores_text(results[-1].scores, found)[0]
-        items.append(Item(path.stem, _input_of(results[-1], shape), found, note))
+        note = scores_text(results[-1].scores, loaded)[0]
+        items.append(Item(path.stem, _input_of(results[-1], shape), loaded, note))
     _tell_hidden(results, [item.shape for item in items], quiet)
     contact_sheet(items, output, columns=columns, title=title)
     if not quiet:
@@ -218,14 +241,13 @@ def sheet_command(
 
 def statements_command(
     names: Annotated[
-        list[str] | None,
-        typer.Argument(metavar="NAME", help="Statements, loops or roles. Default: a list of all."),
+        list[str] | None, typer.Argument(metavar="NAME", help="Statements, loops or roles. Default: a list of all.")
     ] = None,
     modules: terminal.With = None,
 ) -> None:
     """Print the manual of the language, or of some statements.
 
-    Example: shapeprog statements box leg mirror
+    Example: shapeprog statements box row leg
     """
     from shapeprog.view.manual import manual
 
@@ -246,10 +268,10 @@ def program_files(folder: Path) -> list[Path]:
     if not folder.is_dir():
         raise InputError(f"there is no folder {folder}", cure)
     json_last = sorted(suffixes("program"), key=".json".__eq__)
-    found = {path.with_suffix(""): path for suffix in json_last for path in folder.glob(f"*{suffix}")}
-    if not found:
+    result = {path.with_suffix(""): path for suffix in json_last for path in folder.glob(f"*{suffix}")}
+    if not result:
         raise InputError(f"the folder {folder} holds no programs", cure)
-    return [found[key] for key in sorted(found)]
+    return [result[key] for key in sorted(result)]
 
 
 def _result(path: Path, changes: Sequence[str] | None = None) -> Result:
@@ -286,18 +308,18 @@ def _input_of(result: Result, named: Path | None) -> Shape | None:
     if source is None:
         return None
     try:
-        found = load(f"{source}{mark}{member}")
+        shape = load(f"{source}{mark}{member}")
     except ShapeProgError:
         return None  # a picture without the input is better than none
-    if result.frame is None or found.vertices is None or result.frame.axes == found.frame.axes:
-        return found
+    if result.frame is None or shape.vertices is None or result.frame.axes == shape.frame.axes:
+        return shape
     # It was inferred with --up or --front: show it as it was seen then.
-    seen = result.frame.to_grid(found.frame.to_world(found.vertices))
-    return replace(found, vertices=seen.astype(found.vertices.dtype))
+    seen = result.frame.to_grid(shape.frame.to_world(shape.vertices))
+    return replace(shape, vertices=seen.astype(shape.vertices.dtype))
 
 
 def _tell_hidden(results: list[Result], shapes: list[Shape | None], quiet: bool) -> None:
     """Say that inputs are not shown, where programs name some and none was found."""
     if any(result.source for result in results) and not any(shapes) and not quiet:
-        said = "Inputs are not shown: none was found and readable. Give them with --shape."
-        terminal.errors().print(said, style="dim", markup=False)
+        message = "Inputs are not shown: none was found and readable. Give them with --shape."
+        terminal.errors().print(message, style="dim", markup=False)

@@ -288,16 +288,26 @@ def _distances(scene: Scene, target: Target, points: int, seed: int) -> tuple[fl
     if samples is None:
         return float("nan"), float("nan"), float("nan"), float("nan")
     square = world_scale(target) ** 2
-    floor = float(squared_distance(*samples).mean() + squared_distance(*reversed(samples)).mean()) * square
+    floor = noise_floor(samples, square)
     surface = samples[0] if target.vertices is not None and target.faces is not None else _all_points(target, points)
     try:
         sampled = sample_surface(scene, points, torch.Generator().manual_seed(seed)).points.double()
     except ShapeProgError:  # no primitive has a surface
         return float("inf"), float("inf"), 0.0, floor
+    return *cloud_distances(sampled, surface, square), floor
+
+
+def noise_floor(samples: tuple[Cloud, Cloud], square: float) -> float:
+    """The Chamfer distance between two samplings of one surface; ``square`` is the area of a cell in the world."""
+    return float(squared_distance(*samples).mean() + squared_distance(*reversed(samples)).mean()) * square
+
+
+def cloud_distances(sampled: Cloud, surface: Cloud, square: float) -> tuple[float, float, float]:
+    """Prediction to target, target to prediction, and F1, of points on both; ``square`` is the area of a cell."""
     to_target, from_target = squared_distance(sampled, surface), squared_distance(surface, sampled)
     precision, recall = float((to_target <= CELL**2).double().mean()), float((from_target <= CELL**2).double().mean())
     f1 = 2 * precision * recall / (precision + recall) if precision + recall > 0 else 0.0
-    return float(to_target.mean()) * square, float(from_target.mean()) * square, f1, floor
+    return float(to_target.mean()) * square, float(from_target.mean()) * square, f1
 
 
 def _all_points(target: Target, points: int) -> Cloud:

@@ -26,13 +26,8 @@ _CURE = "write the file again; binvox files start with '#binvox 1' and hold runs
 
 
 def read_binvox(path: str | os.PathLike[str]) -> tuple[Array, Array, float]:
-    """Occupied cells (d, d, d) along x, y and z, the corner of the cube and the side of a cell.
-
-    Raises
-    ------
-    InputError
-        If the file is not a binvox file, is truncated, or has values other than 0 and 1.
-    """
+    """Occupied cells (d, d, d) along x, y and z, the corner of the cube and the side of a cell; an ``InputError`` if
+    the file is not a binvox file, is truncated, or has values other than 0 and 1."""
     name = Path(path).name
     content = Path(path).read_bytes()
     head, mark, _ = content[:_HEAD].partition(b"data\n")
@@ -86,8 +81,8 @@ def write_binvox(path: str | os.PathLike[str], voxels: Array, frame: Frame | Non
     starts = np.flatnonzero(np.diff(flat, prepend=1 - flat[:1]))
     runs = bytearray()
     for value, length in zip(flat[starts], np.diff(starts, append=len(flat)), strict=True):
-        whole, rest = divmod(int(length), 255)
-        runs += bytes((value, 255)) * whole + (bytes((value, rest)) if rest else b"")
+        full, partial = divmod(int(length), 255)
+        runs += bytes((value, 255)) * full + (bytes((value, partial)) if partial else b"")
     translate = " ".join(f"{number:.9g}" for number in corner)
     head = f"#binvox 1\ndim {size} {size} {size}\ntranslate {translate}\nscale {frame.scale * 2 * HALF:.9g}\ndata\n"
     write_bytes(path, head.encode() + bytes(runs))

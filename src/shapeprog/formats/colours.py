@@ -1,41 +1,52 @@
-"""One colour per statement, the same in every file and picture.
+"""One colour for each role and solid, the same in every file and picture.
 
-Hues follow Paul Tol's colour-blind-safe schemes: the statements that meet in one piece of furniture are far apart in
-hue and lightness, and members of one family (tops, supports, bases) are shades of one colour.
+Statements of the paper have hues of Paul Tol's colour-blind-safe schemes, where members of one family (tops, supports,
+bases) are shades of one colour.  The other roles were placed by annealing in CIE Lab, so that roles that occur together
+in a piece of furniture are at least 25 apart.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import lru_cache
+
+from shapeprog.language.statement import Language, language
 
 Colour = tuple[int, int, int]
 """Red, green and blue from 0 to 255."""
 
-_BUILT_IN: Mapping[int, str] = {
-    1: "#4477AA",  # leg
-    2: "#DDAA33", 3: "#E8C25E", 4: "#C8921A",  # tops
-    5: "#44AA99",  # layer
-    6: "#332288", 7: "#5A49B0",  # supports
-    8: "#AA4499", 9: "#BF6BB2", 10: "#8E3380",  # bases
-    11: "#CC6677",  # sideboard
-    12: "#117733",  # horizontal bar
-    13: "#88CCEE",  # vertical board
-    14: "#8C6D46",  # locker
-    15: "#BB4455",  # back
-    16: "#EE8866",  # chair beam
-    17: "#AABB33",  # line
-    18: "#882255",  # back support
+_BY_NAME: Mapping[str, str] = {
+    "leg": "#4477AA", "layer": "#44AA99", "sideboard": "#CC6677", "horizontal_bar": "#117733",
+    "top_rectangle": "#DDAA33", "top_square": "#E8C25E", "top_circle": "#C8921A",
+    "support_cylinder": "#332288", "support_cuboid": "#5A49B0",
+    "base_circle": "#AA4499", "base_square": "#BF6BB2", "base_cross": "#8E3380",
+    "vertical_board": "#88CCEE", "locker": "#8C6D46", "back": "#BB4455", "chair_beam": "#EE8866", "line": "#AABB33",
+    "back_support": "#882255",
+    "seat": "#DDAA33", "top": "#C8921A", "arm": "#22DDEE", "arm_post": "#117777", "headboard": "#BBAA55",
+    "footboard": "#665500", "mattress": "#FF88AA", "cushion": "#BB99FF", "pillow": "#66AA44", "shelf": "#44AA99",
+    "drawer": "#BB99AA", "door": "#AADD88", "handle": "#994400", "side": "#336644", "panel": "#88CCEE",
+    "body": "#8C6D46", "base": "#AA4499", "foot": "#0099FF", "rail": "#FF8866", "slat": "#11CC99", "post": "#885555",
+    "apron": "#556600", "stretcher": "#117733", "brace": "#CCCC99", "pedestal": "#5A49B0", "block": "#FF88CC",
+    "box": "#8FA3BF", "board": "#8FA3BF", "leaning_box": "#8FA3BF", "bar": "#C2A878", "beam": "#C2A878",
+    "cylinder": "#7FB09A", "rod": "#B58FB5", "taper": "#C98F7A", "bent_rod": "#9AAE5C",
 }  # fmt: skip
 
 _OTHERS = ("#66CCEE", "#EE6677", "#228833", "#CCBB44", "#AA3377", "#EE7733", "#009988", "#0077BB")
+"""Colours of a user's own statements and roles, by their id."""
 
 
 def colour(statement: int) -> Colour:
-    """The colour of the statement with this id, built in or a user's own."""
-    text = _BUILT_IN.get(statement, _OTHERS[statement % len(_OTHERS)])
+    """The colour of the role or statement with this id, built in or a user's own."""
+    text = _by_id(language()).get(statement, _OTHERS[statement % len(_OTHERS)])
     return (int(text[1:3], 16), int(text[3:5], 16), int(text[5:7], 16))
 
 
 def hexadecimal(statement: int) -> str:
     """The same colour as ``#rrggbb``."""
     return "#{:02x}{:02x}{:02x}".format(*colour(statement))
+
+
+@lru_cache(maxsize=4)
+def _by_id(known: Language) -> dict[int, str]:
+    names = {*known.names, *known.roles}
+    return {known.called(name).id: text for name, text in _BY_NAME.items() if name in names}

@@ -8,9 +8,14 @@ from pathlib import Path
 from shapeprog.errors import InputError, OutputError, did_you_mean
 from shapeprog.files import output_error
 from shapeprog.formats.format import format_of, listed, program_suffixes, suffixes
-from shapeprog.formats.frames import upright
+from shapeprog.formats.frames import placement
+from shapeprog.language.convert import placed_if_possible
+from shapeprog.language.placement import SIZES
 from shapeprog.language.program import Program
 from shapeprog.space import Frame
+
+FLOOR = "floor"
+"""What programs in cells call the level on which the whole stands."""
 
 
 def load(path: str | os.PathLike[str]) -> Program:
@@ -19,7 +24,7 @@ def load(path: str | os.PathLike[str]) -> Program:
     Raises
     ------
     InputError
-        If the file cannot be read or is of another kind.
+        If the file cannot be read or has another format.
     ProgramError
         If its text is not a valid program.
     """
@@ -35,20 +40,22 @@ def load_with_frame(path: str | os.PathLike[str]) -> tuple[Program, Frame | None
         As for :func:`load`.
     """
     file = Path(path)
-    chosen = format_of(file)
-    if chosen is None or not chosen.reader:
-        known = " or ".join(program_suffixes())
+    file_format = format_of(file)
+    if file_format is None or not file_format.reader:
+        endings = " or ".join(program_suffixes())
         if file.is_dir():
-            held = sorted(each.name for each in file.iterdir() if each.suffix.lower() in program_suffixes())
-            cure = f"name one of its programs, such as {file / held[0]}" if held else f"programs are {known} files"
+            held = sorted(entry.name for entry in file.iterdir() if entry.suffix.lower() in program_suffixes())
+            cure = f"name one of its programs, such as {file / held[0]}" if held else f"programs are {endings} files"
             raise InputError(f"{file} is a folder", cure)
         ending = f"its name ends in {file.suffix!r}" if file.suffix else "its name has no suffix"
-        raise InputError(f"{file} holds no program: {ending}", f"programs are {known} files")
-    return chosen.read(file)
+        raise InputError(f"{file} holds no program: {ending}", f"programs are {endings} files")
+    return file_format.read(file)
 
 
 def save(program: Program, path: str | os.PathLike[str], frame: Frame | None = None) -> None:
     """Write a program so that :func:`load_with_frame` returns the same program and frame.
+
+    A program in cells that names sizes of the whole, or its floor, is written with its parts placed from the sides.
 
     Parameters
     ----------
@@ -65,12 +72,25 @@ def save(program: Program, path: str | os.PathLike[str], frame: Frame | None = N
         If the suffix is not that of a program file, or the file cannot be written.
     """
     if Path(path).suffix.lower() not in suffixes("program"):
-        known = " or ".join(suffixes("program"))
-        raise OutputError(f"{path} could not be read back as a program", f"name a {known} file, or use export")
+        endings = " or ".join(suffixes("program"))
+        raise OutputError(f"{path} could not be read back as a program", f"name a {endings} file, or use export")
+    is_old = program.source is not None and bool({*SIZES, FLOOR} & program.source.numbers.keys())
+    if is_old and Path(path).suffix.lower() in (".shape", ".json"):
+        program = placed_if_possible(program)
     export(program, path, frame)
 
 
-def export(program: Program, path: str | os.PathLike[str], frame: Frame | None = None, **options: int) -> Path:
+def export(
+    program: Program,
+    path: str | os.PathLike[str],
+    frame: Frame | None = None,
+    *,
+    unit: str = "",
+    file_unit: str = "",
+    up: str = "",
+    on_input: bool | None = None,
+    **options: int,
+) -> Path:
     """Write a program in the format that the suffix of ``path`` names, whole or not at all, and return the path.
 
     ::
@@ -85,7 +105,10 @@ def export(program: Program, path: str | os.PathLike[str], frame: Frame | None =
         Where to; the folder must exist.
     frame
         From the grid to the coordinates of the input, so that the export lies on it; without it the shape stands
-        upright in the axes of the format, one unit of the program one of the file (:mod:`shapeprog.formats.frames`).
+        upright in the axes of the format.  Formats for makers (.stl .3mf .scad .py .step) are upright, z up, on z = 0
+        and in millimetres in any case (:mod:`shapeprog.formats.frames`).
+    unit, file_unit, up, on_input
+        Other coordinates than those of the format, see :func:`~shapeprog.formats.frames.placement`.
     options
         For .npy the ``resolution`` in cells along each side (32), for .xyz how many ``points`` (5000) and their
         ``seed`` (0).
@@ -96,16 +119,17 @@ def export(program: Program, path: str | os.PathLike[str], frame: Frame | None =
         If the suffix is unknown, the program draws nothing that the format can hold, or the file cannot be written.
     """
     target = Path(path)
-    chosen, suffix = format_of(target), target.suffix.lower()
-    if chosen is None or not chosen.writer:
+    file_format, suffix = format_of(target), target.suffix.lower()
+    if file_format is None or not file_format.writer:
         wrong = f"no export ends in {suffix!r}" if suffix else f"{target} has no suffix, so its format is unknown"
         raise OutputError(wrong, did_you_mean(suffix, suffixes()))
     for name in options:
-        if name not in chosen.options:
-            raise OutputError(f"{suffix} takes no {name}", f"it takes {', '.join(chosen.options) or 'no options'}")
-    placed = upright(chosen, program.unit) if frame is None else frame
+        if name not in file_format.options:
+            raise OutputError(f"{suffix} takes no {name}", f"it takes {', '.join(file_format.options) or 'no options'}")
+    lies = placement(file_format, program, frame, unit=unit, file_unit=file_unit, up=up, on_input=on_input)
+    named = {"unit": lies.unit} if file_format.takes_unit else {}
     try:
-        chosen.write(program, target, placed, **options)
+        file_format.write(program, target, lies.frame, **options, **named)
     except OSError as error:
         raise output_error(target, error) from error
     return target

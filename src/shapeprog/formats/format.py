@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from shapeprog.language.program import Program
     from shapeprog.space import Frame
 
-Kind = Literal["program", "solid", "sample", "shape"]
+Kind = Literal["program", "solid", "list", "sample", "shape"]
 
 Axes = tuple[str, str]
 """World axes that point up and that the front faces, such as ``("+y", "+z")``."""
@@ -40,8 +40,9 @@ class Format:
     name
         Name of the format.
     kind
-        ``program`` can be read back as the same program; ``solid`` is its geometry, for other tools; ``sample`` is its
-        cells or points; ``shape`` is read alone, as the shape to infer a program from.
+        ``program`` can be read back as the same program; ``solid`` is its geometry, for other tools; ``list`` is a
+        table of its parts; ``sample`` is its cells or points; ``shape`` is read alone, as the shape to infer a program
+        from.
     suffixes
         Endings of file names, the usual one first.
     axes
@@ -52,6 +53,12 @@ class Format:
         ``module:function`` of this package: ``(path) -> (program, frame or None)`` and ``(program, path, frame)``.
     options
         Further arguments of the writer.
+    unit
+        Unit of the coordinates of a file unless another is asked for; ``text`` for that of the program, empty for that
+        of the input, or of the program if no input is known.  Files in millimetres are for makers: the shape stands
+        upright on the origin, whatever its input.
+    takes_unit
+        Whether the writer takes the name of the unit.
     """
 
     name: str
@@ -62,13 +69,20 @@ class Format:
     reader: str = ""
     writer: str = ""
     options: tuple[str, ...] = ()
+    unit: str = ""
+    takes_unit: bool = False
+
+    @property
+    def maker(self) -> bool:
+        """Whether the shape stands upright on the origin."""
+        return self.unit == "mm"
 
     def read(self, path: Path) -> tuple[Program, Frame | None]:
         """The program in a file of this format, and its frame if the file has one."""
-        found: tuple[Program, Frame | None] = _function(self.reader)(path)
-        return found
+        result: tuple[Program, Frame | None] = _function(self.reader)(path)
+        return result
 
-    def write(self, program: Program, path: Path, frame: Frame | None, **options: int) -> None:
+    def write(self, program: Program, path: Path, frame: Frame | None, **options: int | str) -> None:
         """Write a program; ``frame`` maps the grid to the coordinates of the file."""
         _function(self.writer)(program, path, frame, **options)
 
@@ -81,7 +95,7 @@ FORMATS = (
     ),
     Format(
         "JSON", "program", (".json",), None,
-        "the same with names for everything, for other programs to read",
+        "the text with a list of the solids that it draws, for other programs",
         reader="json_form:read_json", writer="json_form:write_json",
     ),
     Format(
@@ -97,11 +111,11 @@ FORMATS = (
     Format(
         "GLB", "solid", (".glb",), Y_UP,
         "one named node per part, coloured by statement",
-        writer="meshes:write_glb",
+        writer="meshes:write_glb", unit="m",
     ),
     Format(
         "OBJ", "solid", (".obj",), Y_UP,
-        "one object per part, colours in an .mtl file beside it",
+        "one object per part, colours in an .mtl file next to it",
         writer="meshes:write_obj",
     ),
     Format(
@@ -112,22 +126,32 @@ FORMATS = (
     Format(
         "STL", "solid", (".stl",), Z_UP,
         "the union of all parts: one watertight solid",
-        writer="meshes:write_stl",
+        writer="meshes:write_stl", unit="mm",
+    ),
+    Format(
+        "3MF", "solid", (".3mf",), Z_UP,
+        "one named, coloured object per part, for 3D printing",
+        writer="threemf:write_3mf", unit="mm", takes_unit=True,
     ),
     Format(
         "OpenSCAD", "solid", (".scad",), Z_UP,
-        "loops as loops, numbers as named variables at the top",
-        writer="openscad:write_scad",
+        "the program as a script: groups, functions, loops; its named numbers for the customizer",
+        writer="openscad:write_scad", unit="mm", takes_unit=True,
     ),
     Format(
         "build123d", "solid", (".py",), Z_UP,
         "the same as a Python script, which writes a STEP file when run",
-        writer="build123d:write_script",
+        writer="build123d:write_script", unit="mm", takes_unit=True,
     ),
     Format(
         "STEP", "solid", (".step", ".stp"), Z_UP,
         "named, coloured solids, through build123d (pip install build123d)",
-        writer="build123d:write_step",
+        writer="build123d:write_step", unit="mm", takes_unit=True,
+    ),
+    Format(
+        "cut list", "list", (".csv",), Z_UP,
+        "count, role and size of each distinct part",
+        writer="cuts:write_cuts", unit="text", takes_unit=True,
     ),
     Format(
         "binvox", "sample", (".binvox",), Y_UP,
@@ -150,7 +174,7 @@ FORMATS = (
         writer="samples:write_points", options=("points", "seed"),
     ),
     Format("OFF", "shape", (".off",), Y_UP, "a mesh"),
-    Format("glTF", "shape", (".gltf",), Y_UP, "a mesh and the files beside it"),
+    Format("glTF", "shape", (".gltf",), Y_UP, "a mesh and the files next to it"),
     Format("HDF5", "shape", (".h5", ".hdf5"), GRID, "many grids of cells, as published"),
 )  # fmt: skip
 """Every format, found by its suffix."""
@@ -168,21 +192,21 @@ def format_of(path: str | os.PathLike[str]) -> Format | None:
 
 def suffixes(*kinds: Kind) -> tuple[str, ...]:
     """The suffixes that can be written, of the kinds given or of all."""
-    return tuple(s for each in FORMATS if each.writer and (not kinds or each.kind in kinds) for s in each.suffixes)
+    return tuple(s for entry in FORMATS if entry.writer and (not kinds or entry.kind in kinds) for s in entry.suffixes)
 
 
 def program_suffixes() -> tuple[str, ...]:
     """The suffixes of files that a program can be read from."""
-    return tuple(suffix for each in FORMATS if each.reader for suffix in each.suffixes)
+    return tuple(suffix for entry in FORMATS if entry.reader for suffix in entry.suffixes)
 
 
 def listed() -> str:
     """The formats that can be written, one line each with suffixes and contents."""
-    rows = [(" ".join(each.suffixes), each.doc) for each in FORMATS if each.writer]
+    rows = [(" ".join(entry.suffixes), entry.doc) for entry in FORMATS if entry.writer]
     width = max(len(names) for names, _ in rows)
     return "\n".join(f"{names:<{width}}  {doc}" for names, doc in rows)
 
 
-def _function(place: str) -> Any:
-    module, _, name = place.partition(":")
+def _function(location: str) -> Any:
+    module, _, name = location.partition(":")
     return getattr(importlib.import_module(f"shapeprog.formats.{module}"), name)

@@ -1,12 +1,19 @@
 """Where an export lies: on the input when its frame is known, upright on the format's own axes when not.
 
-A ``.shape`` file may carry its frame as a comment in its first lines, which the parser ignores:
+Formats for makers, in millimetres, are always upright and stand on the origin unless ``on_input`` is asked for.
+
+A ``.shape`` file may keep the frame of the input in a comment above its first statement:
+
+    # placed: up y, front z, origin 0 0.5 0, 1 unit = 0.01 m
+
+``up`` and ``front`` are axes of the input; ``origin`` is where the point x = 0, y = 0, z = 0 of the text, the middle of
+the floor, lies in it; the last entry is the length of a unit of the text in the unit of the input.  Frames along other
+axes, and those of statements in cells, are JSON:
 
     # frame: {"scale": 0.0417, "centre": [0, 0.5, 0], "axes": [[0, 0, 1], [1, 0, 0], [0, 1, 0]]}
 
-``shapeprog infer`` writes it there, so that ``shapeprog export chair.shape chair.glb`` lies on the mesh it was
-inferred from.  Without it one unit of the file is one of the program (a cell unless it has another unit), the centre
-of the grid is the origin, and the axes are those of the format.
+Without a frame one unit of the file is one of the program (a cell unless it has another unit), the centre of the grid
+is the origin, and the axes are those of the format.
 """
 
 from __future__ import annotations
@@ -15,31 +22,146 @@ import json
 import math
 import re
 from reprlib import repr as shortened
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from shapeprog.errors import InputError
-from shapeprog.formats.format import Format
-from shapeprog.language.unit import Unit
-from shapeprog.space import Frame, grid_axes
+from shapeprog.formats.format import GRID, Y_UP, Z_UP, Format
+from shapeprog.language.ast import Scale
+from shapeprog.language.evaluate import placed_source
+from shapeprog.language.placement import LONGEST_SIDE
+from shapeprog.language.program import Program
+from shapeprog.language.text import Text
+from shapeprog.language.unit import METRES, metres
+from shapeprog.space import Array, FloatArray, Frame, grid_axes
+
+CELLS = "cells"
+"""The word for lengths in cells."""
 
 _HEADER = re.compile(r"^#[ \t]*frame:(.*)$", re.MULTILINE)
 _CURE = (
     'write it as # frame: {"scale": 1, "centre": [0, 0, 0], "axes": [[1, 0, 0], [0, 1, 0], [0, 0, 1]]}, or remove it'
 )
+_LINE = re.compile(r"([^\r\n]*)(?:\r\n|\r|\n)")
+_PLACED = re.compile(r"#[ \t]*placed:[ \t]*([^\r\n]*)")
+_ENTRIES = re.compile(
+    r"up +([+-]?[xyz]) *, *front +([+-]?[xyz]) *, *origin +(\S+) +(\S+) +(\S+) *, *1 unit *= *(\S+)(?: +[a-z]+)?\s*"
+)
+_PLACED_CURE = "write it as # placed: up y, front z, origin 0 0.5 0, 1 unit = 1, or remove it"
+
+_ALIGNED = 1e-9
+"""Largest difference of the axes of a frame from those of the input where they are written by name."""
+
+_ROUNDED = 1e-8
+"""Share of the longest side by which the frame of a placed text is rounded."""
+
+_GRID = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
+"""Directions x, y, z of a text in the axes of the grid, as columns."""
 
 
-def upright(chosen: Format, unit: Unit | None = None) -> Frame | None:
-    """The default frame of a format: one unit of a program is one unit of the file; up and front are those of the
-    format.
+UP = {"x": GRID, "y": Y_UP, "z": Z_UP}
+"""Up and front axes of a file by the axis that points up."""
 
-    Program files have none.
+
+class Placement(NamedTuple):
+    """How a file lies: the map from the grid to its coordinates, and their unit, empty if it is not known."""
+
+    frame: Frame | None
+    unit: str = ""
+
+
+def placement(
+    chosen: Format,
+    program: Program,
+    frame: Frame | None = None,
+    *,
+    unit: str = "",
+    file_unit: str = "",
+    up: str = "",
+    on_input: bool | None = None,
+) -> Placement:
+    """How a program lies in a file: on its input, or upright.
+
+    Parameters
+    ----------
+    chosen
+        The format of the file.
+    program
+        What is written.
+    frame
+        From the grid to the coordinates of the input, if it is known.
+    unit
+        Unit of the coordinates of the file: ``mm``, ``cm``, ``m``, ``in`` or ``cells``; empty for that of the format.
+    file_unit
+        Unit of the coordinates of the input, metres by default.
+    up
+        Axis of the file that points up: ``x``, ``y`` or ``z``; empty for that of the format, or of the input.
+    on_input
+        Whether the file lies on the input; by default if the input is known, except for formats in millimetres.
+
+    Raises
+    ------
+    InputError
+        If the input, the axis or the size of the object is not known.
     """
     if chosen.axes is None:
-        return None
-    axes = tuple((float(a), float(b), float(c)) for a, b, c in grid_axes(*chosen.axes))
-    return Frame(1.0 if unit is None else unit.per_cell, axes=axes)
+        return Placement(frame)
+    if up and up.removeprefix("+") not in UP:
+        raise InputError(f"{up!r} is no axis that points up", "use x, y or z")
+    if on_input and frame is None:
+        raise InputError("the program does not say how its input lies", "export a program that infer has written")
+    lies = frame is not None and not up and (not chosen.maker if on_input is None else on_input)
+    if lies and not unit and chosen.unit != "text":
+        return Placement(frame)
+    per_cell, name = _cell_size(chosen, program, frame, unit, file_unit)
+    if lies:
+        assert frame is not None
+        x, y, z = (per_cell / frame.scale * place for place in frame.centre)
+        return Placement(Frame(per_cell, (x, y, z), frame.axes), name)
+    matrix = grid_axes(*(UP[up.removeprefix("+")] if up else chosen.axes))
+    axes = tuple((float(a), float(b), float(c)) for a, b, c in matrix)
+    centre = -per_cell * (matrix @ _ground(program)) + 0.0 if chosen.maker else (0.0, 0.0, 0.0)
+    return Placement(Frame(per_cell, (float(centre[0]), float(centre[1]), float(centre[2])), axes), name)
+
+
+def _cell_size(chosen: Format, program: Program, frame: Frame | None, unit: str, file_unit: str) -> tuple[float, str]:
+    """The size of a cell in a file, and the unit that it is in, empty if it is not known."""
+    if unit == CELLS:
+        return 1.0, ""
+    own, known = program.unit, "" if program.unit is None else program.unit.name
+    per_cell = 1.0 if own is None else own.per_cell
+    if program.scale is not None:
+        per_cell = 1 / program.scale.cells_per_unit  # not rounded
+    wanted = unit or (known if chosen.unit == "text" else chosen.unit)
+    if not wanted and chosen.unit == "text" and frame is not None:
+        wanted = "mm"
+    if not wanted and frame is not None:
+        return frame.scale, ""
+    if not wanted:
+        return per_cell, known
+    if frame is not None and (file_unit or not known):
+        return frame.scale * metres(file_unit or "m") / metres(wanted), wanted
+    if known:
+        return per_cell * (metres(known) / metres(wanted)), wanted
+    if unit:
+        message = f"cannot write {' '.join(chosen.suffixes)} in {unit}: the size of the object is unknown"
+        raise InputError(message, "infer it with --unit, or write its unit at the top, as in '# unit: cm'")
+    return per_cell, ""
+
+
+def _ground(program: Program) -> FloatArray:
+    """The point of the grid where a program stands: the middle of the bottom of the whole, or of what is drawn."""
+    from shapeprog.formats.parts import as_placed, parts  # reading a program needs no geometry
+
+    if (placed := as_placed(program)) is not None and placed.scale is not None:
+        return np.array([placed.scale.floor, 0.0, 0.0])
+    vertices = [part.vertices for part in parts(program)]
+    if not vertices:
+        return np.zeros(3)
+    every = np.concatenate(vertices)
+    low, high = every.min(0), every.max(0)
+    return np.array([low[0], *(low[1:] + high[1:]) / 2])
 
 
 def frame_dict(frame: Frame) -> dict[str, Any]:
@@ -48,13 +170,8 @@ def frame_dict(frame: Frame) -> dict[str, Any]:
 
 
 def frame_from(data: Any, name: str) -> Frame:
-    """The frame that :func:`frame_dict` wrote.
-
-    Raises
-    ------
-    InputError
-        If numbers are missing or not finite, the scale is not positive or the axes are not a rotation.
-    """
+    """The frame that :func:`frame_dict` wrote; an ``InputError`` if numbers are missing or not finite, the scale is not
+    positive or the axes are not a rotation."""
     try:
         scale, centre = float(data["scale"]), [float(value) for value in data["centre"]]
         axes = [[float(value) for value in row] for row in data["axes"]]
@@ -69,29 +186,128 @@ def frame_from(data: Any, name: str) -> Frame:
     return Frame(scale, (centre[0], centre[1], centre[2]), tuple((a, b, c) for a, b, c in axes))
 
 
-def frame_comment(frame: Frame | None) -> str:
-    """The comment line that stores a frame in program text; empty without a frame."""
-    return "" if frame is None else f"# frame: {json.dumps(frame_dict(frame))}\n"
+def frame_of_text(frame: Frame, scale: Scale) -> Frame:
+    """The map from x, y, z of a text to the world, given that from the grid."""
+    axes = np.asarray(frame.axes) @ _GRID
+    origin = np.asarray(frame.centre) + frame.scale * scale.floor * axes[:, 2]
+    return _frame(frame.scale * scale.cells_per_unit, origin, axes)
+
+
+def frame_of_grid(text: Frame, scale: Scale) -> Frame:
+    """The map from the grid to the world, given that from x, y, z of a text."""
+    size, axes = text.scale / scale.cells_per_unit, np.asarray(text.axes)
+    return _frame(size, np.asarray(text.centre) - size * scale.floor * axes[:, 2], axes @ _GRID.T)
+
+
+def scale_of(program: Program) -> Scale:
+    """How x, y, z of a text lie in the grid; statements in cells have their origin in the middle of it."""
+    return program.scale or Scale(1.0 if program.unit is None else 1 / program.unit.per_cell, 0.0)
+
+
+def frame_comment(frame: Frame | None, program: Program | None = None) -> str:
+    """The comment line that stores a frame above program text; empty without a frame.
+
+    Parameters
+    ----------
+    frame
+        The map from the grid to the world.
+    program
+        The program of the text, if its parts may be placed: then the line states where the origin of the text lies.
+    """
+    if frame is None:
+        return ""
+    if program is None or program.source is None or program.scale is None:
+        return f"# frame: {json.dumps(frame_dict(frame))}\n"
+    source, text = program.source, frame_of_text(frame, program.scale)
+    read = placed_source(source.lines).scale  # the program may lie in another grid than its text
+    assert read is not None
+    axes, step = np.asarray(text.axes), _ROUNDED * text.scale * LONGEST_SIDE / read.cells_per_unit
+    if np.abs(axes - np.rint(axes)).max() > _ALIGNED or not 1e-300 < step < 1e300:
+        return frame_comment(frame_of_grid(text, read))
+    size = f"{text.scale:.8g}"
+    for name, length in METRES.items():
+        factor = METRES.get(source.unit.name if source.unit else "", 0.0) / length
+        if math.isclose(factor, text.scale, rel_tol=2e-7):
+            size = f"{factor:.8g} {name}"
+    digits = -math.ceil(math.log10(step))
+    origin = " ".join(f"{round(value, digits) + 0.0:.15g}" for value in text.centre)
+    up, front = _axis_name(axes[:, 2]), _axis_name(-axes[:, 1])
+    return f"# placed: up {up}, front {front}, origin {origin}, 1 unit = {size}\n"
 
 
 def without_frame(text: str) -> str:
     """Program text without the comment that stores its frame; line numbers do not change."""
-    return _HEADER.sub("", text)
+    _, placed = _placed_comment(text)
+    return _HEADER.sub("", text if placed is None else text[: placed.start()] + text[placed.end() :])
 
 
-def frame_in(text: str, name: str = "<program>") -> Frame | None:
+def frame_in(text: str, name: str = "<program>", program: Program | None = None) -> Frame | None:
     """The frame stored in program text, or None.
+
+    Parameters
+    ----------
+    text, name
+        The text, and its name in errors.
+    program
+        The program of the text, if its parts may be placed.
 
     Raises
     ------
-    InputError
+    InputError, ProgramError
         If the comment cannot be read.
     """
-    found = _HEADER.search(text)
-    if not found:
+    row, placed = _placed_comment(text)
+    if placed is not None and program is not None and program.scale is not None:
+        return frame_of_grid(_placed_frame(placed, Text(text, name), row), program.scale)
+    match = _HEADER.search(text)
+    if not match:
         return None
     try:
-        data = json.loads(found.group(1))
+        data = json.loads(match.group(1))
     except (ValueError, RecursionError) as error:
         raise InputError(f"{name}: the comment '# frame:' holds no JSON", _CURE) from error
     return frame_from(data, name)
+
+
+def _placed_comment(text: str) -> tuple[int, re.Match[str] | None]:
+    """The comment above the first statement that places a text, and its row, from 1."""
+    for row, line in enumerate(_LINE.finditer(text), 1):
+        if match := _PLACED.match(text, line.start()):
+            return row, match
+        if line[1].strip() and not line[1].startswith("#"):
+            break
+    return 0, None
+
+
+def _placed_frame(comment: re.Match[str], text: Text, row: int) -> Frame:
+    """The map from x, y, z of a text to the world, as its comment on a row says."""
+    start = comment.start(1) - comment.start()
+    entries = _ENTRIES.fullmatch(comment[1])
+    if entries is None:
+        raise text.at(row, start + 1, "this is no frame of a text", _PLACED_CURE)
+    try:
+        axes = grid_axes(entries[1], entries[2]) @ _GRID
+    except ValueError as error:
+        raise text.at(row, start + 1, str(error), _PLACED_CURE) from None
+    numbers = []
+    for group in (3, 4, 5, 6):
+        try:
+            numbers.append(float(entries[group]))
+        except ValueError:
+            numbers.append(math.nan)
+        if not math.isfinite(numbers[-1]) or (group == 6 and not numbers[-1] > 0):
+            what = "a number" if group < 6 else "a positive number"
+            raise text.at(
+                row, start + entries.start(group) + 1, f"{shortened(entries[group])} is not {what}", _PLACED_CURE
+            )
+    return _frame(numbers[3], np.array(numbers[:3]), axes)
+
+
+def _frame(scale: float, centre: Array, axes: Array) -> Frame:
+    x, y, z = centre.tolist()
+    return Frame(float(scale), (x, y, z), tuple((a, b, c) for a, b, c in axes.tolist()))
+
+
+def _axis_name(direction: Array) -> str:
+    axis = int(np.abs(direction).argmax())
+    return ("-" if direction[axis] < 0 else "") + "xyz"[axis]

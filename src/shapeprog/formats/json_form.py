@@ -1,36 +1,47 @@
-"""Programs as JSON: versioned, with names, exact for every float32.
+"""Programs as JSON for other programs: the text, and a list of the solids that it draws.
 
-{"format": "shapeprog", "version": 1, "program": [
-  {"statement": "translate", "parameters": {"count": 2, "by": [0, 0, 18]}, "body": [
-    {"statement": "leg", "parameters": {"at": [-12, -8, -10], "size": [16, 2, 2]}}]}]}
+{"format": "shapeprog", "version": 4, "text": "width, depth, height = 40, 40, 45\\nleg(left=0, width=4)...",
+ "unit": "cm",
+ "solids": [{"line": 2, "role": "leg", "kind": "box", "low": [-20, -20, 0], "high": [-16, 20, 45]}, ...],
+ "frame": {"origin": [0, 0, 0], "scale": 0.01, "axes": [[1, 0, 0], [0, 0, 1], [0, -1, 0]]}}
 
-Programs with names, expressions or functions have version 2, those whose lengths are not in cells version 3, with a key
-"unit": {"name": "cm", "per_cell": 3.75}.  The entries are in :mod:`shapeprog.formats.json_lines`.
+``text`` is the content of a ``.shape`` file; it alone is read.  The bounds of solids are along x (right), y (rear) and
+z (up) in the unit of the text; those of round solids that lean are of a mesh.  ``frame`` maps them to the coordinates
+of the input: origin + scale * axes @ (x, y, z).
 """
 
 from __future__ import annotations
 
 import json
 from collections import Counter
+from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from reprlib import repr as shortened
 from typing import Any, NoReturn
 
+import numpy as np
+
 from shapeprog.errors import InputError, ProgramError, ShapeProgError
 from shapeprog.files import write_text
-from shapeprog.formats.frames import frame_dict, frame_from
-from shapeprog.formats.json_lines import entries_of, program_from_entries
-from shapeprog.formats.shape import LARGEST_FILE, read_text
-from shapeprog.language.parameters import LARGEST, shortest
-from shapeprog.language.place import proper_text
+from shapeprog.formats.frames import frame_of_text, scale_of
+from shapeprog.formats.shape import LARGEST_FILE, program_in, program_text, read_text
+from shapeprog.language.ast import Draw, Part
+from shapeprog.language.evaluate import provenance
+from shapeprog.language.parameters import LARGEST
+from shapeprog.language.printer import printed, source_of
 from shapeprog.language.program import Program
-from shapeprog.language.unit import Unit
+from shapeprog.language.statement import language
+from shapeprog.language.text import proper_text
+from shapeprog.lazy_torch import torch
 from shapeprog.space import Frame
 
 FORMAT = "shapeprog"
-VERSIONS = (1, 2, 3)
-"""Those that can be read."""
+VERSION = 4
+
+MOST_SOLIDS = 10_000
+"""Solids of the largest list; longer ones are left out."""
 
 
 @dataclass(frozen=True)
@@ -50,40 +61,35 @@ class Result:
 
     @property
     def program(self) -> Program:
-        """The program; an ``InputError`` if it is not valid."""
-        return program_from_entries(self.content.get("program"), self.name, "program", self.unit)
-
-    @property
-    def unit(self) -> Unit | None:
-        """The unit of the program if the file has one; an ``InputError`` if it is not valid."""
-        kept = self.content.get("unit")
-        if kept is None:
-            return None
-        cure = 'write {"name": "cm", "per_cell": 3.75}, or leave it out'
-        if not isinstance(kept, dict) or {*kept} != {"name", "per_cell"} or type(kept["per_cell"]) not in (int, float):
-            raise InputError(f"{self.name}: unit: {shortened(kept)} is not a name and a number per cell", cure)
-        try:
-            return Unit(str(kept["name"]), kept["per_cell"])
-        except ShapeProgError as mistake:
-            raise InputError(f"{self.name}: unit: {mistake.message}", mistake.hint) from None
-
-    @property
-    def snapped(self) -> Program | None:
-        """Its form in whole cells, if the file has one; an ``InputError`` if that is not valid."""
-        body = self.content.get("snapped")
-        return None if body is None else program_from_entries(body, self.name, "snapped")
+        """The program; a ``ProgramError`` if its text is not valid, an ``InputError`` if there is none."""
+        return self._read[0]
 
     @property
     def frame(self) -> Frame | None:
-        """The frame of the input if the file has one; an ``InputError`` if it is not valid."""
-        kept = self.content.get("frame")
-        return None if kept is None else frame_from(kept, self.name)
+        """The frame of the input if the text has one."""
+        return self._read[1] if "text" in self.content else None
+
+    @property
+    def snapped(self) -> Program | None:
+        """Its form in whole cells, if the file has one."""
+        return self._parsed("snapped")[0] if "snapped" in self.content else None
+
+    @cached_property
+    def _read(self) -> tuple[Program, Frame | None]:
+        return self._parsed("text")
+
+    def _parsed(self, entry: str) -> tuple[Program, Frame | None]:
+        text = self.content.get(entry)
+        if not isinstance(text, str):
+            message = f"{self.name}: {entry}: {shortened(text)} is not a string"
+            raise InputError(message, "write the text of the program, with \\n at the end of each line")
+        return program_in(text, f"{self.name}: {entry}")
 
     @property
     def scores(self) -> dict[str, float]:
         """The scores that are finite numbers; other values are ignored."""
-        kept = self.content.get("scores")
-        named = kept.items() if isinstance(kept, dict) else ()
+        scores = self.content.get("scores")
+        named = scores.items() if isinstance(scores, dict) else ()
         return {name: value for name, value in named if type(value) in (int, float) and abs(value) <= LARGEST}
 
     @property
@@ -115,27 +121,78 @@ def write_json(program: Program, path: Path, frame: Frame | None) -> None:
     write_text(path, result_json(program, frame))
 
 
-def result_json(program: Program, frame: Frame | None = None, **more: Any) -> str:
-    """The JSON form of a program with its frame and further entries, such as scores."""
-    content = json.loads(program_to_json(program))
-    if frame is not None:
-        content["frame"] = frame_dict(frame)
-    return json.dumps({**content, **more}, indent=2, allow_nan=False) + "\n"
-
-
 def program_to_json(program: Program, indent: int | None = 2) -> str:
     """A program as JSON text; numbers have the fewest digits that read back exactly.
 
     Raises
     ------
     ShapeProgError
-        If a number is not finite, a statement is not declared, or loops nest too deeply to be read back.
+        As for :func:`shapeprog.format_program`.
     """
-    unit = program.unit
-    content: dict[str, Any] = {"format": FORMAT, "version": 1 if program.source is None else 2 if unit is None else 3}
-    if unit is not None:
-        content["unit"] = {"name": unit.name, "per_cell": json.loads(shortest(unit.per_cell))}
-    return json.dumps({**content, "program": entries_of(program)}, indent=indent) + "\n"
+    return json.dumps(_content(program, None), indent=indent) + "\n"
+
+
+def result_json(program: Program, frame: Frame | None = None, **more: Any) -> str:
+    """The JSON form of a program with its frame and further entries, such as scores; a line for each solid."""
+    content = {**_content(program, frame), **more}
+    solids = [f"    {json.dumps(solid)}" for solid in content.get("solids", ())]
+    entries = ((key, value) for key, value in content.items() if key != "solids")
+    lines = [f"  {json.dumps(key)}: {json.dumps(value, allow_nan=False)}" for key, value in entries]
+    if solids:
+        lines.append('  "solids": [\n' + ",\n".join(solids) + "\n  ]")
+    return "{\n" + ",\n".join(lines) + "\n}\n"
+
+
+def _content(program: Program, frame: Frame | None) -> dict[str, Any]:
+    text, unit = program_text(program, frame), program.unit
+    content = {"format": FORMAT, "version": VERSION, "text": text, "unit": "cells" if unit is None else unit.name}
+    if frame is not None:
+        placed = frame_of_text(frame, scale_of(program))
+        content["frame"] = {"origin": placed.centre, "scale": placed.scale, "axes": placed.axes}
+    try:
+        return {**content, "solids": _solids(program, text.startswith("#") and frame is not None)}
+    except ShapeProgError:  # too many or too large for a list
+        return content
+
+
+def _solids(program: Program, framed: bool) -> list[dict[str, Any]]:
+    """The line, role, kind and bounds of each solid that a program draws; ``framed`` if a comment is above its text."""
+    if program.size > MOST_SOLIDS:
+        raise ShapeProgError(f"more than {MOST_SOLIDS} solids")
+    source, scale = source_of(program), scale_of(program)
+    drawn, blocks = provenance(source).blocks, dict[int, tuple[int, str]]()
+    for row, (_, line) in enumerate(printed(source), 1 + framed):
+        if isinstance(line, Draw | Part):
+            kind = line.kind if isinstance(line, Part) else line.name
+            blocks |= dict.fromkeys(drawn[id(line)], (row, kind))
+    roles = [draw.word if draw.word in language().roles else "" for draw in program.draws]
+    solids = []
+    for block, low, high in _bounds(program):
+        (up_low, depth_low, side_low), (up_high, depth_high, side_high) = low, high
+        corners = (-side_high, depth_low, up_low - scale.floor), (-side_low, depth_high, up_high - scale.floor)
+        places = [[float(f"{value / scale.cells_per_unit + 0.0:.6g}") for value in corner] for corner in corners]
+        row, kind = blocks[block]
+        solids.append({"line": row, "role": roles[block], "kind": kind, "low": places[0], "high": places[1]})
+    return solids
+
+
+def _bounds(program: Program) -> Iterator[tuple[int, list[float], list[float]]]:
+    """The block of each solid of a program, and its low and high corner in the grid."""
+    from shapeprog.geometry.arrays import array
+    from shapeprog.geometry.mesh import part_meshes
+    from shapeprog.geometry.primitive import primitives
+    from shapeprog.language.tensors import encode
+    from shapeprog.language.unroll import on_numpy_if_shipped, unroll
+
+    with on_numpy_if_shipped(program):
+        scene = unroll(encode(program, dtype=torch.float64))
+        centre, turn = array(scene.centre), np.abs(array(scene.rotation))
+        for slot, vertices, _ in part_meshes(scene):
+            low, high = vertices.min(0), vertices.max(0)
+            if (turn[slot].max(-1) > 1 - 1e-12).all():  # along the axes of the grid
+                bound = array(primitives[int(scene.kind[slot])].bound(scene.size[slot : slot + 1]))[0]
+                low, high = centre[slot] - turn[slot] @ bound, centre[slot] + turn[slot] @ bound
+            yield int(scene.block[slot]), low.tolist(), high.tolist()
 
 
 def program_from_json(text: str, name: str = "<json>") -> Program:
@@ -144,7 +201,7 @@ def program_from_json(text: str, name: str = "<json>") -> Program:
     Raises
     ------
     ProgramError
-        If the text is not JSON, at its place.
+        If the text is not JSON, or the program in it is not valid, at its place.
     InputError
         If it is JSON of another kind, naming the entry.
     """
@@ -156,11 +213,11 @@ def _document(text: str, name: str) -> dict[str, Any]:
         raise InputError(f"{name}: {constant} is not a number of a program", "write finite numbers")
 
     def unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-        found = dict(pairs)
-        if len(found) != len(pairs):
+        result = dict(pairs)
+        if len(result) != len(pairs):
             twice, _ = Counter(word for word, _ in pairs).most_common(1)[0]
             raise InputError(f"{name}: {shortened(twice)} is given twice in one entry", "leave one of them out")
-        return found
+        return result
 
     text = proper_text(text, name)
     try:
@@ -178,9 +235,13 @@ def _document(text: str, name: str) -> dict[str, Any]:
         raise InputError(f"{name}: a number has too many digits to be read", "write shorter numbers") from error
     if not isinstance(content, dict) or content.get("format") != FORMAT:
         raise InputError(f"{name}: this JSON holds no program", f'it begins {{"format": "{FORMAT}", ...')
-    if content.get("version") not in VERSIONS:
+    version = content.get("version")
+    if version in (1, 2, 3):
         raise InputError(
-            f"{name}: unknown version {shortened(content.get('version'))} of the program format",
-            f"this release reads versions {', '.join(map(str, VERSIONS))}; a newer one may read it",
+            f"{name}: version {version} of the program format is no longer read",
+            "read the .shape file that was written with it, or infer the shape again",
         )
+    if version != VERSION:
+        reason = f"{name}: unknown version {shortened(version)} of the program format"
+        raise InputError(reason, f"this release reads version {VERSION}; a newer one may read it")
     return content

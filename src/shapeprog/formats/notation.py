@@ -19,10 +19,10 @@ from shapeprog.formats.frames import frame_comment, frame_in
 from shapeprog.formats.published import COUNT, Groups, is_published, restored
 from shapeprog.formats.shape import LARGEST_FILE, read_text
 from shapeprog.language.parameters import Parameter
-from shapeprog.language.place import proper_text
+from shapeprog.language.printer import INDENT, checked_role, variable
 from shapeprog.language.program import DEEPEST, Draw, Loop, Node, Program
 from shapeprog.language.statement import Statement, language
-from shapeprog.language.text import INDENT, checked_role, variable
+from shapeprog.language.text import proper_text
 from shapeprog.space import Frame
 
 _NUMBER = r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?"
@@ -88,20 +88,20 @@ def parse_notation(text: str, name: str = "<program>", notes: list[str] | None =
 def groups(declared: Statement) -> dict[str, tuple[Parameter, ...]]:
     """The groups of numbers that the notation writes for a statement and the parameters in each."""
     rest = declared.parameters[declared.is_loop :]
-    found: dict[str, tuple[Parameter, ...]] = {}
+    result: dict[str, tuple[Parameter, ...]] = {}
     if declared.is_loop:
         for parameter in rest:
-            symbol = declared.paper[1] if declared.paper and not found else parameter.name
-            found[symbol] = (parameter,)
-        return found
+            symbol = declared.paper[1] if declared.paper and not result else parameter.name
+            result[symbol] = (parameter,)
+        return result
     positions = [parameter for parameter in rest if parameter.quantity.kind == "position"]
     for number, parameter in enumerate(positions, 1):
-        found[f"P{number}" if len(positions) > 1 else "P"] = (parameter,)
+        result[f"P{number}" if len(positions) > 1 else "P"] = (parameter,)
     lengths = tuple(parameter for parameter in rest if parameter.quantity.kind == "length")
     if lengths:
-        found["G"] = lengths
-    found.update({p.name: (p,) for p in rest if p.quantity.kind not in ("position", "length")})
-    return found
+        result["G"] = lengths
+    result.update({p.name: (p,) for p in rest if p.quantity.kind not in ("position", "length")})
+    return result
 
 
 def _words(declared: Statement) -> list[str]:
@@ -127,10 +127,7 @@ def _nested(node: Node, around: int = 0) -> bool:
 
 
 def _lines(node: Node, loops: list[Loop], numbered: bool) -> Iterator[str]:
-    known = language()
-    if node.name not in known:
-        raise ShapeProgError(f"unknown statement {node.name!r}", "load the module that declares it")
-    declared = known[node.name]
+    declared = language().declaration(node.name, len(node.values))
     shifts = [depth for depth, outer in enumerate(loops) if _moves(outer)]
     names = [f"u{place + 1}" if numbered else "u" for place in range(len(shifts) + 1)]
     moved = "".join(f"+{variable(depth)}*{u}" for depth, u in zip(shifts, names, strict=False))
@@ -197,14 +194,14 @@ class _Reader:
     def _node(self, indent: int, depth: int) -> Node:
         row = self.next
         text = _bare(self.lines[row][1])
-        found = _DRAW.match(text) or _FOR.match(text)
-        if not found:
+        match = _DRAW.match(text) or _FOR.match(text)
+        if not match:
             raise self._error(
                 "a line is draw(...), for(...) or end", "write draw('Leg', 'Cub', P=(_, _, _), G=(_, _, _))"
             )
-        is_loop = found.re is _FOR
-        start: Groups = {COUNT: [float(found[1])]} if is_loop else {}
-        words, groups = self._arguments(text, found, indent, start)
+        is_loop = match.re is _FOR
+        start: Groups = {COUNT: [float(match[1])]} if is_loop else {}
+        words, groups = self._arguments(text, match, indent, start)
         declared, values = self._declared(words, groups, is_loop)
         self.next += 1
         if not is_loop:
@@ -215,11 +212,11 @@ class _Reader:
             raise self._error(f"loops are nested more than {DEEPEST} deep", "put some of them side by side")
         return Loop(declared.name, values, self.body(indent, depth + 1, row))
 
-    def _arguments(self, text: str, found: re.Match[str], indent: int, groups: Groups) -> tuple[list[str], Groups]:
+    def _arguments(self, text: str, match: re.Match[str], indent: int, groups: Groups) -> tuple[list[str], Groups]:
         """Quoted words and groups of numbers; the published printer omits the last parenthesis of a rotation."""
         words: list[str] = []
-        at = found.end()
-        last = found[0][-1] if found.re is _FOR else ","
+        at = match.end()
+        last = match[0][-1] if match.re is _FOR else ","
         while last == ",":
             part = _WORD.match(text, at) or _GROUP.match(text, at) or _TURN.match(text, at)
             if not part:
@@ -239,15 +236,15 @@ class _Reader:
             raise self._error("unexpected text after the statement", "remove it", indent + at)
         return words, groups
 
-    def _declared(self, words: list[str], found: Groups, is_loop: bool) -> tuple[Statement, tuple[float, ...]]:
+    def _declared(self, words: list[str], by_symbol: Groups, is_loop: bool) -> tuple[Statement, tuple[float, ...]]:
         known = [declared for declared in language() if declared.is_loop == is_loop]
         fitting = next((declared for declared in known if _words(declared) == words), None)
         if fitting is None and not is_loop and len(words) > 1 and words[0] in language().roles:
             solids = [declared for declared in known if declared.name != words[0]]  # leg(...) implies the role
             fitting = next((declared for declared in solids if [words[0], declared.name] == words), None)
         try:
-            if is_published(words, found):
-                name, numbers, note = restored(words, found)
+            if is_published(words, by_symbol):
+                name, numbers, note = restored(words, by_symbol)
                 fitting = next((declared for declared in known if declared.name == name), None)
                 if fitting is not None:
                     self.notes.append(f"{self.name}, line {self.lines[self.next][0]}: {note}")
@@ -258,14 +255,14 @@ class _Reader:
                 raise ShapeProgError(
                     f"no {what} is called {_quoted(words)[:_SHOWN] or 'nothing'}", did_you_mean(_quoted(words), spelled)
                 )
-            return fitting, self._sorted(fitting, found)
+            return fitting, self._sorted(fitting, by_symbol)
         except ShapeProgError as mistake:
             raise self._error(mistake.message, mistake.hint) from None
 
-    def _sorted(self, declared: Statement, found: Groups) -> tuple[float, ...]:
+    def _sorted(self, declared: Statement, by_symbol: Groups) -> tuple[float, ...]:
         """Numbers in slot order."""
         wanted = groups(declared)
-        given = {_symbol(symbol, wanted): numbers for symbol, numbers in found.items()}
+        given = {_symbol(symbol, wanted): numbers for symbol, numbers in by_symbol.items()}
         for symbol in given:
             if symbol not in wanted and symbol != COUNT:
                 raise ShapeProgError(

@@ -1,145 +1,25 @@
-"""OpenSCAD out: loops stay loops, and every number is a named variable at the top, ready for the customizer."""
+"""OpenSCAD: parts are placed from the sides of a box, as in the program; named numbers are those of the customizer."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from shapeprog.files import write_text
-from shapeprog.formats.colours import colour
-from shapeprog.formats.plan import (
-    Definition,
-    Heading,
-    Invocation,
-    Module,
-    Plan,
-    Repetition,
-    Solid,
-    Step,
-    Variable,
-)
-from shapeprog.formats.preamble import needed
-from shapeprog.formats.symbolic import number
-from shapeprog.formats.written_plan import script_plan
+from shapeprog.formats.openscad_prelude import PRELUDE
+from shapeprog.formats.scripts import Number, Script, needed, number, script
 from shapeprog.geometry.primitives.cylinder import SEGMENTS
+from shapeprog.language.ast import Argument, Assignment, Call, Comment, Function, Group, Keywords, Line, Part, Point
+from shapeprog.language.expression import Expression, Value, text_of
+from shapeprog.language.placement import AXES, BOX, ROUND
 from shapeprog.language.program import Program
 from shapeprog.space import Frame
 
-_MODULES = """
-// A box from its low corner and its extents; its top is shifted by lean along y (a shear, not a turn).
-module cuboid(low, size, lean = 0) {
-  if (min(size) > 0) translate(low)
-    multmatrix([[1, 0, 0, 0], [lean / size[0], 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]) cube(size);
-}
-
-// A round bar between two points, which may be tapered; as a prism of the same volume as the true one.
-module cylinder_between(start, end, radius, end_radius = undef) {
-  last = is_undef(end_radius) ? radius : end_radius;
-  fuller = sqrt(2 * PI / segments / sin(360 / segments));
-  along = end - start;
-  height = norm(along);
-  flat = norm([along[0], along[1]]);
-  if (height > 0 && min(radius, last) >= 0 && max(radius, last) > 0) translate(start)
-    rotate([0, acos(max(-1, min(1, along[2] / height))), flat > 0 ? atan2(along[1], along[0]) : 0])
-      cylinder(h = height, r1 = radius * fuller, r2 = last * fuller, $fn = segments);
-}
-
-// A box from its low corner, turned to the rear by tilt degrees about its bottom front edge.
-module tilted_box(at, size, tilt) {
-  if (min(size) > 0) translate(at) rotate([0, 0, tilt]) cube(size);
-}
-
-// A bar between two points, turned about them by turn degrees: the sides of its section lie along the axes that it runs
-// along least, in their order, and are leaned with it.
-module bar_between(start, end, section, turn) {
-  along = end - start;
-  far = [for (way = along) abs(way)];
-  main = far[0] == max(far) ? 0 : far[1] == max(far) ? 1 : 2;
-  axis = [for (k = [0:2]) k == main ? 1 : 0];
-  size = main == 0 ? [norm(along), section[0], section[1]] :
-         main == 1 ? [section[0], norm(along), section[1]] : [section[0], section[1], norm(along)];
-  leaned = along[main] < 0 ? -along : along;
-  across = cross(axis, leaned);
-  if (min(size) > 0) translate((start + end) / 2)
-    rotate(atan2(norm(across), leaned[main]), across) rotate(turn * axis) cube(size, center = true);
-}
-
-// A round bar along the circle from one point through a second to a third, at most as thick as fills the ring; its
-// prisms have the volume of the true one.
-module arc_through(start, through, end, radius) {
-  middle = (start + end) / 2;
-  half = norm(end - start) / 2;
-  unit = (end - start) / (2 * half);
-  along = (through - middle) * unit;
-  away = through - middle - along * unit;
-  height = norm(away);
-  rest = half * half - along * along - height * height;
-  // How high the circle rises over its chord.
-  rise = 2 * height * half * half / (norm([2 * height * half, rest]) + rest);
-  if (half > 0 && radius > 0) {
-    if (rise > half / 100000) {
-      ring = (half * half + rise * rise) / (2 * rise);
-      angle = 4 * atan2(rise, half);
-      step = angle / segments;
-      fuller = sqrt(2 * PI / segments / sin(360 / segments) * step * PI / 180 / sin(step));
-      thick = min(min(radius, ring) * fuller, 0.9999 * ring / cos(180 / segments));
-      bulge = away / height;
-      side = cross(bulge, unit);
-      posed(middle + (rise - ring) * bulge, [for (k = [0:2]) [bulge[k], unit[k], side[k]]])
-        rotate([0, 0, -angle / 2]) rotate_extrude(angle = angle, $fn = segments * 360 / angle)
-          translate([ring, 0]) rotate(180 / segments) circle(r = thick, $fn = segments);
-    } else cylinder_between(start, end, radius);
-  }
-}
-
-// A box from its low corner, with rounded edges: a ball of polygons around it, pulled apart.
-module rounded_box(at, size, edge) {
-  radius = min(edge, min(size) / 2);
-  last = segments / 2 - 1;
-  step = 360 / segments;
-  fuller = 1 / cos(step / 2);
-  if (min(size) > 0 && radius > 0) {
-    points = [for (tilt = [step / 2:step:180], a = [step / 2:step:360])
-      let (way = [cos(tilt), sin(tilt) * cos(a) * fuller, sin(tilt) * sin(a) * fuller])
-        [for (n = [0:2]) at[n] + size[n] / 2 + sign(way[n]) * (size[n] / 2 - radius) + way[n] * radius * fuller]];
-    caps = [[for (j = [1:segments]) segments - j], [for (j = [0:segments - 1]) last * segments + j]];
-    sides = [for (k = [0:last - 1], j = [0:segments - 1])
-      let (a = k * segments + j, b = k * segments + (j + 1) % segments) [a, b, b + segments, a + segments]];
-    polyhedron(points = points, faces = concat(caps, sides), convexity = 2);
-  } else cuboid(at, size);
-}
-
-// Any other solid: its mesh in a box of half extents 1, stretched and put at its centre.
-module shell(centre, half, mesh) {
-  if (min(half) > 0) translate(centre) scale(half) polyhedron(points = mesh[0], faces = mesh[1], convexity = 10);
-}
-
-// Local axes as columns of a rotation, about a point.
-module posed(centre, axes) {
-  multmatrix([for (r = [0:2]) [axes[r][0], axes[r][1], axes[r][2], centre[r]]]) children();
-}
-
-// Copy i of a translation loop.
-module move(i, by) { translate(i * by) children(); }
-
-// The mirror image along every axis whose sign is negative.
-module reflect(signs) {
-  multmatrix([[signs[0], 0, 0, 0], [0, signs[1], 0, 0], [0, 0, signs[2], 0], [0, 0, 0, 1]]) children();
-}
-
-// A turn about the vertical axis (x) through a point.
-module turn(degrees, about = [0, 0, 0]) {
-  translate([0, about[1], about[2]]) rotate([degrees, 0, 0]) translate([0, -about[1], -about[2]]) children();
-}
-"""
-
-
 _KEYWORDS = """
-module function if else for let true false undef include use each assert echo PI segments world
+module function if else for let true false undef include use each assert echo PI segments colours unit
 abs sign sin cos tan acos asin atan atan2 floor round ceil ln len log pow sqrt exp rands min max norm cross concat
 lookup str chr ord search version version_num parent_module is_undef is_bool is_num is_string is_list is_function
 cube sphere cylinder polyhedron square circle polygon text import projection surface render group
@@ -147,119 +27,180 @@ union difference intersection hull minkowski translate rotate scale resize mirro
 linear_extrude rotate_extrude children intersection_for assign child echo roof
 """
 
-
-def write_scad(program: Program, path: Path, frame: Frame) -> None:
-    """Write an OpenSCAD model; the outermost transformation maps it to the coordinates of the input."""
-    write_text(path, scad_text(program, frame))
+_GROUPS = {"mirror": "mirrored", "rotate": "rotated", "translate": "translated"}
+"""Names of groups that OpenSCAD has for other modules."""
 
 
-def scad_text(program: Program, frame: Frame) -> str:
-    """The OpenSCAD model of a program.
+def write_scad(program: Program, path: Path, frame: Frame, unit: str = "") -> None:
+    """Write an OpenSCAD model in the coordinates of ``frame``, whose unit is ``unit`` if it is known."""
+    write_text(path, scad_text(program, frame, unit))
 
-    Inside the model x is up, y is depth (positive = rear) and z is left-right, in the unit of the program.
+
+def scad_text(program: Program, frame: Frame, unit: str = "") -> str:
+    """The OpenSCAD model of a program: x to the right, y to the rear, z up, in the unit of the program.
+
+    Parameters
+    ----------
+    program
+        What to write.
+    frame
+        From the grid to the coordinates of the file.
+    unit
+        Unit of the coordinates of the file; empty if it is not known.
     """
-    made = script_plan(program, _reserved())
+    made = script(program, frame, {*_KEYWORDS.split(), *re.findall(r"(?:module|function) (\w+)", PRELUDE)}, "$")
     lines = ["// Made by shapeprog. Change the numbers below, or use the customizer."]
-    lines += [f"// Lengths are in {made.word}.", ""]
-    if made.numbers:
-        lines += ["/* [Numbers] */", *(line for each in made.numbers for line in _definition(each, made.step)), ""]
-    for heading in made.headings:
-        lines += [*_heading(heading, made), ""]
-    lines += ["/* [Quality and place] */", f"segments = {SEGMENTS}; // [12:4:128]"]
-    placed = replace(frame, scale=frame.scale / made.cell).matrix()
-    matrix = ", ".join(f"[{', '.join(number(value) for value in row)}]" for row in placed)
-    lines += [f"// From {made.word} to the world of the input.", f"world = [{matrix}];", ""]
-    lines += ["/* [Hidden] */", *_tables(made)]
-    body = [line for function in made.functions for line in [*_module(function), ""]]
-    body += ["multmatrix(world) union() {"]
-    body += [line for step in made.body for line in _step(step, 1)]
-    tools = [f"{piece}\n" for piece in needed(_MODULES.strip().split("\n\n"), "\n".join(body))]
-    return "\n".join([*lines, *tools, *body, "}", ""])
+    if made.unit:
+        lines += [f"// Numbers are in {made.unit}{f', the model is in {unit}' if unit else ''}."]
+    lines += ["", f"/* [Numbers{f', in {made.unit}' if made.unit else ''}] */"] if made.numbers else []
+    lines += [text for entry in made.numbers for text in _number(entry)]
+    body = list(_model(made))
+    if "segments" in (tools := "\n\n".join(needed(PRELUDE.strip().split("\n\n"), "\n".join(body)))):
+        lines += ["", "/* [Quality] */", f"segments = {SEGMENTS}; // [12:4:128]"]
+    table = ", ".join(f'["{word}", "{shade}"]' for word, shade in made.colours.items())
+    lines += ["", "/* [Hidden] */", f"colours = [{table}];", '$role = "";', ""]
+    return "\n".join([*lines, *body, "", tools, ""])
 
 
-def _heading(heading: Heading, made: Plan) -> Iterator[str]:
-    yield f"/* [{heading.name}] */"
-    yield f"// {heading.doc}"
-    for each in heading.variables:
-        yield f"{each.name} = {each.text}; // {_range(each, made)}"
-
-
-def _definition(each: Definition, step: float) -> Iterator[str]:
-    if each.note:
-        yield f"// {each.note}"
-    slider = ""
-    if each.value is not None:
-        far = 10 * step * np.ceil(abs(each.value) / (5 * step))
-        low, high = sorted((0.0, np.copysign(far, each.value)))
-        if each.whole:  # a share of a span between copies is undefined for one copy
-            low = min(2.0, each.value)
-        slider = f" // [{number(low)}:{1 if each.whole else number(step)}:{number(max(high, 10 * step))}]"
-    yield f"{each.name} = {each.text};{slider}"
-
-
-def _module(function: Module) -> Iterator[str]:
-    if function.note:
-        yield f"// {function.note}"
-    given = [name if default is None else f"{name} = {default}" for name, default in function.parameters]
-    yield f"module {function.name}({', '.join(given)}) {{"
-    for step in function.body:
-        yield from _step(step, 1)
+def _model(made: Script) -> Iterator[str]:
+    """The functions and the model itself."""
+    for line in made.lines:
+        if isinstance(line, Function):
+            yield from _lines([line], 0)
+            yield ""
+    if made.meshes:
+        for mesh in made.meshes:
+            points = ", ".join(_vector(np.round(vertex, 6)) for vertex in mesh.vertices)
+            # OpenSCAD wants faces clockwise from outside.
+            faces = ", ".join(f"[{a}, {c}, {b}]" for a, b, c in mesh.faces.tolist())
+            yield f'painted("{mesh.word}") polyhedron(points = [{points}], faces = [{faces}], convexity = 10);'
+        return
+    rows = ", ".join(map(_vector, made.world))
+    around = f"multmatrix([{rows}]) " if made.moved else f"scale({number(made.scale)}) " if made.scale != 1 else ""
+    yield f"{around}whole(width, depth, height) {{"
+    yield from _lines([line for line in made.lines if not isinstance(line, Function)], 1)
     yield "}"
 
 
-def _reserved() -> set[str]:
-    """Reserved words of OpenSCAD and of these scripts."""
-    return {*_KEYWORDS.split(), *re.findall(r"(?:module|function) (\w+)", _MODULES)}
+def _number(entry: Number | Comment) -> Iterator[str]:
+    if isinstance(entry, Comment):
+        yield f"// {entry.text}" if entry.text else ""
+        return
+    if entry.note:
+        yield f"// {entry.note}"
+    slider = "" if entry.value is None else f" // [{':'.join(map(number, entry.range))}]"
+    yield f"{entry.name} = {entry.text};{slider}"
 
 
-def _range(each: Variable, made: Plan) -> str:
-    if each.fixed:
-        return "not used below: changing it has no effect"
-    cell, whole = (made.cell, 10 * made.step) if each.quantity.spatial else (1.0, 1.0)
-    step = 1 if each.quantity.discrete else whole / 2
-    values = [float(word) for word in each.text.strip("[]").split(",")]
-    low, high = min(each.quantity.low * cell, *values, 0), max(each.quantity.high * cell, *values)
-    return f"[{number(whole * np.floor(low / whole))}:{number(step)}:{number(whole * np.ceil(high / whole))}]"
-
-
-def _tables(made: Plan) -> Iterator[str]:
-    for name, (vertices, faces) in made.shells.items():
-        points = ", ".join(f"[{', '.join(number(round(value, 9)) for value in vertex)}]" for vertex in vertices)
-        # OpenSCAD wants faces clockwise from outside.
-        triangles = ", ".join(f"[{a}, {c}, {b}]" for a, b, c in faces.tolist())
-        yield f"{name} = [[{points}], [{triangles}]];"
-    for name, table in made.tables.items():
-        rows = [number(row) if np.ndim(row) == 0 else f"[{', '.join(map(number, row))}]" for row in table]
-        yield f"{name} = [{', '.join(rows)}];"
-
-
-def _step(step: Step, depth: int) -> Iterator[str]:
+def _lines(lines: list[Line] | tuple[Line, ...], depth: int) -> Iterator[str]:
     indent = "  " * depth
-    if isinstance(step, Definition):
-        yield f"{indent}{step.name} = {step.text};"
-        return
-    if isinstance(step, Invocation):
-        yield f"{indent}{step.name}({', '.join(f'{name} = {text}' for name, text in step.arguments)});"
-        return
-    if isinstance(step, Repetition):
-        words = [f"for ({step.letter} = [0 : 1 : {step.count} - 1])"]
-        words += [f"move({step.shift[0]}, {step.shift[1]})"] if step.shift else []
-        words += [f"turn({', '.join(step.turn)})"] if step.turn else []
-        words += [f"reflect({step.signs})"] if step.signs else []
-        yield f"{indent}{' '.join(words)} {{"
-        for inner in step.body:
-            yield from _step(inner, depth + 1)
-        yield f"{indent}}}"
-        return
-    shade = ", ".join(f"{channel / 255:.3f}" for channel in colour(step.statement))
-    yield f"{indent}color([{shade}]) {_call(step)}; // {step.name}"
+    for line in lines:
+        if isinstance(line, Comment):
+            yield f"{indent}// {line.text}" if line.text else ""
+            continue
+        note = f" // {line.note}" if line.note else ""
+        match line:
+            case Assignment(numbers):
+                for name, value in numbers:
+                    yield f"{indent}{name} = {text_of(value)};{note}"
+                    note = ""
+            case Part():
+                role = f'part("{line.role}") ' if line.role and line.role != line.kind else ""
+                upright = line.kind in ROUND and "start" not in dict(line.keywords)
+                kind = f'upright("{line.kind}", ' if upright else f"{line.kind}("
+                yield f"{indent}{role}{kind}{_keywords(line.keywords)});{note}"
+            case Call():
+                yield f"{indent}{_call(line)};{note}"
+            case Function(name, parameters, body):
+                declared = ", ".join(w if v is None else f"{w} = {text_of(v)}" for w, v in parameters)
+                yield f"{indent}module {name}({declared}) {{{note}"
+                yield from _lines(body, depth + 1)
+                yield f"{indent}}}"
+            case Group():
+                yield f"{indent}{_group(line)} {{{note}"
+                yield from _lines(line.body, depth + 1)
+                yield f"{indent}}}"
 
 
-def _call(step: Solid) -> str:
-    arguments, around = list(step.arguments), ""
-    if step.axes is not None:
-        axes = ", ".join(f"[{', '.join(number(round(value, 12)) for value in row)}]" for row in step.axes)
-        around = f"posed({arguments[0]}, [{axes}]) "
-        lean = f" - [0, ({arguments[2]}) / 2, 0]" if len(arguments) > 2 else ""
-        arguments[0] = f"-{arguments[1]} / 2{lean}" if step.kind == "cuboid" else "[0, 0, 0]"
-    return f"{around}{step.kind}({', '.join([*arguments, *([step.shell] if step.shell else [])])})"
+def _call(line: Call) -> str:
+    """A call in the box of its keywords; sizes of the box around in its arguments are evaluated outside of that."""
+    box = tuple(pair for pair in line.arguments if pair[0] in (*BOX, "tilt"))
+    arguments = [(word, text_of(value)) for word, value in line.arguments if (word, value) not in box]
+    outside = [(word, text) for word, text in arguments if box and "$" in text]
+    words = [f'part("{line.role}")'] if line.role else []
+    if outside:
+        words.append(f"let ({', '.join(f'$given_{word} = {text}' for word, text in outside)})")
+    words += [f"inside({_keywords(box)})"] if box else []
+    texts = (f"{word} = {f'$given_{word}' if (word, text) in outside else text}" for word, text in arguments)
+    return " ".join([*words, f"{line.name}({', '.join(texts)})"])
+
+
+def _group(line: Group) -> str:
+    words = [] if line.count is None else [text_of(line.count)]
+    words += [f'"{line.axis}"'] if line.axis else []
+    keywords = line.keywords
+    if line.kind == "row":
+        words.append(f"in_box({_keywords(_first(line.body) or ())})")
+        keywords = dict(keywords)["last"].keywords  # type: ignore[union-attr]
+    words += [_keywords(keywords)] if keywords else []
+    return f"{_GROUPS.get(line.kind, line.kind)}({', '.join(words)})"
+
+
+def _first(body: tuple[Line, ...]) -> Keywords | None:
+    """The keywords of the box to which a row refers: that of the first part, call or group in its body."""
+    for line in body:
+        match line:
+            case Group(kind="inside" | "divide", keywords=keywords) | Call(arguments=keywords):
+                return tuple((word, value) for word, value in keywords if word in BOX)
+            case Group():
+                if (inner := _first(line.body)) is not None:
+                    return inner
+            case Part():
+                return _reference(line)
+    return None
+
+
+def _reference(line: Part) -> Keywords:
+    """The box of a part; the box of a solid between points is its start."""
+    keywords = dict(line.keywords)
+    if isinstance(start := keywords.get("start"), Point):
+        return (*start.keywords, *((words.size, 0.0) for words in AXES))
+    sides = {word: value for word, value in keywords.items() if word in BOX}
+    if line.kind in ROUND:
+        across: Value | None = None
+        if "radius" in keywords:
+            across = _Text(f"2 * max({_argument(keywords['radius'])})")
+        else:
+            by = [words.size in sides or {words.low, words.high} <= sides.keys() for words in AXES[:2]]
+            if by[0] != by[1]:
+                words, size = AXES[by.index(True)], AXES[by.index(True)].size
+                across = sides.get(size, _Text(f"${size} - ({text_of(sides.get(words.low, 0.0))})"))  # type: ignore[assignment,arg-type]
+                if size not in sides:
+                    across = _Text(f"{across} - ({text_of(sides[words.high])})")  # type: ignore[arg-type]
+        if across is not None:
+            sides |= {words.size: across for words in AXES[:2] if not {words.low, words.high} <= sides.keys()}
+    return tuple(sides.items())
+
+
+class _Text(Expression):
+    """An expression that only OpenSCAD has."""
+
+    def __init__(self, text: str) -> None:
+        self.text = text
+
+    def __str__(self) -> str:
+        return self.text
+
+
+def _keywords(keywords: Keywords) -> str:
+    return ", ".join(f"{word} = {_argument(argument)}" for word, argument in keywords)
+
+
+def _argument(argument: Argument) -> str:
+    if isinstance(argument, Point):
+        return f"at({_keywords(argument.keywords)})"
+    return f"[{', '.join(map(text_of, argument))}]" if isinstance(argument, tuple) else text_of(argument)
+
+
+def _vector(values: object) -> str:
+    return f"[{', '.join(number(float(value)) for value in values)}]"  # type: ignore[attr-defined]

@@ -12,8 +12,9 @@ import numpy.typing as npt
 
 from shapeprog.errors import OutputError, ShapeProgError
 from shapeprog.geometry.mesh import part_meshes, union_mesh
+from shapeprog.language.convert import placed as placed_program
 from shapeprog.language.parameters import LARGEST
-from shapeprog.language.program import Draw, Program
+from shapeprog.language.program import Program
 from shapeprog.language.statement import language
 from shapeprog.language.tensors import encode
 from shapeprog.language.unroll import on_numpy_if_shipped, unroll
@@ -77,77 +78,59 @@ def parts(program: Program, frame: Frame | None = None) -> list[Part]:
         scene = unroll(encode(program, dtype=torch.float64))
         blocks, meshes = scene.block.tolist(), part_meshes(scene)
     numbers: Counter[str] = Counter()
-    found = []
-    called = [language().called(chain[-1].word) for chain in program.chains if isinstance(chain[-1], Draw)]
+    result = []
+    called = [language().called(draw.word) for draw in program.draws]
     for slot, vertices, faces in meshes:
         block = blocks[slot]
         word = called[block].name
         numbers[word] += 1
         where = placed(vertices, frame)
-        found.append(Part(f"{word}_{numbers[word]}", called[block].id, word, block, where, faces))
-    return found
+        result.append(Part(f"{word}_{numbers[word]}", called[block].id, word, block, where, faces))
+    return result
 
 
 def placed(points: npt.NDArray[Any], frame: Frame | None = None) -> Vertices:
-    """Points of the grid in the world of ``frame``, or unchanged without one.
-
-    Raises
-    ------
-    OutputError
-        If a coordinate exceeds float32, which most files store.
-    """
-    found = np.asarray(points, np.float64)
+    """Points of the grid in the world of ``frame``, or unchanged without one; an ``OutputError`` if a coordinate
+    exceeds float32, which most files store."""
+    result = np.asarray(points, np.float64)
     with np.errstate(over="ignore", invalid="ignore"):
-        found = found if frame is None else frame.to_world(found)
-    if not (np.abs(found) <= LARGEST).all():
-        said = "a part of this program, or its frame, is too large or too far away to be drawn in single precision"
-        raise OutputError(said, f"coordinates go from -{LARGEST:.7e} to {LARGEST:.7e}")
-    return found
+        result = result if frame is None else frame.to_world(result)
+    if not (np.abs(result) <= LARGEST).all():
+        message = "a part of this program, or its frame, is too large or too far away to be drawn in single precision"
+        raise OutputError(message, f"coordinates go from -{LARGEST:.7e} to {LARGEST:.7e}")
+    return result
 
 
 def drawn_parts(program: Program, frame: Frame | None = None) -> list[Part]:
-    """The same, but never empty.
-
-    Raises
-    ------
-    OutputError
-        If the program draws nothing.
-    """
-    found = parts(program, frame)
-    if not found:
+    """The same, but never empty; an ``OutputError`` if the program draws nothing."""
+    result = parts(program, frame)
+    if not result:
         raise OutputError("this program draws nothing, so there is no mesh of it", "add a statement, or save as .shape")
-    return found
+    return result
 
 
 def solid(program: Program, frame: Frame | None = None) -> tuple[Vertices, Faces]:
-    """The union of all parts as one watertight mesh.
-
-    Raises
-    ------
-    OutputError
-        If no part has a volume, there are too many to join, or a coordinate exceeds single precision.
-    """
+    """The union of all parts as one watertight mesh; an ``OutputError`` if no part has a volume, there are too many to
+    join, or a coordinate exceeds single precision."""
     try:
         with on_numpy_if_shipped(program):
             vertices, faces = union_mesh(unroll(encode(program, dtype=torch.float64)))
     except ShapeProgError as error:
         if not program.body:
-            raise OutputError(
-                "this program is empty", "write a statement, such as box(at=(0, 0, 0), size=(1, 1, 1))"
-            ) from error
+            raise OutputError("this program is empty", "write a part below its size, such as box(height=2)") from error
         raise OutputError(f"this program makes no solid: {error.message}", error.hint) from error
     return placed(vertices, frame), faces
 
 
-def part_normals(each: Sequence[Part]) -> Iterator[Vertices]:
+def part_normals(solids: Sequence[Part]) -> Iterator[Vertices]:
     """The :func:`crease_normals` of every part; many small parts are worked on together."""
     start = 0
-    while start < len(each):
-        stop, triangles = start + 1, len(each[start].faces)
-        while stop < len(each) and triangles + len(each[stop].faces) <= _AT_ONCE:
-            triangles += len(each[stop].faces)
+    while start < len(solids):
+        stop, triangles = start + 1, len(solids[start].faces)
+        while stop < len(solids) and triangles + len(solids[stop].faces) <= _AT_ONCE:
+            triangles += len(solids[stop].faces)
             stop += 1
-        some = each[start:stop]
+        some = solids[start:stop]
         starts = np.cumsum([0, *(len(part.vertices) for part in some)])
         faces = np.concatenate([part.faces + first for part, first in zip(some, starts, strict=False)])
         vertices, owner = np.concatenate([part.vertices for part in some]), np.repeat(range(len(some)), np.diff(starts))
@@ -158,10 +141,7 @@ def part_normals(each: Sequence[Part]) -> Iterator[Vertices]:
 
 
 def crease_normals(
-    vertices: npt.NDArray[Any],
-    faces: npt.NDArray[Any],
-    angle: float = 40.0,
-    owner: npt.NDArray[np.int64] | None = None,
+    vertices: npt.NDArray[Any], faces: npt.NDArray[Any], angle: float = 40.0, owner: npt.NDArray[np.int64] | None = None
 ) -> Vertices:
     """Unit normals (F, 3, 3) of the corners of every triangle: smooth across shallow edges, sharp across steep ones.
 
@@ -173,20 +153,20 @@ def crease_normals(
     area = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     length = np.linalg.norm(area, axis=1, keepdims=True)
     flat = area / np.where(length > 0, length, 1)
-    place = _places(np.asarray(vertices, np.float64), owner)[faces].reshape(-1)
-    order = np.argsort(place, kind="stable")
-    starts = np.flatnonzero(np.diff(place[order], prepend=-1))
+    vertex = _places(np.asarray(vertices, np.float64), owner)[faces].reshape(-1)
+    order = np.argsort(vertex, kind="stable")
+    starts = np.flatnonzero(np.diff(vertex[order], prepend=-1))
     counts = np.diff(starts, append=len(order))
     group = np.repeat(np.arange(len(starts)), counts)
     # All pairs of corners that share a place, without a loop over places.
     repeats = np.where(counts < _LARGEST_FAN, counts, 0)[group]
     first = np.repeat(np.arange(len(order)), repeats)
     within = np.arange(len(first)) - np.repeat(np.cumsum(repeats) - repeats, repeats)
-    one, two = order[first], order[starts[group[first]] + within]
-    near = np.einsum("pc,pc->p", flat[one // 3], flat[two // 3]) > np.cos(np.radians(angle))
+    corner, partner = order[first], order[starts[group[first]] + within]
+    smooth = np.einsum("pc,pc->p", flat[corner // 3], flat[partner // 3]) > np.cos(np.radians(angle))
     total = np.zeros((len(faces) * 3, 3))
     for axis in range(3):
-        total[:, axis] = np.bincount(one[near], area[two[near] // 3, axis], minlength=len(total))
+        total[:, axis] = np.bincount(corner[smooth], area[partner[smooth] // 3, axis], minlength=len(total))
     size = np.linalg.norm(total, axis=1, keepdims=True)
     fallback = np.repeat(flat, 3, axis=0)
     normals: Vertices = np.where(size > 1e-30, total / np.where(size > 1e-30, size, 1), fallback).reshape(-1, 3, 3)
@@ -204,6 +184,17 @@ def _places(vertices: Vertices, owner: npt.NDArray[np.int64] | None) -> npt.NDAr
     scale = np.repeat(np.maximum(extent, 1e-30), counts)[:, None]
     keys = np.column_stack([owner, np.rint((vertices - np.repeat(low, counts, 0)) / scale * 1e6).astype(np.int64)])
     order = np.lexsort(keys.T[::-1])
-    place = np.empty(len(vertices), np.int64)
-    place[order] = np.cumsum((np.diff(keys[order], axis=0, prepend=keys[order[:1]]) != 0).any(-1))
-    return place
+    result = np.empty(len(vertices), np.int64)
+    result[order] = np.cumsum((np.diff(keys[order], axis=0, prepend=keys[order[:1]]) != 0).any(-1))
+    return result
+
+
+def as_placed(program: Program) -> Program | None:
+    """The program with its parts placed from the sides of a box; none if a statement in it cannot be."""
+    if program.scale is not None:
+        return program
+    try:
+        with on_numpy_if_shipped(program):
+            return placed_program(program)
+    except ShapeProgError:
+        return None

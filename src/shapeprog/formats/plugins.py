@@ -33,8 +33,8 @@ def load_statements(path: str | os.PathLike[str]) -> tuple[Statement, ...]:
     if file in _loaded:
         return _declare_again(file)
     if not file.is_file():
-        found = "a folder" if file.is_dir() else "no file"
-        raise InputError(f"{path} is {found}", "give the path of a Python file that declares statements")
+        result = "a folder" if file.is_dir() else "no file"
+        raise InputError(f"{path} is {result}", "give the path of a Python file that declares statements")
     before, roles, solids = set(language().names), set(language().roles), dict(primitives.names)
     module_name = f"shapeprog_statements_{len(_loaded)}_{file.stem}"
     try:

@@ -30,20 +30,15 @@ Groups = dict[str, list[float]]
 
 def is_published(words: Sequence[str], groups: Groups) -> bool:
     """Whether a ``draw`` or ``for`` has a form that only the published printer writes."""
-    first, *rest = [*words, ""]
+    first, *following = [*words, ""]
     if set(groups) == {"P1", "P2"}:
-        return first in ("Base", "Connect") and rest == ["Line", ""]
+        return first in ("Base", "Connect") and following == ["Line", ""]
     return "theta" in groups and (words == ["Rot"] or words == ["Back", "Cub"])
 
 
 def restored(words: Sequence[str], groups: Groups) -> tuple[str, tuple[float, ...], str]:
-    """Statement name, values and a note on the defaults used.
-
-    Raises
-    ------
-    ShapeProgError
-        If the text is not that of the published printer, or a number is too large.
-    """
+    """Statement name, values and a note on the defaults used; a ``ShapeProgError`` if the text is not that of the
+    published printer, or a number is too large."""
     for number in (number for numbers in groups.values() for number in numbers):
         to_float32(number)
     if words == ["Rot"]:
@@ -87,6 +82,6 @@ def _tilt(height: float, angle: float) -> float:
     if not height:
         return 0.0
     exact = height * math.tan(math.radians(angle))
-    near = [round(exact) + offset for offset in range(-2, 3)]
-    fitting = [tilt for tilt in near if int(math.degrees(math.atan(tilt / height))) == int(angle)]
+    candidates = [round(exact) + offset for offset in range(-2, 3)]
+    fitting = [tilt for tilt in candidates if int(math.degrees(math.atan(tilt / height))) == int(angle)]
     return float(min(fitting, key=abs)) if fitting else exact

@@ -62,7 +62,7 @@ def write_arrays(program: Program, path: Path, frame: Frame) -> None:
     array                       shape                meaning
     ==========================  ===================  ==========================================================
     ``voxels``                  (32, 32, 32) bool    cells of the program snapped to the grid
-    ``points``, ``normals``     (5000, 3) float32    on the surface of the union of the program as it is, in cells
+    ``points``, ``normals``     (5000, 3) float32    on the surface of the union of the unchanged program, in cells
     ``ids``, ``parameters``     (K, J), (K, J, 7+)   the program as tensors
     ``scale, centre, axes``     (), (3,), (3, 3)     the way to the world: centre + axes @ (scale * point)
     ==========================  ===================  ==========================================================
@@ -76,10 +76,10 @@ def write_arrays(program: Program, path: Path, frame: Frame) -> None:
         arrays |= {"points": surface.points.detach().numpy(), "normals": surface.normals.detach().numpy()}
     else:
         arrays |= {"points": np.zeros((0, 3), np.float32), "normals": np.zeros((0, 3), np.float32)}
-    place: dict[str, Any] = {
+    frame_arrays: dict[str, Any] = {
         "scale": np.float64(frame.scale),
         "centre": np.array(frame.centre),
         "axes": np.array(frame.axes),
     }
     with atomic_path(path) as temporary, temporary.open("wb") as stream:
-        np.savez_compressed(stream, **arrays, **place)
+        np.savez_compressed(stream, **arrays, **frame_arrays)

@@ -10,8 +10,9 @@ from pathlib import Path
 from shapeprog.errors import InputError
 from shapeprog.files import write_text
 from shapeprog.formats.frames import frame_comment, frame_in, without_frame
+from shapeprog.language.parser import parse
+from shapeprog.language.printer import format_program
 from shapeprog.language.program import Program
-from shapeprog.language.text import format_program, parse
 from shapeprog.space import Frame
 
 LARGEST_FILE = 16_000_000
@@ -20,30 +21,35 @@ LARGEST_FILE = 16_000_000
 
 def read_shape(path: Path) -> tuple[Program, Frame | None]:
     """The program of a text file, and its frame if it has one."""
-    text = read_text(path, LARGEST_FILE)
-    return parse(without_frame(text), str(path)), frame_in(text, str(path))
+    return program_in(read_text(path, LARGEST_FILE), str(path))
+
+
+def program_in(text: str, name: str) -> tuple[Program, Frame | None]:
+    """The program of a text, and its frame if a comment stores one."""
+    program = parse(without_frame(text), name)
+    return program, frame_in(text, name, program)
 
 
 def write_shape(program: Program, path: Path, frame: Frame | None) -> None:
     """Write canonical program text."""
-    write_text(path, frame_comment(frame) + format_program(program))
+    write_text(path, program_text(program, frame))
+
+
+def program_text(program: Program, frame: Frame | None) -> str:
+    """Canonical program text with its frame in a comment above it."""
+    return frame_comment(frame, program) + format_program(program)
 
 
 def read_text(path: str | os.PathLike[str], largest: float = math.inf) -> str:
-    """The text of a UTF-8 file of limited size, with or without a byte order mark.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read, is no regular file, is larger, or is not UTF-8.
-    """
+    """The text of a UTF-8 file of limited size, with or without a byte order mark; an ``InputError`` if the file cannot
+    be read, is no regular file, is larger, or is not UTF-8."""
     try:
-        kept = os.stat(path)
-        if stat.S_ISDIR(kept.st_mode):
+        status = os.stat(path)
+        if stat.S_ISDIR(status.st_mode):
             raise InputError(f"{path} is a folder, not a file", "name a file in it")
-        if not stat.S_ISREG(kept.st_mode):
+        if not stat.S_ISREG(status.st_mode):
             raise InputError(f"{path} is not a regular file", "name a file on a disk")
-        if kept.st_size > largest:
+        if status.st_size > largest:
             raise InputError(f"{path} is larger than {largest / 1e6:.0f} MB", "check that it is a program")
         return Path(path).read_bytes().decode("utf-8-sig")
     except FileNotFoundError as error:

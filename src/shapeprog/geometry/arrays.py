@@ -34,8 +34,8 @@ def twin_of(kernel: Callable[..., Any]) -> Callable[[Function], Function]:
 
     def decorate(twin: Function) -> Function:
         @wraps(twin)
-        def choose(first: Any, *rest: Any, **named: Any) -> Any:
-            return (kernel if by_kernel(first) else twin)(first, *rest, **named)
+        def choose(first: Any, *others: Any, **named: Any) -> Any:
+            return (kernel if by_kernel(first) else twin)(first, *others, **named)
 
         choose.twin = twin  # type: ignore[attr-defined]
         return choose  # type: ignore[return-value]
@@ -54,7 +54,7 @@ def numbers(tensor: Tensor) -> Array:
 
 
 def cast(values: Array, like: Tensor) -> Tensor:
-    """An array as a tensor of another's type, cast by numpy: torch wakes threads that stand in the way of kernels."""
+    """An array as a tensor of another's type, cast by numpy: torch wakes threads that occupy the cores of kernels."""
     with np.errstate(over="ignore"):  # beyond single precision is infinite
         return torch.from_numpy(np.ascontiguousarray(values, array(like).dtype))
 
@@ -62,7 +62,7 @@ def cast(values: Array, like: Tensor) -> Tensor:
 def table_of(batch: Batch) -> Array:
     """All primitives as rows of the table (B * N, WIDTH) for kernels, see ``kernels.table``.
 
-    Its kinds are numbers among the built-in primitives, negative for padding and for what kernels do not know.
+    Its kinds are numbers among the built-in primitives, negative for padding and for declared primitives.
     """
     count = batch.mask.numel()
     table: Array = np.empty((count, WIDTH))
@@ -75,22 +75,22 @@ def table_of(batch: Batch) -> Array:
 
 def gradients(table: Array, like: Tensor, *shape: int) -> tuple[Tensor, Tensor, Tensor]:
     """Gradient by sizes, centres and rotations of primitives (B, N) from rows of gradient by :func:`table_of`."""
-    found = torch.from_numpy(table).to(like).reshape(*shape, WIDTH)
-    return found[..., SIZE:CENTRE], found[..., CENTRE:ROTATION], found[..., ROTATION:].unflatten(-1, (3, 3))
+    tensors = torch.from_numpy(table).to(like).reshape(*shape, WIDTH)
+    return tensors[..., SIZE:CENTRE], tensors[..., CENTRE:ROTATION], tensors[..., ROTATION:].unflatten(-1, (3, 3))
 
 
 def declared_kinds(batch: Batch) -> list[int]:
-    """Kinds of primitive in use that only their declaration knows."""
+    """Kinds of primitive in use without kernels."""
     if len(primitives) == len(BUILT_IN):
         return []
-    known = _numbers()
-    return [kind for kind in batch.kinds if known[kind] < 0]
+    kernel_numbers = _numbers()
+    return [kind for kind in batch.kinds if kernel_numbers[kind] < 0]
 
 
 def _numbers() -> Array:
-    """For every kind the number that kernels know it by, -1 for those that they do not."""
-    known = {id(primitive): number for number, primitive in enumerate(BUILT_IN)}
-    return np.array([known.get(id(primitive), -1) for primitive in primitives], np.float64)
+    """The number among the built-in primitives for every kind, -1 for declared ones."""
+    kernel_numbers = {id(primitive): number for number, primitive in enumerate(BUILT_IN)}
+    return np.array([kernel_numbers.get(id(primitive), -1) for primitive in primitives], np.float64)
 
 
 _kernel_threads = 0
@@ -99,7 +99,7 @@ _kernel_threads = 0
 
 @contextmanager
 def one_tensor_thread(kernels: int = 0) -> Iterator[None]:
-    """Let torch compute in one thread within: its idle ones would spin on the cores beside the work.
+    """Let torch compute in one thread within: its idle threads would spin on the cores.
 
     Kernels keep as many threads as there were, or run in ``kernels``.
     """

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, fields
-from typing import NamedTuple, TypeVar
+from typing import TypeVar
 
 from jaxtyping import Bool, Float, Int
 
@@ -14,34 +14,23 @@ from shapeprog.lazy_torch import Tensor, torch
 Some = TypeVar("Some", bound="Batch")
 
 
-class Form(NamedTuple):
-    """How a solid was constructed: the name of the construction, a function of scripts that are exported, and its
-    arguments (...) or (..., width) in order, first coordinates and lengths, then angles."""
-
-    name: str
-    arguments: tuple[Tensor, ...]
-    angles: tuple[Tensor, ...] = ()
-
-
 @dataclass(frozen=True)
 class Solids:
     """Primitives of one kind as a statement returns them, in cells of the grid frame, with any leading dimensions.
 
     ``kind`` is the number in the registry; sizes are in the order that the primitive declares; the columns of
-    ``rotation`` are the local axes, ``None`` when they are those of the grid.  A ``form`` tells exports how the solid
-    follows from numbers that it is not linear in; nothing is drawn from it.
+    ``rotation`` are the local axes, ``None`` when they are those of the grid.
     """
 
     kind: int
     size: Float[Tensor, "*batch 4"]
     centre: Float[Tensor, "*batch 3"]
     rotation: Float[Tensor, "*batch 3 3"] | None = None
-    form: Form | None = None
 
 
 @dataclass(frozen=True)
 class Batch:
-    """``N`` slots of primitives for each element of a batch; ``mask`` says which slots hold one.
+    """``N`` slots of primitives for each element of a batch; ``mask`` is true for slots that hold one.
 
     A local point p of slot n lies at ``centre[n] + rotation[n] @ p``.  Padding has size and centre zero, no rotation.
     """

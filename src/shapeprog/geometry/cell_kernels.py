@@ -38,8 +38,8 @@ def _fill_turned(table, row, planes, plane, half, low, high):
     half[0], half[1], half[2] = bound(table, row)
     for axis in range(3):
         reach = 0.0
-        for other in range(3):
-            reach += abs(table[row, ROTATION + 3 * axis + other]) * half[other]
+        for column in range(3):
+            reach += abs(table[row, ROTATION + 3 * axis + column]) * half[column]
         if not math.isfinite(reach):
             return
         low[axis] = clip(np.floor(table[row, CENTRE + axis] - reach - 0.5), resolution)
@@ -49,11 +49,11 @@ def _fill_turned(table, row, planes, plane, half, low, high):
         x = i + 0.5 - table[row, CENTRE]
         for j in range(low[1], high[1]):
             y = j + 0.5 - table[row, CENTRE + 1]
-            near, far = stretch(table, row, half, x, y, reach)
-            if near > far:
+            start, stop = stretch(table, row, half, x, y, reach)
+            if start > stop:
                 continue
-            first = max(clip(np.floor(near + side - 0.5), resolution), low[2])
-            last = min(clip(np.ceil(far + side + 0.5), resolution), high[2])
+            first = max(clip(np.floor(start + side - 0.5), resolution), low[2])
+            last = min(clip(np.ceil(stop + side + 0.5), resolution), high[2])
             while first < last and _excess(table, row, x, y, first + 0.5 - side) > 0:
                 first += 1
             while first < last and _excess(table, row, x, y, last - 0.5 - side) > 0:
@@ -62,15 +62,15 @@ def _fill_turned(table, row, planes, plane, half, low, high):
 
 
 @kernel("void(f8[:, ::1], i8[::1], i8, u4[:, :, :, ::1], i8, i8)")
-def fill(table, owner, many, planes, begin, end):
-    """Fill planes of words (P, W, R, R) with the cells of scenes ``begin`` to ``end``, of ``many`` rows each.
+def fill(table, owner, per_scene, planes, begin, end):
+    """Fill planes of words (P, W, R, R) with the cells of scenes ``begin`` to ``end``, of ``per_scene`` rows each.
 
     Each row of the table, which is scaled to cells and used up, has its owner: the plane that its cells go to.
     """
     resolution = planes.shape[2]
     scale, origin = resolution / 32, resolution / 2
     half, low, high = np.empty(3), np.empty(3, np.int64), np.empty(3, np.int64)
-    for row in range(begin * many, end * many):
+    for row in range(begin * per_scene, end * per_scene):
         if table[row, KIND] < 0:
             continue
         total, square = 0.0, True
@@ -96,11 +96,11 @@ def unpack(words, table, cells, begin, end):
 
 
 @kernel("void(u4[:, ::1], u4[:, ::1], i8[:, ::1])")
-def shared(one, two, counts):
+def shared(first_grid, second_grid, counts):
     """Number of cells in both and in either of pairs of packed grids (B, words)."""
-    for pair in range(one.shape[0]):
-        both, either = 0, 0
-        for word in range(one.shape[1]):
-            both += ones(np.uint64(one[pair, word] & two[pair, word]))
-            either += ones(np.uint64(one[pair, word] | two[pair, word]))
-        counts[pair, 0], counts[pair, 1] = both, either
+    for pair in range(first_grid.shape[0]):
+        common, joined = 0, 0
+        for word in range(first_grid.shape[1]):
+            common += ones(np.uint64(first_grid[pair, word] & second_grid[pair, word]))
+            joined += ones(np.uint64(first_grid[pair, word] | second_grid[pair, word]))
+        counts[pair, 0], counts[pair, 1] = common, joined

@@ -86,8 +86,8 @@ def _pack_rows_by_numpy(rows: Bool[Tensor, "*batch places"]) -> Int[Tensor, "*ba
 @twin_of(_pack_rows_by_numpy)
 def pack_rows(rows: Bool[Tensor, "*batch places"]) -> Int[Tensor, "*batch words"]:
     """Rows of cells as words; the highest bit wraps to the sign, as it should."""
-    whole = torch.nn.functional.pad(rows, (0, -rows.shape[-1] % WORD)).unflatten(-1, (-1, WORD))
-    return (whole * (1 << torch.arange(WORD, device=rows.device))).sum(-1).to(torch.int32)
+    padded = torch.nn.functional.pad(rows, (0, -rows.shape[-1] % WORD)).unflatten(-1, (-1, WORD))
+    return (padded * (1 << torch.arange(WORD, device=rows.device))).sum(-1).to(torch.int32)
 
 
 def _unpack_by_kernel(cells: Cells) -> UInt8[Tensor, "*batch R R R"]:
@@ -121,20 +121,20 @@ def count(cells: Cells) -> Int[Tensor, "*batch"]:
     return unpack.twin(cells).flatten(-3).sum(-1, dtype=torch.int64)  # type: ignore[attr-defined]
 
 
-def _iou_by_kernel(one: Int[Tensor, "*one words R"], two: Int[Tensor, "*two words R"]) -> Float[Tensor, "*batch"]:
-    first, second = torch.broadcast_tensors(one, two)
+def _iou_by_kernel(a: Int[Tensor, "*one words R"], b: Int[Tensor, "*two words R"]) -> Float[Tensor, "*batch"]:
+    first, second = torch.broadcast_tensors(a, b)
     lead = first.shape[:-2]
     counts = np.empty((lead.numel(), 2), np.int64)
-    kernels.shared(*(words_of(each).reshape(lead.numel(), -1) for each in (first, second)), counts)
-    both, either = torch.from_numpy(counts).double().reshape(*lead, 2).unbind(-1)
-    return torch.where(either > 0, both / either.clamp(min=1), 1.0)
+    kernels.shared(*(words_of(item).reshape(lead.numel(), -1) for item in (first, second)), counts)
+    intersection, either = torch.from_numpy(counts).double().reshape(*lead, 2).unbind(-1)
+    return torch.where(either > 0, intersection / either.clamp(min=1), 1.0)
 
 
 @twin_of(_iou_by_kernel)
-def iou(one: Int[Tensor, "*one words R"], two: Int[Tensor, "*two words R"]) -> Float[Tensor, "*batch"]:
+def iou(a: Int[Tensor, "*one words R"], b: Int[Tensor, "*two words R"]) -> Float[Tensor, "*batch"]:
     """Intersection over union of packed cells, with broadcasting; 1 when both are empty."""
-    both, either = count(one & two).double(), count(one | two).double()
-    return torch.where(either > 0, both / either.clamp(min=1), 1.0)
+    intersection, either = count(a & b).double(), count(a | b).double()
+    return torch.where(either > 0, intersection / either.clamp(min=1), 1.0)
 
 
 def union(parts: Int[Tensor, "*batch K words R"]) -> Cells:
@@ -170,7 +170,7 @@ def widen(cells: Cells) -> Cells:
 
 
 def fill_by_kernel(flat: Batch, plane: Int[Tensor, "B N"], cells: Cells) -> None:
-    """Add the cells of every slot to its plane, by the kernel as far as it knows the primitive."""
+    """Add the cells of every slot to its plane, by the kernel for built-in primitives."""
     words = words_of(cells.unflatten(-2, (-1, cells.shape[-1])))
     data = table_of(flat), array(plane).reshape(-1), flat.mask.shape[-1], words
     over_threads(partial(kernels.fill, *data), len(flat), least=32)
@@ -186,17 +186,17 @@ def fill(flat: Batch, plane: Int[Tensor, "B N"], cells: Cells, kinds: list[int] 
     resolution = cells.shape[-1]
     scale, origin = resolution / RESOLUTION, resolution / 2
     for kind in flat.kinds if kinds is None else kinds:
-        declared, here = primitives[kind], flat.mask & (flat.kind == kind)
-        size, centre, rotation = (each.detach()[here].double() for each in (flat.size, flat.centre, flat.rotation))
+        declared, selected = primitives[kind], flat.mask & (flat.kind == kind)
+        size, centre, rotation = (item.detach()[selected].double() for item in (flat.size, flat.centre, flat.rotation))
         size, centre = declared.cell_size(size * scale), centre * scale + origin
         finite = torch.cat([size, centre, rotation.flatten(1)], -1).isfinite().all(-1)
-        size, centre, rotation, target = (each[finite] for each in (size, centre, rotation, plane[here]))
+        size, centre, rotation, target = (item[finite] for item in (size, centre, rotation, plane[selected]))
         square = ((rotation - rotation.round()).abs() <= kernels.SQUARE).all(-1).all(-1)
         if declared.spans is not None:
             spans = declared.spans(size, centre, rotation, square, resolution)
             covers = target, *spans.layers, *spans.depth, *spans.side
-            _fill_rows(cells, *(each[spans.known] for each in covers))
-            size, centre, rotation, target = (each[~spans.known] for each in (size, centre, rotation, target))
+            _fill_rows(cells, *(item[spans.applies] for item in covers))
+            size, centre, rotation, target = (item[~spans.applies] for item in (size, centre, rotation, target))
         _fill_tested(cells, target, declared, size, centre, rotation)
 
 
@@ -206,13 +206,13 @@ def _fill_rows(cells: Tensor, plane: Int[Tensor, " M"], *covers: Float[Tensor, "
     order = plane.argsort()
     plane = plane[order]
     rank = torch.arange(len(plane), device=plane.device) - torch.searchsorted(plane, plane)
-    places = torch.arange(resolution, device=plane.device)
+    ticks = torch.arange(resolution, device=plane.device)
     for turn in range(int(rank.max()) + 1 if len(rank) else 0):
         for part in (rank == turn).nonzero()[:, 0].split(max(1, AT_ONCE // resolution**2)):
-            up, top, front, rear, left, right = (each[order[part]] for each in covers)
-            layers = (places >= up) & (places < top)
-            depth = (places >= front[..., None]) & (places < rear[..., None]) & layers[..., None]
-            side = (places >= left[..., None]) & (places < right[..., None])
+            up, top, front, rear, left, right = (item[order[part]] for item in covers)
+            layers = (ticks >= up) & (ticks < top)
+            depth = (ticks >= front[..., None]) & (ticks < rear[..., None]) & layers[..., None]
+            side = (ticks >= left[..., None]) & (ticks < right[..., None])
             words = pack_rows.twin(side).movedim(-1, 1)  # type: ignore[attr-defined]
             cells[plane[part]] |= torch.where(depth[:, None], words[..., None], 0).flatten(1, 2)
 
@@ -250,9 +250,13 @@ def _within(
     start = 0
     while start < len(low):
         stop = start + max(1, int((volume[start:].cumsum(0) <= AT_ONCE).sum()))
-        many = volume[start:stop]
-        owner = torch.repeat_interleave(torch.arange(start, stop, device=low.device), many)
-        rest = torch.arange(len(owner), device=owner.device) - (many.cumsum(0) - many)[owner - start]
+        volumes = volume[start:stop]
+        owner = torch.repeat_interleave(torch.arange(start, stop, device=low.device), volumes)
+        offset_in_box = torch.arange(len(owner), device=owner.device) - (volumes.cumsum(0) - volumes)[owner - start]
         side, depth = window[owner, 2], window[owner, 1]
-        yield owner, torch.stack([rest // (side * depth), rest // side % depth, rest % side], -1) + first[owner]
+        yield (
+            owner,
+            torch.stack([offset_in_box // (side * depth), offset_in_box // side % depth, offset_in_box % side], -1)
+            + first[owner],
+        )
         start = stop

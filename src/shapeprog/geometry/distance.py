@@ -31,21 +31,21 @@ AT_ONCE = 1 << 22
 """Pairs of point and primitive that are looked at together where no kernel helps."""
 
 MOST_LOOKS = 1 << 30
-"""Most pairs that the kernel looks at for one answer, some seconds' worth, where a scene has very many primitives: if
+"""Most pairs that the kernel compares for one result, some seconds' worth, where a scene has very many primitives: if
 they lie over each other, no list of the nearest is short."""
 
 
 def each_distance(batch: Batch, points: Float[Tensor, "*shared P 3"]) -> Float[Tensor, "*batch P N"]:
     """Signed distance of every point to every primitive, negative inside, infinite for padding; exact."""
     flat, positions = _aligned(batch, points)
-    found = positions.new_full((*flat.mask.shape, points.shape[-2]), torch.inf)
+    result = positions.new_full((*flat.mask.shape, points.shape[-2]), torch.inf)
     for kind in flat.kinds:
         element, slot = (flat.mask & (flat.kind == kind)).nonzero(as_tuple=True)
         offset = positions[element] - flat.centre[element, slot][:, None]
         size = flat.size[element, slot][:, None].expand(*offset.shape[:2], SIZES)
         values = primitives[kind].distance(offset @ flat.rotation[element, slot], size)
-        found = found.index_put((element, slot), values)
-    return found.mT.reshape(*batch.batch_shape, points.shape[-2], flat.mask.shape[-1])
+        result = result.index_put((element, slot), values)
+    return result.mT.reshape(*batch.batch_shape, points.shape[-2], flat.mask.shape[-1])
 
 
 @torch.no_grad()
@@ -55,9 +55,9 @@ def nearest_primitive(batch: Batch, points: Float[Tensor, "*shared P 3"]) -> Nea
     if by_kernel(flat.mask):
         slot, value = nearest_by_kernel(flat, positions, table_of(flat))
         if declared := declared_kinds(flat):
-            rest = replace(flat, mask=flat.mask & torch.isin(flat.kind, torch.tensor(declared)))
-            other, closer = nearest(rest, positions)
-            slot, value = torch.where(closer < value, other, slot), torch.minimum(closer, value)
+            remaining = replace(flat, mask=flat.mask & torch.isin(flat.kind, torch.tensor(declared)))
+            slot_declared, closer = nearest(remaining, positions)
+            slot, value = torch.where(closer < value, slot_declared, slot), torch.minimum(closer, value)
     else:
         slot, value = nearest(flat, positions)
     shape = *batch.batch_shape, points.shape[-2]
@@ -75,24 +75,24 @@ def signed_distance(batch: Batch, points: Float[Tensor, "*shared P 3"]) -> Float
     flat, positions = _aligned(batch, points)
     if by_kernel(flat):
         data = flat, flat.size, flat.centre, flat.rotation, positions
-        found: Tensor = _UnionDistance.apply(*data)  # type: ignore[no-untyped-call]
+        result: Tensor = _UnionDistance.apply(*data)  # type: ignore[no-untyped-call]
     else:
-        found = gathered_distance(flat, positions)
-    return found.reshape(*batch.batch_shape, points.shape[-2])
+        result = gathered_distance(flat, positions)
+    return result.reshape(*batch.batch_shape, points.shape[-2])
 
 
 def gathered_distance(flat: Batch, positions: Float[Tensor, "B P 3"]) -> Float[Tensor, "B P"]:
     """The same from the declarations, for any kind of primitive on any device; the twin of the kernels."""
-    found = torch.full_like(positions[..., 0], torch.inf)
+    result = torch.full_like(positions[..., 0], torch.inf)
     if not flat.mask.shape[-1]:
-        return found
+        return result
     kind, size, centre, rotation = flat.at(nearest_primitive(flat, positions)[0])
     local = ((positions - centre)[..., :, None] * rotation).sum(-2)
-    there = flat.mask.any(-1, keepdim=True)
-    for each in flat.kinds:
-        here = (there & (kind == each)).nonzero(as_tuple=True)
-        found = found.index_put(here, primitives[each].distance(local[here], size[here]))
-    return found
+    occupied = flat.mask.any(-1, keepdim=True)
+    for item in flat.kinds:
+        selected = (occupied & (kind == item)).nonzero(as_tuple=True)
+        result = result.index_put(selected, primitives[item].distance(local[selected], size[selected]))
+    return result
 
 
 class _UnionDistance(torch.autograd.Function):
@@ -110,15 +110,15 @@ class _UnionDistance(torch.autograd.Function):
     @once_differentiable
     def backward(ctx: Any, slope: Tensor) -> tuple[Tensor | None, ...]:
         points, slots = ctx.saved_tensors
-        (scenes, count), many = slots.shape, len(ctx.table) // max(len(slots), 1)
+        (scenes, count), per_scene = slots.shape, len(ctx.table) // max(len(slots), 1)
         to_table, to_points = np.zeros((len(ctx.table), WIDTH)), np.zeros((scenes * count, 3))
         data = (
-            ctx.table, many, numbers(points).reshape(-1, 3), count, slots.numpy().reshape(-1),
+            ctx.table, per_scene, numbers(points).reshape(-1, 3), count, slots.numpy().reshape(-1),
             numbers(slope).reshape(-1), to_table, to_points,
         )  # fmt: skip
         over_threads(partial(kernels.pull, *data), scenes)
         to_points = to_points.reshape(scenes, count, 3)
-        return None, *gradients(to_table, points, scenes, many), torch.from_numpy(to_points).to(points)
+        return None, *gradients(to_table, points, scenes, per_scene), torch.from_numpy(to_points).to(points)
 
 
 def _aligned(batch: Batch, points: Tensor) -> tuple[Batch, Float[Tensor, "B P 3"]]:
@@ -128,7 +128,7 @@ def _aligned(batch: Batch, points: Tensor) -> tuple[Batch, Float[Tensor, "B P 3"
 
 
 def nearest_by_kernel(flat: Batch, points: Float[Tensor, "B P 3"], table: Array) -> Nearest:
-    """The nearest of the primitives that kernels know, which are rows of the table."""
+    """The nearest of the built-in primitives, which are rows of the table."""
     scenes, count = points.shape[:-1]
     slots, values = np.empty(scenes * count, np.int64), np.empty(scenes * count)
     data = table, flat.mask.shape[-1], numbers(points).reshape(-1, 3), count, MOST_LOOKS, slots, values
@@ -138,8 +138,8 @@ def nearest_by_kernel(flat: Batch, points: Float[Tensor, "B P 3"], table: Array)
             f"too many of the {flat.mask.shape[-1]} parts lie over each other for distances of {count} points",
             f"lower the counts, or ask for fewer points: at most {MOST_LOOKS} pairs are looked at",
         )
-    found = torch.from_numpy(slots), torch.from_numpy(values).to(points.dtype)
-    return found[0].reshape(scenes, count), found[1].reshape(scenes, count)
+    result = torch.from_numpy(slots), torch.from_numpy(values).to(points.dtype)
+    return result[0].reshape(scenes, count), result[1].reshape(scenes, count)
 
 
 def nearest(flat: Batch, points: Float[Tensor, "B P 3"]) -> Nearest:
@@ -148,8 +148,8 @@ def nearest(flat: Batch, points: Float[Tensor, "B P 3"]) -> Nearest:
         nothing = torch.full_like(points[..., 0], torch.inf)
         return torch.zeros_like(nothing, dtype=torch.long), nothing
     step = max(1, AT_ONCE // max(flat.mask.numel(), 1))
-    found = [each_distance(flat, piece).min(-1) for piece in points.split(step, -2)]
-    return torch.cat([each.indices for each in found], -1), torch.cat([each.values for each in found], -1)
+    result = [each_distance(flat, piece).min(-1) for piece in points.split(step, -2)]
+    return torch.cat([item.indices for item in result], -1), torch.cat([item.values for item in result], -1)
 
 
 def _projected_by_kernel(pairs: Batch, points: Float[Tensor, "C 3"], rounds: int) -> Float[Tensor, "C 3"]:
@@ -166,9 +166,9 @@ def projected(pairs: Batch, points: Float[Tensor, "C 3"], rounds: int) -> Float[
     gap between them is narrow (von Neumann 1933).
     """
     parts = pairs.kind, pairs.size, pairs.centre, pairs.rotation, pairs.mask
-    one, two = (Batch(*(part[:, place : place + 1] for part in parts)) for place in range(2))
+    first, second = (Batch(*(part[:, number : number + 1] for part in parts)) for number in range(2))
     for _ in range(rounds):
-        for batch in (two, one):
+        for batch in (second, first):
             at = points[:, None].detach().requires_grad_()
             value = signed_distance(batch, at)
             (slope,) = torch.autograd.grad(value.sum(), at)

@@ -13,30 +13,30 @@ from shapeprog.kernels.table import CENTRE, KIND, ROTATION, SIZE, local, turned
 ROUNDING = 2e-6  # error of a bound in single precision against the size of the coordinates, generously
 STRIDE = 2.0  # how far in cells from a point its list of possible nearest primitives is used
 LONG_STRIDE, MANY = 8.0, 1024  # the same among more primitives than this, which take longer than a longer list
-RIVAL = 8  # what a distance costs, in bounds
+RIVAL = 8  # cost of a distance, in bounds
 FARTHEST = 1e18  # coordinates whose squares fit into single precision, in which bounds are taken and points drawn
 
 
 @helper
-def _boxes(table, first, many, kept, box):
+def _boxes(table, first, per_scene, listed, box):
     """Fill the columns of ``box`` with the primitives that are there; returns how many, and how far they reach.
 
     Of each: centre, local axes and half extents of the turned box around it.
     """
     used, extent = 0, 0.0
-    for slot in range(many):
+    for slot in range(per_scene):
         row = first + slot
         if table[row, KIND] < 0:
             continue
         for axis in range(3):
             box[axis, used] = table[row, CENTRE + axis]
-            for other in range(3):
-                box[3 + 3 * axis + other, used] = table[row, ROTATION + 3 * other + axis]
+            for column in range(3):
+                box[3 + 3 * axis + column, used] = table[row, ROTATION + 3 * column + axis]
         box[12, used], box[13, used], box[14, used] = bound(table, row)
         for entry in range(3):
             reach = abs(box[entry, used]) + box[12 + entry, used]
             extent = max(extent, reach if reach < FARTHEST else np.inf)
-        kept[used] = slot
+        listed[used] = slot
         used += 1
     return used, extent
 
@@ -69,23 +69,23 @@ def _bounds(box, count, x, y, z, extent, up, depth, lower):
 
 
 @helper(forceinline=True)
-def _best(table, first, kept, lower, count, x, y, z):
+def _best(table, first, listed, lower, count, x, y, z):
     """The best primitive by its exact distance, looking only at those whose bound is below the best so far."""
-    found, least = 0, lower[0]
+    closest, lowest = 0, lower[0]
     for n in range(count):
         value = lower[n]
-        if value < least:
-            least, found = value, n
-    best, start = np.inf, found
+        if value < lowest:
+            lowest, closest = value, n
+    best, start = np.inf, closest
     for turn in range(-1, count):
         n = start if turn < 0 else turn
         if (turn >= 0 and n == start) or lower[n] > best:
             continue
-        a, b, c = local(table, first + kept[n], x, y, z)
-        closer = distance(table, first + kept[n], a, b, c)
-        if closer < best or (closer == best and n < found):
-            best, found = closer, n
-    return best, found
+        a, b, c = local(table, first + listed[n], x, y, z)
+        closer = distance(table, first + listed[n], a, b, c)
+        if closer < best or (closer == best and n < closest):
+            best, closest = closer, n
+    return best, closest
 
 
 @helper
@@ -98,12 +98,12 @@ def _rivals(lower, count, best):
 
 
 @helper
-def _few(all_kept, all_box, lower, used, limit, kept, box):
+def _few(all_listed, all_box, lower, used, limit, listed, box):
     """Keep the boxes whose bound is not above a limit, or no number; returns how many."""
     number = 0
     for n in range(used):
         if not lower[n] > limit:
-            kept[number] = all_kept[n]
+            listed[number] = all_listed[n]
             for entry in range(15):
                 box[entry, number] = all_box[entry, n]
             number += 1
@@ -111,26 +111,26 @@ def _few(all_kept, all_box, lower, used, limit, kept, box):
 
 
 @kernel("void(f8[:, ::1], i8, f8[:, ::1], i8, i8, i8[::1], f8[::1], i8, i8)")
-def nearest(table, many, points, count, most, slots, values, begin, end):
+def nearest(table, per_scene, points, count, budget, slots, values, begin, end):
     """Nearest primitive and signed distance of the union for the points ``begin`` to ``end`` of all scenes.
 
-    Each scene has ``many`` rows of the table and ``count`` points.  The turned box around a primitive bounds its
+    Each scene has ``per_scene`` rows of the table and ``count`` points.  The turned box around a primitive bounds its
     signed distance from below, inside too.  Distances change no faster than points move: a primitive whose bound at
     one point exceeds the best there by more than twice the stride is not the nearest within a stride of it, so
-    points that come in order, such as cells, look at few primitives.  Where coordinates are too large for bounds, or
+    points that come in order, such as cells, test few primitives.  Where coordinates are too large for bounds, or
     no numbers, every primitive is looked at.  Among more than ``MANY`` primitives, once these points have had their
-    share of ``most`` bounds looked at, the slots of all others are -1.
+    share of ``budget`` bounds looked at, the slots of all others are -1.
     """
-    left = (most // len(points) + MANY) * (end - begin)
-    all_kept, kept = np.empty(many, np.int64), np.empty(many, np.int64)
-    all_box, box = np.empty((15, many), np.float32), np.empty((15, many), np.float32)
-    up, depth, lower = np.empty(many, np.float32), np.empty(many, np.float32), np.empty(many, np.float32)
-    scene, used, number, extent, least, stride = -1, 0, 0, 0.0, 0.0, STRIDE
+    remaining = (budget // len(points) + MANY) * (end - begin)
+    all_listed, listed = np.empty(per_scene, np.int64), np.empty(per_scene, np.int64)
+    all_box, box = np.empty((15, per_scene), np.float32), np.empty((15, per_scene), np.float32)
+    up, depth, lower = np.empty(per_scene, np.float32), np.empty(per_scene, np.float32), np.empty(per_scene, np.float32)
+    scene, used, number, extent, lowest, stride = -1, 0, 0, 0.0, 0.0, STRIDE
     px, py, pz = np.inf, np.inf, np.inf
     for item in range(begin, end):
         if item // count != scene:
             scene, px = item // count, np.inf
-            used, extent = _boxes(table, scene * many, many, all_kept, all_box)
+            used, extent = _boxes(table, scene * per_scene, per_scene, all_listed, all_box)
             stride = STRIDE if used <= MANY else LONG_STRIDE
         if used == 0:
             slots[item], values[item] = 0, np.inf
@@ -139,28 +139,28 @@ def nearest(table, many, points, count, most, slots, values, begin, end):
         far = not abs(x) + abs(y) + abs(z) + extent < FARTHEST
         if not far and (x - px) * (x - px) + (y - py) * (y - py) + (z - pz) * (z - pz) < stride * stride:
             if number == 0:
-                number = _few(all_kept, all_box, lower, used, least + 2 * stride + 1e-3, kept, box)
-            of, some, those = number, kept, box
+                number = _few(all_listed, all_box, lower, used, lowest + 2 * stride + 1e-3, listed, box)
+            of, some, those = number, listed, box
         else:
             px, py, pz, number = x, y, z, 0
-            of, some, those = used, all_kept, all_box
+            of, some, those = used, all_listed, all_box
         if far:
             lower[:of], px = -np.inf, np.inf
         else:
             _bounds(those, of, x, y, z, extent, up, depth, lower)
-        best, found = _best(table, scene * many, some, lower, of, x, y, z)
-        slots[item], values[item] = some[found], best
+        best, closest = _best(table, scene * per_scene, some, lower, of, x, y, z)
+        slots[item], values[item] = some[closest], best
         if number == 0:
-            least = best
+            lowest = best
         if used > MANY:
-            left -= of + RIVAL * _rivals(lower, of, best)
-            if left < 0:
+            remaining -= of + RIVAL * _rivals(lower, of, best)
+            if remaining < 0:
                 slots[item:end] = -1
                 return
 
 
 @kernel("void(f8[:, ::1], i8, f8[:, ::1], i8, i8[::1], f8[::1], f8[:, ::1], f8[:, ::1], i8, i8)")
-def pull(table, many, points, count, slots, slope, to_table, to_points, begin, end):
+def pull(table, per_scene, points, count, slots, slope, to_table, to_points, begin, end):
     """Gradient of the distances to known primitives, given the gradient of a loss by each of them.
 
     ``to_table`` has the rows of the table; the scenes are ``begin`` to ``end``.
@@ -168,20 +168,20 @@ def pull(table, many, points, count, slots, slope, to_table, to_points, begin, e
     part = np.empty(7)
     for scene in range(begin, end):
         for item in range(scene * count, (scene + 1) * count):
-            row, weight = scene * many + slots[item], slope[item]
+            row, weight = scene * per_scene + slots[item], slope[item]
             if weight == 0:
                 continue
             a, b, c = local(table, row, points[item, 0], points[item, 1], points[item, 2])
             slopes(table, row, a, b, c, part)
-            for place in range(4):
-                if place == 3 or table[row, SIZE + place] >= 0:  # lengths below zero count as zero
-                    to_table[row, SIZE + place] += weight * part[3 + place]
+            for entry_index in range(4):
+                if entry_index == 3 or table[row, SIZE + entry_index] >= 0:  # lengths below zero count as zero
+                    to_table[row, SIZE + entry_index] += weight * part[3 + entry_index]
             for axis in range(3):
                 offset = points[item, axis] - table[row, CENTRE + axis]
                 moved = 0.0
-                for other in range(3):
-                    moved += table[row, ROTATION + 3 * axis + other] * part[other]
-                    to_table[row, ROTATION + 3 * axis + other] += weight * offset * part[other]
+                for column in range(3):
+                    moved += table[row, ROTATION + 3 * axis + column] * part[column]
+                    to_table[row, ROTATION + 3 * axis + column] += weight * offset * part[column]
                 to_table[row, CENTRE + axis] -= weight * moved
                 to_points[item, axis] = weight * moved
 

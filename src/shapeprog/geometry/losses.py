@@ -29,7 +29,7 @@ Cells = Float[Tensor, "*cells"]
 
 
 class Chamfer(NamedTuple):
-    """Mean squared distance of points to the target (is what is there right?) and back (is everything there?)."""
+    """Mean squared distance of points to the target (precision) and back (completeness)."""
 
     to_target: Values
     from_target: Values
@@ -45,7 +45,7 @@ def chamfer_directions(
 ) -> Chamfer:
     """Both directions of the chamfer distance, as means of squared distances over clouds that may differ in size.
 
-    Weights say how much each point counts in its mean, such as those of a surface sample; evenly by default.
+    Weights of points in the mean, such as those of a surface sample; equal by default.
     """
     if weights is None and target_weights is None:
         return Chamfer(*mean_squared_distances(points, target))
@@ -58,7 +58,7 @@ def chamfer(
 ) -> Values:
     """Chamfer distance: mean squared distance to the nearest neighbour, points to target plus target to points.
 
-    That of section 4.3.1, which says sum where its numbers are means.
+    That of section 4.3.1, where "sum" is a mean by its numbers.
 
     Parameters
     ----------
@@ -141,7 +141,7 @@ def soft_iou(occupancy: Grid, target: Marked) -> Values:
 
 
 def weighted_iou(occupancy: Row, target: Row, weights: Row | None = None) -> Values:
-    """The same for some cells in a row, each of which stands for as many as its weight says."""
+    """The same for some cells in a row, each weighted by the number of cells it represents."""
     both, either = occupancy * target, occupancy + target - occupancy * target
     if weights is not None:
         both, either = both * weights, either * weights

@@ -21,8 +21,8 @@ FLAT = 1e-5
 and is left out.  It is well above the lengths that primitives take for zero."""
 
 FARTHEST = 1 << 24
-"""Coordinates in cells up to which parts are meshed: files of meshes hold single precision, which ends to tell one cell
-from the next there."""
+"""Coordinates in cells up to which parts are meshed: single precision, in which files of meshes are, resolves no cells
+beyond."""
 
 MOST_TRIANGLES = 1 << 21
 """Most triangles of the parts of a scene together."""
@@ -66,15 +66,15 @@ def part_meshes(scene: Batch) -> list[PartMesh]:
         raise ShapeProgError(
             f"a batch of shape {tuple(scene.batch_shape)} has no single mesh", "mesh its scenes one by one"
         )
-    found, triangles, known = [], 0, dict[bytes, Triangles]()
+    results, triangles, cached = [], 0, dict[bytes, Triangles]()
     solid, reach = array(scene.mask).copy(), np.zeros((len(scene.mask), 3))
     size, centre, rotation = (array(t.double()) for t in (scene.size, scene.centre, scene.rotation))
     for kind in scene.kinds:
-        here, declared = array(scene.kind) == kind, primitives[kind]
-        of_kind = torch.tensor(size[here])
-        reach[here] = array(declared.bound(of_kind))
-        filled = array(declared.volume(of_kind)) / (2 * reach[here].clip(FLAT, FARTHEST)).prod(-1)  # refused beyond
-        solid[here] &= ~((reach[here] <= FLAT).any(-1) | (filled <= FLAT))
+        selected, declared = array(scene.kind) == kind, primitives[kind]
+        of_kind = torch.tensor(size[selected])
+        reach[selected] = array(declared.bound(of_kind))
+        filled = array(declared.volume(of_kind)) / (2 * reach[selected].clip(FLAT, FARTHEST)).prod(-1)  # refused beyond
+        solid[selected] &= ~((reach[selected] <= FLAT).any(-1) | (filled <= FLAT))
     far = solid & ~((np.abs(centre) + np.linalg.norm(reach, axis=-1, keepdims=True)).max(-1, initial=0) <= FARTHEST)
     if far.any():
         raise ShapeProgError(
@@ -83,24 +83,24 @@ def part_meshes(scene: Batch) -> list[PartMesh]:
         )
     for slot, kind in zip(np.flatnonzero(solid).tolist(), array(scene.kind)[solid].tolist(), strict=True):
         key = kind.to_bytes(4, "little") + size[slot].tobytes()  # copies share their sizes
-        if key not in known:
+        if key not in cached:
             vertices, faces = primitives[kind].mesh(size[slot])
-            known[key] = vertices, np.asarray(faces, np.int64)
-        vertices, faces = known[key]
+            cached[key] = vertices, np.asarray(faces, np.int64)
+        vertices, faces = cached[key]
         triangles += len(faces)
         if triangles > MOST_TRIANGLES:
             raise ShapeProgError(
                 f"the {int(solid.sum())} parts of this program have more than {MOST_TRIANGLES} triangles",
                 "lower its counts, or save it as program text, .scad or .py, which keep its loops",
             )
-        found.append(PartMesh(slot, vertices @ rotation[slot].T + centre[slot], faces))
-    return found
+        results.append(PartMesh(slot, vertices @ rotation[slot].T + centre[slot], faces))
+    return results
 
 
 def union_mesh(scene: Batch) -> Triangles:
     """One watertight mesh of the union of all primitives of one scene.
 
-    Only parts that touch are joined; the others are put beside them as they are.  A ``ShapeProgError`` if the scene
+    Only parts that touch are joined; the others are appended unchanged.  A ``ShapeProgError`` if the scene
     holds no solid part, a batch is given, or more than ``MOST_TOUCHING`` pairs of parts touch.
     """
     solids: list[Single] = []
@@ -132,13 +132,13 @@ def gaps(scene: Batch, within: float) -> dict[tuple[int, int], float]:
     parts = part_meshes(scene)
     solids = [Manifold(Mesh(part.vertices.astype(np.float32), part.faces.astype(np.uint32))) for part in parts]
     low, high = (np.array([corner(part.vertices, 0) for part in parts]) for corner in (np.min, np.max))
-    found = {}
-    for one, two in combinations(range(len(parts)), 2):
-        if (low[one] <= high[two] + within).all() and (low[two] <= high[one] + within).all():
-            apart = solids[one].min_gap(solids[two], 2 * within)
-            if apart < within:
-                found[parts[one].slot, parts[two].slot] = float(apart)
-    return found
+    results = {}
+    for i, j in combinations(range(len(parts)), 2):
+        if (low[i] <= high[j] + within).all() and (low[j] <= high[i] + within).all():
+            gap = solids[i].min_gap(solids[j], 2 * within)
+            if gap < within:
+                results[parts[i].slot, parts[j].slot] = float(gap)
+    return results
 
 
 def _touching(scene: Batch) -> list[list[Single]]:
@@ -157,7 +157,7 @@ def _joined(parts: list[Single]) -> Any:
     while len(solids) > 1:
         solids = [Manifold.batch_boolean(solids[n : n + AT_ONCE], OpType.Add) for n in range(0, len(solids), AT_ONCE)]
         for solid in solids:
-            solid.num_tri()  # nothing is computed before somebody asks
+            solid.num_tri()  # manifold3d computes lazily
     return solids[0]
 
 
@@ -178,21 +178,21 @@ def _groups(parts: list[npt.NDArray[np.float32]]) -> list[list[int]]:
     while start < len(parts):
         before = ends[start] - later[start]
         stop = max(start + 1, int(np.searchsorted(ends, before + PAIRS_AT_ONCE, "right")))
-        one = np.repeat(np.arange(start, stop), later[start:stop])
-        two = one + 1 + np.arange(len(one)) - (ends - later - before)[one]
+        i = np.repeat(np.arange(start, stop), later[start:stop])
+        j = i + 1 + np.arange(len(i)) - (ends - later - before)[i]
         for axis in {0, 1, 2} - {swept}:
-            near = (low[axis, one] <= high[axis, two]) & (low[axis, two] <= high[axis, one])
-            one, two = one[near], two[near]
-        pairs.append(order[np.stack([one, two])])
-        if sum(each.shape[1] for each in pairs) > MOST_TOUCHING:
+            touching = (low[axis, i] <= high[axis, j]) & (low[axis, j] <= high[axis, i])
+            i, j = i[touching], j[touching]
+        pairs.append(order[np.stack([i, j])])
+        if sum(block.shape[1] for block in pairs) > MOST_TOUCHING:
             raise ShapeProgError(
                 f"more than {MOST_TOUCHING} pairs of the {len(parts)} parts touch, too many to join into one solid",
                 "lower the counts, or export the parts as they are, as .ply",
             )
         start = stop
-    one, two = np.concatenate(pairs, 1)
+    i, j = np.concatenate(pairs, 1)
     groups = [[number] for number in range(len(parts))]
-    for first, second in zip(one.tolist(), two.tolist(), strict=True):
+    for first, second in zip(i.tolist(), j.tolist(), strict=True):
         small, large = sorted((groups[first], groups[second]), key=len)
         if small is not large:
             large += small

@@ -1,4 +1,4 @@
-"""Exact nearest neighbours between point clouds, found without gradient by what is fastest on the device.
+"""Exact nearest neighbours between point clouds, without gradient, by the fastest method for the device.
 
 On the CPU kernels search a uniform grid, by threads over the batch; elsewhere all pairs are compared in pieces.
 """
@@ -31,11 +31,11 @@ def nearest(queries: Cloud, points: Other) -> Int[Tensor, "*batch P"]:
 
     A ``ShapeProgError`` if there are no points, or the leading dimensions differ.
     """
-    many, few = _pair(queries.detach(), points.detach())
-    if by_kernel(many):
-        index = torch.from_numpy(neighbours_by_kernel(many, few)[0] - np.arange(len(few))[:, None] * few.shape[1])
+    source, few = _pair(queries.detach(), points.detach())
+    if by_kernel(source):
+        index = torch.from_numpy(neighbours_by_kernel(source, few)[0] - np.arange(len(few))[:, None] * few.shape[1])
     else:
-        index = neighbours(many, few)
+        index = neighbours(source, few)
     return index.reshape(queries.shape[:-1])
 
 
@@ -44,22 +44,22 @@ def squared_distance(queries: Cloud, points: Other) -> Float[Tensor, "*batch P"]
 
     Neighbours are found without gradient; the gradient of the distance to them is that of the minimum.
     """
-    many, few = _pair(queries, points)
-    if by_kernel(many):
-        (found,) = _Squared.apply(many, few, False)  # type: ignore[no-untyped-call]
+    source, few = _pair(queries, points)
+    if by_kernel(source):
+        (results,) = _Squared.apply(source, few, False)  # type: ignore[no-untyped-call]
     else:
-        index = neighbours(many.detach(), few.detach())
-        found = ((many - few.gather(1, index[..., None].expand(-1, -1, 3))) ** 2).sum(-1)
-    squared: Tensor = found.reshape(queries.shape[:-1])
+        index = neighbours(source.detach(), few.detach())
+        results = ((source - few.gather(1, index[..., None].expand(-1, -1, 3))) ** 2).sum(-1)
+    squared: Tensor = results.reshape(queries.shape[:-1])
     return squared
 
 
-def mean_squared_distances(one: Cloud, two: Other) -> tuple[Float[Tensor, "*batch"], Float[Tensor, "*batch"]]:
+def mean_squared_distances(cloud: Cloud, other: Other) -> tuple[Float[Tensor, "*batch"], Float[Tensor, "*batch"]]:
     """Means of the squared distances from each cloud to the nearest points of the other, with gradient to both."""
-    if not by_kernel(one) or not one.shape[-2]:
-        return squared_distance(one, two).mean(-1), squared_distance(two, one).mean(-1)
-    there, back = _Squared.apply(*_pair(one, two), True)  # type: ignore[no-untyped-call]
-    return there.reshape(one.shape[:-2]), back.reshape(one.shape[:-2])
+    if not by_kernel(cloud) or not cloud.shape[-2]:
+        return squared_distance(cloud, other).mean(-1), squared_distance(other, cloud).mean(-1)
+    outward, back = _Squared.apply(*_pair(cloud, other), True)  # type: ignore[no-untyped-call]
+    return outward.reshape(cloud.shape[:-2]), back.reshape(cloud.shape[:-2])
 
 
 class _Squared(torch.autograd.Function):
@@ -69,27 +69,27 @@ class _Squared(torch.autograd.Function):
     """
 
     @staticmethod
-    def forward(ctx: Any, one: Tensor, two: Tensor, means: bool) -> tuple[Tensor, ...]:
-        ways = [(one, two), (two, one)] if means else [(one, two)]
-        found = [neighbours_by_kernel(*way) for way in ways]
-        ctx.save_for_backward(one, two)
-        ctx.means, ctx.index = means, [index for index, _ in found]
-        return tuple(cast(squared.mean(-1) if means else squared, one) for _, squared in found)
+    def forward(ctx: Any, cloud: Tensor, other: Tensor, means: bool) -> tuple[Tensor, ...]:
+        ways = [(cloud, other), (other, cloud)] if means else [(cloud, other)]
+        results = [neighbours_by_kernel(*way) for way in ways]
+        ctx.save_for_backward(cloud, other)
+        ctx.means, ctx.index = means, [index for index, _ in results]
+        return tuple(cast(squared.mean(-1) if means else squared, cloud) for _, squared in results)
 
     @staticmethod
     @once_differentiable
     def backward(ctx: Any, *slopes: Tensor) -> tuple[Tensor | None, ...]:
-        clouds = [numbers(each) for each in ctx.saved_tensors]
-        found = [np.zeros(each.shape) for each in clouds]
+        clouds = [numbers(item) for item in ctx.saved_tensors]
+        results = [np.zeros(item.shape) for item in clouds]
         for way, (index, slope) in enumerate(zip(ctx.index, slopes, strict=True)):
             count = clouds[way].shape[1]
             weight = numbers(slope)[:, None] / count if ctx.means else numbers(slope)
             data = (
                 clouds[way].reshape(-1, 3), count, clouds[1 - way].reshape(-1, 3), index.reshape(-1), weight,
-                found[way].reshape(-1, 3), found[1 - way].reshape(-1, 3),
+                results[way].reshape(-1, 3), results[1 - way].reshape(-1, 3),
             )  # fmt: skip
             over_threads(partial(kernels.pull, *data), len(index), least=8)
-        return *(cast(each, cloud) for each, cloud in zip(found, ctx.saved_tensors, strict=True)), None
+        return *(cast(item, cloud) for item, cloud in zip(results, ctx.saved_tensors, strict=True)), None
 
 
 def _pair(queries: Cloud, points: Other) -> tuple[Float[Tensor, "B P 3"], Float[Tensor, "B Q 3"]]:
@@ -102,26 +102,26 @@ def _pair(queries: Cloud, points: Other) -> tuple[Float[Tensor, "B P 3"], Float[
             "both must be (..., points, 3) with the same leading dimensions",
         )
     count = queries.shape[:-2].numel()
-    many = queries.reshape(count, queries.shape[-2], 3).contiguous()
-    return many, points.to(many).reshape(count, points.shape[-2], 3).contiguous()
+    source = queries.reshape(count, queries.shape[-2], 3).contiguous()
+    return source, points.to(source).reshape(count, points.shape[-2], 3).contiguous()
 
 
 def neighbours_by_kernel(queries: Tensor, points: Tensor) -> tuple[Array, Array]:
     """Rows of the nearest points among those of all clouds, and squared distances, (B, P) each."""
-    (clouds, many), count = queries.shape[:2], points.shape[1]
-    index, squared = np.empty(clouds * many, np.int64), np.empty(clouds * many)
-    data = numbers(queries).reshape(-1, 3), many, numbers(points).reshape(-1, 3), count, index, squared
+    (clouds, source), count = queries.shape[:2], points.shape[1]
+    index, squared = np.empty(clouds * source, np.int64), np.empty(clouds * source)
+    data = numbers(queries).reshape(-1, 3), source, numbers(points).reshape(-1, 3), count, index, squared
     over_threads(partial(kernels.neighbours, *data), clouds)
-    return index.reshape(clouds, many), squared.reshape(clouds, many)
+    return index.reshape(clouds, source), squared.reshape(clouds, source)
 
 
 def neighbours(queries: Float[Tensor, "B P 3"], points: Float[Tensor, "B Q 3"]) -> Int[Tensor, "B P"]:
     """The twin of the kernel.  Differences are taken before they are squared, which keeps small distances exact."""
     step = max(1, AT_ONCE // max(1, points.shape[0] * points.shape[1]))
-    found = []
+    results = []
     for piece in queries.split(step, 1):
         squared = piece.new_zeros(())
         for axis in range(3):
             squared = squared + (piece[:, :, None, axis] - points[:, None, :, axis]) ** 2
-        found.append(squared.argmin(-1))
-    return torch.cat(found, 1)
+        results.append(squared.argmin(-1))
+    return torch.cat(results, 1)

@@ -21,10 +21,10 @@ MOST_CELLS = 48  # along an axis
 @helper
 def _cell(value, low, inverse, cells):
     """Cell of a coordinate, the nearest one if it is outside; the first one if it is no number."""
-    place = (value - low) * inverse
-    if not place > 0:
+    position = (value - low) * inverse
+    if not position > 0:
         return 0
-    return cells - 1 if place >= cells else int(place)
+    return cells - 1 if position >= cells else int(position)
 
 
 @helper
@@ -51,7 +51,7 @@ def _layout(points, first, count, low, cells):
 
 
 @helper
-def _sort(points, first, count, low, inverse, cells, key, place, starts, order):
+def _sort(points, first, count, low, inverse, cells, key, position, starts, order):
     """Counting sort of points by cell: first place of each cell, and the points in that order."""
     every = cells[0] * cells[1] * cells[2]
     for cell in range(every + 1):
@@ -63,24 +63,24 @@ def _sort(points, first, count, low, inverse, cells, key, place, starts, order):
         key[point] = (i * cells[1] + j) * cells[2] + k
         starts[key[point] + 1] += 1
     for cell in range(every):
-        place[cell] = starts[cell]
+        position[cell] = starts[cell]
         starts[cell + 1] += starts[cell]
     for point in range(count):
-        order[place[key[point]]] = first + point
-        place[key[point]] += 1
+        order[position[key[point]]] = first + point
+        position[key[point]] += 1
 
 
 @helper
-def _column(x, y, z, ordered, starts, base, first, last, best, found):
+def _column(x, y, z, ordered, starts, base, first, last, best, closest):
     """Best of the points in the cells ``first`` to ``last`` of the column that starts at cell ``base``."""
-    for place in range(starts[base + first], starts[base + last + 1]):
-        dx = ordered[place, 0] - x
-        dy = ordered[place, 1] - y
-        dz = ordered[place, 2] - z
+    for position in range(starts[base + first], starts[base + last + 1]):
+        dx = ordered[position, 0] - x
+        dy = ordered[position, 1] - y
+        dz = ordered[position, 2] - z
         square = dx * dx + dy * dy + dz * dz
         if square < best:
-            best, found = square, place
-    return best, found
+            best, closest = square, position
+    return best, closest
 
 
 @helper
@@ -91,7 +91,7 @@ def _gap(value, low, side, cell):
 
 
 @helper
-def _search(x, y, z, ordered, starts, low, side, cells, best, found):
+def _search(x, y, z, ordered, starts, low, side, cells, best, closest):
     """Walk over the columns in rings."""
     inverse = 1 / side
     centre_i = _cell(x, low[0], inverse, cells[0])
@@ -99,16 +99,16 @@ def _search(x, y, z, ordered, starts, low, side, cells, best, found):
     for ring in range(max(cells[0], cells[1])):
         if ring > 0:
             # every column of this ring is at least this far away along axis 0 or axis 1
-            near = np.inf
+            close = np.inf
             if centre_i - ring >= 0:
-                near = min(near, x - low[0] - (centre_i - ring + 1) * side)
+                close = min(close, x - low[0] - (centre_i - ring + 1) * side)
             if centre_i + ring < cells[0]:
-                near = min(near, low[0] + (centre_i + ring) * side - x)
+                close = min(close, low[0] + (centre_i + ring) * side - x)
             if centre_j - ring >= 0:
-                near = min(near, y - low[1] - (centre_j - ring + 1) * side)
+                close = min(close, y - low[1] - (centre_j - ring + 1) * side)
             if centre_j + ring < cells[1]:
-                near = min(near, low[1] + (centre_j + ring) * side - y)
-            if near > 0 and near * near > best:
+                close = min(close, low[1] + (centre_j + ring) * side - y)
+            if close > 0 and close * close > best:
                 break
         for i in range(max(centre_i - ring, 0), min(centre_i + ring, cells[0] - 1) + 1):
             dx = _gap(x, low[0], side, i)
@@ -121,53 +121,53 @@ def _search(x, y, z, ordered, starts, low, side, cells, best, found):
                     base = (i * cells[1] + j) * cells[2]
                     if starts[base] < starts[base + cells[2]]:
                         dy = _gap(y, low[1], side, j)
-                        left = best - dx * dx - dy * dy
-                        if left > 0:
-                            reach = math.sqrt(left)
+                        remaining = best - dx * dx - dy * dy
+                        if remaining > 0:
+                            reach = math.sqrt(remaining)
                             first = _cell(z - reach, low[2], inverse, cells[2])
                             last = _cell(z + reach, low[2], inverse, cells[2])
-                            best, found = _column(x, y, z, ordered, starts, base, first, last, best, found)
+                            best, closest = _column(x, y, z, ordered, starts, base, first, last, best, closest)
                 j += max(step, 1)
-    return best, found
+    return best, closest
 
 
 @kernel("void(f8[:, ::1], i8, f8[:, ::1], i8, i8[::1], f8[::1], i8, i8)")
-def neighbours(queries, many, points, count, index, squared, begin, end):
-    """Nearest of the ``count`` points to each of the ``many`` queries of the clouds ``begin`` to ``end``.
+def neighbours(queries, query_count, points, count, index, squared, begin, end):
+    """Nearest of the ``count`` points to each of the ``query_count`` queries of the clouds ``begin`` to ``end``.
 
     Fills the row of ``points`` (B * count, 3), and the squared distance, for each of ``queries`` (B * many, 3).
     """
     low, cells = np.empty(3), np.empty(3, np.int64)
     key, order, visit = (
-        np.empty(max(count, many), np.int64), np.empty(count, np.int64), np.empty(many, np.int64)
+        np.empty(max(count, query_count), np.int64), np.empty(count, np.int64), np.empty(query_count, np.int64)
     )  # fmt: skip
-    starts, place = np.empty((MOST_CELLS + 1) ** 3, np.int64), np.empty((MOST_CELLS + 1) ** 3, np.int64)
+    starts, position = np.empty((MOST_CELLS + 1) ** 3, np.int64), np.empty((MOST_CELLS + 1) ** 3, np.int64)
     ordered = np.empty((count, 3))
     for cloud in range(begin, end):
         side = _layout(points, cloud * count, count, low, cells)
-        _sort(queries, cloud * many, many, low, 1 / side, cells, key, place, starts, visit)
-        _sort(points, cloud * count, count, low, 1 / side, cells, key, place, starts, order)
+        _sort(queries, cloud * query_count, query_count, low, 1 / side, cells, key, position, starts, visit)
+        _sort(points, cloud * count, count, low, 1 / side, cells, key, position, starts, order)
         for item in range(count):
             for axis in range(3):
                 ordered[item, axis] = points[order[item], axis]
-        found = 0
-        for turn in range(many):
+        closest = 0
+        for turn in range(query_count):
             query = visit[turn]
             x, y, z = queries[query, 0], queries[query, 1], queries[query, 2]
-            dx, dy, dz = ordered[found, 0] - x, ordered[found, 1] - y, ordered[found, 2] - z
-            best, found = _search(x, y, z, ordered, starts, low, side, cells, dx * dx + dy * dy + dz * dz, found)
-            index[query], squared[query] = order[found], best
+            dx, dy, dz = ordered[closest, 0] - x, ordered[closest, 1] - y, ordered[closest, 2] - z
+            best, closest = _search(x, y, z, ordered, starts, low, side, cells, dx * dx + dy * dy + dz * dz, closest)
+            index[query], squared[query] = order[closest], best
 
 
 @kernel("void(f8[:, ::1], i8, f8[:, ::1], i8[::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], i8, i8)")
-def pull(queries, many, points, index, slope, to_queries, to_points, begin, end):
+def pull(queries, query_count, points, index, slope, to_queries, to_points, begin, end):
     """Add the gradient of squared distances to known neighbours, given the gradient of a loss by each of them.
 
     ``slope`` (B, many), or (B, 1) when it is the same for all queries of a cloud.
     """
     for cloud in range(begin, end):
-        for turn in range(many):
-            query, twice = cloud * many + turn, 2 * slope[cloud, min(turn, slope.shape[1] - 1)]
+        for turn in range(query_count):
+            query, twice = cloud * query_count + turn, 2 * slope[cloud, min(turn, slope.shape[1] - 1)]
             for axis in range(3):
                 part = twice * (queries[query, axis] - points[index[query], axis])
                 to_queries[query, axis] += part

@@ -37,7 +37,7 @@ Triple = tuple[float, float, float]
 
 @helper
 def tested(table: Array, row: int, square: bool, planes: Array, plane: int, low: Array, high: Array) -> bool:
-    """Cells of a primitive without a rule of its own: those whose centre is inside."""
+    """Cells of a primitive without a special rule: those whose centre is inside."""
     return False
 
 
@@ -61,10 +61,10 @@ class Kernels:
         ``(..., u, v, w, da, db, dc, out)``: add to out (rows, WIDTH) the gradient by the sizes of a placed point,
         given that by its local coordinates.
     cells
-        ``(..., square, planes, plane, low, high) -> bool``: where cells follow a rule of their own, fill them and say
-        so, or change the sizes in the row to those by which they are tested.  All is in cells; ``square`` says whether
-        the axes stand along those of the grid; ``low`` and ``high`` (3,) are scratch.  What is not convex fills all of
-        its cells here.
+        ``(..., square, planes, plane, low, high) -> bool``: where cells follow a special rule, fill them and return
+        true; else the sizes in the row may be changed to those by which cells are tested.  All is in cells; ``square``
+        is whether the axes are parallel to those of the grid; ``low`` and ``high`` (3,) are scratch.  A solid that is
+        not convex fills all of its cells here.
     """
 
     distance: Helper
@@ -79,12 +79,12 @@ class Kernels:
 
 
 class Spans(NamedTuple):
-    """Cells of M solids by a rule of their own: for which of them, and the layers they cover, from low to high.
+    """Cells of M solids by a special rule: to which it applies, and the layers that they cover, from low to high.
 
-    ``depth`` and ``side`` are what they cover in every layer of the grid along depth and left-right.
+    ``depth`` and ``side`` are their extents in every layer of the grid along depth and left-right.
     """
 
-    known: Bool[Tensor, " M"]
+    applies: Bool[Tensor, " M"]
     layers: tuple[Float[Tensor, "M 1"], Float[Tensor, "M 1"]]
     depth: tuple[Float[Tensor, "M R"], Float[Tensor, "M R"]]
     side: tuple[Float[Tensor, "M R"], Float[Tensor, "M R"]]
@@ -97,13 +97,13 @@ class Primitive:
     Parameters
     ----------
     name, sizes, extents
-        What it and its sizes, at most four, are called; the first ``extents`` of them are lengths, never negative.
+        Names of the primitive and of its sizes, at most four; the first ``extents`` are lengths, never negative.
     distance
         ``(points (..., 3), size (..., 4)) -> (...)``: exact signed distance in the local frame, negative inside, with a
         finite gradient everywhere.
     bound, areas, volume
         Of a size: half extents (..., 3) of the box around it, centred at the origin; areas (..., F) of the faces that
-        ``sample`` knows; exact volume (...).
+        ``sample`` numbers; exact volume (...).
     sample
         ``(size, face (...), u (..., 3)) -> unit (..., 3)``: place on a face for three uniform numbers in [0, 1), such
         that ``place(size, unit)`` is uniform by area.  Called without gradient.
@@ -138,7 +138,7 @@ class Primitive:
 class Primitives:
     """The registry: the kind of a primitive is its number in this process, which no other ever gets.
 
-    Names are those of the language in force; what a language does not name is still drawn where a scene holds it.
+    Names are those of the language in force; a scene may hold primitives that the language does not name.
     """
 
     def __init__(self) -> None:
@@ -150,12 +150,12 @@ class Primitives:
 
         A ``DeclarationError`` if its name is taken, or its sizes or what its functions return do not fit.
         """
-        said = f"primitive {primitive.name!r}"
+        message = f"primitive {primitive.name!r}"
         if primitive.name in self.names:
-            raise DeclarationError(f"{said} is declared twice", "give one of them another name")
+            raise DeclarationError(f"{message} is declared twice", "give one of them another name")
         if not 1 <= len(primitive.sizes) <= SIZES or not 0 <= primitive.extents <= len(primitive.sizes):
-            said += f" has {len(primitive.sizes)} sizes, {primitive.extents} of them lengths"
-            raise DeclarationError(said, f"a primitive has 1 to {SIZES} sizes")
+            message += f" has {len(primitive.sizes)} sizes, {primitive.extents} of them lengths"
+            raise DeclarationError(message, f"a primitive has 1 to {SIZES} sizes")
         if not all(ships(value) for value in vars(primitive).values() if callable(value)):
             _try(primitive)
         self._kinds.append(primitive)
@@ -169,7 +169,7 @@ class Primitives:
 
     @contextmanager
     def using(self, names: dict[str, int]) -> Iterator[None]:
-        """Put other names in force for a while; what is registered meanwhile is added to them."""
+        """Put other names in force for a while; primitives registered meanwhile are added to them."""
         token = self._names.set(names)
         try:
             yield
@@ -184,7 +184,7 @@ class Primitives:
 
     def number(self, primitive: Primitive) -> int:
         """The kind of a registered primitive, whatever language is in force."""
-        return next(kind for kind, known in enumerate(self._kinds) if known is primitive)
+        return next(kind for kind, registered in enumerate(self._kinds) if registered is primitive)
 
     def __getitem__(self, kind: int) -> Primitive:
         return self._kinds[kind]
@@ -224,20 +224,20 @@ def _try(primitive: Primitive) -> None:
         "cell_size": ((size,), (2, SIZES)),
         "mesh": ((np.ones(SIZES),), (None, 3)),
     }
-    for word, (arguments, wanted) in calls.items():
+    for word, (arguments, expected) in calls.items():
         try:
             result = getattr(primitive, word)(*arguments)
-            found = tuple((result[0] if word == "mesh" else result).shape)
+            shape = tuple((result[0] if word == "mesh" else result).shape)
         except Exception as cause:
-            said = f"{word} of primitive {primitive.name!r} fails: {cause}"
-            hint = "it gets sizes (..., 4) and what else Primitive says, with any leading dimensions"
-            raise DeclarationError(said, hint) from cause
-        if len(found) != len(wanted) or any(w not in (None, f) for f, w in zip(found, wanted, strict=True)):
-            said = f"{word} of primitive {primitive.name!r} returns shape {found}"
-            raise DeclarationError(said, f"for 2 sizes it should be {wanted}".replace("None", "any number"))
-    here = torch.tensor([[0.9, 0.7, 0.8], [-0.6, 1.3, 0.4], [0.3, -0.5, 1.1], [-1.2, -0.2, 0.6]])
-    there = here * torch.tensor([1.0, 1.0, -1.0])
+            message = f"{word} of primitive {primitive.name!r} fails: {cause}"
+            hint = "it gets sizes (..., 4) and the other arguments of Primitive, with any leading dimensions"
+            raise DeclarationError(message, hint) from cause
+        if len(shape) != len(expected) or any(w not in (None, f) for f, w in zip(shape, expected, strict=True)):
+            message = f"{word} of primitive {primitive.name!r} returns shape {shape}"
+            raise DeclarationError(message, f"for 2 sizes it should be {expected}".replace("None", "any number"))
+    sample_points = torch.tensor([[0.9, 0.7, 0.8], [-0.6, 1.3, 0.4], [0.3, -0.5, 1.1], [-1.2, -0.2, 0.6]])
+    mirrored = sample_points * torch.tensor([1.0, 1.0, -1.0])
     sizes = torch.tensor([1.0, 0.8, 0.6, 0.4]).expand(4, SIZES)
-    if not torch.allclose(primitive.distance(here, sizes), primitive.distance(there, sizes), atol=1e-5):
-        said = f"primitive {primitive.name!r} is not its own mirror image along its local axis 2"
-        raise DeclarationError(said, "turn its local frame: one of its planes of symmetry must lie across that axis")
+    if not torch.allclose(primitive.distance(sample_points, sizes), primitive.distance(mirrored, sizes), atol=1e-5):
+        message = f"primitive {primitive.name!r} is not its own mirror image along its local axis 2"
+        raise DeclarationError(message, "turn its local frame: one of its planes of symmetry must lie across that axis")

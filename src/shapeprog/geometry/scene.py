@@ -1,4 +1,4 @@
-"""A scene: what programs unroll to, primitives that know the statement that drew them."""
+"""A scene: what programs unroll to, primitives with the statement that drew them."""
 
 from __future__ import annotations
 

@@ -4,7 +4,7 @@ Which primitive and which face a point lies on, where on the face, and whether a
 without gradient; then only its place is differentiated.
 
 *Weighting.*  Faces are chosen in proportion to their area, so a plain mean over points is the mean over the surface,
-but the choice has no gradient: growing a face moves its points and does not yet make it count for more.  Every point
+but the choice has no gradient: growing a face moves its points and does not yet increase its weight.  Every point
 therefore has a weight of value 1 whose gradient is that of the logarithm of the area of its face.  A mean weighted
 by it has the gradient of the mean over the surface, for faces that ``place`` stretches evenly, as those of cuboid
 and cylinder.  The line along which a part becomes hidden in another is held still.
@@ -60,7 +60,7 @@ class SurfaceSample(NamedTuple):
 
 
 class Choice(NamedTuple):
-    """What is decided without gradient.
+    """Decisions made without gradient.
 
     Parameters
     ----------
@@ -125,7 +125,7 @@ def sample_surface(batch: Batch, n: int, generator: torch.Generator | None = Non
         points, weights = place(flat, areas, choice)
         normals = choice.places[..., 6:].to(points)
     found = SurfaceSample(points, weights, choice.slot, normals)
-    return SurfaceSample(*(each.reshape(*batch.batch_shape, *each.shape[1:]) for each in found))
+    return SurfaceSample(*(item.reshape(*batch.batch_shape, *item.shape[1:]) for item in found))
 
 
 sample = sample_surface  # its public name, shapeprog.sample
@@ -140,11 +140,11 @@ def has_surface(batch: Batch) -> Bool[Tensor, "*batch"]:
 def face_areas(flat: Batch) -> Float[Tensor, "B N F"]:
     """Area of every face of every slot, zero where there is none."""
     slots = [(kind, (flat.mask & (flat.kind == kind)).nonzero(as_tuple=True)) for kind in flat.kinds]
-    found = [primitives[kind].areas(flat.size[here]) for kind, here in slots]
-    most = max((each.shape[-1] for each in found), default=1)
-    areas = flat.size.new_zeros(*flat.mask.shape, most)
-    for (_, here), each in zip(slots, found, strict=True):
-        areas = areas.index_put(here, torch.nn.functional.pad(each, (0, most - each.shape[-1])))
+    found = [primitives[kind].areas(flat.size[selected]) for kind, selected in slots]
+    width = max((item.shape[-1] for item in found), default=1)
+    areas = flat.size.new_zeros(*flat.mask.shape, width)
+    for (_, selected), item in zip(slots, found, strict=True):
+        areas = areas.index_put(selected, torch.nn.functional.pad(item, (0, width - item.shape[-1])))
     return areas
 
 
@@ -157,17 +157,17 @@ def area_shares(areas: Float[Tensor, "B N F"], batch: Batch) -> Float[Tensor, "B
         If an element has no area, or an infinite one.
     """
     total = areas.double().flatten(-2).cumsum(-1)
-    whole = total[..., -1:] if total.shape[-1] else total.new_zeros(len(total), 1)
-    bare = ~((whole[:, 0] > 0) & whole[:, 0].isfinite())
+    total_area = total[..., -1:] if total.shape[-1] else total.new_zeros(len(total), 1)
+    bare = ~((total_area[:, 0] > 0) & total_area[:, 0].isfinite())
     if bool(bare.any()):
         number = int(bare.nonzero()[0, 0])
         which = f"scene {number} of {len(bare)}" if batch.batch_shape else "the scene"
-        if not bool(whole[number].isfinite()):
+        if not bool(total_area[number].isfinite()):
             raise ShapeProgError(f"{which} has a surface of infinite or undefined area", "lower sizes and positions")
         raise ShapeProgError(
             f"{which} has no surface to draw points from", "give the program a statement that draws something"
         )
-    return total / whole
+    return total / total_area
 
 
 def visible_by_kernel(table: Array, shares: Float[Tensor, "B C"], n: int, seed: int) -> Choice:
@@ -179,7 +179,7 @@ def visible_by_kernel(table: Array, shares: Float[Tensor, "B C"], n: int, seed: 
         table, len(table) // max(count, 1), numbers(shares), seed, SKIN, PATIENCE * n, n, chosen, places, found,
     )  # fmt: skip
     over_threads(lambda first, last: kernels.visible(*data, first, last), count)
-    return Choice(*(torch.from_numpy(each).reshape(count, *shape) for each, shape in (
+    return Choice(*(torch.from_numpy(item).reshape(count, *shape) for item, shape in (
         (chosen, (n, 2)), (places, (n, 9)), (found, ())
     )))  # fmt: skip
 
@@ -188,21 +188,21 @@ def visible(flat: Batch, shares: Float[Tensor, "B C"], n: int, seed: int) -> Cho
     """The same from the declarations alone, for any kind of primitive on any device; the twin of the kernel."""
     per = shares.shape[-1] // flat.mask.shape[-1]
     pieces: list[tuple[Tensor, ...]] = []
-    drawn, found = 0, torch.zeros(len(shares), dtype=torch.long, device=shares.device)
-    while drawn < PATIENCE * n and bool((found < n).any()):
-        more = min(max(n, 256), PATIENCE * n - drawn)
-        count = 4 * drawn + torch.arange(4 * more, device=shares.device)
+    tried, found = 0, torch.zeros(len(shares), dtype=torch.long, device=shares.device)
+    while tried < PATIENCE * n and bool((found < n).any()):
+        more = min(max(n, 256), PATIENCE * n - tried)
+        count = 4 * tried + torch.arange(4 * more, device=shares.device)
         numbers = uniform(seed, (torch.arange(len(shares), device=shares.device)[:, None] << 40) + count)
         numbers = numbers.unflatten(-1, (more, 4))
         cell = torch.searchsorted(shares, numbers[..., 0].contiguous(), right=True)
         slot, face = cell.div(per, rounding_mode="floor"), cell % per
         places = _drawn(flat, slot, face, numbers[..., 1:])
-        seen = ~_hidden(flat, slot, places[..., 3:6].to(flat.size), places[..., 6:].to(flat.size))
-        pieces.append((torch.stack([slot, face], -1), places, seen))
-        found = found + seen.sum(-1)
-        drawn += more
-    chosen, places, seen = (torch.cat(each, 1) for each in zip(*pieces, strict=True))
-    first = torch.argsort(~seen, dim=-1, stable=True)[:, :n]
+        shown = ~_hidden(flat, slot, places[..., 3:6].to(flat.size), places[..., 6:].to(flat.size))
+        pieces.append((torch.stack([slot, face], -1), places, shown))
+        found = found + shown.sum(-1)
+        tried += more
+    chosen, places, shown = (torch.cat(item, 1) for item in zip(*pieces, strict=True))
+    first = torch.argsort(~shown, dim=-1, stable=True)[:, :n]
     places = _rows(places, first)
     far = ~(places[..., 3:6].abs().sum(-1) < FARTHEST) & (torch.arange(n, device=found.device) < found[:, None])
     return Choice(_rows(chosen, first), places, torch.where(far.any(-1), -1, found.clamp(max=n)))
@@ -213,9 +213,9 @@ def place(flat: Batch, areas: Float[Tensor, "B N F"], choice: Choice) -> tuple[T
     kind, size, centre, rotation = flat.at(choice.slot)
     unit = choice.places[..., :3].to(size)
     local = torch.zeros_like(unit)
-    for each in flat.kinds:
-        here = (kind == each).nonzero(as_tuple=True)
-        local = local.index_put(here, primitives[each].place(size[here], unit[here]))
+    for item in flat.kinds:
+        selected = (kind == item).nonzero(as_tuple=True)
+        local = local.index_put(selected, primitives[item].place(size[selected], unit[selected]))
     area = areas.flatten(-2).gather(-1, choice.slot * areas.shape[-1] + choice.chosen[..., 1])
     return _turned(rotation, local) + centre, area / area.detach()
 
@@ -236,16 +236,16 @@ class _Placed(torch.autograd.Function):
     @once_differentiable
     def backward(ctx: Any, slope: Tensor, weigh: Tensor) -> tuple[Tensor | None, ...]:
         (areas,) = ctx.saved_tensors
-        scenes, many, faces = areas.shape
+        scenes, per_scene, faces = areas.shape
         n, choice = slope.shape[1], ctx.choice
-        to_table, to_faces = np.zeros((scenes * many, WIDTH)), np.zeros((scenes * many, faces))
+        to_table, to_faces = np.zeros((scenes * per_scene, WIDTH)), np.zeros((scenes * per_scene, faces))
         data = (
-            ctx.table, many, n, array(choice.chosen).reshape(-1, 2), array(choice.places).reshape(-1, 9),
+            ctx.table, per_scene, n, array(choice.chosen).reshape(-1, 2), array(choice.places).reshape(-1, 9),
             numbers(slope).reshape(-1, 3), numbers(weigh).reshape(-1), to_table, to_faces,
         )  # fmt: skip
         over_threads(lambda first, last: kernels.pull(*data, first, last), scenes)
         to_areas = torch.from_numpy(to_faces).to(areas).reshape(areas.shape) / torch.where(areas > 0, areas, 1)
-        return *gradients(to_table, areas, scenes, many), to_areas, None, None
+        return *gradients(to_table, areas, scenes, per_scene), to_areas, None, None
 
 
 def _whole(choice: Choice, n: int) -> Choice:
@@ -273,11 +273,11 @@ def _drawn(flat: Batch, slot: Tensor, face: Tensor, numbers: Float[Tensor, "B n 
     kind, size, centre, rotation = flat.at(slot)
     size, centre, rotation = size.double(), centre.double(), rotation.double()
     unit, local, normal = torch.zeros_like(numbers), torch.zeros_like(numbers), torch.zeros_like(numbers)
-    for each in flat.kinds:
-        here, declared = (kind == each).nonzero(as_tuple=True), primitives[each]
-        unit[here] = declared.sample(size[here], face[here], numbers[here])
-        local[here] = declared.place(size[here], unit[here])
-        normal[here] = declared.normal(size[here], unit[here], face[here])
+    for item in flat.kinds:
+        selected, declared = (kind == item).nonzero(as_tuple=True), primitives[item]
+        unit[selected] = declared.sample(size[selected], face[selected], numbers[selected])
+        local[selected] = declared.place(size[selected], unit[selected])
+        normal[selected] = declared.normal(size[selected], unit[selected], face[selected])
     return torch.cat([unit, _turned(rotation, local) + centre, _turned(rotation, normal)], -1)
 
 

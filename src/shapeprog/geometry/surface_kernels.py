@@ -23,32 +23,34 @@ RUN = 256
 
 
 @helper
-def _around(table, first, many, skin, box):
+def _around(table, first, per_scene, skin, box):
     """Boxes around the primitives: centre and reach along each axis."""
-    for slot in range(many):
+    for slot in range(per_scene):
         if table[first + slot, KIND] < 0:
             continue
-        one, two, three = bound(table, first + slot)
+        first_number, second_number, third_number = bound(table, first + slot)
         for axis in range(3):
             column = ROTATION + 3 * axis
-            reach = abs(table[first + slot, column]) * one + abs(table[first + slot, column + 1]) * two
+            reach = (
+                abs(table[first + slot, column]) * first_number + abs(table[first + slot, column + 1]) * second_number
+            )
             box[slot, axis] = table[first + slot, CENTRE + axis]
-            box[slot, 3 + axis] = skin + reach + abs(table[first + slot, column + 2]) * three
+            box[slot, 3 + axis] = skin + reach + abs(table[first + slot, column + 2]) * third_number
 
 
 @helper
-def _list_near(table, first, many, box, near, nears):
+def _list_near(table, first, per_scene, box, neighbours, neighbour_counts):
     """For each primitive the others whose box touches its own: only they can hide it."""
-    for slot in range(many):
-        nears[slot] = 0
-        for other in range(many):
-            apart = other == slot or table[first + slot, KIND] < 0 or table[first + other, KIND] < 0
+    for slot in range(per_scene):
+        neighbour_counts[slot] = 0
+        for rival in range(per_scene):
+            separate = rival == slot or table[first + slot, KIND] < 0 or table[first + rival, KIND] < 0
             for axis in range(3):
-                gap = abs(box[slot, axis] - box[other, axis]) - box[slot, 3 + axis] - box[other, 3 + axis]
-                apart = apart or gap > 0
-            if not apart:
-                near[slot, nears[slot]] = other
-                nears[slot] += 1
+                gap = abs(box[slot, axis] - box[rival, axis]) - box[slot, 3 + axis] - box[rival, 3 + axis]
+                separate = separate or gap > 0
+            if not separate:
+                neighbours[slot, neighbour_counts[slot]] = rival
+                neighbour_counts[slot] += 1
 
 
 @helper
@@ -59,12 +61,12 @@ def _inside(table, row, x, y, z):
 
 
 @helper
-def _join(table, first, many, box, joined):
+def _join(table, first, per_scene, box, joined):
     """Boxes around runs of primitives: low and high corner."""
     for run in range(len(joined)):
         for axis in range(3):
             joined[run, axis], joined[run, 3 + axis] = np.inf, -np.inf
-        for slot in range(run * RUN, min(run * RUN + RUN, many)):
+        for slot in range(run * RUN, min(run * RUN + RUN, per_scene)):
             if table[first + slot, KIND] >= 0:
                 for axis in range(3):
                     joined[run, axis] = min(joined[run, axis], box[slot, axis] - box[slot, 3 + axis])
@@ -80,24 +82,24 @@ def _beyond(box, slot, x, y, z):
 
 
 @helper
-def _hidden(table, first, box, near, line, count, slot, x, y, z, dx, dy, dz):
+def _hidden(table, first, box, neighbours, line, count, slot, x, y, z, dx, dy, dz):
     """Whether another part begins just outside the point, or an earlier part has the same face there.
 
-    The parts looked at are the first ``count`` in a line of ``near``.
+    The parts looked at are the first ``count`` in a line of ``neighbours``.
     """
     for turn in range(count):
-        other = near[line, turn]
-        if _beyond(box, other, x, y, z):
+        rival = neighbours[line, turn]
+        if _beyond(box, rival, x, y, z):
             continue
-        if _inside(table, first + other, x + dx, y + dy, z + dz):
+        if _inside(table, first + rival, x + dx, y + dy, z + dz):
             return True
-        if other < slot and _inside(table, first + other, x - dx, y - dy, z - dz):
+        if rival < slot and _inside(table, first + rival, x - dx, y - dy, z - dz):
             return True
     return False
 
 
 @helper
-def _hidden_in_runs(table, first, many, box, joined, near, slot, x, y, z, dx, dy, dz):
+def _hidden_in_runs(table, first, per_scene, box, joined, neighbours, slot, x, y, z, dx, dy, dz):
     """The same for all parts, run by run."""
     for run in range(len(joined)):
         if x < joined[run, 0] or y < joined[run, 1] or z < joined[run, 2]:
@@ -105,42 +107,42 @@ def _hidden_in_runs(table, first, many, box, joined, near, slot, x, y, z, dx, dy
         if x > joined[run, 3] or y > joined[run, 4] or z > joined[run, 5]:
             continue
         count = 0
-        for other in range(run * RUN, min(run * RUN + RUN, many)):
-            if other != slot and table[first + other, KIND] >= 0:
-                near[0, count] = other
+        for rival in range(run * RUN, min(run * RUN + RUN, per_scene)):
+            if rival != slot and table[first + rival, KIND] >= 0:
+                neighbours[0, count] = rival
                 count += 1
-        if _hidden(table, first, box, near, 0, count, slot, x, y, z, dx, dy, dz):
+        if _hidden(table, first, box, neighbours, 0, count, slot, x, y, z, dx, dy, dz):
             return True
     return False
 
 
 @kernel("void(f8[:, ::1], i8, f8[:, ::1], i8, f8, i8, i8, i8[:, ::1], f8[:, ::1], i8[::1], i8, i8)")
-def visible(table, many, shares, seed, skin, most, n, chosen, places, found, begin, end):
+def visible(table, per_scene, shares, seed, skin, attempts, n, chosen, places, found, begin, end):
     """Draw visible surface points of the scenes ``begin`` to ``end``, n of each.
 
     ``shares`` (B, N * F) are cumulative shares of area.  ``chosen`` (B * n, 2) receives slot and face, ``places``
-    (B * n, 9) the unit place, the grid position and the normal, and ``found`` (B,) how many of at most ``most``
+    (B * n, 9) the unit place, the grid position and the normal, and ``found`` (B,) how many of at most ``attempts``
     candidates were visible, n at most; -1 if one of them is farther away than ``FARTHEST``.
     """
-    listed = many if many <= LISTED else 0
-    box, joined = np.empty((many, 6)), np.empty((0 if listed else -(-many // RUN), 6))
-    near = np.empty((listed, listed) if listed > 0 else (1, RUN), np.int64)
-    nears = np.empty(listed, np.int64)
+    listed = per_scene if per_scene <= LISTED else 0
+    box, joined = np.empty((per_scene, 6)), np.empty((0 if listed else -(-per_scene // RUN), 6))
+    neighbours = np.empty((listed, listed) if listed > 0 else (1, RUN), np.int64)
+    neighbour_counts = np.empty(listed, np.int64)
     guide = np.empty(GUIDE + 1, np.int64)
-    per = shares.shape[1] // max(many, 1)
+    per = shares.shape[1] // max(per_scene, 1)
     for scene in range(begin, end):
-        first, stream, base = scene * many, scene << 40, scene * n
-        _around(table, first, many, skin, box)
-        _list_near(table, first, listed, box, near, nears)
-        _join(table, first, many, box, joined)
+        first, stream, base = scene * per_scene, scene << 40, scene * n
+        _around(table, first, per_scene, skin, box)
+        _list_near(table, first, listed, box, neighbours, neighbour_counts)
+        _join(table, first, per_scene, box, joined)
         cell = 0
         for step in range(GUIDE + 1):
             while cell < shares.shape[1] and shares[scene, cell] <= step / GUIDE:
                 cell += 1
             guide[step] = cell
-        kept = 0
-        for candidate in range(most):
-            if kept == n:
+        accepted = 0
+        for candidate in range(attempts):
+            if accepted == n:
                 break
             count = stream + 4 * candidate
             number = uniform(seed, count)
@@ -149,8 +151,12 @@ def visible(table, many, shares, seed, skin, most, n, chosen, places, found, beg
                 cell += 1
             slot, face = cell // per, cell % per
             row = first + slot
-            one, two, three = uniform(seed, count + 1), uniform(seed, count + 2), uniform(seed, count + 3)
-            u, v, w = sample(table, row, face, one, two, three)
+            first_number, second_number, third_number = (
+                uniform(seed, count + 1),
+                uniform(seed, count + 2),
+                uniform(seed, count + 3),
+            )
+            u, v, w = sample(table, row, face, first_number, second_number, third_number)
             a, b, c = place(table, row, u, v, w)
             x, y, z = turned(table, row, a, b, c)
             x, y, z = x + table[row, CENTRE], y + table[row, CENTRE + 1], z + table[row, CENTRE + 2]
@@ -158,25 +164,25 @@ def visible(table, many, shares, seed, skin, most, n, chosen, places, found, beg
             a, b, c = turned(table, row, a, b, c)
             dx, dy, dz = skin * a, skin * b, skin * c
             if listed > 0:
-                hidden = _hidden(table, first, box, near, slot, nears[slot], slot, x, y, z, dx, dy, dz)
+                hidden = _hidden(table, first, box, neighbours, slot, neighbour_counts[slot], slot, x, y, z, dx, dy, dz)
             else:
-                hidden = _hidden_in_runs(table, first, many, box, joined, near, slot, x, y, z, dx, dy, dz)
+                hidden = _hidden_in_runs(table, first, per_scene, box, joined, neighbours, slot, x, y, z, dx, dy, dz)
             if hidden:
                 continue
             if not abs(x) + abs(y) + abs(z) < FARTHEST:
-                kept = -1
+                accepted = -1
                 break
-            item = base + kept
+            item = base + accepted
             chosen[item, 0], chosen[item, 1] = slot, face
             places[item, 0], places[item, 1], places[item, 2] = u, v, w
             places[item, 3], places[item, 4], places[item, 5] = x, y, z
             places[item, 6], places[item, 7], places[item, 8] = a, b, c
-            kept += 1
-        found[scene] = kept
+            accepted += 1
+        found[scene] = accepted
 
 
 @kernel("void(f8[:, ::1], i8, i8, i8[:, ::1], f8[:, ::1], f8[:, ::1], f8[::1], f8[:, ::1], f8[:, ::1], i8, i8)")
-def pull(table, many, n, chosen, places, slope, weigh, to_table, to_faces, begin, end):
+def pull(table, per_scene, n, chosen, places, slope, weigh, to_table, to_faces, begin, end):
     """Gradient by rows of the table and by faces of placed points and their weights.
 
     ``slope`` (B * n, 3) and ``weigh`` (B * n,) are the gradients of a loss by each point and each weight;
@@ -184,7 +190,7 @@ def pull(table, many, n, chosen, places, slope, weigh, to_table, to_faces, begin
     """
     for scene in range(begin, end):
         for item in range(scene * n, (scene + 1) * n):
-            row = scene * many + chosen[item, 0]
+            row = scene * per_scene + chosen[item, 0]
             to_faces[row, chosen[item, 1]] += weigh[item]
             u, v, w = places[item, 0], places[item, 1], places[item, 2]
             a, b, c = place(table, row, u, v, w)

@@ -19,11 +19,11 @@ from scipy.linalg import block_diag
 from shapeprog.errors import ShapeProgError
 from shapeprog.inference.roles import with_roles
 from shapeprog.inference.tunable import CELLS, Tunable, least
-from shapeprog.language.evaluation import expanded
+from shapeprog.language.ast import Call, Source
+from shapeprog.language.evaluate import expanded
 from shapeprog.language.expression import Expression, Value
 from shapeprog.language.parameters import to_float32
 from shapeprog.language.program import Draw, Loop, Node, Program, nest
-from shapeprog.language.source import Call, Source, WrittenLoop
 from shapeprog.language.statement import language
 from shapeprog.library.blocks import Block, forms_of
 from shapeprog.library.matching import EXACT, Form, Pattern
@@ -63,7 +63,7 @@ class Called:
         call = Call(
             self.pattern.function.name, tuple((name, value) for (name, usual), value in pairs if value != usual)
         )
-        loops = [WrittenLoop(loop.name, loop.values, ()) for loop in self.around]
+        loops = [Loop(loop.name, loop.values, ()) for loop in self.around]
         source = Source((*self.pattern.others, self.pattern.function, within(loops, call)))
         return Program(expanded(source), source)
 

@@ -29,10 +29,10 @@ from shapeprog.inference.stretching import stretched
 from shapeprog.inference.tunable import THINNEST, bounds
 from shapeprog.language.hints import Box
 from shapeprog.language.parameters import to_float32
+from shapeprog.language.printer import numbers_written
 from shapeprog.language.program import Draw, Loop, Node, Program, nest
 from shapeprog.language.statement import END, Statement, language
 from shapeprog.language.tensors import encode
-from shapeprog.language.text import numbers_written
 from shapeprog.language.unroll import unroll
 from shapeprog.space import Array, FloatArray
 

@@ -31,9 +31,9 @@ from shapeprog.geometry.surface import face_areas, sample_surface
 from shapeprog.inference.coverage_kernels import LIFT, TURNED, charged, explain, hold
 from shapeprog.inference.evidence import Evidence
 from shapeprog.inference.repeating import mirrors
+from shapeprog.language.ast import Assignment, Comment
 from shapeprog.language.free import numbers_outside
 from shapeprog.language.program import Loop, Program
-from shapeprog.language.source import Assignment, Comment, WrittenLoop
 from shapeprog.language.unroll import unroll
 from shapeprog.library.length import outside
 from shapeprog.space import DEPTH, HALF, RESOLUTION, SIDE, FloatArray
@@ -88,7 +88,7 @@ class Prices:
         """The price of a program as it is written; functions are known, and cost nothing."""
         written = program.walk() if program.source is None else outside(program.source.lines)
         lines = [line for line in written if not isinstance(line, Comment | Assignment)]
-        loops = [isinstance(line, Loop | WrittenLoop) for line in lines]
+        loops = [isinstance(line, Loop | Loop) for line in lines]
         price = sum(self.loop if each else self.statement for each in loops)
         called = program.blocks - loops.count(False)
         return float(price + self.loop * called + self.number * numbers_outside(program))

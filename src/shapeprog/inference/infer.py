@@ -6,6 +6,7 @@ the shape, from every statement there is; cells have a surface as well, if a coa
 
 from __future__ import annotations
 
+import importlib
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -33,6 +34,7 @@ from shapeprog.inference.roles import named_anew
 from shapeprog.inference.structure import Settings, search_structure
 from shapeprog.inference.surface import points_of_cells
 from shapeprog.inference.ties.tying import tie
+from shapeprog.language.convert import placed_if_possible
 from shapeprog.language.free import numbers
 from shapeprog.language.merging import merged
 from shapeprog.language.program import Program
@@ -81,6 +83,19 @@ class Result:
     cut: tuple[str, ...]
     seconds: float = field(compare=False)
     trade_off: tuple[TradeOff, ...] = ()
+
+    def __str__(self) -> str:
+        """A short report: the size of the program, how well it fits, and why the search stopped."""
+        program = self.program
+        size = f"{program.blocks} blocks, {program.statements} statements, {program.size} solids"
+        words = {"numbers": "{:.0f} free numbers", "explained": "{:.1%} of the surface explained", "iou": "IoU {:.3f}"}
+        shown = [text.format(self.scores[name]) for name, text in words.items() if name in self.scores]
+        return f"{', '.join([size, *shown])}\n{self.reason}\n{self.seconds:.1f} s; its program is .program"
+
+    def _repr_png_(self) -> bytes:
+        """A picture of the program, which notebooks show."""
+        picture: bytes = importlib.import_module("shapeprog.view.page").png(self.program, self.scores)
+        return picture
 
 
 @one_tensor_thread()
@@ -179,9 +194,9 @@ def infer(
             if costs(tied) <= costs(program, snapped=snapped):
                 program, snapped = tied, None
     if snapped is None:
+        program = placed_if_possible(merged(program))
         for library in libraries:
             program = with_library(program, library)
-        program = merged(program)
     if target.note:
         reason += f" {target.note}"
     cut = tuple(each.cut for each in (searching, refining) if each.cut)
@@ -234,5 +249,5 @@ def outer_points(target: Shape, snapped: Program, seed: int) -> Float[Tensor, "P
 
 def _advice(used: int, allowed: int) -> str:
     if used >= allowed:
-        return f"; all {allowed} drawing statements are in use, raise --blocks for more."
+        return f"; the limit of --blocks {allowed} is reached, raise it for more."
     return f"; {used} of {allowed} drawing statements are in use, another would improve the fit too little."

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from shapeprog.inference.connecting import afloat
-from shapeprog.language.converting import in_unit
+from shapeprog.language.dimensions import in_unit
 from shapeprog.language.program import Loop, Program
 from shapeprog.language.statement import language
 from shapeprog.language.unit import Unit
@@ -29,7 +29,7 @@ def in_readable_unit(program: Program, unit: Unit | None, seed: int = 0) -> Prog
     Raises
     ------
     ShapeProgError
-        As for :func:`~shapeprog.language.converting.in_unit`.
+        As for :func:`~shapeprog.language.dimensions.in_unit`.
     """
     if program.unit == unit:
         return program

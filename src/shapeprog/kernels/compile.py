@@ -9,12 +9,11 @@
         for k in range(len(values)):
             out[k] = square(values[k])
 
-A *kernel* is called from Python and has the one signature that it declares, so it is compiled once; a call with other
-types is an error.  A *helper* is a plain Python function that kernels call.  Neither needs numba to be imported:
-it is loaded when the first kernel is called.  Compiled kernels are kept in numba's cache; a kernel counts as changed
-when its own code, that of any helper it reaches, or a constant that these read has changed, in whatever file.
+A *kernel* is called from Python and has the one signature that it declares; a call with other types is an error.  A
+*helper* is a plain Python function that kernels call.  Numba is imported when the first kernel is called.
 
-What makes compiling slow is the compiler's front end: a tenth of a second for each helper, and more for its lines.
+Compiled kernels are kept in numba's cache.  That compares the file of the kernel alone, but the code of its helpers is
+compiled into it: the name under which a kernel is kept therefore has a digest of all code and constants it reaches.
 """
 
 from __future__ import annotations
@@ -23,17 +22,16 @@ import gc
 import importlib
 import inspect
 import os
+import subprocess
+import sys
 import threading
-from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from functools import cache, cached_property
 from hashlib import sha256
+from pathlib import Path
 from types import CodeType, FunctionType
 from typing import Any
-
-from shapeprog.errors import ShapeProgError
-from shapeprog.processes import Worker, serve
 
 Function = Callable[..., Any]
 
@@ -41,7 +39,8 @@ OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "no_cfunc_wrap
 """Kernels run without the interpreter's lock, and divide as numpy does, without a check before each division."""
 
 MOST = 3
-"""Maximum number of further processes that compile, if there are as many cores."""
+"""Processes that compile in parallel with this one, at most, where there are as many cores."""
+
 
 _lock = threading.RLock()
 _helpers: dict[Function, dict[str, Any]] = {}
@@ -49,24 +48,24 @@ _kernels: dict[str, Kernel] = {}
 
 
 def helper(function: Function | None = None, **options: Any) -> Any:
-    """Declare a function that only kernels call; it stays a plain one.  Options are numba's, such as ``inline``."""
+    """Declare a function that kernels call; it stays a plain one.  Options are numba's, such as ``forceinline``."""
     if function is None:
-        return lambda decorated: helper(decorated, **options)
+        return lambda declared: helper(declared, **options)
     plain = inspect.unwrap(function)
     _helpers[plain] = options
     return plain
 
 
-def kernel(signature: str, **options: Any) -> Callable[[Function], Kernel]:
-    """Declare a kernel by its one signature in numba's short words, such as ``"void(f8[:, ::1], i8)"``."""
-    return lambda function: Kernel(inspect.unwrap(function), signature, options)
+def kernel(signature: str) -> Callable[[Function], Kernel]:
+    """Declare a kernel by its one signature in numba's short form, such as ``"void(f8[:, ::1], i8)"``."""
+    return lambda function: Kernel(inspect.unwrap(function), signature)
 
 
 class Kernel:
     """A compiled function, loaded from the cache or compiled when it is first called."""
 
-    def __init__(self, function: Function, signature: str, options: dict[str, Any]) -> None:
-        self.function, self.signature, self._options = function, signature, options
+    def __init__(self, function: Function, signature: str) -> None:
+        self.function, self.signature = function, signature
         self._compiled: Any = None
         self.__name__, self.__doc__ = function.__name__, function.__doc__
         self.name = f"{function.__module__}:{function.__qualname__}"
@@ -82,17 +81,16 @@ class Kernel:
         """Load it from the cache, or compile it and keep it there."""
         with _lock, _without_collector():
             if self._compiled is None:
-                self._dispatcher.compile(self._types())
+                self._dispatcher.compile(self.signature)
                 self._dispatcher.disable_compile()
                 self._compiled = self._dispatcher
 
     def load(self) -> bool:
-        """Load it from the cache; whether it was there."""
+        """Load it from the cache; returns whether it was there."""
         with _lock:
             if self._compiled is None:
-                cache = self._dispatcher._cache
-                key = cache._index_key(self._types(), self._dispatcher.targetctx.codegen())
-                if key not in cache._cache_file._load_index():
+                folder = Path(self._dispatcher.stats.cache_path)
+                if not any(folder.glob(f"*{self._dispatcher.__qualname__}-*.nbi")):
                     return False
             self.compile()
             return True
@@ -100,125 +98,116 @@ class Kernel:
     @cached_property
     def _dispatcher(self) -> Any:
         numba: Any = importlib.import_module("numba")
-        dispatcher = numba.njit(cache=True, **OPTIONS, **self._options)(_linked(self.function))
-        # numba only checks the file of the kernel, but the compiled code includes all helpers
-        stamp = _digest(self.function, f"{numba.__version__}, bounds checked: {numba.config.BOUNDSCHECK}")
-        dispatcher._cache._cache_file._source_stamp = stamp
-        return dispatcher
+        copy = _linked(self.function)
+        copy.__qualname__ = f"{self.function.__name__}_{self._digest()}"
+        return numba.njit(cache=True, **OPTIONS)(copy)
 
-    def _types(self) -> Any:
-        sigutils: Any = importlib.import_module("numba.core.sigutils")
-        return sigutils.normalize_signature(self.signature)[0]
+    def _digest(self) -> str:
+        """Changes with the kernel, the helpers it reaches, every number or text that these read, and the compiler."""
+        numba: Any = importlib.import_module("numba")
+        host = importlib.import_module("llvmlite.binding").get_host_cpu_name()
+        changed = Path(self.function.__code__.co_filename).stat().st_mtime_ns  # which numba compares too
+        digest, visited, stack = sha256(), set[Function](), [self.function]
+        digest.update(repr((numba.__version__, numba.config.BOUNDSCHECK, host, changed)).encode())
+        while stack:
+            current = stack.pop()
+            if current in visited:
+                continue
+            visited.add(current)
+            code, names = current.__code__, current.__globals__
+            values = {name: names[name] for name in code.co_names if name in names}
+            read = sorted((name, repr(value)) for name, value in values.items() if isinstance(value, (int, float, str)))
+            constants = [value.co_code if isinstance(value, CodeType) else value for value in code.co_consts]
+            digest.update(repr((code.co_name, code.co_code, constants, code.co_names, read)).encode())
+            stack += [value for value in values.values() if isinstance(value, FunctionType)]
+        return digest.hexdigest()[:16]
 
 
-def prepare(modules: Sequence[str], report: Callable[[str], None] | None = None) -> None:
-    """Load or compile all kernels of some modules, given by full name, before they are needed.
+def prepare(modules: Sequence[str], tell: Callable[[str], None] | None = None) -> None:
+    """Compile all kernels of some modules, so that nobody waits for them later.
 
-    Kernels that are missing in the cache are compiled by several processes at once.  The others take kernels from the
-    front, this one from the back, so list modules that import quickly first.  ``report`` is called with a sentence
-    before the first compilation, which takes seconds.
+    What the cache lacks is compiled by several processes at once, which share only the cache: the others begin
+    with the first modules, this one with the last.
+
+    Parameters
+    ----------
+    modules
+        Full names; those that import quickly first.
+    tell
+        Called with a sentence before anything is compiled, which takes seconds.
     """
     lacking: list[Kernel] = []
-    waiting: deque[str] = deque()
-    complete = threading.Event()
-    threads: list[threading.Thread] = []
+    children: list[subprocess.Popen[bytes]] = []
     try:
-        for name in modules:
-            importlib.import_module(name)
-            for item in list(_kernels.values()):
-                if item.function.__module__ == name and not item.load():
-                    if report and not lacking:
-                        report("compiling kernels for this machine (first run only, up to half a minute)")
-                    lacking.append(item)
-                    waiting.append(item.name)
-            while waiting and len(threads) < min(max((os.cpu_count() or 2) - 1, 1), MOST):
-                threads.append(threading.Thread(target=_serve, args=(waiting, complete), daemon=True))
-                threads[-1].start()
-        while waiting:
-            with suppress(IndexError):  # another process took the last one
-                _kernels[waiting.pop()].compile()
+        for kernel in _of(modules):
+            if kernel.load():
+                continue
+            if not lacking:
+                if tell:
+                    tell("compiling kernels for this machine (first run only, up to half a minute)")
+                count = min(max((os.cpu_count() or 2) - 1, 1), MOST)
+                with suppress(OSError):  # where no other can be started, all is compiled here
+                    children += [_other(f"{number}/{count}", modules) for number in range(count)]
+            lacking.append(kernel)
+        for kernel in reversed(lacking):
+            kernel.compile()
     finally:
-        waiting.clear()
-        complete.set()
-    for thread in threads:
-        thread.join()
-    for item in lacking:  # from the cache now; compiled here should another process have failed
-        item.compile()
+        for child in children:
+            child.kill()
+            child.communicate()
 
 
-def _serve(waiting: deque[str], complete: threading.Event) -> None:
-    """Have another process compile kernels into the cache, one of the names waiting after another."""
-    with suppress(ShapeProgError):  # should it fail, its kernels are compiled here
-        worker = Worker("shapeprog.kernels.compile", quiet=True)
-        try:
-            while name := _next(waiting, complete):
-                worker.ask(name)
-        finally:
-            worker.close()
+def _of(modules: Iterable[str]) -> Iterator[Kernel]:
+    """The kernels of some modules, which are imported one by one."""
+    for name in modules:
+        importlib.import_module(name)
+        yield from [kernel for kernel in _kernels.values() if kernel.function.__module__ == name]
 
 
-def _next(waiting: deque[str], complete: threading.Event) -> str:
-    """The next name, once there is one; none at the end."""
-    while True:
-        with suppress(IndexError):
-            return waiting.popleft()
-        if complete.wait(0.01):
-            return ""
+def _other(share: str, modules: Sequence[str]) -> subprocess.Popen[bytes]:
+    """Start a process that compiles a share of the kernels of some modules; Ctrl-C does not reach it."""
+    path = os.pathsep.join(entry for entry in sys.path if entry)
+    return subprocess.Popen(
+        [sys.executable, "-m", "shapeprog.kernels.compile", share, *modules], env={**os.environ, "PYTHONPATH": path},
+        stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True,
+    )  # fmt: skip
+
+
+def _serve(share: str, modules: Sequence[str]) -> None:
+    """Compile a share of the kernels, until the process that holds the standard input ends."""
+    threading.Thread(target=lambda: (sys.stdin.read(), os._exit(0)), daemon=True).start()
+    number, count = map(int, share.split("/"))
+    for index, kernel in enumerate(_of(modules)):
+        if index % count == number:
+            kernel.compile()
 
 
 def _linked(function: Function) -> FunctionType:
-    """A copy of a function whose helpers are compiled ones; the function itself is unchanged."""
-    assert isinstance(function, FunctionType)
-    helpers = {name: _compiled_helper(value) for name, value in _read(function).items() if _is_helper(value)}
-    names = {**function.__globals__, **helpers}
-    copy = FunctionType(function.__code__, names, function.__name__, function.__defaults__)
-    copy.__qualname__, copy.__module__ = function.__qualname__, function.__module__
+    """A copy of a function that calls compiled helpers; the function itself is unchanged."""
+    names = function.__globals__
+    replaced = {name: _compiled(names[name]) for name in function.__code__.co_names if _is_helper(names.get(name))}
+    copy = FunctionType(function.__code__, {**names, **replaced}, function.__name__, function.__defaults__)
+    copy.__module__ = function.__module__
     return copy
 
 
 @cache
-def _compiled_helper(function: Function) -> Any:
-    """A helper as the compiler wants it: compiled with, and into, the kernels that reach it.
-
-    Literal numbers count as any others, or the compiler would make a version of the helper for each of them.
-    """
+def _compiled(function: Function) -> Any:
+    """A helper for the compiler, which makes it a part of the kernels that reach it."""
     numba: Any = importlib.import_module("numba")
-    unliteral = importlib.import_module("numba.core.types").unliteral
     dispatcher = numba.njit(no_cpython_wrapper=True, **OPTIONS, **_helpers[function])(_linked(function))
-    template = dispatcher.get_call_template
-    dispatcher.get_call_template = lambda args, kws: template(tuple(map(unliteral, args)), kws)
+    template = dispatcher.get_call_template  # else each literal number is a version: 15 % slower
+    dispatcher.get_call_template = lambda args, kws: template(tuple(map(numba.types.unliteral, args)), kws)
     return dispatcher
-
-
-def _read(function: FunctionType) -> dict[str, Any]:
-    """The module-level values that a function uses, by name."""
-    module = function.__globals__
-    return {name: module[name] for name in function.__code__.co_names if name in module}
 
 
 def _is_helper(value: Any) -> bool:
     return isinstance(value, FunctionType) and value in _helpers
 
 
-def _digest(function: Function, compiler: str) -> str:
-    """Changes with the code of a kernel, of the helpers it reaches, and with every number or text that these read."""
-    digest, visited, stack = sha256(compiler.encode()), set[Function](), [function]
-    while stack:
-        current = stack.pop()
-        if current in visited or not isinstance(current, FunctionType):
-            continue
-        visited.add(current)
-        code, values = current.__code__, _read(current)
-        read = sorted((name, repr(value)) for name, value in values.items() if isinstance(value, (int, float, str)))
-        constants = [value.co_code if isinstance(value, CodeType) else value for value in code.co_consts]
-        digest.update(repr((code.co_name, code.co_code, constants, code.co_names, read)).encode())
-        stack += [value for value in values.values() if isinstance(value, FunctionType)]
-    return digest.hexdigest()
-
-
 @contextmanager
 def _without_collector() -> Iterator[None]:
-    """The compiler creates many objects that stay alive, so garbage collection only costs time."""
+    """The compiler makes many objects and hardly any garbage: the collector would search in vain."""
     before = gc.isenabled()
     gc.disable()
     try:
@@ -228,14 +217,7 @@ def _without_collector() -> Iterator[None]:
             gc.enable()
 
 
-def _compile(name: str) -> str:
-    """The work of another process: compile a kernel into the cache, given its name."""
-    from shapeprog.kernels import compile as room  # not the copy of this module that runs as a script
-
-    importlib.import_module(name.partition(":")[0])
-    room._kernels[name].compile()
-    return name
-
-
 if __name__ == "__main__":
-    serve(_compile)
+    from shapeprog.kernels import compile as module  # not the copy of this module that runs as a script
+
+    module._serve(sys.argv[1], sys.argv[2:])

@@ -2,7 +2,7 @@
 
 from shapeprog.language import builtin as builtin
 from shapeprog.language import furniture as furniture
-from shapeprog.language.evaluation import evaluated
+from shapeprog.language.evaluate import evaluated
 from shapeprog.language.named import Named, inline, names, set
 from shapeprog.language.parametric import Parametric
 from shapeprog.language.program import Draw, Loop, Program

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from shapeprog.geometry.batch import Solids
 from shapeprog.language.parameters import Count, Extent, Half, Length, Position, Radius, Shift, Shift3, Turn
-from shapeprog.language.shapes import bar, box, cuboid, disc, slab
+from shapeprog.language.shapes import bar, box, cuboid, disc, leaning_box, slab
 from shapeprog.language.statement import Motion, loop, statement
 from shapeprog.lazy_torch import Tensor, torch
 
@@ -32,7 +32,7 @@ def _round(at: Position, thickness: Length, radius: Radius) -> Solids:
     return disc(at, thickness, radius)
 
 
-# statements that differ in their name alone; the function says where they stand
+# statements that differ in their name alone; the docstring of the function gives their position
 for _id, _name, _paper, _draw, _what in (
     (1, "leg", ("Leg", "Cub"), _box, "A leg: a post"),
     (2, "top_rectangle", ("Top", "Rec"), _rectangle, "A rectangular top or seat"),
@@ -84,8 +84,7 @@ def sideboard(at: Position, height: Length, half_depth: Length, width: Length) -
 @statement("back", id=15, paper=("Back", "Cub"))
 def back(at: Position, size: Extent, tilt: Shift) -> Solids:
     """A back: a board whose top is shifted to the rear by ``tilt`` cells (a shear, not a rotation)."""
-    shift = torch.stack([torch.zeros_like(tilt), tilt / 2, torch.zeros_like(tilt)], -1)
-    return cuboid(at + size / 2 + shift, size / 2, lean=tilt)
+    return leaning_box(at, size, tilt)
 
 
 @statement("line", id=17, paper=("Connect", "Line"), pivot=lambda start, **_: start + CELL_CENTRE)
@@ -96,12 +95,12 @@ def line(start: Position, end: Position, radius: Radius) -> Solids:
 
 @loop("translate", id=19, paper=("Trans", "u"))
 def translate(copy: Tensor, quarter: Tensor, count: Count, by: Shift3) -> Motion:
-    """Repeats what is inside ``count`` times, copy i moved by i times ``by``."""
+    """Repeats the body ``count`` times, copy i moved by i times ``by``."""
     return Motion(shift=copy[..., None] * by)
 
 
 @loop("rotate", id=20, paper=("Rot", "step"))
 def rotate(copy: Tensor, quarter: Tensor, count: Count, step: Turn) -> Motion:
-    """Repeats what is inside ``count`` times around a vertical axis: a line about its start, a cross arm about its hub
+    """Repeats the body ``count`` times around a vertical axis: a line about its start, a cross arm about its hub
     in quarter turns of ``step``, everything else about the axis of the grid, spread evenly over the circle."""
     return Motion(turn=torch.where(quarter, copy * step / 4, copy / count.clamp(min=1)))

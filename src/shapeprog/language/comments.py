@@ -7,7 +7,7 @@ import tokenize
 from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
-from shapeprog.language.source import Comment
+from shapeprog.language.ast import Comment
 
 
 class _Remark(NamedTuple):
@@ -26,26 +26,29 @@ class Comments:
 
     def before(self, row: int) -> tuple[Comment, ...]:
         """Those above a row."""
-        return tuple(Comment(each.text) for each in self._while(lambda each: each.row < row))
+        return tuple(Comment(remark.text) for remark in self._while(lambda remark: remark.row < row))
 
     def note(self, row: int) -> str:
-        """Those down to a row as one: they stand behind what was read last, or within it."""
-        return "  ".join(each.text for each in self._while(lambda each: each.row <= row) if each.text)
+        """Those down to a row as one: they are behind or within the last line that was read."""
+        return "  ".join(remark.text for remark in self._while(lambda remark: remark.row <= row) if remark.text)
 
     def ending(self, column: int, row: float) -> tuple[Comment, ...]:
         """Those above a row that end a block at a column: they are indented like it, or more."""
-        found = self._while(lambda each: each.row < row and (not each.text or each.column >= column))
-        while found and not found[-1].text:  # empty lines below a block are not in it
-            self._rest.insert(0, found.pop())
-        return tuple(Comment(each.text) for each in found)
+        result = self._while(lambda each: each.row < row and (not each.text or each.column >= column))
+        while result and not result[-1].text:  # empty lines below a block are not in it
+            self._rest.insert(0, result.pop())
+        return tuple(Comment(each.text) for each in result)
 
     def _while(self, wanted: Callable[[_Remark], bool]) -> list[_Remark]:
         count = next((place for place, each in enumerate(self._rest) if not wanted(each)), len(self._rest))
-        found, self._rest = self._rest[:count], self._rest[count:]
-        return found
+        result, self._rest = self._rest[:count], self._rest[count:]
+        return result
 
 
 def _remarks(lines: Sequence[str]) -> Iterator[_Remark]:
+    if not any("#" in line for line in lines):  # empty lines alone: tokens take long
+        yield from (_Remark(row, 1, "") for row, line in enumerate(lines, 1) if not line.strip() and row < len(lines))
+        return
     for token in tokenize.generate_tokens(io.StringIO("\n".join(lines)).readline):
         row, column = token.start
         if token.type == tokenize.COMMENT:

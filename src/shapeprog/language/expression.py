@@ -144,15 +144,15 @@ class Binary(Expression):
     def at(self, numbers: Mapping[str, Any]) -> Any:
         """What its operator makes of both sides."""
         try:
-            found = _APPLY[self.operator](value_at(self.left, numbers), value_at(self.right, numbers))
+            result = _APPLY[self.operator](value_at(self.left, numbers), value_at(self.right, numbers))
         except ZeroDivisionError:
             cure = f"let {text_of(self.right)} be another number"
             if isinstance(self.right, Binary) and self.right.operator == "-" and isinstance(self.right.left, Name):
                 cure = f"let {self.right.left} be more than {text_of(self.right.right)}"
             raise ExpressionError(self, f"{self} divides by zero", cure) from None
-        if isinstance(found, float) and not math.isfinite(found):
+        if isinstance(result, float) and not math.isfinite(result):
             raise ExpressionError(self, f"{self} is too large", "numbers end at 3.4028235e+38")
-        return found
+        return result
 
     def names(self) -> Iterator[Name]:
         """The names on both sides."""
@@ -174,16 +174,21 @@ def text_of(value: Value) -> str:
     return str(value) if isinstance(value, Expression) else shortest(value)
 
 
-def with_numbers(value: Value, change: Callable[[float], float]) -> Value:
-    """The same number or expression with every plain number in it changed."""
+def replaced(value: Value, change: Callable[[float | Name], Value]) -> Value:
+    """The same number or expression with every plain number and every name in it changed."""
     match value:
         case Binary(sign, left, right):
-            return Binary(sign, with_numbers(left, change), with_numbers(right, change))
+            return Binary(sign, replaced(left, change), replaced(right, change))
         case Negative(inner):
-            return -with_numbers(inner, change)
-        case Expression():
-            return value
-    return change(value)
+            return -replaced(inner, change)
+        case Name() | float() | int():
+            return change(value)
+    return value
+
+
+def names_in(value: Value) -> list[str]:
+    """The names in a number or expression, in the order of its text, each as often as it is there."""
+    return [name.name for name in value.names()] if isinstance(value, Expression) else []
 
 
 def _within(value: Value, level: int) -> str:
@@ -214,8 +219,8 @@ class Linear:
         factors = dict(self.factors)
         for name, factor in other.factors:
             factors[name] = factors.get(name, 0.0) + factor
-        kept = tuple((name, factor) for name, factor in factors.items() if factor)
-        return Linear(self.constant + other.constant, kept)
+        nonzero = tuple((name, factor) for name, factor in factors.items() if factor)
+        return Linear(self.constant + other.constant, nonzero)
 
     def __mul__(self, other: Linear | float) -> Linear:
         if isinstance(other, Linear) and other.factors:

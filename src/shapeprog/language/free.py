@@ -1,8 +1,8 @@
 """The free numbers of a program: those that may be set without another having to follow.
 
-They are the names that stand for plain numbers, all other plain numbers of statements, loops and calls, and those that
-expressions add, in the order of the text.  Counts, turns and axes are none; neither is a zero, which says that
-something is left as it is, nor what an expression multiplies or divides by, which is how it follows from others.
+They are the names of plain numbers, all other plain numbers of statements, loops and calls, and the terms of sums in
+expressions, in the order of the text.  Counts, turns and axes are not free; neither are zeros, which change nothing,
+nor the factors and divisors of an expression, which define how it depends on names.
 """
 
 from __future__ import annotations
@@ -11,22 +11,13 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from itertools import count
 
-from shapeprog.language.counts import Counts
-from shapeprog.language.evaluation import evaluated
+from shapeprog.language.ast import Function, Line, Source, changed_lines, with_values
+from shapeprog.language.dimensions import Counts, uses
+from shapeprog.language.evaluate import evaluated
 from shapeprog.language.expression import Binary, Expression, Negative, Value
 from shapeprog.language.parameters import to_float32
+from shapeprog.language.printer import numbers_written, source_of
 from shapeprog.language.program import Program
-from shapeprog.language.source import (
-    Assignment,
-    Call,
-    Function,
-    Line,
-    WrittenDraw,
-    WrittenLoop,
-    with_values,
-)
-from shapeprog.language.statement import language
-from shapeprog.language.text import numbers_written, source_of
 
 
 def numbers(program: Program) -> int:
@@ -38,7 +29,7 @@ def numbers(program: Program) -> int:
 
 
 def numbers_outside(program: Program) -> int:
-    """The same without those inside of functions: what is said by a program whose functions are known."""
+    """The same without those inside of functions: the numbers of a program that shares its functions with others."""
     if program.source is None:
         return numbers(program)
     lines = tuple(line for line in program.source.lines if not isinstance(line, Function))
@@ -63,46 +54,40 @@ def multiplied(program: Program, place: int, factor: float) -> Program:
     """
     source, counter = source_of(program), count()
     counts = Counts(source)
-    lines = tuple(_changed(line, counts, counter, place, factor) for line in source.lines)
-    return evaluated(replace(source, lines=lines))
+
+    def change(number: float) -> float:
+        return to_float32(number * factor) if next(counter) == place else number
+
+    def changed(line: Line) -> Line:
+        if isinstance(line, Function):
+            return line
+        return with_values(line, [use.value if counts.has(use) else _mapped(use.value, change) for use in uses(line)])
+
+    return evaluated(replace(source, lines=changed_lines(source.lines, changed)))
 
 
 def _places(lines: tuple[Line, ...], counts: Counts) -> Iterator[float]:
-    for line in lines:
-        for value, free in _numbers(line, counts):
-            if free:
-                yield from _within(value)
-        if isinstance(line, WrittenLoop | Function):
-            yield from _places(line.body, counts)
+    """The free numbers on lines and inside of them; defaults of parameters are not free."""
+    for line in Source(lines).walk():
+        for use in () if isinstance(line, Function) else uses(line):
+            if not counts.has(use):
+                yield from _within(use.value)
 
 
 def _within(value: Value) -> list[float]:
     """All that is free in a number, from left to right."""
-    found: list[float] = []
+    result: list[float] = []
 
     def noted(number: float) -> float:
-        found.append(number)
+        result.append(number)
         return number
 
     _mapped(value, noted)
-    return found
-
-
-def _numbers(line: Line, counts: Counts) -> Iterator[tuple[Value, bool]]:
-    """The numbers on a line, and whether each may have free ones in it: it is continuous, and no count."""
-    if isinstance(line, WrittenDraw | WrittenLoop):
-        declared = language()[line.name]
-        for value, quantity in zip(line.values, declared.quantities, strict=True):
-            yield value, not quantity.discrete
-    elif isinstance(line, Assignment):
-        yield from ((value, name not in counts.outside) for name, value in line.numbers)
-    elif isinstance(line, Call):
-        whole = counts.of.get(line.name, ())
-        yield from ((value, name not in whole) for name, value in line.arguments)
+    return result
 
 
 def _mapped(value: Value, change: Callable[[float], float]) -> Value:
-    """The number with a change made to all that is free in it, from left to right: itself, or what it adds."""
+    """The value with a change made to its free numbers, from left to right: a plain number, or the terms of a sum."""
     if not isinstance(value, Expression):
         return change(value) if value else value
     if isinstance(value, Negative):
@@ -112,23 +97,9 @@ def _mapped(value: Value, change: Callable[[float], float]) -> Value:
     if not isinstance(value, Binary):
         return value
     adds = value.operator in ("+", "-")
-    left, right = value.left, value.right
-    if adds or isinstance(left, Expression):
-        left = _mapped(left, change)
-    if adds or (value.operator == "*" and isinstance(right, Expression)):
-        right = _mapped(right, change)
-    return replace(value, left=left, right=right)
-
-
-def _changed(line: Line, counts: Counts, counter: Iterator[int], place: int, factor: float) -> Line:
-    """The line with one free number of the program multiplied."""
-
-    def changed(number: float) -> float:
-        return to_float32(number * factor) if next(counter) == place else number
-
-    values = [_mapped(value, changed) if free else value for value, free in _numbers(line, counts)]
-    found = line if isinstance(line, Function) else with_values(line, values)
-    if isinstance(found, WrittenLoop | Function):
-        body = tuple(_changed(inner, counts, counter, place, factor) for inner in found.body)
-        return replace(found, body=body)
-    return found
+    first, second = value.left, value.right
+    if adds or isinstance(first, Expression):
+        first = _mapped(first, change)
+    if adds or (value.operator == "*" and isinstance(second, Expression)):
+        second = _mapped(second, change)
+    return replace(value, left=first, right=second)

@@ -1,6 +1,6 @@
-"""Statements of our own beside those of the paper: solids in any direction, the mirror loop, and roles.
+"""Statements in addition to those of the paper: solids in any direction, the mirror loop, and roles.
 
-A solid says what a part looks like, a role what it is for: ``leg(taper(...))``, ``arm(bent_rod(...))``.
+A solid is the shape of a part, a role its purpose: ``leg(taper(...))``, ``arm(bent_rod(...))``.
 """
 
 from __future__ import annotations
@@ -10,17 +10,21 @@ from shapeprog.language import hints, shapes
 from shapeprog.language.parameters import (
     Angle,
     Axis,
+    Count,
     Extent,
     Length,
+    Pivot,
     Place,
     Position,
     Radii,
     Radius,
     Section,
+    Shift,
     Two,
 )  # fmt: skip
 from shapeprog.language.statement import Motion, loop, role, statement
-from shapeprog.lazy_torch import Tensor
+from shapeprog.lazy_torch import Tensor, torch
+from shapeprog.space import SIDE
 
 
 @statement("box", id=64, taught=False, hint=hints.upright_box)
@@ -73,9 +77,34 @@ def cushion(at: Position, size: Extent, edge: Radius) -> Solids:
     return shapes.rounded_box(at, size, edge)
 
 
+@statement("leaning_box", id=72, taught=False, hint=hints.never)
+def leaning_box(at: Position, size: Extent, lean: Shift) -> Solids:
+    """A box from its low, front, left corner, whose top is shifted to the rear by ``lean`` (a shear)."""
+    return shapes.leaning_box(at, size, lean)
+
+
+@statement("beam", id=73, taught=False, hint=hints.never)
+def beam(start: Position, end: Position, section: Section, axis: Axis, turn: Angle) -> Solids:
+    """A bar whose section lies along the other two axes than ``axis``, which it need not run along most."""
+    return shapes.bar_between(start, end, section, turn, axis.long() % 3)
+
+
+@loop("rotate_about", id=81, taught=False)
+def rotate_about(copy: Tensor, quarter: Tensor, count: Count, step: Angle, at: Pivot) -> Motion:
+    """Repeats the body around the vertical axis through ``at``, ``step`` degrees from copy to copy."""
+    return Motion(turn=copy * step / 360, pivot=torch.cat([torch.zeros_like(at[..., :1]), at], -1))
+
+
+@loop("tilt_about", id=82, taught=False)
+def tilt_about(copy: Tensor, quarter: Tensor, count: Count, tilt: Angle, at: Pivot) -> Motion:
+    """Leans the body to the rear by ``tilt`` degrees about the left-right axis through ``at`` (up, depth)."""
+    axis = torch.full_like(tilt, SIDE, dtype=torch.long)
+    return Motion(rotation=shapes.about_axis(axis, tilt), pivot=torch.cat([at, torch.zeros_like(at[..., :1])], -1))
+
+
 @loop("mirror", id=80, taught=False)
 def mirror(copy: Tensor, quarter: Tensor, count: Two, axis: Axis, at: Place = 0) -> Motion:  # type: ignore[assignment]
-    """Repeats what is inside twice: as it is, and its mirror image along an axis, about the plane across it that lies
+    """Draws the body and its mirror image along an axis, about the plane across it that lies
     at ``at``."""
     across = shapes.unit(axis.long(), at) * copy[..., None]
     return Motion(shift=2 * at[..., None] * across, signs=1 - 2 * across)

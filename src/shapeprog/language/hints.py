@@ -19,7 +19,7 @@ ROUND = 0.75
 """Least ratio of the sides of a section that may be round."""
 
 SOFT = 0.5
-"""Least radius in cells of an edge that can be told from a sharp one."""
+"""Least radius in cells of an edge that differs visibly from a sharp one."""
 
 STEEPEST = 45.0
 """Degrees up to which a board is tilted."""
@@ -36,6 +36,11 @@ class Box(NamedTuple):
     half: FloatArray
 
 
+def never(box: Box) -> Iterator[list[float]]:
+    """No box: the statement is not for inference."""
+    return iter(())
+
+
 def upright_box(box: Box) -> Iterator[list[float]]:
     """Low corner and extents, of a box along the axes of the grid."""
     if (np.abs(box.rotation).max(0) >= STRAIGHT).all():
@@ -46,9 +51,9 @@ def upright_box(box: Box) -> Iterator[list[float]]:
 def tilted_board(box: Box) -> Iterator[list[float]]:
     """Low corner, extents and tilt, of a box turned about the left-right axis."""
     across = int(np.abs(box.rotation[SIDE]).argmax())
-    others = [axis for axis in range(3) if axis != across]
-    rising = max(others, key=lambda axis: abs(box.rotation[UP, axis]))
-    flat = others[0] if rising == others[1] else others[1]
+    sides = [axis for axis in range(3) if axis != across]
+    rising = max(sides, key=lambda axis: abs(box.rotation[UP, axis]))
+    flat = sides[0] if rising == sides[1] else sides[1]
     along = box.rotation[:, rising] * np.sign(box.rotation[UP, rising])
     tilt = np.degrees(np.arctan2(along[DEPTH], along[UP]))
     if abs(box.rotation[SIDE, across]) < STRAIGHT or not 180 / np.pi * 0.05 < abs(tilt) <= STEEPEST:
@@ -67,12 +72,12 @@ def straight_bar(box: Box) -> Iterator[list[float]]:
     main = int(np.abs(along).argmax())
     along = along * np.sign(along[main])
     first, second = (_leaned(along, main, axis) for axis in range(3) if axis != main)
-    others = [axis for axis in range(3) if axis != long]
-    near = max(others, key=lambda axis: abs(box.rotation[:, axis] @ first))
-    far = others[0] if near == others[1] else others[1]
-    x, y = box.rotation[:, near] @ first, box.rotation[:, near] @ second
+    sides = [axis for axis in range(3) if axis != long]
+    nearest = max(sides, key=lambda axis: abs(box.rotation[:, axis] @ first))
+    far = sides[0] if nearest == sides[1] else sides[1]
+    x, y = box.rotation[:, nearest] @ first, box.rotation[:, nearest] @ second
     turn = np.degrees(np.arctan2(y * np.sign(x), abs(x))) * (-1 if main == DEPTH else 1)
-    yield [*start, *end, 2 * box.half[near], 2 * box.half[far], float(turn)]
+    yield [*start, *end, 2 * box.half[nearest], 2 * box.half[far], float(turn)]
 
 
 def upright_cylinder(box: Box) -> Iterator[list[float]]:
@@ -118,18 +123,18 @@ def bent(box: Box) -> Iterator[list[float]]:
 
 def rounded(box: Box) -> Iterator[list[float]]:
     """Low corner, extents and radius of the edges, of a box along the axes of the grid: round all the way; and half as
-    much, where that can be told from an edge."""
+    much, where that differs from a sharp edge."""
     for values in upright_box(box):
-        least = min(values[3:])
-        yield [*values, 0.5 * least]
-        if 0.25 * least >= SOFT:
-            yield [*values, 0.25 * least]
+        thinnest = min(values[3:])
+        yield [*values, 0.5 * thinnest]
+        if 0.25 * thinnest >= SOFT:
+            yield [*values, 0.25 * thinnest]
 
 
 def _leaned(along: FloatArray, main: int, axis: int) -> FloatArray:
     """A grid axis after the least rotation that brings the ``main`` one to a unit vector: as bars are leaned."""
-    found: FloatArray = np.eye(3)[axis] - along[axis] / (1 + along[main]) * (np.eye(3)[main] + along)
-    return found
+    result: FloatArray = np.eye(3)[axis] - along[axis] / (1 + along[main]) * (np.eye(3)[main] + along)
+    return result
 
 
 def _ends(box: Box, axis: int) -> tuple[FloatArray, FloatArray]:

@@ -50,9 +50,9 @@ class Quantity:
 
     ``position`` and ``shift`` are coordinates in cells (a shift is relative), ``length`` is an extent in cells,
     ``angle`` is in degrees, ``count`` a number of copies, ``turn`` a number of quarter turns, ``axis`` an axis of the
-    grid, written as its word.  The width is how many numbers there are, one tensor slot each, and ``each`` says which
-    is which; programs are sampled from ``low`` to ``high``, which errors name.  A count with one legal value, such as
-    that of a mirror, is not written.
+    grid, written as its word.  The width is how many numbers there are, one tensor slot each, and ``each`` names
+    them in order; programs are sampled from ``low`` to ``high``, which errors name.  A count with one legal value, such
+    as that of a mirror, is not written.
     """
 
     kind: Kind
@@ -73,18 +73,18 @@ class Quantity:
 
     @property
     def written_out(self) -> bool:
-        """Whether it stands in the text at all."""
+        """Whether text contains it."""
         return self.kind != "count" or self.low < self.high
 
     @property
     def blank(self) -> str:
-        """What stands for a number of it that is left open."""
+        """The placeholder of one of its numbers."""
         return self.written(self.high) if self.kind == "axis" or not self.written_out else "_"
 
     def nearest(self, value: float) -> float:
         """The legal whole number nearest to ``value``: counts and turns end where float32 does not hold them all."""
-        kept = self.kind == "axis" or not self.written_out
-        low, high = (self.low, self.high) if kept else (-LARGEST_WHOLE, LARGEST_WHOLE)
+        bounded = self.kind == "axis" or not self.written_out
+        low, high = (self.low, self.high) if bounded else (-LARGEST_WHOLE, LARGEST_WHOLE)
         return float(round(min(max(value, low), high)))
 
     @property
@@ -92,8 +92,8 @@ class Quantity:
         """The declared range in words."""
         if self.kind == "axis":
             return f"one of {', '.join(AXES)}"
-        whole = "whole numbers " if self.discrete else ""
-        return f"{whole}from {shortest(self.low)} to {shortest(self.high)}"
+        prefix = "whole numbers " if self.discrete else ""
+        return f"{prefix}from {shortest(self.low)} to {shortest(self.high)}"
 
     def written(self, value: float) -> str:
         """A number as program text: whole for counts and turns, the word of an axis, else the shortest decimal."""
@@ -118,6 +118,7 @@ Axis = Annotated[Tensor, Quantity("axis", 1, 0, 2)]
 Two = Annotated[Tensor, Quantity("count", 1, 2, 2)]
 Section = Annotated[Tensor, Quantity("length", 2, 0, RESOLUTION, "first, second")]
 Radii = Annotated[Tensor, Quantity("length", 2, 0, HALF, "start, end")]
+Pivot = Annotated[Tensor, Quantity("position", 2, -HALF, HALF, "of the two axes that turn")]
 Place = Annotated[Tensor, Quantity("position", 1, -HALF, HALF)]
 
 
@@ -125,7 +126,7 @@ Place = Annotated[Tensor, Quantity("position", 1, -HALF, HALF)]
 class Parameter:
     """One named parameter of a statement and the first of the tensor slots it takes.
 
-    A parameter of one number may have a default, which goes without saying in program text and is in its unit.
+    A parameter of one number may have a default, which program text omits and which is in its unit.
     """
 
     name: str
@@ -161,24 +162,24 @@ class Parameter:
 
         Coordinates and lengths may be any finite number: the declared range is where programs are sampled from, and a
         negative length draws nothing.  Counts and turns must be whole; beyond their range they stay legal as far as
-        float32 holds whole numbers, since a count of zero or less erases what is inside.
+        float32 holds whole numbers, since a count of zero or less draws nothing.
         """
-        quantity, place = self.quantity, f"{self.name} of {owner}"
+        quantity, label = self.quantity, f"{self.name} of {owner}"
         if len(numbers) != quantity.width:
-            wanted = "1 number" if quantity.width == 1 else f"{quantity.width} numbers"
-            raise ShapeProgError(f"{place} takes {wanted}, not {len(numbers)}", f"write {self.blank}")
+            expected = "1 number" if quantity.width == 1 else f"{quantity.width} numbers"
+            raise ShapeProgError(f"{label} takes {expected}, not {len(numbers)}", f"write {self.blank}")
         singles = [to_float32(number) for number in numbers]
         if not quantity.discrete:
             return singles
         for number in numbers:
             if quantity.kind == "axis" and number not in range(len(AXES)):
-                raise ShapeProgError(f"{place} is {number!r}, which is not an axis", f"it is {quantity.range_text}")
+                raise ShapeProgError(f"{label} is {number!r}, which is not an axis", f"it is {quantity.range_text}")
             if not quantity.written_out and number != quantity.low:
                 only = quantity.written(quantity.low)
-                raise ShapeProgError(f"{place} is {number!r}, but {owner} always has {only}", f"leave it at {only}")
+                raise ShapeProgError(f"{label} is {number!r}, but {owner} always has {only}", f"leave it at {only}")
             if number != math.floor(number):
-                raise ShapeProgError(f"{place} is {number!r}, but must be whole", f"it takes {quantity.range_text}")
+                raise ShapeProgError(f"{label} is {number!r}, but must be whole", f"it takes {quantity.range_text}")
             if abs(number) > LARGEST_WHOLE:
-                said = f"{place} is {int(number)}, beyond {LARGEST_WHOLE}, the end of exact whole numbers"
-                raise ShapeProgError(said, f"it takes {quantity.range_text}")
+                message = f"{label} is {int(number)}, beyond {LARGEST_WHOLE}, the end of exact whole numbers"
+                raise ShapeProgError(message, f"it takes {quantity.range_text}")
         return [single + 0.0 for single in singles]  # no minus zero

@@ -13,30 +13,30 @@ from typing import Any
 from jaxtyping import Float, Int
 
 from shapeprog.errors import ShapeProgError
-from shapeprog.language.evaluation import symbolic
+from shapeprog.language.ast import Source
+from shapeprog.language.evaluate import symbolic
 from shapeprog.language.expression import Linear
 from shapeprog.language.named import names
 from shapeprog.language.program import Program
-from shapeprog.language.source import Source
 from shapeprog.language.statement import language
 from shapeprog.language.tensors import Code, encode
 from shapeprog.lazy_torch import Tensor, torch
 
 
 class Parametric:
-    """The tensors of a program for any values of its free named numbers; counts, turns and axes stay as they are.
+    """The tensors of a program for any values of its free named numbers; counts, turns and axes do not change.
 
     Attributes
     ----------
     names, values
-        The F free numbers that others follow from, without those that are whole, and what they are in the program.
+        The F free numbers that others follow from, without those that are whole, and their values in the program.
     slots
         Which M numbers of the flattened ``code.parameters`` depend on them.
     matrix, offset
         ``offset + matrix @ values`` are those numbers where all of them are linear in the names, as
         :class:`~shapeprog.language.expression.Linear` has it; else ``None``.
     code
-        The tensors of the program as it is, in float64.
+        The tensors of the unchanged program, in float64.
     """
 
     names: tuple[str, ...]
@@ -60,7 +60,7 @@ class Parametric:
         except ShapeProgError:  # a product of names
             return
         factors = [dict(form.factors) for form in forms]
-        rows = [[each.get(name, 0.0) for name in self.names] for each in factors]
+        rows = [[row.get(name, 0.0) for name in self.names] for row in factors]
         self.matrix = torch.tensor(rows, dtype=torch.float64).reshape(len(forms), len(free))
         self.offset = torch.tensor([form.constant for form in forms], dtype=torch.float64)
 
@@ -69,22 +69,22 @@ class Parametric:
         if self.matrix is not None and self.offset is not None:
             numbers = self.offset.to(values) + values @ self.matrix.to(values).T
         else:
-            found = self._moving(dict(zip(self.names, values.unbind(-1), strict=True)))
-            numbers = torch.stack(list(found.values()), -1)
-        lead, kept = values.shape[:-1], self.code.parameters
-        flat = kept.to(values).flatten().expand(*lead, -1).index_copy(-1, self.slots.to(values.device), numbers)
+            result = self._moving(dict(zip(self.names, values.unbind(-1), strict=True)))
+            numbers = torch.stack(list(result.values()), -1)
+        lead, original = values.shape[:-1], self.code.parameters
+        flat = original.to(values).flatten().expand(*lead, -1).index_copy(-1, self.slots.to(values.device), numbers)
         ids, roles = self.code.ids.expand(*lead, *self.code.ids.shape), self.code.roles
-        return Code(ids, flat.reshape(*lead, *kept.shape), None if roles is None else roles.expand(*lead, *roles.shape))
+        roles = None if roles is None else roles.expand(*lead, *roles.shape)
+        return Code(ids, flat.reshape(*lead, *original.shape), roles)
 
-    def _moving(self, given: Mapping[str, Any]) -> dict[int, Any]:
+    def _moving(self, scope: Mapping[str, Any]) -> dict[int, Any]:
         """The continuous numbers that depend on names, by their place among all, for these values of the names."""
         _, steps, slots = self.code.parameters.shape
-        found: dict[int, Any] = {}
-        chains = (chain for each in symbolic(self._source, given) for chain in each.chains())
-        for block, chain in enumerate(chains):
+        result: dict[int, Any] = {}
+        for block, chain in enumerate(Program(symbolic(self._source, scope)).chains):
             for step, node in enumerate(chain):
                 quantities = language()[node.name].quantities
                 for slot, (quantity, number) in enumerate(zip(quantities, node.values, strict=True)):
                     if not isinstance(number, int | float) and not quantity.discrete:
-                        found[(block * steps + step) * slots + slot] = number
-        return found
+                        result[(block * steps + step) * slots + slot] = number
+        return result

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import importlib
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from shapeprog.language.source import Source
+from shapeprog.language.ast import Draw as Draw
+from shapeprog.language.ast import Loop as Loop
+from shapeprog.language.ast import Scale, Source
 from shapeprog.language.unit import Unit
 
 PUBLISHED_DEPTH = 3
@@ -14,37 +17,6 @@ PUBLISHED_DEPTH = 3
 
 DEEPEST = 64
 """Levels of loops, calls and parentheses in text; Python itself ends at 100 levels of indentation."""
-
-
-@dataclass(frozen=True)
-class Draw:
-    """A drawing statement with its parameters in slot order, and the role it plays, if another than its own name.
-
-    Every number is exact in float32.
-    """
-
-    name: str
-    values: tuple[float, ...]
-    role: str = ""
-
-    @property
-    def word(self) -> str:
-        """The name of the part, its role or else its statement."""
-        return self.role or self.name
-
-
-@dataclass(frozen=True)
-class Loop:
-    """A loop with its parameters in slot order and what it repeats."""
-
-    name: str
-    values: tuple[float, ...]
-    body: tuple[Node, ...]
-
-    @property
-    def count(self) -> int:
-        """Number of copies; none when the count is not positive."""
-        return max(0, round(self.values[0]))
 
 
 Node = Draw | Loop
@@ -56,13 +28,23 @@ Chain = tuple[Node, ...]
 class Program:
     """A shape as a list of drawing statements and loops, in the order they are written.
 
-    Where its text has named numbers, expressions or functions, ``source`` is that text and ``body`` what it comes to:
-    see :func:`shapeprog.language.evaluation.evaluated`, which makes such programs.  What works on shapes looks at the
+    Where its text has named numbers, expressions or functions, ``source`` is that text and ``body`` its value:
+    see :func:`shapeprog.language.evaluate.evaluated`, which makes such programs.  Functions of shapes use the
     body alone; a program made from another body is plain.
     """
 
     body: tuple[Node, ...] = ()
     source: Source | None = None
+
+    def __str__(self) -> str:
+        """Its text, without the last line break."""
+        text: str = importlib.import_module("shapeprog.language.printer").format_program(self)  # which imports this
+        return text.rstrip("\n")
+
+    def _repr_png_(self) -> bytes:
+        """A picture, which notebooks show."""
+        picture: bytes = importlib.import_module("shapeprog.view.page").png(self)  # drawn above this level
+        return picture
 
     @property
     def unit(self) -> Unit | None:
@@ -70,10 +52,20 @@ class Program:
         return None if self.source is None else self.source.unit
 
     @property
+    def scale(self) -> Scale | None:
+        """How its text lies in the grid, if its parts are placed."""
+        return None if self.source is None else self.source.scale
+
+    @property
+    def draws(self) -> list[Draw]:
+        """The drawing statements, in the order of the text."""
+        return [node for node in self.walk() if isinstance(node, Draw)]
+
+    @property
     def chains(self) -> list[Chain]:
         """The blocks, each as the loops around a drawing statement, outermost first, then the statement.
 
-        A loop around several statements is the union of that loop around each, so nothing is lost.
+        A loop around several statements is the union of that loop around each, so the shape is the same.
         """
         return [chain for node in self.body for chain in _chains(node)]
 
@@ -109,7 +101,7 @@ class Program:
 
 
 def nest(chain: Chain) -> Node:
-    """The node that a chain of loops and a drawing statement stands for."""
+    """The node of a chain of loops and a drawing statement."""
     *loops, node = chain
     for outer in reversed(loops):
         assert isinstance(outer, Loop)

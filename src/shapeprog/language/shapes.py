@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from jaxtyping import Float, Int
 
-from shapeprog.geometry.batch import Form, Solids
+from shapeprog.geometry.batch import Solids
 from shapeprog.geometry.primitive import SIZES, Primitive, primitives, safe_norm
 from shapeprog.geometry.primitives.arc import ARC
 from shapeprog.geometry.primitives.cuboid import CUBOID
@@ -22,16 +22,12 @@ FLAT = 1e-6  # cells below which three points are in line
 
 
 def solid(
-    primitive: Primitive,
-    centre: Vector,
-    *sizes: Scalar,
-    rotation: Float[Tensor, "*batch 3 3"] | None = None,
-    form: Form | None = None,
+    primitive: Primitive, centre: Vector, *sizes: Scalar, rotation: Float[Tensor, "*batch 3 3"] | None = None
 ) -> Solids:
     """A solid of any declared primitive from its sizes in the order it declares them."""
     zero = torch.zeros_like(centre[..., 0])
     padded = [*sizes, *[zero] * (SIZES - len(sizes))]
-    return Solids(primitives.number(primitive), torch.stack(padded, -1), centre, rotation, form)
+    return Solids(primitives.number(primitive), torch.stack(padded, -1), centre, rotation)
 
 
 def cuboid(centre: Vector, half: Vector, lean: Scalar | None = None) -> Solids:
@@ -45,12 +41,12 @@ def box(corner: Vector, extent: Vector) -> Solids:
 
 
 def slab(at: Vector, thickness: Scalar, half_depth: Scalar, half_side: Scalar) -> Solids:
-    """A cuboid that stands on ``at``, the centre of its bottom face."""
+    """A cuboid from ``at``, the centre of its bottom face."""
     return cuboid(_raised(at, thickness), torch.stack([thickness / 2, half_depth, half_side], -1))
 
 
 def disc(at: Vector, thickness: Scalar, radius: Scalar) -> Solids:
-    """An upright cylinder that stands on ``at``, the centre of its bottom face."""
+    """An upright cylinder from ``at``, the centre of its bottom face."""
     return solid(CYLINDER, _raised(at, thickness), thickness / 2, radius)
 
 
@@ -69,29 +65,37 @@ def cone_between(start: Vector, end: Vector, radii: Pair) -> Solids:
 
 def tilted_box(at: Vector, size: Vector, tilt: Scalar) -> Solids:
     """A cuboid from its low, front, left corner, turned to the rear by ``tilt`` degrees about its bottom front edge."""
-    form = Form("tilted_box", (at, size), (tilt,))
     rotation = about_axis(torch.full_like(tilt, SIDE, dtype=torch.long), tilt)
     half = size / 2
-    return solid(CUBOID, at + (rotation @ half[..., None])[..., 0], *half.unbind(-1), rotation=rotation, form=form)
+    return solid(CUBOID, at + (rotation @ half[..., None])[..., 0], *half.unbind(-1), rotation=rotation)
 
 
-def bar_between(start: Vector, end: Vector, section: Pair, turn: Scalar) -> Solids:
-    """A cuboid between two points, turned about them by ``turn`` degrees: the sides of its section lie along the grid
-    axes that it runs along least, in their order, and are leaned with it."""
-    form = Form("bar_between", (start, end, section), (turn,))
+def leaning_box(at: Vector, size: Vector, lean: Scalar) -> Solids:
+    """A cuboid from its low, front, left corner, whose top is shifted to the rear by ``lean``."""
+    shift = torch.stack([torch.zeros_like(lean), lean / 2, torch.zeros_like(lean)], -1)
+    return cuboid(at + size / 2 + shift, size / 2, lean=lean)
+
+
+def bar_between(
+    start: Vector, end: Vector, section: Pair, turn: Scalar, main: Int[Tensor, "*batch"] | None = None
+) -> Solids:
+    """A cuboid between two points, turned about them by ``turn`` degrees.
+
+    The sides of its section lie along the grid axes other than ``main``, in their order, and are leaned with it; the
+    default of ``main`` is the axis that it runs along most.
+    """
     along = end - start
     length = safe_norm((along**2).sum(-1))
-    main = along.detach().abs().argmax(-1)
+    main = along.detach().abs().argmax(-1) if main is None else main
     first, second = torch.where(main == 0, 1, 0), torch.where(main == 2, 1, 2)
     half = length[..., None] * unit(main, along) + section[..., :1] * unit(first, along)
     half = (half + section[..., 1:] * unit(second, along)) / 2
     rotation = leaned(along, main) @ about_axis(main, turn)
-    return solid(CUBOID, (start + end) / 2, *half.unbind(-1), rotation=rotation, form=form)
+    return solid(CUBOID, (start + end) / 2, *half.unbind(-1), rotation=rotation)
 
 
 def arc_through(start: Vector, through: Vector, end: Vector, radius: Scalar) -> Solids:
     """A round rod along the circle from one point through a second to a third."""
-    form = Form("arc_through", (start, through, end, radius))
     chord, middle = end - start, (start + end) / 2
     frame = align(chord)
     half = safe_norm((chord**2).sum(-1)) / 2
@@ -100,17 +104,16 @@ def arc_through(start: Vector, through: Vector, end: Vector, radius: Scalar) -> 
     height = safe_norm((away**2).sum(-1))
     bulge = torch.where((height > FLAT)[..., None], away / height[..., None], frame[..., 1])
     # The height of the circle over its chord; nothing cancels where the three points are nearly in line.
-    rest = half**2 - along**2 - height**2
-    root = safe_norm(4 * height**2 * half**2 + rest**2)
-    sagitta = 2 * height * half**2 / (root + rest).clamp(min=1e-9)
+    difference = half**2 - along**2 - height**2
+    root = safe_norm(4 * height**2 * half**2 + difference**2)
+    sagitta = 2 * height * half**2 / (root + difference).clamp(min=1e-9)
     rotation = torch.stack([frame[..., 0], bulge, torch.linalg.cross(frame[..., 0], bulge)], -1)
-    return solid(ARC, middle + bulge * sagitta[..., None] / 2, half, radius, sagitta, rotation=rotation, form=form)
+    return solid(ARC, middle + bulge * sagitta[..., None] / 2, half, radius, sagitta, rotation=rotation)
 
 
 def rounded_box(at: Vector, size: Vector, edge: Scalar) -> Solids:
     """A box from its low, front, left corner, with edges rounded to the radius ``edge``."""
-    form = Form("rounded_box", (at, size, edge))
-    return solid(ROUNDED_BOX, at + size / 2, *(size / 2).unbind(-1), edge, form=form)
+    return solid(ROUNDED_BOX, at + size / 2, *(size / 2).unbind(-1), edge)
 
 
 def align(direction: Vector) -> Float[Tensor, "*batch 3 3"]:

@@ -21,7 +21,7 @@ from typing import Any, get_type_hints
 
 from jaxtyping import Float
 
-from shapeprog.errors import DeclarationError
+from shapeprog.errors import DeclarationError, ShapeProgError
 from shapeprog.geometry.batch import Solids
 from shapeprog.geometry.primitive import SIZES, primitives, ships
 from shapeprog.geometry.primitives import built_in_names
@@ -40,20 +40,23 @@ Hint = Callable[[Box], Iterable[Sequence[float]]]
 
 @dataclass(frozen=True)
 class Motion:
-    """How a loop moves one copy: reflections, a turn about the vertical axis through the pivot, then a shift in cells.
+    """How a loop moves one copy: reflections, a turn or a rotation about the pivot, then a shift in cells.
 
-    The reflections are -1 or 1 for each axis of the grid, about the planes through its origin.  The turn is a fraction
-    of a full circle, from depth towards left-right.
+    The reflections are -1 or 1 for each axis of the grid, about the planes through its origin.  The turn is about the
+    vertical axis, as a fraction of a full circle from depth towards left-right; it is exact at quarters.  The default
+    pivot is that of the statement.
     """
 
     turn: Float[Tensor, "*batch"] | None = None
+    rotation: Float[Tensor, "*batch 3 3"] | None = None
+    pivot: Float[Tensor, "*batch 3"] | None = None
     shift: Float[Tensor, "*batch 3"] | None = None
     signs: Float[Tensor, "*batch 3"] | None = None
 
 
 @dataclass(frozen=True)
 class Role:
-    """What a part is for, whatever its solid: ``leg(taper(...))`` and ``leg(bar(...))`` are both legs.
+    """The purpose of a part, whatever its solid: ``leg(taper(...))`` and ``leg(bar(...))`` are both legs.
 
     Parameters
     ----------
@@ -80,7 +83,7 @@ class Statement:
         Word in program text, number in tensors, one line of manual, and named parameters in slot order; names in the
         notation of the paper, such as ``("Leg", "Cub")``.
     draw, move
-        What a drawing statement makes of parameter tensors by name, one or more :class:`Solids`; or for a loop
+        The function of a drawing statement from parameter tensors by name to one or more :class:`Solids`; or of a loop
         ``(copy index, quarter, **parameters) -> Motion``.
     pivot, quarter
         Parameter tensors by name to a point (..., 3) on the vertical axis about which rotation loops turn what the
@@ -88,7 +91,7 @@ class Statement:
     taught
         Whether synthetic furniture draws it, so that generators learn it.
     hint
-        How inference starts to fit it: values for an oriented box that its solid about fills, none where it would not.
+        Starting values of inference for an oriented box that its solid fills about; none where it would not.
     """
 
     name: str
@@ -105,13 +108,13 @@ class Statement:
 
     @property
     def is_loop(self) -> bool:
-        """Whether it repeats what is inside instead of drawing."""
+        """Whether it repeats its body instead of drawing."""
         return self.move is not None
 
     @property
     def ships(self) -> bool:
         """Whether it comes with the package: it is known to work, on NumPy arrays as on tensors."""
-        return all(ships(each) for each in (self.draw, self.move, self.pivot) if each is not None)
+        return all(ships(function) for function in (self.draw, self.move, self.pivot) if function is not None)
 
     @property
     def size(self) -> int:
@@ -124,7 +127,7 @@ class Statement:
         return tuple(p.quantity for p in self.parameters for _ in range(p.quantity.width))
 
     def call(self, numbers: Sequence[str]) -> str:
-        """How it is written with these numbers, in slot order; what a loop begins with goes without its name."""
+        """How it is written with these numbers, in slot order; the first argument of a loop has no keyword."""
         words = [p.call(numbers[p.slots]) for p in self.parameters if not p.silent(numbers[p.slots])]
         if self.is_loop:
             words[0] = words[0].removeprefix(f"{self.first.name}=")
@@ -132,12 +135,20 @@ class Statement:
 
     def written(self, values: Sequence[float]) -> int:
         """How many continuous numbers text writes for these values."""
-        shown = [each for each in self.parameters if not each.quantity.discrete]
-        return sum(each.quantity.width for each in shown if each.unsaid is None or values[each.start] != each.unsaid)
+        shown = [parameter for parameter in self.parameters if not parameter.quantity.discrete]
+        return sum(
+            parameter.quantity.width
+            for parameter in shown
+            if parameter.unsaid is None or values[parameter.start] != parameter.unsaid
+        )
 
     def parameter_at(self, slot: int) -> Parameter:
-        """The parameter that a tensor slot in use is of."""
-        return next(each for each in self.parameters if each.start <= slot < each.start + each.quantity.width)
+        """The parameter of a tensor slot in use."""
+        return next(
+            parameter
+            for parameter in self.parameters
+            if parameter.start <= slot < parameter.start + parameter.quantity.width
+        )
 
     @property
     def first(self) -> Parameter:
@@ -147,7 +158,7 @@ class Statement:
     @property
     def signature(self) -> str:
         """How it is written, with a blank for each number that it leaves open; loops begin with ``for i in``."""
-        call = self.call([each.blank for each in self.quantities])
+        call = self.call([quantity.blank for quantity in self.quantities])
         return f"for i in {call}:" if self.is_loop else call
 
     def split(self, values: Float[Tensor, "*batch slots"]) -> dict[str, Tensor]:
@@ -161,8 +172,8 @@ class Statement:
     def solids(self, values: Float[Tensor, "*batch slots"]) -> list[Solids]:
         """What the statement draws for parameters, of which it takes the first, before any loop."""
         assert self.draw is not None
-        drawn = self.draw(**self.split(values))
-        return [drawn] if isinstance(drawn, Solids) else list(drawn)
+        result = self.draw(**self.split(values))
+        return [result] if isinstance(result, Solids) else list(result)
 
 
 WORDS = "use letters, digits and underscores"
@@ -218,18 +229,26 @@ class Language:
         """
         return name if name in self.roles and self[name].hint is None else ""
 
+    def declaration(self, name: str, numbers: int) -> Statement:
+        """The statement or loop of a name; a ``ShapeProgError`` if there is none with so many numbers."""
+        if name not in self:
+            raise ShapeProgError(f"unknown statement {name!r}", "load the module that declares it")
+        if numbers != self[name].size:
+            raise ShapeProgError(f"{name} has {numbers} numbers instead of {self[name].size}", "correct the program")
+        return self[name]
+
     def called(self, word: str) -> Role | Statement:
         """What parts are called by a word: a role, or a statement that is none."""
         return self.roles[word] if word in self.roles else self._by_name[word]
 
     def word(self, number: int) -> str:
         """The role or statement with this id."""
-        found = self.role(number)
-        return self._by_id[number].name if found is None else found.name
+        result = self.role(number)
+        return self._by_id[number].name if result is None else result.name
 
     def _faults(self, declared: Statement) -> Iterator[tuple[str, str]]:
         """What is wrong with a declaration before it is tried, and the cure."""
-        said = f"statement {declared.name!r}"
+        what = f"statement {declared.name!r}"
         owners = dict.fromkeys((EMPTY, END), "the language itself") | {each.id: each.name for each in self}
         owners = {role.id: f"the role {role.name}" for role in self.roles.values()} | owners
         if not is_word(declared.name):
@@ -238,18 +257,18 @@ class Language:
             yield f"loop {declared.name!r} has no count", "annotate its first parameter with Count"
         if declared.size > MOST_SLOTS:
             limit = f"{declared.size} numbers, but a statement has at most {MOST_SLOTS}"
-            yield f"{said} has {limit}", "use fewer or narrower parameters"
+            yield f"{what} has {limit}", "use fewer or narrower parameters"
         if any(quantity.low > quantity.high for quantity in declared.quantities):
-            yield f"a range of {said} ends before it starts", "swap low and high"
+            yield f"a range of {what} ends before it starts", "swap low and high"
         if declared.name in self._by_name:
-            yield f"{said} is declared twice", "give one of them another name"
+            yield f"{what} is declared twice", "give one of them another name"
         if declared.id in owners:
             free = f"leave the id out; the next free one is {self.free_id()}"
-            yield f"{said} wants id {declared.id}, which belongs to {owners[declared.id]}", free
+            yield f"{what} wants id {declared.id}, which belongs to {owners[declared.id]}", free
         for twin in self:
             if declared.paper and twin.paper == declared.paper:
                 own = "leave it out; the notation then uses the statement's own name"
-                yield f"{said} has the paper's name {declared.paper}, which belongs to {twin.name}", own
+                yield f"{what} has the paper's name {declared.paper}, which belongs to {twin.name}", own
 
     def forget(self, name: str) -> None:
         """Take a declaration out again, as when the module that made it fails."""
@@ -257,8 +276,8 @@ class Language:
 
     def free_id(self) -> int:
         """The smallest id above those of the paper that is not taken."""
-        taken = {*self._by_id, *(role.id for role in self.roles.values())}
-        return next(number for number in count(END + 1) if number not in taken)
+        used = {*self._by_id, *(role.id for role in self.roles.values())}
+        return next(number for number in count(END + 1) if number not in used)
 
     def __contains__(self, key: str | int) -> bool:
         return key in (self._by_name if isinstance(key, str) else self._by_id)
@@ -329,10 +348,10 @@ def loop(
 
 
 def _declare(name: str, id: int | None, doc: str, function: Callable[..., Any], skip: int, **fields: Any) -> Statement:
-    """Register what a function declares by its annotations, the first ``skip`` left out."""
+    """Register the statement that the annotations of a function declare, the first ``skip`` left out."""
     hints = get_type_hints(function, include_extras=True)
     parameters, start = [], 0
-    for word, given in list(inspect.signature(function).parameters.items())[skip:]:
+    for word, argument in list(inspect.signature(function).parameters.items())[skip:]:
         quantity = next((m for m in getattr(hints.get(word), "__metadata__", ()) if isinstance(m, Quantity)), None)
         if quantity is None:
             raise DeclarationError(
@@ -340,17 +359,19 @@ def _declare(name: str, id: int | None, doc: str, function: Callable[..., Any], 
                 "annotate it with one of Position, Extent, Half, Section, Length, Radius, Radii, Place, Shift, Shift3, "
                 "Angle, Count, Turn, Axis",
             )
-        default = None if given.default is inspect.Parameter.empty else float(given.default)
+        default = None if argument.default is inspect.Parameter.empty else float(argument.default)
         if default is not None and quantity.width > 1:
-            said = f"parameter {word!r} of statement {name!r} has a default, but more than one number"
-            raise DeclarationError(said, "leave the default out")
+            message = f"parameter {word!r} of statement {name!r} has a default, but more than one number"
+            raise DeclarationError(message, "leave the default out")
         parameters.append(Parameter(word, quantity, start, default))
         start += quantity.width
     doc = doc or inspect.getdoc(function) or ""
     if not doc:
-        raise DeclarationError(f"statement {name!r} has no docstring", "say in one line what it draws")
-    known, line = language(), " ".join(doc.split("\n\n")[0].split())
-    return known.register(Statement(name, known.free_id() if id is None else id, line, tuple(parameters), **fields))
+        raise DeclarationError(f"statement {name!r} has no docstring", "describe it in one line")
+    registry, line = language(), " ".join(doc.split("\n\n")[0].split())
+    return registry.register(
+        Statement(name, registry.free_id() if id is None else id, line, tuple(parameters), **fields)
+    )
 
 
 def _try(declared: Statement) -> None:
@@ -364,15 +385,15 @@ def _try(declared: Statement) -> None:
             moved = (motion.turn, motion.shift, motion.signs)
             shapes: list[Any] = [part if part is None else tuple(part.shape) for part in moved]
             fitting = shapes[0] in (None, (2,)) and all(shape in (None, (2, 3)) for shape in shapes[1:])
-            found, wanted = "a motion", "a turn must be (...), a shift and signs (..., 3)"
+            result, wanted = "a motion", "a turn must be (...), a shift and signs (..., 3)"
         else:
             shapes = [(tuple(solids.size.shape), tuple(solids.centre.shape)) for solids in declared.solids(values)]
             fitting = bool(shapes) and all(pair == ((2, SIZES), (2, 3)) for pair in shapes)
-            found, wanted = "solids", "sizes must be (..., 4) and centres (..., 3)"
+            result, wanted = "solids", "sizes must be (..., 4) and centres (..., 3)"
     except Exception as cause:
-        said = f"statement {declared.name!r} cannot be {'moved' if declared.is_loop else 'drawn'}: {cause}"
+        message = f"statement {declared.name!r} cannot be {'moved' if declared.is_loop else 'drawn'}: {cause}"
         hint = "its function gets one tensor (...) or (..., width) per parameter, with any leading dimensions"
-        raise DeclarationError(said, hint) from cause
+        raise DeclarationError(message, hint) from cause
     if not fitting:
-        said = f"{kind} {declared.name!r} returns {found} of shapes {shapes}"
-        raise DeclarationError(said, f"{wanted} with the leading dimensions of the parameters")
+        message = f"{kind} {declared.name!r} returns {result} of shapes {shapes}"
+        raise DeclarationError(message, f"{wanted} with the leading dimensions of the parameters")

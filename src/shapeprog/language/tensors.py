@@ -49,23 +49,23 @@ def encode(
     batch = [programs] if isinstance(programs, Program) else list(programs)
     chains = [program.chains for program in batch]
     needed = max([0, *map(len, chains)])
-    steps = max([PUBLISHED_DEPTH, *(len(chain) for each in chains for chain in each)])
+    steps = max([PUBLISHED_DEPTH, *(len(chain) for program in chains for chain in program)])
     rows = needed if blocks is None else blocks
     if needed > rows:
-        said = f"a program of {needed} blocks does not fit {rows} blocks"
-        raise ShapeProgError(said, "allow more blocks, or shorten the program")
+        message = f"a program of {needed} blocks does not fit {rows} blocks"
+        raise ShapeProgError(message, "allow more blocks, or shorten the program")
     ids = np.zeros((len(batch), rows, steps), np.int64)
-    slots = max([SLOTS, *(len(node.values) for each in chains for chain in each for node in chain)])
+    slots = max([SLOTS, *(len(node.values) for program in chains for chain in program for node in chain)])
     parameters = np.zeros((len(batch), rows, steps, slots), np.float64)
     roles = np.zeros((len(batch), rows), np.int64)
-    known = language()
-    for b, each in enumerate(chains):
-        for k, chain in enumerate(each):
+    registry = language()
+    for b, program in enumerate(chains):
+        for k, chain in enumerate(program):
             for j, node in enumerate(chain):
-                ids[b, k, j] = known[node.name].id
+                ids[b, k, j] = registry[node.name].id
                 parameters[b, k, j, : len(node.values)] = node.values
                 if isinstance(node, Draw) and node.role:
-                    roles[b, k] = known.roles[node.role].id
+                    roles[b, k] = registry.roles[node.role].id
     played = torch.from_numpy(roles) if roles.any() else None
     code = Code(torch.from_numpy(ids), torch.from_numpy(parameters).to(dtype or torch.float32), played)
     return code[0] if isinstance(programs, Program) else code
@@ -88,13 +88,13 @@ def decode(code: Code) -> list[Program]:
 
 def _chain(ids: Array, values: Array, role: int) -> Chain | None:
     """The loops and the statement of one block with its role; ``None`` where it is no such thing."""
-    known = language()
+    registry = language()
     chain: list[Loop] = []
-    for place, number in enumerate(ids.tolist()):
-        if number not in known or known[number].size > values.shape[1]:
+    for step, number in enumerate(ids.tolist()):
+        if number not in registry or registry[number].size > values.shape[1]:
             return None
-        declared = known[number]
-        used = values[place, : declared.size]
+        declared = registry[number]
+        used = values[step, : declared.size]
         if not np.isfinite(used).all():
             return None
         numbers = tuple(
@@ -104,8 +104,8 @@ def _chain(ids: Array, values: Array, role: int) -> Chain | None:
         if declared.is_loop:
             chain.append(Loop(declared.name, numbers, ()))
             continue
-        rest = set(ids[place + 1 :].tolist())
-        played = known.role(role) if role else None
-        drawn = Draw(declared.name, numbers, played.name if played else "")
-        return (*chain, drawn) if rest <= {EMPTY, END} else None
+        following = set(ids[step + 1 :].tolist())
+        played = registry.role(role) if role else None
+        statement = Draw(declared.name, numbers, played.name if played else "")
+        return (*chain, statement) if following <= {EMPTY, END} else None
     return None

@@ -1,6 +1,6 @@
 """Unrolling: programs to scenes of primitives, vectorised over programs, blocks and copies.
 
-Loops are transformations of what is inside.  Gradients reach every continuous parameter, shifts of loops included;
+Loops are transformations of their bodies.  Gradients reach every continuous parameter, shifts of loops included;
 counts, turns and ids are discrete and carry none.
 """
 
@@ -20,7 +20,6 @@ from shapeprog.language.program import Program
 from shapeprog.language.statement import EMPTY, END, Statement, language
 from shapeprog.language.tensors import Code, encode
 from shapeprog.lazy_torch import Tensor, on_numpy, torch
-from shapeprog.space import DEPTH, SIDE
 
 MOST_COPIES = 1 << 17
 """Most copies that one program may unroll to: points, cells, meshes and pictures of so many take seconds."""
@@ -42,8 +41,8 @@ def unroll(program: Program | Sequence[Program] | Code) -> Scene:
     primitives with a negative extent.
 
     Where gradients are recorded (``code.parameters`` requires one), no part vanishes: a length below ``THINNEST`` is
-    drawn as that, and the sign of its gradient is made negative, so that descent lengthens it.  The parameters stay as
-    they are, and so does what they draw without gradient.
+    drawn as that, and the sign of its gradient is made negative, so that descent lengthens it.  The parameters and
+    the scene without gradient do not change.
 
     Raises
     ------
@@ -69,7 +68,7 @@ def draw_blocks(code: Code) -> Int[Tensor, "*batch K 32 32"]:
 
 @dataclass(frozen=True)
 class _Level:
-    """All copies, in drawing order, that one kind of loop moves at one level; ``place`` is where its numbers are."""
+    """All copies, in drawing order, that one kind of loop moves at one level; ``place`` is the row of its numbers."""
 
     declared: Statement
     copies: Int[Tensor, " m"]
@@ -80,7 +79,7 @@ class _Level:
 
 @dataclass(frozen=True)
 class _Layout:
-    """Where the solids that the statements return go, and what of a scene no parameter changes.
+    """Where the solids that the statements return go, and the fields of a scene that no parameter changes.
 
     ``drawn`` are the kinds of primitive by statement; ``source`` is the copy of each solid, ``None`` if they are the
     same; ``gather`` the solid of each slot, one past the last for padding; ``signed`` which sizes may be negative;
@@ -96,10 +95,10 @@ class _Layout:
 
 
 class Plan:
-    """What of a batch of programs is discrete: which statement draws which copy, moved by which loops.
+    """The discrete part of a batch of programs: which statement draws which copy, moved by which loops.
 
     Made once, it renders the same programs for other continuous parameters, which is what refinement does.  Copies are
-    in drawing order: by statement, so that each draws all of its own at once, and by place in the program.
+    in drawing order: by statement, so that each draws all of its copies at once, and by position in the program.
     Of the parameters of ``code`` (..., K, J) only the counts are read.
     """
 
@@ -110,7 +109,7 @@ class Plan:
         copy = torch.arange(len(row), device=row.device) - torch.searchsorted(row, row)
         statement = ids[row, step]
         self._rank = torch.argsort(statement, stable=True)
-        row, step, index, copy, statement = (each[self._rank] for each in (row, step, index, copy, statement))
+        row, step, index, copy, statement = (field[self._rank] for field in (row, step, index, copy, statement))
         numbers, counts = torch.unique_consecutive(statement, return_counts=True)
         self._kinds, self._counts = [language()[number] for number in numbers.tolist()], counts.tolist()
         self._place = row * steps + step
@@ -119,25 +118,25 @@ class Plan:
         quarter = _are(statement, lambda declared: declared.quarter)
         self._levels = []
         for level in reversed(range(steps)):
-            here = torch.where(level < step, ids[row, level], EMPTY)
-            for number in torch.unique(here[here != EMPTY]).tolist():
-                moved = (here == number).nonzero()[:, 0]
-                place = row[moved] * steps + level
-                self._levels.append(_Level(language()[number], moved, place, index[moved, level], quarter[moved]))
+            loops = torch.where(level < step, ids[row, level], EMPTY)
+            for number in torch.unique(loops[loops != EMPTY]).tolist():
+                moved = (loops == number).nonzero()[:, 0]
+                slot = row[moved] * steps + level
+                self._levels.append(_Level(language()[number], moved, slot, index[moved, level], quarter[moved]))
         self._known: _Layout | None = None
 
     def scene(self, parameters: Float[Tensor, "*batch K J slots"], *, clamp: bool = False) -> Scene:
         """The scenes for parameters of the same programs, with gradient; see :func:`unroll` for clamped lengths."""
         values = parameters.reshape(-1, parameters.shape[-1])
-        own = values.index_select(0, self._place)
+        numbers = values.index_select(0, self._place)
         if clamp:
             from shapeprog.language.clamping import ClampedLengths
 
-            own = ClampedLengths.apply(own, self._thinnest(own))  # type: ignore[no-untyped-call]
-        pieces = own.split(self._counts)
-        drawn = [declared.solids(piece) for declared, piece in zip(self._kinds, pieces, strict=True)]
-        layout = self._layout(tuple(tuple(solids.kind for solids in each) for each in drawn))
-        parts = [solids for each in drawn for solids in each]
+            numbers = ClampedLengths.apply(numbers, self._thinnest(numbers))  # type: ignore[no-untyped-call]
+        pieces = numbers.split(self._counts)
+        results = [declared.solids(piece) for declared, piece in zip(self._kinds, pieces, strict=True)]
+        layout = self._layout(tuple(tuple(solids.kind for solids in group) for group in results))
+        parts = [solids for group in results for solids in group]
         size = torch.cat([values.new_zeros(0, SIZES), *(part.size for part in parts)])
         centre = torch.cat([values.new_zeros(0, 3), *(part.centre for part in parts)])
         identity, rotation = torch.eye(3, device=values.device, dtype=values.dtype), None
@@ -165,35 +164,35 @@ class Plan:
     def _thinnest(self, values: Float[Tensor, "M slots"]) -> Float[Tensor, "M slots"]:
         """The least that each number of the drawing statements is drawn as; only lengths are bounded."""
         lengths = [[quantity.kind == "length" for quantity in declared.quantities] for declared in self._kinds]
-        rows = [[THINNEST if each else -math.inf for each in row] for row in lengths]
+        rows = [[THINNEST if is_length else -math.inf for is_length in row] for row in lengths]
         padded = [row + [-math.inf] * (values.shape[1] - len(row)) for row in rows]
-        each = [row for row, count in enumerate(self._counts) for _ in range(count)]
-        return values.new_tensor(padded).reshape(-1, values.shape[1])[each]
+        index = [row for row, count in enumerate(self._counts) for _ in range(count)]
+        return values.new_tensor(padded).reshape(-1, values.shape[1])[index]
 
-    def _layout(self, drawn: tuple[tuple[int, ...], ...]) -> _Layout:
+    def _layout(self, returned: tuple[tuple[int, ...], ...]) -> _Layout:
         """The layout for the kinds of primitive that each statement returned; made once."""
-        if self._known is not None and self._known.drawn == drawn:
+        if self._known is not None and self._known.drawn == returned:
             return self._known
         rank, programs = self._rank, math.prod(self._lead)
         pieces = torch.arange(len(rank), device=rank.device).split(self._counts)
-        parts = [(piece, kind) for piece, kinds in zip(pieces, drawn, strict=True) for kind in kinds]
+        parts = [(piece, kind) for piece, kinds in zip(pieces, returned, strict=True) for kind in kinds]
         source = torch.cat([rank[:0], *(piece for piece, _ in parts)])
         kind = torch.cat([rank[:0], *(torch.full_like(piece, kind) for piece, kind in parts)])
         order = torch.argsort(rank[source], stable=True)
         program = self._program[source[order]]
         counts = torch.bincount(program, minlength=programs)
         slots = int(counts.max()) if programs else 0
-        place = torch.arange(len(order), device=rank.device) - (counts.cumsum(0) - counts)[program]
+        slot = torch.arange(len(order), device=rank.device) - (counts.cumsum(0) - counts)[program]
         gather = torch.full((programs * slots,), len(order), device=rank.device)
-        gather = gather.index_copy(0, program * slots + place, order).reshape(*self._lead, slots)
-        whole = torch.cat([self._whole[:, source], kind[None]])
-        fixed = torch.cat([whole, whole.new_zeros(4, 1)], -1)[:, gather]
-        extents = torch.tensor([known.extents for known in primitives], device=rank.device)[fixed[3]]
+        gather = gather.index_copy(0, program * slots + slot, order).reshape(*self._lead, slots)
+        integers = torch.cat([self._whole[:, source], kind[None]])
+        fixed = torch.cat([integers, integers.new_zeros(4, 1)], -1)[:, gather]
+        extents = torch.tensor([primitive.extents for primitive in primitives], device=rank.device)[fixed[3]]
         signed = torch.arange(SIZES, device=rank.device) >= extents[..., None]
-        single = all(len(kinds) == 1 for kinds in drawn)
+        single = all(len(kinds) == 1 for kinds in returned)
         fields = dict(zip(("statement", "block", "copy", "kind"), fixed, strict=True))
         mask = gather < len(order)
-        self._known = _Layout(drawn, None if single else source, gather.flatten(), mask, signed, fields)
+        self._known = _Layout(returned, None if single else source, gather.flatten(), mask, signed, fields)
         return self._known
 
     def _motion(
@@ -206,26 +205,28 @@ class Plan:
         if not self._levels:
             return None, None, None
         shift = values.new_zeros(len(self._rank), 3)
-        turn = axis = signs = None
+        pose = hand = axes = None
         for level in self._levels:
             assert level.declared.move is not None
             named = level.declared.split(values.index_select(0, level.place))
             motion = level.declared.move(level.index.to(values), level.quarter, **named)
-            if motion.signs is not None:  # a reflection after a turn is the other way round before it
+            if motion.signs is not None:
                 flip = torch.ones_like(shift).index_copy(0, level.copies, motion.signs.detach())
-                shift, turn = flip * shift, None if turn is None else turn * flip[:, DEPTH] * flip[:, SIDE]
-                signs = flip if signs is None else signs * flip
-            if motion.turn is not None:
-                axis = self._axes(values) if axis is None else axis
-                angle = torch.zeros_like(shift[:, 0]).index_copy(0, level.copies, motion.turn.detach())
-                shift = (_turned(angle) @ (shift - axis)[..., None])[..., 0] + axis
-                turn = angle if turn is None else turn + angle
+                shift, sign = flip * shift, flip.prod(-1)
+                pose = torch.diag_embed(flip) if pose is None else flip[..., None] * pose
+                hand = sign if hand is None else hand * sign
+            if motion.turn is not None or motion.rotation is not None:
+                turned = _turned(motion.turn) if motion.rotation is None else motion.rotation  # type: ignore[arg-type]
+                identity = torch.eye(3, device=values.device, dtype=values.dtype)
+                matrix = identity.expand(len(shift), 3, 3).clone().index_copy(0, level.copies, turned)
+                if motion.pivot is not None:
+                    pivot = torch.zeros_like(shift).index_copy(0, level.copies, motion.pivot)
+                else:
+                    pivot = axes = self._axes(values) if axes is None else axes
+                shift = (matrix @ (shift - pivot)[..., None])[..., 0] + pivot
+                pose = matrix if pose is None else matrix @ pose
             if motion.shift is not None:
                 shift = shift.index_add(0, level.copies, motion.shift)
-        pose, hand = None if turn is None else _turned(turn), None
-        if signs is not None:
-            hand = signs.prod(-1)
-            pose = torch.diag_embed(signs) if pose is None else pose * signs[:, None]
         if source is None:
             return pose, hand, shift
         return _some(pose, source), _some(hand, source), shift.index_select(0, source)
@@ -233,18 +234,18 @@ class Plan:
     def _axes(self, values: Float[Tensor, "R slots"]) -> Float[Tensor, "M 3"]:
         """A point at height zero on the axis about which rotation loops turn each copy, in drawing order."""
         points = []
-        for declared, place in zip(self._kinds, self._place.split(self._counts), strict=True):
+        for declared, slots in zip(self._kinds, self._place.split(self._counts), strict=True):
             if declared.pivot is None:
-                points.append(values.new_zeros(len(place), 3))
+                points.append(values.new_zeros(len(slots), 3))
             else:
-                point = declared.pivot(**declared.split(values.index_select(0, place)))
+                point = declared.pivot(**declared.split(values.index_select(0, slots)))
                 points.append(torch.cat([torch.zeros_like(point[:, :1]), point[:, 1:]], -1))
         return torch.cat(points)
 
 
-def _are(ids: Int[Tensor, "*batch"], wanted: Callable[[Statement], bool]) -> Bool[Tensor, "*batch"]:
+def _are(ids: Int[Tensor, "*batch"], accepts: Callable[[Statement], bool]) -> Bool[Tensor, "*batch"]:
     """Which ids are those of statements that are as wanted."""
-    numbers = [declared.id for declared in language() if wanted(declared)]
+    numbers = [declared.id for declared in language() if accepts(declared)]
     return torch.isin(ids, torch.tensor(numbers, dtype=ids.dtype, device=ids.device))
 
 
@@ -254,33 +255,33 @@ def _copies(
     """Block row, drawing step and copy index at each loop level of every drawn copy; programs have ``blocks`` rows."""
     steps = ids.shape[-1]
     step = _are(ids, lambda declared: declared.is_loop).long().cumprod(-1).sum(-1, keepdim=True).clamp(max=steps - 1)
-    place = torch.arange(steps, device=ids.device)
+    level = torch.arange(steps, device=ids.device)
     draws = _are(ids.gather(-1, step), lambda declared: not declared.is_loop)
-    legal = draws & ((ids == EMPTY) | (ids == END) | (place <= step)).all(-1, keepdim=True)
+    legal = draws & ((ids == EMPTY) | (ids == END) | (level <= step)).all(-1, keepdim=True)
     counts = values[..., 0].round().nan_to_num(0).clamp(0, MOST_PRIMITIVES + 1).long()
-    counts = torch.where((place < step) & legal, counts, 1)
+    counts = torch.where((level < step) & legal, counts, 1)
     total = torch.where((counts == 0).any(-1), 0, counts.double().prod(-1)) * legal[:, 0]  # the product may be infinite
     drawn = total.reshape(-1, max(blocks, 1)).sum(-1)
     if float(drawn.sum()) > MOST_COPIES:
         if float(drawn.max()) > MOST_COPIES:
-            said = f"the loops of this program make more than {MOST_COPIES} copies"
-            raise ShapeProgError(said, "lower their counts: so many copies can be drawn of one program")
+            message = f"the loops of this program make more than {MOST_COPIES} copies"
+            raise ShapeProgError(message, "lower their counts: so many copies can be drawn of one program")
         if float(drawn.sum()) > MOST_PRIMITIVES:
-            said = f"these {len(drawn)} programs make more than {MOST_PRIMITIVES} copies together"
-            raise ShapeProgError(said, "unroll fewer of them at once")
+            message = f"these {len(drawn)} programs make more than {MOST_PRIMITIVES} copies together"
+            raise ShapeProgError(message, "unroll fewer of them at once")
     last = total.long().cumsum(0)
-    many = torch.arange(int(total.sum()), device=ids.device)
-    row = torch.searchsorted(last, many, right=True)  # repeat_interleave wakes threads for a handful of rows
-    rest = many - (last - total.long())[row]
+    numbers = torch.arange(int(total.sum()), device=ids.device)
+    row = torch.searchsorted(last, numbers, right=True)  # repeat_interleave wakes threads for a handful of rows
+    remainder = numbers - (last - total.long())[row]
     index = []
     for count in reversed(counts[row].unbind(-1)):
-        index.append(rest % count)
-        rest = rest.div(count, rounding_mode="floor")
+        index.append(remainder % count)
+        remainder = remainder.div(count, rounding_mode="floor")
     return row, step[row, 0], torch.stack(index[::-1], -1)
 
 
-def _some(each: Tensor | None, rows: Int[Tensor, " S"]) -> Tensor | None:
-    return None if each is None else each.index_select(0, rows)
+def _some(values: Tensor | None, rows: Int[Tensor, " S"]) -> Tensor | None:
+    return None if values is None else values.index_select(0, rows)
 
 
 def _turned(turn: Float[Tensor, "*batch"]) -> Float[Tensor, "*batch 3 3"]:
@@ -290,5 +291,5 @@ def _turned(turn: Float[Tensor, "*batch"]) -> Float[Tensor, "*batch 3 3"]:
     table = torch.tensor([[1, 0, -1, 0], [0, 1, 0, -1]], device=turn.device).to(turn)[:, nearest.long() % 4]
     angle = 2 * torch.pi * turn
     cos, sin = torch.where(exact, table[0], angle.cos()), torch.where(exact, table[1], angle.sin())
-    zero, one = torch.zeros_like(turn), torch.ones_like(turn)
-    return torch.stack([one, zero, zero, zero, cos, -sin, zero, sin, cos], -1).unflatten(-1, (3, 3))
+    zero, unit = torch.zeros_like(turn), torch.ones_like(turn)
+    return torch.stack([unit, zero, zero, zero, cos, -sin, zero, sin, cos], -1).unflatten(-1, (3, 3))

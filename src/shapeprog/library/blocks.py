@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache, lru_cache
 from typing import Literal, NamedTuple
 
@@ -31,12 +31,14 @@ ZERO = 1e-6
 ROWS: tuple[tuple[int, ...], ...] = ((), (UP, DEPTH, SIDE), (DEPTH,), (SIDE,))
 """Axes along which mirror images may be told as rows."""
 
+PAIR = 2.0
+"""Copies in a row if nothing is given."""
+
 STRAIGHT = 0.02
 """How far in cells a part that is told by points may be from its own mirror image."""
 
-Way = Literal["pair", "row", "mirror", "grid"]
-"""How copies lie along an axis: two, any number at equal steps, or one and its mirror image; in a grid there may be one
-alone."""
+Way = Literal["pair", "row", "mirror"]
+"""How copies lie along an axis: two, any number at equal steps, or one and its mirror image."""
 
 
 class Slot(NamedTuple):
@@ -88,11 +90,6 @@ class Kind:
     repeats: tuple[tuple[int, Way], ...] = ()
     steps: bool = False
     others: tuple[str, ...] = ()
-
-    @property
-    def grid(self) -> bool:
-        """Whether it is told as a grid."""
-        return any(way == "grid" for _, way in self.repeats)
 
     @property
     def spans(self) -> int:
@@ -157,56 +154,6 @@ def readings(chain: Chain) -> list[Block]:
 def forms_of(chain: Chain) -> list[Block]:
     """All forms of a block: those as it is written, then where mirror images are rows of two."""
     return [*blocks_of(chain), *readings(chain)[1:]]
-
-
-def gridded(block: Block) -> Iterator[Block]:
-    """The same block as grids: along the axes of its copies, and along others where there is one alone.
-
-    Instead of the span of all copies grids have the spacing between them, which is zero where there is one alone; and
-    instead of the low corner of a solid that is symmetric the middle of all copies, but for how high it begins, so that
-    a grid which lies in the middle need not say so.  There may be steps, which are zero where there is one alone, too.
-    Nothing for a block that is not repeated.
-    """
-    kind = block.kind
-    if kind.others or not kind.spans:
-        return
-    ways = dict(kind.repeats)
-    free = [axis for axis in range(3) if axis not in ways]
-    for more in (each for size in range(len(free) + 1) for each in itertools.combinations(free, size)):
-        along = [axis for axis in range(3) if axis in more or ways.get(axis, "mirror") != "mirror"]
-        for steps in (True,) if kind.steps else (False, True):
-            if along:
-                yield _grid(block, along, steps)
-
-
-def _grid(block: Block, along: Sequence[int], steps: bool) -> Block:
-    kind, unit = block.kind, np.eye(len(block.rows))
-    first = len(unit) - kind.spans
-    ends = {axis: unit[first + place] for place, (axis, _) in enumerate(kind.repeats)}
-    shifts = unit[-3:] if kind.steps else np.zeros((3, len(unit)))
-    known = dict(zip(ends, block.counts, strict=False))
-    times = block.counts[-1] if kind.steps else 1
-    rows, slots = [*unit[:first]], [*block.slots[:first]]
-    repeats: list[tuple[int, Way]] = []
-    for axis in range(3):
-        size = unit[3 + axis] if kind.boxed else np.zeros(len(unit))
-        if kind.boxed and axis != UP:
-            rows[axis] = unit[axis] + (ends.get(axis, size) + (times - 1) * shifts[axis]) / 2
-            slots[axis] = Slot("middle", "position", axis)
-        if axis in along:
-            repeats.append((axis, "grid"))
-            rows.append((ends.get(axis, size) - size) / max(known.get(axis, 1) - 1, 1))
-            slots.append(Slot("spacing", "length", axis))
-        elif axis in ends:
-            repeats.append((axis, "mirror"))
-            rows.append(ends[axis])
-            slots.append(Slot("plane", "length", axis))
-    counts = tuple(known.get(axis, 1) for axis, _ in repeats)
-    if steps:
-        rows, slots, counts = [*rows, *shifts], [*slots, *STEPS], (*counts, times)
-    change = np.stack(rows)
-    kind = replace(kind, repeats=tuple(repeats), steps=steps)
-    return Block(kind, tuple(slots), change @ block.values, change @ block.rows, counts)
 
 
 class _Repeated(NamedTuple):

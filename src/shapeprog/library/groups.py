@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
-from collections.abc import Iterable, Iterator, Sequence
+from collections import Counter, defaultdict
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from shapeprog.language.program import Draw, Program, nest
+from shapeprog.language.printer import source_of
+from shapeprog.language.program import Chain, Draw, Program, nest
 from shapeprog.language.statement import language
-from shapeprog.language.text import source_of
-from shapeprog.library.blocks import Block, Kind, Slot, blocks_of, gridded, readings
+from shapeprog.library.blocks import PAIR, Block, Kind, Slot, blocks_of
 from shapeprog.library.length import STATEMENT, length
-from shapeprog.library.measures import Group, Measure, measures, relations
+from shapeprog.library.measures import LEAST_EXTENT, Group, Measure, boxes_of, measures, moved, relations
 from shapeprog.space import FloatArray
 
 NEAR = 0.03
@@ -27,9 +27,10 @@ LEAST_PROGRAMS, LEAST_SHARE = 3, 0.02
 LARGEST = 3
 """Most blocks of a function."""
 
-ARGUMENTS, SHARE = 10, 0.6
-"""Most arguments of a function that draws several blocks, and the share of their numbers that these may be: nobody
-would call one with more, and whatever has a base and a top would do for one of two loose boxes."""
+PARAMETERS, SHARE = 6, 0.6
+"""Most parameters of a function beside its box, which every call has, and the share of the numbers of several blocks
+that both together may be: nobody would call one with more, and whatever has a base and a top would do for one of two
+loose boxes."""
 
 OPEN = 0.6
 """Share of the uses from which a measure that is zero need not be said."""
@@ -62,8 +63,9 @@ class Candidate:
 
     Parameters
     ----------
-    group, rows, openings
-        Its blocks, the relations (R, M) that hold for them, and measures (U, M) that are mostly zero.
+    group, box, rows, openings
+        Its blocks, the sides of its box (6, M), the relations (R, M) that hold for them, and angles (U, M) that are
+        mostly zero.
     uses
         Where it would be called; no two of them share a block.
     gain
@@ -71,6 +73,7 @@ class Candidate:
     """
 
     group: Group
+    box: FloatArray
     rows: FloatArray
     openings: FloatArray
     uses: tuple[Use, ...]
@@ -85,13 +88,25 @@ class Candidate:
 def units_of(program: Program) -> list[Unit | None]:
     """The blocks of a program that functions may draw, in the order of its text."""
     found: list[Unit | None] = []
+    shared = Counter(_around(chain) for chain in program.chains)
     for chain in program.chains:
-        forms = [form for form in blocks_of(chain) if not form.kind.others]
-        forms += {form.kind: form for each in readings(chain) for form in gridded(each)}.values()
+        forms = [form for form in blocks_of(chain) if not form.kind.others and not form.kind.steps]
         draw = chain[-1]
         assert isinstance(draw, Draw)
-        found.append(Unit(tuple(forms), draw, length(source_of(Program((nest(chain),))).lines)) if forms else None)
+        found.append(Unit(tuple(forms), draw, _length(chain, shared)) if forms else None)
     return found
+
+
+def _around(chain: Chain) -> tuple[tuple[str, tuple[float, ...]], ...]:
+    """The loops around a statement."""
+    return tuple((node.name, node.values) for node in chain[:-1])
+
+
+def _length(chain: Chain, shared: Mapping[tuple[tuple[str, tuple[float, ...]], ...], int]) -> int:
+    """How long a block is in placed text: mirrors are one loop, and blocks in the same loops share these."""
+    mirrors = sum(node.name == "mirror" for node in chain[:-1])
+    loops = len(chain) - 1 - max(mirrors - 1, 0)
+    return length(source_of(Program((nest(chain[-1:]),))).lines) + round(STATEMENT * loops / shared[_around(chain)])
 
 
 def least_of(corpus: Corpus, blocks: int = 1) -> int:
@@ -109,12 +124,10 @@ def candidates(corpus: Corpus) -> Iterator[Candidate]:
             for form in unit.forms if unit is not None else ():
                 for kind in dict.fromkeys((form.kind, replace(form.kind, word=""))):
                     slots[kind] = form.slots
-                    use = Use(number, (place,), form.values, unit.length - STATEMENT)  # type: ignore[union-attr]
+                    gain = unit.length - STATEMENT - _counted(form)  # type: ignore[union-attr]
+                    use = Use(number, (place,), form.values, gain)
                     groups[(kind,)].append(use)
-    level = _frequent(
-        {kinds: uses for kinds, uses in groups.items() if kinds[0].word and not (kinds[0].grid or kinds[0].steps)},
-        least,
-    )
+    level = _frequent({kinds: uses for kinds, uses in groups.items() if kinds[0].word}, least)
     for _ in range(1, LARGEST):
         level = _frequent(_larger(level, corpus), least)
         groups |= level
@@ -136,6 +149,11 @@ def statement_of(shape: str) -> str:
     return name if name in known and not known.own_role(name) else ""
 
 
+def _counted(form: Block) -> int:
+    """How many rows of a block have other than two copies, which a call need not give."""
+    return sum(way == "row" and count != PAIR for (_, way), count in zip(form.kind.repeats, form.counts, strict=True))
+
+
 def _frequent(level: dict[tuple[Kind, ...], list[Use]], least: int) -> dict[tuple[Kind, ...], list[Use]]:
     return {kinds: uses for kinds, uses in level.items() if programs(uses) >= least}
 
@@ -149,22 +167,35 @@ def _larger(level: dict[tuple[Kind, ...], list[Use]], corpus: Corpus) -> dict[tu
                 if unit is None or place in use.blocks:
                     continue
                 form = unit.forms[0]
-                if form.kind.steps:
-                    continue
                 behind = repr(form.kind) > repr(kinds[-1])
                 other = form.kind.word and form.kind.word not in [kind.word for kind in kinds]
                 if other and behind:
                     values = np.append(use.values, form.values)
-                    more = Use(use.program, (*use.blocks, place), values, use.gain + unit.length)
+                    more = Use(use.program, (*use.blocks, place), values, use.gain + unit.length - _counted(form))
                     found[(*kinds, form.kind)].append(more)
     return found
 
 
 def _best(group: Group, uses: Sequence[Use], least: int) -> Iterator[Candidate]:
-    """The function for a group that shortens most: those relations that hold most often are asked for, one by one."""
+    """The function for a group and each of its boxes that shortens most."""
+    typical = np.median([use.values for use in uses], 0)
+    for box in boxes_of(group, typical):
+        yield from _best_in(box, group, typical, uses, least)
+
+
+def _best_in(
+    box: FloatArray, group: Group, typical: FloatArray, uses: Sequence[Use], least: int
+) -> Iterator[Candidate]:
+    """The function that shortens most: those relations that hold most often are asked for, one by one.
+
+    Nothing is asked of its box, which every call has of its own.
+    """
     values = np.array([use.values for use in uses])
-    known = list(measures(group, np.median(values, 0)))
-    openings = [each for each in known if each.opening and len(group.kinds) == 1]
+    extents = values @ box[3:].T
+    uses = [use for use, sizes in zip(uses, extents, strict=True) if min(sizes) >= LEAST_EXTENT]
+    values = np.array([use.values for use in uses]).reshape(-1, group.size)
+    known = list(measures(group, typical))
+    openings = [each for each in known if each.sort == "angle" and len(group.kinds) == 1]
     offered = _offered(group, known, openings)
     holds = np.abs(values @ offered.T) <= NEAR
     owner = np.repeat(np.arange(len(group.slots)), [len(each) for each in group.slots])
@@ -176,14 +207,15 @@ def _best(group: Group, uses: Sequence[Use], least: int) -> Iterator[Candidate]:
     while True:
         if joined >= len(group.kinds) - 1:
             fitting = [use for use, fits in zip(uses, alive, strict=True) if fits]
-            found = _priced(group, rows, openings, fitting)
-            called = len(group.kinds) == 1 or found.arguments <= min(ARGUMENTS, SHARE * group.size)
+            found = _priced(group, box, rows, openings, fitting)
+            most = PARAMETERS if len(group.kinds) == 1 else min(PARAMETERS, SHARE * group.size - len(box))
+            called = found.arguments + len(found.openings) <= most
             if called and programs(found.uses) >= least and found.gain > (best.gain if best else 0):
                 best = found
         support = (holds[:, untried] & alive[:, None]).sum(0)
         order = np.argsort(-support, kind="stable")
         untried = untried[order][support[order] >= least]
-        following = next((k for k in untried if _independent(rows, offered[k])), None)
+        following = next((k for k in untried if _independent(np.vstack([box, rows]), offered[k])), None)
         if following is None:
             break
         rows, alive = np.vstack([rows, offered[following]]), alive & holds[:, following]
@@ -194,46 +226,43 @@ def _best(group: Group, uses: Sequence[Use], least: int) -> Iterator[Candidate]:
 
 
 def _offered(group: Group, known: Sequence[Measure], openings: Sequence[Measure]) -> FloatArray:
-    """Relations that may be asked for: not those by which an opening is zero."""
+    """Relations that may be asked for: not those by which an opening is zero, nor where the group is."""
     rows = [row for row in relations(known) if all(np.linalg.matrix_rank([row, each.row]) == 2 for each in openings)]
+    rows = [row for row in rows if not (moved(group) @ row).any()]
     return np.array(rows).reshape(-1, group.size)
 
 
-def _priced(group: Group, rows: FloatArray, openings: Sequence[Measure], uses: Sequence[Use]) -> Candidate:
+def _priced(
+    group: Group, box: FloatArray, rows: FloatArray, openings: Sequence[Measure], uses: Sequence[Use]
+) -> Candidate:
     """The function of a group for which relations hold, and what it saves where it is used."""
     chosen: FloatArray = np.zeros((0, group.size))
-    sorts: list[str] = []
     for each in openings:
         zero = [bool(abs(use.values @ each.row) <= NEAR) for use in uses]
-        free = group.kinds[0].grid and each.sort in ("spacing", "step")
-        rare = free or sum(zero) >= OPEN * len(uses)
-        if not rare or not _independent(np.vstack([rows, chosen]), each.row):
+        if sum(zero) < OPEN * len(uses) or not _independent(np.vstack([box, rows, chosen]), each.row):
             continue
-        if all(zero) and each.sort != "spacing":
+        if all(zero):
             rows = np.vstack([rows, each.row])
         else:
             chosen = np.vstack([chosen, each.row])
-            sorts.append(each.sort)
     values = np.array([use.values for use in uses]).reshape(-1, group.size)
     arguments = _arguments(group, rows, chosen)
-    told = np.abs(values @ chosen.T) > NEAR
-    counted = [sort == "spacing" for sort in sorts]  # each with a count of its own, steps with one
-    stepping = [sort == "step" and group.kinds[0].grid for sort in sorts]
-    said = (told.sum(1) + told[:, counted].sum(1) + told[:, stepping].any(1)).tolist()
+    said = (np.abs(values @ chosen.T) > NEAR).sum(1).tolist()
     taken: set[tuple[int, int]] = set()
     kept: list[Use] = []
     for use, more in zip(uses, said, strict=True):
         own = {(use.program, place) for place in use.blocks}
         if not own & taken:
             taken |= own
-            kept.append(use._replace(gain=use.gain - arguments - more))
-    lines = 1 + sum(1 + len(kind.repeats) + kind.steps for kind in group.kinds)
+            kept.append(use._replace(gain=use.gain - arguments + group.counts - len(box) - more))
+    lines = 1 + sum(1 + len(kind.repeats) for kind in group.kinds)
     cost = STATEMENT * lines + arguments + len(chosen) + group.size
-    return Candidate(group, rows, chosen, tuple(kept), sum(use.gain for use in kept) - cost)
+    return Candidate(group, box, rows, chosen, tuple(kept), sum(use.gain for use in kept) - cost)
 
 
 def _arguments(group: Group, rows: FloatArray, openings: FloatArray) -> int:
-    return group.size - len(rows) - len(openings) + group.counts
+    """How many arguments every call of a function gives beside its box."""
+    return group.size - 6 - len(rows) - len(openings) + group.counts
 
 
 def _independent(rows: FloatArray, row: FloatArray) -> bool:

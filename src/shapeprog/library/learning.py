@@ -7,23 +7,25 @@ that shortens the programs most becomes a function; what it draws is taken out o
 
 from __future__ import annotations
 
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
-from shapeprog.language.evaluation import evaluated
+from shapeprog.language.ast import Assignment, Call, Comment, Function, Line, Source
+from shapeprog.language.convert import in_cells, placed, placed_if_possible
+from shapeprog.language.evaluate import evaluated, placed_source
+from shapeprog.language.placement import BOX_IN_CELLS, SIZES
+from shapeprog.language.printer import format_source, source_of
 from shapeprog.language.program import Program
-from shapeprog.language.source import Call, Comment, Function, Line, Source
-from shapeprog.language.text import format_source, source_of
 from shapeprog.library.blocks import Block, Kind
-from shapeprog.library.groups import NEAR, Candidate, Corpus, Unit, candidates, statement_of, units_of
+from shapeprog.library.groups import LEAST_PROGRAMS, NEAR, Candidate, Corpus, Unit, candidates, statement_of, units_of
 from shapeprog.library.length import statements
-from shapeprog.library.measures import LINES, Group
+from shapeprog.library.measures import Group
 from shapeprog.library.rewriting import with_library
-from shapeprog.library.store import Library
+from shapeprog.library.store import Library, library_of
 from shapeprog.library.words import name_of
 from shapeprog.library.writing import basis, function
 
@@ -32,6 +34,10 @@ MOST = 12
 
 OWN = 0.9
 """Share of the uses of a function from which parts of one role make it their own."""
+
+
+BOARD = 24.0
+"""Sides of the whole that placed text of functions declares, as any does; calls have boxes of their own."""
 
 
 class Learned(NamedTuple):
@@ -46,21 +52,48 @@ def learn(given: Sequence[Program], most: int = MOST) -> Library:
 
     Comments tell how often each is used by the programs, and a typical call.
     """
-    found = list(_functions(given, most))
-    library = Library(Source(tuple(each.function for each in found)))
-    written = [with_library(program, library) for program in given]
-    calls = [Counter(line.name for line in source_of(each).walk() if isinstance(line, Call)) for each in written]
+    found = list(_functions([in_cells(program) for program in given], most))
+    if not found:
+        return Library(Source())
+    given = [placed_if_possible(program) for program in given]
+    library, written, users = _used(given, _library(found))
+    if len(kept := [each for each in found if len(users[each.function.name]) >= LEAST_PROGRAMS]) < len(found):
+        if not kept:
+            return Library(Source())
+        library, written, users = _used(given, _library(kept))
     before, after = sum(map(statements, given)), sum(map(statements, written))
     said = f"Learned from {len(given)} programs: {before} statements, {after} with these functions"
-    lines: list[Line] = [Comment(said), Comment()]
-    for each in found:
-        name = each.function.name
-        times = sum(count[name] for count in calls)
-        if times:
-            used = f"used {times} times, by {sum(count[name] > 0 for count in calls)} programs, such as"
-            call = format_source(Source((each.function, each.example))).splitlines()[-1]
-            lines += [Comment(used), Comment(call), each.function, Comment()]
-    return Library(evaluated(Source(tuple(lines))).source or Source())
+    lines: list[Line] = [Comment(said), *(line for line in library.source.lines if isinstance(line, Assignment))]
+    for learned in library.source.functions.values():
+        where = users[learned.name]
+        used = f"used {sum(where)} times, by {len(where)} programs, such as"
+        lines += [Comment(), Comment(used), *map(Comment, library.comments[learned.name]), learned]
+    return library_of(evaluated(replace(library.source, lines=tuple(lines))))
+
+
+def _used(given: Sequence[Program], library: Library) -> tuple[Library, list[Program], dict[str, list[int]]]:
+    """A library, the programs written with it, and how often each of its functions is called by those that call it."""
+    written = [with_library(program, library) for program in given]
+    users: dict[str, list[int]] = defaultdict(list)
+    for program in written:
+        for name, times in Counter(line.name for line in source_of(program).walk() if isinstance(line, Call)).items():
+            users[name].append(times)
+    return library, written, users
+
+
+def _library(found: Sequence[Learned]) -> Library:
+    """The functions as placed text, each below its call."""
+    examples = (replace(each.example, role="") for each in found)  # which would be that of cushions in it
+    program = evaluated(Source((*(each.function for each in found), *examples)))
+    functions = source_of(placed(program)).functions.values()
+    source = placed_source((Assignment(tuple((size, BOARD) for size in SIZES)), *functions))
+    lines: list[Line] = [*source.lines[:1]]
+    for each, written in zip(found, functions, strict=True):
+        arguments = tuple(pair for pair in each.example.arguments if pair[0] not in BOX_IN_CELLS[:3])
+        call = replace(each.example, arguments=arguments)
+        text = format_source(replace(source, lines=(*source.lines, call))).splitlines()[-1]
+        lines += [Comment(), Comment(text), written]
+    return Library(replace(source, lines=tuple(lines)))
 
 
 def _functions(given: Sequence[Program], most: int) -> Iterator[Learned]:
@@ -102,7 +135,7 @@ def _made(best: Candidate, corpus: Corpus, taken: set[str]) -> Learned | None:
     """The function of a candidate, after the use that is nearest to all; none if its sums are no simple ones."""
     values = np.array([use.values for use in best.uses])
     typical = best.uses[int(np.abs(values - np.median(values, 0)).sum(1).argmin())]
-    made = basis(best.group, typical.values, best.rows, best.openings)
+    made = basis(best.group, best.box, typical.values, best.rows, best.openings)
     if made is None:
         return None
     kinds = best.group.kinds
@@ -114,13 +147,9 @@ def _made(best: Candidate, corpus: Corpus, taken: set[str]) -> Learned | None:
     written = function(name_of(kinds, taken), best.group, made, draws)
     counts = (count for kind, unit in zip(kinds, units, strict=True) for count in _counts(kind, unit))
     numbers = {name: float(each.row @ typical.values) for name, each in zip(made.names, made.chosen, strict=True)}
-    lines = _lines(kinds[0], units[0]) if kinds[0].grid else {}
     arguments: list[tuple[str, float]] = []
     for name, default in written.parameters:
-        if name in lines:
-            value = float(lines[name])
-        else:
-            value = round(numbers[name], 2) + 0.0 if name in numbers else float(next(counts))
+        value = round(numbers[name], 2) + 0.0 if name in numbers else float(next(counts))
         if not isinstance(default, float) or abs(value - default) > NEAR:
             arguments.append((name, value))
     role = "" if kinds[0].word else units[0].forms[0].kind.word
@@ -128,18 +157,8 @@ def _made(best: Candidate, corpus: Corpus, taken: set[str]) -> Learned | None:
 
 
 def _counts(kind: Kind, unit: Unit) -> Iterator[int]:
-    """The counts of a block that are no parameters by themselves: of its steps, then of its rows."""
-    counts = _form(kind, unit).counts
-    if kind.steps and not kind.grid:
-        yield counts[-1]
-    yield from (count for (_, way), count in zip(kind.repeats, counts, strict=False) if way == "row")
-
-
-def _lines(kind: Kind, unit: Unit) -> dict[str, int]:
-    """How many copies a grid has along each axis, by the parameters that say so."""
-    counts = _form(kind, unit).counts
-    lines = {LINES[axis]: count for (axis, _), count in zip(kind.repeats, counts, strict=False)}
-    return lines | ({"steps": counts[-1]} if kind.steps else {})
+    """The counts of the rows of a block."""
+    yield from (count for (_, way), count in zip(kind.repeats, _form(kind, unit).counts, strict=True) if way == "row")
 
 
 def _form(kind: Kind, unit: Unit) -> Block:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 
+from shapeprog.language.ast import Assignment, Call, Draw, Function, Group, Line, Loop, Part, body_of, values
 from shapeprog.language.expression import Binary, Expression, Negative, Value
+from shapeprog.language.printer import source_of
 from shapeprog.language.program import Program
-from shapeprog.language.source import Call, Comment, Function, Line, WrittenDraw, WrittenLoop
 from shapeprog.language.statement import language
-from shapeprog.language.text import source_of
 
 STATEMENT = 50
 """Numbers or names that a statement, loop or call is worth: a line of its own, and a thing to keep in mind; from 30 on
@@ -22,7 +22,7 @@ def statements(program: Program) -> int:
 
 def written(lines: Iterable[Line]) -> int:
     """How many statements, loops and calls are among some lines and in their loops, apart from those in functions."""
-    return sum(isinstance(line, WrittenDraw | WrittenLoop | Call) for line in outside(lines))
+    return sum(isinstance(line, Draw | Loop | Part | Group | Call) for line in outside(lines))
 
 
 def length(lines: Iterable[Line]) -> int:
@@ -30,18 +30,14 @@ def length(lines: Iterable[Line]) -> int:
     found = 0
     for line in lines:
         match line:
-            case WrittenDraw():
-                found += STATEMENT + _written(line)
-            case WrittenLoop():
-                found += STATEMENT + _written(line) + length(line.body)
-            case Call():
-                found += STATEMENT + sum(terms(value) for _, value in line.arguments)
+            case Draw() | Loop():
+                found += STATEMENT + _written(line) + length(body_of(line))
             case Function():
                 found += STATEMENT + len(line.parameters) + length(line.body)
-            case Comment():
-                pass
-            case _:
-                found += sum(terms(value) for _, value in line.numbers)
+            case Part() | Group() | Call():
+                found += STATEMENT + sum(map(terms, values(line))) + length(body_of(line))
+            case Assignment():
+                found += sum(map(terms, values(line)))
     return found
 
 
@@ -55,7 +51,7 @@ def terms(value: Value) -> int:
     return 1
 
 
-def _written(line: WrittenDraw | WrittenLoop) -> int:
+def _written(line: Draw | Loop) -> int:
     found = 0
     for parameter in language()[line.name].parameters:
         values = line.values[parameter.slots]
@@ -66,9 +62,8 @@ def _written(line: WrittenDraw | WrittenLoop) -> int:
 
 
 def outside(lines: Iterable[Line]) -> Iterator[Line]:
-    """Every line apart from functions and what is in them, the lines in loops included."""
+    """Every line apart from functions and what is in them, the lines in loops and groups included."""
     for line in lines:
         if not isinstance(line, Function):
             yield line
-            if isinstance(line, WrittenLoop):
-                yield from outside(line.body)
+            yield from outside(body_of(line))

@@ -19,11 +19,11 @@ import numpy.typing as npt
 
 from shapeprog.errors import ShapeProgError
 from shapeprog.independence import independent
-from shapeprog.language.counts import Counts
-from shapeprog.language.evaluation import expanded, symbolic
+from shapeprog.language.ast import Assignment, Call, Function, Source
+from shapeprog.language.dimensions import Counts
+from shapeprog.language.evaluate import expanded, symbolic
 from shapeprog.language.expression import Linear, Name, Value, combined, value_at
 from shapeprog.language.program import Program
-from shapeprog.language.source import Assignment, Call, Function, Source
 from shapeprog.library.blocks import Block, Kind, blocks_of
 from shapeprog.library.length import terms, written
 from shapeprog.space import FloatArray
@@ -171,7 +171,7 @@ def forms(
     Each comes in several ways: with mirror images as rows of two along these axes wherever they are the same.
     """
     chains = Program(expanded(source)).chains
-    parts = [part for node in symbolic(source, given) for part in node.chains()]
+    parts = Program(symbolic(source, given)).chains
     for chain, part in zip(chains, parts, strict=True):
         numbers = [_linear(value) for node in part for value in node.values]
         factors = np.array([[dict(each.factors).get(name, 0.0) for name in names] for each in numbers])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -15,9 +15,6 @@ from shapeprog.space import DEPTH, SIDE, UP, FloatArray
 EXTENTS = ("height", "depth", "width")
 LOW = ("bottom", "front", "left")
 AXIS = ("up", "depth", "side")
-LINES = ("levels", "rows", "columns")
-SPACINGS = ("level_spacing", "row_spacing", "column_spacing")
-STEPS = ("step_up", "step_back", "step_aside")
 
 THIN = 0.6
 """A solid is thin along an axis where it measures less than this share of the next longer."""
@@ -25,7 +22,13 @@ THIN = 0.6
 CHOSEN = 2.5
 """Price up to which a place is a side of a whole block; dearer ones are of single copies, or ends of rods."""
 
-Sort = Literal["length", "place", "middle", "angle", "spacing", "step"]
+SIDES_OF = (("bottom", "top"), ("front", "rear"), ("right", "left"))
+"""The low and the high side of a box along each axis of the grid."""
+
+LEAST_EXTENT = 0.1
+"""Cells that the box of a group measures along each axis, at least."""
+
+Sort = Literal["length", "place", "middle", "angle"]
 
 
 class Group(NamedTuple):
@@ -42,7 +45,7 @@ class Group(NamedTuple):
     @property
     def counts(self) -> int:
         """How many of their repetitions have a count that is open."""
-        return sum((kind.steps and not kind.grid) + sum(way == "row" for _, way in kind.repeats) for kind in self.kinds)
+        return sum(way == "row" for kind in self.kinds for _, way in kind.repeats)
 
 
 class Measure(NamedTuple):
@@ -61,7 +64,7 @@ class Measure(NamedTuple):
     @property
     def opening(self) -> bool:
         """Whether it may be an argument that need not be said."""
-        return self.sort in ("angle", "spacing", "step") or (self.sort == "middle" and self.axis != UP)
+        return self.sort == "angle" or (self.sort == "middle" and self.axis != UP)
 
 
 def measures(group: Group, typical: FloatArray) -> Iterator[Measure]:
@@ -75,6 +78,93 @@ def measures(group: Group, typical: FloatArray) -> Iterator[Measure]:
             _boxed(kind, slots, own, values) if kind.boxed else _pointed(kind, slots, own, values)
         ):
             yield Measure(block, word, sort, axis, row, price)
+
+
+def boxes_of(group: Group, typical: FloatArray) -> Iterator[FloatArray]:
+    """The boxes of a group as rows (6, M): their low corner, then their extents, if these are more than nothing.
+
+    Which sides of which blocks are the sides of a box follows from ``typical`` (M,), the numbers in one program.  Parts
+    between points count by these points along their direction and where they are mirrored; elsewhere by their thickness
+    at the start, so that they may lean either way, or by their points as well.
+    """
+    unique = {box.tobytes(): box for leaning in (True, False) if (box := _box(group, typical, leaning)) is not None}
+    yield from unique.values()
+
+
+def _box(group: Group, typical: FloatArray, leaning: bool) -> FloatArray | None:
+    lows: list[list[FloatArray]] = [[], [], []]
+    highs: list[list[FloatArray]] = [[], [], []]
+    start, unit = 0, np.eye(group.size)
+    for kind, slots in zip(group.kinds, group.slots, strict=True):
+        own, first = unit[start : start + len(slots)], len(slots) - kind.spans
+        start += len(slots)
+        spans = {axis: own[place] for place, (axis, _) in enumerate(kind.repeats, first)}
+        mirrored = {axis for axis, way in kind.repeats if way == "mirror"}
+        across = _across(kind, slots, own, own @ typical) if leaning else {}
+        for row, slot in zip(own[:first], slots[:first], strict=True):
+            if slot.kind != "position":
+                continue
+            axis = slot.axis
+            if axis in across and axis not in mirrored and axis not in spans:
+                ends = [row - across[axis] / 2, row + across[axis] / 2] if slot.word == "start" else []
+                lows[axis] += ends
+                highs[axis] += ends
+                continue
+            sizes = [size for size, other in zip(own, slots, strict=True) if other == ("size", "length", axis)]
+            ends = [row, *(row + size for size in sizes)]
+            if axis in mirrored:
+                ends += [2 * spans[axis] - end for end in ends]
+            elif axis in spans:
+                ends = [row, row + spans[axis]]
+            lows[axis] += ends
+            highs[axis] += ends
+    low = [min(rows, key=lambda row: row @ typical) for rows in lows]
+    high = [max(rows, key=lambda row: row @ typical) for rows in highs]
+    box = np.array([*low, *(b - a for a, b in zip(low, high, strict=True))])
+    return box if min(box[3:] @ typical) >= LEAST_EXTENT and np.linalg.matrix_rank(box) == 6 else None
+
+
+def _across(kind: Kind, slots: Sequence[Slot], own: FloatArray, values: FloatArray) -> dict[int, FloatArray]:
+    """The thickness of a part between two points along the axes across its direction."""
+    across = sorted({UP, *_leaning(slots, values)} if _leaning(slots, values) != {DEPTH, SIDE} else {DEPTH, SIDE})
+    thick = [row for slot, row in zip(slots, own, strict=True) if slot.word in ("section", "radius")]
+    if not thick or not _leaning(slots, values):
+        return {}
+    return {axis: thick[place] if kind.shape == "bar" else 2 * thick[0] for place, axis in enumerate(across)}
+
+
+def _leaning(slots: Sequence[Slot], values: FloatArray) -> set[int]:
+    """The horizontal axes across the direction of a part between two points; none of other parts."""
+    ends = {(slot.word, slot.axis): value for slot, value in zip(slots, values, strict=False)}
+    if ("end", UP) not in ends or ("through", UP) in ends:
+        return set()
+    along = max(range(3), key=lambda axis: abs(ends["end", axis] - ends["start", axis]))
+    return {DEPTH, SIDE} - {along}
+
+
+def within_box(known: Iterable[Measure], box: FloatArray) -> Iterator[Measure]:
+    """Measures with places told from the low and the high side of a box (6, M)."""
+    for each in known:
+        if each.sort not in ("place", "middle"):
+            yield each
+            continue
+        low, size = box[each.axis], box[3 + each.axis]
+        end = f"{each.word.partition('_at_')[0]}_" if "_at_" in each.word else ""
+        near, far = SIDES_OF[each.axis]
+        yield each._replace(word=f"{end}{near}", row=each.row - low)
+        yield each._replace(word=f"{end}{far}", row=low + size - each.row, price=each.price + 0.1)
+
+
+def moved(group: Group) -> FloatArray:
+    """How the numbers of a group change where it moves by one cell along each axis: (3, M)."""
+    slots = [slot for each in group.slots for slot in each]
+    return np.array(
+        [
+            [slot.axis == axis and (slot.kind == "position" or slot.word == "plane") for slot in slots]
+            for axis in range(3)
+        ],
+        np.float64,
+    )
 
 
 def relations(known: Sequence[Measure]) -> list[FloatArray]:
@@ -110,26 +200,15 @@ def _boxed(kind: Kind, slots: Sequence[Slot], own: FloatArray, values: FloatArra
     flat = bool(sizes[thin] < THIN * np.sort(sizes)[1])
     for axis in range(3):
         low, size, word = own[axis], own[3 + axis], EXTENTS[axis]
-        if kind.steps:
-            yield STEPS[axis], "step", axis, own[axis - 3], 0.5
         span = own[repeats[axis]] if axis in repeats else size
-        if axis in repeats and not kind.grid:
+        if axis in repeats:
             yield word, "length", axis, span, 0.0
             word = f"each_{word}"
         if kind.shape == "cylinder" and axis != UP:
             word = "diameter"
-        elif flat and axis == thin and not kind.grid:
+        elif flat and axis == thin:
             word = "thickness"
         yield word, "length", axis, size, 1.0 + 0.1 * axis
-        if kind.grid:
-            if axis in repeats:
-                yield SPACINGS[axis], "spacing", axis, own[repeats[axis]], 0.5
-            yield (
-                (LOW[axis], "place", axis, low, 2.0)
-                if axis == UP
-                else (f"middle_{AXIS[axis]}", "middle", axis, low, 2.0)
-            )
-            continue
         yield LOW[axis], "place", axis, low, 2.0
         yield f"middle_{AXIS[axis]}", "middle", axis, low + span / 2, 4.0
         yield f"{LOW[axis]}_end", "place", axis, low + span, 5.0
@@ -167,17 +246,16 @@ def _pointed(kind: Kind, slots: Sequence[Slot], own: FloatArray, values: FloatAr
             yield word, "length", slot.axis, row, 1.0
         else:
             yield slot.word, "angle", -1, row, 1.0
+    ends = {(slot.word, slot.axis): row for slot, row in zip(slots, own, strict=False)}
+    for axis in _leaning(slots, values) - planes.keys():
+        yield "lean" if axis == DEPTH else "shift", "angle", axis, ends["end", axis] - ends["start", axis], 1.2
     if heights.keys() >= {"start", "end"}:
         yield "height" if rising else "rise", "length", UP, heights["end"] - heights["start"], 1.5
     for place, (axis, way) in enumerate(kind.repeats, first):
         if way == "mirror":
             yield f"middle_{AXIS[axis]}", "middle", axis, own[place], 4.0
-        elif way == "grid":
-            yield SPACINGS[axis], "spacing", axis, own[place], 0.5
         else:
             yield EXTENTS[axis], "length", axis, own[place], 0.5
-    for axis in range(3 * kind.steps):
-        yield STEPS[axis], "step", axis, own[axis - 3], 0.5
 
 
 def _rises(slots: Sequence[Slot], values: FloatArray) -> bool:

@@ -9,25 +9,25 @@ from typing import NamedTuple
 import numpy as np
 
 from shapeprog.errors import ShapeProgError
-from shapeprog.language.converting import in_unit
-from shapeprog.language.counts import Counts
-from shapeprog.language.evaluation import evaluated
-from shapeprog.language.expression import Expression, Linear, Name, Value
-from shapeprog.language.merging import apart, merged
-from shapeprog.language.program import Program
-from shapeprog.language.source import (
+from shapeprog.language.ast import (
     Assignment,
     Call,
     Comment,
+    Draw,
     Function,
     Line,
+    Loop,
     Source,
-    WrittenDraw,
-    WrittenLoop,
     names_of,
     values,
 )
-from shapeprog.language.text import source_of
+from shapeprog.language.convert import in_cells, placed_if_possible
+from shapeprog.language.dimensions import Counts, in_unit
+from shapeprog.language.evaluate import evaluated
+from shapeprog.language.expression import Expression, Linear, Name, Value
+from shapeprog.language.merging import apart, merged
+from shapeprog.language.printer import source_of
+from shapeprog.language.program import Program
 from shapeprog.library.blocks import ROWS
 from shapeprog.library.length import length, outside, statements, written
 from shapeprog.library.matching import TOLERANCE, Form, Match, Matcher, Pattern, Sums, forms
@@ -44,6 +44,8 @@ def with_library(program: Program, library: Library) -> Program:
     It draws the same within ``TOLERANCE`` cells.  The functions that it calls stand in it, below the numbers that it
     names; ties are kept, as arguments are expressions of its names.  Its lengths stay in their unit.
     """
+    if program.source is not None and program.source.placed:
+        return _placed_with(program, library)
     if program.unit is not None:
         try:
             plain = in_unit(program, None)
@@ -56,6 +58,32 @@ def with_library(program: Program, library: Library) -> Program:
         return program
     found = merged(_rewritten(_apart(program), chosen, library.functions))
     return found if statements(found) < statements(merged(program)) else program
+
+
+def _placed_with(program: Program, library: Library) -> Program:
+    """A placed program with those calls that make its own text shorter: loops may be shared by several parts."""
+    cells = in_cells(program)
+    try:
+        cells = cells if cells.unit is None else in_unit(cells, None)
+    except ShapeProgError:  # one of its names is a length in one place only
+        return program
+    source, chosen = _apart(cells), offers(cells, library)
+
+    def written_with(some: Sequence[Offer]) -> tuple[float, Program]:
+        found = placed_if_possible(merged(_rewritten(source, some, library.functions))) if some else program
+        shorter = [line for line in source_of(found).lines if not isinstance(line, Function)]
+        return length(shorter) if source_of(found).placed else np.inf, found
+
+    best = written_with(chosen)
+    for offer in reversed(chosen):
+        fewer = [each for each in chosen if each is not offer]
+        other = written_with(fewer)
+        if other[0] <= best[0]:
+            chosen, best = fewer, other
+    if statements(best[1]) >= statements(program):
+        return program
+    own, found = source_of(program), source_of(in_unit(best[1], program.unit))
+    return evaluated(replace(found, unit=own.unit, scale=own.scale))
 
 
 def _apart(program: Program) -> Source:
@@ -74,7 +102,7 @@ class Offer(NamedTuple):
     gain: float
     call: Call
     lines: tuple[int, ...]
-    around: tuple[WrittenLoop, ...]
+    around: tuple[Loop, ...]
 
 
 def offers(program: Program, library: Library) -> list[Offer]:
@@ -90,7 +118,7 @@ def offers(program: Program, library: Library) -> list[Offer]:
     return _chosen(source, usable)
 
 
-def matchers_of(source: Source) -> Iterator[tuple[Matcher, tuple[WrittenLoop, ...]]]:
+def matchers_of(source: Source) -> Iterator[tuple[Matcher, tuple[Loop, ...]]]:
     """The blocks of a program that calls may replace: of all its lines, then of what equal loops have inside of them.
 
     With each come the loops that stay around, without bodies.  None if its numbers are not linear in its names.
@@ -100,24 +128,22 @@ def matchers_of(source: Source) -> Iterator[tuple[Matcher, tuple[WrittenLoop, ..
     given = {name: Linear.of(name) for name in free}
     numbers = np.array([plain[name] for name in free])
 
-    def of(
-        lines: Sequence[tuple[int, Line]], *around: WrittenLoop
-    ) -> Iterator[tuple[Matcher, tuple[WrittenLoop, ...]]]:
+    def of(lines: Sequence[tuple[int, Line]], *around: Loop) -> Iterator[tuple[Matcher, tuple[Loop, ...]]]:
         found: list[list[Form]] = [[] for _ in ROWS]
         units: list[int] = []
-        inner: dict[WrittenLoop, list[tuple[int, Line]]] = {}
+        inner: dict[Loop, list[tuple[int, Line]]] = {}
         for number, line in lines:
-            if isinstance(line, WrittenDraw | WrittenLoop):
+            if isinstance(line, Draw | Loop):
                 for read in forms(Source((*named, line)), given, free, ROWS):
                     units.append(number)
                     for some, form in zip(found, read, strict=True):
                         some.append(form)
-            if isinstance(line, WrittenLoop) and len(line.body) == 1:
+            if isinstance(line, Loop) and len(line.body) == 1:
                 inner.setdefault(replace(line, body=(), note=""), []).append((number, line.body[0]))
         for some in {tuple(form.block.kind for form in some): some for some in found}.values():
             yield Matcher(some, units, numbers, sums), around
         for loop, within_it in inner.items():
-            if len(within_it) > 1 or isinstance(within_it[0][1], WrittenLoop):
+            if len(within_it) > 1 or isinstance(within_it[0][1], Loop):
                 yield from of(within_it, *around, loop)
 
     try:
@@ -191,7 +217,7 @@ def _counted(source: Source, lines: Sequence[Line], pattern: Pattern, match: Mat
     Steps that follow from such a count are as they are there: more copies share the same span.
     """
     plain = _plain(source)
-    loops = [line for line in Source(tuple(lines)).walk() if isinstance(line, WrittenLoop)]
+    loops = [line for line in Source(tuple(lines)).walk() if isinstance(line, Loop)]
     counts = {
         plain[count.name]: count
         for count in (loop.values[0] for loop in loops)
@@ -204,7 +230,7 @@ def _counted(source: Source, lines: Sequence[Line], pattern: Pattern, match: Mat
     ]  # fmt: skip
     shifts = {
         name.name
-        for line in Source(pattern.function.body).walk() if isinstance(line, WrittenLoop)
+        for line in Source(pattern.function.body).walk() if isinstance(line, Loop)
         for value in line.values[1:] if isinstance(value, Expression)
         for name in value.names()
     }  # fmt: skip
@@ -225,7 +251,7 @@ def _counted(source: Source, lines: Sequence[Line], pattern: Pattern, match: Mat
         yield word, next(same, value)
 
 
-def within(around: Sequence[WrittenLoop], line: Line) -> Line:
+def within(around: Sequence[Loop], line: Line) -> Line:
     """A line in some loops, the outermost of which comes first."""
     for loop in reversed(around):
         line = replace(loop, body=(line,))

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
 from shapeprog.errors import InputError, OutputError, ShapeProgError
 from shapeprog.files import write_text
 from shapeprog.formats.files import load
+from shapeprog.language.ast import Assignment, Call, Comment, Function, Source
+from shapeprog.language.convert import function_in_cells
+from shapeprog.language.parser import parse
+from shapeprog.language.placement import BOX_IN_CELLS, SIZES
+from shapeprog.language.printer import format_source, source_of
 from shapeprog.language.program import Program
-from shapeprog.language.source import Assignment, Call, Comment, Function, Source
-from shapeprog.language.text import format_source, parse, source_of
 from shapeprog.library.matching import Pattern
 
 DEFAULT = Path(__file__).parent / "furniture.shape"
@@ -31,10 +34,19 @@ class Library:
 
     source: Source
 
-    @property
+    @cached_property
     def functions(self) -> tuple[Function, ...]:
-        """The functions, in the order of the text."""
-        return tuple(line for line in self.source.lines if isinstance(line, Function))
+        """The functions in cells, in the order of the text; those of placed text have their box as parameters."""
+        functions = tuple(self.source.functions.values())
+        if not self.placed:
+            return functions
+        shown = {name: dict(call.arguments) for name, call in self.examples.items()}
+        return tuple(function_in_cells(self.source, each.name, shown.get(each.name, {})) for each in functions)
+
+    @property
+    def placed(self) -> bool:
+        """Whether its functions are placed; the first line of the text then gives any size of a whole."""
+        return self.source.placed
 
     @cached_property
     def comments(self) -> dict[str, tuple[str, ...]]:
@@ -52,14 +64,23 @@ class Library:
     def examples(self) -> dict[str, Call]:
         """Calls of functions that the comment right above them shows as its last line."""
         found = {}
-        for function in self.functions:
+        above = replace(self.source, lines=tuple(each for each in self.source.lines if not isinstance(each, Comment)))
+        for function in self.source.functions.values():
             text = (self.comments[function.name] or ("",))[-1]
             try:
-                shown = source_of(parse(format_source(Source(self.functions)) + text)).lines[-1]
+                shown = source_of(parse(format_source(above) + text)).lines[-1]
             except ShapeProgError:  # it is an ordinary comment
                 continue
-            if isinstance(shown, Call) and shown.name == function.name:
-                found[function.name] = shown
+            if not isinstance(shown, Call) or shown.name != function.name:
+                continue
+            if self.placed:
+                given = dict(shown.arguments)
+                if not given.keys() >= {*SIZES} or not all(isinstance(given[size], float) for size in SIZES):
+                    continue
+                low = {"bottom": 0.0, "front": -given["depth"] / 2, "left": -given["width"] / 2}
+                pairs = {word: (low | given)[word] for word in BOX_IN_CELLS} | given
+                shown = replace(shown, arguments=tuple(pairs.items()))
+            found[function.name] = shown
         return found
 
     @cached_property
@@ -89,10 +110,12 @@ def library_of(program: Program, name: str = "<library>") -> Library:
     """The library that is a program of functions alone; an ``InputError`` if it is none."""
     source = source_of(program)
     more = next((line for line in source.lines if not isinstance(line, Comment | Function)), None)
+    if source.placed and isinstance(more, Assignment) and {*SIZES} == source.numbers.keys():
+        more = next((line for line in source.lines if not isinstance(line, Assignment | Comment | Function)), None)
     if more is not None:
         what = "numbers of its own" if isinstance(more, Assignment) else "statements outside of functions"
         raise InputError(f"{name} is not a library: it has {what}", "a library holds only functions")
-    if source.unit is not None:
+    if source.unit is not None and source.unit.name:
         said = f"{name} is not a library: its lengths are in {source.unit.name} of one object"
         raise InputError(said, "write them in cells, and leave out the line '# unit:'; programs may be in any unit")
     if not source.functions:

@@ -21,7 +21,9 @@ SOLIDS = {
 PLACES = {
     ((2, "pair"),): "left_and_right", ((1, "pair"),): "front_and_rear", ((0, "pair"),): "below_and_above",
     ((2, "row"),): "left_to_right", ((1, "row"),): "front_to_rear", ((0, "row"),): "stack",
-    ((1, "pair"), (2, "pair")): "four",
+    ((1, "pair"), (2, "pair")): "four", ((0, "row"), (2, "pair")): "stacked_pairs",
+    ((0, "row"), (2, "row")): "lattice", ((0, "row"), (1, "pair"), (2, "pair")): "stacked_fours",
+    ((1, "row"), (2, "pair")): "pairs_to_rear", ((1, "pair"), (2, "row")): "pairs_to_left",
 }  # fmt: skip
 """How copies lie, by the axes along which they are repeated."""
 
@@ -50,18 +52,6 @@ def name_of(kinds: Sequence[Kind], taken: Collection[str]) -> str:
 
 def _one(kind: Kind) -> Iterator[str]:
     solids = SOLIDS.get(kind.shape, plural(kind.shape))
-    if kind.grid:
-        images = tuple((axis, "pair") for axis, way in kind.repeats if way == "mirror")
-        place = PLACES.get(images, "") if images else ""
-        yield (
-            _joined(place, LOOKS.get(kind.shape, ""), plural(kind.word))
-            if kind.word
-            else _joined(place, solids or "boxes")
-        )
-        return
-    if kind.steps:
-        yield f"{plural(kind.word) if kind.word else solids or 'boxes'}_in_steps"
-        return
     ways = tuple((axis, "pair" if way == "mirror" else way) for axis, way in kind.repeats)
     place = PLACES.get(ways, "several")
     if kind.word:

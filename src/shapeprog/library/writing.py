@@ -7,18 +7,16 @@ from typing import NamedTuple
 
 import numpy as np
 
+from shapeprog.language.ast import Draw, Function, Line, Loop, Source, values
 from shapeprog.language.expression import Binary, Expression, Name, Value, combined
-from shapeprog.language.source import Function, Line, Source, WrittenDraw, WrittenLoop, values
+from shapeprog.language.placement import BOX_IN_CELLS, RESERVED
 from shapeprog.language.statement import language
-from shapeprog.library.blocks import Kind, solid_of
-from shapeprog.library.measures import LINES, SPACINGS, STEPS, Group, Measure, measures
-from shapeprog.space import DEPTH, SIDE, UP, FloatArray
+from shapeprog.library.blocks import PAIR, Kind, solid_of
+from shapeprog.library.measures import Group, Measure, measures, within_box
+from shapeprog.space import FloatArray
 
 SAME = 1e-6
 """Difference below which factors are the same."""
-
-ORDER = ("bottom", "height", "rise", "front", "depth", "left", "width")
-"""Parameters in the order in which they are given, after counts; all others follow."""
 
 
 class Basis(NamedTuple):
@@ -33,15 +31,16 @@ class Basis(NamedTuple):
     openings: int
 
 
-def basis(group: Group, typical: FloatArray, rows: FloatArray, openings: FloatArray) -> Basis | None:
+def basis(group: Group, box: FloatArray, typical: FloatArray, rows: FloatArray, openings: FloatArray) -> Basis | None:
     """The cheapest measures that tell a group for which relations (R, M) hold; none if sums of them are no simple ones.
 
-    ``openings`` (U, M) are among them.
+    The sides of its ``box`` (6, M) come first, ``openings`` (U, M) last.
     """
-    every = sorted(measures(group, typical), key=lambda each: (each.price, each.block))
+    every = sorted(within_box(measures(group, typical), box), key=lambda each: (each.price, each.block))
+    sides = [Measure(0, word, "length", -1, row, 0.0) for word, row in zip(BOX_IN_CELLS, box, strict=True)]
     last = [next(each for each in every if np.array_equal(each.row, row)) for row in openings]
-    stack, chosen = list(rows), []
-    for each in [*last, *every]:
+    stack, chosen = list(rows), list[Measure]()
+    for each in [*sides, *last, *every]:
         if len(stack) < group.size and np.linalg.matrix_rank([*stack, each.row], tol=SAME) > len(stack):
             stack.append(each.row)
             chosen.append(each)
@@ -51,10 +50,7 @@ def basis(group: Group, typical: FloatArray, rows: FloatArray, openings: FloatAr
     near = np.round(factors * 4) / 4
     if np.abs(factors - near).max(initial=0) > SAME:
         return None
-    order = sorted(
-        range(len(chosen)),
-        key=lambda k: (k < len(last), chosen[k].sort == "step", _rank(chosen[k].word), chosen[k].block, k),
-    )
+    order = sorted(range(len(chosen)), key=lambda k: (k >= 6, 6 <= k < 6 + len(last), chosen[k].block, k))
     ordered = tuple(chosen[k] for k in order)
     return Basis(ordered, _names(group, ordered), near[:, order] + 0.0, len(last))
 
@@ -74,54 +70,29 @@ def function(name: str, group: Group, made: Basis, draws: Sequence[tuple[str, st
         if isinstance(value, Expression) for name in value.names()
     }  # fmt: skip
     said = len(made.names) - made.openings
-    parameters: list[tuple[str, float | None]] = []
-    for place, word in enumerate(made.names):
-        if word in SPACINGS:  # how often something is repeated, and how far apart
-            parameters.append((LINES[SPACINGS.index(word)], 1.0))
-        if word in STEPS and group.kinds[0].grid and not any(name == "steps" for name, _ in parameters):
-            parameters.append(("steps", 1.0))
-        if word in used:
-            parameters.append((word, None if place < said else 0.0))
-    return Function(name, (*((count, None) for count in counts), *parameters), tuple(lines))
+    box: list[tuple[str, float | None]] = [(word, None) for word in BOX_IN_CELLS]
+    needed = [(word, None) for k, word in enumerate(made.names) if len(box) <= k < said and word in used]
+    others = [(word, 0.0) for k, word in enumerate(made.names) if k >= said and word in used]
+    parameters = (*box, *needed, *((count, PAIR) for count in counts), *others)
+    return Function(name, parameters, tuple(lines), box=True)
 
 
 def _block(
     kind: Kind, own: FloatArray, names: Sequence[str], counts: Iterator[str], statement: str, role: str
-) -> WrittenDraw | WrittenLoop:
+) -> Draw | Loop:
     """The lines of one block whose numbers follow from the parameters by ``own`` (M, P)."""
     solid = solid_of(statement)
     first = len(own) - kind.spans
     base = own[:first].copy()
     place = np.round(np.linalg.pinv(solid.rows[:, :-1]), 9)  # which leaves traces where it has zeros
-    before: dict[int, list[tuple[Value, float]]] = {}
     mirrors: list[tuple[str, tuple[Value, ...]]] = []
     loops: list[tuple[str, tuple[Value, ...]]] = []
 
-    def starts_before(axis: int, count: Name, step: Value) -> None:
-        """What copies on either side of the middle take away from where the first begins."""
-        slot = int(np.flatnonzero(place[:, axis])[0])
-        before.setdefault(slot, []).append(((count - 1.0) * step, -0.5))
-
-    if kind.grid and solid.boxed:
-        base[1:3] -= own[4:6] / 2  # of the middle
-    if kind.steps:
-        times = Name("steps") if kind.grid else Name(next(counts))
-        steps = [_sum(row, names) for row in own[-3:]]
-        loops.append(("translate", (times, *steps)))
-        for axis in (DEPTH, SIDE) if kind.grid and solid.boxed else ():
-            if isinstance(steps[axis], Expression):
-                starts_before(axis, times, steps[axis])
     for (axis, way), span in zip(kind.repeats, own[first:], strict=False):
         if way == "mirror":
             mirrors.append(("mirror", (2.0, float(axis), _sum(span, names))))
             continue
         shift: list[Value] = [0.0, 0.0, 0.0]
-        if way == "grid":
-            count, shift[axis] = Name(LINES[axis]), _sum(span, names)
-            loops.append(("translate", (count, *shift)))
-            if solid.boxed and axis != UP:
-                starts_before(axis, count, shift[axis])
-            continue
         reach = span - own[3 + axis] if solid.boxed else span
         middle = own[axis] + span / 2
         if way == "pair" and (not middle.any() or np.array_equal(np.sort(middle)[::-1], np.eye(len(middle))[0])):
@@ -132,15 +103,11 @@ def _block(
             step = _sum(reach, names)
             shift[axis] = Binary("/", step, number - 1.0) if isinstance(number, Name) else step
             loops.append(("translate", (number, *shift)))
-    numbers = [_sum(row, names, *before.get(slot, ())) for slot, row in enumerate(place @ base)]
-    line: WrittenDraw | WrittenLoop = WrittenDraw(statement, tuple(numbers), role)
+    numbers = [_sum(row, names) for row in place @ base]
+    line: Draw | Loop = Draw(statement, tuple(numbers), role)
     for loop, given in reversed([*mirrors, *loops]):
-        line = WrittenLoop(loop, given, (line,))
+        line = Loop(loop, given, (line,))
     return line
-
-
-def _rank(word: str) -> int:
-    return ORDER.index(word) if word in ORDER else len(ORDER)
 
 
 def _names(group: Group, chosen: Sequence[Measure]) -> tuple[str, ...]:
@@ -148,15 +115,14 @@ def _names(group: Group, chosen: Sequence[Measure]) -> tuple[str, ...]:
     words = [each.word.removesuffix("_end") for each in chosen]
     for place, word in enumerate(words):
         stem = word.removeprefix("bottom_")
-        if stem != word and f"upper_{stem}" not in words and stem not in words:
+        if stem != word and f"upper_{stem}" not in words and stem not in words and stem not in RESERVED:
             words[place] = stem  # it is the same above
-    if sum(word.startswith("middle_") for word in words) == 1:
-        words = ["middle" if word.startswith("middle_") else word for word in words]
     known = language()
-    taken = {*known.names, *known.roles}
-    names: list[str] = []
-    for each, word in zip(chosen, words, strict=True):
-        base = f"{group.kinds[each.block].word}_{word}" if words.count(word) > 1 and len(group.kinds) > 1 else word
+    names = [*BOX_IN_CELLS]
+    taken = {*known.names, *known.roles, *RESERVED, "tilt"}
+    for each, word in zip(chosen[6:], words[6:], strict=True):
+        own = word in RESERVED or (words.count(word) > 1 and len(group.kinds) > 1)
+        base = f"{group.kinds[each.block].word or 'part'}_{word}" if own else word
         name, number = base, 2
         while name in taken:
             name, number = f"{base}_{number}", number + 1
@@ -165,6 +131,6 @@ def _names(group: Group, chosen: Sequence[Measure]) -> tuple[str, ...]:
     return tuple(names)
 
 
-def _sum(row: FloatArray, names: Sequence[str], *more: tuple[Value, float]) -> Value:
+def _sum(row: FloatArray, names: Sequence[str]) -> Value:
     parts = [(Name(name), float(factor)) for name, factor in zip(names, np.round(row, 6) + 0.0, strict=True) if factor]
-    return combined(0.0, [*sorted(parts, key=lambda part: part[1] < 0), *more])
+    return combined(0.0, [*sorted(parts, key=lambda part: part[1] < 0)])

@@ -3,26 +3,25 @@
 from __future__ import annotations
 
 import math
-from collections import defaultdict
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
-from shapeprog.language.expression import Value, with_numbers
-from shapeprog.language.program import Program
-from shapeprog.language.source import (
+from shapeprog.language.ast import (
     Assignment,
     Call,
     Comment,
-    Function,
+    Draw,
+    Group,
     Line,
-    Source,
-    WrittenDraw,
-    WrittenLoop,
+    Part,
+    changed_lines,
     values,
     with_values,
 )
+from shapeprog.language.evaluate import provenance
+from shapeprog.language.expression import Name, Value, replaced
+from shapeprog.language.printer import printed, source_of
+from shapeprog.language.program import Program
 from shapeprog.language.statement import language
-from shapeprog.language.text import format_source, source_of
 from shapeprog.language.unit import Unit
 
 DIGITS = 2
@@ -30,37 +29,47 @@ DIGITS = 2
 
 
 @dataclass(frozen=True)
-class Shown:
-    """One line of program text.
+class Row:
+    """One row of program text.
 
     Parameters
     ----------
     text
         As printed.
     word
-        The role, statement, loop or function on it; empty if there is none.
+        The role, statement, loop, group or function on it; empty if there is none.
     statement
-        The id of that role or statement if it draws, else None.
+        The id of the role or statement in whose colour it is shown if it draws, else None.
     blocks
         Indices, from 0, of the drawing statements of the expanded program that it draws or repeats.
     """
 
     text: str
-    word: str
-    statement: int | None
-    blocks: tuple[int, ...]
+    word: str = ""
+    statement: int | None = None
+    blocks: tuple[int, ...] = ()
 
 
-def listing(program: Program, digits: int | None = DIGITS) -> list[Shown]:
-    """The lines of a program, with numbers rounded for reading unless ``digits`` is None."""
-    source = source_of(program)
+def listing(program: Program, digits: int | None = DIGITS) -> list[Row]:
+    """The rows of the text of a program, with numbers rounded for reading unless ``digits`` is None."""
+    source, shown = source_of(program), source_of(program)
     if digits is not None:
-        kept = digits_in(source.unit, digits)
-        source = replace(source, lines=tuple(_rounded(line, kept) for line in source.lines))
-    drawn = _Drawn(source)
-    texts = iter(format_source(source).splitlines())
-    head = [] if source.unit is None else [Shown(next(texts), "", None, ())]
-    return [*head, *_shown(source.lines, texts, drawn.blocks)]
+        decimals = digits_in(source.unit, digits)
+        shown = replace(source, lines=changed_lines(source.lines, lambda line: _rounded(line, decimals)))
+    blocks, words = provenance(source).blocks, [draw.word for draw in program.draws]
+    rows = []
+    for (text, _), (_, line) in zip(printed(shown), printed(source), strict=True):
+        if line is None or isinstance(line, Comment | Assignment):
+            rows.append(Row(text))
+            continue
+        drawn = tuple(blocks.get(id(line), ()))
+        word, called = _word(line), ""
+        if isinstance(line, Draw | Part):
+            called = words[drawn[0]] if drawn else word
+        elif isinstance(line, Call):
+            called = line.role
+        rows.append(Row(text, word, language().called(called).id if called else None, drawn))
+    return rows
 
 
 def digits_in(unit: Unit | None, digits: int = DIGITS) -> int:
@@ -68,7 +77,7 @@ def digits_in(unit: Unit | None, digits: int = DIGITS) -> int:
     return digits if unit is None else max(0, digits - math.floor(math.log10(unit.per_cell)))
 
 
-def parted(line: Shown) -> tuple[str, str, str]:
+def parted(line: Row) -> tuple[str, str, str]:
     """The text before the word, the word, and the text after it."""
     if not line.word:
         return (line.text, "", "") if line.text.lstrip().startswith("#") else ("", "", line.text)
@@ -78,11 +87,11 @@ def parted(line: Shown) -> tuple[str, str, str]:
     return line.text[:start], line.word, line.text[start + len(line.word) :]
 
 
-def wrapped(line: Shown, most: int) -> list[Shown]:
+def wrapped(line: Row, most: int) -> list[Row]:
     """A line as several of at most so many letters, broken behind commas, else between words; those that follow have no
     word and stand farther in.  What has no place to break is cut."""
     indent = " " * (len(line.text) - len(line.text.lstrip(" ")) + 4)
-    found, rest, word = [], line.text, line.word
+    result, rest, word = [], line.text, line.word
     while len(rest) > most:
         limit = max(most, len(indent) + 2)
         cuts = (rest.rfind(end, len(indent), limit) + len(end) for end in ("), ", ", ", " "))
@@ -90,55 +99,19 @@ def wrapped(line: Shown, most: int) -> list[Shown]:
         if not cut:
             rest = rest[: limit - 1] + "…"
             break
-        found.append(replace(line, text=rest[:cut].rstrip(), word=word))
+        result.append(replace(line, text=rest[:cut].rstrip(), word=word))
         rest, word = indent + rest[cut:], ""
-    return [*found, replace(line, text=rest, word=word)]
+    return [*result, replace(line, text=rest, word=word)]
 
 
-class _Drawn:
-    """Drawing statements of the expanded program by the ``id`` of the line that makes them."""
-
-    def __init__(self, source: Source) -> None:
-        self.blocks: dict[int, list[int]] = defaultdict(list)
-        self.functions = source.functions
-        self._next = 0
-        self._draw(source.lines)
-
-    def _draw(self, lines: tuple[Line, ...]) -> None:
-        for line in lines:
-            start = self._next
-            match line:
-                case WrittenDraw():
-                    self._next += 1
-                case WrittenLoop():
-                    self._draw(line.body)
-                case Call():
-                    self._draw(self.functions[line.name].body)
-                    self.blocks[id(self.functions[line.name])] += range(start, self._next)
-            self.blocks[id(line)] += range(start, self._next)
-
-
-def _shown(lines: tuple[Line, ...], texts: Iterator[str], blocks: dict[int, list[int]]) -> Iterator[Shown]:
-    for line in lines:
-        word, statement = "" if isinstance(line, Comment | Assignment) else line.name, None
-        if isinstance(line, WrittenDraw) or (isinstance(line, Call) and line.role):
-            word = line.role or line.name
-            statement = language().called(word).id
-        text, body = next(texts), line.body if isinstance(line, WrittenLoop | Function) else None
-        if body == ():
-            text += f" {next(texts).strip()}"
-        yield Shown(text, word, statement, tuple(blocks[id(line)]))
-        if body:
-            yield from _shown(body, texts, blocks)
-            if all(isinstance(inner, Comment) for inner in body):
-                yield Shown(next(texts), "", None, ())
+def _word(line: Line) -> str:
+    if isinstance(line, Draw | Part | Call) and line.role:
+        return line.role
+    return line.kind if isinstance(line, Part | Group) else line.name  # type: ignore[union-attr]
 
 
 def _rounded(line: Line, digits: int) -> Line:
-    def short(value: Value) -> Value:
-        return with_numbers(value, lambda number: round(number, digits) + 0.0)
+    def rounded(leaf: float | Name) -> Value:
+        return leaf if isinstance(leaf, Name) else round(leaf, digits) + 0.0
 
-    found = with_values(line, map(short, values(line)))
-    if isinstance(found, WrittenLoop | Function):
-        return replace(found, body=tuple(_rounded(inner, digits) for inner in found.body))
-    return found
+    return with_values(line, [replaced(value, rounded) for value in values(line)])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -19,7 +20,7 @@ from shapeprog.formats.colours import colour
 from shapeprog.formats.parts import parts
 from shapeprog.language.program import Program
 from shapeprog.language.statement import language
-from shapeprog.view.listing import Shown, listing, parted, wrapped
+from shapeprog.view.listing import Row, listing, parted, wrapped
 from shapeprog.view.model import Model, of_parts, of_shape
 from shapeprog.view.render import Image, camera_for, render
 
@@ -28,6 +29,9 @@ if TYPE_CHECKING:
 
 VIEW = 560
 """Pixels along each side of one view in a picture."""
+
+IN_NOTEBOOK = 400
+"""Pixels along each side of the view in a notebook."""
 
 SMALL = (216, 204)
 """Width and height of one view in a contact sheet."""
@@ -96,6 +100,18 @@ def picture(
         If the suffix is unknown or the file cannot be written.
     """
     target = _checked(path)
+    _save(_picture(shape, program, title, scores, view), target)
+    return target
+
+
+def png(program: Program, scores: Mapping[str, float] | None = None) -> bytes:
+    """The same without an input, small, as the bytes of a PNG: notebooks show it for programs and results."""
+    content = io.BytesIO()
+    _picture(None, program, "", scores, IN_NOTEBOOK).save(content, format="PNG")
+    return content.getvalue()
+
+
+def _picture(shape: Shape | None, program: Program, title: str, scores: Mapping[str, float] | None, view: int) -> Any:
     models = ([of_shape(shape)] if shape is not None else []) + [of_parts(parts(program))]
     views = _views(models, view, view)
     panel = _Panel(program, scores, int(view * 1.12), view)
@@ -104,12 +120,11 @@ def picture(
     page, draw = _sheet(width, view + head + 20)
     name = title or (shape.name if shape is not None else "")
     names = [name, "reconstruction"][: len(views)]
-    for place, (image, name) in enumerate(zip(views, names, strict=True)):
-        _paste(page, image, place * view, head)
-        _text(draw, (place * view + view / 2, 16), _cut(name, 46), 19, _FAINT, anchor="ma")
+    for index, (image, name) in enumerate(zip(views, names, strict=True)):
+        _paste(page, image, index * view, head)
+        _text(draw, (index * view + view / 2, 16), _cut(name, 46), 19, _FAINT, anchor="ma")
     panel.draw(draw, view * len(views) + _PAD, head)
-    _save(page, target)
-    return target
+    return page
 
 
 def contact_sheet(
@@ -120,17 +135,19 @@ def contact_sheet(
     Raises
     ------
     OutputError
-        If there is nothing to show, the suffix is unknown or the file cannot be written.
+        If there are no items, the suffix is unknown or the file cannot be written.
     """
     target = _checked(path)
     if not items:
         raise OutputError("there is nothing to put on the contact sheet", "name a folder that holds programs")
     wide, tall = SMALL
     across = min(columns, len(items))
-    drawn = [_pair(item) for item in items]
-    beside = wide if any(left is not None for left, _, _ in drawn) else 0  # room for inputs only where there are any
-    cell, row = wide + beside + _PAD, tall + 52
-    words = sorted({statement for _, _, used in drawn for statement in used})
+    pairs = [_pair(item) for item in items]
+    input_width = (
+        wide if any(image is not None for image, _, _ in pairs) else 0
+    )  # room for inputs only where there are any
+    cell, row = wide + input_width + _PAD, tall + 52
+    words = sorted({statement for _, _, used in pairs for statement in used})
     width = across * cell + _PAD
     legend = _legend_rows(words, width - 2 * _PAD)
     head = (54 if title else 14) + 30 * len(legend)
@@ -142,14 +159,16 @@ def contact_sheet(
             _swatch(draw, _PAD + offset, head - 30 * (len(legend) - line) + 4, 13, statement)
             corner = (_PAD + offset + 20, head - 30 * (len(legend) - line))
             _text(draw, corner, language().word(statement), 15, _INK)
-    for number, (item, (left, right, _)) in enumerate(zip(items, drawn, strict=True)):
+    for number, (item, (input_image, reconstruction, _)) in enumerate(zip(items, pairs, strict=True)):
         x, y = _PAD + number % across * cell, head + number // across * row
-        for offset, image in ((0, left), (beside, right)):
+        for offset, image in ((0, input_image), (input_width, reconstruction)):
             if image is not None:
                 _paste(page, image, x + offset, y)
-        middle = x + (wide + beside) // 2
-        _text(draw, (middle, y + tall + 2), _cut(item.name, 44 if beside else 24), 14, _INK, anchor="ma", bold=True)
-        _text(draw, (middle, y + tall + 21), _cut(item.note, 56 if beside else 32), 13, _FAINT, anchor="ma")
+        middle = x + (wide + input_width) // 2
+        _text(
+            draw, (middle, y + tall + 2), _cut(item.name, 44 if input_width else 24), 14, _INK, anchor="ma", bold=True
+        )
+        _text(draw, (middle, y + tall + 21), _cut(item.note, 56 if input_width else 32), 13, _FAINT, anchor="ma")
     _save(page, target)
     return target
 
@@ -173,13 +192,13 @@ class _Panel:
         shown = lines if len(lines) <= fits else lines[: fits - 1]
         top = y + max(0, (room - step * len(lines)) // 2)
         for number, line in enumerate(shown):
-            place = (x + 24, top + number * step)
+            corner = (x + 24, top + number * step)
             if line.statement is not None and line.word:
-                _swatch(draw, x, place[1] + size * 0.28, int(size * 0.72), line.statement)
-            _line(draw, place, line, size, advance)
+                _swatch(draw, x, corner[1] + size * 0.28, int(size * 0.72), line.statement)
+            _line(draw, corner, line, size, advance)
         if len(shown) < len(lines):
-            left = f"... and {len(lines) - len(shown)} more lines"
-            _text(draw, (x + 24, top + len(shown) * step), left, size, _FAINT, face="Mono")
+            remainder = f"... and {len(lines) - len(shown)} more lines"
+            _text(draw, (x + 24, top + len(shown) * step), remainder, size, _FAINT, face="Mono")
         foot = y + self.height - 62
         draw.line([(x, foot), (x + self.width - 8, foot)], fill=_RULE, width=1)
         for number, text in enumerate(self.scores):
@@ -188,7 +207,8 @@ class _Panel:
 
 def scores_text(scores: Mapping[str, float] | None, program: Program) -> list[str]:
     """Scores and size of a program as one or two short lines."""
-    size = f"{program.size} parts · {program.blocks} drawing statements"
+    parts, blocks = program.size, program.blocks
+    size = f"{parts} part{'s' * (parts != 1)} · {blocks} drawing statement{'s' * (blocks != 1)}"
     if not scores:
         return [size]
     labels = {"iou": "IoU", "cd": "CD", "f1": "F1", "seconds": "time"}
@@ -209,10 +229,10 @@ def _views(models: Sequence[Model], width: int, height: int) -> list[Image]:
 
 
 def _pair(item: Item) -> tuple[Image | None, Image, set[int]]:
-    drawn = parts(item.program)
-    models = ([of_shape(item.shape)] if item.shape is not None else []) + [of_parts(drawn)]
+    solids = parts(item.program)
+    models = ([of_shape(item.shape)] if item.shape is not None else []) + [of_parts(solids)]
     views = _views(models, *SMALL)
-    return (views[0] if len(views) > 1 else None), views[-1], {part.statement for part in drawn}
+    return (views[0] if len(views) > 1 else None), views[-1], {part.statement for part in solids}
 
 
 def _legend_rows(words: Sequence[int], width: int) -> list[list[tuple[int, int]]]:
@@ -228,9 +248,9 @@ def _legend_rows(words: Sequence[int], width: int) -> list[list[tuple[int, int]]
     return rows
 
 
-def _line(draw: ImageDraw, place: tuple[float, float], line: Shown, size: int, advance: float) -> None:
+def _line(draw: ImageDraw, corner: tuple[float, float], line: Row, size: int, advance: float) -> None:
     before, word, after = parted(line)
-    x, y = place
+    x, y = corner
     shade = _FAINT if line.statement is None else readable(line.statement)
     _text(draw, (x, y), before, size, _FAINT, face="Mono")
     _text(draw, (x + advance * len(before), y), word, size, shade, face="Mono", bold=line.statement is not None)
@@ -256,7 +276,7 @@ def typeface(size: int, face: str = "", bold: bool = False) -> Any:
 
 def _text(
     draw: ImageDraw,
-    place: tuple[float, float],
+    corner: tuple[float, float],
     text: str,
     size: int,
     fill: tuple[int, int, int],
@@ -265,15 +285,15 @@ def _text(
     bold: bool = False,
     anchor: str = "la",
 ) -> None:
-    draw.text(place, text, font=typeface(size, face, bold), fill=fill, anchor=anchor)
+    draw.text(corner, text, font=typeface(size, face, bold), fill=fill, anchor=anchor)
 
 
 def _swatch(draw: ImageDraw, x: float, y: float, size: int, statement: int) -> None:
     draw.rounded_rectangle([x, y, x + size, y + size], 3, fill=colour(statement))
 
 
-def _cut(text: str, most: int) -> str:
-    return text if len(text) <= most else text[: most - 1] + "…"
+def _cut(text: str, length: int) -> str:
+    return text if len(text) <= length else text[: length - 1] + "…"
 
 
 def _sheet(width: int, height: int) -> tuple[Any, ImageDraw]:

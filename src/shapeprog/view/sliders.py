@@ -14,7 +14,7 @@ import numpy as np
 
 from shapeprog.errors import ShapeProgError
 from shapeprog.formats.parts import Part, part_normals, parts
-from shapeprog.language.converting import lengths
+from shapeprog.language.dimensions import lengths
 from shapeprog.language.named import Named, names, set
 from shapeprog.language.program import Program
 from shapeprog.language.unit import Unit
@@ -70,8 +70,8 @@ def sliders(program: Program, drawn: Sequence[Part]) -> list[Slider]:
     if len(free) * len(SHARES) * sum(3 * len(part.faces) for part in drawn) > MOST:
         return []
     unit, measured = program.unit, lengths(program)
-    found = (_slider(program, drawn, named, unit if named.name in measured else None) for named in free)
-    return [slider for slider in found if slider is not None]
+    result = (_slider(program, drawn, named, unit if named.name in measured else None) for named in free)
+    return [slider for slider in result if slider is not None]
 
 
 def pieces(text: str, movable: Sequence[str]) -> list[tuple[str, str]] | None:
@@ -86,13 +86,13 @@ def pieces(text: str, movable: Sequence[str]) -> list[tuple[str, str]] | None:
     (target,) = line.targets
     named = target.elts if isinstance(target, ast.Tuple) else [target]
     values = line.value.elts if isinstance(line.value, ast.Tuple) else [line.value]
-    start, last, found = len(text) - len(text.lstrip()), 0, list[tuple[str, str]]()
+    start, last, result = len(text) - len(text.lstrip()), 0, list[tuple[str, str]]()
     for name, value in zip(named, values, strict=True):
         if isinstance(name, ast.Name) and name.id in movable:
             first, end = start + value.col_offset, start + (value.end_col_offset or 0)
-            found += [(text[last:first], ""), (text[first:end], name.id)]
+            result += [(text[last:first], ""), (text[first:end], name.id)]
             last = end
-    return [*found, (text[last:], "")] if found else None
+    return [*result, (text[last:], "")] if result else None
 
 
 def corners_of(drawn: Sequence[Part]) -> list[Array]:
@@ -108,14 +108,14 @@ def _slider(program: Program, drawn: Sequence[Part], named: Named, unit: Unit | 
     least = LEAST if unit is None else LEAST * unit.per_cell
     size = max(abs(value), least) * (1.0 if value >= 0 else -1.0)
     places = dict(_places(program, drawn, start, name, [value + (share - 1) * size for share in SHARES]))
-    if not places or all(part is None for found in places.values() for part in found):
+    if not places or all(part is None for corners in places.values() for part in corners):
         return None
     low, high = min(*places, value), max(*places, value)
     far = max(places, key=lambda at: abs(at - value))
     straight = all(
         _straight(before, there, last, (at - value) / (far - value))
-        for at, found in places.items()
-        for before, there, last in zip(start, found, places[far], strict=True)
+        for at, corners in places.items()
+        for before, there, last in zip(start, corners, places[far], strict=True)
     )
     return Slider(name, value, low, high, unit.name if unit else "", {far: places[far]} if straight else places)
 

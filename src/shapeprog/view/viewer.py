@@ -74,7 +74,7 @@ def viewer(
     low, high = points.min(0), points.max(0)
     movable = sliders(program, shown_parts)
     content = {
-        "frame": frame_comment(frame),
+        "frame": frame_comment(frame, program),
         "title": title or (shape.name if shape is not None else Path(path).stem),
         "facts": " · ".join(scores_text(scores, program)),
         "middle": (_TO_PAGE @ ((low + high) / 2)).tolist(),

@@ -14,7 +14,7 @@ from shapeprog.geometry.primitive import primitives as primitives
 BUILT_IN: tuple[Primitive, ...] = tuple(
     primitives.register(import_module(f"{__name__}.{module.name}").PRIMITIVE) for module in iter_modules(__path__)
 )
-"""All of them; the number of one here is what kernels know it by, whatever its kind."""
+"""All of them; kernels number them in this order."""
 
 
 def built_in_names() -> dict[str, int]:

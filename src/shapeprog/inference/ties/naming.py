@@ -9,11 +9,11 @@ import numpy as np
 from shapeprog.inference.ties.basis import Basis, Measure
 from shapeprog.inference.ties.sums import SAME
 from shapeprog.inference.tunable import Tunable
-from shapeprog.language.evaluation import evaluated
+from shapeprog.language.ast import Assignment, Loop, Source
+from shapeprog.language.evaluate import evaluated
 from shapeprog.language.expression import Name, Value, combined
 from shapeprog.language.parameters import to_float32
 from shapeprog.language.program import Draw, Node, Program
-from shapeprog.language.source import Assignment, Source, WrittenDraw, WrittenLoop
 from shapeprog.language.statement import language
 from shapeprog.space import DEPTH, SIDE, UP, FloatArray
 
@@ -36,6 +36,9 @@ NOTES = {"above the floor": ("top", "bottom", "up"), "from the side": ("inset",)
 
 SHARED = ("thickness", "radius", "edge", "spacing", "inset", "setback", "tilt")
 """What different parts may share and be called so without the name of a part."""
+
+PLACED_AS = {"leaning_box": "box", "beam": "bar"}
+"""What placed text calls statements that it does not have."""
 
 WORDS = (("lower", "upper"), ("front", "rear"), ("inner", "outer"))
 """What tells parts with one role apart, along each axis; the last by how far from the middle they are."""
@@ -183,7 +186,8 @@ def _name(tunable: Tunable, group: list[Measure]) -> tuple[list[str], int]:
 
 def _part(tunable: Tunable, node: int) -> str:
     """What the part is called that a node is; of a loop the first part in it."""
-    return _drawn(tunable, node)[1].word
+    word = _drawn(tunable, node)[1].word
+    return PLACED_AS.get(word, word)
 
 
 def _drawn(tunable: Tunable, node: int) -> tuple[int, Draw]:
@@ -237,13 +241,13 @@ def _length(tunable: Tunable, measure: Measure) -> str:
 
 def _lines(
     body: tuple[Node, ...], counter: Iterator[int], table: dict[tuple[int, int], Value]
-) -> tuple[WrittenDraw | WrittenLoop, ...]:
-    found: list[WrittenDraw | WrittenLoop] = []
+) -> tuple[Draw | Loop, ...]:
+    found: list[Draw | Loop] = []
     for node in body:
         n = next(counter)
         values = tuple(table.get((n, slot), value + 0.0) for slot, value in enumerate(node.values))  # no minus zero
         if isinstance(node, Draw):
-            found.append(WrittenDraw(node.name, values, node.role))
+            found.append(Draw(node.name, values, node.role))
         else:
-            found.append(WrittenLoop(node.name, values, _lines(node.body, counter, table)))
+            found.append(Loop(node.name, values, _lines(node.body, counter, table)))
     return tuple(found)

@@ -1,0 +1,208 @@
+"""The common part of the scripts for CAD: the placed tree of a program with names that are free in a language."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from shapeprog.formats.colours import hexadecimal
+from shapeprog.formats.frames import frame_of_text
+from shapeprog.formats.parts import Part as Mesh
+from shapeprog.formats.parts import as_placed, parts
+from shapeprog.language.ast import (
+    Assignment,
+    Call,
+    Comment,
+    Function,
+    Group,
+    Line,
+    Part,
+    Source,
+    body_of,
+    names_of,
+    values,
+    with_values,
+)
+from shapeprog.language.dimensions import Counts
+from shapeprog.language.expression import Expression, Name, text_of
+from shapeprog.language.placement import LONGEST_SIDE, SIZES
+from shapeprog.language.program import Program
+from shapeprog.language.statement import language
+from shapeprog.space import FloatArray, Frame
+
+_DEFINED = re.compile(r"^(?:module|function|def|class) (\w+)", re.MULTILINE)
+_CALLED = re.compile(r"(?:@(?=\w+$)|\b(?=\w+\s*\())(\w+)", re.MULTILINE)
+
+
+@dataclass(frozen=True)
+class Number:
+    """A named number of the file: its text, its comment, and its value if a slider may change it."""
+
+    name: str
+    text: str
+    note: str
+    value: float | None
+    whole: bool
+
+    @property
+    def range(self) -> tuple[float, float, float]:
+        """Lowest value, step and highest value of a slider."""
+        assert self.value is not None
+        step = 1.0 if self.whole else float(10.0 ** math.floor(math.log10(max(abs(self.value), 1e-6) / 20)))
+        far = 10 * step * math.ceil(max(abs(self.value), step) / (5 * step))
+        low = -far if self.value < 0 else min(self.value, 1.0) if self.whole else 0.0
+        return low, step, 0.0 if self.value < 0 else far
+
+
+@dataclass(frozen=True)
+class Script:
+    """A program as a script prints it.
+
+    Parameters
+    ----------
+    unit
+        Unit of the numbers in it; empty if it is not known.
+    numbers
+        Its named numbers, comments between them included.
+    lines
+        Its functions, parts and groups, with free names.
+    world
+        The map from its coordinates to those of the file, (4, 4).
+    colours
+        Colours by role.
+    meshes
+        Its parts, if its statements cannot be written with placed parts; then there are no numbers and lines.
+    """
+
+    unit: str
+    numbers: tuple[Number | Comment, ...]
+    lines: tuple[Line, ...]
+    world: FloatArray
+    colours: dict[str, str]
+    meshes: tuple[Mesh, ...] = ()
+
+    @property
+    def scale(self) -> float:
+        """Units of the file in a unit of the script."""
+        return float(f"{np.linalg.norm(self.world[:3, 0]):.9g}")
+
+    @property
+    def moved(self) -> bool:
+        """Whether the script is more than scaled."""
+        return bool(np.abs(self.world[:3, :3] / self.scale - np.eye(3)).max() > 1e-9 or self.world[:3, 3].any())
+
+
+def script(program: Program, frame: Frame, reserved: Collection[str], inner: str) -> Script:
+    """A program as a script prints it, in the coordinates of a file.
+
+    Parameters
+    ----------
+    program
+        A program in either notation.
+    frame
+        From the grid to the coordinates of the file.
+    reserved
+        Words of the script that are no names.
+    inner
+        The prefix of ``width``, ``depth`` and ``height`` of a box inside of the whole.
+    """
+    placed = as_placed(program)
+    if placed is None:
+        meshes = tuple(parts(program, frame))
+        return Script("", (), (), np.eye(4), _colours({mesh.word for mesh in meshes}), meshes)
+    source = placed.source
+    assert source is not None
+    assert source.unit is not None
+    words = _free_names([*sorted(names_of(source)), *source.functions], reserved)
+    lines = tuple(_renamed(line, words, inner, False) for line in source.lines)
+    roles = {line.role for line in source.walk() if isinstance(line, Part | Call)} - {""}
+    kinds = {line.kind for line in source.walk() if isinstance(line, Part)}
+    head = 0
+    while head < len(lines) and isinstance(lines[head], Assignment | Comment):
+        head += 1
+    body = tuple(line for line in lines[head:] if not isinstance(line, Assignment))
+    numbers = _numbers(source, lines, head)
+    return Script(source.unit.name, numbers, body, world_of(source, frame), _colours(roles | kinds))
+
+
+def world_of(source: Source, frame: Frame) -> FloatArray:
+    """The map (4, 4) from the coordinates of placed text to those of a file; rounded to nine digits of its scale."""
+    scale = source.scale
+    assert scale is not None
+    world = frame_of_text(frame, scale).matrix()
+    size = float(np.linalg.norm(world[:3, 0]))
+    world[:3, :3] = np.round(world[:3, :3] / size, 9) * float(f"{size:.7g}")
+    world[:3, 3] = np.where(np.abs(world[:3, 3]) < 1e-6 * size * LONGEST_SIDE / scale.cells_per_unit, 0, world[:3, 3])
+    return world + 0.0
+
+
+def number(value: float) -> str:
+    """A number with at most 12 digits and no trailing point."""
+    return f"{value + 0.0:.12g}"
+
+
+def needed(pieces: Sequence[str], text: str) -> list[str]:
+    """The pieces of a prelude, in order, that a text needs; pieces without a definition are kept."""
+    named = [(match[1] if (match := _DEFINED.search(piece)) else "", piece) for piece in pieces]
+    used: set[str] = {""}
+    waiting = [text, *(piece for name, piece in named if not name)]
+    while waiting:
+        called = set(_CALLED.findall(waiting.pop())) - used
+        waiting += [piece for name, piece in named if name in called]
+        used |= called
+    return [piece for name, piece in named if name in used]
+
+
+def _numbers(source: Source, lines: tuple[Line, ...], head: int) -> tuple[Number | Comment, ...]:
+    """The named numbers at the top of a script: assignments, and the comments above the first part."""
+    counts = Counts(source).outside
+    result: list[Number | Comment] = []
+    for index, line in enumerate(lines):
+        if isinstance(line, Comment) and index < head:
+            result += [line] if result or line.text else []
+        elif isinstance(line, Assignment):
+            note = line.note
+            for (original, _), (name, value) in zip(source.lines[index].numbers, line.numbers, strict=True):  # type: ignore[union-attr]
+                literal = None if isinstance(value, Expression) else float(value)
+                integer = original in counts and literal is not None and literal == round(literal)
+                result.append(Number(name, text_of(value), note, literal, integer))
+                note = ""
+    return tuple(result[:-1] if result[-1:] == [Comment()] else result)
+
+
+def _renamed(line: Line, words: dict[str, str], inner: str, boxed: bool) -> Line:
+    """A line with free names; ``boxed`` if it is in a box inside of the whole, whose sizes have other names."""
+    scope = {name: Name(word) for name, word in words.items()}
+    scope |= {size: Name(inner + size if boxed else size) for size in SIZES}
+    line = with_values(line, [v.at(scope) if isinstance(v, Expression) else v for v in values(line)])
+    if body := body_of(line):
+        below = boxed or isinstance(line, Function) or (isinstance(line, Group) and line.kind in ("inside", "divide"))
+        line = replace(line, body=tuple(_renamed(inner_line, words, inner, below) for inner_line in body))  # type: ignore[arg-type]
+    match line:
+        case Assignment(numbers):
+            return replace(line, numbers=tuple((words.get(name, name), value) for name, value in numbers))
+        case Function(name, parameters):
+            new_parameters = tuple((words[word], value) for word, value in parameters)
+            return replace(line, name=words[name], parameters=new_parameters)
+        case Call(name, arguments):
+            return replace(line, name=words[name], arguments=tuple((words.get(w, w), v) for w, v in arguments))
+    return line
+
+
+def _free_names(names: Sequence[str], reserved: Collection[str]) -> dict[str, str]:
+    """Names of letters, digits and underscores that are no reserved words, all different."""
+    unavailable, words = {*reserved}, dict[str, str]()
+    for name in dict.fromkeys(names):
+        word = name if name in SIZES else re.sub(r"[^A-Za-z0-9_]", "_", name)
+        while name not in SIZES and (word in unavailable or word in words.values()):
+            word += "_"
+        words[name] = word
+    return words
+
+
+def _colours(words: Collection[str]) -> dict[str, str]:
+    return {word: hexadecimal(language().called(word).id) for word in sorted(words)}

@@ -1,0 +1,310 @@
+"""The syntax tree of program text, as immutable values.
+
+There are two notations.  In *cells*, the statements of the paper have coordinates (:class:`Draw`, :class:`Loop`).  In
+*placed* text, the usual one, parts are placed from the sides of a box by keywords (:class:`Part`, :class:`Group`).  A
+placed program is evaluated to statements and loops in cells, see :mod:`shapeprog.language.evaluate`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field, replace
+from typing import Any, TypeAlias
+
+from shapeprog.language.expression import Expression, Value, value_at
+from shapeprog.language.unit import Unit
+
+
+@dataclass(frozen=True)
+class Comment:
+    """A comment on a line of its own, without its ``#``; an empty line if its text is empty."""
+
+    text: str = ""
+
+
+@dataclass(frozen=True)
+class Assignment:
+    """``width, depth = 10.2, 9``: names with their values; ``note`` is the comment behind it, as in all that follow."""
+
+    numbers: tuple[tuple[str, Value], ...]
+    note: str = ""
+
+
+@dataclass(frozen=True)
+class Draw:
+    """A drawing statement in cells: its values in slot order, and its role if that is not its own name.
+
+    The values are numbers or expressions; in the body of a :class:`~shapeprog.language.program.Program` they are
+    numbers that float32 holds exactly.
+    """
+
+    name: str
+    values: tuple[Any, ...]
+    role: str = ""
+    note: str = ""
+
+    @property
+    def word(self) -> str:
+        """The name of the part, its role or else its statement."""
+        return self.role or self.name
+
+
+@dataclass(frozen=True)
+class Loop:
+    """A loop in cells: its values in slot order, and the lines, statements and loops that it repeats."""
+
+    name: str
+    values: tuple[Any, ...]
+    body: tuple[Any, ...]
+    note: str = ""
+
+    @property
+    def count(self) -> int:
+        """Number of copies; none when the count is not positive."""
+        return max(0, round(self.values[0]))
+
+
+@dataclass(frozen=True)
+class Point:
+    """``at(left=3, top=0)``: a point by its distances from the sides of a box, or its offsets from the middle."""
+
+    keywords: tuple[tuple[str, Value], ...] = ()
+
+
+Argument: TypeAlias = Value | tuple[Value, Value] | Point
+Keywords: TypeAlias = tuple[tuple[str, Argument], ...]
+
+
+@dataclass(frozen=True)
+class Part:
+    """A placed solid: ``leg(cylinder(left=3, radius=2))`` has the kind ``cylinder`` and the role ``leg``.
+
+    A role alone, ``leg(left=0, width=2)``, has the kind ``box``.
+    """
+
+    kind: str
+    keywords: Keywords = ()
+    role: str = ""
+    note: str = ""
+
+
+@dataclass(frozen=True)
+class Group:
+    """Lines with a placed loop or box around them: ``for _ in row(3, last=at(top=0)):``, ``with inside(left=2):``.
+
+    Parameters
+    ----------
+    kind
+        ``inside``, ``divide``, ``mirror``, ``rotate``, ``translate`` or ``row``.
+    keywords
+        Its keywords; ``last`` of a row is a :class:`Point`.
+    body
+        The lines inside.
+    count
+        How many copies; ``None`` for ``inside`` and ``mirror``.
+    axis
+        ``x``, ``y`` or ``z`` for ``divide``, else empty.
+    """
+
+    kind: str
+    keywords: Keywords
+    body: tuple[Line, ...]
+    count: Value | None = None
+    axis: str = ""
+    note: str = ""
+
+
+@dataclass(frozen=True)
+class Call:
+    """``leg(posts(thick=2))``: the lines of a function, with a value for each parameter that has no default.
+
+    A role around it is that of all parts in it that have none of their own.  In placed text the arguments may also be
+    keywords of the box in which the lines are drawn, and ``tilt``.
+    """
+
+    name: str
+    arguments: tuple[tuple[str, Value], ...]
+    note: str = ""
+    role: str = ""
+
+
+@dataclass(frozen=True)
+class Function:
+    """``def legs(height, thick=2):`` with the lines of its body; ``None`` is a parameter without a default.
+
+    With ``box``, its first parameters in cells are the box in which its lines are drawn, which placed calls have.
+    """
+
+    name: str
+    parameters: tuple[tuple[str, Value | None], ...]
+    body: tuple[Line, ...]
+    note: str = ""
+    box: bool = field(default=False, compare=False, repr=False)
+
+    @property
+    def names(self) -> set[str]:
+        """Its parameters, and the names that it assigns."""
+        assigned = {name for line in self.body if isinstance(line, Assignment) for name, _ in line.numbers}
+        return assigned | {name for name, _ in self.parameters}
+
+
+Line: TypeAlias = Comment | Assignment | Draw | Loop | Part | Group | Call | Function
+
+
+@dataclass(frozen=True)
+class Scale:
+    """How placed text lies in the grid; fixed when the text is read, whatever is set afterwards.
+
+    Parameters
+    ----------
+    cells_per_unit
+        Cells per unit of length; as read, the longest side of the whole is 24 cells.
+    floor
+        Height of the floor in the grid, in cells.
+    """
+
+    cells_per_unit: float
+    floor: float
+
+
+@dataclass(frozen=True)
+class Source:
+    """A program as its lines, in the order of the text.
+
+    Parameters
+    ----------
+    lines
+        The lines at the top level.
+    unit
+        Unit of its lengths; for statements in cells with their size, ``None`` for cells.
+    scale
+        How it lies in the grid, if its parts are placed; ``None`` for statements in cells.
+    warnings
+        What is legal and probably a mistake, as messages with their line.
+    """
+
+    lines: tuple[Line, ...] = ()
+    unit: Unit | None = None
+    scale: Scale | None = None
+    warnings: tuple[str, ...] = field(default=(), compare=False, repr=False)
+
+    @property
+    def placed(self) -> bool:
+        """Whether its parts are placed from the sides of a box."""
+        return self.scale is not None
+
+    @property
+    def plain(self) -> bool:
+        """Whether plain numbers in statements and loops in cells are all there is, beside comments."""
+        cells = all(isinstance(line, Comment | Draw | Loop) for line in self.walk())
+        return cells and not any(isinstance(value, Expression) for line in self.walk() for value in values(line))
+
+    @property
+    def functions(self) -> dict[str, Function]:
+        """The functions by name."""
+        return {line.name: line for line in self.lines if isinstance(line, Function)}
+
+    @property
+    def numbers(self) -> dict[str, Value]:
+        """The named numbers of the program itself, not those inside of functions, in the order of the text."""
+        pairs = (line.numbers for line in self.lines if isinstance(line, Assignment))
+        return dict(pair for numbers in pairs for pair in numbers)
+
+    def evaluated_numbers(self) -> dict[str, float]:
+        """The values of these names."""
+        known: dict[str, float] = {}
+        for name, value in self.numbers.items():
+            known[name] = value_at(value, known)
+        return known
+
+    def walk(self) -> Iterator[Line]:
+        """Every line in the order of the text, those in loops, groups and functions included."""
+        stack = [*reversed(self.lines)]
+        while stack:
+            yield (line := stack.pop())
+            stack += reversed(body_of(line))
+
+
+def body_of(line: Line) -> tuple[Line, ...]:
+    """The lines inside of a line; none if it has no body."""
+    return line.body if isinstance(line, Loop | Group | Function) else ()
+
+
+def values(line: Line) -> tuple[Value, ...]:
+    """The numbers and expressions on a line, in the order of its text."""
+    match line:
+        case Draw() | Loop():
+            return line.values
+        case Assignment(pairs) | Call(arguments=pairs):
+            return tuple(value for _, value in pairs)
+        case Function():
+            return tuple(default for _, default in line.parameters if default is not None)
+        case Part(keywords=keywords):
+            return tuple(_argument_values(keywords))
+        case Group(keywords=keywords, count=count):
+            return (*(() if count is None else (count,)), *_argument_values(keywords))
+        case _:
+            return ()
+
+
+def with_values(line: Line, new_values: Iterable[Value]) -> Line:
+    """The line with other numbers and expressions, as many as :func:`values` gives."""
+    new = iter(new_values)
+    match line:
+        case Draw() | Loop():
+            return replace(line, values=tuple(new))
+        case Assignment(pairs):
+            return replace(line, numbers=tuple((name, next(new)) for name, _ in pairs))
+        case Function(parameters=given):
+            return replace(line, parameters=tuple((name, None if v is None else next(new)) for name, v in given))
+        case Part(keywords=keywords):
+            return replace(line, keywords=_with_arguments(keywords, new))
+        case Call(arguments=pairs):
+            return replace(line, arguments=tuple((name, next(new)) for name, _ in pairs))
+        case Group(keywords=keywords, count=count):
+            return replace(line, count=None if count is None else next(new), keywords=_with_arguments(keywords, new))
+        case _:
+            return line
+
+
+def names_of(source: Source) -> set[str]:
+    """All names of numbers: those of the program, and those inside of functions."""
+    return {*source.numbers}.union(*(function.names for function in source.functions.values()))
+
+
+def changed_lines(lines: Iterable[Line], change: Callable[[Line], Line]) -> tuple[Line, ...]:
+    """The lines with a change made to each of them, and then to those inside of it."""
+    result = []
+    for line in map(change, lines):
+        if body := body_of(line):
+            line = replace(line, body=changed_lines(body, change))  # type: ignore[arg-type]
+        result.append(line)
+    return tuple(result)
+
+
+def without_double_blanks(lines: tuple[Line, ...]) -> tuple[Line, ...]:
+    """The lines of a block without empty ones at its ends, or one behind another."""
+    result: list[Line] = []
+    for line in lines:
+        if line != Comment() or (result and result[-1] != Comment()):
+            result.append(line)
+    return tuple(result[:-1] if result and result[-1] == Comment() else result)
+
+
+def _argument_values(keywords: Keywords) -> Iterator[Value]:
+    for _, argument in keywords:
+        if isinstance(argument, Point):
+            yield from (value for _, value in argument.keywords)
+        elif isinstance(argument, tuple):
+            yield from argument
+        else:
+            yield argument
+
+
+def _with_arguments(keywords: Keywords, new: Iterator[Value]) -> Keywords:
+    def changed(argument: Argument) -> Argument:
+        if isinstance(argument, Point):
+            return Point(tuple((word, next(new)) for word, _ in argument.keywords))
+        return (next(new), next(new)) if isinstance(argument, tuple) else next(new)
+
+    return tuple((word, changed(argument)) for word, argument in keywords)

@@ -1,0 +1,6 @@
+"""Conversion between the notations: parts placed from the sides of the whole, and statements in cells."""
+
+from shapeprog.language.convert.cells import function_in_cells as function_in_cells
+from shapeprog.language.convert.cells import in_cells as in_cells
+from shapeprog.language.convert.placed import placed as placed
+from shapeprog.language.convert.placed import placed_if_possible as placed_if_possible

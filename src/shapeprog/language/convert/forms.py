@@ -1,0 +1,181 @@
+"""Numbers as linear forms of names, and the best keywords for a position."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import NamedTuple, TypeAlias
+
+from shapeprog.errors import ShapeProgError
+from shapeprog.language.ast import Keywords, Point, Source
+from shapeprog.language.convert.names import NOTHING
+from shapeprog.language.expression import Binary, Expression, Linear, Name, Negative, Value, combined, value_at
+from shapeprog.language.parameters import shortest, to_float32
+from shapeprog.language.placement import AXES
+
+Triple: TypeAlias = tuple[Linear, Linear, Linear]
+"""Along x, y and z, measured from the middle of the whole."""
+
+Cost: TypeAlias = tuple[int, int]
+"""Operators and words."""
+
+
+class Span(NamedTuple):
+    """An interval along an axis: its low end from the middle of the whole, and its length."""
+
+    low: Linear
+    size: Linear
+
+    @property
+    def middle(self) -> Linear:
+        """Its middle."""
+        return self.low + self.size / 2.0
+
+
+class Forms:
+    """The numbers of a program as linear forms, and the choice of keywords.
+
+    Parameters
+    ----------
+    source
+        A program in cells.
+    """
+
+    def __init__(self, source: Source) -> None:
+        self.original = source
+        self.per_cell = 1.0 if source.unit is None else source.unit.per_cell
+        self.nothing = NOTHING * self.per_cell
+        self.atoms: dict[str, Expression] = {}
+        self.inlined: dict[str, Linear] = {}
+        self.names = source.evaluated_numbers()
+        self.scope = dict(self.names)
+        self.sizes: Triple = (Linear(), Linear(), Linear())
+
+    # ---- numbers ------------------------------------------------------------------------------------------------
+
+    def form(self, value: Value) -> Linear:
+        """A number as a linear form of names, and of products and quotients of names."""
+        match value:
+            case Name(name):
+                return self.inlined.get(name) or Linear.of(name)
+            case Negative(inner):
+                return -self.form(inner)
+            case Binary("+", left, right):
+                return self.form(left) + self.form(right)
+            case Binary("-", left, right):
+                return self.form(left) - self.form(right)
+            case Binary(operator, left, right):
+                first, second = self.form(left), self.form(right)
+                try:
+                    return first * second if operator == "*" else first / second
+                except (ShapeProgError, ZeroDivisionError):
+                    atom = Binary(operator, self.written(first, exact=True), self.written(second, exact=True))
+                    self.atoms[str(atom)] = atom
+                    return Linear.of(str(atom))
+            case Expression():
+                raise TypeError(f"{value!r} is not an expression")
+        return Linear(float(shortest(value)))
+
+    def written(self, form: Linear, *, exact: bool = False) -> Value:
+        """A linear form as a person writes it, positive terms first; without terms near zero, unless exact."""
+        form = form if exact else self._clean(form)
+        terms = [(self._atom(text), factor) for text, factor in form.factors]
+        terms.sort(key=lambda term: term[1] < 0)
+        if terms and terms[0][1] < 0 and form.constant > 0:
+            negated = combined(0.0, [(atom, -factor) for atom, factor in terms])
+            return Binary("-", to_float32(form.constant), negated) if len(terms) == 1 else _differences(form, terms)
+        return combined(form.constant, terms)
+
+    def number(self, form: Linear) -> float:
+        """The value of a form with the numbers in force."""
+        return form.constant + sum(factor * value_at(self._atom(text), self.scope) for text, factor in form.factors)
+
+    def _atom(self, text: str) -> Expression:
+        return self.atoms.get(text) or Name(text)
+
+    def _clean(self, form: Linear) -> Linear:
+        factors = tuple((name, factor) for name, factor in form.factors if abs(factor) > 1e-9)
+        return Linear(form.constant if abs(form.constant) > self.nothing else 0.0, factors)
+
+    def _zero(self, form: Linear) -> bool:
+        form = self._clean(form)
+        return not form.constant and not form.factors
+
+    # ---- the choice of keywords ---------------------------------------------------------------------------------
+
+    def interval(self, axis: int, span: Span) -> Keywords:
+        """The best keywords for an interval along an axis."""
+        words, half = AXES[axis], self.sizes[axis] / 2.0
+        low, high, size = span.low + half, half - span.low - span.size, span.size
+        a, b, length = self.number(low), self.number(high), self.number(size)
+        nearer, farther = ((words.low, low), (words.high, high)) if a <= b else ((words.high, high), (words.low, low))
+        sides = ((words.low, low), (words.high, high))
+        sized = (words.size, size)
+        options: list[tuple[tuple[str, Linear], ...]] = []
+        if self._zero(low) and self._zero(high):
+            return ()
+        covers = length > max(a, b)
+        if covers or size.factors or self.sizes[axis].factors:  # else it would not keep its size with the whole
+            options += [(side,) for side, opposite in (sides, sides[::-1]) if self._zero(opposite[1])]
+        if self._zero(low) if axis == 2 else self._zero(low - high):
+            options.append((sized,))
+        options += [sides, (nearer, sized), (farther, sized)] if covers else [(nearer, sized), (farther, sized), sides]
+        options.append(((words.offset, span.middle), sized))
+        return self._best(options)
+
+    def point(self, place: Triple, start: Triple | None = None) -> Point:
+        """The best keywords for a point; those that follow from the start are left out."""
+        keywords: list[tuple[str, Value]] = []
+        for axis, value in enumerate(place):
+            default = start[axis] if start else self.sizes[2] / -2.0 if axis == 2 else Linear()
+            if not self._zero(value - default):
+                keywords += self._single(axis, value)  # type: ignore[arg-type]
+        return Point(tuple(keywords))
+
+    def _single(self, axis: int, middle: Linear, radius: Linear | None = None) -> Keywords:
+        """The best keyword for the middle of something along an axis, which reaches so far to both sides."""
+        words, half, radius = AXES[axis], self.sizes[axis] / 2.0, radius or Linear()
+        low, high = (words.low, middle + half - radius), (words.high, half - middle - radius)
+        nearer, farther = (low, high) if self.number(low[1]) <= self.number(high[1]) else (high, low)
+        options = [(nearer,), (farther,), ((words.offset, middle),)]
+        return self._best(options[::-1] if self._zero(middle) else options)
+
+    def _best(self, options: Iterable[tuple[tuple[str, Linear], ...]]) -> Keywords:
+        """The option with the fewest operators, then the fewest words, then the first."""
+        written = [tuple((word, self.written(form)) for word, form in option) for option in options]
+        return min(written, key=cost)
+
+    def _extra(self, word: str, form: Linear) -> Keywords:
+        return () if self._zero(form) else ((word, self.written(form)),)
+
+
+def cost(keywords: Keywords) -> Cost:
+    """How many operators and words keywords have."""
+    operators, words = 0, len(keywords)
+    for _, argument in keywords:
+        if isinstance(argument, Point):
+            costs = [cost(argument.keywords), (0, 1)]
+        else:
+            costs = [_cost(value) for value in (argument if isinstance(argument, tuple) else (argument,))]
+        operators, words = operators + sum(a for a, _ in costs), words + sum(b for _, b in costs)
+    return operators, words
+
+
+def _cost(value: Value) -> Cost:
+    match value:
+        case Binary(_, left, right):
+            (a, b), (c, d) = _cost(left), _cost(right)
+            return a + c + 1, b + d + 1
+        case Negative(inner):
+            a, b = _cost(inner)
+            return a, b + 1
+        case Expression():
+            return 0, 1
+    return 0, 2 if value < 0 else 1
+
+
+def _differences(form: Linear, terms: Sequence[tuple[Expression, float]]) -> Value:
+    """A positive number from which everything else is subtracted."""
+    total: Value = to_float32(form.constant)
+    for atom, factor in terms:
+        total = Binary("-", total, combined(0.0, [(atom, -factor)]))
+    return total

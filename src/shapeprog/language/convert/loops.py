@@ -1,0 +1,211 @@
+"""The loops of cells as placed loops."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
+
+from shapeprog.errors import ShapeProgError
+from shapeprog.language.ast import (
+    Assignment,
+    Call,
+    Comment,
+    Draw,
+    Function,
+    Group,
+    Keywords,
+    Line,
+    Loop,
+    Part,
+    Point,
+    Source,
+)
+from shapeprog.language.builtin import CELL_CENTRE
+from shapeprog.language.convert.forms import Triple, cost
+from shapeprog.language.convert.parts import Converted, Parts, ordered
+from shapeprog.language.expression import Binary, Linear, Value
+from shapeprog.language.placement import AXES
+from shapeprog.space import DEPTH, SIDE, UP
+
+PIVOTED = ("line", "base_cross")
+"""Statements that published rotations turn about themselves."""
+
+
+class Loops(Parts, ABC):
+    """The conversion of loops."""
+
+    @abstractmethod
+    def line(self, line: Line, role: str) -> Converted:
+        """The placed lines of one line; none for a part that draws nothing."""
+
+    def lines(self, lines: Iterable[Line], role: str) -> Converted:
+        """Some lines, in order; ``role`` is the one around the call that they belong to."""
+        return self._joined([self.line(line, role) for line in lines])
+
+    def _joined(self, results: Sequence[Converted]) -> Converted:
+        drawing = [
+            result for result in results if any(not isinstance(line, Comment | Assignment) for line in result.lines)
+        ]
+        middles: list[Linear | None] = []
+        for axis in range(3):
+            first, *following = [result.middles[axis] for result in drawing] or [None]
+            same = first is not None and all(middle is not None and self._zero(first - middle) for middle in following)
+            middles.append(first if same else None)
+        first_box = drawing[0].first if drawing else None
+        return Converted(tuple(line for result in results for line in result.lines), first_box, tuple(middles))  # type: ignore[arg-type]
+
+    def _loop(self, line: Loop, role: str) -> Converted:
+        body = self.lines(line.body, role)
+        if all(isinstance(inner, Comment) for inner in body.lines):
+            return Converted(body.lines)
+        v = [self.form(value) for value in line.values]
+        match line.name:
+            case "mirror":
+                axis = {UP: 2, DEPTH: 1, SIDE: 0}[round(self.number(v[1]))]
+                self.decisions.append(axis)
+                return self._mirror(line, role, axis, (-v[2] if axis == 0 else v[2]) + self.shift[axis])
+            case "translate":
+                return self._translate(body, line, role, v[0], (-v[3], v[2], v[1]))
+            case "tilt_about":
+                return self._tilted(body, v)
+            case "rotate_about":
+                point = self.point((-v[3], v[2], self.sizes[2] / -2.0)).keywords
+                keywords = (*point, ("step", self.written(v[1])))
+                return Converted((Group("rotate", keywords, body.lines, self.written(v[0]), "", line.note),))
+        raise ShapeProgError(f"{line.name} has no placed form", "keep this program as statements in cells")
+
+    def _tilted(self, body: Converted, v: list[Linear]) -> Converted:
+        """A single part that is leaned about the bottom front edge of its box."""
+        (part, *following), box = body.lines, body.first
+        if isinstance(part, Part) and not following and box and not {"start", "tilt"} & dict(part.keywords).keys():
+            at_edge = self._zero(box[1].low - v[3] - self.shift[1]) and self._zero(box[2].low - v[2] - self.shift[2])
+            if at_edge and self._zero(v[0] - 1.0):
+                part = replace(part, keywords=(*part.keywords, ("tilt", self.written(v[1]))))
+                return Converted((part,), box, (body.middles[0], None, None))
+        raise ShapeProgError("this tilt has no placed form", "keep this program as statements in cells")
+
+    def _mirror(self, line: Loop, role: str, axis: int, plane: Linear) -> Converted:
+        """A mirror; a part that may be on either side of it is written at the left, the front or the bottom."""
+        results = []
+        for inner in line.body:
+            result = self.line(inner, role)
+            middle = result.middles[axis]
+            if middle is not None and self.number(middle - plane) > self.nothing:
+                before, shift = self.shift, list(self.shift)
+                shift[axis] = shift[axis] + (plane - middle) * 2.0
+                self.shift = shift[0], shift[1], shift[2]
+                result = self.line(inner, role)
+                self.shift = before
+            results.append(result)
+        body = self._joined(results)
+        middles = tuple(plane if index == axis else middle for index, middle in enumerate(body.middles))
+        group = Group("mirror", self._single(axis, plane), body.lines, note=line.note)
+        return Converted((group,), body.first, middles)  # type: ignore[arg-type]
+
+    def _translate(self, body: Converted, line: Loop, role: str, count: Linear, step: Triple) -> Converted:
+        """A loop with fixed steps, a row, or a mirror, whichever is shortest."""
+        moving = [axis for axis in range(3) if not self._zero(step[axis])]
+        number = None if count.factors else max(0, round(count.constant))
+        middles: list[Linear | None] = list(body.middles)
+        for axis in moving:
+            middle = middles[axis]
+            known = middle is not None and number is not None and len(moving) == 1
+            middles[axis] = middle + step[axis] * ((number - 1) / 2) if known else None  # type: ignore[operator]
+        written, moved = self.written(count), tuple(middles)
+        by = tuple(pair for axis in moving for pair in self._extra("xyz"[axis], step[axis])) or (("x", 0.0),)
+        options = [Group("translate", by, body.lines, written, note=line.note)]
+        ways = [self._way(step[axis], count, number) for axis in moving]
+        if body.first and moving and all(way is not None for way in ways):
+            last: list[tuple[str, Value]] = []
+            for axis, way in zip(moving, ways, strict=True):
+                assert way is not None
+                span = body.first[axis]
+                half = self.sizes[axis] / 2.0
+                low, high = span.low + way + half, half - span.low - span.size - way
+                sides = [((AXES[axis].low, low),), ((AXES[axis].high, high),)]
+                if self.number(low) > self.number(high):
+                    sides.reverse()
+                last += self._best([*sides, ((AXES[axis].offset, span.middle + way),)])  # type: ignore[arg-type]
+            options.append(Group("row", (("last", Point(tuple(last))),), body.lines, written, note=line.note))
+        best = min(options, key=lambda group: cost(group.keywords))
+        result = Converted((best,), body.first, moved)  # type: ignore[arg-type]
+        if number == 2 and len(moving) == 1 and (middle := body.middles[moving[0]]) is not None:
+            mirror = self._mirror(line, role, moving[0], middle + step[moving[0]] / 2.0)
+            group = mirror.lines[0]
+            assert isinstance(group, Group)
+            if cost(group.keywords) < cost(best.keywords):
+                return mirror._replace(middles=moved)  # type: ignore[arg-type]
+        return result
+
+    def _way(self, step: Linear, count: Linear, number: int | None) -> Linear | None:
+        """How far the last of some copies is from the first; none if that is no linear form, or there is one copy."""
+        if number is not None:
+            return step * float(number - 1) if number > 1 else None
+        ((text, factor), *following) = step.factors or (("", 0.0),)
+        match self.atoms.get(text):
+            case Binary("/", total, steps) if not following and not step.constant:
+                return self.form(total) * factor if self._zero(self.form(steps) - count + 1.0) else None
+        return None
+
+    def _rotate(self, line: Loop, role: str) -> Converted:
+        """A published rotation: about the axis of the whole, or about that of the statement inside."""
+        pivots = [draw for draw in Source(line.body).walk() if isinstance(draw, Draw) and draw.name in PIVOTED]
+        draws = list(self._drawn(line.body))
+        if sum(draw.name in PIVOTED for draw in draws) > len(pivots):
+            message = "a rotation around a call has no placed form if it turns about what the function draws"
+            raise ShapeProgError(message, "write the function out")
+        if pivots and len(draws) > 1:
+            single_loops = [
+                replace(line, body=(inner,), note="" if n else line.note) for n, inner in enumerate(_apart(line))
+            ]
+            return Converted(tuple(placed for inner in single_loops for placed in self._rotate(inner, role).lines))
+        body = self.lines(line.body, role).lines
+        if all(isinstance(inner, Comment) for inner in body):
+            return Converted(body)
+        count, step = (self.form(value) for value in line.values)
+        keywords: Keywords = ()
+        for draw in pivots:
+            shift = CELL_CENTRE * self.per_cell if draw.name == "line" else 0.0
+            _, depth, side = (self.form(value) + shift for value in draw.values[:3])
+            keywords = self.point((-side, depth, self.sizes[2] / -2.0)).keywords
+            if draw.name == "base_cross":
+                keywords = (*keywords, ("step", self.written(step * 90.0)))
+        return Converted((Group("rotate", keywords, body, self.written(count), "", line.note),))
+
+    def _drawn(self, lines: Iterable[Line]) -> Iterator[Draw]:
+        """The drawing statements of lines, those of functions that they call included."""
+        for line in Source(tuple(lines)).walk():
+            if isinstance(line, Draw):
+                yield line
+            elif isinstance(line, Call):
+                yield from self._drawn(self.original.functions[line.name].body)
+
+
+def _apart(line: Loop) -> Iterator[Line]:
+    """The body of a loop as chains of loops around one line."""
+    for inner in line.body:
+        if isinstance(inner, Loop):
+            yield from (
+                replace(inner, body=(nested,), note="" if n else inner.note) for n, nested in enumerate(_apart(inner))
+            )
+        else:
+            yield inner
+
+
+def with_joined_mirrors(lines: Iterable[Line]) -> tuple[Line, ...]:
+    """Nested mirrors along different axes as one."""
+    result: list[Line] = []
+    for line in lines:
+        if isinstance(line, Group | Function):
+            line = replace(line, body=with_joined_mirrors(line.body))
+        if isinstance(line, Group) and line.kind == "mirror" and len(line.body) == 1:
+            (inner,) = line.body
+            if isinstance(inner, Group) and inner.kind == "mirror" and not inner.note:
+                axes = [
+                    next(a for a, words in enumerate(AXES) if w in words) for w, _ in (*line.keywords, *inner.keywords)
+                ]
+                if len(set(axes)) == len(axes):
+                    line = replace(line, keywords=ordered((*line.keywords, *inner.keywords)), body=inner.body)
+        result.append(line)
+    return tuple(result)

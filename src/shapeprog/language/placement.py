@@ -1,0 +1,110 @@
+"""The keywords by which placed parts lie in a box, and the tables of placed solids, loops and groups.
+
+x points right, y to the rear, z up, as seen by a person who looks at the front.  The whole stands on z = 0 and is
+centred at x = 0, y = 0.  The grid has the axes up, depth and *left*: ``up = z + floor``, ``depth = y``, ``side = -x``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import NamedTuple
+
+
+class AxisWords(NamedTuple):
+    """The keywords of one axis: its low and high side, the size along it, and the offset of the centre."""
+
+    low: str
+    high: str
+    size: str
+    offset: str
+
+
+AXES = (
+    AxisWords("left", "right", "width", "x"),
+    AxisWords("front", "rear", "depth", "y"),
+    AxisWords("bottom", "top", "height", "z"),
+)
+"""Left-right, front-rear, vertical."""
+
+SIZES = tuple(words.size for words in AXES)
+BOX = tuple(word for words in AXES for word in words)
+"""Keywords of a box."""
+
+POINT = tuple(word for word in BOX if word not in SIZES)
+"""Keywords of a point."""
+
+POINTS = ("start", "through", "end")
+"""Keywords of a solid that take a point."""
+
+
+class Needs(NamedTuple):
+    """Keywords that a solid needs, and keywords that it may have, beside those of its box."""
+
+    required: tuple[str, ...]
+    optional: tuple[str, ...]
+
+
+IN_BOX = {
+    "box": Needs((), ("tilt", "lean")),
+    "cushion": Needs(("edge",), ("tilt",)),
+    "cylinder": Needs((), ("radius", "tilt")),
+    "rod": Needs((), ("radius", "tilt")),
+    "taper": Needs(("radius",), ("tilt",)),
+}
+"""Solids that are placed by a box."""
+
+BETWEEN = {
+    "bar": Needs(("start", "end"), (*SIZES, "turn")),
+    "rod": Needs(("start", "end", "radius"), ()),
+    "taper": Needs(("start", "end", "radius"), ()),
+    "bent_rod": Needs((*POINTS, "radius"), ()),
+}
+"""Solids between points; ``rod`` and ``taper`` are these if they have a ``start``."""
+
+ROUND = ("cylinder", "rod", "taper")
+"""Solids that stand upright and round in a box."""
+
+ROUND_ROLES = ("top_circle", "base_circle", "support_cylinder", "line")
+"""Roles of round parts, which are never a box."""
+
+
+class GroupWords(NamedTuple):
+    """Keywords of a loop or group, how many arguments stand before them, and an example."""
+
+    keywords: tuple[str, ...]
+    arguments: int
+    example: str
+
+
+GROUPS = {
+    "inside": GroupWords((*BOX, "tilt"), 0, "with inside(left=..., width=...):"),
+    "divide": GroupWords((*BOX, "gap", "tilt"), 2, "for _ in divide(3, z, gap=0.5):"),
+    "mirror": GroupWords(POINT, 0, "for _ in mirror(x=0):"),
+    "rotate": GroupWords((*POINT[:6], "step"), 1, "for _ in rotate(5):"),
+    "translate": GroupWords(("x", "y", "z"), 1, "for _ in translate(3, z=20):"),
+    "row": GroupWords(("last",), 1, "for _ in row(3, last=at(top=2)):"),
+}
+
+RESERVED = frozenset([*BOX, *IN_BOX, *BETWEEN, *GROUPS, *POINTS, "at"])
+"""Words that are never names, beside roles and statements."""
+
+BOX_IN_CELLS = ("bottom", "front", "left", "height", "depth", "width")
+"""Parameters in cells that are the box of a function: its low corner along up, depth and left, and its extents."""
+
+ATTRIBUTES = frozenset(["radius", "edge", "tilt", "lean", "turn", "step", "gap"])
+"""Keywords that may be names of numbers, but not of functions."""
+
+LONGEST_SIDE = 24.0
+"""Cells of the longest side of the whole, as read."""
+
+MOST_SOLIDS = 1 << 17
+"""Most solids, and most evaluated bodies."""
+
+LEAST_ALONG = 0.25
+"""Least share of its length that a bar covers along the axis that its two sizes leave open."""
+
+
+def is_sized(keywords: Iterable[str], axis: int) -> bool:
+    """Whether keywords determine the size along an axis."""
+    words, (low, high, size, _) = set(keywords), AXES[axis]
+    return size in words or {low, high} <= words

@@ -1,0 +1,263 @@
+"""What both notations have in common: names and their scopes, functions, comments, and the places of mistakes."""
+
+from __future__ import annotations
+
+import ast
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import NamedTuple, TypeAlias
+
+from shapeprog.errors import ProgramError, ShapeProgError, did_you_mean
+from shapeprog.language.ast import Assignment, Comment, Function, Line, without_double_blanks
+from shapeprog.language.comments import Comments
+from shapeprog.language.expression import Binary, Expression, Name, Operator, Value
+from shapeprog.language.faults import Fault
+from shapeprog.language.parameters import to_float32
+from shapeprog.language.placement import SIZES
+from shapeprog.language.program import DEEPEST
+from shapeprog.language.text import Node, Text
+
+_OPERATORS: dict[type[ast.operator], Operator] = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/"}
+
+
+@dataclass
+class Declared:
+    """A declared name, parameter or function, and whether anything uses it."""
+
+    node: Node
+    used: bool = False
+
+
+Names: TypeAlias = dict[str, Declared]
+
+
+class Block(NamedTuple):
+    """Where lines stand: the names that they see, whether in a function, how many loops deep, and the last row."""
+
+    scope: Names
+    local: bool = False
+    depth: int = 0
+    end: float = math.inf
+
+
+class Reader(ABC):
+    """Turns syntax into lines, checks what needs no number, and knows the place of every line and number.
+
+    Parameters
+    ----------
+    text, tree
+        The text and its syntax tree.
+    comments
+        Comments that become lines or notes.
+    """
+
+    def __init__(self, text: Text, tree: ast.Module, comments: Comments) -> None:
+        self.text, self.tree, self.comments = text, tree, comments
+        self.expressions: dict[int, Node] = {}
+        self.places: dict[tuple[int, str], Node] = {}
+        self.functions: dict[str, Function] = {}
+        self.names: Names = {}
+        self.function_names: Names = {}
+        self.declared: list[tuple[str, Declared]] = []
+        self.variables: dict[str, ast.expr] = {}
+        self.later = {node.name for node in tree.body if isinstance(node, ast.FunctionDef)}
+
+    @abstractmethod
+    def reserved(self, word: str, kind: str) -> str:
+        """Why a word cannot be declared as a ``name``, ``parameter`` or ``function``; empty if it can."""
+
+    @abstractmethod
+    def element(self, call: ast.Call, scope: Names) -> Line:
+        """A line that draws: a solid, or a call of a function."""
+
+    @abstractmethod
+    def loop(self, node: ast.For | ast.With, block: Block) -> Line:
+        """A loop or a group."""
+
+    def ready(self, node: ast.stmt) -> None:  # noqa: B027  nothing need stand above
+        """Refuse a line that draws or defines before what must stand above it."""
+
+    def assigned(self, words: list[str], local: bool) -> None:  # noqa: B027
+        """Take note of the names of an assignment."""
+
+    # ---- lines --------------------------------------------------------------------------------------------------
+
+    def lines(self) -> tuple[Line, ...]:
+        """The lines of the whole text."""
+        return self.body(self.tree.body, Block(self.names))
+
+    def warnings(self) -> tuple[str, ...]:
+        """What is legal and probably a mistake."""
+        unused = [(word, name.node.lineno) for word, name in self.declared if not name.used]
+        return tuple(f"line {row}: unused name {word!r}" for word, row in unused)
+
+    def located(self, fault: Fault) -> ProgramError:
+        """A fault in the lines that were read, with its place in the text."""
+        key = (id(fault.line), str(fault.key))
+        node = self.expressions.get(id(fault.expression)) or self.places.get(key) or self.places[key[0], ""]
+        return self.error(node, fault.message, fault.hint)
+
+    def error(self, node: Node, message: str, hint: str) -> ProgramError:
+        """A mistake at a piece of syntax."""
+        return self.text.error(node, message, hint)
+
+    def require(self, condition: object, node: Node, message: str, hint: str) -> None:
+        """Raise an error at a piece of syntax unless a condition holds."""
+        if not condition:
+            raise self.error(node, message, hint)
+
+    def body(self, statements: list[ast.stmt], block: Block) -> tuple[Line, ...]:
+        """The lines of a block."""
+        lines: list[Line] = []
+        ends = [*(statement.lineno for statement in statements), block.end][1:]
+        for statement, following in zip(statements, ends, strict=True):
+            lines += self.comments.before(statement.lineno)
+            if isinstance(statement, ast.Pass):
+                lines += [Comment(note)] if (note := self.comments.note(statement.lineno)) else []
+            else:
+                lines.append(self._line(statement, block._replace(end=following)))
+        column = statements[0].col_offset + 1 if block.depth or block.local else 1
+        return without_double_blanks((*lines, *self.comments.ending(column, block.end)))
+
+    def _line(self, node: ast.stmt, block: Block) -> Line:
+        if isinstance(node, ast.Assign):
+            self.require(
+                not block.depth, node, "a name is declared inside a loop or a group", "move this line above it"
+            )
+            return self._assignment(node, block.scope, block.local)
+        known = isinstance(node, ast.For | ast.With | ast.FunctionDef)
+        known = known or (isinstance(node, ast.Expr) and isinstance(node.value, ast.Call))
+        hint = "use a part, a loop, with inside(...), a function or name = number"
+        self.require(known, node, "this is no statement of a program", hint)
+        self.ready(node)
+        if isinstance(node, ast.Expr) and isinstance(node.value, ast.Call):
+            return self.element(node.value, block.scope)
+        if isinstance(node, ast.For | ast.With):
+            return self.loop(node, block)
+        assert isinstance(node, ast.FunctionDef)
+        outermost = not block.depth and not block.local
+        self.require(outermost, node, "a function is defined inside another block", "move it to the top")
+        return self._function(node, block.end)
+
+    def _assignment(self, node: ast.Assign, scope: Names, local: bool) -> Line:
+        """Names with their values."""
+        message = "there are two = on this line"
+        self.require(len(node.targets) == 1, node.targets[-1], message, "declare one name, then the other")
+        target, value = node.targets[0], node.value
+        targets = target.elts if isinstance(target, ast.Tuple) else [target]
+        values = value.elts if isinstance(value, ast.Tuple) and isinstance(target, ast.Tuple) else [value]
+        message = f"{len(targets)} names for {len(values)} numbers"
+        self.require(len(targets) == len(values), node, message, "write as many numbers as names")
+        words = [getattr(name, "id", "") for name in targets]
+        pairs = [(word, self.value(word, number, scope)) for word, number in zip(words, values, strict=True)]
+        self.assigned(words, local)
+        for name, word in zip(targets, words, strict=True):
+            self.require(word, name, f"{self.text.shown(name)} is not a name", "write name = number")
+            self.declare(word, name, scope)
+        places: dict[str, Node] = dict(zip(words, targets, strict=True))
+        return self.recorded(Assignment(tuple(pairs), self.note(node)), node, places)
+
+    def declare(self, word: str, node: Node, scope: Names, parameter: bool = False) -> None:
+        """Add a name to a scope; a parameter may hide a name of the program."""
+        taken = not parameter and (word in scope or word in self.functions)
+        self.require(not taken, node, f"{word!r} is declared twice", "use another name")
+        if why := self.reserved(word, "parameter" if parameter else "name"):
+            hint = f"use another name, such as {word}_size"
+            raise self.error(node, why, "width, depth, height = ... is one line" if word in SIZES else hint)
+        if word in self.variables:
+            message = f"the variable {word} of this loop has the name of a number or function"
+            raise self.error(self.variables[word], message, "give the variable another name, such as i")
+        scope[word] = Declared(node, used=word in SIZES)  # the sizes of the whole always count as used
+        self.declared.append((word, scope[word]))
+
+    def _function(self, node: ast.FunctionDef, end: float) -> Line:
+        """A function, which is known below its definition only, so that there is no recursion."""
+        head, name = node.args, node.name
+        taken = self.reserved(name, "function") or name in self.functions or name in self.names
+        self.require(not taken, node, f"{name!r} has a meaning already", "use another name")
+        extra = [head.posonlyargs, head.vararg, head.kwonlyargs, head.kwarg, node.decorator_list, node.returns]
+        extra += [*(argument.annotation for argument in head.args), getattr(node, "type_params", None)]
+        self.require(not any(extra), node, "parameters are name or name=number", "remove the rest")
+        outer = self.visible_in_defaults()
+        defaults: list[ast.expr | None] = [*[None] * (len(head.args) - len(head.defaults)), *head.defaults]
+        scope, parameters = dict(self.names), dict[str, Value | None]()
+        self.function_names[name] = Declared(node)
+        self.declared.append((name, self.function_names[name]))
+        for parameter, default in zip(head.args, defaults, strict=True):
+            word = parameter.arg
+            self.require(word not in parameters, parameter, f"{word!r} is declared twice", "use another name")
+            parameters[word] = None if default is None else self.value(word, default, outer)
+            self.declare(word, parameter, scope, parameter=True)
+        heads = [node.lineno, *(a.end_lineno or 0 for a in head.args), *(d.end_lineno or 0 for d in head.defaults)]
+        note = self.comments.note(max(heads))
+        body = self.body(node.body, Block(scope, True, 0, end))
+        function = Function(name, tuple(parameters.items()), body, note)
+        self.functions[name] = function
+        return self.recorded(function, node, {argument.arg: argument for argument in head.args})
+
+    def visible_in_defaults(self) -> Names:
+        """The names that the default of a parameter may use."""
+        return self.names
+
+    # ---- numbers ------------------------------------------------------------------------------------------------
+
+    def value(self, word: str, node: ast.expr, scope: Mapping[str, Declared]) -> Value:
+        """A number or an expression of names in a scope; ``word`` is what holds it, in errors."""
+        value = self.number(word, node)
+        self.use(value, scope)
+        return value if isinstance(value, Expression) else to_float32(value)
+
+    def number(self, word: str, node: ast.expr, depth: int = 0) -> Value:
+        """A number or an expression, whose names are not checked yet."""
+        if depth > DEEPEST:
+            message = f"{word} holds an expression of more than {DEEPEST} levels"
+            raise self.error(node, message, "give a part of it a name of its own")
+        result: Value
+        match node:
+            case ast.Constant(float() | int() as literal) if not isinstance(literal, bool):
+                try:
+                    to_float32(float(literal))
+                except (OverflowError, ShapeProgError):
+                    message = f"{word} holds {self.text.shown(node)}, which is too large"
+                    raise self.error(node, message, "numbers end at 3.4028235e+38") from None
+                return float(literal)
+            case ast.Name(name):
+                result = Name(name)
+            case ast.UnaryOp(ast.UAdd(), inner):
+                return self.number(word, inner, depth + 1)
+            case ast.UnaryOp(ast.USub(), inner):
+                result = -self.number(word, inner, depth + 1)
+            case ast.BinOp(left, operator, right) if type(operator) in _OPERATORS:
+                sides = self.number(word, left, depth + 1), self.number(word, right, depth + 1)
+                result = Binary(_OPERATORS[type(operator)], *sides)
+            case _:
+                hint = "write numbers such as 4 or -2.5, or names of numbers, with + - * / between them"
+                raise self.error(node, f"{word} holds {self.text.shown(node)}, which is not a number", hint)
+        self.expressions[id(result)] = node
+        return result
+
+    def use(self, value: Value, scope: Mapping[str, Declared]) -> None:
+        """Refuse names that are not in a scope, and take note of those that are."""
+        for name in value.names() if isinstance(value, Expression) else ():
+            if name.name not in scope:
+                raise self.error(self.expressions[id(name)], *self._undefined(name, scope))
+            scope[name.name].used = True
+
+    def _undefined(self, name: Name, scope: Mapping[str, Declared]) -> tuple[str, str]:
+        if name.name in self.variables:
+            message = f"unknown name {name.name!r}: it is the variable of a loop, not a number"
+            return message, "the keywords of the loop say how it moves its copies"
+        otherwise = f"declare it above: {name.name} = ..."
+        return f"unknown name {name.name!r}", did_you_mean(name.name, scope, otherwise) if scope else otherwise
+
+    def note(self, node: ast.expr | ast.stmt) -> str:
+        """The comment behind a line."""
+        return self.comments.note(node.end_lineno or node.lineno)
+
+    def recorded(self, line: Line, node: Node, places: Mapping[str, Node]) -> Line:
+        """The line, with the places of its keywords and names."""
+        self.places |= {(id(line), key): place for key, place in places.items()}
+        self.places[id(line), ""] = node
+        return line

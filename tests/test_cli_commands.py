@@ -498,3 +498,12 @@ def test_help_and_version_load_nothing_heavy():
     )
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
     assert not {"torch", "numpy", "numba", "trimesh", "matplotlib", "scipy", "PIL"} & set(found)
+
+
+def test_a_file_that_cannot_be_written_does_not_stop_the_others(run: Run, tmp_path: Path):
+    (tmp_path / "table.shape").write_text(PLACED)
+    ended = run("export", "table.shape", "none/a.stl", "b.stl", "none/c.obj", "d.csv")
+    assert ended.code != 0
+    assert ended.err.count("its folder does not exist") == 2
+    assert (tmp_path / "b.stl").exists()
+    assert (tmp_path / "d.csv").exists()

@@ -78,6 +78,7 @@ def export_command(
     makers = any(chosen.maker for path in outputs if (chosen := format_of(path)) is not None)
     if frame is not None and unknown and makers and not (file_unit or quiet) and SPAN * frame.scale > LARGE:
         terminal.errors().print(assumed(SPAN * frame.scale), style="dim", markup=False)
+    failures: list[ShapeProgError] = []
     for path in outputs:
         written = loaded
         if unit is not None and path.suffix.lower() in WRITTEN:
@@ -85,11 +86,19 @@ def export_command(
 
             written = in_readable_unit(loaded, asked_unit(loaded.unit, frame, program, unit, file_unit))
         asked: dict[str, Any] = {"unit": unit or "", "file_unit": file_unit or "", "up": up, "on_input": on_input}
-        export(written, path, frame, **asked)
+        try:
+            export(written, path, frame, **asked)
+        except ShapeProgError as error:  # the other files do not depend on this one
+            failures.append(error)
+            continue
         if not quiet:
             terminal.output().print(f"wrote {path}")
             if path.suffix.lower() == ".csv":
                 terminal.output().print(_cut_table(loaded, path, frame, asked), markup=False, highlight=False)
+    for failure in failures[:-1]:
+        terminal.complain(failure)
+    if failures:
+        raise failures[-1]
 
 
 def _cut_table(program: Program, path: Path, frame: Frame | None, asked: Mapping[str, Any]) -> str:

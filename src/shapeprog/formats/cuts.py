@@ -29,7 +29,7 @@ DIGITS = 3
 """Significant digits of sizes whose unit is not known, and of areas."""
 
 BOARD = "board"
-"""The shape of a box at most half as thick as it is wide."""
+"""The shape of a box whose thickness is at most half its width."""
 
 SAME = 1e-3
 """Cells within which two copies coincide."""
@@ -173,16 +173,11 @@ def _round_cut(role: str, shape: str, length: float, diameter: float, unit: str)
     return Cut(role, shape, length, diameter, diameter, round=True) if min(length, diameter) > 0 else None
 
 
-def _step(unit: str, value: float) -> float:
-    """What lengths are rounded to."""
-    if unit:
-        return FINEST / METRES[unit]
-    return float(10.0 ** (math.floor(math.log10(max(abs(value), 1e-30))) - DIGITS))
-
-
 def _rounded(value: float, unit: str) -> float:
-    digits = -math.floor(math.log10(_step(unit, value)) + 1e-9)
-    return round(value, digits) + 0.0
+    """A length in multiples of ``FINEST``, or with one more than ``DIGITS`` digits if its unit is not known."""
+    if unit:
+        return round(value, -math.floor(math.log10(FINEST / METRES[unit]) + 1e-9)) + 0.0
+    return round(value, DIGITS - math.floor(math.log10(max(abs(value), 1e-30)))) + 0.0
 
 
 def _digits(value: float) -> float:

@@ -79,8 +79,7 @@ class Format:
 
     def read(self, path: Path) -> tuple[Program, Frame | None]:
         """The program in a file of this format, and its frame if the file has one."""
-        result: tuple[Program, Frame | None] = _function(self.reader)(path)
-        return result
+        return _function(self.reader)(path)
 
     def write(self, program: Program, path: Path, frame: Frame | None, **options: int | str) -> None:
         """Write a program; ``frame`` maps the grid to the coordinates of the file."""
@@ -182,7 +181,7 @@ FORMATS = (
 OTHER_MESHES: Axes = Y_UP
 """Axes of the mesh files that trimesh reads besides."""
 
-_BY_SUFFIX = {suffix: each for each in FORMATS for suffix in each.suffixes}
+_BY_SUFFIX = {suffix: entry for entry in FORMATS for suffix in entry.suffixes}
 
 
 def format_of(path: str | os.PathLike[str]) -> Format | None:

@@ -87,20 +87,20 @@ def parse_notation(text: str, name: str = "<program>", notes: list[str] | None =
 
 def groups(declared: Statement) -> dict[str, tuple[Parameter, ...]]:
     """The groups of numbers that the notation writes for a statement and the parameters in each."""
-    rest = declared.parameters[declared.is_loop :]
+    parameters = declared.parameters[declared.is_loop :]
     result: dict[str, tuple[Parameter, ...]] = {}
     if declared.is_loop:
-        for parameter in rest:
+        for parameter in parameters:
             symbol = declared.paper[1] if declared.paper and not result else parameter.name
             result[symbol] = (parameter,)
         return result
-    positions = [parameter for parameter in rest if parameter.quantity.kind == "position"]
+    positions = [parameter for parameter in parameters if parameter.quantity.kind == "position"]
     for number, parameter in enumerate(positions, 1):
         result[f"P{number}" if len(positions) > 1 else "P"] = (parameter,)
-    lengths = tuple(parameter for parameter in rest if parameter.quantity.kind == "length")
+    lengths = tuple(parameter for parameter in parameters if parameter.quantity.kind == "length")
     if lengths:
         result["G"] = lengths
-    result.update({p.name: (p,) for p in rest if p.quantity.kind not in ("position", "length")})
+    result.update({p.name: (p,) for p in parameters if p.quantity.kind not in ("position", "length")})
     return result
 
 
@@ -115,8 +115,8 @@ def _quoted(words: list[str]) -> str:
 
 def _moves(node: Node) -> bool:
     """Whether a node is a loop that shifts, with a ``u`` in the notation."""
-    known = language()
-    shifts = node.name in known and any(p.quantity.kind == "shift" for p in known[node.name].parameters)
+    registry = language()
+    shifts = node.name in registry and any(p.quantity.kind == "shift" for p in registry[node.name].parameters)
     return isinstance(node, Loop) and shifts
 
 
@@ -129,7 +129,7 @@ def _nested(node: Node, around: int = 0) -> bool:
 def _lines(node: Node, loops: list[Loop], numbered: bool) -> Iterator[str]:
     declared = language().declaration(node.name, len(node.values))
     shifts = [depth for depth, outer in enumerate(loops) if _moves(outer)]
-    names = [f"u{place + 1}" if numbered else "u" for place in range(len(shifts) + 1)]
+    names = [f"u{index + 1}" if numbered else "u" for index in range(len(shifts) + 1)]
     moved = "".join(f"+{variable(depth)}*{u}" for depth, u in zip(shifts, names, strict=False))
     words = [_quoted([checked_role(node), declared.name] if isinstance(node, Draw) and node.role else _words(declared))]
     for symbol, parameters in groups(declared).items():
@@ -237,20 +237,20 @@ class _Reader:
         return words, groups
 
     def _declared(self, words: list[str], by_symbol: Groups, is_loop: bool) -> tuple[Statement, tuple[float, ...]]:
-        known = [declared for declared in language() if declared.is_loop == is_loop]
-        fitting = next((declared for declared in known if _words(declared) == words), None)
+        candidates = [declared for declared in language() if declared.is_loop == is_loop]
+        fitting = next((declared for declared in candidates if _words(declared) == words), None)
         if fitting is None and not is_loop and len(words) > 1 and words[0] in language().roles:
-            solids = [declared for declared in known if declared.name != words[0]]  # leg(...) implies the role
+            solids = [declared for declared in candidates if declared.name != words[0]]  # leg(...) implies the role
             fitting = next((declared for declared in solids if [words[0], declared.name] == words), None)
         try:
             if is_published(words, by_symbol):
                 name, numbers, note = restored(words, by_symbol)
-                fitting = next((declared for declared in known if declared.name == name), None)
+                fitting = next((declared for declared in candidates if declared.name == name), None)
                 if fitting is not None:
                     self.notes.append(f"{self.name}, line {self.lines[self.next][0]}: {note}")
                     return fitting, _values(fitting, list(numbers))
             if fitting is None:
-                spelled = [_quoted(_words(declared)) for declared in known]
+                spelled = [_quoted(_words(declared)) for declared in candidates]
                 what = "loop" if is_loop else "statement"
                 raise ShapeProgError(
                     f"no {what} is called {_quoted(words)[:_SHOWN] or 'nothing'}", did_you_mean(_quoted(words), spelled)
@@ -261,23 +261,23 @@ class _Reader:
 
     def _sorted(self, declared: Statement, by_symbol: Groups) -> tuple[float, ...]:
         """Numbers in slot order."""
-        wanted = groups(declared)
-        given = {_symbol(symbol, wanted): numbers for symbol, numbers in by_symbol.items()}
-        for symbol in given:
-            if symbol not in wanted and symbol != COUNT:
+        declared_groups = groups(declared)
+        numbers_of = {_symbol(symbol, declared_groups): numbers for symbol, numbers in by_symbol.items()}
+        for symbol in numbers_of:
+            if symbol not in declared_groups and symbol != COUNT:
                 raise ShapeProgError(
-                    f"{declared.name} has no group {symbol[:_SHOWN]}", f"its groups are {', '.join(wanted)}"
+                    f"{declared.name} has no group {symbol[:_SHOWN]}", f"its groups are {', '.join(declared_groups)}"
                 )
         slots = [0.0] * declared.size
         if declared.is_loop:
-            slots[:1] = given[COUNT]
-        for symbol, parameters in wanted.items():
+            slots[:1] = numbers_of[COUNT]
+        for symbol, parameters in declared_groups.items():
             width = sum(parameter.quantity.width for parameter in parameters)
-            numbers = given.get(symbol)
+            numbers = numbers_of.get(symbol)
             if numbers is None or len(numbers) != width:
-                seen = "is missing" if numbers is None else f"has {len(numbers)} numbers"
+                actual = "is missing" if numbers is None else f"has {len(numbers)} numbers"
                 cure = "write one number" if width == 1 else f"write {width} numbers"
-                raise ShapeProgError(f"{symbol} of {declared.name} {seen}", cure)
+                raise ShapeProgError(f"{symbol} of {declared.name} {actual}", cure)
             for parameter in parameters:
                 slots[parameter.slots] = numbers[: parameter.quantity.width]
                 numbers = numbers[parameter.quantity.width :]
@@ -289,10 +289,10 @@ class _Reader:
         return ProgramError(message, line=number, column=start + 1, source=line, hint=hint, name=self.name)
 
 
-def _symbol(symbol: str, wanted: dict[str, tuple[Parameter, ...]]) -> str:
-    """``u1`` and ``u2`` of nested loops both stand for ``u``."""
+def _symbol(symbol: str, declared_groups: dict[str, tuple[Parameter, ...]]) -> str:
+    """``u1`` and ``u2`` of nested loops both mean ``u``."""
     bare = symbol.rstrip("0123456789")
-    return bare if symbol not in wanted and bare in wanted else symbol
+    return bare if symbol not in declared_groups and bare in declared_groups else symbol
 
 
 def _values(declared: Statement, slots: list[float]) -> tuple[float, ...]:

@@ -8,7 +8,7 @@ PRELUDE = """
 // A box is placed in the box around it by distances from its sides (left, right, front, rear, bottom, top), sizes
 // (width, depth, height) and offsets of its centre (x, y, z). $width, $depth and $height are sizes of the box around.
 module inside($BOX, tilt = 0) {
-  box = in_box($BOX_NAMES);
+  box = in_box($BOX);
   size = [for (side = box) side[1] - side[0]];
   translate([for (side = box) side[0]]) rotate([-tilt, 0, 0])
     let ($width = size[0], $depth = size[1], $height = size[2]) children();
@@ -56,7 +56,7 @@ module painted(kind) { color(colours[search([$role == "" ? kind : $role], colour
 
 // n equal boxes along the axis "x", "y" or "z".
 module divide(n, axis, gap = 0, $BOX, tilt = 0) {
-  inside($BOX_NAMES, tilt) slices(count(n), search(axis, "xyz")[0], gap) children();
+  inside($BOX, tilt) slices(count(n), search(axis, "xyz")[0], gap) children();
 }
 
 module slices(n, axis, gap) {
@@ -71,7 +71,7 @@ module slices(n, axis, gap) {
 
 // The children and their mirror image; along several axes, all of them.
 module mirrored($POINT) {
-  plane = at($POINT_NAMES);
+  plane = at($POINT);
   far = [for (k = plane) is_undef(k) ? 0 : 1];
   for (a = [0:far[0]], b = [0:far[1]], c = [0:far[2]])
     multmatrix([[1 - 2 * a, 0, 0, 2 * a * or_zero(plane[0])], [0, 1 - 2 * b, 0, 2 * b * or_zero(plane[1])],
@@ -91,7 +91,7 @@ module translated(n, x = 0, y = 0, z = 0) {
 
 // Evenly spaced copies: the keywords place the last copy of the first box.
 module row(n, first, $POINT) {
-  target = at($POINT_NAMES);
+  target = at($POINT);
   share = [is_undef(left) ? is_undef(right) ? 1 / 2 : 1 : 0, is_undef(front) ? is_undef(rear) ? 1 / 2 : 1 : 0,
     is_undef(bottom) ? is_undef(top) ? 1 / 2 : 1 : 0];
   step = [for (k = [0:2]) is_undef(target[k]) ? 0 :
@@ -101,7 +101,7 @@ module row(n, first, $POINT) {
 
 // A box; lean moves its top to the rear.
 module box($BOX, tilt = 0, lean = 0) {
-  inside($BOX_NAMES, tilt) painted("box") {
+  inside($BOX, tilt) painted("box") {
     if (min($width, $depth, $height) > 0)
       multmatrix([[1, 0, 0, 0], [0, 1, lean / $height, 0], [0, 0, 1, 0], [0, 0, 0, 1]])
         cube([$width, $depth, $height]);
@@ -110,7 +110,7 @@ module box($BOX, tilt = 0, lean = 0) {
 
 // A box with rounded edges.
 module cushion($BOX, edge, tilt = 0) {
-  inside($BOX_NAMES, tilt) painted("cushion") rounded([$width, $depth, $height], edge);
+  inside($BOX, tilt) painted("cushion") rounded([$width, $depth, $height], edge);
 }
 
 // A ball of polygons around a box, pulled apart.
@@ -135,7 +135,7 @@ module upright(kind, $BOX, radius, tilt = 0) {
   across = !is_undef(radius) ? 2 * max(radius) :
     let (by_x = !is_undef(width) || !(is_undef(left) || is_undef(right)),
       by_y = !is_undef(depth) || !(is_undef(front) || is_undef(rear)),
-      sides = in_box($BOX_NAMES))
+      sides = in_box($BOX))
     by_y && !by_x ? sides[1][1] - sides[1][0] : sides[0][1] - sides[0][0];
   inside(left, right, across, x, front, rear, across, y, bottom, top, height, z, tilt) painted(kind)
     between(middle(), [$width / 2, $depth / 2, $height], is_undef(radius) ? across / 2 : radius);
@@ -208,10 +208,5 @@ module bent_rod(start, through, end, radius) {
   }
 }
 """
-PRELUDE = (
-    PRELUDE.replace("$BOX_NAMES", ", ".join(BOX))
-    .replace("$BOX", ", ".join(BOX))
-    .replace("$POINT_NAMES", ", ".join(POINT))
-    .replace("$POINT", ", ".join(POINT))
-)
+PRELUDE = PRELUDE.replace("$BOX", ", ".join(BOX)).replace("$POINT", ", ".join(POINT))
 """Definitions with empty lines between them."""

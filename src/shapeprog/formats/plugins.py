@@ -39,8 +39,8 @@ def load_statements(path: str | os.PathLike[str]) -> tuple[Statement, ...]:
     module_name = f"shapeprog_statements_{len(_loaded)}_{file.stem}"
     try:
         _run(file, module_name)
-        declared = tuple(each for each in language() if each.name not in before)
-        played = tuple(each for name, each in language().roles.items() if name not in roles)
+        declared = tuple(declaration for declaration in language() if declaration.name not in before)
+        played = tuple(role for name, role in language().roles.items() if name not in roles)
         if not declared and not played:
             raise DeclarationError(f"{path} declares no statement", "decorate a function with @statement or @loop")
     except BaseException as cause:
@@ -68,26 +68,28 @@ def _run(file: Path, module_name: str) -> None:
 
 
 def _declare_again(file: Path) -> tuple[Statement, ...]:
-    known = language()
+    registry = language()
     declared = []
     statements, roles, solids = _loaded[file]
     primitives.names.update(solids)
-    for each in statements:
-        if each.name not in known:
-            known.register(replace(each, id=known.free_id()) if each.id in known else each)
-        declared.append(known[each.name])
+    for declaration in statements:
+        if declaration.name not in registry:
+            registry.register(
+                replace(declaration, id=registry.free_id()) if declaration.id in registry else declaration
+            )
+        declared.append(registry[declaration.name])
     for role in roles:
-        if role.name not in known.roles:
-            known.add_role(role.name, role.doc, role.label)
+        if role.name not in registry.roles:
+            registry.add_role(role.name, role.doc, role.label)
     return tuple(declared)
 
 
 def _in_words(path: str | os.PathLike[str], file: Path, cause: BaseException) -> DeclarationError:
     lines = [frame.lineno for frame in traceback.extract_tb(cause.__traceback__) if frame.filename == str(file)]
     line = cause.lineno if isinstance(cause, SyntaxError) else (lines[-1] if lines else None)
-    place = f"{path}, line {line}" if line else f"{path}"
+    location = f"{path}, line {line}" if line else f"{path}"
     if isinstance(cause, ShapeProgError):
-        return DeclarationError(f"{place}: {cause.message}", cause.hint)
+        return DeclarationError(f"{location}: {cause.message}", cause.hint)
     reason = str(cause).split("\n")[0]
     kind = type(cause).__name__
-    return DeclarationError(f"{place}: {kind}: {reason}" if reason else f"{place}: {kind}", "correct the module")
+    return DeclarationError(f"{location}: {kind}: {reason}" if reason else f"{location}: {kind}", "correct the module")

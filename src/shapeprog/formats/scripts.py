@@ -10,7 +10,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from shapeprog.formats.colours import hexadecimal
-from shapeprog.formats.frames import frame_of_text
 from shapeprog.formats.parts import Part as Mesh
 from shapeprog.formats.parts import as_placed, parts
 from shapeprog.language.ast import (
@@ -133,10 +132,11 @@ def world_of(source: Source, frame: Frame) -> FloatArray:
     """The map (4, 4) from the coordinates of placed text to those of a file; rounded to nine digits of its scale."""
     scale = source.scale
     assert scale is not None
-    world = frame_of_text(frame, scale).matrix()
+    k = scale.cells_per_unit
+    world = frame.matrix() @ np.array([[0, 0, k, scale.floor], [0, k, 0, 0], [-k, 0, 0, 0], [0, 0, 0, 1]])
     size = float(np.linalg.norm(world[:3, 0]))
     world[:3, :3] = np.round(world[:3, :3] / size, 9) * float(f"{size:.7g}")
-    world[:3, 3] = np.where(np.abs(world[:3, 3]) < 1e-6 * size * LONGEST_SIDE / scale.cells_per_unit, 0, world[:3, 3])
+    world[:3, 3] = np.where(np.abs(world[:3, 3]) < 1e-6 * size * LONGEST_SIDE / k, 0, world[:3, 3])
     return world + 0.0
 
 

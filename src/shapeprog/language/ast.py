@@ -7,7 +7,7 @@ placed program is evaluated to statements and loops in cells, see :mod:`shapepro
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, TypeAlias
 
@@ -210,11 +210,12 @@ class Source:
         pairs = (line.numbers for line in self.lines if isinstance(line, Assignment))
         return dict(pair for numbers in pairs for pair in numbers)
 
-    def evaluated_numbers(self) -> dict[str, float]:
-        """The values of these names."""
-        known: dict[str, float] = {}
+    def evaluated_numbers(self, given: Mapping[str, Any] | None = None) -> dict[str, Any]:
+        """The values of these names, some of which may be given."""
+        known = dict(given or {})
         for name, value in self.numbers.items():
-            known[name] = value_at(value, known)
+            if name not in known:
+                known[name] = value_at(value, known)
         return known
 
     def walk(self) -> Iterator[Line]:

@@ -34,13 +34,13 @@ class Comments:
 
     def ending(self, column: int, row: float) -> tuple[Comment, ...]:
         """Those above a row that end a block at a column: they are indented like it, or more."""
-        result = self._while(lambda each: each.row < row and (not each.text or each.column >= column))
+        result = self._while(lambda remark: remark.row < row and (not remark.text or remark.column >= column))
         while result and not result[-1].text:  # empty lines below a block are not in it
             self._rest.insert(0, result.pop())
-        return tuple(Comment(each.text) for each in result)
+        return tuple(Comment(remark.text) for remark in result)
 
-    def _while(self, wanted: Callable[[_Remark], bool]) -> list[_Remark]:
-        count = next((place for place, each in enumerate(self._rest) if not wanted(each)), len(self._rest))
+    def _while(self, accepted: Callable[[_Remark], bool]) -> list[_Remark]:
+        count = next((index for index, remark in enumerate(self._rest) if not accepted(remark)), len(self._rest))
         result, self._rest = self._rest[:count], self._rest[count:]
         return result
 

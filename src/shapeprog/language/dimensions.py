@@ -255,8 +255,8 @@ class _Powers:
         """The power of a literal in an expression, which is not known as yet."""
         return self._literals.setdefault((id(value), index), Linear.of(f"#{len(self._literals)}"))
 
-    def _agree(self, value: Expression, one: Linear, other: Linear) -> None:
-        if not self._holds(one - other):
+    def _agree(self, value: Expression, first: Linear, second: Linear) -> None:
+        if not self._holds(first - second):
             message = f"{text_of(value)} stands for a length in one place, and for another number elsewhere"
             raise ShapeProgError(message, "give each of them a name of its own, or keep the unit")
 

@@ -63,7 +63,7 @@ def placed_source(lines: tuple[Line, ...], unit: str = "", warnings: tuple[str, 
     lines
         Lines of which one assigns ``width``, ``depth`` and ``height``.
     unit
-        Name of the unit of their lengths, empty if it is not known.
+        Name of the unit of their lengths; empty if unknown.
     warnings
         See :class:`Source`.
     """
@@ -75,7 +75,7 @@ def placed_source(lines: tuple[Line, ...], unit: str = "", warnings: tuple[str, 
         cells = LONGEST_SIDE / max(names[size] for size in SIZES)
         scale = Scale(cells, -names["height"] * cells / 2)
         per_cell = Unit(unit, 1 / cells)
-    except (ShapeProgError, ArithmeticError):  # evaluation says what is wrong
+    except (ShapeProgError, ArithmeticError):  # evaluation reports the mistake
         scale, per_cell = Scale(1.0, 0.0), Unit(unit, 1.0)
     return Source(lines, per_cell, scale, warnings)
 
@@ -309,7 +309,7 @@ def _role(line: Draw, around: str) -> str:
 
 
 def _without_double_blanks(lines: tuple[Line, ...]) -> tuple[Line, ...]:
-    """The lines without superfluous empty ones, in bodies too; a line that changes nothing is left as it is."""
+    """The lines without superfluous empty ones, in bodies too; unchanged lines stay the same objects."""
     result = []
     for line in lines:
         if body := body_of(line):

@@ -4,7 +4,7 @@
     inner = width - 2 * Name("thick")       # str(inner) == "width - 2 * thick"
     inner.at({"width": 10, "thick": 1})     # 8.0
 
-What they are evaluated with need only know + - * /: plain numbers, tensors (then gradients flow), or linear forms.
+Names may have any values with + - * /: plain numbers, tensors (then gradients flow), or linear forms.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class Expression:
         raise NotImplementedError
 
     def names(self) -> Iterator[Name]:
-        """The names in it, in the order of its text, each as often as it is there."""
+        """The names in it, in the order of its text, with repetitions."""
         raise NotImplementedError
 
     def __add__(self, other: Value) -> Expression:
@@ -74,7 +74,7 @@ class Expression:
 
 
 Value: TypeAlias = float | Expression
-"""A number as it is written: exact in float32, or an expression."""
+"""A number that float32 holds exactly, or an expression."""
 
 
 @dataclass(frozen=True)
@@ -115,7 +115,7 @@ class Negative(Expression):
         return -self.of.at(numbers)
 
     def names(self) -> Iterator[Name]:
-        """The names in what it is put before."""
+        """The names in its operand."""
         return self.of.names()
 
     def __str__(self) -> str:
@@ -187,7 +187,7 @@ def replaced(value: Value, change: Callable[[float | Name], Value]) -> Value:
 
 
 def names_in(value: Value) -> list[str]:
-    """The names in a number or expression, in the order of its text, each as often as it is there."""
+    """The names in a number or expression, in the order of its text, with repetitions."""
     return [name.name for name in value.names()] if isinstance(value, Expression) else []
 
 

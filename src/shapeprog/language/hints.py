@@ -133,8 +133,7 @@ def rounded(box: Box) -> Iterator[list[float]]:
 
 def _leaned(along: FloatArray, main: int, axis: int) -> FloatArray:
     """A grid axis after the least rotation that brings the ``main`` one to a unit vector: as bars are leaned."""
-    result: FloatArray = np.eye(3)[axis] - along[axis] / (1 + along[main]) * (np.eye(3)[main] + along)
-    return result
+    return np.eye(3)[axis] - along[axis] / (1 + along[main]) * (np.eye(3)[main] + along)
 
 
 def _ends(box: Box, axis: int) -> tuple[FloatArray, FloatArray]:

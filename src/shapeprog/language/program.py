@@ -43,8 +43,7 @@ class Program:
 
     def _repr_png_(self) -> bytes:
         """A picture, which notebooks show."""
-        picture: bytes = importlib.import_module("shapeprog.view.page").png(self)  # drawn above this level
-        return picture
+        return importlib.import_module("shapeprog.view.page").png(self)  # drawn above this level
 
     @property
     def unit(self) -> Unit | None:

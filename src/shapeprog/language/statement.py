@@ -135,20 +135,12 @@ class Statement:
 
     def written(self, values: Sequence[float]) -> int:
         """How many continuous numbers text writes for these values."""
-        shown = [parameter for parameter in self.parameters if not parameter.quantity.discrete]
-        return sum(
-            parameter.quantity.width
-            for parameter in shown
-            if parameter.unsaid is None or values[parameter.start] != parameter.unsaid
-        )
+        shown = (p for p in self.parameters if not p.quantity.discrete)
+        return sum(p.quantity.width for p in shown if p.unsaid is None or values[p.start] != p.unsaid)
 
     def parameter_at(self, slot: int) -> Parameter:
         """The parameter of a tensor slot in use."""
-        return next(
-            parameter
-            for parameter in self.parameters
-            if parameter.start <= slot < parameter.start + parameter.quantity.width
-        )
+        return next(p for p in self.parameters if p.start <= slot < p.start + p.quantity.width)
 
     @property
     def first(self) -> Parameter:
@@ -247,9 +239,11 @@ class Language:
         return self._by_id[number].name if result is None else result.name
 
     def _faults(self, declared: Statement) -> Iterator[tuple[str, str]]:
-        """What is wrong with a declaration before it is tried, and the cure."""
+        """The mistakes in a declaration, found without drawing it, each with its cure."""
         what = f"statement {declared.name!r}"
-        owners = dict.fromkeys((EMPTY, END), "the language itself") | {each.id: each.name for each in self}
+        owners = dict.fromkeys((EMPTY, END), "the language itself") | {
+            declaration.id: declaration.name for declaration in self
+        }
         owners = {role.id: f"the role {role.name}" for role in self.roles.values()} | owners
         if not is_word(declared.name):
             yield f"{declared.name!r} is not a Python identifier", WORDS
@@ -267,8 +261,8 @@ class Language:
             yield f"{what} wants id {declared.id}, which belongs to {owners[declared.id]}", free
         for twin in self:
             if declared.paper and twin.paper == declared.paper:
-                own = "leave it out; the notation then uses the statement's own name"
-                yield f"{what} has the paper's name {declared.paper}, which belongs to {twin.name}", own
+                cure = "leave it out; the notation then uses the statement's own name"
+                yield f"{what} has the paper's name {declared.paper}, which belongs to {twin.name}", cure
 
     def forget(self, name: str) -> None:
         """Take a declaration out again, as when the module that made it fails."""
@@ -385,15 +379,15 @@ def _try(declared: Statement) -> None:
             moved = (motion.turn, motion.shift, motion.signs)
             shapes: list[Any] = [part if part is None else tuple(part.shape) for part in moved]
             fitting = shapes[0] in (None, (2,)) and all(shape in (None, (2, 3)) for shape in shapes[1:])
-            result, wanted = "a motion", "a turn must be (...), a shift and signs (..., 3)"
+            result, requirement = "a motion", "a turn must be (...), a shift and signs (..., 3)"
         else:
             shapes = [(tuple(solids.size.shape), tuple(solids.centre.shape)) for solids in declared.solids(values)]
             fitting = bool(shapes) and all(pair == ((2, SIZES), (2, 3)) for pair in shapes)
-            result, wanted = "solids", "sizes must be (..., 4) and centres (..., 3)"
+            result, requirement = "solids", "sizes must be (..., 4) and centres (..., 3)"
     except Exception as cause:
         message = f"statement {declared.name!r} cannot be {'moved' if declared.is_loop else 'drawn'}: {cause}"
         hint = "its function gets one tensor (...) or (..., width) per parameter, with any leading dimensions"
         raise DeclarationError(message, hint) from cause
     if not fitting:
         message = f"{kind} {declared.name!r} returns {result} of shapes {shapes}"
-        raise DeclarationError(message, f"{wanted} with the leading dimensions of the parameters")
+        raise DeclarationError(message, f"{requirement} with the leading dimensions of the parameters")

@@ -70,8 +70,8 @@ def metres(name: str) -> float:
 
 
 def read_unit(text: Text, first: float) -> tuple[Unit | None, Sequence[str]]:
-    """The unit that a text tells above its ``first`` row, and its lines without that; a ``ProgramError`` if it cannot
-    be read, stands further down, or is told twice."""
+    """The unit in a comment of a text above its ``first`` row, and its lines without it; a ``ProgramError`` if it
+    cannot be read, is further down, or is declared twice."""
     result: Unit | None = None
     lines = list(text.lines)
     for row, line in enumerate(text.lines, 1):

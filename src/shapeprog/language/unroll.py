@@ -261,13 +261,13 @@ def _copies(
     counts = values[..., 0].round().nan_to_num(0).clamp(0, MOST_PRIMITIVES + 1).long()
     counts = torch.where((level < step) & legal, counts, 1)
     total = torch.where((counts == 0).any(-1), 0, counts.double().prod(-1)) * legal[:, 0]  # the product may be infinite
-    drawn = total.reshape(-1, max(blocks, 1)).sum(-1)
-    if float(drawn.sum()) > MOST_COPIES:
-        if float(drawn.max()) > MOST_COPIES:
+    sizes = total.reshape(-1, max(blocks, 1)).sum(-1)
+    if float(sizes.sum()) > MOST_COPIES:
+        if float(sizes.max()) > MOST_COPIES:
             message = f"the loops of this program make more than {MOST_COPIES} copies"
             raise ShapeProgError(message, "lower their counts: so many copies can be drawn of one program")
-        if float(drawn.sum()) > MOST_PRIMITIVES:
-            message = f"these {len(drawn)} programs make more than {MOST_PRIMITIVES} copies together"
+        if float(sizes.sum()) > MOST_PRIMITIVES:
+            message = f"these {len(sizes)} programs make more than {MOST_PRIMITIVES} copies together"
             raise ShapeProgError(message, "unroll fewer of them at once")
     last = total.long().cumsum(0)
     numbers = torch.arange(int(total.sum()), device=ids.device)

@@ -62,13 +62,13 @@ def listing(program: Program, digits: int | None = DIGITS) -> list[Row]:
         if line is None or isinstance(line, Comment | Assignment):
             rows.append(Row(text))
             continue
-        drawn = tuple(blocks.get(id(line), ()))
+        block_numbers = tuple(blocks.get(id(line), ()))
         word, called = _word(line), ""
         if isinstance(line, Draw | Part):
-            called = words[drawn[0]] if drawn else word
+            called = words[block_numbers[0]] if block_numbers else word
         elif isinstance(line, Call):
             called = line.role
-        rows.append(Row(text, word, language().called(called).id if called else None, drawn))
+        rows.append(Row(text, word, language().called(called).id if called else None, block_numbers))
     return rows
 
 
@@ -87,21 +87,21 @@ def parted(line: Row) -> tuple[str, str, str]:
     return line.text[:start], line.word, line.text[start + len(line.word) :]
 
 
-def wrapped(line: Row, most: int) -> list[Row]:
-    """A line as several of at most so many letters, broken behind commas, else between words; those that follow have no
-    word and stand farther in.  What has no place to break is cut."""
+def wrapped(line: Row, length: int) -> list[Row]:
+    """A line as several of at most ``length`` letters, broken behind commas, else between words; later lines have
+    no word and are indented.  Text without a point to break is cut."""
     indent = " " * (len(line.text) - len(line.text.lstrip(" ")) + 4)
-    result, rest, word = [], line.text, line.word
-    while len(rest) > most:
-        limit = max(most, len(indent) + 2)
-        cuts = (rest.rfind(end, len(indent), limit) + len(end) for end in ("), ", ", ", " "))
+    result, text, word = [], line.text, line.word
+    while len(text) > length:
+        limit = max(length, len(indent) + 2)
+        cuts = (text.rfind(end, len(indent), limit) + len(end) for end in ("), ", ", ", " "))
         cut = next((cut for cut in cuts if cut > len(indent) + 2), 0)
         if not cut:
-            rest = rest[: limit - 1] + "…"
+            text = text[: limit - 1] + "…"
             break
-        result.append(replace(line, text=rest[:cut].rstrip(), word=word))
-        rest, word = indent + rest[cut:], ""
-    return [*result, replace(line, text=rest, word=word)]
+        result.append(replace(line, text=text[:cut].rstrip(), word=word))
+        text, word = indent + text[cut:], ""
+    return [*result, replace(line, text=text, word=word)]
 
 
 def _word(line: Line) -> str:

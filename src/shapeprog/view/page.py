@@ -17,11 +17,11 @@ from shapeprog.data.shape import Shape
 from shapeprog.errors import OutputError
 from shapeprog.files import atomic_path
 from shapeprog.formats.colours import colour
-from shapeprog.formats.parts import parts
+from shapeprog.formats.parts import Part, parts
 from shapeprog.language.program import Program
 from shapeprog.language.statement import language
 from shapeprog.view.listing import Row, listing, parted, wrapped
-from shapeprog.view.model import Model, of_parts, of_shape
+from shapeprog.view.model import of_parts, of_shape
 from shapeprog.view.render import Image, camera_for, render
 
 if TYPE_CHECKING:
@@ -112,8 +112,7 @@ def png(program: Program, scores: Mapping[str, float] | None = None) -> bytes:
 
 
 def _picture(shape: Shape | None, program: Program, title: str, scores: Mapping[str, float] | None, view: int) -> Any:
-    models = ([of_shape(shape)] if shape is not None else []) + [of_parts(parts(program))]
-    views = _views(models, view, view)
+    views = _views(shape, parts(program), view, view)
     panel = _Panel(program, scores, int(view * 1.12), view)
     head = 44
     width = view * len(views) + panel.width + 2 * _PAD
@@ -221,8 +220,9 @@ def scores_text(scores: Mapping[str, float] | None, program: Program) -> list[st
     return [" · ".join(words), size] if words else [size]
 
 
-def _views(models: Sequence[Model], width: int, height: int) -> list[Image]:
-    """One view of each model from the same camera; kernels hold no lock, so threads help."""
+def _views(shape: Shape | None, drawn: Sequence[Part], width: int, height: int) -> list[Image]:
+    """The input if there is one, and the parts, from the same camera; kernels hold no lock, so threads help."""
+    models = [*([] if shape is None else [of_shape(shape)]), of_parts(drawn)]
     camera = camera_for(models, width / height)
     with ThreadPoolExecutor(2) as pool:
         return list(pool.map(lambda model: render(model, camera, width, height), models))
@@ -230,8 +230,7 @@ def _views(models: Sequence[Model], width: int, height: int) -> list[Image]:
 
 def _pair(item: Item) -> tuple[Image | None, Image, set[int]]:
     solids = parts(item.program)
-    models = ([of_shape(item.shape)] if item.shape is not None else []) + [of_parts(solids)]
-    views = _views(models, *SMALL)
+    views = _views(item.shape, solids, *SMALL)
     return (views[0] if len(views) > 1 else None), views[-1], {part.statement for part in solids}
 
 

@@ -184,8 +184,7 @@ def render(model: Model, camera: Camera, width: int, height: int, samples: int =
     total = np.zeros((height, width, 3), np.float32)
     kernels.develop(face, colours, lit, lines, INKS, AMBIENT, ground, samples, total)
     linear = total / np.float64(samples * samples)
-    image: Image = (np.clip(linear, 0, 1) ** (1 / GAMMA) * 255 + 0.5).astype(np.uint8)
-    return image
+    return (np.clip(linear, 0, 1) ** (1 / GAMMA) * 255 + 0.5).astype(np.uint8)
 
 
 def _surface(face: Array, depth: Array, solid: Sequence[Array], view: Array, low: float, ground: bool) -> list[Array]:
@@ -208,8 +207,7 @@ def _enlarged(coarse: Array, height: int, width: int) -> Array:
     field = np.clip(np.asarray(large), 0, 1)[:height, :width]
     across, down = (np.minimum(np.arange(n), np.arange(n)[::-1]) / (FADE * n) for n in (width, height))
     inside = np.minimum(np.minimum.outer(down, across), 1)
-    faded: Array = (1 - (1 - field) * inside**2 * (3 - 2 * inside)).astype(np.float32)
-    return faded
+    return (1 - (1 - field) * inside**2 * (3 - 2 * inside)).astype(np.float32)
 
 
 def _blurred(image: Array) -> Array:

@@ -58,19 +58,19 @@ class Slider:
     places: dict[float, list[Array | None]]
 
 
-def sliders(program: Program, drawn: Sequence[Part]) -> list[Slider]:
+def sliders(program: Program, unchanged: Sequence[Part]) -> list[Slider]:
     """The free numbers of a program, except for those that change how many parts there are or how they are divided.
 
     Parameters
     ----------
-    drawn
+    unchanged
         The parts of the unchanged program.
     """
     free = [named for named in names(program) if named.free]
-    if len(free) * len(SHARES) * sum(3 * len(part.faces) for part in drawn) > MOST:
+    if len(free) * len(SHARES) * sum(3 * len(part.faces) for part in unchanged) > MOST:
         return []
     unit, measured = program.unit, lengths(program)
-    result = (_slider(program, drawn, named, unit if named.name in measured else None) for named in free)
+    result = (_slider(program, unchanged, named, unit if named.name in measured else None) for named in free)
     return [slider for slider in result if slider is not None]
 
 
@@ -95,53 +95,53 @@ def pieces(text: str, movable: Sequence[str]) -> list[tuple[str, str]] | None:
     return [*result, (text[last:], "")] if result else None
 
 
-def corners_of(drawn: Sequence[Part]) -> list[Array]:
+def corners_of(solids: Sequence[Part]) -> list[Array]:
     """The corners of the triangles of parts (F, 3, 6): positions and normals."""
     return [
         np.concatenate([part.vertices[part.faces], normals], -1)
-        for part, normals in zip(drawn, part_normals(drawn), strict=True)
+        for part, normals in zip(solids, part_normals(solids), strict=True)
     ]
 
 
-def _slider(program: Program, drawn: Sequence[Part], named: Named, unit: Unit | None) -> Slider | None:
-    start, name, value = corners_of(drawn), named.name, named.value
-    least = LEAST if unit is None else LEAST * unit.per_cell
-    size = max(abs(value), least) * (1.0 if value >= 0 else -1.0)
-    places = dict(_places(program, drawn, start, name, [value + (share - 1) * size for share in SHARES]))
+def _slider(program: Program, unchanged: Sequence[Part], named: Named, unit: Unit | None) -> Slider | None:
+    start, name, value = corners_of(unchanged), named.name, named.value
+    smallest = LEAST if unit is None else LEAST * unit.per_cell
+    size = max(abs(value), smallest) * (1.0 if value >= 0 else -1.0)
+    places = dict(_places(program, unchanged, start, name, [value + (share - 1) * size for share in SHARES]))
     if not places or all(part is None for corners in places.values() for part in corners):
         return None
     low, high = min(*places, value), max(*places, value)
     far = max(places, key=lambda at: abs(at - value))
     straight = all(
-        _straight(before, there, last, (at - value) / (far - value))
+        _straight(before, after, last, (at - value) / (far - value))
         for at, corners in places.items()
-        for before, there, last in zip(start, corners, places[far], strict=True)
+        for before, after, last in zip(start, corners, places[far], strict=True)
     )
     return Slider(name, value, low, high, unit.name if unit else "", {far: places[far]} if straight else places)
 
 
 def _places(
-    program: Program, drawn: Sequence[Part], start: list[Array], name: str, wanted: Sequence[float]
+    program: Program, unchanged: Sequence[Part], start: list[Array], name: str, numbers: Sequence[float]
 ) -> Iterator[tuple[float, list[Array | None]]]:
     """The corners of moving parts for each value that yields the same number of triangles."""
-    for at in wanted:
+    for at in numbers:
         try:
             moved = parts(set(program, {name: at}))
         except ShapeProgError:
             continue
-        if [part.faces.shape for part in moved] != [part.faces.shape for part in drawn]:
+        if [part.faces.shape for part in moved] != [part.faces.shape for part in unchanged]:
             continue
         yield (
             at,
             [
-                None if np.abs(there - before).max(initial=0) < STRAIGHT / 10 else there
-                for before, there in zip(start, corners_of(moved), strict=True)
+                None if np.abs(after - before).max(initial=0) < STRAIGHT / 10 else after
+                for before, after in zip(start, corners_of(moved), strict=True)
             ],
         )
 
 
-def _straight(before: Array, there: Array | None, last: Array | None, share: float) -> bool:
+def _straight(before: Array, after: Array | None, last: Array | None, share: float) -> bool:
     """Whether corners lie on a straight path to their last position."""
     end = before if last is None else last
-    now = before if there is None else there
-    return bool(np.abs(before + share * (end - before) - now).max(initial=0) < STRAIGHT)
+    position = before if after is None else after
+    return bool(np.abs(before + share * (end - before) - position).max(initial=0) < STRAIGHT)

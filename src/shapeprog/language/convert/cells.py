@@ -14,7 +14,7 @@ from shapeprog.language.convert.forms import Forms
 from shapeprog.language.convert.names import NOTHING, pruned, used_names
 from shapeprog.language.dimensions import Counts, in_unit
 from shapeprog.language.evaluate import evaluated, expanded, symbolic
-from shapeprog.language.expression import Expression, Linear, Name, combined, value_at
+from shapeprog.language.expression import Expression, Linear, Name, combined
 from shapeprog.language.placement import BOX_IN_CELLS, SIZES
 from shapeprog.language.printer import source_of
 from shapeprog.language.program import Node, Program
@@ -39,10 +39,7 @@ def in_cells(program: Program) -> Program:
     try:
         form: Any = floor
         if abs(floor + source.evaluated_numbers()["height"] / 2) < NOTHING:
-            forms: dict[str, Any] = {}
-            for name, value in source.numbers.items():
-                forms[name] = names.get(name) or value_at(value, forms)
-            form = forms["height"] / -2.0
+            form = source.evaluated_numbers(names)["height"] / -2.0
         nodes = symbolic(replace(source, unit=None, scale=Scale(1.0, floor)), names, form)
     except ShapeProgError:
         return Program(tuple(_published(node, node) for node in program.body))

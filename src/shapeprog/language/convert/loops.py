@@ -110,8 +110,8 @@ class Loops(Parts, ABC):
         middles: list[Linear | None] = list(body.middles)
         for axis in moving:
             middle = middles[axis]
-            known = middle is not None and number is not None and len(moving) == 1
-            middles[axis] = middle + step[axis] * ((number - 1) / 2) if known else None  # type: ignore[operator]
+            determined = middle is not None and number is not None and len(moving) == 1
+            middles[axis] = middle + step[axis] * ((number - 1) / 2) if determined else None  # type: ignore[operator]
         written, moved = self.written(count), tuple(middles)
         by = tuple(pair for axis in moving for pair in self._extra("xyz"[axis], step[axis])) or (("x", 0.0),)
         options = [Group("translate", by, body.lines, written, note=line.note)]

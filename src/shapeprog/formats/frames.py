@@ -152,10 +152,11 @@ def _cell_size(chosen: Format, program: Program, frame: Frame | None, unit: str,
 
 def _ground(program: Program) -> FloatArray:
     """The point of the grid where a program stands: the middle of the bottom of the whole, or of what is drawn."""
-    from shapeprog.formats.parts import as_placed, parts  # reading a program needs no geometry
+    from shapeprog.formats.parts import parts  # reading a program needs no geometry
+    from shapeprog.language.convert import placed_if_possible
 
-    if (placed := as_placed(program)) is not None and placed.scale is not None:
-        return np.array([placed.scale.floor, 0.0, 0.0])
+    if (scale := placed_if_possible(program).scale) is not None:
+        return np.array([scale.floor, 0.0, 0.0])
     vertices = [part.vertices for part in parts(program)]
     if not vertices:
         return np.zeros(3)

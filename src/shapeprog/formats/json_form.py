@@ -160,7 +160,7 @@ def _solids(program: Program, framed: bool) -> list[dict[str, Any]]:
     if program.size > MOST_SOLIDS:
         raise ShapeProgError(f"more than {MOST_SOLIDS} solids")
     source, scale = source_of(program), scale_of(program)
-    drawn, blocks = provenance(source).blocks, dict[int, tuple[int, str]]()
+    drawn, blocks = provenance(source), dict[int, tuple[int, str]]()
     for row, (_, line) in enumerate(printed(source), 1 + framed):
         if isinstance(line, Draw | Part):
             kind = line.kind if isinstance(line, Part) else line.name

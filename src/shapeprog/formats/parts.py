@@ -12,7 +12,6 @@ import numpy.typing as npt
 
 from shapeprog.errors import OutputError, ShapeProgError
 from shapeprog.geometry.mesh import part_meshes, union_mesh
-from shapeprog.language.convert import placed as placed_program
 from shapeprog.language.parameters import LARGEST
 from shapeprog.language.program import Program
 from shapeprog.language.statement import language
@@ -187,14 +186,3 @@ def _places(vertices: Vertices, owner: npt.NDArray[np.int64] | None) -> npt.NDAr
     result = np.empty(len(vertices), np.int64)
     result[order] = np.cumsum((np.diff(keys[order], axis=0, prepend=keys[order[:1]]) != 0).any(-1))
     return result
-
-
-def as_placed(program: Program) -> Program | None:
-    """The program with its parts placed from the sides of a box; none if a statement in it cannot be."""
-    if program.scale is not None:
-        return program
-    try:
-        with on_numpy_if_shipped(program):
-            return placed_program(program)
-    except ShapeProgError:
-        return None

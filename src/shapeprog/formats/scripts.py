@@ -11,7 +11,7 @@ import numpy as np
 
 from shapeprog.formats.colours import hexadecimal
 from shapeprog.formats.parts import Part as Mesh
-from shapeprog.formats.parts import as_placed, parts
+from shapeprog.formats.parts import parts
 from shapeprog.language.ast import (
     Assignment,
     Call,
@@ -26,6 +26,7 @@ from shapeprog.language.ast import (
     values,
     with_values,
 )
+from shapeprog.language.convert import placed_if_possible
 from shapeprog.language.dimensions import Counts
 from shapeprog.language.expression import Expression, Name, text_of
 from shapeprog.language.placement import LONGEST_SIDE, SIZES
@@ -109,12 +110,10 @@ def script(program: Program, frame: Frame, reserved: Collection[str], inner: str
     inner
         The prefix of ``width``, ``depth`` and ``height`` of a box inside of the whole.
     """
-    placed = as_placed(program)
-    if placed is None:
+    source = placed_if_possible(program).source
+    if source is None or not source.placed:
         meshes = tuple(parts(program, frame))
         return Script("", (), (), np.eye(4), _colours({mesh.word for mesh in meshes}), meshes)
-    source = placed.source
-    assert source is not None
     assert source.unit is not None
     words = _free_names([*sorted(names_of(source)), *source.functions], reserved)
     lines = tuple(_renamed(line, words, inner, False) for line in source.lines)

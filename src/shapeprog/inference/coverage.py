@@ -1,4 +1,4 @@
-"""What each of many candidates does for a target: what it explains, what it costs, and what it hides of the others.
+"""Coverage of a target by candidates: the points that each explains, its cost, and the parts of others that it hides.
 
 A candidate is a program of one block.  All that choosing between them needs is put into bits once:
 

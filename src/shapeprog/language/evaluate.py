@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 from shapeprog.errors import ShapeProgError, did_you_mean
@@ -103,27 +103,11 @@ def symbolic(source: Source, values: Mapping[str, Any], floor: Any = None) -> tu
     return tuple(evaluator.program())
 
 
-@dataclass(frozen=True)
-class Provenance:
-    """What the lines of a program draw.
-
-    Attributes
-    ----------
-    nodes
-        The statements and loops that a line became, once for each evaluation of it, by the ``id`` of the line.
-    blocks
-        Indices of the drawing statements of the expanded program that a line draws or repeats, by its ``id``.
-    """
-
-    nodes: dict[int, list[Any]]
-    blocks: dict[int, list[int]]
-
-
-def provenance(source: Source) -> Provenance:
-    """Which statements, loops and blocks each line of a program became."""
+def provenance(source: Source) -> dict[int, list[int]]:
+    """Indices of the drawing statements of the expanded program that each line draws or repeats, by its ``id``."""
     evaluator = _Evaluator(source, None)
     evaluator.program()
-    return Provenance(evaluator.met, evaluator.blocks)
+    return evaluator.blocks
 
 
 class _Evaluator(Lowering):
@@ -144,7 +128,6 @@ class _Evaluator(Lowering):
         self.functions = source.functions
         self.outermost: Scope = {}
         self.expansions = 0
-        self.met: dict[int, list[Any]] = defaultdict(list)
         self.blocks: dict[int, list[int]] = defaultdict(list)
 
     def program(self) -> list[Any]:
@@ -174,7 +157,6 @@ class _Evaluator(Lowering):
                 case Draw():
                     self._count(line, calls)
                     new = [self.leaf(line.name, self._values(line, scope), _role(line, context.role))]
-                    self.met[id(line)] += new
                 case Loop():
                     new = self._cells_loop(line, context)
                 case Call():
@@ -187,7 +169,6 @@ class _Evaluator(Lowering):
                     drawing = self.part(line, context) if isinstance(line, Part) else self.group(line, context)
                     new, element = drawing
                     first = first or element
-                    self.met[id(line)] += new
             self.blocks[id(line)] += range(start, self.drawn)
             nodes += new
         return Drawn(nodes, first)
@@ -198,7 +179,6 @@ class _Evaluator(Lowering):
             raise Fault(line, f"loops are nested more than {DEEPEST} deep", "put some of them side by side")
         body = tuple(self.lines(line.body, context._replace(loops=context.loops + 1)).nodes)
         loop = Loop(line.name, self._values(line, context.scope), body)
-        self.met[id(line)].append(loop)
         return list(body) if context.calls and _is_single(loop) else [loop]
 
     def _call(self, line: Call, context: Context) -> Drawn:

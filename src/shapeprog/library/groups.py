@@ -186,9 +186,9 @@ def _best(group: Group, uses: Sequence[Use], least: int) -> Iterator[Candidate]:
 def _best_in(
     box: FloatArray, group: Group, typical: FloatArray, uses: Sequence[Use], least: int
 ) -> Iterator[Candidate]:
-    """The function that shortens most: those relations that hold most often are asked for, one by one.
+    """The function that shortens programs most; relations are required one by one, the most frequent first.
 
-    Nothing is asked of its box, which every call has of its own.
+    No relation constrains its box, since every call gives another one.
     """
     values = np.array([use.values for use in uses])
     extents = values @ box[3:].T

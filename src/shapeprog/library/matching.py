@@ -38,7 +38,7 @@ STEEP = 8.0
 """How much smaller than another such parameter the next is: thin parts are."""
 
 EXACT = 0.01
-"""How far in cells a default may be from what is drawn to stand for it."""
+"""Largest difference in cells between the default of a parameter and a number that it replaces."""
 
 TRIES = 12
 """Ways in which arguments are expressed, of which the shortest is kept."""
@@ -166,9 +166,9 @@ class Match(NamedTuple):
 def forms(
     source: Source, given: Mapping[str, Any], names: Sequence[str], ways: Sequence[Sequence[int]] = ((),)
 ) -> Iterator[tuple[Form, ...]]:
-    """The blocks of a program as it is written, linear in ``names``; ``given`` is what its names stand for.
+    """The blocks of the text of a program, linear in ``names``; ``given`` has the values of its names.
 
-    Each comes in several ways: with mirror images as rows of two along these axes wherever they are the same.
+    Each block has several forms: with mirror images as rows of two along these axes, where both draw the same.
     """
     chains = Program(expanded(source)).chains
     parts = Program(symbolic(source, given)).chains

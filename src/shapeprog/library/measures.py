@@ -49,9 +49,9 @@ class Group(NamedTuple):
 
 
 class Measure(NamedTuple):
-    """A measure of a group: the block that it is of, its row of factors, and what it costs a reader as an argument.
+    """A measure of a group: its block, its row of factors, and its price as an argument of a call.
 
-    An ``opening`` is zero in most programs: a middle that lies in that of the whole, an angle of what stands straight.
+    An ``opening`` is zero in most programs: a part centred in the whole, or an upright angle.
     """
 
     block: int
@@ -63,12 +63,12 @@ class Measure(NamedTuple):
 
     @property
     def opening(self) -> bool:
-        """Whether it may be an argument that need not be said."""
+        """Whether it may be an optional argument."""
         return self.sort == "angle" or (self.sort == "middle" and self.axis != UP)
 
 
 def measures(group: Group, typical: FloatArray) -> Iterator[Measure]:
-    """All measures of a group; ``typical`` are its numbers (M,) in one program, which tell what is thin."""
+    """All measures of a group; ``typical`` are its numbers (M,) in one program, by which thin parts are recognised."""
     start = 0
     unit = np.eye(group.size)
     for block, (kind, slots) in enumerate(zip(group.kinds, group.slots, strict=True)):

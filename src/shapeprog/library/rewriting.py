@@ -93,9 +93,9 @@ def _apart(program: Program) -> Source:
 
 
 class Offer(NamedTuple):
-    """A call that could stand in a program: in the place of some lines, in the loops around the first of them.
+    """A call that could replace some lines of a program, inside the loops around the first of them.
 
-    ``lines`` tells for each block of its function on which line it is, where each nest of loops has one statement.
+    ``lines`` has the index of the line that each block of its function replaces; loops hold one statement each.
     """
 
     fewer: int

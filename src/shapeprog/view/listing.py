@@ -56,7 +56,7 @@ def listing(program: Program, digits: int | None = DIGITS) -> list[Row]:
     if digits is not None:
         decimals = digits_in(source.unit, digits)
         shown = replace(source, lines=changed_lines(source.lines, lambda line: _rounded(line, decimals)))
-    blocks, words = provenance(source).blocks, [draw.word for draw in program.draws]
+    blocks, words = provenance(source), [draw.word for draw in program.draws]
     rows = []
     for (text, _), (_, line) in zip(printed(shown), printed(source), strict=True):
         if line is None or isinstance(line, Comment | Assignment):

@@ -28,7 +28,7 @@ from shapeprog.language.printer import source_of
 from shapeprog.language.program import Program
 from shapeprog.language.tensors import encode
 from shapeprog.language.unit import Unit
-from shapeprog.language.unroll import unroll
+from shapeprog.language.unroll import on_numpy_if_shipped, unroll
 from shapeprog.lazy_torch import torch
 from shapeprog.space import DEPTH, SIDE, UP
 
@@ -233,11 +233,12 @@ class _Converter(Loops):
 
 def _extents(program: Program) -> list[float]:
     """Width, depth and height in cells of the smallest box about the middle of the grid that holds a program."""
-    scene = unroll(encode(program, dtype=torch.float64))
     reach = np.zeros(3)
-    for kind in scene.kinds:
-        selected = scene.mask & (scene.kind == kind)
-        half = primitives[kind].bound(scene.size[selected])
-        corners = (scene.rotation[selected].abs() @ half[..., None])[..., 0] + scene.centre[selected].abs()
-        reach = np.maximum(reach, array(corners).max(0))
+    with on_numpy_if_shipped(program):
+        scene = unroll(encode(program, dtype=torch.float64))
+        for kind in scene.kinds:
+            selected = scene.mask & (scene.kind == kind)
+            half = primitives[kind].bound(scene.size[selected])
+            corners = (scene.rotation[selected].abs() @ half[..., None])[..., 0] + scene.centre[selected].abs()
+            reach = np.maximum(reach, array(corners).max(0))
     return [float(2 * reach[axis]) for axis in (SIDE, DEPTH, UP)]

@@ -219,7 +219,7 @@ def test_broken_and_absurd_solids_fill_the_same_cells_by_kernel_and_by_declarati
 
 
 def test_a_ball_and_a_cone_fill_the_cells_whose_centre_they_contain():
-    ball = make_scene(["ellipsoid"], [[5.0, 5, 5]], [[0.0, 0, 0]])
+    ball = make_scene(["rounded_box"], [[5.0, 5, 5, 5]], [[0.0, 0, 0]])
     ticks = np.arange(32) - 15.5
     square = ticks[:, None, None] ** 2 + ticks[:, None] ** 2 + ticks**2
     assert (voxels(ball).numpy() == (square <= 25)).all()

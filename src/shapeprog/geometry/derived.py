@@ -34,7 +34,6 @@ def solid(
     volume: Formula,
     cell_size: Formula | None = None,
     spans: Callable[..., Spans] | None = None,
-    sample_kernel: Helper | None = None,
     cells: Helper = tested,
 ) -> Primitive:
     """A primitive from formulas of its sizes, see :class:`Primitive`.
@@ -48,8 +47,7 @@ def solid(
     bound, areas, volume, cell_size
         Of ``size``.
     sample, place, normal
-        ``(size, face, uniform)``, ``(size, unit)`` and ``(size, unit, face)``; a sample that draws until it accepts is
-        no formula, and is given as ``sample_kernel``.
+        ``(size, face, uniform)``, ``(size, unit)`` and ``(size, unit, face)``.
     cells
         See :class:`Kernels`.
     """
@@ -63,9 +61,7 @@ def solid(
         ),
         bound=generated("bound", "table, row", triple, bound(_SIZES)),
         excess=generated("excess", "table, row, a, b, c", "return {}", [excess(_SIZES, _POINT)]),
-        sample=sample_kernel or generated(
-            "sample", "table, row, face, one, two, three", triple, sample(_SIZES, _FACE, _UNIFORM)
-        ),
+        sample=generated("sample", "table, row, face, one, two, three", triple, sample(_SIZES, _FACE, _UNIFORM)),
         place=generated("place", "table, row, u, v, w", triple, placed),
         normal=generated("normal", "table, row, face, u, v, w", triple, normal(_SIZES, _UNIT, _FACE)),
         pull=generated(

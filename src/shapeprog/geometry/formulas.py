@@ -86,19 +86,11 @@ def meet(x: Number, y: Number) -> Number:
     return where(inner > 0, root(positive(x) ** 2 + positive(y) ** 2), inner)
 
 
-def call(compiled: Callable[..., Triple], on_tensors: Callable[..., Triple], *arguments: Number) -> Triple:
-    """Three numbers that a helper computes, and another function from tensors; without gradient."""
-    if not isinstance(arguments[0], Node):
-        return on_tensors(*arguments)
-    result = _node("call", compiled, *arguments)
-    return _node("item", result, 0), _node("item", result, 1), _node("item", result, 2)
-
-
 _CODE: dict[str, str] = {
     "abs": "abs({})", "square": "{0} * {0}", "where": "({1} if {0} else {2})", "min": "min({}, {})",
     "max": "max({}, {})", "at_least": "max({}, {})", "clamp": "min(max({}, {}), {})",
     "root": f"math.sqrt(max({{}}, {TINY}))", "sin": "math.sin({})", "cos": "math.cos({})",
-    "atan2": "math.atan2({}, {})", "constant": "{}", "item": "{}[{}]",
+    "atan2": "math.atan2({}, {})", "constant": "{}",
 }  # fmt: skip
 
 _GRADIENTS: dict[str, Callable[..., tuple[Number | None, ...]]] = {
@@ -168,14 +160,8 @@ def generated(name: str, arguments: str, results: str, outputs: Sequence[Number]
     names: dict[Any, str] = {}
     lines = [f"def {name}({arguments}):"]
     for number, node in enumerate(_sorted(outputs)):
-        values = [names.get(value, repr(value)) for value in node.arguments if not callable(value)]
-        if node.operation == "call":
-            scope[node.arguments[0].__name__] = node.arguments[0]
-            code = f"{node.arguments[0].__name__}({', '.join(values)})"
-        elif not values:
-            code = node.operation
-        else:
-            code = _CODE.get(node.operation, f"{{}} {node.operation} {{}}").format(*values)
+        values = [names.get(value, repr(value)) for value in node.arguments]
+        code = _CODE.get(node.operation, f"{{}} {node.operation} {{}}").format(*values) if values else node.operation
         names[node] = f"v{number}"
         lines.append(f"    v{number} = {code}")
     lines.append("    " + results.format(*(names.get(output, repr(output)) for output in outputs)))

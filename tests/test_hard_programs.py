@@ -122,20 +122,6 @@ def test_only_regular_files_of_a_programs_size_are_read(tmp_path: Path) -> None:
             read_text(name)
 
 
-@pytest.mark.parametrize(
-    "line",
-    [
-        "draw('Back', 'Cub', P=(0, 0, 0), G=(3e38, 1, 1), theta=90)",
-        "draw('Back', 'Cub', P=(0, 0, 0), G=(1, 1, 1), theta=1e999)",
-        "draw('Back', 'Cub', P=(0, 0, 0), G=(1e999, 1, 1), theta=5)",
-        "draw('Base', 'Line', P1=(0, 0, 0), P2=(0, 0, 1e400))",
-    ],
-)
-def test_what_the_published_printer_cut_off_is_not_restored_from_endless_numbers(line: str) -> None:
-    with pytest.raises(ProgramError, match="too large"):
-        parse_notation(line)
-
-
 def test_endless_products_of_counts_are_refused_and_those_with_a_zero_draw_nothing() -> None:
     def nest(*counts: float) -> Program:
         node: Draw | Loop = PROGRAM.body[0]

@@ -107,51 +107,6 @@ def test_the_notation_is_pinned() -> None:
     )
 
 
-def test_loops_of_the_notation_may_end_in_words() -> None:
-    text = "for(i<2,'Trans',u=(0,0,18))\nfor(i<3,'Trans',u=(0,4,0))\ndraw('Leg','Cub',P=(1,2,3),G=(4,5,6))\nend\nend\n"
-    leg = Draw("leg", (1, 2, 3, 4, 5, 6))
-    inner = Loop("translate", (3, 0, 4, 0), (leg,))
-    assert parse_notation(text + "draw('Leg','Cub',P=(1,2,3),G=(4,5,6))") == Program(
-        (Loop("translate", (2, 0, 0, 18), (inner,)), leg)
-    )
-
-
-def test_what_the_published_printer_drops_is_filled_in_and_reported() -> None:
-    text = (
-        "for(i<2, 'Trans', u=(0,0,18))\n"
-        "    draw('Base', 'Line', P1=(1,2,3)+i*u, P2=(1,2,-1))+i*u\n\n"
-        "for(i<4, 'Rot', theta=90\N{DEGREE SIGN}, axis=(1,2,3)\n"
-        "    draw('Base', 'Line', P1=(1,2,3), P2=(1,6,3), theta*i, axis)\n\n"
-        "for(i<5, 'Rot', theta=72\N{DEGREE SIGN}, axis=(1,2,3)\n"
-        "    draw('Base', 'Line', P1=(1,2,3), P2=(-3,2,-1), theta*i, axis)\n\n"
-        "draw('Back', 'Cub', P=(1,2,3), G=(14,2,16), theta=12\N{DEGREE SIGN})\n\n"
-        "draw('Connect', 'Line', P1=(1,2,3), P2=(1,2,-1))\n"
-    )
-    notes: list[str] = []
-    assert format_program(parse_notation(text, "paper.txt", notes)) == (
-        "for i in translate(2, by=(0, 0, 18)):\n"
-        "    base_cross(at=(1, 2, 3), thickness=1, length=4, turn=0)\n"
-        "for i in rotate(4, step=1):\n"
-        "    base_cross(at=(1, 2, 3), thickness=1, length=4, turn=1)\n"
-        "for i in rotate(5, step=1):\n"
-        "    line(start=(1, 2, 3), end=(-3, 2, -1), radius=1)\n"
-        "back(at=(1, 2, 3), size=(14, 2, 16), tilt=3)\n"
-        "line(start=(1, 2, 3), end=(1, 2, -1), radius=1)\n"
-    )
-    assert len(notes) == 7
-    assert "paper.txt, line 10: the tilt of a back was printed as 12 degrees; taken as 3 cells" in notes
-
-
-def test_published_tilts_are_recovered_from_their_angle() -> None:
-    for height in range(4, 17):
-        for tilt in range(5):
-            angle = int(math.degrees(math.atan(tilt / height)))
-            text = f"draw('Back', 'Cub', P=(0,0,0), G=({height},1,9), theta={angle}\N{DEGREE SIGN})"
-            found = parse_notation(text).body[0].values[6]
-            assert int(math.degrees(math.atan(found / height))) == angle
-            assert found == tilt or height > 10
-
-
 @pytest.mark.parametrize("declared", [*STATEMENTS, *LOOPS], ids=name_of)
 def test_the_manual_shows_text_that_parses(declared: Statement) -> None:
     shown = page(declared)

@@ -9,40 +9,34 @@ follows by its name: ``tilt``, ``turn``, ``step``.  Statements that the paper do
 
 from __future__ import annotations
 
-import re
+import ast
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any, TypeAlias
 
 from shapeprog.errors import ProgramError, ShapeProgError, did_you_mean
 from shapeprog.files import write_text
 from shapeprog.formats.frames import frame_comment, frame_in
-from shapeprog.formats.published import COUNT, Groups, is_published, restored
 from shapeprog.formats.shape import LARGEST_FILE, read_text
 from shapeprog.language.parameters import Parameter
 from shapeprog.language.printer import INDENT, checked_role, variable
 from shapeprog.language.program import DEEPEST, Draw, Loop, Node, Program
 from shapeprog.language.statement import Statement, language
-from shapeprog.language.text import proper_text
+from shapeprog.language.text import Text
 from shapeprog.space import Frame
 
-_NUMBER = r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?"
-# No pattern begins with blanks if the one before may end with them, so that matching stays linear.
-_VALUE = rf"\(\s*{_NUMBER}(?:\s*,\s*{_NUMBER})*\s*(?:,\s*)?\)|{_NUMBER}(?:\s*\N{{DEGREE SIGN}})?"
-_COPIES = r"(?:\s*\+\s*[a-z]\w*\s*\*\s*[a-z]\w*)*"
-_WORD = re.compile(r"\s*'([^'\n]*)'\s*(,|\)|$)")
-_GROUP = re.compile(rf"\s*([A-Za-z_]\w*)\s*=\s*({_VALUE}){_COPIES}\s*(,|\)|$)")
-_TURN = re.compile(r"\s*(?:theta\s*\*\s*[a-z]|axis)\s*(,|\)|$)")
-_DRAW = re.compile(r"draw\s*\(")
-_FOR = re.compile(rf"for\s*\(\s*[a-z]\w*\s*<\s*({_NUMBER})\s*(,|\))")
-_REST = re.compile(rf"{_COPIES}\s*(?::\s*)?$")
+Groups: TypeAlias = dict[str, tuple[float, ...]]
+"""Numbers by the name of their group."""
+
+_COUNT = ""
+"""The group that holds the count of a loop; no name of the notation can be empty."""
+
+_FORM = "write draw('Leg', 'Cub', P=(_, _, _), G=(_, _, _))"
 _SHOWN = 60
 
 
 def read_notation(path: Path) -> tuple[Program, Frame | None]:
-    """The program of a file in the notation of the paper, and its frame where a comment keeps it.
-
-    Defaults replace the numbers that the published printer omits; :func:`parse_notation` can report them.
-    """
+    """The program of a file in the notation of the paper, and its frame where a comment keeps it."""
     text = read_text(path, LARGEST_FILE)
     return parse_notation(text, str(path)), frame_in(text, str(path))
 
@@ -63,26 +57,15 @@ def format_notation(program: Program) -> str:
     return "".join(f"{line}\n" for node in program.body for line in _lines(node, [], _nested(node)))
 
 
-def parse_notation(text: str, name: str = "<program>", notes: list[str] | None = None) -> Program:
-    """The program of a text in the notation of the paper.
-
-    The body of a loop is indented, or ends with ``end``.  Text of the published
-    printer is accepted too.
-
-    Parameters
-    ----------
-    notes
-        Receives one sentence for each omitted number that was replaced by a default.
+def parse_notation(text: str, name: str = "<program>") -> Program:
+    """The program of a text in the notation of the paper; the body of a loop is indented.
 
     Raises
     ------
     ProgramError
         At the first place that is not in the notation.
     """
-    text = proper_text(text, name)
-    lines = [(number, line) for number, line in enumerate(text.splitlines(), 1) if _bare(line)]
-    reader = _Reader(lines, name, [] if notes is None else notes)
-    return Program(reader.body(-1, 0, inside=None))
+    return Program(_Reader(Text(text, name)).body(-1, 0))
 
 
 def groups(declared: Statement) -> dict[str, tuple[Parameter, ...]]:
@@ -154,150 +137,131 @@ def _number(parameter: Parameter, value: float) -> str:
 
 
 class _Reader:
-    """Parses lines; errors have the line and column."""
+    """Parses lines: each is a call in the syntax of Python but for its name ``for``."""
 
-    def __init__(self, lines: list[tuple[int, str]], name: str, notes: list[str]) -> None:
-        self.lines = lines
-        self.name = name
-        self.notes = notes
-        self.next = 0
-        self.ends = any(_bare(line) == "end" for _, line in lines)
+    def __init__(self, text: Text) -> None:
+        self.text = text
+        self.rest = [(row, line) for row, line in enumerate(text.lines, 1) if line.partition("#")[0].strip()][::-1]
 
-    def body(self, outside: int, depth: int, inside: int | None) -> tuple[Node, ...]:
-        """The nodes indented deeper than ``outside``, or up to ``end``, for the loop of line ``inside``."""
+    def body(self, outside: int, depth: int) -> tuple[Node, ...]:
+        """The nodes that are indented deeper than ``outside``, in ``depth`` loops."""
         nodes: list[Node] = []
         level: int | None = None
-        while self.next < len(self.lines):
-            line = self.lines[self.next][1]
+        while self.rest:
+            row, line = self.rest[-1]
             indent = len(line) - len(line.lstrip())
-            if self.ends:
-                if _bare(line) == "end":
-                    if inside is None:
-                        raise self._error("there is no loop to end here", "remove this end")
-                    break
-            elif indent <= outside:
+            if indent <= outside:
                 break
-            elif level is not None and indent != level:
-                raise self._error("unexpected indentation", "indent with four spaces in a loop")
+            if level not in (None, indent):
+                raise self.text.at(row, indent + 1, "unexpected indentation", "indent with four spaces in a loop")
             level = indent
-            nodes.append(self._node(indent, depth))
-        if inside is not None and self.ends:
-            if self.next == len(self.lines):
-                self.next = inside
-                raise self._error("missing end of this loop", "write end after its body")
-            self.next += 1
-        if inside is not None and not nodes:
-            self.next = inside
-            raise self._error("this loop has no body", "indent its body by four spaces")
+            self.rest.pop()
+            nodes.append(self._node(row, indent, line, depth))
         return tuple(nodes)
 
-    def _node(self, indent: int, depth: int) -> Node:
-        row = self.next
-        text = _bare(self.lines[row][1])
-        match = _DRAW.match(text) or _FOR.match(text)
-        if not match:
-            raise self._error(
-                "a line is draw(...), for(...) or end", "write draw('Leg', 'Cub', P=(_, _, _), G=(_, _, _))"
-            )
-        is_loop = match.re is _FOR
-        start: Groups = {COUNT: [float(match[1])]} if is_loop else {}
-        words, groups = self._arguments(text, match, indent, start)
-        declared, values = self._declared(words, groups, is_loop)
-        self.next += 1
-        if not is_loop:
-            role = words[0] if words == [words[0], declared.name] != _words(declared) else ""
-            return Draw(declared.name, values, role)
-        if depth >= DEEPEST:
-            self.next = row
-            raise self._error(f"loops are nested more than {DEEPEST} deep", "put some of them side by side")
-        return Loop(declared.name, values, self.body(indent, depth + 1, row))
-
-    def _arguments(self, text: str, match: re.Match[str], indent: int, groups: Groups) -> tuple[list[str], Groups]:
-        """Quoted words and groups of numbers; the published printer omits the last parenthesis of a rotation."""
-        words: list[str] = []
-        at = match.end()
-        last = match[0][-1] if match.re is _FOR else ","
-        while last == ",":
-            part = _WORD.match(text, at) or _GROUP.match(text, at) or _TURN.match(text, at)
-            if not part:
-                raise self._error(
-                    "this is neither a quoted word nor a group of numbers", "write 'Leg' or P=(0, 0, 0)", indent + at
-                )
-            if part.re is _WORD:
-                words.append(part[1])
-            elif part.re is _GROUP:
-                if part[1] in groups:
-                    raise self._error(f"{part[1][:_SHOWN]} is given twice", "leave one of them out", indent + at)
-                groups[part[1]] = [float(number) for number in re.findall(_NUMBER, part[2])]
-            at, last = part.end(), part[part.re.groups]
-        if not last and words != ["Rot"]:
-            raise self._error("the last parenthesis is missing", "write )", indent + at)
-        if not _REST.match(text, at):
-            raise self._error("unexpected text after the statement", "remove it", indent + at)
-        return words, groups
-
-    def _declared(self, words: list[str], by_symbol: Groups, is_loop: bool) -> tuple[Statement, tuple[float, ...]]:
-        candidates = [declared for declared in language() if declared.is_loop == is_loop]
-        fitting = next((declared for declared in candidates if _words(declared) == words), None)
-        if fitting is None and not is_loop and len(words) > 1 and words[0] in language().roles:
-            solids = [declared for declared in candidates if declared.name != words[0]]  # leg(...) implies the role
-            fitting = next((declared for declared in solids if [words[0], declared.name] == words), None)
+    def _node(self, row: int, indent: int, line: str, depth: int) -> Node:
+        call = self._call(row, indent, line)
+        is_loop = getattr(call.func, "id", "") == "For"
+        words, numbers = self._arguments(call, is_loop)
         try:
-            if is_published(words, by_symbol):
-                name, numbers, note = restored(words, by_symbol)
-                fitting = next((declared for declared in candidates if declared.name == name), None)
-                if fitting is not None:
-                    self.notes.append(f"{self.name}, line {self.lines[self.next][0]}: {note}")
-                    return fitting, _values(fitting, list(numbers))
-            if fitting is None:
-                spelled = [_quoted(_words(declared)) for declared in candidates]
-                what = "loop" if is_loop else "statement"
-                raise ShapeProgError(
-                    f"no {what} is called {_quoted(words)[:_SHOWN] or 'nothing'}", did_you_mean(_quoted(words), spelled)
-                )
-            return fitting, self._sorted(fitting, by_symbol)
+            declared = _statement(words, is_loop)
+            values = _in_slots(declared, numbers)
         except ShapeProgError as mistake:
-            raise self._error(mistake.message, mistake.hint) from None
+            raise self.text.error(call, mistake.message, mistake.hint) from None
+        if not is_loop:
+            return Draw(declared.name, values, "" if words == _words(declared) else words[0])
+        if depth >= DEEPEST:
+            message = f"loops are nested more than {DEEPEST} deep"
+            raise self.text.error(call, message, "put some of them side by side")
+        if not (body := self.body(indent, depth + 1)):
+            raise self.text.error(call, "this loop has no body", "indent its body by four spaces")
+        return Loop(declared.name, values, body)
 
-    def _sorted(self, declared: Statement, by_symbol: Groups) -> tuple[float, ...]:
-        """Numbers in slot order."""
-        declared_groups = groups(declared)
-        numbers_of = {_symbol(symbol, declared_groups): numbers for symbol, numbers in by_symbol.items()}
-        for symbol in numbers_of:
-            if symbol not in declared_groups and symbol != COUNT:
-                raise ShapeProgError(
-                    f"{declared.name} has no group {symbol[:_SHOWN]}", f"its groups are {', '.join(declared_groups)}"
-                )
-        slots = [0.0] * declared.size
-        if declared.is_loop:
-            slots[:1] = numbers_of[COUNT]
-        for symbol, parameters in declared_groups.items():
-            width = sum(parameter.quantity.width for parameter in parameters)
-            numbers = numbers_of.get(symbol)
-            if numbers is None or len(numbers) != width:
-                actual = "is missing" if numbers is None else f"has {len(numbers)} numbers"
-                cure = "write one number" if width == 1 else f"write {width} numbers"
-                raise ShapeProgError(f"{symbol} of {declared.name} {actual}", cure)
-            for parameter in parameters:
-                slots[parameter.slots] = numbers[: parameter.quantity.width]
-                numbers = numbers[parameter.quantity.width :]
-        return _values(declared, slots)
+    def _call(self, row: int, indent: int, line: str) -> ast.Call:
+        """The call on a line, at its place in the text."""
+        bare = line.partition("#")[0].strip().removesuffix(":")
+        if bare.startswith("for"):
+            bare = "For" + bare[3:]
+        try:
+            tree = ast.parse(bare, mode="eval").body
+        except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
+            column = (getattr(error, "offset", None) or 1) + indent
+            raise self.text.at(
+                row, min(column, len(line) + 1), f"invalid syntax: {getattr(error, 'msg', error)}", _FORM
+            ) from None
+        for node in ast.walk(tree):
+            if isinstance(node, ast.expr | ast.keyword):
+                node.lineno, node.col_offset = row, node.col_offset + len(line[:indent].encode())
+        if isinstance(tree, ast.Call) and getattr(tree.func, "id", "") in ("draw", "For"):
+            return tree
+        raise self.text.at(row, indent + 1, "a line is draw(...) or for(...)", _FORM)
 
-    def _error(self, message: str, hint: str, column: int | None = None) -> ProgramError:
-        number, line = self.lines[min(self.next, len(self.lines) - 1)]
-        start = len(line) - len(line.lstrip()) if column is None else column
-        return ProgramError(message, line=number, column=start + 1, source=line, hint=hint, name=self.name)
+    def _arguments(self, call: ast.Call, is_loop: bool) -> tuple[list[str], Groups]:
+        """Quoted words and groups of numbers."""
+        words: list[str] = []
+        numbers: Groups = {}
+        for node in [*call.args, *call.keywords]:
+            match node:
+                case ast.Constant(str(word)):
+                    words.append(word)
+                    continue
+                case ast.Compare(ast.Name(), [ast.Lt()], [value]) if is_loop and _COUNT not in numbers:
+                    symbol = _COUNT
+                case ast.keyword(str(symbol), value) if symbol not in numbers:
+                    pass
+                case ast.keyword(symbol):
+                    raise self.text.error(node, f"{symbol} is given twice", "leave one of them out")
+                case _:
+                    raise self._neither(node)
+            while isinstance(value, ast.BinOp) and isinstance(value.op, ast.Add):  # P=(...)+i*u
+                value = value.left
+            try:
+                result = ast.literal_eval(value)
+                numbers[symbol] = tuple(map(float, result if isinstance(result, tuple) else [result]))
+            except (ValueError, TypeError, OverflowError, RecursionError):
+                raise self._neither(value) from None
+        return words, numbers
+
+    def _neither(self, node: Any) -> ProgramError:
+        return self.text.error(
+            node, "this is neither a quoted word nor a group of numbers", "write 'Leg' or P=(0, 0, 0)"
+        )
 
 
-def _symbol(symbol: str, declared_groups: dict[str, tuple[Parameter, ...]]) -> str:
-    """``u1`` and ``u2`` of nested loops both mean ``u``."""
-    bare = symbol.rstrip("0123456789")
-    return bare if symbol not in declared_groups and bare in declared_groups else symbol
+def _statement(words: list[str], is_loop: bool) -> Statement:
+    """The declaration that words name, after a role or alone."""
+    candidates = [declared for declared in language() if declared.is_loop == is_loop]
+    for declared in candidates:
+        if _words(declared) == words:
+            return declared
+    if not is_loop and len(words) == 2 and words[0] in language().roles and words[0] != words[1]:
+        for declared in candidates:
+            if declared.name == words[1]:
+                return declared
+    spelled = [_quoted(_words(declared)) for declared in candidates]
+    message = f"no {'loop' if is_loop else 'statement'} is called {_quoted(words)[:_SHOWN] or 'nothing'}"
+    raise ShapeProgError(message, did_you_mean(_quoted(words), spelled))
 
 
-def _values(declared: Statement, slots: list[float]) -> tuple[float, ...]:
+def _in_slots(declared: Statement, by_symbol: Groups) -> tuple[float, ...]:
+    """Numbers in slot order."""
+    wanted = ({_COUNT: declared.parameters[:1]} if declared.is_loop else {}) | groups(declared)
+    given = {}
+    for symbol, numbers in by_symbol.items():
+        bare = symbol.rstrip("0123456789")  # u1 and u2 of nested loops both mean u
+        given[bare if symbol not in wanted and bare in wanted else symbol] = numbers
+    for symbol in given:
+        if symbol not in wanted:
+            hint = f"its groups are {', '.join(groups(declared))}"
+            raise ShapeProgError(f"{declared.name} has no group {symbol[:_SHOWN]}", hint)
+    slots = [0.0] * declared.size
+    for symbol, parameters in wanted.items():
+        width = sum(parameter.quantity.width for parameter in parameters)
+        numbers = given.get(symbol, ())
+        if len(numbers) != width:
+            actual = f"has {len(numbers)} numbers" if numbers else "is missing"
+            hint = "write one number" if width == 1 else f"write {width} numbers"
+            raise ShapeProgError(f"{symbol or 'the count'} of {declared.name} {actual}", hint)
+        for parameter in parameters:
+            slots[parameter.slots], numbers = numbers[: parameter.quantity.width], numbers[parameter.quantity.width :]
     return tuple(n for p in declared.parameters for n in p.checked(declared.name, slots[p.slots]))
-
-
-def _bare(line: str) -> str:
-    return line.partition("#")[0].strip()

@@ -135,7 +135,7 @@ def test_an_interruption_says_what_was_kept(run: Run, tmp_path: Path, monkeypatc
 
 
 def test_a_fault_of_ours_in_measuring_one_shape_stops_nothing(run: Run, tmp_path: Path, monkeypatch):
-    from shapeprog.cli import scoring
+    from shapeprog.evaluation import scoring
 
     (tmp_path / "in").mkdir()
     for name in ("a", "b"):
@@ -393,7 +393,7 @@ def test_evaluate_tells_how_many_physical_parts_have_a_primitive_of_their_own(ru
     assert (row["part_recall"], row["part_precision"]) == (1, 1)
     (folder / "0.ply").write_text("ply")
     ended = run("evaluate", "table.json", "kitchen_table.obj", "--parts", "parts")
-    assert (ended.code, "parts of table: 0.ply" in ended.err) == (1, True)
+    assert (ended.code, "prediction table: 0.ply" in ended.err) == (1, True)
 
 
 def test_evaluate_tells_what_has_no_partner(run: Run, tmp_path: Path, program: Path):
@@ -403,7 +403,7 @@ def test_evaluate_tells_what_has_no_partner(run: Run, tmp_path: Path, program: P
     table(tmp_path / "one.obj")
     ended = run("evaluate", "programs", "one.obj")
     assert ended.code == 1
-    assert "two has no target" in ended.err
+    assert "prediction two: there is no target" in ended.err
     table(tmp_path / "other.obj")
     ended = run("evaluate", "programs", "other.obj")
     assert (ended.code, "matched by name" in ended.err) == (2, True)

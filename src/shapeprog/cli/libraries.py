@@ -78,7 +78,7 @@ def show_command(
 
 
 def _files(folder: Path) -> list[Path]:
-    from shapeprog.cli.writing import program_files
+    from shapeprog.formats.files import program_files
 
     return [folder] if folder.is_file() else program_files(folder)
 

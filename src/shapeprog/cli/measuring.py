@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from shapeprog.cli import terminal
-from shapeprog.errors import InputError
+from shapeprog.errors import InputError, ShapeProgError
 
 if TYPE_CHECKING:
     from shapeprog.evaluation.metrics import Metrics, Summary
@@ -119,8 +119,8 @@ def evaluate_command(
     """
     from rich.progress import track
 
-    from shapeprog.cli import scoring
     from shapeprog.data.parts import part_files
+    from shapeprog.evaluation import scoring
     from shapeprog.evaluation.metrics import summarise
 
     terminal.load_modules(modules)
@@ -133,11 +133,18 @@ def evaluate_command(
     listed = list(scoring.predictions(predictions))
     rows: list[Metrics] = []
     silent = quiet or as_json or as_csv
-    for name, prediction in track(listed, "measuring", console=terminal.errors(), transient=True, disable=silent):
+    for path, name, prediction in track(listed, "measuring", console=terminal.errors(), transient=True, disable=silent):
         target = next(iter(shapes.values())) if len(shapes) == len(listed) == 1 else shapes.get(name)
-        row, failure = scoring.score(name, prediction, target, files, points, seed)
-        rows += [row] if row else []
-        failures += [failure] if failure else []
+        if isinstance(prediction, tuple):
+            terminal.warn(path, prediction[0])
+        try:
+            rows.append(scoring.measure(prediction, target, points, seed))
+            if isinstance(prediction, tuple) and target is not None and target.name in files:
+                rows[-1] = scoring.with_parts(rows[-1], prediction[0], target, files[target.name], seed)
+        except ShapeProgError as mistake:
+            failures.append(ShapeProgError(f"prediction {name}: {mistake.message}", mistake.hint))
+        except Exception as unexpected:
+            failures.append(terminal.fault(f"prediction {name} could not be measured", unexpected))
     if not rows:
         for error in failures:
             terminal.complain(error)

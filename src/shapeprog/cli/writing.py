@@ -220,6 +220,7 @@ def sheet_command(
 
     Inputs are found by the name in the .json file, in the folder of the programs or in that of --shape and below.
     """
+    from shapeprog.formats.files import program_files
     from shapeprog.view import Item, contact_sheet
     from shapeprog.view.page import scores_text
 
@@ -263,24 +264,6 @@ def statements_command(
     terminal.load_modules(modules)
     pages = [manual(name) for name in names] if names else [manual()]
     terminal.output().print("\n".join(pages).rstrip("\n"))
-
-
-def program_files(folder: Path) -> list[Path]:
-    """The programs in a folder in the order of their names; NAME.json, which keeps most, stands for all of that name.
-
-    Raises
-    ------
-    InputError
-        If there is no such folder, or it holds no programs.
-    """
-    cure = f"give a folder that holds {' or '.join(suffixes('program'))} files"
-    if not folder.is_dir():
-        raise InputError(f"there is no folder {folder}", cure)
-    json_last = sorted(suffixes("program"), key=".json".__eq__)
-    result = {path.with_suffix(""): path for suffix in json_last for path in folder.glob(f"*{suffix}")}
-    if not result:
-        raise InputError(f"the folder {folder} holds no programs", cure)
-    return [result[key] for key in sorted(result)]
 
 
 def _result(path: Path, changes: Sequence[str] | None = None) -> Result:

@@ -52,6 +52,24 @@ def load_with_frame(path: str | os.PathLike[str]) -> tuple[Program, Frame | None
     return file_format.read(file)
 
 
+def program_files(folder: Path) -> list[Path]:
+    """The programs in a folder in the order of their names; NAME.json, which keeps most, stands for all of that name.
+
+    Raises
+    ------
+    InputError
+        If there is no such folder, or it holds no programs.
+    """
+    cure = f"give a folder that holds {' or '.join(suffixes('program'))} files"
+    if not folder.is_dir():
+        raise InputError(f"there is no folder {folder}", cure)
+    json_last = sorted(suffixes("program"), key=".json".__eq__)
+    result = {path.with_suffix(""): path for suffix in json_last for path in folder.glob(f"*{suffix}")}
+    if not result:
+        raise InputError(f"the folder {folder} holds no programs", cure)
+    return [result[key] for key in sorted(result)]
+
+
 def save(program: Program, path: str | os.PathLike[str], frame: Frame | None = None) -> None:
     """Write a program so that :func:`load_with_frame` returns the same program and frame.
 

@@ -1,0 +1,117 @@
+"""Predictions of any kind against targets of any kind: programs by themselves, everything else as a shape."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import torch
+
+from shapeprog.data import load_all
+from shapeprog.data.parts import read_parts
+from shapeprog.data.reading import in_words
+from shapeprog.data.sampling import sample_surface
+from shapeprog.data.shape import Shape
+from shapeprog.data.voxelise import voxelise_mesh, voxelise_points
+from shapeprog.errors import InputError, ShapeProgError
+from shapeprog.evaluation.likeness import Triangles
+from shapeprog.evaluation.metrics import (
+    Metrics,
+    cloud_distances,
+    evaluate_program,
+    noise_floor,
+    target_samples,
+    with_likeness,
+    world_scale,
+)
+from shapeprog.evaluation.parts import part_scores
+from shapeprog.formats.files import load, program_files
+from shapeprog.formats.format import suffixes
+from shapeprog.formats.json_form import read_result
+from shapeprog.language.program import Program
+from shapeprog.language.unroll import unroll
+from shapeprog.space import Array
+
+Prediction = tuple[Program, Program | None] | Shape
+"""A program with its whole-numbered form where the file holds one, or a shape."""
+
+
+def predictions(path: Path) -> Iterator[tuple[Path, str, Prediction | ShapeProgError]]:
+    """Files, names and predictions of a file, a pack or a folder; a folder that holds programs is read for those."""
+    files = [path] if path.suffix.lower() in suffixes("program") else []
+    if path.is_dir() and any(any(path.glob(f"*{suffix}")) for suffix in suffixes("program")):
+        files = program_files(path)
+    for file in files:
+        try:
+            with in_words(file, "a program"):
+                result = read_result(file) if file.suffix.lower() == ".json" else None
+                prediction = (load(file), None) if result is None else (result.program, result.snapped)
+        except ShapeProgError as error:
+            yield file, file.stem, error
+        else:
+            yield file, file.stem, prediction
+    if not files:
+        for file, shape in load_all([path]):
+            yield file, (file.stem if isinstance(shape, ShapeProgError) else shape.name), shape
+
+
+def read_targets(
+    paths: list[Path], up: str | None, front: str | None, points: int, seed: int
+) -> tuple[dict[str, Shape], list[ShapeProgError]]:
+    """The target shapes by name, and what cannot be read or has the name of another."""
+    shapes: dict[str, Shape] = {}
+    failures = []
+    for path, shape in load_all(paths, up=up, front=front, points=2 * points, seed=seed):
+        if isinstance(shape, ShapeProgError):
+            failures.append(ShapeProgError(f"target {path}: {shape.message}", shape.hint))
+        elif shape.name in shapes:
+            sources = " and ".join(str(source) for source in (shapes[shape.name].source, shape.source) if source)
+            cure = "rename one of them; until then the first is used"
+            failures.append(ShapeProgError(f"duplicate target name {shape.name}: {sources or path}", cure))
+        else:
+            shapes[shape.name] = shape
+    return shapes, failures
+
+
+def measure(prediction: Prediction | ShapeProgError, target: Shape | None, points: int, seed: int) -> Metrics:
+    """The measures of one prediction; sizes are 0 for shapes.  Raises the error that stands for a prediction."""
+    if isinstance(prediction, ShapeProgError):
+        raise prediction
+    if target is None:
+        raise InputError("there is no target of this name", "give both the same name")
+    if isinstance(prediction, Shape):
+        return _measure_shape(prediction, target, points, seed)
+    return evaluate_program(prediction[0], target, prediction[1], points, seed, looks=True)
+
+
+def with_parts(row: Metrics, program: Program, target: Shape, files: list[Path], seed: int) -> Metrics:
+    """The measures with recall and precision of the physical parts in ``files``, see :func:`read_parts`."""
+    parts = [Triangles(target.frame.to_grid(vertices), faces) for vertices, faces in read_parts(files)]
+    return replace(row, **part_scores(parts, unroll(program), seed)._asdict())
+
+
+def _measure_shape(prediction: Shape, target: Shape, points: int, seed: int) -> Metrics:
+    """A predicted mesh or cloud is in the coordinates of the target; cells are in the grid."""
+    cells, mesh = prediction.voxels, None
+    sampled: Array | None = prediction.points
+    if prediction.vertices is not None and prediction.faces is not None:
+        mesh = Triangles(
+            target.frame.to_grid(prediction.frame.to_world(prediction.vertices)), np.asarray(prediction.faces)
+        )
+        cells, sampled = voxelise_mesh(*mesh), sample_surface(*mesh, points, seed)
+    elif prediction.kind == "points" and sampled is not None:
+        sampled = target.frame.to_grid(prediction.frame.to_world(sampled))
+        cells = voxelise_points(sampled)
+    union = int((cells | target.voxels).sum())
+    iou = float((cells & target.voxels).sum() / union) if union else 1.0
+    samples, square = target_samples(target, points, seed), world_scale(target) ** 2
+    forward = backward = floor = f1 = math.nan
+    if samples is not None and sampled is not None and len(sampled):
+        cloud = torch.from_numpy(np.asarray(sampled, np.float64))
+        forward, backward, f1 = cloud_distances(cloud, samples[0], square)
+        floor = noise_floor(samples, square)
+    row = Metrics(target.name, forward + backward, forward, backward, floor, f1, iou, 0, 0, 0)
+    return row if mesh is None else with_likeness(row, mesh, target, seed)

@@ -24,7 +24,6 @@ from scipy.spatial import cKDTree
 from shapeprog.geometry.cells import iou, rasterise, voxels
 from shapeprog.geometry.distance import each_distance, signed_distance
 from shapeprog.geometry.losses import chamfer, coverage
-from shapeprog.geometry.occupancy import cell_centres, soft_occupancy
 from shapeprog.geometry.primitive import primitives
 from shapeprog.geometry.primitives import built_in_names
 from shapeprog.geometry.scene import Scene
@@ -228,7 +227,8 @@ def bench_chamfer(batch: int) -> None:
 def bench_distance() -> None:
     scene, leaves = turned("cuboid", 64)
     target = torch.rand(1, POINTS, 3, generator=torch.Generator().manual_seed(1)) * 24 - 12
-    centres = cell_centres().reshape(1, -1, 3)
+    ticks = torch.arange(32) - 15.5
+    centres = torch.cartesian_prod(ticks, ticks, ticks)[None]
 
     def pairs(points: torch.Tensor) -> torch.Tensor:
         return each_distance(scene, points).min(-1)[0]
@@ -236,9 +236,6 @@ def bench_distance() -> None:
     rows = {
         f"coverage {POINTS} x 64 turned boxes": (
             lambda: coverage(scene, target).sum(), lambda: pairs(target).clamp(min=0).mean(),
-        ),
-        "soft occupancy 32^3 x 64 turned boxes": (
-            lambda: soft_occupancy(scene, 4.0).mean(), lambda: torch.sigmoid(-4.0 * pairs(centres)).mean(),
         ),
         "signed distance 32^3 x 64 turned boxes": (
             lambda: signed_distance(scene, centres).mean(), lambda: pairs(centres).mean(),

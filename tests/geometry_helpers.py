@@ -89,6 +89,12 @@ def _ball_normal(size, unit, face):
     return normal / safe_norm((normal**2).sum(-1, keepdim=True))
 
 
+def cell_centres(resolution=32):
+    """Centres (R, R, R, 3) of all cells in the grid frame."""
+    ticks = (torch.arange(resolution) + 0.5) * 32 / resolution - 16
+    return torch.stack(torch.meshgrid(ticks, ticks, ticks, indexing="ij"), -1)
+
+
 def ellipsoid_kind():
     """Index of the test's ellipsoid, declared on first use."""
     name = "test_ellipsoid"

@@ -1,4 +1,4 @@
-"""Losses between shapes: chamfer, coverage and its reverse, occupancy, and the price of volume and of parts.
+"""Losses between shapes: chamfer, coverage and its reverse.
 
 Sections and equations are those of Liang (2022), "Learning to Infer 3D Shape Programs with Differentiable Renderer".
 All return one value for each shape of the batch.  Distances are in cells; squared ones are means, not sums.
@@ -9,23 +9,18 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import torch
-from jaxtyping import Float, Shaped
+from jaxtyping import Float
 from torch import Tensor
 
 from shapeprog.geometry.batch import Batch
 from shapeprog.geometry.distance import signed_distance
 from shapeprog.geometry.nearest import mean_squared_distances, squared_distance
-from shapeprog.geometry.primitive import primitives
 
 Cloud = Float[Tensor, "*batch P 3"]
 Weights = Float[Tensor, "*batch P"]
 Target = Float[Tensor, "*batch Q 3"]
 TargetWeights = Float[Tensor, "*batch Q"]
 Values = Float[Tensor, "*batch"]
-Grid = Float[Tensor, "*batch R R R"]
-Marked = Shaped[Tensor, "*batch R R R"]
-Row = Float[Tensor, "*batch S"]
-Cells = Float[Tensor, "*cells"]
 
 
 class Chamfer(NamedTuple):
@@ -81,7 +76,7 @@ def coverage(scene: Batch, target: Cloud, *, surface: bool = False) -> Values:
 
     The distance to a union is equation 2, that to a cuboid equation 3, to a primitive in any pose equation 4; that to
     a cylinder is appendix A, mended.  A target point inside a primitive costs nothing, so alone it is minimised by one
-    box that fills everything: add :func:`shapeprog.geometry.losses.excess` and a price.
+    box that fills everything: add :func:`shapeprog.geometry.losses.excess`.
 
     Parameters
     ----------
@@ -104,49 +99,6 @@ def coverage(scene: Batch, target: Cloud, *, surface: bool = False) -> Values:
 def excess(points: Cloud, target: Target, *, weights: Weights | None = None) -> Values:
     """How far points of the prediction are from the target on average: the reverse of coverage."""
     return _mean(torch.sqrt(squared_distance(points, target).clamp(min=1e-12)), weights)
-
-
-def volume(scene: Batch) -> Values:
-    """Price of volume: the volumes of all primitives added, in cubic cells; overlaps are paid for twice."""
-    total = torch.zeros_like(scene.centre[..., 0])
-    for kind in scene.kinds:
-        here = scene.mask & (scene.kind == kind)
-        total = total + torch.where(here, primitives[kind].volume(scene.size), 0)
-    return total.sum(-1)
-
-
-def parts(scene: Batch, presence: Float[Tensor, "*batch N"] | None = None) -> Values:
-    """Price of parts: how many primitives there are, or are expected where ``presence`` gives their probabilities.
-
-    It has a gradient to ``presence`` alone: no size or position changes how many there are.
-    """
-    mask = scene.mask.to(scene.size)
-    return (mask if presence is None else mask * presence).sum(-1)
-
-
-def cell_cross_entropy(logits: Cells, target: Cells, reduction: str = "none") -> Tensor:
-    """Cross-entropy of the occupancy of each cell against the target, or its ``mean``, from logits."""
-    return torch.nn.functional.binary_cross_entropy_with_logits(logits, target, reduction=reduction)
-
-
-def occupancy_cross_entropy(logits: Grid, target: Marked) -> Values:
-    """Cross-entropy of soft occupancy, see ``soft_logits``, as a mean over target cells, 0, 1 or a share between."""
-    logits = logits.clamp(-1e4, 1e4)  # an empty scene is infinitely far away
-    return cell_cross_entropy(logits, target.to(logits)).flatten(-3).mean(-1)
-
-
-def soft_iou(occupancy: Grid, target: Marked) -> Values:
-    """Intersection over union of soft cells against target cells; 1 when both are empty, exact for hard cells."""
-    return weighted_iou(occupancy.flatten(-3), target.to(occupancy).flatten(-3))
-
-
-def weighted_iou(occupancy: Row, target: Row, weights: Row | None = None) -> Values:
-    """The same for some cells in a row, each weighted by the number of cells it represents."""
-    both, either = occupancy * target, occupancy + target - occupancy * target
-    if weights is not None:
-        both, either = both * weights, either * weights
-    shared, all_cells = both.sum(-1), either.sum(-1)
-    return torch.where(all_cells > 0, shared / all_cells.clamp(min=1e-12), 1.0)
 
 
 def _mean(values: Weights, weights: Weights | None) -> Values:

@@ -19,7 +19,6 @@ from torch import Tensor
 from shapeprog.errors import InputError
 from shapeprog.geometry.arrays import one_tensor_thread
 from shapeprog.geometry.distance import signed_distance
-from shapeprog.geometry.losses import cell_cross_entropy
 from shapeprog.geometry.nearest import squared_distance
 from shapeprog.geometry.primitive import primitives
 from shapeprog.geometry.scene import Scene
@@ -217,4 +216,4 @@ def _shell(voxels: npt.NDArray[np.bool_]) -> Float[Tensor, "S 4"]:
 def _occupancy_loss(scene: Scene, cells: Float[Tensor, "S 4"]) -> Float[Tensor, ""]:
     """Cross-entropy of touched cells: a solid touches a cell when it comes within half a cell of its centre."""
     logits = SHARPNESS * (0.5 - signed_distance(scene, cells[:, :3]))
-    return cell_cross_entropy(logits, cells[:, 3], "mean")
+    return torch.nn.functional.binary_cross_entropy_with_logits(logits, cells[:, 3])

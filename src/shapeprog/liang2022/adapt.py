@@ -32,7 +32,6 @@ from torch import Tensor, nn
 
 from shapeprog.data.packs import read_pack
 from shapeprog.errors import ShapeProgError
-from shapeprog.geometry.losses import occupancy_cross_entropy
 from shapeprog.geometry.surface import has_surface
 from shapeprog.inference.surface import points_of_cells
 from shapeprog.language.program import Draw, Program
@@ -165,7 +164,10 @@ class AdaptTask:
         if self._executor is not None:
             executor, one_hot = self._executor.to(rng.device), torch.nn.functional.one_hot(code.ids, IDS).float()
             logits = executor.union(one_hot, code.parameters, prediction.batch.live & (code.ids[..., 0] != EMPTY))
-            values[NEURAL] = self._losses[NEURAL] * occupancy_cross_entropy(logits, targets.cells)
+            logits = logits.clamp(-1e4, 1e4)  # of an empty scene they may be infinite
+            of_cells = torch.nn.functional.binary_cross_entropy_with_logits
+            loss = of_cells(logits, targets.cells.to(logits), reduction="none").flatten(1).mean(1)
+            values[NEURAL] = self._losses[NEURAL] * loss
         return values
 
     def _id_losses(self, prediction: Prediction, decoded: Decoded) -> dict[str, Tensor]:

@@ -15,7 +15,6 @@ from torch import Tensor, nn
 from torch.nn.functional import one_hot
 
 from shapeprog.geometry.cells import iou, pack, unpack
-from shapeprog.geometry.losses import cell_cross_entropy
 from shapeprog.language.statement import SLOTS
 from shapeprog.language.tensors import Code
 from shapeprog.language.unroll import draw_blocks
@@ -111,7 +110,8 @@ class ExecutorTask:
         weights = 1 + (first + (last - first) * progress - 1) * cells
         overlap, size = (part.flatten(1).sum(-1) for part in (logits.sigmoid() * cells, logits.sigmoid() + cells))
         dice = (2 * overlap + 1) / (size + 1)
-        cross_entropy = (cell_cross_entropy(logits, cells) * weights).sum() / weights.sum()
+        total = torch.nn.functional.binary_cross_entropy_with_logits(logits, cells, weights, reduction="sum")
+        cross_entropy = total / weights.sum()
         return {"cells": cross_entropy, "dice": 1 - dice.mean()}
 
     def _logits(self, blocks: Blocks) -> Float[Tensor, "N 32 32 32"]:

@@ -98,7 +98,9 @@ def soft_iou(comparison: Comparison) -> Values:
     axes = [sampled.div(RESOLUTION**power, rounding_mode="floor") % RESOLUTION for power in (2, 1, 0)]
     distance = signed_distance(scene, torch.stack(axes, -1).to(scene.centre) + 0.5 - HALF)
     logits = -SHARPNESS * distance.clamp(-1e3, 1e3)
-    return 1 - losses.weighted_iou(logits.sigmoid(), flat.gather(1, sampled).to(logits), weights)
+    soft, hard = logits.sigmoid(), flat.gather(1, sampled).to(logits)
+    both, either = (soft * hard * weights).sum(-1), ((soft + hard - soft * hard) * weights).sum(-1)
+    return 1 - torch.where(either > 0, both / either.clamp(min=1e-12), 1.0)
 
 
 def parse_losses(text: str) -> dict[str, float]:

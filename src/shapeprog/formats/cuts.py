@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from shapeprog.files import write_text
-from shapeprog.geometry.arrays import array
+from shapeprog.geometry.mesh import solids_of
 from shapeprog.geometry.primitive import primitives
 from shapeprog.language.program import Program
 from shapeprog.language.tensors import encode
@@ -131,11 +131,10 @@ def write_cuts(program: Program, path: Path, frame: Frame, unit: str = "") -> No
 def _cuts(program: Program, scale: float, unit: str) -> Iterator[tuple[Cut, tuple[float, ...]]]:
     """The entry of every part that has a volume, and where it lies: its centre and extents, rounded."""
     scene = unroll(encode(program, dtype=torch.float64))
-    words = [draw.word for draw in program.draws]
-    blocks, kinds = scene.block.tolist(), scene.kind.tolist()
-    sizes, centre, rotation = (array(tensor) for tensor in (scene.size, scene.centre, scene.rotation))
-    for slot in np.flatnonzero(array(scene.mask)).tolist():
-        half = array(primitives[kinds[slot]].bound(torch.tensor(sizes[slot : slot + 1])))[0]
+    words, blocks, kinds = [draw.word for draw in program.draws], scene.block.tolist(), scene.kind.tolist()
+    solid, sizes, centre, rotation, halves = solids_of(scene)
+    for slot in np.flatnonzero(solid).tolist():
+        half = halves[slot]
         cut = _cut(words[blocks[slot]], primitives[kinds[slot]].name, sizes[slot], half, scale, unit)
         if cut is not None:
             spread = rotation[slot] @ np.diag(half**2) @ rotation[slot].T

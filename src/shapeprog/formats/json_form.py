@@ -6,8 +6,8 @@
  "frame": {"origin": [0, 0, 0], "scale": 0.01, "axes": [[1, 0, 0], [0, 0, 1], [0, -1, 0]]}}
 
 ``text`` is the content of a ``.shape`` file; it alone is read.  The bounds of solids are along x (right), y (rear) and
-z (up) in the unit of the text; those of round solids that lean are of a mesh.  ``frame`` maps them to the coordinates
-of the input: origin + scale * axes @ (x, y, z).
+z (up) in the unit of the text; those of solids that lean, but for boxes, are of a mesh.  ``frame`` maps them to the
+coordinates of the input: origin + scale * axes @ (x, y, z).
 """
 
 from __future__ import annotations
@@ -20,8 +20,6 @@ from functools import cached_property
 from pathlib import Path
 from reprlib import repr as shortened
 from typing import Any, NoReturn
-
-import numpy as np
 
 from shapeprog.errors import InputError, ProgramError, ShapeProgError
 from shapeprog.files import write_text
@@ -178,21 +176,14 @@ def _solids(program: Program, framed: bool) -> list[dict[str, Any]]:
 
 def _bounds(program: Program) -> Iterator[tuple[int, list[float], list[float]]]:
     """The block of each solid of a program, and its low and high corner in the grid."""
-    from shapeprog.geometry.arrays import array
-    from shapeprog.geometry.mesh import part_meshes
-    from shapeprog.geometry.primitive import primitives
+    from shapeprog.geometry.mesh import bounds
     from shapeprog.language.tensors import encode
     from shapeprog.language.unroll import on_numpy_if_shipped, unroll
 
     with on_numpy_if_shipped(program):
         scene = unroll(encode(program, dtype=torch.float64))
-        centre, turn = array(scene.centre), np.abs(array(scene.rotation))
-        for slot, vertices, _ in part_meshes(scene):
-            low, high = vertices.min(0), vertices.max(0)
-            if (turn[slot].max(-1) > 1 - 1e-12).all():  # along the axes of the grid
-                bound = array(primitives[int(scene.kind[slot])].bound(scene.size[slot : slot + 1]))[0]
-                low, high = centre[slot] - turn[slot] @ bound, centre[slot] + turn[slot] @ bound
-            yield int(scene.block[slot]), low.tolist(), high.tolist()
+        blocks = scene.block.tolist()
+        yield from ((blocks[slot], low.tolist(), high.tolist()) for slot, low, high in bounds(scene))
 
 
 def program_from_json(text: str, name: str = "<json>") -> Program:

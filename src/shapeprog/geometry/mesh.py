@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import replace
 from itertools import combinations
 from typing import Any, NamedTuple
 
@@ -13,6 +15,7 @@ from shapeprog.geometry.arrays import array
 from shapeprog.geometry.batch import Batch
 from shapeprog.geometry.primitive import Mesh as Triangles
 from shapeprog.geometry.primitive import primitives
+from shapeprog.geometry.primitives.cuboid import CUBOID
 from shapeprog.lazy_torch import torch
 from shapeprog.space import Array, FloatArray
 
@@ -54,19 +57,25 @@ class PartMesh(NamedTuple):
     faces: npt.NDArray[np.int64]
 
 
-def part_meshes(scene: Batch) -> list[PartMesh]:
-    """A watertight mesh of every primitive of one scene, in the order of the slots; degenerate ones are left out.
+class Solids(NamedTuple):
+    """The numbers of the primitives of one scene as arrays, and which of them are solid: not degenerate, nor padding.
 
-    Raises
-    ------
-    ShapeProgError
-        If given a batch, or a part lies beyond ``FARTHEST``, or there are more triangles than ``MOST_TRIANGLES``.
+    ``half`` are half extents of the box around each in its local frame.
     """
+
+    solid: npt.NDArray[np.bool_]
+    size: FloatArray
+    centre: FloatArray
+    rotation: FloatArray
+    half: FloatArray
+
+
+def solids_of(scene: Batch) -> Solids:
+    """The primitives of one scene; a ``ShapeProgError`` if given a batch, or a part lies beyond ``FARTHEST``."""
     if scene.batch_shape:
         raise ShapeProgError(
             f"a batch of shape {tuple(scene.batch_shape)} has no single mesh", "mesh its scenes one by one"
         )
-    results, triangles, cached = [], 0, dict[bytes, Triangles]()
     solid, reach = array(scene.mask).copy(), np.zeros((len(scene.mask), 3))
     size, centre, rotation = (array(t.double()) for t in (scene.size, scene.centre, scene.rotation))
     for kind in scene.kinds:
@@ -81,6 +90,38 @@ def part_meshes(scene: Batch) -> list[PartMesh]:
             f"{int(far.sum())} of {int(solid.sum())} parts reach farther than {FARTHEST} cells from the centre",
             "lower their positions, sizes or shifts: nearer to it, single precision still tells cells apart",
         )
+    return Solids(solid, size, centre, rotation, reach)
+
+
+def bounds(scene: Batch) -> Iterator[tuple[int, FloatArray, FloatArray]]:
+    """The slot of each solid part of one scene, and the low and high corner (3,) of the box around it.
+
+    They are exact for boxes and along the axes of the grid, else those of the mesh; raises what :func:`part_meshes`
+    does.
+    """
+    parts = solids_of(scene)
+    turn = np.abs(parts.rotation)
+    half = (turn @ parts.half[..., None])[..., 0]
+    low, high = parts.centre - half, parts.centre + half
+    exact = (turn.max(-1) > 1 - 1e-12).all(-1) | (array(scene.kind) == primitives.number(CUBOID)) & (
+        parts.size[:, 3] == 0
+    )
+    if (parts.solid & ~exact).any():
+        for slot, vertices, _ in part_meshes(replace(scene, mask=scene.mask & torch.tensor(~exact))):
+            low[slot], high[slot] = vertices.min(0), vertices.max(0)
+    return ((slot, low[slot], high[slot]) for slot in np.flatnonzero(parts.solid).tolist())
+
+
+def part_meshes(scene: Batch) -> list[PartMesh]:
+    """A watertight mesh of every primitive of one scene, in the order of the slots; degenerate ones are left out.
+
+    Raises
+    ------
+    ShapeProgError
+        As for :func:`solids_of`, or if there are more triangles than ``MOST_TRIANGLES``.
+    """
+    results, triangles, cached = [], 0, dict[bytes, Triangles]()
+    solid, size, centre, rotation, _ = solids_of(scene)
     for slot, kind in zip(np.flatnonzero(solid).tolist(), array(scene.kind)[solid].tolist(), strict=True):
         key = kind.to_bytes(4, "little") + size[slot].tobytes()  # copies share their sizes
         if key not in cached:

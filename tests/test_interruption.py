@@ -21,15 +21,6 @@ sys.argv = {words!r}
 from shapeprog.__main__ import main
 main()
 """
-AT_THE_FIRST_LINES = """
-import signal, sys
-class Files:
-    def find_spec(self, name, *_):
-        print(name, signal.getsignal(signal.SIGINT) is signal.default_int_handler)
-sys.meta_path.insert(0, Files())
-sys.argv = ["shapeprog", "--version"]
-import shapeprog.__main__
-"""
 
 
 @pytest.fixture(autouse=True)
@@ -51,13 +42,6 @@ def test_an_interruption_while_the_command_starts_is_told_in_a_line(name: str, t
     assert ended.returncode == 130
     assert ended.stderr.startswith("Interrupted")
     assert ended.stderr.count("\n") == 1
-
-
-def test_nothing_takes_time_before_interruptions_are_expected():
-    """Until then Python prints its own traceback, as for any program."""
-    ended = subprocess.run([sys.executable, "-c", AT_THE_FIRST_LINES], capture_output=True, text=True, check=True)
-    before = [line.removesuffix(" True") for line in ended.stdout.splitlines() if line.endswith(" True")]
-    assert before == ["shapeprog", "shapeprog.__main__"]
 
 
 def test_an_interruption_that_is_ignored_stays_so():

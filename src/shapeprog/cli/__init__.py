@@ -1,5 +1,46 @@
-"""The commands of ``shapeprog``."""
+"""The commands of ``shapeprog``, and how the process of a command begins and ends."""
 
-from shapeprog.cli.entry import main
+from __future__ import annotations
 
-__all__ = ["main"]
+import atexit
+import gc
+import os
+import sys
+from collections.abc import Sequence
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run the command with the arguments of the process, or with those given; ends in ``SystemExit``.
+
+    With the arguments of the process it is the whole of the process, which then ends at once.
+    """
+    from shapeprog.cli import terminal
+    from shapeprog.cli.app import app
+
+    if arguments is None:
+        gc.set_threshold(100_000, 50, 50)  # imports make many objects that stay, which the collector would count often
+    words = sys.argv[1:] if arguments is None else arguments
+    terminal.write_anything()
+    terminal.debugging = "--debug" in words  # wherever it stands
+    try:
+        app(args=[word for word in words if word != "--debug"], prog_name="shapeprog")
+    except SystemExit as stop:
+        if arguments is None and isinstance(stop.code, int | None):
+            _leave(stop.code or 0, stop.code == terminal.INTERRUPTED)
+        raise
+
+
+def _leave(code: int, interrupted: bool) -> None:
+    """End the process without tearing down torch, which takes longer than many a command; not under a profiler.
+
+    After an interruption within an ``exec`` Python would end itself by a signal instead of the exit code.
+    """
+    if not ("torch" in sys.modules or interrupted) or sys.gettrace() or sys.getprofile():
+        return
+    try:
+        sys.stdout.flush()
+        sys.stderr.flush()
+    except OSError:
+        return  # the interpreter reports it
+    atexit._run_exitfuncs()
+    os._exit(code)

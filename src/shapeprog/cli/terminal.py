@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar, get_type_hints
 
 import typer
 
-from shapeprog.cli import interruption
 from shapeprog.errors import InputError, ShapeProgError
 from shapeprog.files import output_error
 
@@ -32,7 +31,8 @@ debugging = False
 WIDTH = 120
 """Columns of a table where the output is no terminal."""
 
-MISTAKE = 2
+MISTAKE, INTERRUPTED = 2, 130
+"""Exit codes."""
 
 Command = TypeVar("Command", bound=Callable[..., None])
 
@@ -83,9 +83,8 @@ def guarded(command: Command) -> Command:
     @functools.wraps(command)
     def run(*args: Any, **kwargs: Any) -> None:
         try:
-            with interruption.tidied():
-                command(*args, **kwargs)
-                sys.stdout.flush()
+            command(*args, **kwargs)
+            sys.stdout.flush()
         except ShapeProgError as error:
             if debugging:
                 raise
@@ -94,7 +93,7 @@ def guarded(command: Command) -> Command:
         except KeyboardInterrupt as stop:
             note = str(stop) if isinstance(stop, Interrupted) else "no file is incomplete"
             errors().print(f"Interrupted; {note}.", style="yellow", markup=False, highlight=False)
-            raise typer.Exit(interruption.INTERRUPTED) from None
+            raise typer.Exit(INTERRUPTED) from None
         except BrokenPipeError:
             # The reader of a pipe has gone; keep Python from complaining about it at exit.
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

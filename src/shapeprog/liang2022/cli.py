@@ -6,14 +6,18 @@ import inspect
 import pkgutil
 import runpy
 import shlex
+import signal
 import sys
+import threading
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal, get_origin, get_type_hints
 
 import typer
 
-from shapeprog.cli import interruption, terminal
+from shapeprog.cli import terminal
 from shapeprog.cli.sampling import write_samples
 from shapeprog.errors import InputError, ShapeProgError
 from shapeprog.liang2022.settings import BEST, WEIGHTS, AdaptSettings, ExecutorSettings, PretrainSettings
@@ -162,7 +166,7 @@ def _add_training(name: str, kind: type[Any], task: str, doc: str) -> None:
         _load_losses(files or [], options.get("loss") or "")
         console, last = terminal.errors(), {"samples_seen": 0.0}
         with (
-            interruption.stop_event() as stop,
+            _stop_event() as stop,
             Progress(console=console, disable=quiet or not console.is_terminal) as bar,
         ):
             progress = bar.add_task("training", total=settings.num_shapes)
@@ -192,6 +196,23 @@ def _add_training(name: str, kind: type[Any], task: str, doc: str) -> None:
     run.__signature__ = inspect.Signature(signature)  # type: ignore[attr-defined]
     run.__annotations__ = {each.name: each.annotation for each in signature}
     app.command(name, help=doc)(terminal.guarded(run))
+
+
+@contextmanager
+def _stop_event() -> Iterator[threading.Event]:
+    """An event that the first Ctrl-C or SIGTERM sets; the second interrupts at once."""
+    stop = threading.Event()
+
+    def ask(*_: object) -> None:
+        if stop.is_set():
+            raise KeyboardInterrupt
+        stop.set()
+
+    with ExitStack() as restore:
+        for number in (signal.SIGINT, signal.SIGTERM):
+            if signal.getsignal(number) != signal.SIG_IGN:
+                restore.callback(signal.signal, number, signal.signal(number, ask))
+        yield stop
 
 
 def _load_losses(files: list[Path], option: str) -> None:

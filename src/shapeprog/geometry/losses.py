@@ -6,8 +6,6 @@ All return one value for each shape of the batch.  Distances are in cells; squar
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import torch
 from jaxtyping import Float
 from torch import Tensor
@@ -21,31 +19,6 @@ Weights = Float[Tensor, "*batch P"]
 Target = Float[Tensor, "*batch Q 3"]
 TargetWeights = Float[Tensor, "*batch Q"]
 Values = Float[Tensor, "*batch"]
-
-
-class Chamfer(NamedTuple):
-    """Mean squared distance of points to the target (precision) and back (completeness)."""
-
-    to_target: Values
-    from_target: Values
-
-    @property
-    def total(self) -> Values:
-        """Both directions added."""
-        return self.to_target + self.from_target
-
-
-def chamfer_directions(
-    points: Cloud, target: Target, *, weights: Weights | None = None, target_weights: TargetWeights | None = None
-) -> Chamfer:
-    """Both directions of the chamfer distance, as means of squared distances over clouds that may differ in size.
-
-    Weights of points in the mean, such as those of a surface sample; equal by default.
-    """
-    if weights is None and target_weights is None:
-        return Chamfer(*mean_squared_distances(points, target))
-    forward = _mean(squared_distance(points, target), weights)
-    return Chamfer(forward, _mean(squared_distance(target, points), target_weights))
 
 
 def chamfer(
@@ -68,7 +41,12 @@ def chamfer(
     Tensor
         One value for each shape, in squared cells.
     """
-    return chamfer_directions(points, target, weights=weights, target_weights=target_weights).total
+    if weights is None and target_weights is None:
+        there, back = mean_squared_distances(points, target)
+    else:
+        there = _mean(squared_distance(points, target), weights)
+        back = _mean(squared_distance(target, points), target_weights)
+    return there + back
 
 
 def coverage(scene: Batch, target: Cloud, *, surface: bool = False) -> Values:

@@ -15,11 +15,7 @@ GUIDE = 256
 """Steps of the table that shortens the search for a face."""
 
 LISTED = 512
-"""Most primitives of a scene of which each gets a list of those near it; in larger scenes they are found anew for each
-point, by the boxes around runs of primitives that follow each other."""
-
-RUN = 256
-"""Primitives in such a run."""
+"""Most primitives of a scene of which each gets a list of those near it; in larger scenes all are looked at."""
 
 
 @helper
@@ -28,26 +24,25 @@ def _around(table, first, per_scene, skin, box):
     for slot in range(per_scene):
         if table[first + slot, KIND] < 0:
             continue
-        first_number, second_number, third_number = bound(table, first + slot)
+        half = bound(table, first + slot)
         for axis in range(3):
-            column = ROTATION + 3 * axis
-            reach = (
-                abs(table[first + slot, column]) * first_number + abs(table[first + slot, column + 1]) * second_number
-            )
-            box[slot, axis] = table[first + slot, CENTRE + axis]
-            box[slot, 3 + axis] = skin + reach + abs(table[first + slot, column + 2]) * third_number
+            box[slot, axis], box[slot, 3 + axis] = table[first + slot, CENTRE + axis], skin
+            for column in range(3):
+                box[slot, 3 + axis] += abs(table[first + slot, ROTATION + 3 * axis + column]) * half[column]
 
 
 @helper
 def _list_near(table, first, per_scene, box, neighbours, neighbour_counts):
-    """For each primitive the others whose box touches its own: only they can hide it."""
-    for slot in range(per_scene):
+    """For each primitive the others whose box touches its own, since only they can hide it; or one list of all."""
+    for slot in range(len(neighbours)):
         neighbour_counts[slot] = 0
         for rival in range(per_scene):
-            separate = rival == slot or table[first + slot, KIND] < 0 or table[first + rival, KIND] < 0
-            for axis in range(3):
-                gap = abs(box[slot, axis] - box[rival, axis]) - box[slot, 3 + axis] - box[rival, 3 + axis]
-                separate = separate or gap > 0
+            separate = table[first + rival, KIND] < 0
+            if len(neighbours) == per_scene and not separate:
+                separate = rival == slot or table[first + slot, KIND] < 0
+                for axis in range(3):
+                    gap = abs(box[slot, axis] - box[rival, axis]) - box[slot, 3 + axis] - box[rival, 3 + axis]
+                    separate = separate or gap > 0
             if not separate:
                 neighbours[slot, neighbour_counts[slot]] = rival
                 neighbour_counts[slot] += 1
@@ -58,19 +53,6 @@ def _inside(table, row, x, y, z):
     """Whether a point is inside the primitive of a row."""
     a, b, c = local(table, row, x, y, z)
     return excess(table, row, a, b, c) < 0
-
-
-@helper
-def _join(table, first, per_scene, box, joined):
-    """Boxes around runs of primitives: low and high corner."""
-    for run in range(len(joined)):
-        for axis in range(3):
-            joined[run, axis], joined[run, 3 + axis] = np.inf, -np.inf
-        for slot in range(run * RUN, min(run * RUN + RUN, per_scene)):
-            if table[first + slot, KIND] >= 0:
-                for axis in range(3):
-                    joined[run, axis] = min(joined[run, axis], box[slot, axis] - box[slot, 3 + axis])
-                    joined[run, 3 + axis] = max(joined[run, 3 + axis], box[slot, axis] + box[slot, 3 + axis])
 
 
 @helper
@@ -89,29 +71,11 @@ def _hidden(table, first, box, neighbours, line, count, slot, x, y, z, dx, dy, d
     """
     for turn in range(count):
         rival = neighbours[line, turn]
-        if _beyond(box, rival, x, y, z):
+        if rival == slot or _beyond(box, rival, x, y, z):
             continue
         if _inside(table, first + rival, x + dx, y + dy, z + dz):
             return True
         if rival < slot and _inside(table, first + rival, x - dx, y - dy, z - dz):
-            return True
-    return False
-
-
-@helper
-def _hidden_in_runs(table, first, per_scene, box, joined, neighbours, slot, x, y, z, dx, dy, dz):
-    """The same for all parts, run by run."""
-    for run in range(len(joined)):
-        if x < joined[run, 0] or y < joined[run, 1] or z < joined[run, 2]:
-            continue
-        if x > joined[run, 3] or y > joined[run, 4] or z > joined[run, 5]:
-            continue
-        count = 0
-        for rival in range(run * RUN, min(run * RUN + RUN, per_scene)):
-            if rival != slot and table[first + rival, KIND] >= 0:
-                neighbours[0, count] = rival
-                count += 1
-        if _hidden(table, first, box, neighbours, 0, count, slot, x, y, z, dx, dy, dz):
             return True
     return False
 
@@ -124,17 +88,15 @@ def visible(table, per_scene, shares, seed, skin, attempts, n, chosen, places, f
     (B * n, 9) the unit place, the grid position and the normal, and ``found`` (B,) how many of at most ``attempts``
     candidates were visible, n at most; -1 if one of them is farther away than ``FARTHEST``.
     """
-    listed = per_scene if per_scene <= LISTED else 0
-    box, joined = np.empty((per_scene, 6)), np.empty((0 if listed else -(-per_scene // RUN), 6))
-    neighbours = np.empty((listed, listed) if listed > 0 else (1, RUN), np.int64)
-    neighbour_counts = np.empty(listed, np.int64)
+    lists = per_scene if per_scene <= LISTED else 1
+    box, neighbours = np.empty((per_scene, 6)), np.empty((lists, per_scene), np.int64)
+    neighbour_counts = np.empty(lists, np.int64)
     guide = np.empty(GUIDE + 1, np.int64)
     per = shares.shape[1] // max(per_scene, 1)
     for scene in range(begin, end):
         first, stream, base = scene * per_scene, scene << 40, scene * n
         _around(table, first, per_scene, skin, box)
-        _list_near(table, first, listed, box, neighbours, neighbour_counts)
-        _join(table, first, per_scene, box, joined)
+        _list_near(table, first, per_scene, box, neighbours, neighbour_counts)
         cell = 0
         for step in range(GUIDE + 1):
             while cell < shares.shape[1] and shares[scene, cell] <= step / GUIDE:
@@ -151,23 +113,16 @@ def visible(table, per_scene, shares, seed, skin, attempts, n, chosen, places, f
                 cell += 1
             slot, face = cell // per, cell % per
             row = first + slot
-            first_number, second_number, third_number = (
-                uniform(seed, count + 1),
-                uniform(seed, count + 2),
-                uniform(seed, count + 3),
-            )
-            u, v, w = sample(table, row, face, first_number, second_number, third_number)
+            one, two, three = uniform(seed, count + 1), uniform(seed, count + 2), uniform(seed, count + 3)
+            u, v, w = sample(table, row, face, one, two, three)
             a, b, c = place(table, row, u, v, w)
             x, y, z = turned(table, row, a, b, c)
             x, y, z = x + table[row, CENTRE], y + table[row, CENTRE + 1], z + table[row, CENTRE + 2]
             a, b, c = normal(table, row, face, u, v, w)
             a, b, c = turned(table, row, a, b, c)
             dx, dy, dz = skin * a, skin * b, skin * c
-            if listed > 0:
-                hidden = _hidden(table, first, box, neighbours, slot, neighbour_counts[slot], slot, x, y, z, dx, dy, dz)
-            else:
-                hidden = _hidden_in_runs(table, first, per_scene, box, joined, neighbours, slot, x, y, z, dx, dy, dz)
-            if hidden:
+            line = min(slot, lists - 1)
+            if _hidden(table, first, box, neighbours, line, neighbour_counts[line], slot, x, y, z, dx, dy, dz):
                 continue
             if not abs(x) + abs(y) + abs(z) < FARTHEST:
                 accepted = -1

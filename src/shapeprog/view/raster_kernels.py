@@ -49,13 +49,9 @@ def covered(wb, wc, step_b, step_c, first, last):
     return math.ceil(low), math.floor(high)
 
 
-@kernel("void(f8[:, ::1], i8[:, ::1], f8, i4[:, ::1], f8[:, ::1])")
-def nearest_faces(points, faces, tolerance, face, depth):
-    """Face and inverse depth of every pixel; of faces in one place the first in the list shows.
-
-    ``points`` (V, 3) are pixel coordinates and inverse depth, which is linear across the screen.  ``face`` and
-    ``depth`` (H, W) come filled with ``BACKGROUND`` and 0.
-    """
+@helper
+def draw_faces(points, faces, tolerance, face, depth):
+    """Keep the face of the largest depth of every pixel, see :func:`nearest_faces`."""
     height, width = face.shape
     for f in range(len(faces)):
         a, b, c = points[faces[f, 0]], points[faces[f, 1]], points[faces[f, 2]]
@@ -80,6 +76,16 @@ def nearest_faces(points, faces, tolerance, face, depth):
                     face[y, x] = f
 
 
+@kernel("void(f8[:, ::1], i8[:, ::1], f8, i4[:, ::1], f8[:, ::1])")
+def nearest_faces(points, faces, tolerance, face, depth):
+    """Face and inverse depth of every pixel; of faces in one place the first in the list shows.
+
+    ``points`` (V, 3) are pixel coordinates and inverse depth, which is linear across the screen.  ``face`` and
+    ``depth`` (H, W) come filled with ``BACKGROUND`` and 0.
+    """
+    draw_faces(points, faces, tolerance, face, depth)
+
+
 @kernel("void(f8[:, ::1], i8[:, ::1], f8[:, :, ::1], f8, f8[:, ::1], f4[:, :, ::1])")
 def light_maps(vertices, faces, frames, radius, placed, maps):
     """For each light the height of the highest surface below it, seen along its direction.
@@ -89,7 +95,7 @@ def light_maps(vertices, faces, frames, radius, placed, maps):
     the lowest height.
     """
     size = maps.shape[1]
-    scale = size / (2 * radius)
+    scale, face = size / (2 * radius), np.empty((size, size), np.int32)
     for light in range(len(frames)):
         frame = frames[light]
         for v in range(len(vertices)):
@@ -99,25 +105,7 @@ def light_maps(vertices, faces, frames, radius, placed, maps):
                 )
             placed[v, 0] = (placed[v, 0] + radius) * scale
             placed[v, 1] = (placed[v, 1] + radius) * scale
-        depth = maps[light]
-        for f in range(len(faces)):
-            a, b, c = placed[faces[f, 0]], placed[faces[f, 1]], placed[faces[f, 2]]
-            area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
-            if abs(area) < 1e-12:
-                continue
-            left = first_pixel(a[0], b[0], c[0])
-            right = last_pixel(a[0], b[0], c[0], size)
-            low = first_pixel(a[1], b[1], c[1])
-            high = last_pixel(a[1], b[1], c[1], size)
-            step_b, step_c = (c[1] - a[1]) / area, (a[1] - b[1]) / area
-            slope = step_b * (b[2] - a[2]) + step_c * (c[2] - a[2])
-            for y in range(low, high + 1):
-                wb = ((0.5 - a[0]) * (c[1] - a[1]) - (y + 0.5 - a[1]) * (c[0] - a[0])) / area
-                wc = ((b[0] - a[0]) * (y + 0.5 - a[1]) - (b[1] - a[1]) * (0.5 - a[0])) / area
-                first, last = covered(wb, wc, step_b, step_c, left, right)
-                start = a[2] + wb * (b[2] - a[2]) + wc * (c[2] - a[2])
-                for x in range(first, last + 1):
-                    depth[y, x] = max(depth[y, x], start + x * slope)
+        draw_faces(placed, faces, 0.0, face, maps[light])
 
 
 @kernel(

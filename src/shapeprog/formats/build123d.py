@@ -18,7 +18,7 @@ from shapeprog.files import atomic_path, write_text
 from shapeprog.formats.build123d_prelude import HEAD, TAIL, TOOLS
 from shapeprog.formats.parts import drawn_parts
 from shapeprog.formats.scripts import Script, needed, number, script
-from shapeprog.language.ast import Call, Comment, Function, Line, Part, body_of, changed_lines
+from shapeprog.language.ast import Call, Function, Line, Part, body_of, changed_lines
 from shapeprog.language.printer import lines_text
 from shapeprog.language.program import Program
 from shapeprog.space import Frame
@@ -75,12 +75,7 @@ def script_text(program: Program, frame: Frame, stem: str = "model", unit: str =
     lines = [HEAD.format(stem=stem)]
     if made.unit:
         lines += [f"# Numbers are in {made.unit}{f', the model is in {unit}' if unit else ''}."]
-    for entry in made.numbers:
-        if isinstance(entry, Comment):
-            lines += [f"# {entry.text}" if entry.text else ""]
-        else:
-            lines += [f"{entry.name} = {entry.text}" + (f"  # {entry.note}" if entry.note else "")]
-    lines += ["", *_world(made), f"colours = {made.colours}"]
+    lines += [*lines_text(made.numbers), "", *_world(made), f"colours = {made.colours}"]
     body = "\n".join(_body(made))
     tail = TAIL.format(stem=stem, unit=_UNITS.get(unit, "MM"))
     tools = "\n\n\n".join(needed(TOOLS.strip().split("\n\n\n"), body))

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+import math
 import re
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from pathlib import Path
 
 import numpy as np
 
 from shapeprog.files import write_text
 from shapeprog.formats.openscad_prelude import PRELUDE
-from shapeprog.formats.scripts import Number, Script, needed, number, script
+from shapeprog.formats.scripts import Script, needed, number, script
 from shapeprog.geometry.primitives.cylinder import SEGMENTS
 from shapeprog.language.ast import Argument, Assignment, Call, Comment, Function, Group, Keywords, Line, Part, Point
 from shapeprog.language.expression import Expression, Value, text_of
@@ -53,7 +54,7 @@ def scad_text(program: Program, frame: Frame, unit: str = "") -> str:
     if made.unit:
         lines += [f"// Numbers are in {made.unit}{f', the model is in {unit}' if unit else ''}."]
     lines += ["", f"/* [Numbers{f', in {made.unit}' if made.unit else ''}] */"] if made.numbers else []
-    lines += [text for entry in made.numbers for text in _number(entry)]
+    lines += [text for entry in made.numbers for text in _number(entry, made.counts)]
     body = list(_model(made))
     if "segments" in (tools := "\n\n".join(needed(PRELUDE.strip().split("\n\n"), "\n".join(body)))):
         lines += ["", "/* [Quality] */", f"segments = {SEGMENTS}; // [12:4:128]"]
@@ -82,14 +83,20 @@ def _model(made: Script) -> Iterator[str]:
     yield "}"
 
 
-def _number(entry: Number | Comment) -> Iterator[str]:
-    if isinstance(entry, Comment):
-        yield f"// {entry.text}" if entry.text else ""
-        return
-    if entry.note:
-        yield f"// {entry.note}"
-    slider = "" if entry.value is None else f" // [{':'.join(map(number, entry.range))}]"
-    yield f"{entry.name} = {entry.text};{slider}"
+def _number(entry: Assignment | Comment, counts: Collection[str]) -> Iterator[str]:
+    """A named number, with the range of its slider if it is no expression; or a comment."""
+    note = entry.text if isinstance(entry, Comment) else entry.note
+    if note or isinstance(entry, Comment):
+        yield f"// {note}" if note else ""
+    for name, value in entry.numbers if isinstance(entry, Assignment) else ():
+        slider = ""
+        if not isinstance(value, Expression):
+            size, whole = abs(value), name in counts and value == round(value)
+            step = 1.0 if whole else 10.0 ** math.floor(math.log10(max(size, 1e-6) / 20))
+            far = 10 * step * math.ceil(max(size, step) / (5 * step))
+            low, high = (-far, 0.0) if value < 0 else (min(value, 1.0) if whole else 0.0, far)
+            slider = f" // [{':'.join(map(number, (low, step, high)))}]"
+        yield f"{name} = {text_of(value)};{slider}"
 
 
 def _lines(lines: list[Line] | tuple[Line, ...], depth: int) -> Iterator[str]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
@@ -25,10 +24,11 @@ from shapeprog.language.ast import (
     names_of,
     values,
     with_values,
+    without_double_blanks,
 )
 from shapeprog.language.convert import placed_if_possible
 from shapeprog.language.dimensions import Counts
-from shapeprog.language.expression import Expression, Name, text_of
+from shapeprog.language.expression import Expression, Name
 from shapeprog.language.placement import LONGEST_SIDE, SIZES
 from shapeprog.language.program import Program
 from shapeprog.language.statement import language
@@ -36,26 +36,6 @@ from shapeprog.space import FloatArray, Frame
 
 _DEFINED = re.compile(r"^(?:module|function|def|class) (\w+)", re.MULTILINE)
 _CALLED = re.compile(r"(?:@(?=\w+$)|\b(?=\w+\s*\())(\w+)", re.MULTILINE)
-
-
-@dataclass(frozen=True)
-class Number:
-    """A named number of the file: its text, its comment, and its value if a slider may change it."""
-
-    name: str
-    text: str
-    note: str
-    value: float | None
-    whole: bool
-
-    @property
-    def range(self) -> tuple[float, float, float]:
-        """Lowest value, step and highest value of a slider."""
-        assert self.value is not None
-        step = 1.0 if self.whole else float(10.0 ** math.floor(math.log10(max(abs(self.value), 1e-6) / 20)))
-        far = 10 * step * math.ceil(max(abs(self.value), step) / (5 * step))
-        low = -far if self.value < 0 else min(self.value, 1.0) if self.whole else 0.0
-        return low, step, 0.0 if self.value < 0 else far
 
 
 @dataclass(frozen=True)
@@ -67,7 +47,9 @@ class Script:
     unit
         Unit of the numbers in it; empty if it is not known.
     numbers
-        Its named numbers, comments between them included.
+        Its named numbers, an assignment for each, and comments between them.
+    counts
+        Names of numbers that are counts.
     lines
         Its functions, parts and groups, with free names.
     world
@@ -79,7 +61,8 @@ class Script:
     """
 
     unit: str
-    numbers: tuple[Number | Comment, ...]
+    numbers: tuple[Assignment | Comment, ...]
+    counts: frozenset[str]
     lines: tuple[Line, ...]
     world: FloatArray
     colours: dict[str, str]
@@ -113,18 +96,17 @@ def script(program: Program, frame: Frame, reserved: Collection[str], inner: str
     source = placed_if_possible(program).source
     if source is None or not source.placed:
         meshes = tuple(parts(program, frame))
-        return Script("", (), (), np.eye(4), _colours({mesh.word for mesh in meshes}), meshes)
+        return Script("", (), frozenset(), (), np.eye(4), _colours({mesh.word for mesh in meshes}), meshes)
     assert source.unit is not None
     words = _free_names([*sorted(names_of(source)), *source.functions], reserved)
     lines = tuple(_renamed(line, words, inner, False) for line in source.lines)
     roles = {line.role for line in source.walk() if isinstance(line, Part | Call)} - {""}
     kinds = {line.kind for line in source.walk() if isinstance(line, Part)}
-    head = 0
-    while head < len(lines) and isinstance(lines[head], Assignment | Comment):
-        head += 1
-    body = tuple(line for line in lines[head:] if not isinstance(line, Assignment))
-    numbers = _numbers(source, lines, head)
-    return Script(source.unit.name, numbers, body, world_of(source, frame), _colours(roles | kinds))
+    first = next((k for k, line in enumerate(lines) if not isinstance(line, Assignment | Comment)), len(lines))
+    body = tuple(line for line in lines[first:] if not isinstance(line, Assignment))
+    counts = frozenset(words[name] for name in Counts(source).outside)
+    world = world_of(source, frame)
+    return Script(source.unit.name, _numbers(lines, first), counts, body, world, _colours(roles | kinds))
 
 
 def world_of(source: Source, frame: Frame) -> FloatArray:
@@ -156,21 +138,16 @@ def needed(pieces: Sequence[str], text: str) -> list[str]:
     return [piece for name, piece in named if name in used]
 
 
-def _numbers(source: Source, lines: tuple[Line, ...], head: int) -> tuple[Number | Comment, ...]:
-    """The named numbers at the top of a script: assignments, and the comments above the first part."""
-    counts = Counts(source).outside
-    result: list[Number | Comment] = []
+def _numbers(lines: Sequence[Line], first: int) -> tuple[Assignment | Comment, ...]:
+    """The named numbers at the top of a script: all assignments, and the comments above the first part."""
+    result: list[Line] = []
     for index, line in enumerate(lines):
-        if isinstance(line, Comment) and index < head:
-            result += [line] if result or line.text else []
+        if isinstance(line, Comment) and index < first:
+            result.append(line)
         elif isinstance(line, Assignment):
-            note = line.note
-            for (original, _), (name, value) in zip(source.lines[index].numbers, line.numbers, strict=True):  # type: ignore[union-attr]
-                literal = None if isinstance(value, Expression) else float(value)
-                integer = original in counts and literal is not None and literal == round(literal)
-                result.append(Number(name, text_of(value), note, literal, integer))
-                note = ""
-    return tuple(result[:-1] if result[-1:] == [Comment()] else result)
+            notes = [line.note] + [""] * len(line.numbers)
+            result += [Assignment((pair,), note) for pair, note in zip(line.numbers, notes, strict=False)]
+    return without_double_blanks(tuple(result))  # type: ignore[return-value]
 
 
 def _renamed(line: Line, words: dict[str, str], inner: str, boxed: bool) -> Line:

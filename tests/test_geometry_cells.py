@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 
 from shapeprog.data.random import random_program
 from shapeprog.errors import ShapeProgError
-from shapeprog.geometry import cells as room
 from shapeprog.geometry.cells import (
     cells_of,
     count,
@@ -139,8 +138,8 @@ def test_packed_cells_hold_every_cell_and_are_the_same_on_every_device(resolutio
     assert packed.dtype == torch.int32
     assert packed.shape == (*cells.shape[:-3], -(-resolution // 32) * resolution, resolution)
     assert (unpack(packed) == cells).all()
-    assert (unpack.twin(packed) == cells).all()
-    assert (pack_rows(cells) == pack_rows.twin(cells)).all()
+    words = (torch.nn.functional.pad(cells, (0, -resolution % 32)).unflatten(-1, (-1, 32)) << torch.arange(32)).sum(-1)
+    assert (pack_rows(cells) == words.to(torch.int32)).all()
     assert (pack(cells.numpy()) == packed).all()
     assert (pack(cells.to(torch.uint8)) == packed).all()
     assert (cells_of(words_of(packed)) == packed).all()
@@ -150,10 +149,9 @@ def test_packed_cells_hold_every_cell_and_are_the_same_on_every_device(resolutio
 def test_counts_and_unions_are_those_of_single_cells(resolution):
     one, two = random_cells(resolution), random_cells(resolution, seed=1)
     first, second = pack(one), pack(two)
-    assert count(first).tolist() == one.flatten(1).sum(-1).tolist() == count.twin(first).tolist()
+    assert count(first).tolist() == one.flatten(1).sum(-1).tolist()
     expected = (one & two).flatten(1).sum(-1) / (one | two).flatten(1).sum(-1).double()
     torch.testing.assert_close(iou(first, second), expected, rtol=0, atol=0)
-    torch.testing.assert_close(iou.twin(first, second), expected, rtol=0, atol=0)
     assert iou(first[:, None], first[None]).diagonal().tolist() == [1, 1, 1]
     assert iou(first[0], second).shape == (3,)
     assert float(iou(first[0] * 0, first[0] * 0)) == 1
@@ -172,10 +170,13 @@ def test_widened_cells_reach_one_cell_through_every_face(resolution):
 
 
 def by_twin(scene, resolution=32):
-    """Packed cells of elements (B, N) by the declarations alone."""
-    cells = rasterise(require(scene, mask=torch.zeros_like(scene.mask)), resolution)
-    room.fill(scene.detach(), torch.arange(len(scene))[:, None].expand(scene.mask.shape), cells)
-    return cells
+    """Packed cells of elements (B, N), cell by cell."""
+    return pack(np.stack([twins.cells(each, resolution) for each in scene]))
+
+
+def without_upright_shears(scene):
+    """The scene without cuboids whose layers are moved by whole cells."""
+    return require(scene, mask=scene.mask & ~((scene.kind == primitives.kind("cuboid")) & (scene.size[..., 3] != 0)))
 
 
 @pytest.mark.parametrize("whole", [True, False])
@@ -184,7 +185,7 @@ def test_random_programs_fill_the_same_cells_by_kernel_and_by_declaration(whole)
     drawn = [random_program(random, blocks=1 + n % 5, whole=whole, copies=5) for n in range(180)]
     if whole:  # whole ends put the slanting faces of statements that lean on centres of cells, where either is right
         drawn = [each for each in drawn if all(language()[node.name].taught for node in each.walk())]
-    scene = unroll(encode(drawn[:60]))
+    scene = without_upright_shears(unroll(encode(drawn[:60])))
     assert (rasterise(scene) == by_twin(scene)).all()
     apart = rasterise_apart(scene, scene.block, 5)
     assert (union(apart) == rasterise(scene)).all()
@@ -192,16 +193,16 @@ def test_random_programs_fill_the_same_cells_by_kernel_and_by_declaration(whole)
     assert (apart[:, 2] == rasterise(only)).all()
 
 
-@pytest.mark.parametrize("resolution", [32, 45, 128])
+@pytest.mark.parametrize("resolution", [32, 45, 64])
 @pytest.mark.parametrize("user", [False, True])
 def test_any_pose_and_kind_fills_the_same_cells_by_kernel_and_by_declaration(user, resolution):
-    scene = random_scene(3, (6,), slots=7, user=user)
+    scene = without_upright_shears(random_scene(3, (6,), slots=7, user=user))
     assert (rasterise(scene, resolution) == by_twin(scene, resolution)).all()
 
 
 def test_quarter_turns_of_all_primitives_fill_the_same_cells_by_kernel_and_by_declaration():
     random = torch.Generator().manual_seed(2)
-    scene = random_scene(5, (200,), slots=4)
+    scene = without_upright_shears(random_scene(5, (200,), slots=4))
     axes = torch.stack([torch.randperm(3, generator=random) for _ in range(800)])
     signs = torch.randint(0, 2, (800, 3, 1), generator=random) * 2.0 - 1
     scene = require(scene, rotation=(torch.eye(3)[axes] * signs).reshape(200, 4, 3, 3))
@@ -209,7 +210,7 @@ def test_quarter_turns_of_all_primitives_fill_the_same_cells_by_kernel_and_by_de
 
 
 def test_broken_and_absurd_solids_fill_the_same_cells_by_kernel_and_by_declaration():
-    scene = random_scene(1, (7,), slots=3)
+    scene = without_upright_shears(random_scene(1, (7,), slots=3))
     size, centre, rotation = scene.size.clone(), scene.centre.clone(), scene.rotation.clone()
     size[0, 0], size[1, 0], size[2, 0], centre[3, 0] = torch.nan, -1, 0, torch.inf
     size[4, 0], centre[5, 0], rotation[6, 0] = 1e30, -1e30, torch.nan

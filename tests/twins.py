@@ -3,6 +3,7 @@
 import math
 
 import numpy as np
+import torch
 
 from shapeprog.geometry import primitives
 
@@ -93,7 +94,7 @@ def executed_block(ids, parameters):
 
 
 def cells(scene, resolution=SIZE):
-    """Hard cells (R, R, R) of one scene of turned or upright cylinders and cuboids without a shear."""
+    """Hard cells (R, R, R) of one scene, without upright sheared cuboids: those whose centre a primitive contains."""
     scale = resolution / SIZE
     ticks = np.arange(resolution) + 0.5 - resolution / 2
     centres = np.stack(np.meshgrid(ticks, ticks, ticks, indexing="ij"), -1)
@@ -102,13 +103,15 @@ def cells(scene, resolution=SIZE):
         if not scene.mask[n]:
             continue
         size = scene.size[n].double().numpy() * scale
-        local = (centres - scene.centre[n].double().numpy() * scale) @ scene.rotation[n].double().numpy()
+        with np.errstate(invalid="ignore", over="ignore"):
+            local = (centres - scene.centre[n].double().numpy() * scale) @ scene.rotation[n].double().numpy()
         if primitives[int(scene.kind[n])].name == "cylinder":
             inside = (np.abs(local[..., 0]) <= size[0] + 1e-3) & (
                 np.hypot(local[..., 1], local[..., 2]) <= 1.01 * size[1]
             )
         else:
-            inside = (np.abs(local) <= size[:3]).all(-1)
+            points, sizes = torch.from_numpy(local), torch.from_numpy(size).expand(*local.shape[:-1], 4)
+            inside = (primitives[int(scene.kind[n])].distance(points, sizes) <= 0).numpy() & np.isfinite(size).all()
         grid[inside] = 1
     return grid
 

@@ -6,8 +6,7 @@ import os
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
-from functools import cache, wraps
-from typing import Any, TypeVar
+from functools import cache
 
 import numpy as np
 
@@ -18,29 +17,10 @@ from shapeprog.kernels.table import CENTRE, KIND, ROTATION, SIZE, WIDTH
 from shapeprog.lazy_torch import Tensor, torch
 from shapeprog.space import Array
 
-Function = TypeVar("Function", bound=Callable[..., Any])
-
 
 def by_kernel(of: Tensor | Batch) -> bool:
     """Whether kernels do the work: on the CPU, for built-in primitives.  Else it is done in torch."""
     return of.device.type == "cpu" and not (isinstance(of, Batch) and declared_kinds(of))
-
-
-def twin_of(kernel: Callable[..., Any]) -> Callable[[Function], Function]:
-    """Make a function in torch the twin of one that runs kernels, and choose between them by the first argument.
-
-    The decorated function is the readable one; it is kept as ``.twin``, to be compared with what the CPU does.
-    """
-
-    def decorate(twin: Function) -> Function:
-        @wraps(twin)
-        def choose(first: Any, *others: Any, **named: Any) -> Any:
-            return (kernel if by_kernel(first) else twin)(first, *others, **named)
-
-        choose.twin = twin  # type: ignore[attr-defined]
-        return choose  # type: ignore[return-value]
-
-    return decorate
 
 
 def array(tensor: Tensor) -> Array:

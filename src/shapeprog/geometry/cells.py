@@ -2,7 +2,7 @@
 
 Packed cells are int32 tensors (..., W * R, R): a row of R cells along left-right takes W = R / 32 words, rounded up,
 the lowest cell in the lowest bit; the first words of the rows at all heights and depths come first, then the second.
-On the CPU kernels do the work, elsewhere their twins in torch.
+Kernels on the CPU do the work, wherever the tensors are.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ from torch import Tensor
 
 from shapeprog.errors import ShapeProgError
 from shapeprog.geometry import cell_kernels as kernels
-from shapeprog.geometry.arrays import array, by_kernel, declared_kinds, over_threads, table_of, twin_of
+from shapeprog.geometry.arrays import array, declared_kinds, over_threads, table_of
 from shapeprog.geometry.batch import Batch
-from shapeprog.geometry.primitive import Primitive, primitives
+from shapeprog.geometry.primitive import primitives
 from shapeprog.kernels.bits import WORD
 from shapeprog.space import RESOLUTION, Array
 
 AT_ONCE = 1 << 21
-"""Cells, or words, that are worked on together."""
+"""Cells that are tested together."""
 
 Cells = Int[Tensor, "*batch words R"]
 """Packed cells."""
@@ -45,10 +45,14 @@ def rasterise_apart(
     if resolution < 1:
         raise ShapeProgError(f"a grid of {resolution} cells a side holds nothing", "ask for a resolution of 1 or more")
     flat, rows = batch.flatten(), -(-resolution // WORD) * resolution
-    cells = torch.zeros(len(flat) * parts, rows, resolution, dtype=torch.int32, device=flat.device)
-    plane = torch.arange(len(flat), device=flat.device)[:, None] * parts + part.reshape(flat.mask.shape)
-    (fill_by_kernel if by_kernel(flat.mask) else fill)(flat, plane, cells)
-    return cells.reshape(*batch.batch_shape, parts, rows, resolution)
+    cells = torch.zeros(len(flat) * parts, rows, resolution, dtype=torch.int32)
+    plane = torch.arange(len(flat))[:, None] * parts + part.cpu().reshape(flat.mask.shape)
+    words = words_of(cells.unflatten(-2, (-1, resolution)))
+    data = table_of(flat), array(plane).reshape(-1), flat.mask.shape[-1], words
+    over_threads(partial(kernels.fill, *data), len(flat), least=32)
+    for kind in declared_kinds(flat):
+        _fill_declared(flat, kind, plane, cells)
+    return cells.reshape(*batch.batch_shape, parts, rows, resolution).to(flat.device)
 
 
 def voxels(batch: Batch, resolution: int = RESOLUTION) -> UInt8[Tensor, "*batch R R R"]:
@@ -77,63 +81,36 @@ def pack(voxels: Shaped[Tensor, "*batch R R R"] | Array) -> Cells:
     return packed
 
 
-def _pack_rows_by_numpy(rows: Bool[Tensor, "*batch places"]) -> Int[Tensor, "*batch words"]:
+def pack_rows(rows: Bool[Tensor, "*batch places"]) -> Int[Tensor, "*batch words"]:
+    """Rows of cells as words."""
     spare = [(0, 0)] * (rows.ndim - 1) + [(0, -rows.shape[-1] % WORD)]
     bits = np.packbits(np.pad(array(rows), spare) if spare[-1][1] else array(rows), -1, bitorder="little")
-    return cells_of(bits.view("<u4").astype(np.uint32, copy=False))
+    return cells_of(bits.view("<u4").astype(np.uint32, copy=False)).to(rows.device)
 
 
-@twin_of(_pack_rows_by_numpy)
-def pack_rows(rows: Bool[Tensor, "*batch places"]) -> Int[Tensor, "*batch words"]:
-    """Rows of cells as words; the highest bit wraps to the sign, as it should."""
-    padded = torch.nn.functional.pad(rows, (0, -rows.shape[-1] % WORD)).unflatten(-1, (-1, WORD))
-    return (padded * (1 << torch.arange(WORD, device=rows.device))).sum(-1).to(torch.int32)
-
-
-def _unpack_by_kernel(cells: Cells) -> UInt8[Tensor, "*batch R R R"]:
-    rows = _rows(cells)
+def unpack(cells: Cells) -> UInt8[Tensor, "*batch R R R"]:
+    """Grids of cells, 1 or 0, of packed ones."""
+    rows = cells.unflatten(-2, (-1, cells.shape[-1])).movedim(-3, -1)  # the words of every row side by side
     words = words_of(rows).reshape(-1)
     eights = np.empty((len(words), 4), np.uint64)
     over_threads(partial(kernels.unpack, words, _SPREAD, eights), len(words), least=1 << 15)
     voxels = torch.from_numpy(eights.view(np.uint8)).reshape(*rows.shape[:-1], -1)
-    return voxels[..., : cells.shape[-1]].contiguous()
+    return voxels[..., : cells.shape[-1]].contiguous().to(cells.device)
 
 
-@twin_of(_unpack_by_kernel)
-def unpack(cells: Cells) -> UInt8[Tensor, "*batch R R R"]:
-    """Grids of cells, 1 or 0, of packed ones."""
-    bits = (_rows(cells)[..., None] >> torch.arange(WORD, dtype=torch.int32, device=cells.device)) & 1
-    return bits.to(torch.uint8).flatten(-2)[..., : cells.shape[-1]]
-
-
-def _rows(cells: Cells) -> Int[Tensor, "*batch R R W"]:
-    """The words of every row side by side."""
-    return cells.unflatten(-2, (-1, cells.shape[-1])).movedim(-3, -1)
-
-
-def _count_by_numpy(cells: Cells) -> Int[Tensor, "*batch"]:
-    return torch.from_numpy(np.asarray(np.bitwise_count(words_of(cells)).sum((-2, -1), dtype=np.int64)))
-
-
-@twin_of(_count_by_numpy)
 def count(cells: Cells) -> Int[Tensor, "*batch"]:
     """How many cells of each grid are filled."""
-    return unpack.twin(cells).flatten(-3).sum(-1, dtype=torch.int64)  # type: ignore[attr-defined]
+    number = np.bitwise_count(words_of(cells)).sum((-2, -1), dtype=np.int64)
+    return torch.from_numpy(np.asarray(number)).to(cells.device)
 
 
-def _iou_by_kernel(a: Int[Tensor, "*one words R"], b: Int[Tensor, "*two words R"]) -> Float[Tensor, "*batch"]:
+def iou(a: Int[Tensor, "*one words R"], b: Int[Tensor, "*two words R"]) -> Float[Tensor, "*batch"]:
+    """Intersection over union of packed cells, with broadcasting; 1 when both are empty."""
     first, second = torch.broadcast_tensors(a, b)
     lead = first.shape[:-2]
     counts = np.empty((lead.numel(), 2), np.int64)
     kernels.shared(*(words_of(item).reshape(lead.numel(), -1) for item in (first, second)), counts)
-    intersection, either = torch.from_numpy(counts).double().reshape(*lead, 2).unbind(-1)
-    return torch.where(either > 0, intersection / either.clamp(min=1), 1.0)
-
-
-@twin_of(_iou_by_kernel)
-def iou(a: Int[Tensor, "*one words R"], b: Int[Tensor, "*two words R"]) -> Float[Tensor, "*batch"]:
-    """Intersection over union of packed cells, with broadcasting; 1 when both are empty."""
-    intersection, either = count(a & b).double(), count(a | b).double()
+    intersection, either = torch.from_numpy(counts).to(a.device).double().reshape(*lead, 2).unbind(-1)
     return torch.where(either > 0, intersection / either.clamp(min=1), 1.0)
 
 
@@ -169,65 +146,14 @@ def widen(cells: Cells) -> Cells:
     return wide.flatten(-3, -2)
 
 
-def fill_by_kernel(flat: Batch, plane: Int[Tensor, "B N"], cells: Cells) -> None:
-    """Add the cells of every slot to its plane, by the kernel for built-in primitives."""
-    words = words_of(cells.unflatten(-2, (-1, cells.shape[-1])))
-    data = table_of(flat), array(plane).reshape(-1), flat.mask.shape[-1], words
-    over_threads(partial(kernels.fill, *data), len(flat), least=32)
-    if declared := declared_kinds(flat):
-        fill(flat, plane, cells, declared)
-
-
-def fill(flat: Batch, plane: Int[Tensor, "B N"], cells: Cells, kinds: list[int] | None = None) -> None:
-    """The same from the declarations, for some or all kinds of primitive on any device; the twin of the kernel.
-
-    Primitives whose rule is to fill rows are filled row by row, the others tested cell by cell.
-    """
-    resolution = cells.shape[-1]
-    scale, origin = resolution / RESOLUTION, resolution / 2
-    for kind in flat.kinds if kinds is None else kinds:
-        declared, selected = primitives[kind], flat.mask & (flat.kind == kind)
-        size, centre, rotation = (item.detach()[selected].double() for item in (flat.size, flat.centre, flat.rotation))
-        size, centre = declared.cell_size(size * scale), centre * scale + origin
-        finite = torch.cat([size, centre, rotation.flatten(1)], -1).isfinite().all(-1)
-        size, centre, rotation, target = (item[finite] for item in (size, centre, rotation, plane[selected]))
-        square = ((rotation - rotation.round()).abs() <= kernels.SQUARE).all(-1).all(-1)
-        if declared.spans is not None:
-            spans = declared.spans(size, centre, rotation, square, resolution)
-            covers = target, *spans.layers, *spans.depth, *spans.side
-            _fill_rows(cells, *(item[spans.applies] for item in covers))
-            size, centre, rotation, target = (item[~spans.applies] for item in (size, centre, rotation, target))
-        _fill_tested(cells, target, declared, size, centre, rotation)
-
-
-def _fill_rows(cells: Tensor, plane: Int[Tensor, " M"], *covers: Float[Tensor, "M _"]) -> None:
-    """Add solids to their planes: the first of each plane together, then the second, and so on."""
-    resolution = cells.shape[-1]
-    order = plane.argsort()
-    plane = plane[order]
-    rank = torch.arange(len(plane), device=plane.device) - torch.searchsorted(plane, plane)
-    ticks = torch.arange(resolution, device=plane.device)
-    for turn in range(int(rank.max()) + 1 if len(rank) else 0):
-        for part in (rank == turn).nonzero()[:, 0].split(max(1, AT_ONCE // resolution**2)):
-            up, top, front, rear, left, right = (item[order[part]] for item in covers)
-            layers = (ticks >= up) & (ticks < top)
-            depth = (ticks >= front[..., None]) & (ticks < rear[..., None]) & layers[..., None]
-            side = (ticks >= left[..., None]) & (ticks < right[..., None])
-            words = pack_rows.twin(side).movedim(-1, 1)  # type: ignore[attr-defined]
-            cells[plane[part]] |= torch.where(depth[:, None], words[..., None], 0).flatten(1, 2)
-
-
-def _fill_tested(
-    cells: Tensor,
-    plane: Int[Tensor, " M"],
-    declared: Primitive,
-    size: Float[Tensor, "M 4"],
-    centre: Float[Tensor, "M 3"],
-    rotation: Float[Tensor, "M 3 3"],
-) -> None:
-    """Add the cells whose centre is inside, looking at those in the boxes around the solids."""
+def _fill_declared(flat: Batch, kind: int, plane: Int[Tensor, "B N"], cells: Cells) -> None:
+    """Add the cells of a primitive without kernels to their planes: those whose centre is inside."""
+    selected, declared, resolution = flat.mask & (flat.kind == kind), primitives[kind], cells.shape[-1]
+    size, centre, rotation = (t.detach()[selected].double().cpu() for t in (flat.size, flat.centre, flat.rotation))
+    size, centre = size * (resolution / RESOLUTION), centre * (resolution / RESOLUTION) + resolution / 2
+    finite = torch.cat([size, centre, rotation.flatten(1)], -1).isfinite().all(-1)
+    size, centre, rotation, plane = (item[finite] for item in (size, centre, rotation, plane[selected.cpu()]))
     reach = (rotation.abs() @ declared.bound(size)[..., None])[..., 0]
-    resolution = cells.shape[-1]
     for owner, index in _within(centre - reach, centre + reach, resolution):
         offset = index + 0.5 - centre[owner]
         inside = declared.distance((rotation[owner].mT @ offset[..., None])[..., 0], size[owner]) <= 0

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 from shapeprog.geometry.formulas import Node, Number, generated, gradient
-from shapeprog.geometry.primitive import SIZES, Helper, Kernels, Mesh, Primitive, Spans, tested
+from shapeprog.geometry.primitive import SIZES, Helper, Kernels, Mesh, Primitive, tested
 from shapeprog.kernels.table import SIZE
 from shapeprog.lazy_torch import Tensor, torch
 from shapeprog.space import FloatArray
@@ -32,8 +32,6 @@ def solid(
     normal: Formula,
     mesh: Callable[[FloatArray], Mesh],
     volume: Formula,
-    cell_size: Formula | None = None,
-    spans: Callable[..., Spans] | None = None,
     cells: Helper = tested,
 ) -> Primitive:
     """A primitive from formulas of its sizes, see :class:`Primitive`.
@@ -44,7 +42,7 @@ def solid(
         ``(size, point)``: signed distance.
     excess
         ``(size, point)``: its sign is that of the distance, and it is cheaper to compute.
-    bound, areas, volume, cell_size
+    bound, areas, volume
         Of ``size``.
     sample, place, normal
         ``(size, face, uniform)``, ``(size, unit)`` and ``(size, unit, face)``.
@@ -80,8 +78,7 @@ def solid(
         normal=lambda size, unit, face: _join(normal(_split(size), _split(unit), face), unit),
         mesh=mesh,
         volume=lambda size: volume(_split(size)),
-        cell_size=_joined(cell_size) if cell_size else lambda size: size,
-        spans=spans, kernels=kernels,
+        kernels=kernels,
     )  # fmt: skip
 
 

@@ -18,7 +18,7 @@ from torch.autograd.function import once_differentiable
 
 from shapeprog.errors import ShapeProgError
 from shapeprog.geometry import distance_kernels as kernels
-from shapeprog.geometry.arrays import by_kernel, declared_kinds, gradients, numbers, over_threads, table_of, twin_of
+from shapeprog.geometry.arrays import by_kernel, declared_kinds, gradients, numbers, over_threads, table_of
 from shapeprog.geometry.batch import Batch
 from shapeprog.geometry.primitive import SIZES, primitives
 from shapeprog.kernels.table import WIDTH
@@ -152,19 +152,16 @@ def nearest(flat: Batch, points: Float[Tensor, "B P 3"]) -> Nearest:
     return torch.cat([item.indices for item in result], -1), torch.cat([item.values for item in result], -1)
 
 
-def _projected_by_kernel(pairs: Batch, points: Float[Tensor, "C 3"], rounds: int) -> Float[Tensor, "C 3"]:
-    moved = numbers(points).copy()
-    over_threads(partial(kernels.project, table_of(pairs), moved, rounds), len(moved))
-    return torch.from_numpy(moved).to(points.dtype)
-
-
-@twin_of(_projected_by_kernel)
 def projected(pairs: Batch, points: Float[Tensor, "C 3"], rounds: int) -> Float[Tensor, "C 3"]:
     """Points moved onto the second of two primitives (C, 2) and back onto the first, so many times, without gradient.
 
     Points inside a primitive stay where they are.  Where the two overlap the points end in both of them, else where the
     gap between them is narrow (von Neumann 1933).
     """
+    if by_kernel(pairs):
+        moved = numbers(points).copy()
+        over_threads(partial(kernels.project, table_of(pairs), moved, rounds), len(moved))
+        return torch.from_numpy(moved).to(points.dtype)
     parts = pairs.kind, pairs.size, pairs.centre, pairs.rotation, pairs.mask
     first, second = (Batch(*(part[:, number : number + 1] for part in parts)) for number in range(2))
     for _ in range(rounds):

@@ -11,11 +11,11 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 
 from shapeprog.errors import DeclarationError
 from shapeprog.kernels.compile import helper
@@ -78,18 +78,6 @@ class Kernels:
     cells: Helper = tested
 
 
-class Spans(NamedTuple):
-    """Cells of M solids by a special rule: to which it applies, and the layers that they cover, from low to high.
-
-    ``depth`` and ``side`` are their extents in every layer of the grid along depth and left-right.
-    """
-
-    applies: Bool[Tensor, " M"]
-    layers: tuple[Float[Tensor, "M 1"], Float[Tensor, "M 1"]]
-    depth: tuple[Float[Tensor, "M R"], Float[Tensor, "M R"]]
-    side: tuple[Float[Tensor, "M R"], Float[Tensor, "M R"]]
-
-
 @dataclass(frozen=True)
 class Primitive:
     """A kind of solid that statements can draw.
@@ -112,9 +100,6 @@ class Primitive:
         to the outward unit normal there.
     mesh
         ``size (4,) -> Mesh``: watertight triangles.
-    cell_size, spans
-        The sizes by which cells are tested, in cells: one is filled when its centre is inside.  Or another rule,
-        ``(size, centre, rotation, square, resolution) -> Spans``, in cells from the low corner of the grid.
     kernels
         Its twins for kernels; without them the functions above are used everywhere, which is slower.
     """
@@ -130,8 +115,6 @@ class Primitive:
     normal: Callable[[Sizes, Points, Int[Tensor, "*batch"]], Points]
     mesh: Callable[[FloatArray], Mesh]
     volume: Callable[[Sizes], Scalars]
-    cell_size: Callable[[Sizes], Sizes] = lambda size: size
-    spans: Callable[..., Spans] | None = None
     kernels: Kernels | None = None
 
 
@@ -221,7 +204,6 @@ def _try(primitive: Primitive) -> None:
         "place": ((size, points), (2, 3)),
         "normal": ((size, points, face), (2, 3)),
         "volume": ((size,), (2,)),
-        "cell_size": ((size,), (2, SIZES)),
         "mesh": ((np.ones(SIZES),), (None, 3)),
     }
     for word, (arguments, expected) in calls.items():

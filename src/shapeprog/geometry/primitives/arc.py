@@ -176,15 +176,9 @@ def volume(size: Four) -> Number:
     return 2 * math.pi * _bend(size)[1] ** 2 * _length(size)[0]
 
 
-def cell_size(size: Four) -> Four:
-    """The sizes by which cells are tested, in cells; none is inside an arc without length or radius."""
-    solid = (size[1] > 0) & ((size[0] > 0) | (size[2] > 0))
-    return where(solid, size[0], math.nan), size[1], size[2], size[3]
-
-
 _FORMULAS = solid(
     "arc", ("half_chord", "radius", "sagitta"), 2, distance=distance, excess=excess, bound=bound, areas=areas,
-    sample=sample, place=place, normal=normal, mesh=mesh, volume=volume, cell_size=cell_size,
+    sample=sample, place=place, normal=normal, mesh=mesh, volume=volume,
 )  # fmt: skip
 assert _FORMULAS.kernels is not None
 bound_kernel = _FORMULAS.kernels.bound

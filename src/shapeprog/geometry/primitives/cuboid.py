@@ -12,7 +12,6 @@ import math
 from dataclasses import replace
 
 import numpy as np
-from jaxtyping import Bool, Float
 
 from shapeprog.geometry.derived import solid
 from shapeprog.geometry.formulas import (
@@ -30,11 +29,10 @@ from shapeprog.geometry.formulas import (
     root,
     where,
 )  # fmt: skip
-from shapeprog.geometry.primitive import Mesh, Points, Sizes, Spans
+from shapeprog.geometry.primitive import Mesh
 from shapeprog.kernels.compile import helper
 from shapeprog.kernels.rows import clip, fill_box
 from shapeprog.kernels.table import CENTRE, ROTATION, SIZE
-from shapeprog.lazy_torch import Tensor, torch
 from shapeprog.space import Array, FloatArray
 
 
@@ -123,41 +121,9 @@ def volume(size: Four) -> Number:
     return 8 * half_up * half_depth * half_side
 
 
-def cell_size(size: Four) -> Four:
-    """The same sizes; NaN for a cuboid without height, depth or width."""
-    solid = (size[0] > 0) & (size[1] > 0) & (size[2] > 0)
-    return where(solid, size[0], math.nan), size[1], size[2], size[3]
-
-
-def spans(
-    size: Sizes, centre: Points, rotation: Float[Tensor, "M 3 3"], square: Bool[Tensor, " M"], resolution: int
-) -> Spans:
-    """Cells of cuboids at right angles to the grid, and of sheared ones that stand upright."""
-    layer = torch.arange(resolution, device=size.device)
-    turn, item = rotation.round(), torch.arange(len(size), device=size.device)
-    half = (turn.abs() @ size[:, :3, None])[..., 0]
-    low, high = (centre - half).round(), (centre + half).round()
-    # Layer i of t covers [o, o + a) with o = rint(y + lean * i / t) along the axis that it leans to.
-    along = torch.where(turn[:, 1, 1].abs() > 0.5, 1, 2)
-    lean = size[:, 3] * turn[item, along, 1] * turn[:, 0, 0]
-    start = centre[item, along] - size[:, 1] - lean / 2
-    moved = (start[:, None] + lean[:, None] * (layer - low[:, :1]) / (2 * size[:, :1])).round()
-    end = moved + (2 * size[:, 1:2]).round()
-    leans = size[:, 3] != 0
-    covers = [(low[:, axis, None].expand_as(moved), high[:, axis, None].expand_as(moved)) for axis in (1, 2)]
-    for axis in (1, 2):
-        leaning = (leans & (along == axis))[:, None]
-        covers[axis - 1] = (
-            torch.where(leaning, moved, covers[axis - 1][0]),
-            torch.where(leaning, end, covers[axis - 1][1]),
-        )
-    applies = square & (~leans | (turn[:, 0, 0].abs() > 0.5))
-    return Spans(applies, (low[:, :1], high[:, :1]), *covers)
-
-
 @helper
 def cells_kernel(table: Array, row: int, square: bool, planes: Array, plane: int, low: Array, high: Array) -> bool:
-    """Twin of :func:`spans`; fills nothing where a length is not positive."""
+    """Cells of cuboids at right angles to the grid, and of sheared upright ones; nothing without a volume."""
     if table[row, SIZE] <= 0 or table[row, SIZE + 1] <= 0 or table[row, SIZE + 2] <= 0:
         return True
     resolution, lean = planes.shape[2], table[row, SIZE + 3]
@@ -188,7 +154,7 @@ def cells_kernel(table: Array, row: int, square: bool, planes: Array, plane: int
 _FORMULAS = solid(
     "cuboid", ("half_up", "half_depth", "half_side", "lean"), 3,
     distance=distance, excess=excess, bound=bound, areas=areas, sample=sample, place=place, normal=normal, mesh=mesh,
-    volume=volume, cell_size=cell_size, spans=spans, cells=cells_kernel,
+    volume=volume, cells=cells_kernel,
 )  # fmt: skip
 assert _FORMULAS.kernels is not None
 sheared_distance = _FORMULAS.kernels.distance

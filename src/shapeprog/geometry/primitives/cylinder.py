@@ -63,14 +63,9 @@ def mesh(size: FloatArray) -> Mesh:
     return frustum.frustum_mesh(*size[[0, 1, 1]])
 
 
-def cell_size(size: Four) -> Four:
-    """The sizes by which cells are tested, in cells; none is inside a cylinder without height or radius."""
-    return where((size[0] >= 0) & (size[1] > 0), size[0] + CAP, math.nan), size[1] * REACH, size[2], size[3]
-
-
 @helper
 def cells_kernel(table: Array, row: int, square: bool, planes: Array, plane: int, low: Array, high: Array) -> bool:
-    """Twin of :func:`cell_size`; a cylinder that stands upright is one disc of cells, repeated in its layers."""
+    """Cells within ``REACH`` radii of the axis; a cylinder that stands upright is one disc, repeated in its layers."""
     if table[row, SIZE] < 0 or table[row, SIZE + 1] <= 0:
         return True
     table[row, SIZE] += CAP
@@ -100,5 +95,5 @@ PRIMITIVE = CYLINDER = solid(
     "cylinder", ("half_height", "radius"), 2,
     distance=distance, excess=excess, bound=lambda size: frustum.bound(_frustum(size)),
     areas=lambda size: frustum.areas(_frustum(size)), sample=sample, place=place, normal=normal, mesh=mesh,
-    volume=lambda size: frustum.volume(_frustum(size)), cell_size=cell_size, cells=cells_kernel,
+    volume=lambda size: frustum.volume(_frustum(size)), cells=cells_kernel,
 )  # fmt: skip

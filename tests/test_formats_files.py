@@ -25,7 +25,7 @@ from shapeprog.errors import InputError, OutputError, ProgramError
 from shapeprog.formats import FORMATS, Format, export, format_of, listed, load_with_frame, suffixes
 from shapeprog.formats.colours import colour
 from shapeprog.formats.frames import frame_comment, frame_in, frame_of_grid, placement, scale_of
-from shapeprog.formats.json_form import Result, result_json
+from shapeprog.formats.json_form import result_from_json, result_json
 from shapeprog.formats.parts import crease_normals, parts, solid
 from shapeprog.formats.shape import program_in, program_text
 from shapeprog.geometry.primitives.cylinder import mesh as cylinder_mesh
@@ -306,7 +306,7 @@ def test_what_is_saved_and_loaded_lies_at_the_same_place_in_the_world(
 
 
 def both(text: str) -> tuple[Program, Frame | None]:
-    result = Result("x", json.loads(text))
+    result = result_from_json(text, "x")
     return result.program, result.frame
 
 

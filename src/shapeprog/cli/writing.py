@@ -269,8 +269,10 @@ def statements_command(
 def _result(path: Path, changes: Sequence[str] | None = None) -> Result:
     """Scores and input of a .json file; empty for other formats and for programs changed by ``--set``."""
     from shapeprog.formats.json_form import Result, read_result
+    from shapeprog.language.program import Program
 
-    return Result(str(path), {}) if changes or path.suffix.lower() != ".json" else read_result(path)
+    is_empty = changes or path.suffix.lower() != ".json"
+    return Result(str(path), Program()) if is_empty else read_result(path)
 
 
 def _input_of(result: Result, named: Path | None) -> Shape | None:

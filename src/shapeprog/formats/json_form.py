@@ -14,12 +14,11 @@ from __future__ import annotations
 
 import json
 from collections import Counter
-from collections.abc import Iterator
-from dataclasses import dataclass
-from functools import cached_property
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from reprlib import repr as shortened
-from typing import Any, NoReturn
+from types import MappingProxyType
+from typing import Any, NamedTuple, NoReturn
 
 from shapeprog.errors import InputError, ProgramError, ShapeProgError
 from shapeprog.files import write_text
@@ -42,70 +41,53 @@ MOST_SOLIDS = 10_000
 """Solids of the largest list; longer ones are left out."""
 
 
-@dataclass(frozen=True)
-class Result:
-    """A JSON file: a program and its metadata.
+class Result(NamedTuple):
+    """The contents of a JSON file.
 
     Parameters
     ----------
     name
-        Name of the file in errors.
-    content
-        Its entries; only the form and its version have been checked.
+        Name of the file.
+    program, frame
+        The program, and the frame of the input if its text has one.
+    snapped
+        Its form in whole cells, if the file has one.
+    scores
+        The scores that are finite numbers.
+    source
+        The file that the program was inferred from, if recorded.
     """
 
     name: str
-    content: dict[str, Any]
-
-    @property
-    def program(self) -> Program:
-        """The program; a ``ProgramError`` if its text is not valid, an ``InputError`` if there is none."""
-        return self._read[0]
-
-    @property
-    def frame(self) -> Frame | None:
-        """The frame of the input if the text has one."""
-        return self._read[1] if "text" in self.content else None
-
-    @property
-    def snapped(self) -> Program | None:
-        """Its form in whole cells, if the file has one."""
-        return self._parsed("snapped")[0] if "snapped" in self.content else None
-
-    @cached_property
-    def _read(self) -> tuple[Program, Frame | None]:
-        return self._parsed("text")
-
-    def _parsed(self, entry: str) -> tuple[Program, Frame | None]:
-        text = self.content.get(entry)
-        if not isinstance(text, str):
-            message = f"{self.name}: {entry}: {shortened(text)} is not a string"
-            raise InputError(message, "write the text of the program, with \\n at the end of each line")
-        return program_in(text, f"{self.name}: {entry}")
-
-    @property
-    def scores(self) -> dict[str, float]:
-        """The scores that are finite numbers; other values are ignored."""
-        scores = self.content.get("scores")
-        named = scores.items() if isinstance(scores, dict) else ()
-        return {name: value for name, value in named if type(value) in (int, float) and abs(value) <= LARGEST}
-
-    @property
-    def source(self) -> str | None:
-        """The file that the program was inferred from, if recorded."""
-        source = self.content.get("source")
-        return source if isinstance(source, str) else None
+    program: Program
+    frame: Frame | None = None
+    snapped: Program | None = None
+    scores: Mapping[str, float] = MappingProxyType({})
+    source: str | None = None
 
 
 def read_result(path: Path) -> Result:
-    """The contents of a JSON file.
+    """The contents of a JSON file; raises what :func:`program_from_json` does."""
+    return result_from_json(read_text(path, LARGEST_FILE), str(path))
 
-    Raises
-    ------
-    ProgramError, InputError
-        As for :func:`program_from_json`.
-    """
-    return Result(str(path), _document(read_text(path, LARGEST_FILE), str(path)))
+
+def result_from_json(text: str, name: str) -> Result:
+    """The contents of a JSON text; raises what :func:`program_from_json` does."""
+    content = _document(text, name)
+
+    def parsed(entry: str) -> tuple[Program, Frame | None]:
+        if not isinstance(text := content.get(entry), str):
+            message = f"{name}: {entry}: {shortened(text)} is not a string"
+            raise InputError(message, "write the text of the program, with \\n at the end of each line")
+        return program_in(text, f"{name}: {entry}")
+
+    scores, source = content.get("scores"), content.get("source")
+    named = scores.items() if isinstance(scores, dict) else ()
+    return Result(
+        name, *parsed("text"), parsed("snapped")[0] if "snapped" in content else None,
+        {word: value for word, value in named if type(value) in (int, float) and abs(value) <= LARGEST},
+        source if isinstance(source, str) else None,
+    )  # fmt: skip
 
 
 def read_json(path: Path) -> tuple[Program, Frame | None]:
@@ -196,7 +178,7 @@ def program_from_json(text: str, name: str = "<json>") -> Program:
     InputError
         If it is JSON of another kind, naming the entry.
     """
-    return Result(name, _document(text, name)).program
+    return result_from_json(text, name).program
 
 
 def _document(text: str, name: str) -> dict[str, Any]:

@@ -6,14 +6,9 @@ import difflib
 import re
 from collections.abc import Iterable
 
-_WIDEST = 200
-"""Letters of a line that are shown."""
-
-_LONGEST = 200
-"""Letters of a word that are compared with the known words; the time grows with the letters."""
-
-_MOST = 800
-"""Letters of a message."""
+_WIDEST = 200  # letters of a line that are shown
+_LONGEST = 200  # letters of a word that are compared with the known words; the time grows with the letters
+_MOST = 800  # letters of a message
 
 _UNPRINTABLE = re.compile("[\0-\t\x0b-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069\ud800-\udfff]")
 """Control characters of terminals, marks of text direction, and half characters; not the line feed."""

@@ -36,8 +36,7 @@ _CURES = {
 }
 
 
-_UNFINISHED = ".????????~*"
-"""Pattern of the names of temporary files."""
+_UNFINISHED = ".????????~*"  # pattern of the names of temporary files
 
 
 @contextlib.contextmanager

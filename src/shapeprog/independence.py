@@ -8,8 +8,7 @@ import numpy as np
 
 from shapeprog.space import FloatArray
 
-DEPENDENT = 1e-6
-"""Share of its length below which a row is a combination of others: rounding alone leaves that much."""
+DEPENDENT = 1e-6  # share of its length below which a row is a combination of others: rounding alone leaves that much
 
 
 def beside(row: FloatArray, axes: FloatArray) -> FloatArray | None:

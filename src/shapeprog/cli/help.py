@@ -8,8 +8,7 @@ from typing import Any
 
 from typer.core import TyperCommand, TyperGroup
 
-LAST = "Options"
-"""The heading of options without a heading; it comes last."""
+LAST = "Options"  # the heading of options without a heading; it comes last
 
 
 class GroupedCommand(TyperCommand):

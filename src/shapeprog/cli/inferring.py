@@ -25,8 +25,7 @@ if TYPE_CHECKING:
 
 FOLDER = Path("shapeprog-out")
 
-TIPPED = (".stl", ".ply", ".off", ".xyz")
-"""Formats that do not store the up axis."""
+TIPPED = (".stl", ".ply", ".off", ".xyz")  # formats that do not store the up axis
 
 _SUFFIXES = (".json", ".shape", ".glb", ".png")
 _LONGEST = 120

@@ -12,8 +12,7 @@ from shapeprog.cli import terminal
 if TYPE_CHECKING:
     from shapeprog.language.program import Program
 
-SHEET = 24
-"""Shapes drawn where no number is given."""
+SHEET = 24  # shapes drawn where no number is given
 
 
 Count = Annotated[int, typer.Option(metavar="N", help="Number of shapes.", min=1)]

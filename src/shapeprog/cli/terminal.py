@@ -25,14 +25,9 @@ if TYPE_CHECKING:
     from shapeprog.language.program import Program
     from shapeprog.library import Library
 
-debugging = False
-"""Whether errors show their traceback."""
-
-WIDTH = 120
-"""Columns of a table where the output is no terminal."""
-
-MISTAKE, INTERRUPTED = 2, 130
-"""Exit codes."""
+debugging = False  # whether errors show their traceback
+WIDTH = 120  # columns of a table where the output is no terminal
+MISTAKE, INTERRUPTED = 2, 130  # exit codes
 
 Command = TypeVar("Command", bound=Callable[..., None])
 

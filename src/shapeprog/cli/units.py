@@ -14,8 +14,7 @@ if TYPE_CHECKING:
 
 CELLS = "cells"
 
-LARGE = 10.0
-"""Metres from which furniture is more likely to be in another unit."""
+LARGE = 10.0  # metres from which furniture is more likely to be in another unit
 
 AsUnit = Annotated[
     str | None,

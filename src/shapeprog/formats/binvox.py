@@ -16,11 +16,8 @@ from shapeprog.errors import InputError
 from shapeprog.files import write_bytes
 from shapeprog.space import HALF, Array, Frame
 
-_HEAD = 4096
-"""Most bytes of a header."""
-
-_AT_ONCE = 1 << 16
-"""Runs unpacked at once: numpy takes eight bytes for the length of each."""
+_HEAD = 4096  # most bytes of a header
+_AT_ONCE = 1 << 16  # runs unpacked at once: numpy takes eight bytes for the length of each
 
 _CURE = "write the file again; binvox files start with '#binvox 1' and hold runs of 0 and 1"
 

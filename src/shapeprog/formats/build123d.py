@@ -23,11 +23,8 @@ from shapeprog.language.printer import lines_text
 from shapeprog.language.program import Program
 from shapeprog.space import Frame
 
-_UNITS = {"mm": "MM", "cm": "CM", "m": "M", "in": "IN"}
-"""Units of build123d."""
-
-MOST_SOLIDS = 1 << 11
-"""Most solids of a STEP file: build123d takes some milliseconds for each."""
+_UNITS = {"mm": "MM", "cm": "CM", "m": "M", "in": "IN"}  # units of build123d
+MOST_SOLIDS = 1 << 11  # most solids of a STEP file: build123d takes some milliseconds for each
 
 
 def write_script(program: Program, path: Path, frame: Frame, unit: str = "") -> None:

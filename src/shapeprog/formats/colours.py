@@ -12,8 +12,7 @@ from functools import lru_cache
 
 from shapeprog.language.statement import Language, language
 
-Colour = tuple[int, int, int]
-"""Red, green and blue from 0 to 255."""
+Colour = tuple[int, int, int]  # red, green and blue from 0 to 255
 
 _BY_NAME: Mapping[str, str] = {
     "leg": "#4477AA", "layer": "#44AA99", "sideboard": "#CC6677", "horizontal_bar": "#117733",

@@ -22,20 +22,11 @@ from shapeprog.language.unroll import on_numpy_if_shipped, unroll
 from shapeprog.lazy_torch import torch
 from shapeprog.space import FloatArray, Frame
 
-FINEST = 1e-4
-"""Metres to which sizes are rounded."""
-
-DIGITS = 3
-"""Significant digits of sizes whose unit is not known, and of areas."""
-
-BOARD = "board"
-"""The shape of a box whose thickness is at most half its width."""
-
-SAME = 1e-3
-"""Cells within which two copies coincide."""
-
-FLAT = 1e-5
-"""Share of its size by which a part leans, or is bent, at least."""
+FINEST = 1e-4  # metres to which sizes are rounded
+DIGITS = 3  # significant digits of sizes whose unit is not known, and of areas
+BOARD = "board"  # the shape of a box whose thickness is at most half its width
+SAME = 1e-3  # cells within which two copies coincide
+FLAT = 1e-5  # share of its size by which a part leans, or is bent, at least
 
 
 @dataclass(frozen=True, order=True)

@@ -14,8 +14,7 @@ from shapeprog.language.placement import SIZES
 from shapeprog.language.program import Program
 from shapeprog.space import Frame
 
-FLOOR = "floor"
-"""What programs in cells call the level on which the whole stands."""
+FLOOR = "floor"  # what programs in cells call the level on which the whole stands
 
 
 def load(path: str | os.PathLike[str]) -> Program:

@@ -18,14 +18,9 @@ if TYPE_CHECKING:
 
 Kind = Literal["program", "solid", "list", "sample", "shape"]
 
-Axes = tuple[str, str]
-"""World axes that point up and that the front faces, such as ``("+y", "+z")``."""
-
-Y_UP: Axes = ("+y", "+z")
-"""Axes of glTF, and of most mesh files."""
-
-Z_UP: Axes = ("+z", "-y")
-"""Axes of CAD and of 3D printing."""
+Axes = tuple[str, str]  # world axes that point up and that the front faces, such as ``("+y", "+z")``
+Y_UP: Axes = ("+y", "+z")  # axes of glTF, and of most mesh files
+Z_UP: Axes = ("+z", "-y")  # axes of CAD and of 3D printing
 
 GRID: Axes = ("+x", "-y")
 """Axes of arrays: axis 0 is up, axis 1 is depth (positive = rear), axis 2 is left-right already."""
@@ -178,8 +173,7 @@ FORMATS = (
 )  # fmt: skip
 """Every format, found by its suffix."""
 
-OTHER_MESHES: Axes = Y_UP
-"""Axes of the mesh files that trimesh reads besides."""
+OTHER_MESHES: Axes = Y_UP  # axes of the mesh files that trimesh reads besides
 
 _BY_SUFFIX = {suffix: entry for entry in FORMATS for suffix in entry.suffixes}
 

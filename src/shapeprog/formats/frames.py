@@ -36,8 +36,7 @@ from shapeprog.language.text import Text
 from shapeprog.language.unit import METRES, metres
 from shapeprog.space import Array, FloatArray, Frame, grid_axes
 
-CELLS = "cells"
-"""The word for lengths in cells."""
+CELLS = "cells"  # the word for lengths in cells
 
 _HEADER = re.compile(r"^#[ \t]*frame:(.*)$", re.MULTILINE)
 _CURE = (
@@ -50,18 +49,14 @@ _ENTRIES = re.compile(
 )
 _PLACED_CURE = "write it as # placed: up y, front z, origin 0 0.5 0, 1 unit = 1, or remove it"
 
-_ALIGNED = 1e-9
-"""Largest difference of the axes of a frame from those of the input where they are written by name."""
-
-_ROUNDED = 1e-8
-"""Share of the longest side by which the frame of a placed text is rounded."""
+_ALIGNED = 1e-9  # largest difference of the axes of a frame from those of the input where they are written by name
+_ROUNDED = 1e-8  # share of the longest side by which the frame of a placed text is rounded
 
 _GRID = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
 """Directions x, y, z of a text in the axes of the grid, as columns."""
 
 
-UP = {"x": GRID, "y": Y_UP, "z": Z_UP}
-"""Up and front axes of a file by the axis that points up."""
+UP = {"x": GRID, "y": Y_UP, "z": Z_UP}  # up and front axes of a file by the axis that points up
 
 
 class Placement(NamedTuple):

@@ -37,8 +37,7 @@ from shapeprog.space import Frame
 FORMAT = "shapeprog"
 VERSION = 4
 
-MOST_SOLIDS = 10_000
-"""Solids of the largest list; longer ones are left out."""
+MOST_SOLIDS = 10_000  # solids of the largest list; longer ones are left out
 
 
 class Result(NamedTuple):

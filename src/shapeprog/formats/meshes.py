@@ -14,8 +14,7 @@ from shapeprog.formats.parts import Faces, Part, Vertices, drawn_parts, part_nor
 from shapeprog.language.program import Program
 from shapeprog.space import Frame
 
-MOST_NODES = 1 << 14
-"""Most named nodes of a GLB: each takes half a millisecond to write, and viewers list them all."""
+MOST_NODES = 1 << 14  # most named nodes of a GLB: each takes half a millisecond to write, and viewers list them all
 
 
 def write_glb(program: Program, path: Path, frame: Frame) -> None:

@@ -25,11 +25,8 @@ from shapeprog.language.statement import Statement, language
 from shapeprog.language.text import Text
 from shapeprog.space import Frame
 
-Groups: TypeAlias = dict[str, tuple[float, ...]]
-"""Numbers by the name of their group."""
-
-_COUNT = ""
-"""The group that holds the count of a loop; no name of the notation can be empty."""
+Groups: TypeAlias = dict[str, tuple[float, ...]]  # numbers by the name of their group
+_COUNT = ""  # the group that holds the count of a loop; no name of the notation can be empty
 
 _FORM = "write draw('Leg', 'Cub', P=(_, _, _), G=(_, _, _))"
 _SHOWN = 60

@@ -26,8 +26,7 @@ Faces = npt.NDArray[np.int64]
 _LARGEST_FAN = 400
 """Vertices with more corners keep the normals of their triangles, since all pairs of corners are compared."""
 
-_AT_ONCE = 1 << 15
-"""Triangles whose pairs of corners are compared together."""
+_AT_ONCE = 1 << 15  # triangles whose pairs of corners are compared together
 
 
 @dataclass(frozen=True)

@@ -24,8 +24,7 @@ from shapeprog.language.tensors import encode
 from shapeprog.language.unroll import unroll
 from shapeprog.space import RESOLUTION, Frame
 
-POINTS = 5000
-"""Surface points of an NPZ, and the default number for an XYZ."""
+POINTS = 5000  # surface points of an NPZ, and the default number for an XYZ
 
 
 def cells(program: Program, resolution: int = RESOLUTION) -> npt.NDArray[np.bool_]:

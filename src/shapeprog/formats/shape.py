@@ -15,8 +15,7 @@ from shapeprog.language.printer import format_program
 from shapeprog.language.program import Program
 from shapeprog.space import Frame
 
-LARGEST_FILE = 16_000_000
-"""Bytes of the largest program file."""
+LARGEST_FILE = 16_000_000  # bytes of the largest program file
 
 
 def read_shape(path: Path) -> tuple[Program, Frame | None]:

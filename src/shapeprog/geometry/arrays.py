@@ -73,8 +73,7 @@ def _numbers() -> Array:
     return np.array([kernel_numbers.get(id(primitive), -1) for primitive in primitives], np.float64)
 
 
-_kernel_threads = 0
-"""Threads that kernels run in; 0 for as many as torch has."""
+_kernel_threads = 0  # threads that kernels run in; 0 for as many as torch has
 
 
 @contextmanager

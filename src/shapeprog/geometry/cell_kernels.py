@@ -12,8 +12,7 @@ from shapeprog.kernels.compile import helper, kernel
 from shapeprog.kernels.rows import clip, fill_row, stretch
 from shapeprog.kernels.table import CENTRE, KIND, ROTATION, SIZE, WIDTH
 
-SQUARE = 1e-6
-"""How far an entry of a rotation may be from 0 or 1 and still count as a right angle."""
+SQUARE = 1e-6  # how far an entry of a rotation may be from 0 or 1 and still count as a right angle
 
 
 @helper

@@ -24,11 +24,8 @@ from shapeprog.geometry.primitive import primitives
 from shapeprog.kernels.bits import WORD
 from shapeprog.space import RESOLUTION, Array
 
-AT_ONCE = 1 << 21
-"""Cells that are tested together."""
-
-Cells = Int[Tensor, "*batch words R"]
-"""Packed cells."""
+AT_ONCE = 1 << 21  # cells that are tested together
+Cells = Int[Tensor, "*batch words R"]  # packed cells
 
 _SPREAD = np.unpackbits(np.arange(256, dtype=np.uint8), bitorder="little").view(np.uint64)
 

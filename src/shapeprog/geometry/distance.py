@@ -27,8 +27,7 @@ from shapeprog.space import Array
 Nearest = tuple[Int[Tensor, "*batch P"], Float[Tensor, "*batch P"]]
 """Slot of the nearest primitive of each point, and the signed distance to it."""
 
-AT_ONCE = 1 << 22
-"""Pairs of point and primitive that are looked at together where no kernel helps."""
+AT_ONCE = 1 << 22  # pairs of point and primitive that are looked at together where no kernel helps
 
 MOST_LOOKS = 1 << 30
 """Most pairs that the kernel compares for one result, some seconds' worth, where a scene has very many primitives: if

@@ -20,14 +20,12 @@ from typing import Any
 from shapeprog.kernels.compile import helper
 from shapeprog.lazy_torch import torch
 
-Number = Any
-"""A tensor of any shape, a :class:`Node`, or a constant."""
+Number = Any  # a tensor of any shape, a :class:`Node`, or a constant
 
 Triple = tuple[Number, Number, Number]
 Four = tuple[Number, Number, Number, Number]
 
-TINY = 1e-24
-"""Squares below this have this root, and no gradient."""
+TINY = 1e-24  # squares below this have this root, and no gradient
 
 
 class Node:

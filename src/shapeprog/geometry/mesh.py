@@ -27,21 +27,11 @@ FARTHEST = 1 << 24
 """Coordinates in cells up to which parts are meshed: single precision, in which files of meshes are, resolves no cells
 beyond."""
 
-MOST_TRIANGLES = 1 << 21
-"""Most triangles of the parts of a scene together."""
-
-MOST_TOUCHING = 1 << 14
-"""Most pairs of parts that touch, of which one solid is made: each takes up to a millisecond."""
-
-AT_ONCE = 64
-"""Solids that are joined together."""
-
-PAIRS_AT_ONCE = 1 << 21
-"""Pairs of boxes that are looked at together."""
-
-
-Single = tuple[npt.NDArray[np.float32], npt.NDArray[np.int64]]
-"""Vertices in single precision and triangles."""
+MOST_TRIANGLES = 1 << 21  # most triangles of the parts of a scene together
+MOST_TOUCHING = 1 << 14  # most pairs of parts that touch, of which one solid is made: each takes up to a millisecond
+AT_ONCE = 64  # solids that are joined together
+PAIRS_AT_ONCE = 1 << 21  # pairs of boxes that are looked at together
+Single = tuple[npt.NDArray[np.float32], npt.NDArray[np.int64]]  # vertices in single precision and triangles
 
 
 STEP = 1 / 16384

@@ -22,8 +22,7 @@ from shapeprog.space import Array
 Cloud = Float[Tensor, "*batch P 3"]
 Other = Float[Tensor, "*batch Q 3"]
 
-AT_ONCE = 1 << 26
-"""Pairs of points that are compared together on a device without the kernel."""
+AT_ONCE = 1 << 26  # pairs of points that are compared together on a device without the kernel
 
 
 def nearest(queries: Cloud, points: Other) -> Int[Tensor, "*batch P"]:

@@ -22,11 +22,8 @@ from shapeprog.kernels.compile import helper
 from shapeprog.lazy_torch import Tensor, torch
 from shapeprog.space import Array, FloatArray
 
-SIZES = 4
-"""Slots for the sizes of one primitive."""
-
-Mesh = tuple[FloatArray, npt.NDArray[np.int64]]
-"""Vertices (V, 3) and faces (F, 3), counter-clockwise from outside."""
+SIZES = 4  # slots for the sizes of one primitive
+Mesh = tuple[FloatArray, npt.NDArray[np.int64]]  # vertices (V, 3) and faces (F, 3), counter-clockwise from outside
 
 Points = Float[Tensor, "*batch 3"]
 Sizes = Float[Tensor, "*batch 4"]

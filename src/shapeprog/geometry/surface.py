@@ -31,11 +31,8 @@ from shapeprog.geometry.random import uniform
 from shapeprog.kernels.table import WIDTH
 from shapeprog.space import Array
 
-SKIN = 1e-3
-"""How far in cells off the surface a point is looked at to see whether it is hidden."""
-
-PATIENCE = 64
-"""Candidates drawn for each point wanted before a scene is given up."""
+SKIN = 1e-3  # how far in cells off the surface a point is looked at to see whether it is hidden
+PATIENCE = 64  # candidates drawn for each point wanted before a scene is given up
 
 
 class SurfaceSample(NamedTuple):

@@ -11,8 +11,7 @@ from shapeprog.kernels.bits import uniform
 from shapeprog.kernels.compile import helper, kernel
 from shapeprog.kernels.table import CENTRE, KIND, ROTATION, local, turned
 
-GUIDE = 256
-"""Steps of the table that shortens the search for a face."""
+GUIDE = 256  # steps of the table that shortens the search for a face
 
 LISTED = 512
 """Most primitives of a scene of which each gets a list of those near it; in larger scenes all are looked at."""

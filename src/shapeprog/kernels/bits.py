@@ -6,8 +6,7 @@ import numpy as np
 
 from shapeprog.kernels.compile import helper
 
-WORD = 32
-"""Cells in a word."""
+WORD = 32  # cells in a word
 
 GOLDEN, FIRST, SECOND = 0x9E3779B97F4A7C15, 0xBF58476D1CE4E5B9, 0x94D049BB133111EB
 """The step and the two factors of SplitMix64 (Steele, Lea and Flood 2014), which makes random numbers of a counter."""

@@ -38,8 +38,7 @@ Function = Callable[..., Any]
 OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 """Kernels run without the interpreter's lock, and divide as numpy does, without a check before each division."""
 
-MOST = 3
-"""Processes that compile in parallel with this one, at most, where there are as many cores."""
+MOST = 3  # processes that compile in parallel with this one, at most, where there are as many cores
 
 
 _lock = threading.RLock()

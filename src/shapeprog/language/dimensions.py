@@ -37,18 +37,14 @@ from shapeprog.language.program import Program
 from shapeprog.language.statement import language
 from shapeprog.language.unit import Unit
 
-DIGITS = 6
-"""Digits of a length that is converted: float32 has two more, which would show that it was."""
-
-FEWEST = 2
-"""Digits that lengths have at least where they are rounded, so that thin parts keep their thickness."""
+DIGITS = 6  # digits of a length that is converted: float32 has two more, which would show that it was
+FEWEST = 2  # digits that lengths have at least where they are rounded, so that thin parts keep their thickness
 
 _NOTHING = 1e-9
 _PLAIN = ("tilt", "turn", "step")
 
 Change: TypeAlias = Callable[[float, float], float]
-Scope: TypeAlias = Callable[[str], str]
-"""The name that a local name has in the whole program."""
+Scope: TypeAlias = Callable[[str], str]  # the name that a local name has in the whole program
 
 
 class Use(NamedTuple):

@@ -73,8 +73,7 @@ class Expression:
         return Negative(self)
 
 
-Value: TypeAlias = float | Expression
-"""A number that float32 holds exactly, or an expression."""
+Value: TypeAlias = float | Expression  # a number that float32 holds exactly, or an expression
 
 
 @dataclass(frozen=True)

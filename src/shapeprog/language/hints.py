@@ -12,17 +12,10 @@ import numpy as np
 
 from shapeprog.space import DEPTH, SIDE, UP, FloatArray
 
-STRAIGHT = 0.9986
-"""Cosine from which a direction counts as that of an axis: three degrees."""
-
-ROUND = 0.75
-"""Least ratio of the sides of a section that may be round."""
-
-SOFT = 0.5
-"""Least radius in cells of an edge that differs visibly from a sharp one."""
-
-STEEPEST = 45.0
-"""Degrees up to which a board is tilted."""
+STRAIGHT = 0.9986  # cosine from which a direction counts as that of an axis: three degrees
+ROUND = 0.75  # least ratio of the sides of a section that may be round
+SOFT = 0.5  # least radius in cells of an edge that differs visibly from a sharp one
+STEEPEST = 45.0  # degrees up to which a board is tilted
 
 BULGE = (0.15, 0.9)
 """Height of an arc as a share of the half length of its chord, from and to which a flat box may hold one."""

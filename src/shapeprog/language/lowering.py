@@ -18,8 +18,7 @@ from shapeprog.language.parameters import to_float32
 from shapeprog.language.placement import AXES, LEAST_ALONG, MOST_SOLIDS, POINTS, ROUND, SIZES, is_sized
 from shapeprog.language.program import DEEPEST
 
-TOO_LARGE = 1e12
-"""Magnitude from which numbers of placed text are refused."""
+TOO_LARGE = 1e12  # magnitude from which numbers of placed text are refused
 
 POSITIVE = "a size must be positive, and more than a millionth of the whole"
 

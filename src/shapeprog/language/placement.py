@@ -27,14 +27,9 @@ AXES = (
 """Left-right, front-rear, vertical."""
 
 SIZES = tuple(words.size for words in AXES)
-BOX = tuple(word for words in AXES for word in words)
-"""Keywords of a box."""
-
-POINT = tuple(word for word in BOX if word not in SIZES)
-"""Keywords of a point."""
-
-POINTS = ("start", "through", "end")
-"""Keywords of a solid that take a point."""
+BOX = tuple(word for words in AXES for word in words)  # keywords of a box
+POINT = tuple(word for word in BOX if word not in SIZES)  # keywords of a point
+POINTS = ("start", "through", "end")  # keywords of a solid that take a point
 
 
 class Needs(NamedTuple):
@@ -61,11 +56,8 @@ BETWEEN = {
 }
 """Solids between points; ``rod`` and ``taper`` are these if they have a ``start``."""
 
-ROUND = ("cylinder", "rod", "taper")
-"""Solids that stand upright and round in a box."""
-
-ROUND_ROLES = ("top_circle", "base_circle", "support_cylinder", "line")
-"""Roles of round parts, which are never a box."""
+ROUND = ("cylinder", "rod", "taper")  # solids that stand upright and round in a box
+ROUND_ROLES = ("top_circle", "base_circle", "support_cylinder", "line")  # roles of round parts, which are never a box
 
 
 class GroupWords(NamedTuple):
@@ -94,14 +86,9 @@ BOX_IN_CELLS = ("bottom", "front", "left", "height", "depth", "width")
 ATTRIBUTES = frozenset(["radius", "edge", "tilt", "lean", "turn", "step", "gap"])
 """Keywords that may be names of numbers, but not of functions."""
 
-LONGEST_SIDE = 24.0
-"""Cells of the longest side of the whole, as read."""
-
-MOST_SOLIDS = 1 << 17
-"""Most solids, and most evaluated bodies."""
-
-LEAST_ALONG = 0.25
-"""Least share of its length that a bar covers along the axis that its two sizes leave open."""
+LONGEST_SIDE = 24.0  # cells of the longest side of the whole, as read
+MOST_SOLIDS = 1 << 17  # most solids, and most evaluated bodies
+LEAST_ALONG = 0.25  # least share of its length that a bar covers along the axis that its two sizes leave open
 
 
 def is_sized(keywords: Iterable[str], axis: int) -> bool:

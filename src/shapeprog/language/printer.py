@@ -31,8 +31,7 @@ from shapeprog.language.statement import language
 from shapeprog.language.text import LONGEST
 from shapeprog.language.unit import HEAD
 
-INDENT = "    "
-"""One level of indentation."""
+INDENT = "    "  # one level of indentation
 
 
 def format_program(program: Program) -> str:

@@ -12,11 +12,8 @@ from shapeprog.language.ast import Loop as Loop
 from shapeprog.language.ast import Scale, Source
 from shapeprog.language.unit import Unit
 
-PUBLISHED_DEPTH = 3
-"""Steps of one block in the published generator."""
-
-DEEPEST = 64
-"""Levels of loops, calls and parentheses in text; Python itself ends at 100 levels of indentation."""
+PUBLISHED_DEPTH = 3  # steps of one block in the published generator
+DEEPEST = 64  # levels of loops, calls and parentheses in text; Python itself ends at 100 levels of indentation
 
 
 Node = Draw | Loop

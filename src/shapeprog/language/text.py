@@ -9,8 +9,7 @@ from typing import TypeAlias
 
 from shapeprog.errors import ProgramError
 
-LONGEST = 500_000
-"""Letters of the longest text: a syntax tree takes a thousand times the memory of its text."""
+LONGEST = 500_000  # letters of the longest text: a syntax tree takes a thousand times the memory of its text
 
 Node: TypeAlias = ast.stmt | ast.expr | ast.keyword | ast.arg
 

@@ -17,11 +17,8 @@ from shapeprog.language.parameters import shortest, to_float32
 from shapeprog.language.text import Text
 from shapeprog.space import Frame
 
-METRES = {"mm": 0.001, "cm": 0.01, "m": 1.0, "in": 0.0254}
-"""Units by name, in metres."""
-
-HEAD = "unit:"
-"""The beginning of the comment with the unit of a text."""
+METRES = {"mm": 0.001, "cm": 0.01, "m": 1.0, "in": 0.0254}  # units by name, in metres
+HEAD = "unit:"  # the beginning of the comment with the unit of a text
 
 _FORM = "write it as # unit: cm, 3.75 per cell"
 _HEADER = re.compile(rf"#[ \t]*{HEAD}[ \t]*(.*?)[ \t]*")

@@ -24,8 +24,7 @@ from shapeprog.lazy_torch import Tensor, on_numpy, torch
 MOST_COPIES = 1 << 17
 """Most copies that one program may unroll to: points, cells, meshes and pictures of so many take seconds."""
 
-MOST_PRIMITIVES = 1 << 20
-"""Most copies that one batch may unroll to; more is a mistake in a loop count."""
+MOST_PRIMITIVES = 1 << 20  # most copies that one batch may unroll to; more is a mistake in a loop count
 
 THINNEST = 0.2
 """Cells; a shorter length is drawn as this where gradients are recorded.

@@ -24,8 +24,7 @@ from shapeprog.language.program import Program
 from shapeprog.language.statement import language
 from shapeprog.language.unit import Unit
 
-DIGITS = 2
-"""Decimals shown of numbers in cells; files have all of them."""
+DIGITS = 2  # decimals shown of numbers in cells; files have all of them
 
 
 @dataclass(frozen=True)

@@ -13,14 +13,9 @@ from shapeprog.formats.colours import colour
 from shapeprog.formats.parts import Part, crease_normals, part_normals
 from shapeprog.space import RESOLUTION, Array
 
-INPUT_COLOUR = (212, 215, 220)
-"""Light grey of inputs."""
-
-MOST_POINTS = 2500
-"""Points of a cloud that are drawn, each as a small ball."""
-
-FINE = 200_000
-"""From this number of triangles on a mesh is shaded flat: they are smaller than the pixels."""
+INPUT_COLOUR = (212, 215, 220)  # light grey of inputs
+MOST_POINTS = 2500  # points of a cloud that are drawn, each as a small ball
+FINE = 200_000  # from this number of triangles on a mesh is shaded flat: they are smaller than the pixels
 
 
 @dataclass(frozen=True)

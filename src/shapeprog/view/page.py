@@ -27,17 +27,10 @@ from shapeprog.view.render import Image, camera_for, render
 if TYPE_CHECKING:
     from PIL.ImageDraw import ImageDraw
 
-VIEW = 560
-"""Pixels along each side of one view in a picture."""
-
-IN_NOTEBOOK = 400
-"""Pixels along each side of the view in a notebook."""
-
-SMALL = (216, 204)
-"""Width and height of one view in a contact sheet."""
-
-LARGEST, SMALLEST = 17, 9
-"""Sizes of type for the lines of a program."""
+VIEW = 560  # pixels along each side of one view in a picture
+IN_NOTEBOOK = 400  # pixels along each side of the view in a notebook
+SMALL = (216, 204)  # width and height of one view in a contact sheet
+LARGEST, SMALLEST = 17, 9  # sizes of type for the lines of a program
 
 COLUMNS = 4
 SUFFIXES = (".png", ".jpg", ".jpeg", ".webp", ".tif", ".tiff", ".pdf")

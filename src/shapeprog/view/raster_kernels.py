@@ -11,8 +11,7 @@ import numpy as np
 
 from shapeprog.kernels.compile import helper, kernel
 
-BACKGROUND = -1
-"""Face index of a pixel that shows the ground."""
+BACKGROUND = -1  # face index of a pixel that shows the ground
 
 
 @helper

@@ -18,55 +18,27 @@ from shapeprog.view.model import Model
 
 Image = npt.NDArray[np.uint8]
 
-DIRECTION = (0.62, -1.0, -0.72)
-"""From the shape to the eye: above, in front, on the viewer's right."""
-
-DISTANCE = 4.2
-"""Distance of the eye from the middle, in radii of the model: a mild perspective."""
-
-MARGIN = 0.07
-"""Empty border around the shape, as a share of the picture."""
-
-SAMPLES = 3
-"""Samples along each side of a pixel."""
-
-LIGHTS = (27, 45)
-"""Fewest and most lights: small pictures and large meshes get fewer."""
-
-MAP_SIZE = (112, 208)
-"""Pixels along each side of a depth map of a light, in small and in large pictures."""
-
-LARGE = 480
-"""Width in pixels from which a picture counts as large."""
-
-WORK = 1_500_000
-"""Most triangles times lights of a picture."""
-
-KEY = np.array([0.85, -0.55, 0.45])
-"""Where the sky is brightest: above, in front, on the viewer's left."""
-
-AMBIENT = 0.36
-"""Light that reaches every corner, as a share."""
-
-SHADOW = 0.7
-"""How much of the sky's shadow shows on the ground."""
-
-COARSE = 3
-"""Pixels along each side of a square of ground that shares its light."""
-
-FADE = 0.14
-"""Width of the border, as a share of the picture, over which the shadow fades to white."""
-
-BLUR = 1.6
-"""Width of the blur, in such squares, that hides the single lights in the shadow on the ground."""
+DIRECTION = (0.62, -1.0, -0.72)  # from the shape to the eye: above, in front, on the viewer's right
+DISTANCE = 4.2  # distance of the eye from the middle, in radii of the model: a mild perspective
+MARGIN = 0.07  # empty border around the shape, as a share of the picture
+SAMPLES = 3  # samples along each side of a pixel
+LIGHTS = (27, 45)  # fewest and most lights: small pictures and large meshes get fewer
+MAP_SIZE = (112, 208)  # pixels along each side of a depth map of a light, in small and in large pictures
+LARGE = 480  # width in pixels from which a picture counts as large
+WORK = 1_500_000  # most triangles times lights of a picture
+KEY = np.array([0.85, -0.55, 0.45])  # where the sky is brightest: above, in front, on the viewer's left
+AMBIENT = 0.36  # light that reaches every corner, as a share
+SHADOW = 0.7  # how much of the sky's shadow shows on the ground
+COARSE = 3  # pixels along each side of a square of ground that shares its light
+FADE = 0.14  # width of the border, as a share of the picture, over which the shadow fades to white
+BLUR = 1.6  # width of the blur, in such squares, that hides the single lights in the shadow on the ground
 
 INKS = np.array([1.0, 0.45, 0.16, 0.1])
 """Brightness without a line, of creases, of outlines, and of outlines on the ground."""
 
 GAMMA = 2.2
 
-_AT_ONCE = 1 << 18
-"""Points projected at once: meshes may have millions."""
+_AT_ONCE = 1 << 18  # points projected at once: meshes may have millions
 
 
 @dataclass(frozen=True)

@@ -20,17 +20,10 @@ from shapeprog.language.program import Program
 from shapeprog.language.unit import Unit
 from shapeprog.space import Array
 
-SHARES = (0.5, 0.75, 1.25, 1.5)
-"""Values that are drawn, as multiples of the number."""
-
-LEAST = 1.0
-"""Magnitude assumed for smaller numbers, so that a zero can be dragged; for lengths in cells."""
-
-STRAIGHT = 1e-3
-"""Difference in cells below which the path of a corner is linear."""
-
-MOST = 400_000
-"""Most triangle corners of all meshes of a page; with more it has no sliders."""
+SHARES = (0.5, 0.75, 1.25, 1.5)  # values that are drawn, as multiples of the number
+LEAST = 1.0  # magnitude assumed for smaller numbers, so that a zero can be dragged; for lengths in cells
+STRAIGHT = 1e-3  # difference in cells below which the path of a corner is linear
+MOST = 400_000  # most triangle corners of all meshes of a page; with more it has no sliders
 
 
 @dataclass(frozen=True)

@@ -26,8 +26,7 @@ from shapeprog.geometry.formulas import (
 from shapeprog.geometry.primitive import Mesh
 from shapeprog.space import FloatArray
 
-SEGMENTS = 48
-"""Corners of the polygon that approximates a circle in a mesh."""
+SEGMENTS = 48  # corners of the polygon that approximates a circle in a mesh
 
 
 def distance(size: Four, point: Triple) -> Number:

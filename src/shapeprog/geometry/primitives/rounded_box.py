@@ -27,8 +27,7 @@ from shapeprog.geometry.primitive import Mesh
 from shapeprog.geometry.primitives import cuboid
 from shapeprog.space import Array, FloatArray
 
-PER_QUARTER = 8
-"""Edges of the polygon that approximates a quarter of a circle in a mesh."""
+PER_QUARTER = 8  # edges of the polygon that approximates a quarter of a circle in a mesh
 
 
 def _inner(size: Four) -> Four:

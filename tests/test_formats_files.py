@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import errno
-import importlib
 import inspect
 import json
 import os
+import pkgutil
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -221,8 +221,7 @@ def test_each_suffix_has_one_declaration_and_every_readable_shape_states_its_axe
 def test_the_functions_that_a_declaration_names_are_there_and_take_its_options(each: Format):
     for place, first in ((each.reader, ["path"]), (each.writer, ["program", "path", "frame"])):
         if place:
-            module, _, name = place.partition(":")
-            function = getattr(importlib.import_module(f"shapeprog.formats.{module}"), name)
+            function = pkgutil.resolve_name(place if "." in place else f"shapeprog.formats.{place}")
             options = (*each.options, *["unit"] * each.takes_unit) if place == each.writer else ()
             assert list(inspect.signature(function).parameters) == [*first, *options]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shapeprog.independence import beside, independent
+from shapeprog.library.independence import beside, independent
 
 
 @pytest.mark.parametrize("seed", range(5))

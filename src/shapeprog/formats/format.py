@@ -6,8 +6,8 @@ formats from here.  Readers and writers are imported when they are first used.
 
 from __future__ import annotations
 
-import importlib
 import os
+import pkgutil
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -45,7 +45,8 @@ class Format:
     doc
         Contents of such a file, in one line.
     reader, writer
-        ``module:function`` of this package: ``(path) -> (program, frame or None)`` and ``(program, path, frame)``.
+        ``module:function`` of this package or in full: ``(path) -> (program, frame or None)`` and ``(program, path,
+        frame)``.
     options
         Further arguments of the writer.
     unit
@@ -87,7 +88,7 @@ FORMATS = (
     Format("JSON", "program", (".json",), None, "the text with a list of the solids that it draws, for other programs",
         reader="json_form:read_json", writer="json_form:write_json"),
     Format("notation", "program", (".notation",), None, "the same in the notation of the paper",
-        reader="notation:read_notation", writer="notation:write_notation"),
+        reader="shapeprog.liang2022.notation:read_notation", writer="shapeprog.liang2022.notation:write_notation"),
     Format("plain text", "program", (".txt",), None, "program text under another suffix",
         reader="shape:read_shape"),
     Format("GLB", "solid", (".glb",), Y_UP, "one named node per part, coloured by statement",
@@ -152,5 +153,4 @@ def listed() -> str:
 
 
 def _function(location: str) -> Any:
-    module, _, name = location.partition(":")
-    return getattr(importlib.import_module(f"shapeprog.formats.{module}"), name)
+    return pkgutil.resolve_name(location if "." in location else f"shapeprog.formats.{location}")

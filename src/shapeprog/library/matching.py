@@ -18,13 +18,13 @@ import numpy as np
 import numpy.typing as npt
 
 from shapeprog.errors import ShapeProgError
-from shapeprog.independence import independent
 from shapeprog.language.ast import Assignment, Call, Function, Source
 from shapeprog.language.dimensions import Counts
 from shapeprog.language.evaluate import expanded, symbolic
 from shapeprog.language.expression import Linear, Name, Value, combined, value_at
 from shapeprog.language.program import Program
 from shapeprog.library.blocks import Block, Kind, blocks_of
+from shapeprog.library.independence import independent
 from shapeprog.library.length import terms, written
 from shapeprog.space import FloatArray
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from shapeprog.errors import ShapeProgError, did_you_mean
-from shapeprog.formats.notation import groups
 from shapeprog.language.parameters import Parameter
 from shapeprog.language.placement import BETWEEN, BOX, GROUPS, IN_BOX, ROUND_ROLES
 from shapeprog.language.statement import Role, Statement, language
@@ -129,7 +128,7 @@ def page(declared: Statement) -> str:
     lines = [declared.signature, "", f"  {_plain(declared.doc)}", ""]
     if declared.parameters:
         lines += [*_table({parameter.name: _meaning(parameter) for parameter in declared.parameters}), ""]
-    lines.append(f"  {kind} {declared.id} in cells; in the paper's notation {_notation(declared)}")
+    lines.append(f"  {kind} {declared.id} in cells")
     return "\n".join(lines) + "\n"
 
 
@@ -149,13 +148,3 @@ def _meaning(parameter: Parameter) -> str:
     default = "" if parameter.default is None else f", {quantity.written(parameter.default)} unless given"
     legal = quantity.range_text if quantity.written_out else f"always {quantity.written(quantity.low)}"
     return f"{quantity.kind}{order}{UNITS[quantity.kind]}, {legal}{default}; {slots}"
-
-
-def _notation(declared: Statement) -> str:
-    words = [f"'{word}'" for word in (declared.paper or (declared.name,))]
-    if declared.is_loop:
-        words = words[:1]
-    for symbol, parameters in groups(declared).items():
-        width = sum(parameter.quantity.width for parameter in parameters)
-        words.append(f"{symbol}=" + ("_" if width == 1 else f"({', '.join('_' * width)})"))
-    return f"for(i<_, {', '.join(words)})" if declared.is_loop else f"draw({', '.join(words)})"

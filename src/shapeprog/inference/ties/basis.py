@@ -13,10 +13,10 @@ from typing import Literal
 
 import numpy as np
 
-from shapeprog.independence import independent
 from shapeprog.inference.ties.features import Feature
 from shapeprog.inference.ties.following import Following
 from shapeprog.inference.ties.sums import SAME, Flags, cost_of_terms, nearest_quarter
+from shapeprog.library.independence import independent
 from shapeprog.space import DEPTH, SIDE, UP, Array, FloatArray
 
 FLOOR = 0.4

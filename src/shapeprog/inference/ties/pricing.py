@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from shapeprog.independence import beside
 from shapeprog.inference.ties.relations import Relation
+from shapeprog.library.independence import beside
 from shapeprog.space import FloatArray
 
 HELD = 1e-9

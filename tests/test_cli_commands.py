@@ -86,13 +86,13 @@ def test_results_of_another_input_or_of_somebody_else_are_spared(run: Run, tmp_p
 
 @pytest.mark.usefixtures("quick")
 def test_a_disk_that_takes_nothing_ends_the_run(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    from shapeprog.cli import inferring
     from shapeprog.errors import OutputError
+    from shapeprog.inference import results
 
     def full(*_: object) -> list[str]:
         raise OutputError("the disk is full", "free some space")
 
-    monkeypatch.setattr(inferring, "_write", full)
+    monkeypatch.setattr(results, "write", full)
     table(tmp_path / "one.obj")
     ended = run("infer", "one.obj", table(tmp_path / "two.obj"))
     assert ended.code == 2

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import json
-import re
+import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
@@ -21,14 +20,10 @@ from shapeprog.inference.budget import BUDGET, Progress
 if TYPE_CHECKING:
     from shapeprog.data.shape import Shape
     from shapeprog.inference import Result
-    from shapeprog.language.program import Program
 
 FOLDER = Path("shapeprog-out")
 
 TIPPED = (".stl", ".ply", ".off", ".xyz")  # formats that do not store the up axis
-
-_SUFFIXES = (".json", ".shape", ".glb", ".png")
-_LONGEST = 120
 
 
 @dataclass(frozen=True)
@@ -68,10 +63,7 @@ class InferOptions:
 
 
 class Written(NamedTuple):
-    """A shape, what was inferred from it, and the names of the files.
-
-    Files leave the seconds out: the same seed writes the same bytes.
-    """
+    """A shape, what was inferred from it, and the names of the files."""
 
     shape: Shape
     result: Result
@@ -90,11 +82,12 @@ def infer_command(options: InferOptions) -> None:
     An input that cannot be read is reported at the end; the others are processed.
     """
     from shapeprog.files import make_folder
+    from shapeprog.inference.results import document
 
     terminal.check_axes(options.up, options.front)
     check_units(options.unit, options.file_unit)
     _prepare(options)
-    infer_one = partial(_greedy, options) if options.baseline else _search(options)
+    infer_one = _inference(options)
     folder, console = make_folder(options.out), terminal.output()
     failures: list[tuple[Path, ShapeProgError]] = []
     stopped: OutputError | None = None
@@ -107,7 +100,7 @@ def infer_command(options: InferOptions) -> None:
             written += 1
             if options.as_json:
                 report = {"name": outcome.shape.name, "folder": str(folder), "seconds": outcome.result.seconds}
-                terminal.print_json(report | json.loads(_document(outcome.result, outcome.shape)))
+                terminal.print_json(report | json.loads(document(outcome.result, outcome.shape)))
             elif options.talks:
                 _report(console, outcome, options, written == 1)
     except OutputError as error:
@@ -134,6 +127,8 @@ def _results(
 ) -> Iterator[tuple[Path, Written | ShapeProgError]]:
     """Infer and write one shape after another; an ``OutputError`` where a file cannot be written."""
     from shapeprog.data import load_all
+    from shapeprog.inference import results
+    from shapeprog.view import picture
 
     stems = set[str]()
     with terminal.progress(options.talks) as begin:
@@ -143,7 +138,10 @@ def _results(
                 continue
             try:
                 result = infer_one(shape, begin(shape.name))
-                names = _write(result, shape, folder, _free_stem(shape, stems, folder), not options.no_picture)
+                stem = results.free_stem(shape, stems, folder)
+                names = results.write(result, shape, folder, stem)
+                if not options.no_picture:
+                    names.append(picture(shape, result.program, folder / f"{stem}.png", scores=result.scores).name)
             except OutputError:
                 raise
             except ShapeProgError as error:
@@ -165,129 +163,37 @@ def _prepare(options: InferOptions) -> None:
     prepare([*INFERENCE, *READING, *(() if options.no_picture else PICTURES)], report if options.talks else None)
 
 
-def _in_unit(program: Program, shape: Shape, options: InferOptions) -> Program:
-    if options.unit is None:
-        return program
-    from shapeprog.inference.readable import in_readable_unit
-
-    return in_readable_unit(program, asked_unit(None, shape.frame, shape.name, options.unit, options.file_unit))
-
-
-def _search(options: InferOptions) -> Inference:
+def _inference(options: InferOptions) -> Inference:
     """Inference with the options of the command, which are checked before the first shape is read."""
-    from shapeprog.inference import Settings, infer
+    from shapeprog.inference import Result, Settings, greedy_boxes, infer
+    from shapeprog.inference.readable import in_readable_unit
+    from shapeprog.inference.results import measured
 
     settings = None if options.rounds is None else Settings(rounds=options.rounds)
     libraries = terminal.load_libraries(options.modules, options.library)
 
     def infer_one(shape: Shape, progress: Progress) -> Result:
-        result = infer(
-            shape, blocks=options.blocks, budget=options.budget, seed=options.seed, settings=settings,
-            statements="paper" if options.paper else "all", detail=options.detail, ties=not options.no_ties,
-            libraries=libraries, progress=progress,
-        )  # fmt: skip
-        program = _in_unit(result.program, shape, options)
-        scores = _scores(program, result.snapped, shape, result.scores, options.seed)
-        return replace(result, program=program, scores=scores)
+        started = time.monotonic()
+        if options.baseline:
+            boxes = greedy_boxes(shape.voxels, options.blocks).snap()
+            reason = "Greedy boxes: one box per drawing statement, without search."
+            result = Result(boxes, boxes, {}, reason, (), time.monotonic() - started)
+        else:
+            result = infer(
+                shape, blocks=options.blocks, budget=options.budget, seed=options.seed, settings=settings,
+                statements="paper" if options.paper else "all", detail=options.detail, ties=not options.no_ties,
+                libraries=libraries, progress=progress,
+            )  # fmt: skip
+        if options.unit is not None:
+            unit = asked_unit(None, shape.frame, shape.name, options.unit, options.file_unit)
+            result = replace(result, program=in_readable_unit(result.program, unit))
+        return measured(result, shape, options.seed)
 
     return infer_one
 
 
-def _greedy(options: InferOptions, shape: Shape, progress: Progress) -> Result:
-    import time
-
-    from shapeprog.inference import Result, greedy_boxes
-
-    started = time.monotonic()
-    snapped: Program = greedy_boxes(shape.voxels, options.blocks).snap()
-    seconds = time.monotonic() - started
-    reason = "Greedy boxes: one box per drawing statement, without search."
-    program = _in_unit(snapped, shape, options)
-    return Result(program, snapped, _scores(program, snapped, shape, {}, options.seed), reason, (), seconds)
-
-
-def _scores(
-    program: Program, snapped: Program | None, shape: Shape, given_scores: dict[str, float], seed: int
-) -> dict[str, float]:
-    """The scores of inference, the distance to the input, and the size of the program."""
-    from shapeprog.evaluation.metrics import evaluate_program
-
-    measured = evaluate_program(program, shape, snapped, seed=seed, iou=given_scores.get("iou"))
-    fit = {"iou": measured.iou, "cd": measured.cd, "noise_floor": measured.noise_floor, "f1": measured.f1}
-    sizes = {"blocks": measured.blocks, "statements": measured.statements, "primitives": measured.primitives}
-    return terminal.plain({**given_scores, **fit, **sizes})
-
-
-def _document(result: Result, shape: Shape) -> str:
-    from shapeprog.formats.json_form import result_json
-    from shapeprog.language.printer import format_program
-
-    whole = {} if result.snapped is None else {"snapped": format_program(result.snapped)}
-    return result_json(
-        result.program, shape.frame, scores=result.scores, reason=result.reason, source=_source(shape), **whole
-    )
-
-
-def _write(result: Result, shape: Shape, folder: Path, stem: str, picture: bool) -> list[str]:
-    from shapeprog.files import write_text
-    from shapeprog.formats import export
-
-    write_text(folder / f"{stem}.json", _document(result, shape))
-    names = [f"{stem}.json", f"{stem}.shape"]
-    export(result.program, folder / f"{stem}.shape", shape.frame)
-    if result.program.size:
-        export(result.program, folder / f"{stem}.glb", shape.frame)
-        names.append(f"{stem}.glb")
-    if picture:
-        from shapeprog.view import picture as draw
-
-        draw(shape, result.program, folder / f"{stem}.png", scores=result.scores)
-        names.append(f"{stem}.png")
-    return names
-
-
 def _kept(written: int, folder: Path) -> str:
     return f"finished results are kept: {written} program{'s' if written != 1 else ''} in {folder}"
-
-
-def _free_stem(shape: Shape, stems: set[str], folder: Path) -> str:
-    """A file name that neither another shape, of this run or an earlier one, nor another file has.
-
-    The same input may replace its own results.
-    """
-    base = re.sub(r"[^\w.\-]+", "_", shape.name).strip("._")[:_LONGEST] or "shape"
-    stem, number = base, 1
-    while stem in stems or not _replaceable(shape, folder, stem):
-        number += 1
-        stem = f"{base}_{number}"
-    stems.add(stem)
-    return stem
-
-
-def _replaceable(shape: Shape, folder: Path, stem: str) -> bool:
-    """Whether there are no files of that name, or only earlier results of the same shape."""
-    from shapeprog.formats.json_form import read_result
-
-    if shape.source is not None and shape.source.resolve() == (folder / f"{stem}{shape.source.suffix}").resolve():
-        return False
-    if not any((folder / f"{stem}{suffix}").exists() for suffix in _SUFFIXES):
-        return True
-    try:
-        return read_result(folder / f"{stem}.json").source == _source(shape)
-    except ShapeProgError:
-        return False
-
-
-def _source(shape: Shape) -> str | None:
-    """The file, and in a file of many the name of the shape, as :func:`shapeprog.data.load` finds it again."""
-    from shapeprog.data.loading import ARRAY_SUFFIXES
-
-    if shape.source is None:
-        return None
-    path = str(shape.source.absolute())
-    if shape.source.suffix.lower() not in ARRAY_SUFFIXES or shape.name == shape.source.stem:
-        return path
-    return f"{path}#{shape.name.removeprefix(f'{shape.source.stem}#')}"
 
 
 def _report(console: Any, written: Written, options: InferOptions, first: bool) -> None:

@@ -14,7 +14,6 @@ import numpy as np
 import pytest
 
 from shapeprog.kernels import compile as compiling
-from shapeprog.kernels import modules
 
 ROOT = Path(__file__).parents[1]
 
@@ -113,10 +112,7 @@ def test_another_process_ends_with_the_one_that_started_it(tmp_path):
         assert other.wait(timeout=30) == 0
 
 
-def test_every_module_of_kernels_is_named_and_none_compiles_by_itself():
-    named = {*modules.INFERENCE, *modules.READING, *modules.PICTURES}
-    for name in named:
-        assert (ROOT / "src" / Path(*name.split("."))).with_suffix(".py").is_file(), name
+def test_no_module_compiles_by_itself():
     for path in (ROOT / "src").rglob("*.py"):
         text = path.read_text()
         if path.parts[-2:] != ("kernels", "compile.py"):

@@ -41,17 +41,12 @@ def test_what_is_written_out_draws_the_same_and_has_no_names(seed: int) -> None:
     assert sp.names(plain) == []
 
 
-def test_names_tell_their_values_and_where_they_stand() -> None:
+def test_names_tell_their_values() -> None:
     found = {each.name: each for each in sp.names(parse(CHAIR))}
     assert [*found] == ["width", "thick", "span", "slope"]
     assert [each.value for each in found.values()] == [10, 2, 8, 3]
     assert [each.free for each in found.values()] == [True, True, False, True]
     assert found["span"].text == "width - thick"
-    lines = CHAIR.splitlines()
-    shown = {name: [lines[row - 1].strip() for row in each.lines] for name, each in found.items()}
-    assert shown["thick"] == ["span = width - thick", "legs(long=4 * thick, thick=thick)"]
-    assert shown["span"] == [lines[6].strip(), lines[7].strip()]
-    assert shown["width"] == ["span = width - thick", lines[7].strip()]
 
 
 def test_a_number_that_is_set_moves_all_that_follows_from_it() -> None:
@@ -96,18 +91,13 @@ def test_a_number_replaces_an_expression_in_a_program_of_placed_parts() -> None:
     }  # fmt: skip
 
 
-def test_names_of_placed_text_know_the_lines_that_use_them() -> None:
+def test_names_of_placed_text_are_whole_where_they_count() -> None:
     text = TABLE + (
         "with inside(bottom=20, height=height / 2):\n    for _ in divide(ratio, z, gap=inset / 4):\n"
         "        shelf(height=height / 9)\n        shelf(rod(start=at(left=inset), end=at(right=0), radius=1))\n"
         "for _ in row(ratio, last=at(right=inset)):\n    foot(left=0, width=3)\n"
     )
     found = {each.name: each for each in sp.names(parse(text))}
-    lines = text.splitlines()
-    shown = {name: [lines[row - 1].split("(")[0].strip() for row in each.lines] for name, each in found.items()}
-    assert shown["inset"] == ["corner", "for _ in divide", "shelf", "for _ in row"]
-    assert shown["ratio"] == ["inset = leg_width * ratio  # from both sides", "for _ in divide", "for _ in row"]
-    assert shown["height"] == ["with inside"], "height within the group is another one"
     assert [name for name, each in found.items() if each.whole] == ["ratio"]
 
 

@@ -164,13 +164,6 @@ def test_a_name_that_is_set_counts_in_the_unit() -> None:
     close(multiplied(there, place, 1.5), multiplied(program, place, 1.5), 1e-6)
 
 
-def test_names_tell_their_lines_below_the_unit() -> None:
-    there = in_unit(parse(CHAIR), Unit("cm", 4))
-    lines = format_program(there).splitlines()
-    for each in sp.names(there):
-        assert all(each.name in lines[row - 1] for row in each.lines)
-
-
 @pytest.mark.parametrize("text", [CHAIR, CHAIR.replace("share * width", "share * width * width / 9")])
 def test_gradients_reach_names_in_their_unit(text: str) -> None:
     program, unit = parse(text), Unit("mm", 40)

@@ -163,11 +163,10 @@ def _warm_up(seeds: dict[str, bytes], folder: Path) -> None:
     """Load all libraries and kernels, as valid files need them, before anything is timed or limited."""
     import torch
 
-    from shapeprog.kernels import modules
-    from shapeprog.kernels.compile import prepare
+    from shapeprog.kernels.compile import modules_of, prepare
 
     torch.set_num_threads(1)
-    prepare([*modules.READING, *modules.GEOMETRY])
+    prepare(modules_of("data", "geometry"))
     for name in {name.rpartition(".")[2]: name for name in seeds}.values():  # one of each format
         path = _fresh(folder / "case") / name
         path.write_bytes(seeds[name])

@@ -154,13 +154,13 @@ def _results(
 
 def _prepare(options: InferOptions) -> None:
     """Prepare the kernels of inference, with a message if they must be compiled."""
-    from shapeprog.kernels.compile import prepare
-    from shapeprog.kernels.modules import INFERENCE, PICTURES, READING
+    from shapeprog.kernels.compile import modules_of, prepare
 
     def report(sentence: str) -> None:
         terminal.errors().print(f"{sentence.capitalize()}.", style="dim", markup=False)
 
-    prepare([*INFERENCE, *READING, *(() if options.no_picture else PICTURES)], report if options.talks else None)
+    pictures = () if options.no_picture else ("view",)
+    prepare(modules_of("data", "geometry", "inference", *pictures), report if options.talks else None)
 
 
 def _inference(options: InferOptions) -> Inference:

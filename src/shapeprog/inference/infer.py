@@ -220,10 +220,9 @@ def prepare_kernels() -> None:
 
     The first call on a machine takes some seconds, the first in a process a fraction of one.
     """
-    from shapeprog.kernels.compile import prepare
-    from shapeprog.kernels.modules import INFERENCE
+    from shapeprog.kernels.compile import modules_of, prepare
 
-    prepare(INFERENCE)
+    prepare(modules_of("inference", "geometry"))
 
 
 def _load(shape: Shape | str | Path) -> Shape:

@@ -122,6 +122,12 @@ class Kernel:
         return digest.hexdigest()[:16]
 
 
+def modules_of(*packages: str) -> list[str]:
+    """Names of the modules with the kernels of packages."""
+    files = ((name, path) for name in packages for path in (Path(__file__).parents[1] / name).glob("*_kernels.py"))
+    return sorted(f"shapeprog.{name}.{path.stem}" for name, path in files)
+
+
 def prepare(modules: Sequence[str], tell: Callable[[str], None] | None = None) -> None:
     """Compile all kernels of some modules, so that nobody waits for them later.
 
@@ -131,7 +137,7 @@ def prepare(modules: Sequence[str], tell: Callable[[str], None] | None = None) -
     Parameters
     ----------
     modules
-        Full names; those that import quickly first.
+        Their full names.
     tell
         Called with a sentence before anything is compiled, which takes seconds.
     """

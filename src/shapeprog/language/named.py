@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from shapeprog.errors import ShapeProgError, did_you_mean
-from shapeprog.language.ast import Assignment, Function, Group, Line, Source, body_of, values
+from shapeprog.language.ast import Assignment, Line, Source
 from shapeprog.language.dimensions import Counts
 from shapeprog.language.evaluate import evaluated, in_own_unit
 from shapeprog.language.expression import names_in, text_of
 from shapeprog.language.faults import Fault
 from shapeprog.language.parameters import LARGEST, to_float32
-from shapeprog.language.placement import SIZES
 from shapeprog.language.printer import printed
 from shapeprog.language.program import Program
 
@@ -31,8 +30,6 @@ class Named:
         Whether it depends on no other name, so that it can be set.
     whole
         Whether it is a number of copies or of quarter turns.
-    lines
-        The lines of :func:`~shapeprog.language.printer.format_program`, from 1, that use it.
     """
 
     name: str
@@ -40,7 +37,6 @@ class Named:
     text: str
     free: bool
     whole: bool
-    lines: tuple[int, ...]
 
 
 def inline(program: Program) -> Program:
@@ -58,16 +54,9 @@ def names(program: Program) -> list[Named]:
     if program.source is None:
         return []
     numbers = program.source.evaluated_numbers()
-    rows: dict[str, list[int]] = {name: [] for name in program.source.numbers}
-    hidden = dict(_hidden(program.source.lines, frozenset(), program.source.placed))
-    for row, (_, line) in enumerate(printed(program.source), 1):
-        written = () if line is None else values(line)
-        used = {name for value in written for name in names_in(value)}
-        for name in used - hidden.get(id(line), frozenset()):
-            rows[name].append(row)
     counted = Counts(program.source).outside
     return [
-        Named(name, numbers[name], text_of(value), not names_in(value), name in counted, tuple(rows[name]))
+        Named(name, numbers[name], text_of(value), not names_in(value), name in counted)
         for name, value in program.source.numbers.items()
     ]
 
@@ -108,15 +97,3 @@ def _set(line: Line, replacements: Mapping[str, float]) -> Line:
         return line
     pairs = ((name, to_float32(replacements[name]) if name in replacements else value) for name, value in line.numbers)
     return replace(line, numbers=tuple(pairs))
-
-
-def _hidden(lines: tuple[Line, ...], names: frozenset[str], placed: bool) -> Iterator[tuple[int, frozenset[str]]]:
-    """For every line, by its ``id``, the names whose value there differs from that at the top of the program."""
-    for line in lines:
-        yield id(line), names
-        local: frozenset[str] = frozenset()
-        if isinstance(line, Function):
-            local = frozenset([*line.names, *(SIZES if placed else ())])
-        elif isinstance(line, Group) and line.kind in ("inside", "divide"):
-            local = frozenset(SIZES)
-        yield from _hidden(body_of(line), names | local, placed)

@@ -129,9 +129,7 @@ class Plan:
         values = parameters.reshape(-1, parameters.shape[-1])
         numbers = values.index_select(0, self._place)
         if clamp:
-            from shapeprog.language.clamping import ClampedLengths
-
-            numbers = ClampedLengths.apply(numbers, self._thinnest(numbers))  # type: ignore[no-untyped-call]
+            numbers = _clamped(numbers, self._thinnest(numbers))
         pieces = numbers.split(self._counts)
         results = [declared.solids(piece) for declared, piece in zip(self._kinds, pieces, strict=True)]
         layout = self._layout(tuple(tuple(solids.kind for solids in group) for group in results))
@@ -240,6 +238,18 @@ class Plan:
                 point = declared.pivot(**declared.split(values.index_select(0, slots)))
                 points.append(torch.cat([torch.zeros_like(point[:, :1]), point[:, 1:]], -1))
         return torch.cat(points)
+
+
+def _clamped(values: Float[Tensor, "M slots"], bound: Float[Tensor, "M slots"]) -> Float[Tensor, "M slots"]:
+    """Numbers clamped to at least ``bound``; where one was less, its gradient is minus its magnitude.
+
+    A straight-through clamp (Bengio et al. 2013) lets lengths run off below zero; one that passes only the gradients
+    that lengthen leaves them where momentum took them.
+    """
+    short = values.detach() < bound
+    clamped = torch.where(short, bound + (values - values.detach()), values)
+    clamped.register_hook(lambda slope: None if slope is None else torch.where(short, -slope.abs(), slope))
+    return clamped
 
 
 def _are(ids: Int[Tensor, "*batch"], accepts: Callable[[Statement], bool]) -> Bool[Tensor, "*batch"]:

@@ -15,13 +15,14 @@ import numpy as np
 
 from shapeprog.errors import OutputError
 from shapeprog.files import atomic_path, write_text
-from shapeprog.formats.build123d_prelude import HEAD, TAIL, TOOLS
 from shapeprog.formats.parts import drawn_parts
-from shapeprog.formats.scripts import Script, needed, number, script
+from shapeprog.formats.scripts import Script, needed, number, prelude, script
 from shapeprog.language.ast import Call, Function, Line, Part, body_of, changed_lines
 from shapeprog.language.printer import lines_text
 from shapeprog.language.program import Program
 from shapeprog.space import Frame
+
+HEAD, TOOLS, TAIL = prelude("prelude.build123d").split("# ---\n")  # imports; definitions; names, and the STEP file
 
 _UNITS = {"mm": "MM", "cm": "CM", "m": "M", "in": "IN"}  # units of build123d
 MOST_SOLIDS = 1 << 11  # most solids of a STEP file: build123d takes some milliseconds for each
@@ -69,12 +70,12 @@ def script_text(program: Program, frame: Frame, stem: str = "model", unit: str =
     """
     made = script(program, frame, _reserved(), "here.")
     stem = "".join(letter for letter in stem if letter.isprintable() and letter not in "\"'\\{}") or "model"
-    lines = [HEAD.format(stem=stem)]
+    lines = [HEAD.replace("@STEM@", stem)]
     if made.unit:
         lines += [f"# Numbers are in {made.unit}{f', the model is in {unit}' if unit else ''}."]
     lines += [*lines_text(made.numbers), "", *_world(made), f"colours = {made.colours}"]
     body = "\n".join(_body(made))
-    tail = TAIL.format(stem=stem, unit=_UNITS.get(unit, "MM"))
+    tail = TAIL.replace("@STEM@", stem).replace("@UNIT@", _UNITS.get(unit, "MM"))
     tools = "\n\n\n".join(needed(TOOLS.strip().split("\n\n\n"), body))
     return "\n".join(lines) + f"\n\n{tools}\n\n\n{body}\n{tail}"
 
@@ -125,7 +126,7 @@ def _with_role(line: Line, roles: dict[str, str]) -> Line:
 def _reserved() -> set[str]:
     """Reserved words of these scripts."""
     result = {*dir(builtins), "scale", "world", "corner", "colours"}
-    for node in ast.parse(HEAD + TOOLS + TAIL.format(stem="", unit="MM")).body:
+    for node in ast.parse(HEAD + TOOLS + TAIL.replace("@UNIT@", "MM")).body:
         match node:
             case ast.ImportFrom(_, aliases):
                 result |= {alias.name for alias in aliases}

@@ -10,14 +10,15 @@ from pathlib import Path
 import numpy as np
 
 from shapeprog.files import write_text
-from shapeprog.formats.openscad_prelude import PRELUDE
-from shapeprog.formats.scripts import Script, needed, number, script
+from shapeprog.formats.scripts import Script, needed, number, prelude, script
 from shapeprog.geometry.primitives.cylinder import SEGMENTS
 from shapeprog.language.ast import Argument, Assignment, Call, Comment, Function, Group, Keywords, Line, Part, Point
 from shapeprog.language.expression import Expression, Value, text_of
 from shapeprog.language.placement import AXES, BOX, ROUND
 from shapeprog.language.program import Program
 from shapeprog.space import Frame
+
+PRELUDE = prelude("prelude.scad")
 
 _KEYWORDS = """
 module function if else for let true false undef include use each assert echo PI segments colours unit

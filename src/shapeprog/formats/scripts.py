@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
@@ -124,6 +125,11 @@ def world_of(source: Source, frame: Frame) -> FloatArray:
 def number(value: float) -> str:
     """A number with at most 12 digits and no trailing point."""
     return f"{value + 0.0:.12g}"
+
+
+def prelude(name: str) -> str:
+    """A file of this folder, with the definitions that scripts of one language use."""
+    return Path(__file__).with_name(name).read_text(encoding="utf-8")
 
 
 def needed(pieces: Sequence[str], text: str) -> list[str]:

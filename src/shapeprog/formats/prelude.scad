@@ -1,21 +1,14 @@
-"""The modules of OpenSCAD models: boxes placed in boxes, loops, solids."""
-
-from __future__ import annotations
-
-from shapeprog.language.placement import BOX, POINT
-
-PRELUDE = """
 // A box is placed in the box around it by distances from its sides (left, right, front, rear, bottom, top), sizes
 // (width, depth, height) and offsets of its centre (x, y, z). $width, $depth and $height are sizes of the box around.
-module inside($BOX, tilt = 0) {
-  box = in_box($BOX);
+module inside(left, right, width, x, front, rear, depth, y, bottom, top, height, z, tilt = 0) {
+  box = in_box(left, right, width, x, front, rear, depth, y, bottom, top, height, z);
   size = [for (side = box) side[1] - side[0]];
   translate([for (side = box) side[0]]) rotate([-tilt, 0, 0])
     let ($width = size[0], $depth = size[1], $height = size[2]) children();
 }
 
 // The intervals of a box: [[left, right], [front, rear], [bottom, top]].
-function in_box($BOX) = [
+function in_box(left, right, width, x, front, rear, depth, y, bottom, top, height, z) = [
   span(left, right, width, x, $width, (1 / 2)), span(front, rear, depth, y, $depth, (1 / 2)),
   span(bottom, top, height, z, $height, 0)];
 
@@ -28,7 +21,7 @@ function span(low, high, size, offset, full, share) =
 function or_zero(value) = is_undef(value) ? 0 : value;
 
 // A point in the box around; undef along axes without a keyword.
-function at($POINT) =
+function at(left, right, x, front, rear, y, bottom, top, z) =
   [side_at(left, right, x, $width), side_at(front, rear, y, $depth), side_at(bottom, top, z, $height)];
 
 function side_at(low, high, offset, full) =
@@ -55,8 +48,8 @@ module part(role) { let ($role = role) children(); }
 module painted(kind) { color(colours[search([$role == "" ? kind : $role], colours)[0]][1]) children(); }
 
 // n equal boxes along the axis "x", "y" or "z".
-module divide(n, axis, gap = 0, $BOX, tilt = 0) {
-  inside($BOX, tilt) slices(count(n), search(axis, "xyz")[0], gap) children();
+module divide(n, axis, gap = 0, left, right, width, x, front, rear, depth, y, bottom, top, height, z, tilt = 0) {
+  inside(left, right, width, x, front, rear, depth, y, bottom, top, height, z, tilt) slices(count(n), search(axis, "xyz")[0], gap) children();
 }
 
 module slices(n, axis, gap) {
@@ -70,8 +63,8 @@ module slices(n, axis, gap) {
 }
 
 // The children and their mirror image; along several axes, all of them.
-module mirrored($POINT) {
-  plane = at($POINT);
+module mirrored(left, right, x, front, rear, y, bottom, top, z) {
+  plane = at(left, right, x, front, rear, y, bottom, top, z);
   far = [for (k = plane) is_undef(k) ? 0 : 1];
   for (a = [0:far[0]], b = [0:far[1]], c = [0:far[2]])
     multmatrix([[1 - 2 * a, 0, 0, 2 * a * or_zero(plane[0])], [0, 1 - 2 * b, 0, 2 * b * or_zero(plane[1])],
@@ -90,8 +83,8 @@ module translated(n, x = 0, y = 0, z = 0) {
 }
 
 // Evenly spaced copies: the keywords place the last copy of the first box.
-module row(n, first, $POINT) {
-  target = at($POINT);
+module row(n, first, left, right, x, front, rear, y, bottom, top, z) {
+  target = at(left, right, x, front, rear, y, bottom, top, z);
   share = [is_undef(left) ? is_undef(right) ? 1 / 2 : 1 : 0, is_undef(front) ? is_undef(rear) ? 1 / 2 : 1 : 0,
     is_undef(bottom) ? is_undef(top) ? 1 / 2 : 1 : 0];
   step = [for (k = [0:2]) is_undef(target[k]) ? 0 :
@@ -100,8 +93,8 @@ module row(n, first, $POINT) {
 }
 
 // A box; lean moves its top to the rear.
-module box($BOX, tilt = 0, lean = 0) {
-  inside($BOX, tilt) painted("box") {
+module box(left, right, width, x, front, rear, depth, y, bottom, top, height, z, tilt = 0, lean = 0) {
+  inside(left, right, width, x, front, rear, depth, y, bottom, top, height, z, tilt) painted("box") {
     if (min($width, $depth, $height) > 0)
       multmatrix([[1, 0, 0, 0], [0, 1, lean / $height, 0], [0, 0, 1, 0], [0, 0, 0, 1]])
         cube([$width, $depth, $height]);
@@ -109,8 +102,8 @@ module box($BOX, tilt = 0, lean = 0) {
 }
 
 // A box with rounded edges.
-module cushion($BOX, edge, tilt = 0) {
-  inside($BOX, tilt) painted("cushion") rounded([$width, $depth, $height], edge);
+module cushion(left, right, width, x, front, rear, depth, y, bottom, top, height, z, edge, tilt = 0) {
+  inside(left, right, width, x, front, rear, depth, y, bottom, top, height, z, tilt) painted("cushion") rounded([$width, $depth, $height], edge);
 }
 
 // A ball of polygons around a box, pulled apart.
@@ -131,11 +124,11 @@ module rounded(size, edge) {
 }
 
 // An upright round solid, by radius or by the size of its box; a taper has two radii, [bottom, top].
-module upright(kind, $BOX, radius, tilt = 0) {
+module upright(kind, left, right, width, x, front, rear, depth, y, bottom, top, height, z, radius, tilt = 0) {
   across = !is_undef(radius) ? 2 * max(radius) :
     let (by_x = !is_undef(width) || !(is_undef(left) || is_undef(right)),
       by_y = !is_undef(depth) || !(is_undef(front) || is_undef(rear)),
-      sides = in_box($BOX))
+      sides = in_box(left, right, width, x, front, rear, depth, y, bottom, top, height, z))
     by_y && !by_x ? sides[1][1] - sides[1][0] : sides[0][1] - sides[0][0];
   inside(left, right, across, x, front, rear, across, y, bottom, top, height, z, tilt) painted(kind)
     between(middle(), [$width / 2, $depth / 2, $height], is_undef(radius) ? across / 2 : radius);
@@ -207,6 +200,3 @@ module bent_rod(start, through, end, radius) {
     } else between(first, last, radius);
   }
 }
-"""
-PRELUDE = PRELUDE.replace("$BOX", ", ".join(BOX)).replace("$POINT", ", ".join(POINT))
-"""Definitions with empty lines between them."""

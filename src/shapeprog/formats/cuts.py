@@ -8,6 +8,7 @@ import math
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -94,6 +95,7 @@ class CutList:
         return "\n".join(lines)
 
 
+@lru_cache(maxsize=1)  # the command writes and prints the same list
 def cut_list(program: Program, frame: Frame, unit: str = "") -> CutList:
     """The distinct parts of a program; ``frame.scale`` is the size of a cell in ``unit``, which is empty if unknown."""
     with on_numpy_if_shipped(program):

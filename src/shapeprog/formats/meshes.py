@@ -11,6 +11,7 @@ from shapeprog.errors import OutputError
 from shapeprog.files import write_bytes, write_text
 from shapeprog.formats.colours import colour
 from shapeprog.formats.parts import Faces, Part, Vertices, drawn_parts, part_normals, solid
+from shapeprog.geometry.mesh import joined
 from shapeprog.language.program import Program
 from shapeprog.space import Frame
 
@@ -75,14 +76,9 @@ def write_ply(program: Program, path: Path, frame: Frame) -> None:
     import trimesh
 
     each = drawn_parts(program, frame)
-    starts = np.cumsum([0, *(len(part.vertices) for part in each)])
     colours = [np.tile([*colour(part.statement), 255], (len(part.vertices), 1)) for part in each]
-    mesh = trimesh.Trimesh(
-        np.concatenate([part.vertices for part in each]),
-        np.concatenate([part.faces + start for part, start in zip(each, starts, strict=False)]),
-        vertex_colors=np.concatenate(colours).astype(np.uint8),
-        process=False,
-    )
+    vertices, faces = joined([(part.vertices, part.faces) for part in each])
+    mesh = trimesh.Trimesh(vertices, faces, vertex_colors=np.concatenate(colours).astype(np.uint8), process=False)
     content: Any = mesh.export(file_type="ply")
     write_bytes(path, content)
 

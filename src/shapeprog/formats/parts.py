@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from shapeprog.errors import OutputError, ShapeProgError
-from shapeprog.geometry.mesh import part_meshes, union_mesh
+from shapeprog.geometry.mesh import joined, part_meshes, union_mesh
 from shapeprog.language.parameters import LARGEST
 from shapeprog.language.program import Program
 from shapeprog.language.statement import language
@@ -129,12 +129,10 @@ def part_normals(solids: Sequence[Part]) -> Iterator[Vertices]:
             triangles += len(solids[stop].faces)
             stop += 1
         some = solids[start:stop]
-        starts = np.cumsum([0, *(len(part.vertices) for part in some)])
-        faces = np.concatenate([part.faces + first for part, first in zip(some, starts, strict=False)])
-        vertices, owner = np.concatenate([part.vertices for part in some]), np.repeat(range(len(some)), np.diff(starts))
-        yield from np.split(
-            crease_normals(vertices, faces, owner=owner), np.cumsum([len(part.faces) for part in some[:-1]])
-        )
+        vertices, faces = joined([(part.vertices, part.faces) for part in some])
+        owner = np.repeat(range(len(some)), [len(part.vertices) for part in some])
+        normals = crease_normals(vertices, faces, owner=owner)
+        yield from np.split(normals, np.cumsum([len(part.faces) for part in some[:-1]]))
         start = stop
 
 

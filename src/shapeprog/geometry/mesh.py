@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import combinations
 from typing import Any, NamedTuple
@@ -141,11 +141,16 @@ def union_mesh(scene: Batch) -> Triangles:
         else:
             merged = _joined(group).to_mesh()
             solids.append((merged.vert_properties[:, :3], np.asarray(merged.tri_verts, np.int64)))
-    starts = np.cumsum([0, *(len(vertices) for vertices, _ in solids)])
-    if not starts[-1]:
+    if not any(len(vertices) for vertices, _ in solids):
         raise ShapeProgError("the union of the parts is empty", "a part may be too thin; give it some thickness")
-    vertices = np.concatenate([vertices for vertices, _ in solids]).astype(np.float64)
-    return vertices, np.concatenate([faces + start for (_, faces), start in zip(solids, starts, strict=False)])
+    return joined(solids)
+
+
+def joined(meshes: Sequence[tuple[Array, Array]]) -> Triangles:
+    """Vertices (V, 3) and faces (F, 3) of meshes as those of one, in their order."""
+    starts = np.cumsum([0, *(len(vertices) for vertices, _ in meshes)])
+    faces = [faces + start for (_, faces), start in zip(meshes, starts, strict=False)]
+    return np.concatenate([vertices for vertices, _ in meshes]).astype(np.float64), np.concatenate(faces)
 
 
 def pieces(vertices: Array, faces: Array) -> int:

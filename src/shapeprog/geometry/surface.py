@@ -57,21 +57,11 @@ class SurfaceSample(NamedTuple):
 
 
 class Choice(NamedTuple):
-    """Decisions made without gradient.
+    """Decisions made without gradient."""
 
-    Parameters
-    ----------
-    chosen
-        Slot and face of each point.
-    places
-        Its unit place, its position and its normal, three numbers each.
-    found
-        How many points each element has; -1 if some are farther away than ``FARTHEST``.
-    """
-
-    chosen: Int[Tensor, "B n 2"]
-    places: Float[Tensor, "B n 9"]
-    found: Int[Tensor, " B"]
+    chosen: Int[Tensor, "B n 2"]  # slot and face of each point
+    places: Float[Tensor, "B n 9"]  # its unit place, its position and its normal, three numbers each
+    found: Int[Tensor, " B"]  # how many points each element has; -1 if some are farther away than ``FARTHEST``
 
     @property
     def slot(self) -> Int[Tensor, "B n"]:

@@ -90,27 +90,13 @@ class Part:
 
 @dataclass(frozen=True)
 class Group:
-    """Lines with a placed loop or box around them: ``for _ in row(3, last=at(top=0)):``, ``with inside(left=2):``.
+    """Lines with a placed loop or box around them: ``for _ in row(3, last=at(top=0)):``, ``with inside(left=2):``."""
 
-    Parameters
-    ----------
-    kind
-        ``inside``, ``divide``, ``mirror``, ``rotate``, ``translate`` or ``row``.
-    keywords
-        Its keywords; ``last`` of a row is a :class:`Point`.
-    body
-        The lines inside.
-    count
-        How many copies; ``None`` for ``inside`` and ``mirror``.
-    axis
-        ``x``, ``y`` or ``z`` for ``divide``, else empty.
-    """
-
-    kind: str
-    keywords: Keywords
-    body: tuple[Line, ...]
-    count: Value | None = None
-    axis: str = ""
+    kind: str  # ``inside``, ``divide``, ``mirror``, ``rotate``, ``translate`` or ``row``
+    keywords: Keywords  # its keywords; ``last`` of a row is a :class:`Point`
+    body: tuple[Line, ...]  # the lines inside
+    count: Value | None = None  # how many copies; ``None`` for ``inside`` and ``mirror``
+    axis: str = ""  # ``x``, ``y`` or ``z`` for ``divide``, else empty
     note: str = ""
 
 
@@ -153,18 +139,10 @@ Line: TypeAlias = Comment | Assignment | Draw | Loop | Part | Group | Call | Fun
 
 @dataclass(frozen=True)
 class Scale:
-    """How placed text lies in the grid; fixed when the text is read, whatever is set afterwards.
+    """How placed text lies in the grid; fixed when the text is read, whatever is set afterwards."""
 
-    Parameters
-    ----------
-    cells_per_unit
-        Cells per unit of length; as read, the longest side of the whole is 24 cells.
-    floor
-        Height of the floor in the grid, in cells.
-    """
-
-    cells_per_unit: float
-    floor: float
+    cells_per_unit: float  # cells per unit of length; as read, the longest side of the whole is 24 cells
+    floor: float  # height of the floor in the grid, in cells
 
 
 @dataclass(frozen=True)

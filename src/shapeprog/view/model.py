@@ -11,6 +11,7 @@ import numpy as np
 from shapeprog.data.shape import Shape
 from shapeprog.formats.colours import colour
 from shapeprog.formats.parts import Part, crease_normals, part_normals
+from shapeprog.geometry.mesh import joined
 from shapeprog.space import RESOLUTION, Array
 
 INPUT_COLOUR = (212, 215, 220)  # light grey of inputs
@@ -45,10 +46,8 @@ def of_parts(parts: Sequence[Part]) -> Model:
     """Parts in the colours of their statements."""
     if not parts:
         return _empty()
-    starts = np.cumsum([0, *(len(part.vertices) for part in parts)])
     return Model(
-        np.concatenate([part.vertices for part in parts]),
-        np.concatenate([part.faces + start for part, start in zip(parts, starts, strict=False)]),
+        *joined([(part.vertices, part.faces) for part in parts]),
         np.concatenate(list(part_normals(parts))),
         np.concatenate([np.tile(colour(part.statement), (len(part.faces), 1)) for part in parts]),
         np.concatenate([np.full(len(part.faces), number) for number, part in enumerate(parts)]),

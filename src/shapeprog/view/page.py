@@ -41,24 +41,12 @@ _PAD = 28
 
 @dataclass(frozen=True)
 class Item:
-    """One entry of a contact sheet.
+    """One entry of a contact sheet."""
 
-    Parameters
-    ----------
-    name
-        Its caption.
-    shape
-        The input, or None.
-    program
-        Its reconstruction.
-    note
-        A second line, such as the scores.
-    """
-
-    name: str
-    shape: Shape | None
-    program: Program
-    note: str = ""
+    name: str  # its caption
+    shape: Shape | None  # the input, or None
+    program: Program  # its reconstruction
+    note: str = ""  # A second line, such as the scores
 
 
 def picture(

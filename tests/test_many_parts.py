@@ -64,14 +64,6 @@ def test_many_parts_have_points_with_gradient(count, step):
     assert slope.isfinite().all()
 
 
-def test_distances_that_would_take_long_are_refused_with_the_number_allowed(monkeypatch):
-    monkeypatch.setattr(distance, "MOST_LOOKS", 10**6)
-    points = torch.rand(1000, 3)
-    assert unroll(parse(row(MANY, 0))).distance(points).isfinite().all()
-    with pytest.raises(ShapeProgError, match="at most 1000000 pairs"):
-        unroll(parse(row(4 * MANY, 0))).distance(points)
-
-
 def test_one_program_and_a_batch_have_their_own_limits(monkeypatch):
     room = sys.modules[unroll.__module__]
     monkeypatch.setattr(room, "MOST_COPIES", 20)

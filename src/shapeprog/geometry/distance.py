@@ -16,7 +16,6 @@ from jaxtyping import Float, Int
 from torch import Tensor
 from torch.autograd.function import once_differentiable
 
-from shapeprog.errors import ShapeProgError
 from shapeprog.geometry import distance_kernels as kernels
 from shapeprog.geometry.arrays import by_kernel, declared_kinds, gradients, numbers, over_threads, table_of
 from shapeprog.geometry.batch import Batch
@@ -28,10 +27,6 @@ Nearest = tuple[Int[Tensor, "*batch P"], Float[Tensor, "*batch P"]]
 """Slot of the nearest primitive of each point, and the signed distance to it."""
 
 AT_ONCE = 1 << 22  # pairs of point and primitive that are looked at together where no kernel helps
-
-MOST_LOOKS = 1 << 30
-"""Most pairs that the kernel compares for one result, some seconds' worth, where a scene has very many primitives: if
-they lie over each other, no list of the nearest is short."""
 
 
 def each_distance(batch: Batch, points: Float[Tensor, "*shared P 3"]) -> Float[Tensor, "*batch P N"]:
@@ -68,8 +63,7 @@ def signed_distance(batch: Batch, points: Float[Tensor, "*shared P 3"]) -> Float
 
     Outside, it is equation 2 of Liang (2022), of primitives posed as in equation 4.
     The nearest primitive is selected without gradient, and only its distance is differentiated: the gradient of the
-    minimum over all primitives for one evaluation a point.  An empty union is infinitely far away.  A
-    ``ShapeProgError`` if so many of more than a thousand primitives lie over each other that it would take long.
+    minimum over all primitives for one evaluation a point.  An empty union is infinitely far away.
     """
     flat, positions = _aligned(batch, points)
     if by_kernel(flat):
@@ -130,13 +124,8 @@ def nearest_by_kernel(flat: Batch, points: Float[Tensor, "B P 3"], table: Array)
     """The nearest of the built-in primitives, which are rows of the table."""
     scenes, count = points.shape[:-1]
     slots, values = np.empty(scenes * count, np.int64), np.empty(scenes * count)
-    data = table, flat.mask.shape[-1], numbers(points).reshape(-1, 3), count, MOST_LOOKS, slots, values
+    data = table, flat.mask.shape[-1], numbers(points).reshape(-1, 3), count, slots, values
     over_threads(partial(kernels.nearest, *data), len(slots), least=2048)
-    if slots.min(initial=0) < 0:
-        raise ShapeProgError(
-            f"too many of the {flat.mask.shape[-1]} parts lie over each other for distances of {count} points",
-            f"lower the counts, or ask for fewer points: at most {MOST_LOOKS} pairs are looked at",
-        )
     result = torch.from_numpy(slots), torch.from_numpy(values).to(points.dtype)
     return result[0].reshape(scenes, count), result[1].reshape(scenes, count)
 

@@ -13,7 +13,6 @@ from shapeprog.kernels.table import CENTRE, KIND, ROTATION, SIZE, local, turned
 ROUNDING = 2e-6  # error of a bound in single precision against the size of the coordinates, generously
 STRIDE = 2.0  # how far in cells from a point its list of possible nearest primitives is used
 LONG_STRIDE, MANY = 8.0, 1024  # the same among more primitives than this, which take longer than a longer list
-RIVAL = 8  # cost of a distance, in bounds
 FARTHEST = 1e18  # coordinates whose squares fit into single precision, in which bounds are taken and points drawn
 
 
@@ -89,15 +88,6 @@ def _best(table, first, listed, lower, count, x, y, z):
 
 
 @helper
-def _rivals(lower, count, best):
-    """How many primitives had to be looked at because their bound is not above the best distance."""
-    number = 0
-    for n in range(count):
-        number += lower[n] <= best
-    return number
-
-
-@helper
 def _few(all_listed, all_box, lower, used, limit, listed, box):
     """Keep the boxes whose bound is not above a limit, or no number; returns how many."""
     number = 0
@@ -110,18 +100,16 @@ def _few(all_listed, all_box, lower, used, limit, listed, box):
     return number
 
 
-@kernel("void(f8[:, ::1], i8, f8[:, ::1], i8, i8, i8[::1], f8[::1], i8, i8)")
-def nearest(table, per_scene, points, count, budget, slots, values, begin, end):
+@kernel("void(f8[:, ::1], i8, f8[:, ::1], i8, i8[::1], f8[::1], i8, i8)")
+def nearest(table, per_scene, points, count, slots, values, begin, end):
     """Nearest primitive and signed distance of the union for the points ``begin`` to ``end`` of all scenes.
 
     Each scene has ``per_scene`` rows of the table and ``count`` points.  The turned box around a primitive bounds its
     signed distance from below, inside too.  Distances change no faster than points move: a primitive whose bound at
     one point exceeds the best there by more than twice the stride is not the nearest within a stride of it, so
     points that come in order, such as cells, test few primitives.  Where coordinates are too large for bounds, or
-    no numbers, every primitive is looked at.  Among more than ``MANY`` primitives, once these points have had their
-    share of ``budget`` bounds looked at, the slots of all others are -1.
+    no numbers, every primitive is looked at.
     """
-    remaining = (budget // len(points) + MANY) * (end - begin)
     all_listed, listed = np.empty(per_scene, np.int64), np.empty(per_scene, np.int64)
     all_box, box = np.empty((15, per_scene), np.float32), np.empty((15, per_scene), np.float32)
     up, depth, lower = np.empty(per_scene, np.float32), np.empty(per_scene, np.float32), np.empty(per_scene, np.float32)
@@ -152,11 +140,6 @@ def nearest(table, per_scene, points, count, budget, slots, values, begin, end):
         slots[item], values[item] = some[closest], best
         if number == 0:
             lowest = best
-        if used > MANY:
-            remaining -= of + RIVAL * _rivals(lower, of, best)
-            if remaining < 0:
-                slots[item:end] = -1
-                return
 
 
 @kernel("void(f8[:, ::1], i8, f8[:, ::1], i8, i8[::1], f8[::1], f8[:, ::1], f8[:, ::1], i8, i8)")

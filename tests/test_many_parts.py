@@ -103,7 +103,6 @@ def test_a_long_chain_is_one_solid(step):
 
 
 def test_parts_hang_together_where_their_boxes_touch(monkeypatch):
-    monkeypatch.setattr(mesh, "PAIRS_AT_ONCE", 5)
     low = np.random.default_rng(0).uniform(-8, 8, (60, 3)).astype(np.float32)
     boxes = [np.stack([corner, corner + 2]) for corner in low]
     near = (np.abs(low[:, None] - low) <= 2).all(-1)

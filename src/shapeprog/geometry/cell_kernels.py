@@ -9,7 +9,7 @@ import numpy as np
 from shapeprog.geometry.dispatch import bound, cells, excess
 from shapeprog.kernels.bits import ones
 from shapeprog.kernels.compile import helper, kernel
-from shapeprog.kernels.rows import clip, fill_row, stretch
+from shapeprog.kernels.rows import clip, enclose, fill_row, stretch
 from shapeprog.kernels.table import CENTRE, KIND, ROTATION, SIZE, WIDTH
 
 SQUARE = 1e-6  # how far an entry of a rotation may be from 0 or 1 and still count as a right angle
@@ -27,22 +27,16 @@ def _excess(table, row, x, y, z):
 
 
 @helper
-def _fill_turned(table, row, planes, plane, half, low, high):
+def _fill_turned(table, row, planes, plane, low, high):
     """Any primitive in any pose: cells whose centre is inside.
 
     For convex primitives, the others have a rule of their own: the cells of a row are a stretch, which is found for the
     box and its ends are tested.
     """
-    resolution, reach = planes.shape[2], 0.0
-    half[0], half[1], half[2] = bound(table, row)
-    for axis in range(3):
-        reach = 0.0
-        for column in range(3):
-            reach += abs(table[row, ROTATION + 3 * axis + column]) * half[column]
-        if not math.isfinite(reach):
-            return
-        low[axis] = clip(np.floor(table[row, CENTRE + axis] - reach - 0.5), resolution)
-        high[axis] = clip(np.ceil(table[row, CENTRE + axis] + reach + 0.5), resolution)
+    resolution, half = planes.shape[2], bound(table, row)
+    reach = enclose(table, row, half, resolution, low, high)
+    if not math.isfinite(reach):
+        return
     side = table[row, CENTRE + 2]
     for i in range(low[0], high[0]):
         x = i + 0.5 - table[row, CENTRE]
@@ -68,7 +62,7 @@ def fill(table, owner, per_scene, planes, begin, end):
     """
     resolution = planes.shape[2]
     scale, origin = resolution / 32, resolution / 2
-    half, low, high = np.empty(3), np.empty(3, np.int64), np.empty(3, np.int64)
+    low, high = np.empty(3, np.int64), np.empty(3, np.int64)
     for row in range(begin * per_scene, end * per_scene):
         if table[row, KIND] < 0:
             continue
@@ -82,7 +76,7 @@ def fill(table, owner, per_scene, planes, begin, end):
         for column in range(ROTATION, WIDTH):
             square = square and abs(table[row, column] - np.rint(table[row, column])) <= SQUARE
         if math.isfinite(total) and not cells(table, row, square, planes, owner[row], low, high):
-            _fill_turned(table, row, planes, owner[row], half, low, high)
+            _fill_turned(table, row, planes, owner[row], low, high)
 
 
 @kernel("void(u4[::1], u8[::1], u8[:, ::1], i8, i8)")

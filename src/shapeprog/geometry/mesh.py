@@ -30,7 +30,6 @@ beyond."""
 MOST_TRIANGLES = 1 << 21  # most triangles of the parts of a scene together
 MOST_TOUCHING = 1 << 14  # most pairs of parts that touch, of which one solid is made: each takes up to a millisecond
 AT_ONCE = 64  # solids that are joined together
-PAIRS_AT_ONCE = 1 << 21  # pairs of boxes that are looked at together
 Single = tuple[npt.NDArray[np.float32], npt.NDArray[np.int64]]  # vertices in single precision and triangles
 
 
@@ -202,36 +201,27 @@ def _groups(parts: list[npt.NDArray[np.float32]]) -> list[list[int]]:
 
     Boxes are swept along the axis on which the fewest overlap.
     """
-    low, high = (np.array([corner(vertices, 0) for vertices in parts]).T for corner in (np.min, np.max))
+    low, high = (np.array([corner(vertices, 0) for vertices in parts]) for corner in (np.min, np.max))
     sweeps = []
     for axis in range(3):
-        order = np.argsort(low[axis], kind="stable")
-        later = np.searchsorted(low[axis, order], high[axis, order], "right") - np.arange(len(parts)) - 1
-        sweeps.append((int(later.sum()), axis, order, later))
-    _, swept, order, later = min(sweeps, key=lambda sweep: sweep[0])
-    low, high, ends = low[:, order], high[:, order], np.cumsum(later)
-    pairs, start = [np.zeros((2, 0), np.int64)], 0
-    while start < len(parts):
-        before = ends[start] - later[start]
-        stop = max(start + 1, int(np.searchsorted(ends, before + PAIRS_AT_ONCE, "right")))
-        i = np.repeat(np.arange(start, stop), later[start:stop])
-        j = i + 1 + np.arange(len(i)) - (ends - later - before)[i]
-        for axis in {0, 1, 2} - {swept}:
-            touching = (low[axis, i] <= high[axis, j]) & (low[axis, j] <= high[axis, i])
-            i, j = i[touching], j[touching]
-        pairs.append(order[np.stack([i, j])])
-        if sum(block.shape[1] for block in pairs) > MOST_TOUCHING:
+        order = np.argsort(low[:, axis], kind="stable")
+        last = np.searchsorted(low[order, axis], high[order, axis], "right")
+        sweeps.append((int(last.sum()), axis, order, last.tolist()))
+    _, _, order, last = min(sweeps, key=lambda sweep: sweep[:2])
+    groups, pairs = [[number] for number in range(len(parts))], 0
+    for place, first in enumerate(order.tolist()):
+        later = order[place + 1 : last[place]]
+        touching = later[((low[later] <= high[first]) & (low[first] <= high[later])).all(1)].tolist()
+        pairs += len(touching)
+        if pairs > MOST_TOUCHING:
             raise ShapeProgError(
                 f"more than {MOST_TOUCHING} pairs of the {len(parts)} parts touch, too many to join into one solid",
                 "lower the counts, or export the parts as they are, as .ply",
             )
-        start = stop
-    i, j = np.concatenate(pairs, 1)
-    groups = [[number] for number in range(len(parts))]
-    for first, second in zip(i.tolist(), j.tolist(), strict=True):
-        small, large = sorted((groups[first], groups[second]), key=len)
-        if small is not large:
-            large += small
-            for number in small:
-                groups[number] = large
+        for second in touching:
+            small, large = sorted((groups[first], groups[second]), key=len)
+            if small is not large:
+                large += small
+                for number in small:
+                    groups[number] = large
     return [sorted(group) for group in {id(group): group for group in groups}.values()]

@@ -190,7 +190,8 @@ def _serve(share: str, modules: Sequence[str]) -> None:
 def _linked(function: Function) -> FunctionType:
     """A copy of a function that calls compiled helpers; the function itself is unchanged."""
     names = function.__globals__
-    replaced = {name: _compiled(names[name]) for name in function.__code__.co_names if _is_helper(names.get(name))}
+    helpers = {name: names[name] for name in function.__code__.co_names if isinstance(names.get(name), FunctionType)}
+    replaced = {name: _compiled(value) for name, value in helpers.items() if value in _helpers}
     copy = FunctionType(function.__code__, {**names, **replaced}, function.__name__, function.__defaults__)
     copy.__module__ = function.__module__
     return copy
@@ -204,10 +205,6 @@ def _compiled(function: Function) -> Any:
     template = dispatcher.get_call_template  # else each literal number is a version: 15 % slower
     dispatcher.get_call_template = lambda args, kws: template(tuple(map(numba.types.unliteral, args)), kws)
     return dispatcher
-
-
-def _is_helper(value: Any) -> bool:
-    return isinstance(value, FunctionType) and value in _helpers
 
 
 @contextmanager

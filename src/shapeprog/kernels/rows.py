@@ -5,9 +5,13 @@ Positions are in cells from the low corner of the grid, so cell k covers [k, k +
 
 from __future__ import annotations
 
+import math
+
+import numpy as np
+
 from shapeprog.kernels.bits import span
 from shapeprog.kernels.compile import helper
-from shapeprog.kernels.table import ROTATION
+from shapeprog.kernels.table import CENTRE, ROTATION
 
 REACH = 1.01  # radii from the axis of a cylinder up to which cells belong to it, as in the published executor
 CAP = 1e-3  # slack in cells along that axis, so that a cap through the centre of a cell takes it
@@ -34,6 +38,24 @@ def fill_box(planes, plane, low, high):
         for i in range(low[0], high[0]):
             for j in range(low[1], high[1]):
                 planes[plane, word, i, j] |= bits
+
+
+@helper
+def enclose(table, row, half, resolution, low, high):
+    """The cells that a turned box of these half extents reaches, into ``low`` and ``high`` (excluded).
+
+    Returns how far it reaches along left-right; infinite or not a number if it is so along any axis.
+    """
+    reach = 0.0
+    for axis in range(3):
+        reach = 0.0
+        for column in range(3):
+            reach += abs(table[row, ROTATION + 3 * axis + column]) * half[column]
+        if not math.isfinite(reach):
+            return reach
+        low[axis] = clip(np.floor(table[row, CENTRE + axis] - reach - 0.5), resolution)
+        high[axis] = clip(np.ceil(table[row, CENTRE + axis] + reach + 0.5), resolution)
+    return reach
 
 
 @helper

@@ -33,8 +33,8 @@ from shapeprog.geometry.formulas import (
 from shapeprog.geometry.primitive import Mesh
 from shapeprog.geometry.primitives.frustum import SEGMENTS
 from shapeprog.kernels.compile import helper
-from shapeprog.kernels.rows import clip, fill_row, stretch
-from shapeprog.kernels.table import CENTRE, ROTATION, SIZE, local
+from shapeprog.kernels.rows import clip, enclose, fill_row, stretch
+from shapeprog.kernels.table import CENTRE, SIZE, local
 from shapeprog.lazy_torch import torch
 from shapeprog.space import Array, FloatArray
 
@@ -209,15 +209,9 @@ def cells_kernel(table: Array, row: int, square: bool, planes: Array, plane: int
     if table[row, SIZE + 1] <= 0 or (table[row, SIZE] <= 0 and table[row, SIZE + 2] <= 0):
         return True
     resolution, box = planes.shape[2], bound_kernel(table, row)
-    reach = 0.0
-    for axis in range(3):
-        reach, column = 0.0, ROTATION + 3 * axis
-        for entry in range(3):
-            reach += abs(table[row, column + entry]) * box[entry]
-        if not math.isfinite(reach):
-            return True
-        low[axis] = clip(np.floor(table[row, CENTRE + axis] - reach - 0.5), resolution)
-        high[axis] = clip(np.ceil(table[row, CENTRE + axis] + reach + 0.5), resolution)
+    reach = enclose(table, row, box, resolution, low, high)
+    if not math.isfinite(reach):
+        return True
     middle = table[row, CENTRE + 2]
     for i in range(low[0], high[0]):
         for j in range(low[1], high[1]):

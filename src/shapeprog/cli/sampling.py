@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -45,62 +45,44 @@ def sample_command(
 
     if prior != FURNITURE:
         raise InputError(f"unknown prior {prior!r}", did_you_mean(prior, [FURNITURE], quoted=True))
-    write_samples(
-        prior, [furniture(number, seed) for number in range(count)],
-        seed=seed, out=out, folder=folder, pack=pack, points=points, columns=columns, quiet=quiet,
-    )  # fmt: skip
+    programs = [furniture(number, seed) for number in range(count)]
+    files: dict[str, Any] = {"out": out, "folder": folder, "pack": pack}
+    write_samples(prior, programs, seed, **files, points=points, columns=columns, quiet=quiet)
 
 
 def write_samples(
     prior: str,
     programs: list[Program],
-    *,
     seed: int,
-    out: Path | None,
-    folder: Path | None,
-    pack: Path | None,
-    points: int,
-    columns: int,
-    quiet: bool,
+    *,
+    out: Path | None = None,
+    folder: Path | None = None,
+    pack: Path | None = None,
+    points: int = 0,
+    columns: int = 6,
+    quiet: bool = False,
 ) -> None:
     """Write programs of a prior as a sheet, a folder and a pack, as far as asked for; otherwise print them."""
-    names = [f"{prior}_{number:0{len(str(len(programs) - 1))}d}" for number in range(len(programs))]
-    written: list[Path] = []
-    if out is not None:
-        written.append(_write_sheet(names, programs, out, columns, f"{prior}, seed {seed}"))
-    if folder is not None:
-        written.append(_write_folder(names, programs, folder))
-    if pack is not None:
-        from shapeprog.data import write_pack
-        from shapeprog.data.synthetic.shapes import shapes_of
-
-        write_pack(pack, shapes_of(dict(zip(names, programs, strict=True)), points, seed))
-        written.append(pack)
-    if not written:
-        for name, program in zip(names, programs, strict=True):
-            terminal.output().print(f"# {name}")
-            terminal.print_program(terminal.output(), program)
-    if not quiet:
-        for path in written:
-            terminal.output().print(f"wrote {path}: {len(programs)} shapes")
-
-
-def _write_sheet(names: list[str], programs: list[Program], path: Path, columns: int, title: str) -> Path:
-    from shapeprog.view import Item, contact_sheet
-
-    items = [
-        Item(name, None, program, f"{program.size} parts, {program.blocks} drawing statements")
-        for name, program in zip(names, programs, strict=True)
-    ]
-    contact_sheet(items, path, columns=columns, title=title)
-    return path
-
-
-def _write_folder(names: list[str], programs: list[Program], folder: Path) -> Path:
+    from shapeprog.data import write_pack
+    from shapeprog.data.synthetic.shapes import shapes_of
     from shapeprog.files import make_folder
     from shapeprog.formats import save
+    from shapeprog.view import Item, contact_sheet
 
-    made = make_folder(folder)
-    for name, program in zip(names, programs, strict=True):
-        save(program, made / f"{name}.shape")
-    return made
+    named = {f"{prior}_{number:0{len(str(len(programs) - 1))}d}": program for number, program in enumerate(programs)}
+    if out is not None:
+        sizes = [f"{program.size} parts, {program.blocks} drawing statements" for program in programs]
+        items = [Item(name, None, named[name], size) for name, size in zip(named, sizes, strict=True)]
+        contact_sheet(items, out, columns=columns, title=f"{prior}, seed {seed}")
+    if folder is not None:
+        for name, program in named.items():
+            save(program, make_folder(folder) / f"{name}.shape")
+    if pack is not None:
+        write_pack(pack, shapes_of(named, points, seed))
+    if not (out or folder or pack):
+        for name, program in named.items():
+            terminal.output().print(f"# {name}")
+            terminal.print_program(terminal.output(), program)
+    for path in () if quiet else (out, folder, pack):
+        if path is not None:
+            terminal.output().print(f"wrote {path}: {len(programs)} shapes")

@@ -7,7 +7,6 @@ Kernels on the CPU do the work, wherever the tensors are.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from functools import partial
 
 import numpy as np
@@ -20,7 +19,7 @@ from shapeprog.errors import ShapeProgError
 from shapeprog.geometry import cell_kernels as kernels
 from shapeprog.geometry.arrays import array, declared_kinds, over_threads, table_of
 from shapeprog.geometry.batch import Batch
-from shapeprog.geometry.primitive import primitives
+from shapeprog.geometry.primitive import SIZES, primitives
 from shapeprog.kernels.bits import WORD
 from shapeprog.space import RESOLUTION, Array
 
@@ -148,38 +147,17 @@ def _fill_declared(flat: Batch, kind: int, plane: Int[Tensor, "B N"], cells: Cel
     selected, declared, resolution = flat.mask & (flat.kind == kind), primitives[kind], cells.shape[-1]
     size, centre, rotation = (t.detach()[selected].double().cpu() for t in (flat.size, flat.centre, flat.rotation))
     size, centre = size * (resolution / RESOLUTION), centre * (resolution / RESOLUTION) + resolution / 2
-    finite = torch.cat([size, centre, rotation.flatten(1)], -1).isfinite().all(-1)
-    size, centre, rotation, plane = (item[finite] for item in (size, centre, rotation, plane[selected.cpu()]))
     reach = (rotation.abs() @ declared.bound(size)[..., None])[..., 0]
-    for owner, index in _within(centre - reach, centre + reach, resolution):
-        offset = index + 0.5 - centre[owner]
-        inside = declared.distance((rotation[owner].mT @ offset[..., None])[..., 0], size[owner]) <= 0
-        up, depth, side = index[inside].unbind(-1)
-        row = plane[owner[inside]] * cells.shape[-2] + side // WORD * resolution + up
-        # each bit once, so that adding bits is joining them
-        bit = torch.unique((row * resolution + depth) * WORD + side % WORD)
-        added = torch.zeros_like(cells).flatten().index_add(0, bit // WORD, (1 << bit % WORD).to(torch.int32))
-        cells |= added.view_as(cells)
-
-
-def _within(
-    low: Float[Tensor, "M 3"], high: Float[Tensor, "M 3"], resolution: int
-) -> Iterator[tuple[Int[Tensor, " C"], Int[Tensor, "C 3"]]]:
-    """The cells of boxes, some millions at a time: which box, and which cell."""
-    first = (low - 0.5).floor().clamp(0, resolution).long()
-    last = (high + 0.5).ceil().clamp(0, resolution).long()
-    window = (last - first).clamp(min=0)
-    volume = window.prod(-1)
-    start = 0
-    while start < len(low):
-        stop = start + max(1, int((volume[start:].cumsum(0) <= AT_ONCE).sum()))
-        volumes = volume[start:stop]
-        owner = torch.repeat_interleave(torch.arange(start, stop, device=low.device), volumes)
-        offset_in_box = torch.arange(len(owner), device=owner.device) - (volumes.cumsum(0) - volumes)[owner - start]
-        side, depth = window[owner, 2], window[owner, 1]
-        yield (
-            owner,
-            torch.stack([offset_in_box // (side * depth), offset_in_box // side % depth, offset_in_box % side], -1)
-            + first[owner],
+    first = (centre - reach - 0.5).floor().nan_to_num(resolution).clamp(0, resolution).long().tolist()
+    last = (centre + reach + 0.5).ceil().nan_to_num(0).clamp(0, resolution).long().tolist()
+    for number, owner in enumerate(plane[selected.cpu()].tolist()):
+        up, depth, side = (
+            torch.arange(low, max(low, high)) for low, high in zip(first[number], last[number], strict=True)
         )
-        start = stop
+        for layers in up.split(max(1, AT_ONCE // max(1, len(depth) * len(side)))):
+            index = torch.cartesian_prod(layers, depth, side)
+            offset = (index + 0.5 - centre[number]) @ rotation[number]
+            inside = index[declared.distance(offset, size[number].expand(len(index), SIZES)) <= 0]
+            row = inside[:, 2] // WORD * resolution + inside[:, 0]
+            bits = (1 << inside[:, 2] % WORD).to(torch.int32)  # each once, so that adding bits is joining them
+            cells[owner] |= torch.zeros_like(cells[owner]).index_put((row, inside[:, 1]), bits, accumulate=True)

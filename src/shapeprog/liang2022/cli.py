@@ -80,7 +80,7 @@ def sample_command(
     from shapeprog.liang2022.prior import programs
 
     samples = programs(prior, count, seed)
-    write_samples(prior, samples, seed=seed, out=out, folder=None, pack=None, points=0, columns=6, quiet=False)
+    write_samples(prior, samples, seed, out=out)
 
 
 @app.command("models")

@@ -25,11 +25,10 @@ from shapeprog.language.ast import (
     Point,
     Scale,
     Source,
-    body_of,
     with_values,
 )
 from shapeprog.language.evaluate import evaluated
-from shapeprog.language.expression import Binary, Expression, Linear, Name, Negative, Value, text_of
+from shapeprog.language.expression import Binary, Expression, Name, Negative, Value
 from shapeprog.language.parameters import to_float32
 from shapeprog.language.placement import BOX, SIZES
 from shapeprog.language.printer import source_of
@@ -150,7 +149,7 @@ def in_unit(program: Program, unit: Unit | None, *, digits: int | None = None) -
             return to_float32(float(f"{new:.{DIGITS}g}"))
         return to_float32(round(new, max(digits, FEWEST - 1 - math.floor(math.log10(abs(new))))))
 
-    result = Source(_Powers(source).changed(source.lines, str, change), unit)
+    result = Source(_Powers(source).changed(source.lines, change), unit)
     if source.placed:
         height = result.evaluated_numbers()["height"]
         result = replace(result, scale=Scale(1 / after, -height / after / 2))
@@ -164,112 +163,100 @@ def lengths(program: Program) -> frozenset[str]:
         powers = _Powers(source)
     except ShapeProgError:
         return frozenset()
-    return frozenset(name for name in source.numbers if powers.of(Linear.of(name)) == 1)
+    return frozenset(name for name in source.numbers if powers.of(name) == 1)
 
 
 class _Powers:
-    """The powers of length that the names and literals of a program have."""
+    """The powers of length of the names of a program: 1 for a length, 0 for a plain number or a count, 2 for an area.
+
+    They follow from the uses of names, forwards and back through expressions, in passes until no more is learned.
+    Literals in products and quotients are then taken for plain numbers where nothing else follows.
+    """
 
     def __init__(self, source: Source) -> None:
-        self._known: dict[str, Linear] = {}
-        self._literals: dict[tuple[int, int], Linear] = {}
-        for size in SIZES if source.placed else ():
-            self._known[size] = Linear(1.0)
-        self._look(source.lines, str)
-        for literal in reversed(self._literals.values()):  # factors and divisors are plain numbers where they may be
-            self._holds(literal)
+        self._known = dict.fromkeys(SIZES, 1.0) if source.placed else {}
+        for self._plain in (False, True):
+            learned = -1
+            while learned < len(self._known):
+                learned = len(self._known)
+                self.changed(source.lines, lambda number, _: number)
 
-    def of(self, power: Linear) -> float:
-        """A power as a number; what may have any has none."""
-        return self._reduced(power).constant
+    def of(self, name: str) -> float:
+        """The power of a name; none if it may have any."""
+        return self._known.get(name, 0.0)
 
-    def changed(self, lines: tuple[Line, ...], scope: Scope, change: Change) -> tuple[Line, ...]:
-        """Some lines with every literal changed by what its power is."""
+    def changed(self, lines: tuple[Line, ...], change: Change, scope: Scope = str) -> tuple[Line, ...]:
+        """Some lines with every literal changed by what its power is; learns the powers of names."""
         result = []
         for line in lines:
-            pairs = self._wanted(line, scope)
-            new = with_values(line, [self._changed(value, self.of(power), scope, change) for value, power in pairs])
+            new = with_values(line, [self._used(use, scope, change) for use in uses(line)])
             if isinstance(new, Loop | Group | Function):
-                new = replace(new, body=self.changed(new.body, _inside(line, scope), change))
+                new = replace(new, body=self.changed(new.body, change, _inside(line, scope)))
             result.append(new)
         return tuple(result)
 
-    def _changed(self, value: Value, power: float, scope: Scope, change: Change) -> Value:
-        match value:
-            case Binary("+" | "-" as sign, left, right):
-                return Binary(sign, *(self._changed(side, power, scope, change) for side in (left, right)))
-            case Binary(sign, left, right):
-                sides = zip((left, right), map(self.of, self._factors(value, scope)), strict=True)
-                return Binary(sign, *(self._changed(side, inner_power, scope, change) for side, inner_power in sides))
-            case Negative(inner):
-                return -self._changed(inner, power, scope, change)
-            case Expression():
-                return value
-        return change(value, power)
-
-    def _look(self, lines: tuple[Line, ...], scope: Scope) -> None:
-        """Collect the equations of powers that the lines imply."""
-        for line in lines:
-            for value, power in self._wanted(line, scope):
-                if isinstance(value, Expression):
-                    self._agree(value, self._power(value, scope), power)
-            self._look(body_of(line), _inside(line, scope))
-
-    def _wanted(self, line: Line, scope: Scope) -> Iterator[tuple[Value, Linear]]:
-        """The numbers on a line, as ``values`` has them, and the power that each is to have."""
-        for use in uses(line):
+    def _used(self, use: Use, scope: Scope, change: Change) -> Value:
+        """The value of a use with every literal in it changed."""
+        power: float | None = float(use.kind == "length")
+        if use.kind == "named":
             name = use.name if "." in use.name else scope(use.name)
-            yield use.value, Linear.of(name) if use.kind == "named" else Linear(float(use.kind == "length"))
+            power = self._known.get(name)
+            if power is None and (power := self._power(use.value, scope)) is not None:
+                self._known[name] = power
+        return self._at(use.value, power, scope, change)
 
-    def _power(self, value: Expression, scope: Scope) -> Linear:
-        """The power of an expression, linear in those that are not known."""
+    def _at(self, value: Value, power: float | None, scope: Scope, change: Change) -> Value:
+        """A value of this power with every literal in it changed; without a power, names in it may still be learned."""
         match value:
             case Name(name):
-                return Linear.of(scope(name))
-            case Negative(inner):
-                return self._power(inner, scope)
-            case Binary("*" | "/" as sign):
-                first, second = self._factors(value, scope)
-                return first + second if sign == "*" else first - second
-            case Binary(_, left, right):
-                powers = [self._power(side, scope) for side in (left, right) if isinstance(side, Expression)]
-                if not powers:
-                    return self._literal(value, 0)
-                self._agree(value, powers[0], powers[-1])
-                return powers[0]
-        raise TypeError(f"{value!r} is not an expression")
+                if power is not None:
+                    _agree(value, power, self._known.setdefault(scope(name), power))
+                return value
+            case Negative(of):
+                return -self._at(of, power, scope, change)
+            case Binary("+" | "-" as sign, left, right):
+                power = self._power(value, scope) if power is None else power
+                return Binary(sign, *(self._at(side, power, scope, change) for side in (left, right)))
+            case Binary(sign, left, right):
+                first, second = self._power(left, scope), self._power(right, scope)
+                way = 1 if sign == "*" else -1
+                if self._plain and first is None and second is None:
+                    plain_left = isinstance(right, Expression) and not isinstance(left, Expression)
+                    first, second = (0.0, None) if plain_left else (None, 0.0)
+                if power is not None and first is None and second is not None:
+                    first = power - way * second
+                elif power is not None and second is None and first is not None:
+                    second = way * (power - first)
+                elif power is not None and first is not None and second is not None:
+                    _agree(value, power, first + way * second)
+                left = self._at(left, first, scope, change)
+                return Binary(sign, left, self._at(right, second, scope, change))
+        return change(value, power or 0.0)  # type: ignore[arg-type]
 
-    def _factors(self, value: Binary, scope: Scope) -> tuple[Linear, Linear]:
-        """The powers of both sides of a product or quotient."""
-        first, second = (
-            self._power(side, scope) if isinstance(side, Expression) else self._literal(value, index)
-            for index, side in enumerate((value.left, value.right))
-        )
-        return first, second
+    def _power(self, value: Value, scope: Scope) -> float | None:
+        """The power that is known of a value."""
+        match value:
+            case Name(name):
+                return self._known.get(scope(name))
+            case Negative(of):
+                return self._power(of, scope)
+            case Binary("+" | "-", left, right):
+                sides = [self._power(side, scope) for side in (left, right) if isinstance(side, Expression)]
+                return next((power for power in sides if power is not None), None)
+            case Binary(sign, left, right):
+                first, second = (
+                    self._power(side, scope) if isinstance(side, Expression) or not self._plain else 0.0
+                    for side in (left, right)
+                )
+                if first is not None and second is not None:
+                    return first + second if sign == "*" else first - second
+        return None
 
-    def _literal(self, value: Binary, index: int) -> Linear:
-        """The power of a literal in an expression, which is not known as yet."""
-        return self._literals.setdefault((id(value), index), Linear.of(f"#{len(self._literals)}"))
 
-    def _agree(self, value: Expression, first: Linear, second: Linear) -> None:
-        if not self._holds(first - second):
-            message = f"{text_of(value)} stands for a length in one place, and for another number elsewhere"
-            raise ShapeProgError(message, "give each of them a name of its own, or keep the unit")
-
-    def _holds(self, power: Linear) -> bool:
-        """Whether a power may be zero; from now on it is."""
-        power = self._reduced(power)
-        if not power.factors:
-            return abs(power.constant) < _NOTHING
-        name, factor = power.factors[0]
-        self._known[name] = (power - Linear.of(name) * factor) / -factor
-        return True
-
-    def _reduced(self, power: Linear) -> Linear:
-        """A power, linear in those that are free."""
-        while name := next((name for name, _ in power.factors if name in self._known), None):
-            power = power + (self._known[name] - Linear.of(name)) * dict(power.factors)[name]
-        return replace(power, factors=tuple(pair for pair in power.factors if abs(pair[1]) > _NOTHING))
+def _agree(value: Expression, power: float, other: float) -> None:
+    if abs(power - other) > _NOTHING:
+        message = f"{value} stands for a length in one place, and for another number elsewhere"
+        raise ShapeProgError(message, "give each of them a name of its own, or keep the unit")
 
 
 def _inside(line: Line, scope: Scope) -> Scope:

@@ -262,9 +262,12 @@ def changed_lines(lines: Iterable[Line], change: Callable[[Line], Line]) -> tupl
 
 
 def without_double_blanks(lines: tuple[Line, ...]) -> tuple[Line, ...]:
-    """The lines of a block without empty ones at its ends, or one behind another."""
+    """The lines of a block without empty ones at its ends, or one behind another, and so within; lines that do not
+    change stay the same objects."""
     result: list[Line] = []
     for line in lines:
+        if (body := body_of(line)) and (tidied := without_double_blanks(body)) != body:
+            line = replace(line, body=tidied)  # type: ignore[arg-type]
         if line != Comment() or (result and result[-1] != Comment()):
             result.append(line)
     return tuple(result[:-1] if result and result[-1] == Comment() else result)

@@ -25,7 +25,6 @@ from shapeprog.language.ast import (
     Part,
     Scale,
     Source,
-    body_of,
     without_double_blanks,
 )
 from shapeprog.language.expression import Expression, value_at
@@ -51,7 +50,7 @@ def evaluated(source: Source) -> Program:
     """
     if source.plain and source.unit is None:
         return Program(expanded(source))
-    source = replace(source, lines=_without_double_blanks(source.lines))
+    source = replace(source, lines=without_double_blanks(source.lines))
     return Program(expanded(source), source)
 
 
@@ -286,15 +285,3 @@ def _is_single(loop: Loop) -> bool:
 def _role(line: Draw, around: str) -> str:
     """The role of a part in cells: its own, that of its statement, which is not written, or the one around the call."""
     return line.role or ("" if line.name == around or language().own_role(line.name) else around)
-
-
-def _without_double_blanks(lines: tuple[Line, ...]) -> tuple[Line, ...]:
-    """The lines without superfluous empty ones, in bodies too; unchanged lines stay the same objects."""
-    result = []
-    for line in lines:
-        if body := body_of(line):
-            tidied = _without_double_blanks(body)
-            if tidied != body:
-                line = replace(line, body=tidied)  # type: ignore[arg-type]
-        result.append(line)
-    return without_double_blanks(tuple(result))

@@ -7,7 +7,7 @@ nor the factors and divisors of an expression, which define how it depends on na
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 from itertools import count
 
@@ -30,10 +30,7 @@ def numbers(program: Program) -> int:
 
 def numbers_outside(program: Program) -> int:
     """The same without those inside of functions: the numbers of a program that shares its functions with others."""
-    if program.source is None:
-        return numbers(program)
-    lines = tuple(line for line in program.source.lines if not isinstance(line, Function))
-    return len(list(_places(lines, Counts(program.source))))
+    return numbers(program) if program.source is None else len(free_values(program, functions=False))
 
 
 def free_numbers(program: Program) -> int:
@@ -41,10 +38,23 @@ def free_numbers(program: Program) -> int:
     return len(free_values(program))
 
 
-def free_values(program: Program) -> list[float]:
-    """The free numbers of a program, in the order of its text."""
-    source = source_of(program)
-    return list(_places(source.lines, Counts(source)))
+def free_values(program: Program, functions: bool = True) -> list[float]:
+    """The free numbers of a program in the order of its text, with or without those inside of functions.
+
+    Defaults of parameters are not free.
+    """
+    source, result = source_of(program), list[float]()
+    counts = Counts(source)
+
+    def noted(number: float) -> float:
+        result.append(number)
+        return number
+
+    for line in Source(tuple(line for line in source.lines if functions or not isinstance(line, Function))).walk():
+        for use in () if isinstance(line, Function) else uses(line):
+            if not counts.has(use):
+                _mapped(use.value, noted)
+    return result
 
 
 def multiplied(program: Program, place: int, factor: float) -> Program:
@@ -64,26 +74,6 @@ def multiplied(program: Program, place: int, factor: float) -> Program:
         return with_values(line, [use.value if counts.has(use) else _mapped(use.value, change) for use in uses(line)])
 
     return evaluated(replace(source, lines=changed_lines(source.lines, changed)))
-
-
-def _places(lines: tuple[Line, ...], counts: Counts) -> Iterator[float]:
-    """The free numbers on lines and inside of them; defaults of parameters are not free."""
-    for line in Source(lines).walk():
-        for use in () if isinstance(line, Function) else uses(line):
-            if not counts.has(use):
-                yield from _within(use.value)
-
-
-def _within(value: Value) -> list[float]:
-    """All that is free in a number, from left to right."""
-    result: list[float] = []
-
-    def noted(number: float) -> float:
-        result.append(number)
-        return number
-
-    _mapped(value, noted)
-    return result
 
 
 def _mapped(value: Value, change: Callable[[float], float]) -> Value:

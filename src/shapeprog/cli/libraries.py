@@ -102,8 +102,7 @@ def _items(library: Library) -> Iterator[Item]:
         try:
             program = evaluated(Source((*pattern.others, function, pattern.example or spare)))
         except ShapeProgError as fault:
-            raise InputError(
-                f"{function.name} cannot be drawn: {fault.message}", "show a typical call in a comment above it"
-            ) from None
+            message = f"{function.name} cannot be drawn: {fault.message}"
+            raise InputError(message, "show a typical call in a comment above it") from None
         used = next((line for line in library.comments[function.name] if line.startswith("used ")), "")
         yield Item(function.name, None, program, used.removesuffix(", such as"))

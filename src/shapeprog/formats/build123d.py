@@ -42,10 +42,8 @@ def write_step(program: Program, path: Path, frame: Frame, unit: str = "") -> No
             "lower the counts, or export a .py script, which keeps the loops, and run it where there is time",
         )
     if importlib.util.find_spec("build123d") is None:
-        raise OutputError(
-            f"cannot write {path}: STEP needs the library build123d, which is not installed",
-            "pip install build123d, or export a .py script and run it where build123d is",
-        )
+        message = f"cannot write {path}: STEP needs the library build123d, which is not installed"
+        raise OutputError(message, "pip install build123d, or export a .py script and run it where build123d is")
     made: dict[str, Any] = {"__name__": "shapeprog_model"}
     # The script consists of checked names and numbers; running it avoids a second implementation of the geometry.
     exec(compile(script_text(program, frame, path.stem, unit), f"{path.stem}.py", "exec"), made)

@@ -209,10 +209,8 @@ def _document(text: str, name: str) -> dict[str, Any]:
         raise InputError(f"{name}: this JSON holds no program", f'it begins {{"format": "{FORMAT}", ...')
     version = content.get("version")
     if version in (1, 2, 3):
-        raise InputError(
-            f"{name}: version {version} of the program format is no longer read",
-            "read the .shape file that was written with it, or infer the shape again",
-        )
+        message = f"{name}: version {version} of the program format is no longer read"
+        raise InputError(message, "read the .shape file that was written with it, or infer the shape again")
     if version != VERSION:
         reason = f"{name}: unknown version {shortened(version)} of the program format"
         raise InputError(reason, f"this release reads version {VERSION}; a newer one may read it")

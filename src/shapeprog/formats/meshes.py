@@ -37,10 +37,8 @@ def write_glb(program: Program, path: Path, frame: Frame) -> None:
     materials: dict[str, Any] = {}
     each = drawn_parts(program, frame)
     if len(each) > MOST_NODES:
-        raise OutputError(
-            f"the {len(each)} parts of this program are too many named nodes: a GLB takes at most {MOST_NODES}",
-            "lower the counts, or export .ply, which has all parts in one mesh",
-        )
+        message = f"the {len(each)} parts of this program are too many named nodes: a GLB takes at most {MOST_NODES}"
+        raise OutputError(message, "lower the counts, or export .ply, which has all parts in one mesh")
     for part, of_corners in zip(each, part_normals(each), strict=True):
         if part.word not in materials:
             materials[part.word] = make_material(

@@ -54,9 +54,8 @@ def read_text(path: str | os.PathLike[str], largest: float = math.inf) -> str:
     except FileNotFoundError as error:
         raise InputError(f"there is no file {path}", "check the path") from error
     except UnicodeDecodeError as error:
-        raise InputError(
-            f"{path} is not text: byte {error.start} is not UTF-8", "save it as UTF-8, or check that it is a program"
-        ) from error
+        message = f"{path} is not text: byte {error.start} is not UTF-8"
+        raise InputError(message, "save it as UTF-8, or check that it is a program") from error
     except OSError as error:
         raise InputError(f"cannot read {path}: {error.strerror}", "check the path and its permissions") from error
     except ValueError as error:

@@ -62,9 +62,8 @@ class Solids(NamedTuple):
 def solids_of(scene: Batch) -> Solids:
     """The primitives of one scene; a ``ShapeProgError`` if given a batch, or a part lies beyond ``FARTHEST``."""
     if scene.batch_shape:
-        raise ShapeProgError(
-            f"a batch of shape {tuple(scene.batch_shape)} has no single mesh", "mesh its scenes one by one"
-        )
+        message = f"a batch of shape {tuple(scene.batch_shape)} has no single mesh"
+        raise ShapeProgError(message, "mesh its scenes one by one")
     solid, reach = array(scene.mask).copy(), np.zeros((len(scene.mask), 3))
     size, centre, rotation = (array(t.double()) for t in (scene.size, scene.centre, scene.rotation))
     for kind in scene.kinds:

@@ -96,10 +96,8 @@ def _pair(queries: Cloud, points: Other) -> tuple[Float[Tensor, "B P 3"], Float[
     if not points.shape[-2]:
         raise ShapeProgError("there are no points to be near to", "give at least one point for each shape")
     if queries.shape[:-2] != points.shape[:-2] or queries.shape[-1] != 3 or points.shape[-1] != 3:
-        raise ShapeProgError(
-            f"clouds of shapes {tuple(queries.shape)} and {tuple(points.shape)} do not pair up",
-            "both must be (..., points, 3) with the same leading dimensions",
-        )
+        message = f"clouds of shapes {tuple(queries.shape)} and {tuple(points.shape)} do not pair up"
+        raise ShapeProgError(message, "both must be (..., points, 3) with the same leading dimensions")
     count = queries.shape[:-2].numel()
     source = queries.reshape(count, queries.shape[-2], 3).contiguous()
     return source, points.to(source).reshape(count, points.shape[-2], 3).contiguous()

@@ -151,9 +151,8 @@ def area_shares(areas: Float[Tensor, "B N F"], batch: Batch) -> Float[Tensor, "B
         which = f"scene {number} of {len(bare)}" if batch.batch_shape else "the scene"
         if not bool(total_area[number].isfinite()):
             raise ShapeProgError(f"{which} has a surface of infinite or undefined area", "lower sizes and positions")
-        raise ShapeProgError(
-            f"{which} has no surface to draw points from", "give the program a statement that draws something"
-        )
+        message = f"{which} has no surface to draw points from"
+        raise ShapeProgError(message, "give the program a statement that draws something")
     return total / total_area
 
 

@@ -81,10 +81,8 @@ def set(program: Program, changes: Mapping[str, float] | None = None, /, **numbe
             hint = did_you_mean(name, declared) if declared else "it has no names: write name = number at its top"
             raise ShapeProgError(f"this program has no name {name!r}", hint)
         if not abs(replacements[name]) <= LARGEST:  # true of NaN, too
-            raise ShapeProgError(
-                f"{name} = {replacements[name]:g} is too large for single precision, or not finite",
-                "write one such as 12.5",
-            )
+            message = f"{name} = {replacements[name]:g} is too large for single precision, or not finite"
+            raise ShapeProgError(message, "write one such as 12.5")
     try:
         return evaluated(replace(source, lines=tuple(_set(line, replacements) for line in source.lines)))
     except Fault as fault:

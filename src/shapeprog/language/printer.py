@@ -42,10 +42,8 @@ def format_program(program: Program) -> str:
     deeper, than can be read back.
     """
     if not isinstance(program, Program):
-        raise ShapeProgError(
-            f"format_program takes one program, not a {type(program).__name__}",
-            "decode returns a list of programs: format each of them",
-        )
+        message = f"format_program takes one program, not a {type(program).__name__}"
+        raise ShapeProgError(message, "decode returns a list of programs: format each of them")
     return format_source(source_of(program))
 
 
@@ -91,9 +89,8 @@ def checked_role(node: Draw) -> str:
     if node.role and node.role not in language().roles:
         raise ShapeProgError(f"unknown role {node.role!r}", did_you_mean(node.role, language().roles))
     if node.role == node.name:
-        raise ShapeProgError(
-            f"redundant role: {node.name}(...) already has the role {node.name!r}", "leave the role out"
-        )
+        message = f"redundant role: {node.name}(...) already has the role {node.name!r}"
+        raise ShapeProgError(message, "leave the role out")
     return node.role
 
 

@@ -100,7 +100,7 @@ FORMATS = (
     Format("STL", "solid", (".stl",), Z_UP, "the union of all parts: one watertight solid",
         writer="meshes:write_stl", unit="mm"),
     Format("3MF", "solid", (".3mf",), Z_UP, "one named, coloured object per part, for 3D printing",
-        writer="threemf:write_3mf", unit="mm", takes_unit=True),
+        writer="meshes:write_3mf", unit="mm", takes_unit=True),
     Format("OpenSCAD", "solid", (".scad",), Z_UP,
         "the program as a script: groups, functions, loops; its named numbers for the customizer",
         writer="openscad:write_scad", unit="mm", takes_unit=True),

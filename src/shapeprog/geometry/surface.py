@@ -27,7 +27,7 @@ from shapeprog.geometry.batch import Batch
 from shapeprog.geometry.distance import each_distance
 from shapeprog.geometry.distance_kernels import FARTHEST
 from shapeprog.geometry.primitive import primitives
-from shapeprog.geometry.random import uniform
+from shapeprog.kernels.bits import FIRST, GOLDEN, SECOND
 from shapeprog.kernels.table import WIDTH
 from shapeprog.space import Array
 
@@ -278,3 +278,13 @@ def _hidden(flat: Batch, slot: Tensor, points: Tensor, normals: Tensor) -> Bool[
     inside = (each_distance(flat, over) < 0) & (order != slot[..., None])
     flush = (each_distance(flat, under) < 0) & (order < slot[..., None])
     return (inside | flush).any(-1)
+
+
+def uniform(seed: int | Int[Tensor, "*batch"], count: Int[Tensor, "*batch"]) -> Float[Tensor, "*batch"]:
+    """Numbers of the stream of a seed, uniform in [0, 1): the twin of :func:`shapeprog.kernels.bits.uniform`."""
+    word = (count + 1) * (GOLDEN - 2**64) + seed  # whole numbers that wrap around
+    for shift, factor in ((30, FIRST), (27, SECOND)):
+        word = (word ^ ((word >> shift) & ((1 << (64 - shift)) - 1))) * (factor - 2**64)
+    word = word ^ ((word >> 31) & ((1 << 33) - 1))
+    numbers: Tensor = ((word >> 11) & ((1 << 53) - 1)).double() * 2.0**-53
+    return numbers

@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, TypeAlias
 
+from shapeprog.errors import ShapeProgError
 from shapeprog.language.expression import Expression, Value, value_at
 from shapeprog.language.unit import Unit
 
@@ -202,6 +203,28 @@ class Source:
         while stack:
             yield (line := stack.pop())
             stack += reversed(body_of(line))
+
+
+class Fault(ShapeProgError):
+    """A mistake on a line of a program.
+
+    Parameters
+    ----------
+    line
+        The line.
+    message, hint
+        What is wrong, and what to do.
+    key
+        Where on the line: the slot of a number, or the name of a keyword, number, argument or parameter.
+    expression
+        The part of an expression that is wrong.
+    """
+
+    def __init__(
+        self, line: Line, message: str, hint: str, key: int | str = "", expression: Expression | None = None
+    ) -> None:
+        super().__init__(message, hint)
+        self.line, self.key, self.expression = line, key, expression
 
 
 def body_of(line: Line) -> tuple[Line, ...]:

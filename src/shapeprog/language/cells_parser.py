@@ -6,14 +6,12 @@ import ast
 import math
 
 from shapeprog.errors import ProgramError, ShapeProgError, did_you_mean
-from shapeprog.language.ast import Call, Draw, Line, Loop, Source
-from shapeprog.language.comments import Comments
+from shapeprog.language.ast import Call, Draw, Fault, Line, Loop, Source
 from shapeprog.language.evaluate import evaluated
 from shapeprog.language.expression import Expression, Value
-from shapeprog.language.faults import Fault
 from shapeprog.language.parameters import Parameter
 from shapeprog.language.program import DEEPEST, Program
-from shapeprog.language.reader import Block, Names, Reader
+from shapeprog.language.reader import Block, Comments, Names, Reader
 from shapeprog.language.statement import Statement, language
 from shapeprog.language.text import Node, Text
 from shapeprog.language.unit import read_unit

@@ -18,6 +18,7 @@ from shapeprog.language.ast import (
     Call,
     Comment,
     Draw,
+    Fault,
     Function,
     Group,
     Line,
@@ -28,7 +29,6 @@ from shapeprog.language.ast import (
     without_double_blanks,
 )
 from shapeprog.language.expression import Expression, value_at
-from shapeprog.language.faults import Fault
 from shapeprog.language.lowering import Context, Drawn, Lowering, Placed, Scope, sizes_of
 from shapeprog.language.parameters import to_float32
 from shapeprog.language.placement import LONGEST_SIDE, MOST_SOLIDS, SIZES

@@ -11,9 +11,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple, TypeAlias
 
 from shapeprog.errors import ShapeProgError
-from shapeprog.language.ast import Argument, Call, Draw, Group, Line, Loop, Part, Point, Source
+from shapeprog.language.ast import Argument, Call, Draw, Fault, Group, Line, Loop, Part, Point, Source
 from shapeprog.language.expression import Expression, ExpressionError, Value, text_of, value_at
-from shapeprog.language.faults import Fault
 from shapeprog.language.parameters import to_float32
 from shapeprog.language.placement import AXES, LEAST_ALONG, MOST_SOLIDS, POINTS, ROUND, SIZES, is_sized
 from shapeprog.language.program import DEEPEST

@@ -6,11 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from shapeprog.errors import ShapeProgError, did_you_mean
-from shapeprog.language.ast import Assignment, Line, Source
+from shapeprog.language.ast import Assignment, Fault, Line, Source
 from shapeprog.language.dimensions import Counts
 from shapeprog.language.evaluate import evaluated, in_own_unit
 from shapeprog.language.expression import names_in, text_of
-from shapeprog.language.faults import Fault
 from shapeprog.language.parameters import LARGEST, to_float32
 from shapeprog.language.printer import printed
 from shapeprog.language.program import Program

@@ -12,11 +12,9 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 
 from shapeprog.errors import did_you_mean
-from shapeprog.language.ast import Argument, Call, Group, Line, Part, Point
+from shapeprog.language.ast import Argument, Call, Fault, Group, Line, Part, Point
 from shapeprog.language.cells_parser import parse_cells
-from shapeprog.language.comments import Comments
 from shapeprog.language.evaluate import evaluated, placed_source
-from shapeprog.language.faults import Fault
 from shapeprog.language.placement import (
     ATTRIBUTES,
     AXES,
@@ -33,7 +31,7 @@ from shapeprog.language.placement import (
     is_sized,
 )
 from shapeprog.language.program import Program
-from shapeprog.language.reader import Block, Names, Reader
+from shapeprog.language.reader import Block, Comments, Names, Reader
 from shapeprog.language.statement import language
 from shapeprog.language.text import Node, Text
 from shapeprog.language.unit import METRES

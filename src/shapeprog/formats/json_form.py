@@ -14,7 +14,8 @@ from __future__ import annotations
 
 import json
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from reprlib import repr as shortened
 from types import MappingProxyType
@@ -100,7 +101,7 @@ def write_json(program: Program, path: Path, frame: Frame | None) -> None:
     write_text(path, result_json(program, frame))
 
 
-def program_to_json(program: Program, indent: int | None = 2) -> str:
+def program_to_json(program: Program) -> str:
     """A program as JSON text; numbers have the fewest digits that read back exactly.
 
     Raises
@@ -108,63 +109,50 @@ def program_to_json(program: Program, indent: int | None = 2) -> str:
     ShapeProgError
         As for :func:`shapeprog.format_program`.
     """
-    return json.dumps(_content(program, None), indent=indent) + "\n"
+    return result_json(program)
 
 
 def result_json(program: Program, frame: Frame | None = None, **more: Any) -> str:
     """The JSON form of a program with its frame and further entries, such as scores; a line for each solid."""
-    content = {**_content(program, frame), **more}
-    solids = [f"    {json.dumps(solid)}" for solid in content.get("solids", ())]
-    entries = ((key, value) for key, value in content.items() if key != "solids")
-    lines = [f"  {json.dumps(key)}: {json.dumps(value, allow_nan=False)}" for key, value in entries]
-    if solids:
-        lines.append('  "solids": [\n' + ",\n".join(solids) + "\n  ]")
-    return "{\n" + ",\n".join(lines) + "\n}\n"
-
-
-def _content(program: Program, frame: Frame | None) -> dict[str, Any]:
     text, unit = program_text(program, frame), program.unit
     content = {"format": FORMAT, "version": VERSION, "text": text, "unit": "cells" if unit is None else unit.name}
     if frame is not None:
         placed = frame_of_text(frame, scale_of(program))
         content["frame"] = {"origin": placed.centre, "scale": placed.scale, "axes": placed.axes}
-    try:
-        return {**content, "solids": _solids(program, text.startswith("#") and frame is not None)}
-    except ShapeProgError:  # too many or too large for a list
-        return content
+    lines = [f'  "{key}": {json.dumps(value, allow_nan=False)}' for key, value in {**content, **more}.items()]
+    with suppress(ShapeProgError):  # too many or too large for a list
+        if solids := _solids(program, text.startswith("#") and frame is not None):
+            lines.append('  "solids": [\n' + ",\n".join(f"    {json.dumps(solid)}" for solid in solids) + "\n  ]")
+    return "{\n" + ",\n".join(lines) + "\n}\n"
 
 
 def _solids(program: Program, framed: bool) -> list[dict[str, Any]]:
     """The line, role, kind and bounds of each solid that a program draws; ``framed`` if a comment is above its text."""
-    if program.size > MOST_SOLIDS:
-        raise ShapeProgError(f"more than {MOST_SOLIDS} solids")
-    source, scale = source_of(program), scale_of(program)
-    drawn, blocks = provenance(source), dict[int, tuple[int, str]]()
-    for row, (_, line) in enumerate(printed(source), 1 + framed):
-        if isinstance(line, Draw | Part):
-            kind = line.kind if isinstance(line, Part) else line.name
-            blocks |= dict.fromkeys(drawn[id(line)], (row, kind))
-    roles = [draw.word if draw.word in language().roles else "" for draw in program.draws]
-    solids = []
-    for block, low, high in _bounds(program):
-        (up_low, depth_low, side_low), (up_high, depth_high, side_high) = low, high
-        corners = (-side_high, depth_low, up_low - scale.floor), (-side_low, depth_high, up_high - scale.floor)
-        places = [[float(f"{value / scale.cells_per_unit + 0.0:.6g}") for value in corner] for corner in corners]
-        row, kind = blocks[block]
-        solids.append({"line": row, "role": roles[block], "kind": kind, "low": places[0], "high": places[1]})
-    return solids
-
-
-def _bounds(program: Program) -> Iterator[tuple[int, list[float], list[float]]]:
-    """The block of each solid of a program, and its low and high corner in the grid."""
     from shapeprog.geometry.mesh import bounds
     from shapeprog.language.tensors import encode
     from shapeprog.language.unroll import on_numpy_if_shipped, unroll
 
+    if program.size > MOST_SOLIDS:
+        raise ShapeProgError(f"more than {MOST_SOLIDS} solids")
+    source, scale = source_of(program), scale_of(program)
+    drawn, lines = provenance(source), dict[int, tuple[int, str]]()
+    for row, (_, line) in enumerate(printed(source), 1 + framed):
+        if isinstance(line, Draw | Part):
+            lines |= dict.fromkeys(drawn[id(line)], (row, line.kind if isinstance(line, Part) else line.name))
+    roles = [draw.word if draw.word in language().roles else "" for draw in program.draws]
     with on_numpy_if_shipped(program):
         scene = unroll(encode(program, dtype=torch.float64))
-        blocks = scene.block.tolist()
-        yield from ((blocks[slot], low.tolist(), high.tolist()) for slot, low, high in bounds(scene))
+        blocks, boxes = (
+            scene.block.tolist(),
+            [(slot, *low.tolist(), *high.tolist()) for slot, low, high in bounds(scene)],
+        )
+    solids = []
+    for slot, bottom, front, right, top, rear, left in boxes:  # the third axis of the grid points to the left
+        corners = (-left, front, bottom - scale.floor), (-right, rear, top - scale.floor)
+        low, high = ([float(f"{value / scale.cells_per_unit + 0.0:.6g}") for value in corner] for corner in corners)
+        row, kind = lines[blocks[slot]]
+        solids.append({"line": row, "role": roles[blocks[slot]], "kind": kind, "low": low, "high": high})
+    return solids
 
 
 def program_from_json(text: str, name: str = "<json>") -> Program:

@@ -139,6 +139,8 @@ class _Reader:
     def __init__(self, text: Text) -> None:
         self.text = text
         self.rest = [(row, line) for row, line in enumerate(text.lines, 1) if line.partition("#")[0].strip()][::-1]
+        self.known = [{tuple(_words(d)): d for d in language() if d.is_loop == is_loop} for is_loop in (False, True)]
+        self.place = 1, 0  # row and indentation of the line that is read
 
     def body(self, outside: int, depth: int) -> tuple[Node, ...]:
         """The nodes that are indented deeper than ``outside``, in ``depth`` loops."""
@@ -157,25 +159,26 @@ class _Reader:
         return tuple(nodes)
 
     def _node(self, row: int, indent: int, line: str, depth: int) -> Node:
+        self.place = row, indent
         call = self._call(row, indent, line)
         is_loop = getattr(call.func, "id", "") == "For"
         words, numbers = self._arguments(call, is_loop)
         try:
-            declared = _statement(words, is_loop)
+            declared = _statement(words, self.known[is_loop])
             values = _in_slots(declared, numbers)
         except ShapeProgError as mistake:
-            raise self.text.error(call, mistake.message, mistake.hint) from None
+            raise self._error(call, mistake.message, mistake.hint) from None
         if not is_loop:
             return Draw(declared.name, values, "" if words == _words(declared) else words[0])
         if depth >= DEEPEST:
             message = f"loops are nested more than {DEEPEST} deep"
-            raise self.text.error(call, message, "put some of them side by side")
+            raise self._error(call, message, "put some of them side by side")
         if not (body := self.body(indent, depth + 1)):
-            raise self.text.error(call, "this loop has no body", "indent its body by four spaces")
+            raise self._error(call, "this loop has no body", "indent its body by four spaces")
         return Loop(declared.name, values, body)
 
     def _call(self, row: int, indent: int, line: str) -> ast.Call:
-        """The call on a line, at its place in the text."""
+        """The call on a line."""
         bare = line.partition("#")[0].strip().removesuffix(":")
         if bare.startswith("for"):
             bare = "For" + bare[3:]
@@ -186,9 +189,6 @@ class _Reader:
             raise self.text.at(
                 row, min(column, len(line) + 1), f"invalid syntax: {getattr(error, 'msg', error)}", _FORM
             ) from None
-        for node in ast.walk(tree):
-            if isinstance(node, ast.expr | ast.keyword):
-                node.lineno, node.col_offset = row, node.col_offset + len(line[:indent].encode())
         if isinstance(tree, ast.Call) and getattr(tree.func, "id", "") in ("draw", "For"):
             return tree
         raise self.text.at(row, indent + 1, "a line is draw(...) or for(...)", _FORM)
@@ -207,7 +207,7 @@ class _Reader:
                 case ast.keyword(str(symbol), value) if symbol not in numbers:
                     pass
                 case ast.keyword(symbol):
-                    raise self.text.error(node, f"{symbol} is given twice", "leave one of them out")
+                    raise self._error(node, f"{symbol} is given twice", "leave one of them out")
                 case _:
                     raise self._neither(node)
             while isinstance(value, ast.BinOp) and isinstance(value.op, ast.Add):  # P=(...)+i*u
@@ -219,25 +219,25 @@ class _Reader:
                 raise self._neither(value) from None
         return words, numbers
 
+    def _error(self, node: Any, message: str, hint: str) -> ProgramError:
+        """What is wrong at a piece of the line that is read."""
+        row, indent = self.place
+        before = self.text.lines[row - 1][indent:].encode()[: node.col_offset]  # ast counts columns in bytes of UTF-8
+        return self.text.at(row, indent + len(before.decode(errors="replace")) + 1, message, hint)
+
     def _neither(self, node: Any) -> ProgramError:
-        return self.text.error(
-            node, "this is neither a quoted word nor a group of numbers", "write 'Leg' or P=(0, 0, 0)"
-        )
+        return self._error(node, "this is neither a quoted word nor a group of numbers", "write 'Leg' or P=(0, 0, 0)")
 
 
-def _statement(words: list[str], is_loop: bool) -> Statement:
+def _statement(words: list[str], known: dict[tuple[str, ...], Statement]) -> Statement:
     """The declaration that words name, after a role or alone."""
-    candidates = [declared for declared in language() if declared.is_loop == is_loop]
-    for declared in candidates:
-        if _words(declared) == words:
-            return declared
-    if not is_loop and len(words) == 2 and words[0] in language().roles and words[0] != words[1]:
-        for declared in candidates:
-            if declared.name == words[1]:
-                return declared
-    spelled = [_quoted(_words(declared)) for declared in candidates]
-    message = f"no {'loop' if is_loop else 'statement'} is called {_quoted(words)[:_SHOWN] or 'nothing'}"
-    raise ShapeProgError(message, did_you_mean(_quoted(words), spelled))
+    declared = known.get(tuple(words))
+    if declared is None and len(words) == 2 and words[0] in language().roles and words[0] != words[1]:
+        declared = next((each for each in known.values() if each.name == words[1] and not each.is_loop), None)
+    if declared is None:
+        hint = did_you_mean(_quoted(words), [_quoted([*each]) for each in known])
+        raise ShapeProgError(f"no statement or loop is called {_quoted(words)[:_SHOWN] or 'nothing'}", hint)
+    return declared
 
 
 def _in_slots(declared: Statement, by_symbol: Groups) -> tuple[float, ...]:

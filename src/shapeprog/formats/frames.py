@@ -21,6 +21,7 @@ from __future__ import annotations
 import json
 import math
 import re
+from dataclasses import asdict
 from reprlib import repr as shortened
 from typing import Any, NamedTuple
 
@@ -112,12 +113,10 @@ def placement(
     per_cell, name = _cell_size(chosen, program, frame, unit, file_unit)
     if lies:
         assert frame is not None
-        x, y, z = (per_cell / frame.scale * place for place in frame.centre)
-        return Placement(Frame(per_cell, (x, y, z), frame.axes), name)
+        return Placement(_frame(per_cell, per_cell / frame.scale * np.array(frame.centre), np.array(frame.axes)), name)
     matrix = grid_axes(*(UP[up.removeprefix("+")] if up else chosen.axes))
-    axes = tuple((float(a), float(b), float(c)) for a, b, c in matrix)
-    centre = -per_cell * (matrix @ _ground(program)) + 0.0 if chosen.maker else (0.0, 0.0, 0.0)
-    return Placement(Frame(per_cell, (float(centre[0]), float(centre[1]), float(centre[2])), axes), name)
+    centre = -per_cell * (matrix @ _ground(program)) + 0.0 if chosen.maker else np.zeros(3)
+    return Placement(_frame(per_cell, centre, matrix), name)
 
 
 def _cell_size(chosen: Format, program: Program, frame: Frame | None, unit: str, file_unit: str) -> tuple[float, str]:
@@ -160,13 +159,8 @@ def _ground(program: Program) -> FloatArray:
     return np.array([low[0], *(low[1:] + high[1:]) / 2])
 
 
-def frame_dict(frame: Frame) -> dict[str, Any]:
-    """A frame as plain numbers for JSON: scale, centre and the rows of its axes, exact."""
-    return {"scale": frame.scale, "centre": list(frame.centre), "axes": [list(row) for row in frame.axes]}
-
-
 def frame_from(data: Any, name: str) -> Frame:
-    """The frame that :func:`frame_dict` wrote; an ``InputError`` if numbers are missing or not finite, the scale is not
+    """The frame of such a comment; an ``InputError`` if numbers are missing or not finite, the scale is not
     positive or the axes are not a rotation."""
     try:
         scale, centre = float(data["scale"]), [float(value) for value in data["centre"]]
@@ -213,7 +207,7 @@ def frame_comment(frame: Frame | None, program: Program | None = None) -> str:
     if frame is None:
         return ""
     if program is None or program.source is None or program.scale is None:
-        return f"# frame: {json.dumps(frame_dict(frame))}\n"
+        return f"# frame: {json.dumps(asdict(frame))}\n"
     source, text = program.source, frame_of_text(frame, program.scale)
     read = placed_source(source.lines).scale  # the program may lie in another grid than its text
     assert read is not None

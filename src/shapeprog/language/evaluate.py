@@ -155,7 +155,9 @@ class _Evaluator(Lowering):
                     continue
                 case Draw():
                     self._count(line, calls)
-                    new = [self.leaf(line.name, self._values(line, scope), _role(line, context.role))]
+                    self.drawn += 1
+                    role = _role(line, context.role)
+                    new = [Draw(line.name, self._values(line, scope), "" if role == line.name else role)]
                 case Loop():
                     new = self._cells_loop(line, context)
                 case Call():

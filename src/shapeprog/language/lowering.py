@@ -89,10 +89,10 @@ class Lowering(ABC):
     def lines(self, lines: Sequence[Line], context: Context) -> Drawn:
         """Evaluate lines."""
 
-    def leaf(self, name: str, values: tuple[Any, ...], role: str = "") -> Draw:
+    def leaf(self, line: Line, name: str, values: Sequence[Any], role: str) -> Draw:
         """A drawing statement of the result."""
         self.drawn += 1
-        return Draw(name, values, "" if role == name else role)
+        return Draw(name, self._numbers(line, values), "" if role == name else role)
 
     def at(self, line: Line, key: int | str, value: Value, scope: Scope) -> Any:
         """The value of a number or expression on a line."""
@@ -122,7 +122,7 @@ class Lowering(ABC):
             x, y = ((low + high) / 2 for low, high in outer[:2])
             low, high = self._point((x, y, outer[2][0])), self._point((x, y, outer[2][1]))
             ends = [*low, high[0] - low[0]] if line.kind == "cylinder" else [*low, *high]
-            node = self._leaf(line, line.kind, [*ends, *map(self._length, radii)], role)
+            node = self.leaf(line, line.kind, [*ends, *map(self._length, radii)], role)
             return Drawn(self.tilted(part, [node], outer), outer)
         outer = self.box(part)
         (left, right), (front, rear), (bottom, top) = outer
@@ -132,13 +132,13 @@ class Lowering(ABC):
             edge = self._number(part, "edge")
             if self.exact and edge < 0:
                 raise Fault(line, f"edge is {edge:g}", "an edge cannot be negative", "edge")
-            node = self._leaf(line, "cushion", [*values, self._length(edge)], role)
+            node = self.leaf(line, "cushion", [*values, self._length(edge)], role)
         elif "lean" in part.keywords:
-            node = self._leaf(line, "leaning_box", [*values, self._length(self._number(part, "lean"))], role)
+            node = self.leaf(line, "leaning_box", [*values, self._length(self._number(part, "lean"))], role)
         elif "tilt" in part.keywords:
-            return Drawn([self._leaf(line, "board", [*values, self._number(part, "tilt")], role)], outer)
+            return Drawn([self.leaf(line, "board", [*values, self._number(part, "tilt")], role)], outer)
         else:
-            return Drawn([self._leaf(line, "box", values, role)], outer)
+            return Drawn([self.leaf(line, "box", values, role)], outer)
         return Drawn(self.tilted(part, [node], outer), outer)
 
     def _between(self, line: Part, part: Placed, role: str) -> Drawn:
@@ -153,7 +153,7 @@ class Lowering(ABC):
         grid = [number for point in points for number in self._point(point)]
         element = tuple((value, value) for value in start)
         if line.kind != "bar":
-            return Drawn([self._leaf(line, line.kind, [*grid, *map(self._length, self._radii(part))], role)], element)
+            return Drawn([self.leaf(line, line.kind, [*grid, *map(self._length, self._radii(part))], role)], element)
         sizes = {
             axis: self._positive(part, word, self._number(part, word))
             for axis, word in enumerate(SIZES)
@@ -169,7 +169,7 @@ class Lowering(ABC):
         section = [self._length(sizes[axis]) for axis in (2, 1, 0) if axis != main]
         turn = self._number(part, "turn", 0.0)
         values = [*grid, *section, float(2 - main), -turn if main == 0 else turn]
-        return Drawn([self._leaf(line, "beam", values, role)], element)
+        return Drawn([self.leaf(line, "beam", values, role)], element)
 
     def group(self, line: Group, context: Context) -> Drawn:
         """A loop or a box around lines."""
@@ -366,9 +366,6 @@ class Lowering(ABC):
     def _length(self, value: Any) -> Any:
         assert self.source.scale is not None
         return value * self.source.scale.cells_per_unit
-
-    def _leaf(self, line: Line, name: str, values: Sequence[Any], role: str) -> Draw:
-        return self.leaf(name, self._numbers(line, values), role)
 
     def _numbers(self, line: Line, values: Sequence[Any]) -> tuple[Any, ...]:
         """Values in cells, rounded to float32 if they are plain numbers."""

@@ -102,7 +102,7 @@ def _picture(shape: Shape | None, program: Program, title: str, scores: Mapping[
     names = [name, "reconstruction"][: len(views)]
     for index, (image, name) in enumerate(zip(views, names, strict=True)):
         _paste(page, image, index * view, head)
-        _text(draw, (index * view + view / 2, 16), _cut(name, 46), 19, _FAINT, anchor="ma")
+        draw.text((index * view + view / 2, 16), _cut(name, 46), _FAINT, typeface(19), "ma")
     panel.draw(draw, view * len(views) + _PAD, head)
     return page
 
@@ -133,22 +133,22 @@ def contact_sheet(
     head = (54 if title else 14) + 30 * len(legend)
     page, draw = _sheet(width, head + row * -(-len(items) // across) + 8)
     if title:
-        _text(draw, (_PAD, 16), title, 22, _INK, bold=True)
+        draw.text((_PAD, 16), title, _INK, typeface(22, bold=True))
     for line, entries in enumerate(legend):
         for offset, statement in entries:
             _swatch(draw, _PAD + offset, head - 30 * (len(legend) - line) + 4, 13, statement)
             corner = (_PAD + offset + 20, head - 30 * (len(legend) - line))
-            _text(draw, corner, language().word(statement), 15, _INK)
+            draw.text(corner, language().word(statement), _INK, typeface(15))
     for number, (item, (input_image, reconstruction, _)) in enumerate(zip(items, pairs, strict=True)):
         x, y = _PAD + number % across * cell, head + number // across * row
         for offset, image in ((0, input_image), (input_width, reconstruction)):
             if image is not None:
                 _paste(page, image, x + offset, y)
         middle = x + (wide + input_width) // 2
-        _text(
-            draw, (middle, y + tall + 2), _cut(item.name, 44 if input_width else 24), 14, _INK, anchor="ma", bold=True
+        draw.text(
+            (middle, y + tall + 2), _cut(item.name, 44 if input_width else 24), _INK, typeface(14, bold=True), "ma"
         )
-        _text(draw, (middle, y + tall + 21), _cut(item.note, 56 if input_width else 32), 13, _FAINT, anchor="ma")
+        draw.text((middle, y + tall + 21), _cut(item.note, 56 if input_width else 32), _FAINT, typeface(13), "ma")
     _save(page, target)
     return target
 
@@ -178,11 +178,11 @@ class _Panel:
             _line(draw, corner, line, size, advance)
         if len(shown) < len(lines):
             remainder = f"... and {len(lines) - len(shown)} more lines"
-            _text(draw, (x + 24, top + len(shown) * step), remainder, size, _FAINT, face="Mono")
+            draw.text((x + 24, top + len(shown) * step), remainder, _FAINT, typeface(size, "Mono"))
         foot = y + self.height - 62
         draw.line([(x, foot), (x + self.width - 8, foot)], fill=_RULE, width=1)
         for number, text in enumerate(self.scores):
-            _text(draw, (x, foot + 12 + 24 * number), text, 16, _INK if number == 0 else _FAINT)
+            draw.text((x, foot + 12 + 24 * number), text, _INK if number == 0 else _FAINT, typeface(16))
 
 
 def scores_text(scores: Mapping[str, float] | None, program: Program) -> list[str]:
@@ -232,9 +232,9 @@ def _line(draw: ImageDraw, corner: tuple[float, float], line: Row, size: int, ad
     before, word, after = parted(line)
     x, y = corner
     shade = _FAINT if line.statement is None else readable(line.statement)
-    _text(draw, (x, y), before, size, _FAINT, face="Mono")
-    _text(draw, (x + advance * len(before), y), word, size, shade, face="Mono", bold=line.statement is not None)
-    _text(draw, (x + advance * (len(before) + len(word)), y), after, size, _INK, face="Mono")
+    draw.text((x, y), before, _FAINT, typeface(size, "Mono"))
+    draw.text((x + advance * len(before), y), word, shade, typeface(size, "Mono", bold=line.statement is not None))
+    draw.text((x + advance * (len(before) + len(word)), y), after, _INK, typeface(size, "Mono"))
 
 
 def readable(statement: int) -> tuple[int, int, int]:
@@ -252,20 +252,6 @@ def typeface(size: int, face: str = "", bold: bool = False) -> Any:
 
     font = Path(__file__).parent / "fonts" / f"DejaVuSans{face}{'-Bold' if bold else ''}.ttf"
     return ImageFont.truetype(str(font), size)
-
-
-def _text(
-    draw: ImageDraw,
-    corner: tuple[float, float],
-    text: str,
-    size: int,
-    fill: tuple[int, int, int],
-    *,
-    face: str = "",
-    bold: bool = False,
-    anchor: str = "la",
-) -> None:
-    draw.text(corner, text, font=typeface(size, face, bold), fill=fill, anchor=anchor)
 
 
 def _swatch(draw: ImageDraw, x: float, y: float, size: int, statement: int) -> None:

@@ -51,7 +51,7 @@ def test_truncated_obj_whose_vertices_are_missing(tmp_path):
 @pytest.mark.parametrize("suffix", ["npy", "npz", "binvox", "h5"])
 @pytest.mark.parametrize("part", [0.2, 0.5, 0.9])
 def test_truncated_arrays(tmp_path, suffix, part):
-    from shapeprog.formats.binvox import write_binvox
+    from shapeprog.formats.samples import write_binvox
 
     cells = np.random.default_rng(0).random((32, 32, 32)) < 0.3
     path = tmp_path / f"a.{suffix}"

@@ -10,9 +10,10 @@ import pytest
 import trimesh
 
 from shapeprog.data import load, load_all
+from shapeprog.data.binvox import read_binvox
 from shapeprog.data.orientation import axes_of, default_axes
 from shapeprog.errors import InputError, ShapeProgError
-from shapeprog.formats.binvox import read_binvox, write_binvox
+from shapeprog.formats.samples import write_binvox
 from shapeprog.space import Frame, grid_axes
 
 EXAMPLES = Path(__file__).parent.parent / "examples"

@@ -116,7 +116,7 @@ def test_text_and_json_come_back_with_their_frame(tmp_path: Path):
 
 
 def test_binvox_lies_where_the_input_lies(tmp_path: Path):
-    from shapeprog.formats.binvox import read_binvox
+    from shapeprog.data.binvox import read_binvox
 
     cells, corner, cell = read_binvox(export(PROGRAM, tmp_path / "table.binvox", FRAME))
     low, high = np.argwhere(cells).min(0), np.argwhere(cells).max(0) + 1

@@ -168,7 +168,7 @@ def _placed(path: Path, up: str | None, front: str | None, make: Callable[..., S
 
 
 def _read_binvox(path: Path, name: str, make_shape: Place) -> Shape:
-    from shapeprog.formats.binvox import read_binvox
+    from shapeprog.data.binvox import read_binvox
 
     check_count(path.name, "bytes", path.stat().st_size, BYTES)
     cells, corner, cell = read_binvox(path)

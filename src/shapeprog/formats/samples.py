@@ -7,6 +7,7 @@ unsnapped program.
 from __future__ import annotations
 
 import io
+import os
 from pathlib import Path
 from typing import Any
 
@@ -15,14 +16,13 @@ import numpy.typing as npt
 import torch
 
 from shapeprog.files import atomic_path, write_bytes
-from shapeprog.formats.binvox import write_binvox
 from shapeprog.formats.parts import placed
 from shapeprog.geometry.cells import voxels
 from shapeprog.geometry.surface import sample_surface
 from shapeprog.language.program import Program
 from shapeprog.language.tensors import encode
 from shapeprog.language.unroll import unroll
-from shapeprog.space import RESOLUTION, Frame
+from shapeprog.space import HALF, RESOLUTION, Array, Frame
 
 POINTS = 5000  # surface points of an NPZ, and the default number for an XYZ
 
@@ -36,6 +36,36 @@ def write_cells(program: Program, path: Path, frame: Frame) -> None:
     """Write the cells as binvox, in the coordinates of the input."""
     placed(np.array([[-RESOLUTION] * 3, [RESOLUTION] * 3]), frame)  # the header holds numbers alone
     write_binvox(path, cells(program), frame)
+
+
+def write_binvox(path: str | os.PathLike[str], voxels: Array, frame: Frame | None = None) -> None:
+    """Write cells of the grid as a binvox file in the coordinates of the input.
+
+    Parameters
+    ----------
+    path
+        Where to.
+    voxels
+        Occupied cells (R, R, R), axes up, depth, left-right.
+    frame
+        From the grid to the world; its axes are signed world axes, as :func:`~shapeprog.space.grid_axes` gives them.
+    """
+    frame = frame or Frame()
+    cells, axes = np.asarray(voxels, np.bool_), np.asarray(frame.axes)
+    order = np.abs(axes).argmax(1)  # the grid axis that runs along each world axis
+    turned = cells.transpose(order)
+    turned = np.flip(turned, tuple(axis for axis in range(3) if axes[axis, order[axis]] < 0))
+    size = cells.shape[0]
+    corner = np.asarray(frame.centre) - frame.scale * HALF
+    flat = np.ascontiguousarray(turned.transpose(0, 2, 1)).reshape(-1).astype(np.uint8)
+    starts = np.flatnonzero(np.diff(flat, prepend=1 - flat[:1]))
+    runs = bytearray()
+    for value, length in zip(flat[starts], np.diff(starts, append=len(flat)), strict=True):
+        full, partial = divmod(int(length), 255)
+        runs += bytes((value, 255)) * full + (bytes((value, partial)) if partial else b"")
+    translate = " ".join(f"{number:.9g}" for number in corner)
+    head = f"#binvox 1\ndim {size} {size} {size}\ntranslate {translate}\nscale {frame.scale * 2 * HALF:.9g}\ndata\n"
+    write_bytes(path, head.encode() + bytes(runs))
 
 
 def write_grid(program: Program, path: Path, frame: Frame, resolution: int = RESOLUTION) -> None:

@@ -1,4 +1,4 @@
-"""Binvox files, read and written: runs of full and empty cells, the axes x, z, y from slowest to fastest.
+"""Binvox files: runs of full and empty cells, the axes x, z, y from slowest to fastest.
 
 The format is Patrick Min's; its cubes are anchored at a corner: cell ``(i, j, k)`` along x, y, z covers
 ``translate + scale * [i, i + 1) / d`` along x, and so on.
@@ -13,8 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from shapeprog.errors import InputError
-from shapeprog.files import write_bytes
-from shapeprog.space import HALF, Array, Frame
+from shapeprog.space import Array
 
 _HEAD = 4096  # most bytes of a header
 _AT_ONCE = 1 << 16  # runs unpacked at once: numpy takes eight bytes for the length of each
@@ -53,33 +52,3 @@ def read_binvox(path: str | os.PathLike[str]) -> tuple[Array, Array, float]:
         cells[at : at + len(some)] = some
         at += len(some)
     return cells.reshape(shape).transpose(0, 2, 1), corner, scale / shape[0]
-
-
-def write_binvox(path: str | os.PathLike[str], voxels: Array, frame: Frame | None = None) -> None:
-    """Write cells of the grid as a binvox file in the coordinates of the input.
-
-    Parameters
-    ----------
-    path
-        Where to.
-    voxels
-        Occupied cells (R, R, R), axes up, depth, left-right.
-    frame
-        From the grid to the world; its axes are signed world axes, as :func:`~shapeprog.space.grid_axes` gives them.
-    """
-    frame = frame or Frame()
-    cells, axes = np.asarray(voxels, np.bool_), np.asarray(frame.axes)
-    order = np.abs(axes).argmax(1)  # the grid axis that runs along each world axis
-    turned = cells.transpose(order)
-    turned = np.flip(turned, tuple(axis for axis in range(3) if axes[axis, order[axis]] < 0))
-    size = cells.shape[0]
-    corner = np.asarray(frame.centre) - frame.scale * HALF
-    flat = np.ascontiguousarray(turned.transpose(0, 2, 1)).reshape(-1).astype(np.uint8)
-    starts = np.flatnonzero(np.diff(flat, prepend=1 - flat[:1]))
-    runs = bytearray()
-    for value, length in zip(flat[starts], np.diff(starts, append=len(flat)), strict=True):
-        full, partial = divmod(int(length), 255)
-        runs += bytes((value, 255)) * full + (bytes((value, partial)) if partial else b"")
-    translate = " ".join(f"{number:.9g}" for number in corner)
-    head = f"#binvox 1\ndim {size} {size} {size}\ntranslate {translate}\nscale {frame.scale * 2 * HALF:.9g}\ndata\n"
-    write_bytes(path, head.encode() + bytes(runs))

@@ -17,7 +17,12 @@ from shapeprog.formats.parts import parts
 
 def of_meshes(program, frame):
     """Bounds and volume of every part, a row each."""
-    return [(*part.vertices.min(0), *part.vertices.max(0), part.volume) for part in parts(program, frame)]
+    return [(*part.vertices.min(0), *part.vertices.max(0), volume_of(part)) for part in parts(program, frame)]
+
+
+def volume_of(part):
+    """Volume enclosed by a part, by the divergence theorem."""
+    return float(np.linalg.det(part.vertices[part.faces]).sum() / 6)
 
 
 def of_build123d(script):

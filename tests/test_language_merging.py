@@ -10,9 +10,10 @@ from written import written_program
 
 import shapeprog as sp
 from shapeprog.language.evaluate import evaluated
-from shapeprog.language.merging import apart, merged
+from shapeprog.language.merging import merged
 from shapeprog.language.printer import format_program, source_of
 from shapeprog.language.program import Program
+from shapeprog.library.rewriting import separate_loops
 
 CHAIR = """\
 width, depth = 12, 10
@@ -46,7 +47,7 @@ for i in translate(2, by=(thick, 0, 0)):
 
 def separate(program: Program) -> Program:
     source = source_of(program)
-    return evaluated(replace(source, lines=tuple(apart(source.lines))))
+    return evaluated(replace(source, lines=tuple(separate_loops(source.lines))))
 
 
 def test_equal_loops_become_one_at_the_place_of_the_first():

@@ -141,7 +141,8 @@ def _results(
                 stem = results.free_stem(shape, stems, folder)
                 names = results.write(result, shape, folder, stem)
                 if not options.no_picture:
-                    names.append(picture(shape, result.program, folder / f"{stem}.png", scores=result.scores).name)
+                    picture(shape, result.program, folder / f"{stem}.png", scores=result.scores)
+                    names.append(f"{stem}.png")
             except OutputError:
                 raise
             except ShapeProgError as error:

@@ -54,11 +54,6 @@ class Part:
     vertices: Vertices
     faces: Faces
 
-    @property
-    def volume(self) -> float:
-        """Volume enclosed, by the divergence theorem."""
-        return float(np.linalg.det(self.vertices[self.faces]).sum() / 6)
-
 
 def parts(program: Program, frame: Frame | None = None) -> list[Part]:
     """The parts of a program in the order they are drawn, in the world of ``frame`` (the grid by default).

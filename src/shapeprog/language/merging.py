@@ -1,8 +1,8 @@
-"""Loops that repeat in the same way written once, ``for _ in mirror(x=0):`` above all that has an image; and back."""
+"""Loops that repeat in the same way written once, ``for _ in mirror(x=0):`` above all that has an image."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable
 from dataclasses import replace
 
 from shapeprog.language.ast import Assignment, Comment, Function, Group, Line, Loop
@@ -19,17 +19,6 @@ def merged(program: Program) -> Program:
     source = source_of(program)
     lines = merged_lines(source.lines)
     return program if lines == source.lines else evaluated(replace(source, lines=lines))
-
-
-def apart(lines: Sequence[Line]) -> Iterator[Line]:
-    """The lines with each loop in cells around several statements as that loop around each, but for those with
-    comments."""
-    for line in lines:
-        if not isinstance(line, Loop) or any(isinstance(inner, Comment) for inner in line.body):
-            yield line
-            continue
-        for index, inner in enumerate(apart(line.body)):
-            yield replace(line, body=(inner,), note="" if index else line.note)
 
 
 def merged_lines(lines: Iterable[Line]) -> tuple[Line, ...]:

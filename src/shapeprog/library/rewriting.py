@@ -25,7 +25,7 @@ from shapeprog.language.convert import in_cells, placed_if_possible
 from shapeprog.language.dimensions import Counts, in_unit
 from shapeprog.language.evaluate import evaluated
 from shapeprog.language.expression import Expression, Linear, Name, Value
-from shapeprog.language.merging import apart, merged
+from shapeprog.language.merging import merged
 from shapeprog.language.printer import source_of
 from shapeprog.language.program import Program
 from shapeprog.library.blocks import ROWS
@@ -89,7 +89,18 @@ def _placed_with(program: Program, library: Library) -> Program:
 def _apart(program: Program) -> Source:
     """A program as it is written, but with one statement in each nest of loops."""
     source = source_of(program)
-    return replace(source, lines=tuple(apart(source.lines)))
+    return replace(source, lines=tuple(separate_loops(source.lines)))
+
+
+def separate_loops(lines: Sequence[Line]) -> Iterator[Line]:
+    """The lines with each loop in cells around several statements as that loop around each, but for those with
+    comments."""
+    for line in lines:
+        if not isinstance(line, Loop) or any(isinstance(inner, Comment) for inner in line.body):
+            yield line
+            continue
+        for index, inner in enumerate(separate_loops(line.body)):
+            yield replace(line, body=(inner,), note="" if index else line.note)
 
 
 class Offer(NamedTuple):

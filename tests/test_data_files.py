@@ -11,7 +11,8 @@ from pathlib import Path
 import pytest
 
 from shapeprog.errors import OutputError
-from shapeprog.files import append_line, atomic_path, make_folder, write_bytes, write_text
+from shapeprog.files import atomic_path, make_folder, write_bytes, write_text
+from shapeprog.liang2022.loop import append_line
 
 
 def fail_halfway(path, error):

@@ -21,13 +21,13 @@ from shapeprog.geometry.cells import (
     union,
     unpack,
     voxels,
-    widen,
     words_of,
 )
 from shapeprog.geometry.primitive import primitives
 from shapeprog.geometry.scene import Scene
 from shapeprog.language import Code, encode, language, unroll
 from shapeprog.language.parser import parse
+from shapeprog.liang2022.decode import widen
 
 PARAMETERS = [0, 6, 6, 5, 5, 6, 5, 5, 5, 5, 6, 6, 6, 6, 6, 7, 6, 7, 6, 4, 2, 0]
 DRAWN = [*range(1, 17), 18]

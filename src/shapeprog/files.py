@@ -89,23 +89,6 @@ def write_text(path: str | os.PathLike[str], content: str) -> None:
     write_bytes(path, content.encode("utf-8", "surrogateescape"))
 
 
-def append_line(path: str | os.PathLike[str], line: str) -> None:
-    """Add a line to a file; a line that was added in part, because the disk became full, lacks its line feed.
-
-    Raises
-    ------
-    OutputError
-        If it cannot be written.
-    """
-    remaining = f"{line}\n".encode()
-    try:
-        with Path(path).open("ab", buffering=0) as stream:  # a buffer would fail again when it is closed
-            while remaining:
-                remaining = remaining[stream.write(remaining) :]
-    except OSError as error:
-        raise output_error(Path(path), error) from error
-
-
 def make_folder(path: str | os.PathLike[str]) -> Path:
     """The folder ``path``, made with its parents where missing, without what killed processes left unfinished in it.
 

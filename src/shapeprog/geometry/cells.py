@@ -126,22 +126,6 @@ def preceding(parts: Int[Tensor, "*batch K words R"]) -> Int[Tensor, "*batch K w
     return cells
 
 
-def widen(cells: Cells) -> Cells:
-    """All cells that share a face with a filled one, and these themselves."""
-    resolution = cells.shape[-1]
-    words = cells.unflatten(-2, (-1, resolution))
-    wide = words | (words << 1) | ((words >> 1) & 0x7FFFFFFF)  # the sign must not be drawn in
-    wide[..., 1:, :, :] |= (words[..., :-1, :, :] >> 31) & 1
-    wide[..., :-1, :, :] |= words[..., 1:, :, :] << 31
-    if resolution % WORD:
-        wide[..., -1, :, :] &= (1 << resolution % WORD) - 1
-    wide[..., 1:, :] |= words[..., :-1, :]
-    wide[..., :-1, :] |= words[..., 1:, :]
-    wide[..., 1:] |= words[..., :-1]
-    wide[..., :-1] |= words[..., 1:]
-    return wide.flatten(-3, -2)
-
-
 def _fill_declared(flat: Batch, kind: int, plane: Int[Tensor, "B N"], cells: Cells) -> None:
     """Add the cells of a primitive without kernels to their planes: those whose centre is inside."""
     selected, declared, resolution = flat.mask & (flat.kind == kind), primitives[kind], cells.shape[-1]

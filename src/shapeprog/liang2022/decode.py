@@ -22,7 +22,8 @@ from jaxtyping import Float, Int, UInt8
 from torch import Tensor
 
 from shapeprog.errors import ShapeProgError, did_you_mean
-from shapeprog.geometry.cells import count, iou, pack, union, unpack, widen
+from shapeprog.geometry.cells import Cells, count, iou, pack, union, unpack
+from shapeprog.kernels.bits import WORD
 from shapeprog.language.program import Program
 from shapeprog.language.statement import EMPTY, SLOTS
 from shapeprog.language.tensors import Code
@@ -164,3 +165,19 @@ def _rows(state: Any, index: Tensor) -> Any:
     if isinstance(state, tuple):
         return tuple(part[index] for part in state)
     return state if state is None else state[index]
+
+
+def widen(cells: Cells) -> Cells:
+    """All cells that share a face with a filled one, and these themselves."""
+    resolution = cells.shape[-1]
+    words = cells.unflatten(-2, (-1, resolution))
+    wide = words | (words << 1) | ((words >> 1) & 0x7FFFFFFF)  # the sign must not be drawn in
+    wide[..., 1:, :, :] |= (words[..., :-1, :, :] >> 31) & 1
+    wide[..., :-1, :, :] |= words[..., 1:, :, :] << 31
+    if resolution % WORD:
+        wide[..., -1, :, :] &= (1 << resolution % WORD) - 1
+    wide[..., 1:, :] |= words[..., :-1, :]
+    wide[..., :-1, :] |= words[..., 1:, :]
+    wide[..., 1:] |= words[..., :-1]
+    wide[..., :-1] |= words[..., 1:]
+    return wide.flatten(-3, -2)

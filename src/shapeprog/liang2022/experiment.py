@@ -18,12 +18,12 @@ import torch
 from shapeprog.data.packs import read_pack, write_pack
 from shapeprog.data.synthetic.shapes import shapes_of
 from shapeprog.errors import InputError, did_you_mean
-from shapeprog.files import append_line, make_folder
+from shapeprog.files import make_folder
 from shapeprog.inference import greedy_boxes, refine
 from shapeprog.inference.refine import REACH
 from shapeprog.liang2022.adapt import AdaptTask
 from shapeprog.liang2022.evaluate import decode_all, measure
-from shapeprog.liang2022.loop import read_log, train
+from shapeprog.liang2022.loop import append_line, read_log, train
 from shapeprog.liang2022.prior import programs
 from shapeprog.liang2022.settings import BEST, STATE, AdaptSettings, Decoder
 from shapeprog.liang2022.weights import load_generator

@@ -28,7 +28,7 @@ import torch.distributed as dist
 from torch import Tensor, nn
 
 from shapeprog.errors import InputError, ShapeProgError
-from shapeprog.files import append_line, lock, make_folder, write_bytes, write_text
+from shapeprog.files import lock, make_folder, output_error, write_bytes, write_text
 from shapeprog.liang2022.prior import scramble
 from shapeprog.liang2022.settings import BEST, LOG, STATE, WEIGHTS, TrainingSettings
 from shapeprog.liang2022.weights import save_weights
@@ -233,3 +233,20 @@ def _resume(
     except Exception as error:  # no list of what torch raises for a state that does not fit
         raise InputError(f"{path} does not fit the network, or is damaged", "start over with --restart") from error
     return step, best
+
+
+def append_line(path: str | Path, line: str) -> None:
+    """Add a line to a file; a line that was added in part, because the disk became full, lacks its line feed.
+
+    Raises
+    ------
+    OutputError
+        If it cannot be written.
+    """
+    remaining = f"{line}\n".encode()
+    try:
+        with Path(path).open("ab", buffering=0) as stream:  # a buffer would fail again when it is closed
+            while remaining:
+                remaining = remaining[stream.write(remaining) :]
+    except OSError as error:
+        raise output_error(Path(path), error) from error

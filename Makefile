@@ -20,7 +20,7 @@ PAPER := src/shapeprog/liang2022 tests/liang2022_toys.py $(PAPER_TESTS)
 .PHONY: demo test lint docs nightly clean
 
 demo: $(READY)
-	$(BIN)/shapeprog infer examples/chair_kenney.obj --out demo-output
+	$(BIN)/shapeprog infer examples/chair_kenney.obj --unit cm --out demo-output
 
 test: $(READY)
 	$(BIN)/ruff check .

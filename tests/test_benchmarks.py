@@ -92,56 +92,42 @@ box(at=(thick + 4, -width / 2, 0), size=(thick, width, 3.5))
 """
 
 
-def test_numbers_of_a_program_follow_from_its_names_and_its_plain_numbers() -> None:
+def test_features_follow_from_names_and_plain_numbers() -> None:
     program = parse(NAMED)
-    ways = ties.ways_of(program, program)  # the first up and the second side are zero: nothing is free there
-    assert ways.shape == (12, 2 + 4)
-    assert ties.rank(ways) == 6
-    rows = ties.relations_written(sp.inline(program))
-    held = rows[np.abs(rows @ ways).max(1) < 1e-9]
-    assert ties.rank(held) == 6  # two zeros, two parts in the middle, equal thickness and equal width
+    plain = sp.inline(program)
+    ways, own = ties.slopes(program, plain), ties.plain_slopes(plain)
+    assert ways.shape == (2 * ties.PER, 1 + 6)  # lifting, two names and four numbers; zeros are not free
+    assert own.shape == (2 * ties.PER, 1 + 12)
+    rows = ties.relations_written(len(own))
+    held = rows[np.abs(rows @ ways).max(1) < 1e-3]
+    assert ties.rank(held @ own) == 5  # two middles and one side at zero, equal thickness and equal width
 
 
-def test_a_number_that_has_become_zero_follows_from_nothing() -> None:
-    mirrored = "for i in mirror(side, at={}):\n    box(at=(0, 0, 2), size=(1, 2, 3))\n"
-    ways = ties.ways_of(parse(mirrored.format(0)), parse(mirrored.format(0.02)))
-    assert ways.shape == (7, 4)
-    assert not ways[0].any()
+def test_parts_are_compared_wherever_they_are_written() -> None:
+    box = "box(at=(4, 0, 0), size=(1, 1, 1))\n"
+    here = parse("for _ in mirror(side):\n    box(at=(0, 0, 2), size=(1, 2, 3))\n" + box)
+    there = parse(box + "for _ in translate(2, by=(0, 0, 7)):\n    box(at=(0, 0, -5), size=(1, 2, 3))\n")
+    ways = ties.slopes(there, here)
+    assert ways.shape[0] == 2 * ties.PER
+    first, second = ways.reshape(2, ties.PER, -1)
+    assert (first != 0).any(0).sum() == 1 + 5  # lifting, a shift, a place and three sizes
+    assert (second != 0).any(0).sum() == 1 + 4
 
 
 def test_furniture_that_is_drawn_again_is_designed_alike() -> None:
     numbers = ties.redrawn(1004, 0)
     assert len(numbers) > ties.VARIANTS / 2
     assert np.ptp(numbers, axis=0).max() > 1
-    rows = ties.relations_written(planted_furniture(1004))
+    rows = ties.relations_written(numbers.shape[1])
     always = rows[np.abs(rows @ numbers.T).max(1) <= ties.ROUNDED]
     assert 0 < ties.rank(always) < numbers.shape[1]
 
 
-def planted_furniture(number: int) -> sp.Program:
-    from shapeprog.data.synthetic.furniture import furniture
-
-    return furniture(number)
-
-
-def test_noise_moves_every_number_and_no_count() -> None:
-    program = parse("for i in translate(3, by=(0, 0, 4)):\n    box(at=(0, 1, 2), size=(1, 2, 3))\n")
-    noisy = ties.with_noise(program, np.random.default_rng(0))
-    (loop,), (before,) = noisy.body, program.body
-    assert loop.values[:3] == before.values[:3]
-    moved = np.array(loop.body[0].values) - before.body[0].values
-    assert (moved != 0).all()
-    assert np.abs(moved).max() < 5 * ties.NOISE
-
-
-@pytest.mark.parametrize(
-    ("text", "same"),
-    [
-        ("for i in translate(2, by=(0, 0, 5)):\n    box(at=(0, 0, 0), size=(1, 2, 3))\n", True),
-        ("a = 2\nbox(at=(0, 0, 0), size=(1, a, 3))\nbox(at=(0, 0, 5), size=(1, a, 3))\n", False),
-        ("a, b, c = 1, 2, 3\nbox(at=(0, 0, 0), size=(a, b, c))\nbox(at=(0, 0, 5), size=(c, a, b))\n", True),
-    ],
-)
-def test_parts_share_their_numbers_where_no_edit_tells_them_apart(text: str, same: bool) -> None:
-    _, sizes = ties.shaken(parse(text))
-    assert np.allclose(sizes[:, 0], sizes[:, 1]) == same
+@pytest.mark.parametrize("number", range(12))
+def test_planted_groups_are_programs_with_as_many_equal_parts(number: int) -> None:
+    kind, role, text = ties.design(number, np.random.default_rng(number))
+    program = parse(text)
+    assert f"{kind}(" in text
+    assert sum(chain[-1].role == role for chain in program.chains) == 1
+    corners = ties.sides(sp.unroll(program))[0][:, 0]
+    assert np.abs(corners[:, :6]).max() <= 16

@@ -14,7 +14,7 @@ from commands import FRAME, PROGRAM, Run, table
 
 from shapeprog import inference
 from shapeprog.formats import export, load, load_with_frame
-from shapeprog.inference.readable import in_readable_unit
+from shapeprog.inference.readable import in_readable_unit, unit_of_result
 from shapeprog.language.dimensions import in_unit
 from shapeprog.language.free import numbers
 from shapeprog.language.named import names
@@ -35,8 +35,9 @@ for i in translate(n, by=(0, 0, span)):
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     """Inference that always finds the same table, at once."""
 
-    def infer(shape, **_):
-        return inference.Result(PROGRAM, PROGRAM.snap(), {}, "Stopped at once.", (), seconds=0.1)
+    def infer(shape, *, unit, **_):
+        program = in_readable_unit(PROGRAM, unit_of_result(shape, PROGRAM, unit))
+        return inference.Result(program, PROGRAM.snap(), {}, "Stopped at once.", (), seconds=0.1)
 
     monkeypatch.setattr(inference, "infer", infer)
 
@@ -75,7 +76,7 @@ def test_what_is_assumed_of_the_unit_is_told_once_and_where_it_is_unlikely(run: 
         table(tmp_path / f"{name}.obj")
     trimesh.load(tmp_path / "one.obj", force="mesh").apply_scale(450).export(tmp_path / "vast.obj")
     ended = run("infer", "one.obj", "two.obj", "vast.obj", "--unit", "cm", "--no-picture")
-    assert re.findall(r"longest side is (\S+) m", ended.out) == ["2", "900"]
+    assert re.findall(r"longest side is (\S+) m", ended.out) == ["2", "0.9"]
 
 
 def test_meshes_are_exported_in_the_unit_that_is_asked_for(run: Run, tmp_path: Path) -> None:
@@ -141,7 +142,8 @@ def test_tidy_keeps_the_unit_or_takes_another(run: Run, tmp_path: Path) -> None:
     [
         (["infer", "table.obj", "--unit", "furlong"], "--unit: unknown unit 'furlong'"),
         (["infer", "table.obj", "--unit", "cm", "--file-unit", "CM"], "did you mean cm?"),
-        (["infer", "table.obj", "--file-unit", "mm"], "add --unit cm"),
+        (["infer", "table.obj", "--file-unit", "mm", "--unit", "cells"], "add --unit cm"),
+        (["tidy", "legs.shape", "--file-unit", "mm"], "add --unit cm"),
         (["tidy", "legs.shape", "--unit", "cm"], "the size of its cells is unknown"),
         (["export", "legs.shape", "a.scad", "--unit", "cm"], "write its unit at the top"),
         (["export", "mixed.shape", "a.shape", "--unit", "cm"], "n stands for a length in one place"),

@@ -1,11 +1,16 @@
+from pathlib import Path
+
 import numpy as np
 import pytest
 import torch
 import trimesh
 from geometry_helpers import ellipsoid_kind, make_scene, primitives_restored, random_scene
 
+import shapeprog as sp
+from shapeprog.data.random import random_program
 from shapeprog.errors import ShapeProgError
-from shapeprog.geometry.mesh import part_meshes, union_mesh
+from shapeprog.geometry.contacts import contact_groups
+from shapeprog.geometry.mesh import gaps, part_meshes, union_mesh
 from shapeprog.geometry.primitive import primitives
 
 
@@ -91,3 +96,20 @@ def test_a_thin_ring_has_a_mesh_though_it_fills_little_of_its_box():
 def test_a_user_primitive_is_meshed():
     scene = make_scene([ellipsoid_kind(), "cuboid"], [[3.0, 2, 1], [1, 1, 1]], [[0.0, 0, 0], [2, 0, 0]])
     assert trimesh.Trimesh(*union_mesh(scene)).is_watertight
+
+
+def groups(scene, within):
+    """How many groups the primitives of a scene form across gaps of meshes."""
+    group = {slot: slot for slot in np.flatnonzero(scene.mask.numpy()).tolist()}
+    for one, other in gaps(scene, within):
+        group = {slot: group[one] if each == group[other] else each for slot, each in group.items()}
+    return len({*group.values()})
+
+
+def test_groups_of_touching_parts_are_those_of_their_meshes():
+    pieces = sorted((Path(__file__).parents[1] / "examples" / "pieces").glob("*.shape"))
+    programs = [sp.load(path) for path in pieces]
+    programs += [random_program(torch.Generator().manual_seed(seed), blocks=4, copies=6) for seed in range(20)]
+    for program, found in zip(programs, contact_groups(sp.unroll(programs)), strict=True):
+        scene = sp.unroll(program)
+        assert groups(scene, 0.2) <= found <= groups(scene, 0.002)

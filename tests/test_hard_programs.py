@@ -22,6 +22,7 @@ from shapeprog.files import write_text
 from shapeprog.formats import export, load_with_frame, save
 from shapeprog.formats.frames import frame_from, frame_in
 from shapeprog.formats.json_form import program_from_json, read_result, result_json
+from shapeprog.formats.notation import parse_notation
 from shapeprog.formats.parts import crease_normals, parts
 from shapeprog.formats.shape import LARGEST_FILE, read_text
 from shapeprog.language import Draw, Loop, Program, unroll
@@ -29,7 +30,6 @@ from shapeprog.language.parser import parse
 from shapeprog.language.printer import format_program
 from shapeprog.language.text import LONGEST
 from shapeprog.language.unroll import MOST_COPIES
-from shapeprog.liang2022.notation import parse_notation
 from shapeprog.space import Frame
 from shapeprog.view import viewer
 from shapeprog.view.page import scores_text

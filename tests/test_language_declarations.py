@@ -12,6 +12,7 @@ from declared import MODULES
 
 from shapeprog.data.random import random_program
 from shapeprog.errors import DeclarationError, InputError, ShapeProgError
+from shapeprog.formats.notation import format_notation, parse_notation
 from shapeprog.formats.plugins import load_statements
 from shapeprog.geometry import Primitive, Solids, primitives
 from shapeprog.geometry.primitives import built_in_names
@@ -21,7 +22,6 @@ from shapeprog.language.parser import parse
 from shapeprog.language.printer import format_program
 from shapeprog.language.shapes import box
 from shapeprog.language.statement import Motion
-from shapeprog.liang2022.notation import format_notation, parse_notation
 from shapeprog.view.manual import manual
 
 

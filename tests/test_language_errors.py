@@ -8,10 +8,10 @@ import pytest
 
 from shapeprog.errors import InputError, ProgramError, ShapeProgError
 from shapeprog.formats.json_form import program_from_json
+from shapeprog.formats.notation import parse_notation
 from shapeprog.language import Draw, Language, Loop, Program, decode, encode, using
 from shapeprog.language.parser import parse
 from shapeprog.language.printer import format_program
-from shapeprog.liang2022.notation import parse_notation
 
 LEG = "leg(at=(1, 2, 3), size=(1, 2, 3))"
 

@@ -10,12 +10,12 @@ import torch
 import shapeprog as sp
 from shapeprog.errors import DeclarationError, ProgramError, ShapeProgError
 from shapeprog.formats.json_form import program_to_json
+from shapeprog.formats.notation import format_notation, parse_notation
 from shapeprog.geometry.primitive import primitives
 from shapeprog.language import Draw, Language, Loop, Program, decode, encode, language, using
 from shapeprog.language.hints import Box
 from shapeprog.language.parser import parse
 from shapeprog.language.printer import format_program
-from shapeprog.liang2022.notation import format_notation, parse_notation
 
 SIGNS = torch.cartesian_prod(*[torch.tensor([-1.0, 1.0])] * 3)
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 import torch
 from hypothesis import given
@@ -9,6 +11,7 @@ from hypothesis import strategies as st
 from written import written_program
 
 import shapeprog as sp
+from shapeprog.geometry.contacts import TOUCHING, contact_groups
 from shapeprog.language import Draw
 from shapeprog.language.parser import parse
 from shapeprog.language.printer import format_program
@@ -200,3 +203,48 @@ def test_a_plain_program_has_no_parameters() -> None:
     chair = sp.Parametric(parse("leg(at=(0, 0, 0), size=(1, 1, 1))"))
     assert chair.names == ()
     assert torch.equal(chair.at(chair.values).parameters, chair.code.parameters)
+
+
+ROUND_LEGS = """\
+width, depth, height = 20, 10, 24
+leg_height, thickness, inset, legs = 22, 2, 3, 2
+top(top=0, height=thickness)
+for _ in row(legs, last=at(right=inset)):
+    leg(cylinder(left=inset, radius=1, height=leg_height))
+"""
+
+
+def test_names_have_ranges_within_which_parts_touch_and_none_vanishes() -> None:
+    found = {named.name: named for named in sp.names(parse(ROUND_LEGS))}
+    ranges = {name: named.range for name, named in found.items()}
+    assert ranges["leg_height"] == (22, 66)
+    assert ranges["thickness"] == (2, 6)
+    low, high = ranges["height"]
+    assert 0 < low < 1
+    assert high == pytest.approx(24 + TOUCHING, abs=0.05)
+    assert ranges["inset"] == (0, 9)
+    assert ranges["legs"] == (1, 6)
+    assert [named.range for named in sp.names(parse("a = 2\nb = 2 * a\nseat(box(at=(0, 0, 0), size=(a, b, 1)))\n"))][
+        1
+    ] is None
+
+
+def test_ranges_are_in_the_unit_of_the_text() -> None:
+    program = parse(ROUND_LEGS)
+    cells, metres = (
+        {named.name: named.range for named in sp.names(each)}
+        for each in (program, sp.in_unit(program, sp.Unit("m", 0.5)))
+    )
+    for name, (low, high) in cells.items():
+        factor = 1 if name == "legs" else 0.5
+        assert metres[name] == pytest.approx((factor * low, factor * high), rel=1e-3)
+
+
+def test_the_ends_of_ranges_are_programs_in_one_piece() -> None:
+    for path in sorted((Path(__file__).parents[1] / "examples" / "pieces").glob("[cls]*.shape")):
+        program = sp.load(path)
+        for named in sp.names(program):
+            for value in named.range or ():
+                edited = sp.unroll([sp.set(program, {named.name: value})])
+                assert edited.mask.any()
+                assert contact_groups(edited) == [1], (path.name, named.name, value)

@@ -16,12 +16,12 @@ import shapeprog as sp
 from shapeprog.data.random import outside_published, random_program
 from shapeprog.formats import load, save
 from shapeprog.formats.json_form import program_from_json, program_to_json
+from shapeprog.formats.notation import format_notation, parse_notation
 from shapeprog.language import Draw, Loop, Program, Statement, decode, encode, using
 from shapeprog.language.parameters import shortest, to_float32
 from shapeprog.language.parser import parse
 from shapeprog.language.placement import BETWEEN, BOX, GROUPS, IN_BOX
 from shapeprog.language.printer import format_program
-from shapeprog.liang2022.notation import format_notation, parse_notation
 from shapeprog.view.manual import manual, page
 
 

@@ -13,6 +13,7 @@ from written import written_program
 
 import shapeprog as sp
 from shapeprog.data.random import random_program
+from shapeprog.formats.notation import format_notation, parse_notation
 from shapeprog.language import Program, evaluated, language
 from shapeprog.language.ast import Assignment, Draw, Line, Source
 from shapeprog.language.dimensions import in_unit, lengths
@@ -22,7 +23,6 @@ from shapeprog.language.parser import parse
 from shapeprog.language.printer import format_program, source_of
 from shapeprog.language.program import Loop
 from shapeprog.language.unit import METRES, Unit
-from shapeprog.liang2022.notation import format_notation, parse_notation
 from shapeprog.space import Frame
 
 CHAIR = """\

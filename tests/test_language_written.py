@@ -12,12 +12,12 @@ from written import written_program
 import shapeprog as sp
 from shapeprog.errors import ProgramError, ShapeProgError
 from shapeprog.formats.json_form import program_from_json, program_to_json
+from shapeprog.formats.notation import format_notation, parse_notation
 from shapeprog.language import Program, evaluated
 from shapeprog.language.ast import Assignment, Call, Comment, Draw, Function, Loop, Source
 from shapeprog.language.expression import Binary, Expression, Linear, Name, Negative, combined
 from shapeprog.language.parser import parse
 from shapeprog.language.printer import format_program
-from shapeprog.liang2022.notation import format_notation, parse_notation
 
 CHAIR = """\
 # A chair of one board and four legs.

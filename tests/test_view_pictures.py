@@ -318,6 +318,17 @@ def test_numbers_of_a_program_in_a_unit_are_dragged_in_it(tmp_path: Path):
     assert content["lines"][0]["before"] == "# unit: m, 0.04 per cell"
 
 
+def test_sliders_end_where_parts_come_apart():
+    program = parse(
+        "width, depth, height = 20, 10, 24\nleg_height, thickness = 22, 4\n"
+        "top(top=0, height=thickness)\nleg(left=0, width=2, height=leg_height)\n"
+    )
+    found = {slider.name: slider for slider in sliders(program, parts(program))}
+    assert (found["leg_height"].low, found["leg_height"].high) == pytest.approx((20, 33), abs=0.5)
+    assert (found["thickness"].low, found["thickness"].high) == pytest.approx((2, 6), abs=0.1)
+    assert (found["width"].low, found["width"].high) == pytest.approx((10, 30))
+
+
 def test_listing_shows_the_unit_and_as_many_decimals_as_it_needs():
     text = "box(at=(0.123456, 0, 0), size=(1, 1, 2.00004))"
     for head, number in (("", "0.12"), ("cm, 3.75", "0.12"), ("mm, 37.5", "0.1"), ("m, 0.0375", "0.1235")):

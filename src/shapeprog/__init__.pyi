@@ -5,6 +5,7 @@ from .data.shape import Shape
 from .errors import InputError, OutputError, ProgramError, ShapeProgError
 from .formats.files import export, load, load_with_frame, save
 from .formats.json_form import program_from_json, program_to_json
+from .formats.notation import format_notation, parse_notation
 from .formats.plugins import load_statements
 from .geometry.losses import chamfer, coverage
 from .geometry.scene import Scene
@@ -24,7 +25,6 @@ from .language.statement import loop, statement, using
 from .language.tensors import Code, decode, encode
 from .language.unit import Unit
 from .language.unroll import unroll
-from .liang2022.notation import format_notation, parse_notation
 from .library import Library, learn, load_library, save_library, with_library
 from .space import Frame
 

@@ -13,7 +13,7 @@ import typer
 
 from shapeprog.cli import terminal
 from shapeprog.cli.terminal import about_program, about_search
-from shapeprog.cli.units import LARGE, AsUnit, FileUnit, asked_unit, assumed, check_units
+from shapeprog.cli.units import AsUnit, FileUnit, assumed, check_units
 from shapeprog.errors import InputError, OutputError, ShapeProgError
 from shapeprog.inference.budget import BUDGET, Progress
 
@@ -85,13 +85,13 @@ def infer_command(options: InferOptions) -> None:
     from shapeprog.inference.results import document
 
     terminal.check_axes(options.up, options.front)
-    check_units(options.unit, options.file_unit)
+    check_units(options.unit, options.file_unit, needed=False)
     _prepare(options)
     infer_one = _inference(options)
     folder, console = make_folder(options.out), terminal.output()
     failures: list[tuple[Path, ShapeProgError]] = []
     stopped: OutputError | None = None
-    written = 0
+    written, units = 0, set[str]()
     try:
         for path, outcome in _results(options, infer_one, folder):
             if isinstance(outcome, ShapeProgError):
@@ -102,7 +102,7 @@ def infer_command(options: InferOptions) -> None:
                 report = {"name": outcome.shape.name, "folder": str(folder), "seconds": outcome.result.seconds}
                 terminal.print_json(report | json.loads(document(outcome.result, outcome.shape)))
             elif options.talks:
-                _report(console, outcome, options, written == 1)
+                _report(console, outcome, options, units)
     except OutputError as error:
         stopped = error  # a disk that took nothing now takes nothing later
     except KeyboardInterrupt:
@@ -137,6 +137,7 @@ def _results(
                 yield path, shape
                 continue
             try:
+                shape = replace(shape, unit=options.file_unit or "")
                 result = infer_one(shape, begin(shape.name))
                 stem = results.free_stem(shape, stems, folder)
                 names = results.write(result, shape, folder, stem)
@@ -167,27 +168,25 @@ def _prepare(options: InferOptions) -> None:
 def _inference(options: InferOptions) -> Inference:
     """Inference with the options of the command, which are checked before the first shape is read."""
     from shapeprog.inference import Result, Settings, greedy_boxes, infer
-    from shapeprog.inference.readable import in_readable_unit
+    from shapeprog.inference.readable import in_readable_unit, unit_of_result
     from shapeprog.inference.results import measured
 
     settings = None if options.rounds is None else Settings(rounds=options.rounds)
     libraries = terminal.load_libraries(options.modules, options.library)
 
     def infer_one(shape: Shape, progress: Progress) -> Result:
-        started = time.monotonic()
         if options.baseline:
+            started = time.monotonic()
             boxes = greedy_boxes(shape.voxels, options.blocks).snap()
             reason = "Greedy boxes: one box per drawing statement, without search."
-            result = Result(boxes, boxes, {}, reason, (), time.monotonic() - started)
+            program = in_readable_unit(boxes, unit_of_result(shape, boxes, options.unit or ""), options.seed)
+            result = Result(program, boxes, {}, reason, (), time.monotonic() - started)
         else:
             result = infer(
                 shape, blocks=options.blocks, budget=options.budget, seed=options.seed, settings=settings,
                 statements="paper" if options.paper else "all", detail=options.detail, ties=not options.no_ties,
-                libraries=libraries, progress=progress,
+                libraries=libraries, unit=options.unit or "", progress=progress,
             )  # fmt: skip
-        if options.unit is not None:
-            unit = asked_unit(None, shape.frame, shape.name, options.unit, options.file_unit)
-            result = replace(result, program=in_readable_unit(result.program, unit))
         return measured(result, shape, options.seed)
 
     return infer_one
@@ -197,10 +196,10 @@ def _kept(written: int, folder: Path) -> str:
     return f"finished results are kept: {written} program{'s' if written != 1 else ''} in {folder}"
 
 
-def _report(console: Any, written: Written, options: InferOptions, first: bool) -> None:
+def _report(console: Any, written: Written, options: InferOptions, units: set[str]) -> None:
+    """Print a result; ``units`` are those that have been assumed, each of which is reported once."""
     from shapeprog.data.orientation import default_axes
     from shapeprog.data.placement import SCAN
-    from shapeprog.space import SPAN
     from shapeprog.view.page import scores_text
 
     shape, result, names = written
@@ -212,10 +211,10 @@ def _report(console: Any, written: Written, options: InferOptions, first: bool) 
         note = f"The format does not store the up axis: {default_axes(shape.source)[0]} is assumed."
         console.print(f"{note} Another axis: --up +y, or --up auto", style="dim")
     terminal.print_program(console, result.program)
-    side = SPAN * shape.frame.scale
-    named = result.program.unit is not None and result.program.unit.name
-    if named and options.file_unit is None and (first or side > LARGE):
-        console.print(assumed(side), style="dim")
+    unit = shape.file_unit or "m"
+    if result.program.unit and result.program.unit.name and not shape.states_unit and unit not in units:
+        units.add(unit)
+        console.print(assumed(shape.frame, unit), style="dim")
     for line in scores_text(result.scores | {"seconds": result.seconds}, result.program):
         console.print(line, style="dim")
     console.print(result.reason, style="dim")

@@ -38,9 +38,7 @@ def tidy_command(
     from shapeprog.inference.readable import in_readable_unit
     from shapeprog.inference.ties.tying import tie
     from shapeprog.language.ast import Function
-    from shapeprog.language.convert import in_cells, placed_if_possible
     from shapeprog.language.free import numbers
-    from shapeprog.language.merging import merged
     from shapeprog.library import with_library
 
     check_units(unit, file_unit)
@@ -53,9 +51,7 @@ def tidy_command(
         cure = "tidy is for programs of plain numbers; edit this one by hand"
         raise InputError(f"{program} has groups or functions already, which tidy would write out", cure)
     wanted = asked_unit(given.unit, frame, program, unit, file_unit)
-    result = in_cells(given)
-    result = tie(result, evidence_of_program(result, seed), price=price, known=True, seed=seed).program
-    result = placed_if_possible(merged(result))
+    result = tie(given, evidence_of_program(given, seed), price=price, known=True, seed=seed).program
     for each in libraries:
         result = with_library(result, each)
     result = in_readable_unit(result, wanted, seed)

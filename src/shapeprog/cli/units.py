@@ -14,15 +14,15 @@ if TYPE_CHECKING:
 
 CELLS = "cells"
 
-LARGE = 10.0  # metres from which furniture is more likely to be in another unit
-
 AsUnit = Annotated[
     str | None,
-    about_program("--unit", metavar="UNIT", help="Unit of lengths: mm, cm, m, in, or cells (24 = the longest side)."),
+    about_program(
+        "--unit", metavar="UNIT", help="mm, cm, m, in, or cells (24 = the longest side). Default: that of the input."
+    ),
 ]
 FileUnit = Annotated[
     str | None,
-    about_input("--file-unit", metavar="UNIT", help="Unit of the input file: mm, cm, m or in. Default: m, as in glTF."),
+    about_input("--file-unit", metavar="UNIT", help="Unit of the input file: mm, cm, m or in. Default: m, up to 10 m."),
 ]
 
 
@@ -40,10 +40,15 @@ def check_units(unit: str | None, file_unit: str | None, needed: bool = True) ->
         raise InputError("--file-unit has no effect on lengths in cells", "add --unit cm")
 
 
-def assumed(side: float) -> str:
-    """What is assumed of the unit of an input whose longest side is ``side``."""
-    message = f"The unit of the file is assumed to be m, so that the longest side is {side:.3g} m."
-    return f"{message} Another unit: --file-unit mm"
+def assumed(frame: Frame, unit: str = "") -> str:
+    """What is assumed of the unit of an input with a frame; ``unit`` where it does not follow from its size."""
+    from shapeprog.language.unit import assumed_unit, metres
+    from shapeprog.space import SPAN
+
+    longest = SPAN * frame.scale
+    unit = unit or assumed_unit(longest)
+    message = f"The unit of the file is assumed to be {unit}, so that the longest side is"
+    return f"{message} {longest * metres(unit):.3g} m. Another unit: --file-unit {'cm' if unit == 'mm' else 'mm'}"
 
 
 def asked_unit(
@@ -62,4 +67,4 @@ def asked_unit(
     if frame is None:
         message = f"cannot write {path} in {unit}: the size of its cells is unknown"
         raise InputError(message, "infer it with --unit, or add its size at the top, as in '# unit: cm, 3.75 per cell'")
-    return Unit.of(frame, unit, file_unit or "m")
+    return Unit.of(frame, unit, file_unit or "")

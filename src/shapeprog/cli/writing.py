@@ -10,7 +10,7 @@ import typer
 
 from shapeprog.cli import terminal
 from shapeprog.cli.terminal import about_input
-from shapeprog.cli.units import LARGE, AsUnit, FileUnit, asked_unit, assumed, check_units
+from shapeprog.cli.units import AsUnit, FileUnit, asked_unit, assumed, check_units
 from shapeprog.errors import InputError, OutputError, ShapeProgError
 from shapeprog.formats.format import format_of, program_suffixes, suffixes
 
@@ -57,13 +57,14 @@ def export_command(
 ) -> None:
     """Export a program as a mesh, CAD file, voxels, points, or in another program format.
 
-    Example: shapeprog export chair.shape tall.stl tall.scad --set leg_height=14
+    Example: shapeprog export chair.shape tall.stl tall.scad --set leg_height=58
 
     .stl, .3mf, .scad, .py and .step are in millimetres, z up, on the floor; .glb is in metres, y up. If the program
     file stores its frame (all files by infer do), .glb, .obj and .ply lie on the input. --unit, --up, --on-input and
     --upright change that. A .csv is a cut list, which is printed too. --set uses the unit of the program file.
     """
     from shapeprog.formats import export
+    from shapeprog.language.unit import MOST_METRES
     from shapeprog.space import SPAN
 
     check_units(unit, file_unit, needed=False)
@@ -76,8 +77,8 @@ def export_command(
     loaded, frame = terminal.read_program_file(program, changes)
     unknown = loaded.unit is None or not loaded.unit.name
     makers = any(chosen.maker for path in outputs if (chosen := format_of(path)) is not None)
-    if frame is not None and unknown and makers and not (file_unit or quiet) and SPAN * frame.scale > LARGE:
-        terminal.errors().print(assumed(SPAN * frame.scale), style="dim", markup=False)
+    if frame is not None and unknown and makers and not (file_unit or quiet) and SPAN * frame.scale > MOST_METRES:
+        terminal.errors().print(assumed(frame), style="dim", markup=False)
     failures: list[ShapeProgError] = []
     for path in outputs:
         written = loaded

@@ -18,6 +18,7 @@ from shapeprog.data.reading import BYTES, POINTS, check_count, check_file, in_wo
 from shapeprog.data.shape import Shape
 from shapeprog.data.uprightness import find_up
 from shapeprog.errors import InputError, ShapeProgError
+from shapeprog.language.unit import metres
 from shapeprog.space import Array
 
 ARRAY_SUFFIXES = frozenset({".xyz", ".npy", ".npz", ".h5", ".hdf5"})
@@ -31,6 +32,7 @@ def load(
     front: str | None = None,
     points: int = 5000,
     seed: int = 0,
+    unit: str = "",
 ) -> Shape:
     """The shape in a file, centred in the grid with its longest side 24 cells, and the way back.
 
@@ -47,12 +49,18 @@ def load(
         How many points to draw from a mesh, or to keep of a cloud, at most.
     seed
         Seed of that choice.
+    unit
+        Unit of the coordinates of the file, such as ``mm``, where it is known.
 
     Raises
     ------
     InputError
         If there is no such file, or it cannot be read as a shape.
+    ShapeProgError
+        If there is no such unit.
     """
+    if unit:
+        metres(unit)
     file, index = _split_index(path)
     held = _open(file, up, front, points, seed)
     if index is None:
@@ -61,8 +69,8 @@ def load(
                 f"{file.name} holds {len(held)} shapes",
                 f"choose one, as in {file.name}#0, or read them all with load_all",
             )
-        return held[0]
-    return held[_number(file, index, held)]
+        return replace(held[0], unit=unit)
+    return replace(held[_number(file, index, held)], unit=unit)
 
 
 load_shape = load  # its name in ``shapeprog``, whose ``load`` reads programs

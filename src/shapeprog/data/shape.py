@@ -9,7 +9,11 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from shapeprog.space import Frame
+from shapeprog.language.unit import MOST_METRES, assumed_unit
+from shapeprog.space import SPAN, Frame
+
+IN_METRES, IN_MILLIMETRES = (".glb", ".gltf"), (".stl", ".3mf")
+"""Suffixes of formats whose unit is the metre by definition, and the millimetre by convention."""
 
 
 @dataclass(frozen=True)
@@ -38,6 +42,8 @@ class Shape:
         train, val or test, if its pack has splits.
     note
         A sentence on the estimated up axis, if it was estimated.
+    unit
+        Unit of its file where somebody has named it: ``mm``, ``cm``, ``m`` or ``in``; else empty.
     """
 
     name: str
@@ -51,3 +57,23 @@ class Shape:
     kind: Literal["mesh", "points", "voxels"] = "voxels"
     split: str = ""
     note: str = ""
+    unit: str = ""
+
+    @property
+    def file_unit(self) -> str:
+        """Unit of its file: the one that was named, that of the format, or one assumed where the shape would be more
+        than 10 m long in metres; empty if it is not known."""
+        if self.unit:
+            return self.unit
+        if (longest := SPAN * self.frame.scale) > MOST_METRES:
+            return "mm" if self._suffix in IN_MILLIMETRES else assumed_unit(longest)
+        return "m" if self._suffix in IN_METRES else ""
+
+    @property
+    def states_unit(self) -> bool:
+        """Whether that unit is neither assumed nor unknown."""
+        return bool(self.unit) or (self._suffix in IN_METRES and self.file_unit == "m")
+
+    @property
+    def _suffix(self) -> str:
+        return "" if self.source is None else self.source.suffix.lower()

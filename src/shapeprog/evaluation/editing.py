@@ -7,12 +7,17 @@ Symmetry
     on it falls by 1 % or less.
 One piece
     Whether a program that is one connected solid still is.
+Names
+    Whether a program that is one connected solid still is, and all of its parts are there, with .7 and with 1.4 of the
+    value of a free name.
 
-All are means over the edits; symmetry and one piece are not a number where the program did not have them to begin with.
+All are means, over the edits or over the names; symmetry, one piece and names are not a number where the program did
+not have them to begin with.
 """
 
 from __future__ import annotations
 
+from collections.abc import Set
 from itertools import product
 from typing import NamedTuple
 
@@ -25,12 +30,16 @@ from shapeprog.geometry.mesh import gaps, pieces, union_mesh
 from shapeprog.geometry.scene import Scene
 from shapeprog.geometry.surface import sample_surface
 from shapeprog.language.free import free_numbers, multiplied
+from shapeprog.language.named import names, set
 from shapeprog.language.program import Program
 from shapeprog.language.unroll import unroll
 from shapeprog.space import SIDE
 
 FACTORS = (1.2, 0.8)
 """What free numbers are multiplied by."""
+
+OF_NAMES = (0.7, 1.4)
+"""What free names are multiplied by."""
 
 TOUCHING = 0.1
 """Cells between two primitives that touch, at most."""
@@ -50,6 +59,7 @@ class EditScores(NamedTuple):
     symmetry: float
     one_piece: float
     free: int
+    names: float
 
 
 def edit_scores(program: Program) -> EditScores:
@@ -74,15 +84,29 @@ def edit_scores(program: Program) -> EditScores:
     contacts, symmetry, pieces_kept = (
         float(np.nanmean(column)) if np.isfinite(column).any() else float("nan") for column in scores.T
     )
-    return EditScores(contacts, symmetry, pieces_kept, free)
+    kept = _names_kept(program, before) if one_solid else float("nan")
+    return EditScores(contacts, symmetry, pieces_kept, free, kept)
 
 
-def _contacts(scene: Scene) -> set[tuple[int, int]]:
+def _names_kept(program: Program, before: Scene) -> float:
+    kept = []
+    for named in [named for named in names(program) if named.free]:
+        try:
+            scenes = [unroll(set(program, {named.name: factor * named.value})) for factor in OF_NAMES]
+        except ShapeProgError:  # such as a negative size
+            kept.append(False)
+            continue
+        drawn = named.whole or all(scene.mask.sum() >= before.mask.sum() for scene in scenes)
+        kept.append(drawn and all(map(_one_piece, scenes)))
+    return float(np.mean(kept)) if kept else float("nan")
+
+
+def _contacts(scene: Scene) -> Set[tuple[int, int]]:
     """Pairs of slots whose primitives touch."""
     try:
-        return set(gaps(scene, TOUCHING))
+        return gaps(scene, TOUCHING).keys()
     except ShapeProgError:  # a part lies too far away to be measured
-        return set()
+        return frozenset()
 
 
 def _mirrored(scene: Scene) -> float:

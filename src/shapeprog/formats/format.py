@@ -88,7 +88,7 @@ FORMATS = (
     Format("JSON", "program", (".json",), None, "the text with a list of the solids that it draws, for other programs",
         reader="json_form:read_json", writer="json_form:write_json"),
     Format("notation", "program", (".notation",), None, "the same in the notation of the paper",
-        reader="shapeprog.liang2022.notation:read_notation", writer="shapeprog.liang2022.notation:write_notation"),
+        reader="notation:read_notation", writer="notation:write_notation"),
     Format("plain text", "program", (".txt",), None, "program text under another suffix",
         reader="shape:read_shape"),
     Format("GLB", "solid", (".glb",), Y_UP, "one named node per part, coloured by statement",
@@ -153,4 +153,4 @@ def listed() -> str:
 
 
 def _function(location: str) -> Any:
-    return pkgutil.resolve_name(location if "." in location else f"shapeprog.formats.{location}")
+    return pkgutil.resolve_name(f"shapeprog.formats.{location}")

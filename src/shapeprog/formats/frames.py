@@ -34,8 +34,8 @@ from shapeprog.language.evaluate import placed_source
 from shapeprog.language.placement import LONGEST_SIDE
 from shapeprog.language.program import Program
 from shapeprog.language.text import Text
-from shapeprog.language.unit import METRES, metres
-from shapeprog.space import Array, FloatArray, Frame, grid_axes
+from shapeprog.language.unit import METRES, assumed_unit, metres
+from shapeprog.space import SPAN, Array, FloatArray, Frame, grid_axes
 
 CELLS = "cells"  # the word for lengths in cells
 
@@ -51,7 +51,7 @@ _ENTRIES = re.compile(
 _PLACED_CURE = "write it as # placed: up y, front z, origin 0 0.5 0, 1 unit = 1, or remove it"
 
 _ALIGNED = 1e-9  # largest difference of the axes of a frame from those of the input where they are written by name
-_ROUNDED = 1e-8  # share of the longest side by which the frame of a placed text is rounded
+_ROUNDED = 1e-7  # share of the longest side by which the frame of a placed text is rounded
 
 _GRID = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
 """Directions x, y, z of a text in the axes of the grid, as columns."""
@@ -90,7 +90,8 @@ def placement(
     unit
         Unit of the coordinates of the file: ``mm``, ``cm``, ``m``, ``in`` or ``cells``; empty for that of the format.
     file_unit
-        Unit of the coordinates of the input, metres by default.
+        Unit of the coordinates of the input; by default metres, or millimetres or centimetres if it would be larger
+        than 10 m.
     up
         Axis of the file that points up: ``x``, ``y`` or ``z``; empty for that of the format, or of the input.
     on_input
@@ -135,7 +136,7 @@ def _cell_size(chosen: Format, program: Program, frame: Frame | None, unit: str,
     if not wanted:
         return per_cell, known
     if frame is not None and (file_unit or not known):
-        return frame.scale * metres(file_unit or "m") / metres(wanted), wanted
+        return frame.scale * metres(file_unit or assumed_unit(SPAN * frame.scale)) / metres(wanted), wanted
     if known:
         return per_cell * (metres(known) / metres(wanted)), wanted
     if unit:
@@ -214,11 +215,11 @@ def frame_comment(frame: Frame | None, program: Program | None = None) -> str:
     axes, step = np.asarray(text.axes), _ROUNDED * text.scale * LONGEST_SIDE / read.cells_per_unit
     if np.abs(axes - np.rint(axes)).max() > _ALIGNED or not 1e-300 < step < 1e300:
         return frame_comment(frame_of_grid(text, read))
-    size = f"{text.scale:.8g}"
-    for name, length in METRES.items():
-        factor = METRES.get(source.unit.name if source.unit else "", 0.0) / length
+    size, own = f"{text.scale:.8g}", source.unit.name if source.unit else ""
+    factors = {name: METRES[own] / length for name, length in METRES.items()} if own else {"": 1.0}
+    for name, factor in factors.items():
         if math.isclose(factor, text.scale, rel_tol=2e-7):
-            size = f"{factor:.8g} {name}"
+            size = f"{factor:.8g} {name}".rstrip()
     digits = -math.ceil(math.log10(step))
     origin = " ".join(f"{round(value, digits) + 0.0:.15g}" for value in text.centre)
     up, front = _axis_name(axes[:, 2]), _axis_name(-axes[:, 1])

@@ -27,8 +27,9 @@ from shapeprog.geometry.distance import nearest_primitive
 from shapeprog.inference.assembly import TradeOff, assemble
 from shapeprog.inference.blocks import to_program
 from shapeprog.inference.budget import BUDGET, Deadline, Progress
-from shapeprog.inference.calls import recognised, relations
+from shapeprog.inference.calls import recognised
 from shapeprog.inference.cell_coverage import cost_on_cells
+from shapeprog.inference.readable import CELLS, in_readable_unit, unit_of_result
 from shapeprog.inference.refine import REACH, Schedule, refine
 from shapeprog.inference.roles import named_anew
 from shapeprog.inference.structure import Settings, search_structure
@@ -38,6 +39,7 @@ from shapeprog.language.convert import placed_if_possible
 from shapeprog.language.free import numbers
 from shapeprog.language.merging import merged
 from shapeprog.language.program import Program
+from shapeprog.language.unit import metres
 from shapeprog.language.unroll import unroll
 from shapeprog.library import Library, with_library
 
@@ -111,6 +113,7 @@ def infer(
     detail: float = 1.0,
     ties: bool = True,
     libraries: Sequence[Library] = (),
+    unit: str = "",
     progress: Progress | None = None,
 ) -> Result:
     """A short program of at most ``blocks`` blocks that rebuilds a shape.
@@ -143,6 +146,9 @@ def infer(
     libraries
         Functions that the program is written with wherever that is shorter, unless it has the paper's statements alone.
         What they draw competes with single blocks, at the price of a call, and a call counts as one block.
+    unit
+        Unit of the lengths of the program: ``mm``, ``cm``, ``m``, ``in`` or ``cells``; by default that of the file, and
+        cells for voxels.  The numbers are rounded as a person would, by which nothing moves farther than .015 cells.
     progress
         Called with what is being done and the share of it that is done.
 
@@ -150,7 +156,11 @@ def infer(
     ------
     InputError
         If the path is no readable shape.
+    ShapeProgError
+        If there is no such unit.
     """
+    if unit not in ("", CELLS):
+        metres(unit)
     prepare_kernels()
     started = time.monotonic()
     searching, refining = (Deadline(started + share * budget) for share in (SEARCH_SHARE, 1.0))
@@ -185,7 +195,7 @@ def infer(
             scores["explained"] = found.explained
             reason = found.reason[0].upper() + found.reason[1:]
             if ties:
-                held = relations(program, calls) if (calls := recognised(program, libraries)) else None
+                held = {index for call in recognised(program, libraries) for index in call.places}
                 tied = tie(program, found.evidence, held=held, seed=seed, progress=progress).program
                 fits = target.points is not None or costs(tied) <= costs(program)
                 program = tied if fits else program
@@ -197,6 +207,7 @@ def infer(
         program = placed_if_possible(merged(program))
         for library in libraries:
             program = with_library(program, library)
+    program = in_readable_unit(program, unit_of_result(target, program, unit), seed)
     if target.note:
         reason += f" {target.note}"
     cut = tuple(each.cut for each in (searching, refining) if each.cut)

@@ -1,30 +1,72 @@
-"""Programs in a unit with the decimals that a person expects, ``45.2`` for ``45.187``: as few as the parts allow."""
+"""Programs in a unit, with numbers as round as a person would write them: ``34`` for ``33.99``.
+
+The numbers are rounded one after another, each to the fewest decimals with which no face of any part is farther than a
+tolerance from where it was before all rounding.
+"""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
+import torch
+from jaxtyping import Float
+from torch import Tensor
+
+from shapeprog.data.shape import Shape
+from shapeprog.errors import ShapeProgError
 from shapeprog.inference.connecting import afloat
-from shapeprog.language.dimensions import in_unit
-from shapeprog.language.program import Loop, Program
-from shapeprog.language.statement import language
+from shapeprog.inference.tunable import bounds
+from shapeprog.language.dimensions import in_unit, literal_lengths
+from shapeprog.language.parameters import to_float32
+from shapeprog.language.program import Program
+from shapeprog.language.tensors import encode
 from shapeprog.language.unit import Unit
+from shapeprog.language.unroll import unroll
 
-COARSE, DRIFT = 0.03, 0.2
-"""What the last decimal of a length is worth at most, in cells; times the copies of a loop that it moves."""
+TOLERANCES = (0.015, 0.004, 0.001)
+"""How far a face may move, in cells; the smaller ones where parts come apart, and for programs in cells."""
 
-FINER = 3
-"""How many decimals more are tried where parts come apart."""
+STEPS = (0.5, 1.0)
+"""Shares of that in two rounds: numbers that are nearly round go first."""
+
+SHARE = 0.03
+"""Share of itself by which a number may change, so that thin parts keep their thickness."""
+
+FINER = 2
+"""Decimals that are tried beyond those that suffice for one number alone."""
 
 MOST = 256
-"""Most primitives of which it is looked at whether they come apart."""
+"""Most primitives of a program that is rounded."""
+
+CELLS = "cells"
+"""The word for lengths in cells of the grid."""
+
+
+def unit_of_result(shape: Shape, program: Program, name: str = "") -> Unit | None:
+    """The unit in which a program that was inferred from a shape is written.
+
+    Parameters
+    ----------
+    name
+        Name of the unit, or ``cells``; empty for that of the file, which may have no name.  Voxels, and statements
+        in cells, are then left in cells unless somebody has named the unit of the file.
+    """
+    if name == CELLS:
+        return None
+    if name:
+        return Unit.of(shape.frame, name, shape.file_unit)
+    placed = program.source is not None and program.source.placed
+    if not shape.unit and (not placed or shape.kind == "voxels"):
+        return None
+    return Unit(shape.file_unit, shape.frame.scale)
 
 
 def in_readable_unit(program: Program, unit: Unit | None, seed: int = 0) -> Program:
-    """The program with its lengths in a unit, or in cells, rounded as coarsely as a person expects.
+    """The program with its lengths in a unit, or in cells, rounded as a person would.
 
-    A number moves by no more than .015 cells, and the copies of a loop by .1; where parts would come apart, lengths
-    keep more decimals.  A program in this unit is left as it is.
+    No number and no face moves by more than .015 cells; where parts would come apart, by less.  A program in this
+    unit is left as it is.
 
     Raises
     ------
@@ -33,20 +75,49 @@ def in_readable_unit(program: Program, unit: Unit | None, seed: int = 0) -> Prog
     """
     if program.unit == unit:
         return program
-    fewest, apart = _decimals(program, 1.0 if unit is None else unit.per_cell), _floating(program, seed)
-    for digits in range(fewest, fewest + FINER):
-        found = in_unit(program, unit, digits=digits)
-        if _floating(found, seed) <= apart:
-            return found
-    return in_unit(program, unit)
+    exact = in_unit(program, unit)
+    if not 0 < exact.size <= MOST:
+        return exact
+    apart = afloat(program, seed)
+    for tolerance in TOLERANCES[unit is None :]:
+        result = _rounded(exact, tolerance)
+        if afloat(result, seed) <= apart:
+            return result
+    return exact
 
 
-def _decimals(program: Program, per_cell: float) -> int:
-    loops = (node for node in program.walk() if isinstance(node, Loop))
-    moved = (loop.count - 1 for loop in loops if any(q.kind == "shift" for q in language()[loop.name].quantities))
-    return max(0, math.ceil(-math.log10(per_cell * min(COARSE, DRIFT / max(1, *moved, 1)))))
+def _rounded(program: Program, tolerance: float) -> Program:
+    given, with_numbers = literal_lengths(program)
+    numbers, before = [*given], _faces(program)
+    per_cell = 1.0 if program.unit is None else program.unit.per_cell
+    for step in STEPS:
+        for place, number in enumerate(given):
+            for tried in _rounder(number, min(step * tolerance * per_cell, SHARE * abs(number))):
+                if tried == numbers[place]:
+                    break
+                try:
+                    result = with_numbers([*numbers[:place], tried, *numbers[place + 1 :]])
+                    near = float((_faces(result) - before).abs().max()) <= step * tolerance
+                except ShapeProgError:  # something has no size any more
+                    continue
+                if near:
+                    program, numbers[place] = result, tried
+                    break
+    return program
 
 
-def _floating(program: Program, seed: int) -> int:
-    """How many blocks hang together with the others by nothing."""
-    return afloat(program, seed) if program.size <= MOST else 0
+def _rounder(number: float, farthest: float) -> Iterator[float]:
+    """Numbers near one, those with the fewest decimals first."""
+    fewest, most = (-math.floor(math.log10(each)) for each in (abs(number), farthest))
+    for digits in range(fewest - 1, most + FINER):
+        nearest, step = round(number, digits), math.copysign(10.0**-digits, number - round(number, digits))
+        for tried in (to_float32(nearest), to_float32(round(nearest + step, digits))):
+            if abs(tried - number) <= farthest:
+                yield tried
+
+
+def _faces(program: Program) -> Float[Tensor, "N 2 3"]:
+    """The lowest and highest corners of the boxes around the primitives of a program, along the axes of the grid."""
+    scene = unroll(encode(program, dtype=torch.float64))
+    reach = (scene.rotation.abs() @ bounds(scene)[..., None])[..., 0]
+    return torch.stack([scene.centre - reach, scene.centre + reach], 1)

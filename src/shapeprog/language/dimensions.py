@@ -7,7 +7,7 @@ in products, powers of length add up.  Lengths are rescaled when a program is wr
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from typing import Literal, NamedTuple, TypeAlias
 
@@ -149,11 +149,43 @@ def in_unit(program: Program, unit: Unit | None, *, digits: int | None = None) -
             return to_float32(float(f"{new:.{DIGITS}g}"))
         return to_float32(round(new, max(digits, FEWEST - 1 - math.floor(math.log10(abs(new))))))
 
-    result = Source(_Powers(source).changed(source.lines, change), unit)
-    if source.placed:
-        height = result.evaluated_numbers()["height"]
-        result = replace(result, scale=Scale(1 / after, -height / after / 2))
-    return evaluated(result)
+    return _scaled(Source(_Powers(source).changed(source.lines, change), unit, source.scale))
+
+
+def literal_lengths(program: Program) -> tuple[list[float], Callable[[Sequence[float]], Program]]:
+    """The numbers in the text of a program that are lengths, without zeros, and the program as a function of them.
+
+    Raises
+    ------
+    ShapeProgError
+        As for :func:`in_unit`.
+    """
+    source, numbers = source_of(program), list[float]()
+    powers = _Powers(source)
+
+    def noted(number: float, power: float) -> float:
+        numbers.extend([number] * _is_length(number, power))
+        return number
+
+    def with_numbers(values: Sequence[float]) -> Program:
+        new = iter(values)
+        lines = powers.changed(source.lines, lambda old, power: next(new) if _is_length(old, power) else old)
+        return _scaled(replace(source, lines=lines))
+
+    powers.changed(source.lines, noted)
+    return numbers, with_numbers
+
+
+def _is_length(number: float, power: float) -> bool:
+    return power == 1 and number != 0
+
+
+def _scaled(source: Source) -> Program:
+    """The program of a syntax tree whose unit or sizes have changed: a cell is as large as its unit has it."""
+    if source.placed and source.unit is not None:
+        cells = 1 / source.unit.per_cell
+        source = replace(source, scale=Scale(cells, -source.evaluated_numbers()["height"] * cells / 2))
+    return evaluated(source)
 
 
 def lengths(program: Program) -> frozenset[str]:

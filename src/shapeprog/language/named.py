@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from functools import cache, partial
 
 from shapeprog.errors import ShapeProgError, did_you_mean
 from shapeprog.language.ast import Assignment, Fault, Line, Source
@@ -13,6 +14,7 @@ from shapeprog.language.expression import names_in, text_of
 from shapeprog.language.parameters import LARGEST, to_float32
 from shapeprog.language.printer import printed
 from shapeprog.language.program import Program
+from shapeprog.language.ranges import Number, ranges
 
 
 @dataclass(frozen=True)
@@ -29,6 +31,8 @@ class Named:
         Whether it depends on no other name, so that it can be set.
     whole
         Whether it is a number of copies or of quarter turns.
+    ranges
+        Finds the ranges of all free names.
     """
 
     name: str
@@ -36,6 +40,13 @@ class Named:
     text: str
     free: bool
     whole: bool
+    ranges: Callable[[], Mapping[str, tuple[float, float]]] = field(default=dict, compare=False, repr=False)
+
+    @property
+    def range(self) -> tuple[float, float] | None:
+        """The lowest and the highest value, up to three times the present one, with which the parts hang together and
+        none vanishes, while all other names are as they are; ``None`` unless it is free.  Takes a moment."""
+        return self.ranges().get(self.name)
 
 
 def inline(program: Program) -> Program:
@@ -54,10 +65,16 @@ def names(program: Program) -> list[Named]:
         return []
     numbers = program.source.evaluated_numbers()
     counted = Counts(program.source).outside
-    return [
-        Named(name, numbers[name], text_of(value), not names_in(value), name in counted)
-        for name, value in program.source.numbers.items()
-    ]
+    result: list[Named] = []
+
+    @cache
+    def found() -> dict[str, tuple[float, float]]:
+        free = [Number(named.name, named.value, named.whole) for named in result if named.free]
+        return ranges(program, free, partial(_edited, program))
+
+    for name, value in program.source.numbers.items():
+        result.append(Named(name, numbers[name], text_of(value), not names_in(value), name in counted, found))
+    return result
 
 
 def set(program: Program, changes: Mapping[str, float] | None = None, /, **numbers: float) -> Program:
@@ -87,6 +104,13 @@ def set(program: Program, changes: Mapping[str, float] | None = None, /, **numbe
     except Fault as fault:
         (text, _), *_ = printed(Source((fault.line,), scale=source.scale))
         raise ShapeProgError(f"{fault.message}, in {text}", fault.hint) from None
+
+
+def _edited(program: Program, name: str, value: float) -> Program | None:
+    try:
+        return set(program, {name: value})
+    except ShapeProgError:
+        return None
 
 
 def _set(line: Line, replacements: Mapping[str, float]) -> Line:

@@ -15,9 +15,14 @@ from dataclasses import dataclass
 from shapeprog.errors import ProgramError, ShapeProgError, did_you_mean
 from shapeprog.language.parameters import shortest, to_float32
 from shapeprog.language.text import Text
-from shapeprog.space import Frame
+from shapeprog.space import SPAN, Frame
 
 METRES = {"mm": 0.001, "cm": 0.01, "m": 1.0, "in": 0.0254}  # units by name, in metres
+
+MOST_METRES, MOST_CENTIMETRES = 10.0, 300.0
+"""Longest sides up to which the numbers of a file are read as metres, and as centimetres; larger ones as millimetres.
+Furniture is between .2 and 3 m long, with few exceptions."""
+
 HEAD = "unit:"  # the beginning of the comment with the unit of a text
 
 _FORM = "write it as # unit: cm, 3.75 per cell"
@@ -45,9 +50,10 @@ class Unit:
         object.__setattr__(self, "per_cell", size)
 
     @staticmethod
-    def of(frame: Frame, name: str, file: str = "m") -> Unit:
-        """The unit ``name`` of an object that a frame places in the grid; ``file`` is the unit of its file."""
-        return Unit(name, frame.scale * metres(file) / metres(name))
+    def of(frame: Frame, name: str, file: str = "") -> Unit:
+        """The unit ``name`` of an object that a frame places in the grid; ``file`` is the unit of its file, assumed by
+        its size if it is empty."""
+        return Unit(name, frame.scale * metres(file or assumed_unit(SPAN * frame.scale)) / metres(name))
 
     def to(self, name: str) -> Unit:
         """Another unit of the same object."""
@@ -64,6 +70,11 @@ def metres(name: str) -> float:
     if name not in METRES:
         raise ShapeProgError(f"unknown unit {name!r}", did_you_mean(name, METRES))
     return METRES[name]
+
+
+def assumed_unit(longest: float) -> str:
+    """The unit of a file that does not name it, by the longest side of the furniture in it."""
+    return "m" if longest <= MOST_METRES else "cm" if longest <= MOST_CENTIMETRES else "mm"
 
 
 def read_unit(text: Text, first: float) -> tuple[Unit | None, Sequence[str]]:

@@ -20,7 +20,8 @@ from shapeprog.language.program import Program
 from shapeprog.language.unit import Unit
 from shapeprog.space import Array
 
-SHARES = (0.5, 0.75, 1.25, 1.5)  # values that are drawn, as multiples of the number
+REACH = 0.5  # farthest from a number that its slider goes, as a share of it, within the range of the name
+SHARES = (1.0, 0.5)  # values that are drawn on either side, as shares of the way to the end of the slider
 LEAST = 1.0  # magnitude assumed for smaller numbers, so that a zero can be dragged; for lengths in cells
 STRAIGHT = 1e-3  # difference in cells below which the path of a corner is linear
 MOST = 400_000  # most triangle corners of all meshes of a page; with more it has no sliders
@@ -60,7 +61,7 @@ def sliders(program: Program, unchanged: Sequence[Part]) -> list[Slider]:
         The parts of the unchanged program.
     """
     free = [named for named in names(program) if named.free]
-    if len(free) * len(SHARES) * sum(3 * len(part.faces) for part in unchanged) > MOST:
+    if len(free) * 2 * len(SHARES) * sum(3 * len(part.faces) for part in unchanged) > MOST:
         return []
     unit, measured = program.unit, lengths(program)
     result = (_slider(program, unchanged, named, unit if named.name in measured else None) for named in free)
@@ -99,8 +100,10 @@ def corners_of(solids: Sequence[Part]) -> list[Array]:
 def _slider(program: Program, unchanged: Sequence[Part], named: Named, unit: Unit | None) -> Slider | None:
     start, name, value = corners_of(unchanged), named.name, named.value
     smallest = LEAST if unit is None else LEAST * unit.per_cell
-    size = max(abs(value), smallest) * (1.0 if value >= 0 else -1.0)
-    places = dict(_places(program, unchanged, start, name, [value + (share - 1) * size for share in SHARES]))
+    size, (low, high) = REACH * max(abs(value), smallest), named.range or (value, value)
+    ends = max(low, value - size), min(high, value + size)
+    tried = [value + share * (end - value) for end in ends for share in SHARES if end != value]
+    places = dict(_places(program, unchanged, start, name, tried))
     if not places or all(part is None for corners in places.values() for part in corners):
         return None
     low, high = min(*places, value), max(*places, value)

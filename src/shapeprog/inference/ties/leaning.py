@@ -15,6 +15,9 @@ from shapeprog.language.program import Draw, Loop, Node, Program
 LEAST = 1.0
 """Degrees by which a board must lean."""
 
+CENTRED, WIDE = 0.5, 12.0
+"""Cells by which a board may be off the middle, or else how wide it may be: a bar has no left and right side."""
+
 
 def between_ends(program: Program) -> Program:
     """The same parts, those that lean about the left-right axis as bars."""
@@ -27,6 +30,8 @@ def _between_ends(node: Node) -> Node:
     if node.name != "board" or abs(node.values[-1]) < LEAST:
         return node
     up, depth, side, high, deep, wide, tilt = node.values
+    if abs(side + wide / 2) > CENTRED and wide > WIDE:
+        return node
     sin, cos = math.sin(math.radians(tilt)), math.cos(math.radians(tilt))
     upwards, backwards = (cos, sin), (-sin, cos)
     along, across, length, thick = (

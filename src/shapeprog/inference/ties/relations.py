@@ -1,217 +1,357 @@
-"""Relations that may hold between the measures of a program: equal, opposite, centred, in contact, part of a whole."""
+"""Relations that may hold between the numbers of a placed program: zero, equal, in contact, straight, symmetric.
+
+Only quantities of one kind are related: a clearance with a clearance of the same anchor, a size with a size, a radius
+with a radius.  So every relation is written by using one name twice, and only faces that meet need a sum.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from itertools import combinations, permutations
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
 
-from shapeprog.inference.ties.features import Feature
-from shapeprog.space import DEPTH, SIDE, UP, FloatArray
+from shapeprog.inference.ties.anchored import Anchored
+from shapeprog.inference.ties.layout import HIGH, LOW, MIDDLE, Element, Slot
+from shapeprog.language.ast import Group, Part
+from shapeprog.language.placement import AXES
+from shapeprog.space import FloatArray
 
-WITHIN, JOINED = 0.3, 1.5
-"""Cells by which a relation may be off that is worth a thought; and one between the sides of parts that touch, or about
-the middle: parts end inside each other, where nobody sees how far they reach."""
+WITHIN, HIDDEN = 0.3, 1.5
+"""Cells by which a relation may be off; and one between parts that touch, which may end inside each other."""
 
 DEGREES = 2.0
 """The same for angles, in degrees."""
 
+FLOOR = 0.02
+"""Share of the height of the whole up to which a part stands on the floor."""
+
+ALIKE, ROUNDING = 0.25, 0.05
+"""Share of the larger by which equal sizes may differ, beside so many cells."""
+
 THIN = 3.0
-"""Cells below which lengths along different axes may well be the two sides of one section; others are equal by chance:
-a leg as high as the seat is deep."""
+"""Cells below which sizes along different axes may be the two sides of one section."""
 
 
-class Worth(NamedTuple):
-    """What the number that a relation saves is worth to it.
+@dataclass(frozen=True)
+class Trust:
+    """What the number that a relation saves is worth, as a multiple of the usual price.
 
     Parameters
     ----------
+    zero
+        A clearance that is nothing.
+    floor
+        A part that ends just above the floor.
     centred, even
-        For parts that are their own mirror image, left and right; and for those that lie in the middle of the depth.
-    holding
-        For relations that hold touching parts together when a number is changed.
-    sure, likely, possible
-        For such as furniture is built by, are common, and are possible.
-    ratio
-        For lengths that are a simple multiple of others along an axis.
-    buried, inside
-        For relations of parts that are their own mirror image, and for those that hold touching parts together, where
-        they are off by so much that only hidden surfaces can be meant; others are worth nothing there.
+        Equal clearances on both sides, left-right and front-rear.
+    contact
+        Faces that meet.
+    flush
+        Faces of touching parts that lie in one plane.
+    straight
+        Ends of a rod at equal distances, or a row along one axis.
+    same_part, section, other
+        Equal sizes of parts of one role; of thin sides of different roles; and others.
+    aligned, opposite, across
+        Equal clearances of parts that do not touch, at one side or at opposite sides; and of one part at a corner.
+    centre
+        An end of a rod on the middle line of a part that it touches.
+    middle
+        Faces in one plane of parts that touch, of which one is a sum.
+    half
+        An edge that is half a thin side of its part.
+    far
+        Faces in one plane of parts that do not touch, of which one is a sum.
+    hidden
+        Contacts and centred parts off by so much that only hidden surfaces can be meant.
     """
 
-    centred: float
-    even: float
-    holding: float
-    sure: float
-    likely: float
-    possible: float
-    ratio: float
-    buried: float
-    inside: float
-
-
-INFERRED = Worth(
-    centred=4.0, even=4.0, holding=1.2, sure=1.0, likely=1.0, possible=0.4, ratio=0.25, buried=1.3, inside=0.03
-)
-"""In programs that inference found, whose numbers may be off by as much as nobody sees; chosen on val."""
-
-WRITTEN = Worth(
-    centred=4.0, even=4.0, holding=0.9, sure=0.8, likely=0.25, possible=0.25, ratio=0.1, buried=1.3, inside=0.03
-)
-"""In programs that somebody wrote: numbers that are known are rarely off by much; chosen on planted programs."""
-
-RATIOS = (2, 3)
-"""How many times as long one part may be as another along an axis by design: where parts have many lengths, some are
-nearly twice others by chance."""
-
-SIMPLE = 4
-"""Factors of a relation beyond which it is worth less, in proportion: it takes a long sum to write."""
-
-
-Ends = dict[tuple[int, bool, int, str], float]
-"""Where sides are, by node, whether all copies are meant, axis and kind."""
+    zero: float = 1.0
+    floor: float = 4.0
+    centred: float = 4.0
+    even: float = 2.0
+    contact: float = 2.0
+    flush: float = 1.0
+    straight: float = 1.5
+    same_part: float = 1.0
+    section: float = 1.0
+    other: float = 0.4
+    aligned: float = 0.8
+    opposite: float = 0.6
+    across: float = 0.6
+    centre: float = 1.5
+    middle: float = 0.4
+    half: float = 0.5
+    far: float = 0.4
+    hidden: float = 0.6
 
 
 class Relation(NamedTuple):
-    """That a row of factors (F + 3,) times the numbers of a program and the extents of the whole is zero.
-
-    Parameters
-    ----------
-    row
-        The factors, the first that is not zero being positive.
-    trust
-        What the number that it saves is worth to it, from 0 to 1.
-    """
+    """That factors (P,) times the numbers of a program sum to zero, and what the number it saves is worth."""
 
     row: FloatArray
     trust: float
 
 
+class Face(NamedTuple):
+    """An end of an element: from which anchor it is measured, its row of factors (P,), its place from the low side of
+    the whole, whether it faces the low or the high side (-1 or 1; 0 for the middle), and whether it is one number."""
+
+    element: Element
+    anchor: int
+    row: FloatArray
+    at: float
+    facing: int
+    single: bool
+
+
+def faces(anchored: Anchored, numbers: FloatArray) -> list[Face]:
+    """All ends of all elements."""
+    count, result = len(anchored.slots), list[Face]()
+
+    def unit(line: int, word: str) -> FloatArray:
+        row = np.zeros(count)
+        row[anchored.index[line, word]] = 1.0
+        return row
+
+    for (line, key, axis), element in anchored.layout.elements.items():
+        anchors, words, extent = anchored.anchors[line, key, axis], AXES[axis], numbers[axis]
+        word = (words.low, words.offset, words.high)
+
+        def face(anchor: int, row: FloatArray, facing: int, element: Element = element, extent: float = extent) -> Face:
+            value = float(row @ numbers)
+            at = (value, extent / 2 + value, extent - value)[anchor]
+            return Face(element, anchor, row, at, facing, int((row != 0).sum()) == 1)
+
+        if key == "across":
+            if anchors == (LOW, HIGH):
+                row = unit(line, words.low)
+                result += [face(LOW, row, -1), face(HIGH, row, 1)]
+            continue
+        if element.kind == "interval":
+            low, high = anchors
+            if low == high == MIDDLE:
+                middle, half = unit(line, words.offset), unit(line, words.size) / 2
+                result += [face(MIDDLE, middle - half, -1), face(MIDDLE, middle + half, 1)]
+            elif low == high:
+                near, size = unit(line, word[low]), unit(line, words.size)
+                sign = -1 if low == LOW else 1
+                result += [face(low, near, sign), face(low, near + size, -sign)]
+            else:
+                result.append(face(low, unit(line, words.low), -1))
+                result.append(face(high, unit(line, words.high) * (-1 if high == MIDDLE else 1), 1))
+            continue
+        (anchor,) = anchors
+        name = f"{key}.{word[anchor]}" if key else word[anchor]
+        if (line, name) not in anchored.index:
+            continue  # the plane in the middle
+        row = unit(line, name)
+        if element.kind == "coordinate":
+            result.append(face(anchor, row, 0))
+            continue
+        radius = unit(line, "radius") if (line, "radius") in anchored.index else unit(line, "radius.0")
+        if anchor == MIDDLE:
+            result += [face(anchor, row - radius, -1), face(anchor, row, 0), face(anchor, row + radius, 1)]
+        else:
+            sign = -1 if anchor == LOW else 1
+            result += [face(anchor, row, sign), face(anchor, row + radius, 0), face(anchor, row + 2 * radius, -sign)]
+    return result + [_image(face, numbers) for face in result if _is_mirrored(anchored, face.element)]
+
+
+def _is_mirrored(anchored: Anchored, element: Element) -> bool:
+    """Whether a mirror about the middle of the whole copies a part along the axis of its element."""
+    if element.key not in ("", "start", "through", "end"):
+        return False
+    layout, axis = anchored.layout, element.axis
+    planes = (layout.elements.get((loop, "plane", axis)) for loop in layout.loops_around(element.line))
+    return any(plane is not None and abs(plane.low - layout.extents[axis] / 2) < WITHIN for plane in planes)
+
+
+def _image(face: Face, numbers: FloatArray) -> Face:
+    """The face of the mirror image of a part."""
+    extent = numbers[face.element.axis]
+    row = -face.row if face.anchor == MIDDLE else face.row
+    return face._replace(anchor=2 - face.anchor, row=row, at=extent - face.at, facing=-face.facing)
+
+
 def relations(
-    known: list[Feature], numbers: FloatArray, touching: set[tuple[int, int]], worth: Worth
+    anchored: Anchored, numbers: FloatArray, touching: set[tuple[int, int]], trust: Trust, reach: float = 1.0
 ) -> list[Relation]:
     """Relations that nearly hold, each once, with the highest trust that any of its readings has.
 
     Parameters
     ----------
-    numbers
-        Where the numbers of the program and the extents are (F + 3,).
     touching
-        Pairs of nodes, the smaller first, whose parts touch.
-    worth
-        What relations are worth in such a program.
+        Pairs of lines, the smaller first, whose parts touch.
+    reach
+        Multiplies by how much relations may be off.
     """
-    offered = [(row, kind) for row, kind in _candidates(known, numbers, touching) if row.any()]
-    if not offered:
-        return []
-    rows, kinds = np.stack([row for row, _ in offered]), np.array([kind for _, kind in offered])
-    trust = np.array([getattr(worth, kind) for _, kind in offered])
-    used = rows != 0
-    tidy = rows / np.take_along_axis(rows, used.argmax(1)[:, None], 1)
-    off = np.abs(tidy @ numbers) / np.abs(tidy).max(1)
-    angles = np.any([each.row != 0 for each in known if each.kind == "angle"] or np.zeros((1, len(numbers)), bool), 0)
-    near = off < np.where(used[:, angles].any(1), DEGREES, WITHIN)
-    hidden = ~near & ~used[:, angles].any(1) & (off < JOINED)
-    for kind, buried in (("centred", worth.buried), ("holding", worth.inside)):
-        here = hidden & (kinds == kind)
-        trust[here], near[here] = buried, True
-    trust *= np.minimum(1.0, SIMPLE / used.sum(1))
-    found: dict[bytes, Relation] = {}
-    for k in np.flatnonzero(near).tolist():
-        key = np.round(tidy[k], 6).tobytes()
-        if key not in found or found[key].trust < trust[k]:
-            found[key] = Relation(tidy[k], float(trust[k]))
-    return list(found.values())
+    best: dict[bytes, Relation] = {}
+    angles = np.array([slot.kind == "angle" for slot in anchored.slots])
+    for row, worth, hidden in _candidates(anchored, numbers, touching, trust):
+        used = np.flatnonzero(row)
+        if not len(used):
+            continue
+        row = row / row[used[0]]
+        off = abs(float(row @ numbers)) / float(np.abs(row).max())
+        limit = DEGREES if angles[used].all() else WITHIN * reach
+        if off > limit:
+            if not hidden or off > HIDDEN * reach:
+                continue
+            worth = trust.hidden if worth < trust.centred else 1.3
+        key = np.round(row, 6).tobytes()
+        if key not in best or best[key].trust < worth:
+            best[key] = Relation(row, worth)
+    return list(best.values())
 
 
 def _candidates(
-    known: list[Feature], numbers: FloatArray, touching: set[tuple[int, int]]
-) -> Iterator[tuple[FloatArray, str]]:
-    """Rows that may be relations, and what each would be: the name of its worth."""
-    whole = {each.axis: each for each in known if each.kind == "extent"}
-    places = [each for each in known if each.kind in ("low", "high", "middle", "place")]
-    ends: Ends = {(each.node, each.all, each.axis, each.kind): each.at(numbers) for each in places}
-    across = _across(places, numbers)
+    anchored: Anchored, numbers: FloatArray, touching: set[tuple[int, int]], trust: Trust
+) -> Iterator[tuple[FloatArray, float, bool]]:
+    """Rows that may be relations, what each is worth, and whether it may be hidden."""
+    slots, count = anchored.slots, len(anchored.slots)
+    eye = np.eye(count)
+    upright = [abs(_angle(anchored, line)) < DEGREES for line in range(len(anchored.layout.lines))]
+    for k, slot in enumerate(slots):
+        if slot.kind == "clearance":
+            stands = slot.axis == 2 and slot.anchor == LOW and numbers[k] < FLOOR * numbers[2]
+            yield eye[k], trust.floor if stands else trust.zero, False
+        elif slot.kind == "offset":
+            yield eye[k], trust.centred if slot.axis == 0 else trust.even, slot.axis == 0
+        elif slot.kind == "angle" and not slot.word.startswith("step"):
+            yield eye[k], trust.zero, False
     for axis in range(3):
-        here = [each for each in places if each.axis == axis]
-        for one in here:
-            level = one.kind == "middle"
-            if axis in (DEPTH, SIDE):
-                yield one.row, ("centred" if axis == SIDE else "even") if level else "possible"
-            if not level:
-                yield one.row - whole[axis].row / 2, "sure"
-                yield one.row + whole[axis].row / 2, "holding" if axis == UP else "sure"
-        for one, two, flush, mirrored in _near(here, numbers):
-            middles = (one.kind == "middle") + (two.kind == "middle")
-            if one.kind == two.kind == "place" and one.node == two.node:  # the ends of one part
-                if flush:
-                    yield one.row - two.row, "centred" if axis != SIDE and one.node in across else "sure"
-                if mirrored and axis in (DEPTH, SIDE):
-                    yield one.row + two.row, "centred" if axis == SIDE else "likely"
-                continue
-            if middles == 1 or (one.node == two.node and one.all == two.all):
-                continue
-            pair = (min(one.node, two.node), max(one.node, two.node))
-            if flush and (one.kind == two.kind or not _edge(one, two, ends, mirror=False)):
-                yield one.row - two.row, "holding" if pair in touching and not middles else "likely"
-            if mirrored and axis in (DEPTH, SIDE) and not (one.kind == two.kind and _edge(one, two, ends, mirror=True)):
-                yield one.row + two.row, "likely" if middles == 0 else "possible"
-    for run in known:  # the gap between the run and a part is that between its copies
-        facing = {"before": "high", "behind": "low"}.get(run.kind)
-        for side in places:
-            if side.kind == facing and side.axis == run.axis and side.node != run.node:
-                yield run.row - side.row, "likely"
-    for each in known:
-        if each.kind == "shift":  # copies lie in line
-            yield each.row, "sure"
-    for kind in ("length", "radius", "shift", "angle"):
-        alike = [each for each in known if each.kind == kind]
-        for one, two, same, opposite in _near(alike, numbers):
-            thin = kind == "length" and max(abs(one.at(numbers)), abs(two.at(numbers))) < THIN
-            if same and (one.axis == two.axis or thin):
-                yield one.row - two.row, "likely"
-            if opposite and kind in ("shift", "angle"):
-                yield one.row + two.row, "possible"
-    lengths = [(each, each.at(numbers)) for each in known if each.kind in ("length", "extent") and each.axis >= 0]
-    for (one, far), (two, near) in permutations(lengths, 2):
-        if one.axis == two.axis and near > THIN and (times := round(far / near)) in RATIOS:
-            yield one.row - times * two.row, "ratio"
+        here = [face for face in faces(anchored, numbers) if face.element.axis == axis]
+        for one, two in combinations(here, 2):
+            yield from _pair(anchored, one, two, touching, trust, upright)
+    lengths = [k for k, slot in enumerate(slots) if slot.kind in ("size", "radius", "edge", "angle", "length")]
+    for a, b in combinations(lengths, 2):
+        if worth := _equal(anchored, slots[a], slots[b], numbers[a], numbers[b], trust):
+            yield eye[a] - eye[b], worth, False
+            if slots[a].kind == "angle":
+                yield eye[a] + eye[b], worth / 2, False
+        small, side = (a, b) if slots[b].kind == "size" else (b, a)
+        kinds = slots[small].kind, slots[side].kind
+        if kinds == ("edge", "size") and slots[small].line == slots[side].line and numbers[side] < THIN:
+            yield eye[small] - eye[side] / 2, trust.half, False
+    across = [k for k, slot in enumerate(slots) if slot.kind == "clearance" and slot.axis < 2 and numbers[k] > WITHIN]
+    for a, b in combinations(across, 2):
+        if slots[a].axis != slots[b].axis and slots[a].line == slots[b].line and max(numbers[a], numbers[b]) < THIN:
+            yield eye[a] - eye[b], trust.across, False
 
 
-def _across(places: Sequence[Feature], numbers: FloatArray) -> set[int]:
-    """Nodes of parts whose ends are as far to the left of the middle as to the right: bars and rods that lie across."""
-    ends = [each for each in places if each.kind == "place" and each.axis == SIDE]
-    return {
-        one.node
-        for one, two in combinations(ends, 2)
-        if one.node == two.node and abs(one.at(numbers) + two.at(numbers)) < WITHIN < abs(one.at(numbers))
-    }
+def _pair(
+    anchored: Anchored, one: Face, two: Face, touching: set[tuple[int, int]], trust: Trust, upright: list[bool]
+) -> Iterator[tuple[FloatArray, float, bool]]:
+    """Relations of two faces of one axis."""
+    first, second = one.element, two.element
+    axis, same = first.axis, first.line == second.line
+    if one.anchor != two.anchor:
+        if {one.anchor, two.anchor} == {LOW, HIGH} and one.single and two.single and axis < 2:
+            if same:
+                yield one.row - two.row, trust.centred if axis == 0 else trust.even, False
+            elif first.key == "last" or second.key == "last":
+                yield one.row - two.row, trust.even, False
+            else:
+                yield one.row - two.row, trust.opposite, False
+        return
+    row = one.row - two.row
+    if same:
+        if first.key and second.key:  # both ends of a rod
+            yield row, trust.straight, False
+            if one.anchor == MIDDLE:
+                yield one.row + two.row, trust.centred if axis == 0 else trust.even, False
+        return
+    if one.anchor == MIDDLE and one.facing == -two.facing and one.single and two.single:
+        yield one.row + two.row, trust.opposite, False
+    if "last" in (first.key, second.key):
+        loop, other = (first, second) if first.key == "last" else (second, first)
+        part = anchored.layout.first(loop.line)[0]
+        if not (one.single or two.single):
+            return
+        if other.line == part:
+            if one.single and two.single:
+                yield row, trust.straight, False
+        elif (min(part, other.line), max(part, other.line)) in touching:
+            yield row, trust.contact, False
+        elif one.single and two.single:
+            yield row, trust.aligned, False
+        return
+    if "plane" in (first.key, second.key) or "centre" in (first.key, second.key):
+        if one.single and two.single:
+            yield row, trust.aligned, False
+        return
+    touches = (min(first.line, second.line), max(first.line, second.line)) in touching
+    straight = axis == 0 or (upright[first.line] and upright[second.line])
+    if touches and one.facing * two.facing == -1 and straight:
+        yield row, trust.contact, True
+    elif touches and 0 in (one.facing, two.facing) and straight:
+        middle = one.facing == 0 and two.facing == 0
+        ends = first.kind == second.kind == "coordinate"
+        if ends or not middle:
+            yield row, trust.contact, True
+        else:
+            yield row, trust.flush, False
+    elif one.facing == two.facing and straight:
+        if one.single and two.single:
+            yield row, trust.flush if touches else trust.aligned, False
+        else:
+            yield row, trust.middle if touches else trust.far, False
+    elif one.facing * two.facing == -1 and straight:
+        yield row, trust.far, False
+    if touches and axis < 2 and (first.kind, second.kind) in (("coordinate", "interval"), ("interval", "coordinate")):
+        point, box = (one, two) if first.kind == "coordinate" else (two, one)
+        if not box.single and box.facing:  # the middle of a box that it touches
+            yield point.row - (box.row + _other(anchored, box)) / 2, trust.centre, False
 
 
-def _near(alike: Sequence[Feature], numbers: FloatArray) -> Iterator[tuple[Feature, Feature, bool, bool]]:
-    """Pairs of features that may be related, and whether they may be equal, and opposite: others are too far apart."""
-    at = [each.at(numbers) for each in alike]
-    reach = [max(JOINED, DEGREES) * float(np.abs(each.row).max()) for each in alike]
-    for one, two in combinations(range(len(alike)), 2):
-        far = reach[one] + reach[two]
-        equal, opposite = abs(at[one] - at[two]) < far, abs(at[one] + at[two]) < far
-        if equal or opposite:
-            yield alike[one], alike[two], equal, opposite
+def _other(anchored: Anchored, face: Face) -> FloatArray:
+    """The row of the near face of an interval whose far face this is."""
+    element, row = face.element, np.zeros(len(anchored.slots))
+    if face.anchor == MIDDLE:
+        size = anchored.index[element.line, AXES[element.axis].size]
+        row[size] = -np.sign(face.row[size])
+        return face.row + row
+    words = AXES[element.axis]
+    anchor = anchored.anchors[element.line, element.key, element.axis][0]
+    row[anchored.index[element.line, words.low if anchor == LOW else words.high]] = 1.0
+    return row
 
 
-def _edge(one: Feature, two: Feature, ends: Ends, *, mirror: bool) -> bool:
-    """Whether two parts, or one and the mirror image of the other, would meet along an edge at best if these sides met:
-    they hold together by others."""
-    overlaps = []
-    for axis in range(3):
-        sides = [ends.get((each.node, each.all, axis, kind)) for each in (one, two) for kind in ("low", "high")]
-        if any(side is None for side in sides):
-            return False
-        low1, high1, low2, high2 = (float(side) for side in sides if side is not None)
-        if mirror and axis == one.axis:
-            low2, high2 = -high2, -low2
-        overlaps.append(min(high1, high2) - max(low1, low2))
-    others = [overlap for axis, overlap in enumerate(overlaps) if axis != one.axis]
-    return min(others) < min(WITHIN, overlaps[one.axis])
+def _equal(anchored: Anchored, one: Slot, two: Slot, a: float, b: float, trust: Trust) -> float:
+    """What it is worth that two sizes are equal; 0 for sizes that are not compared."""
+    if one.kind != two.kind:
+        return 0.0
+    if one.kind != "angle" and abs(a - b) > ALIKE * max(a, b) + ROUNDING:
+        return 0.0
+    roles = _role(anchored, one.line), _role(anchored, two.line)
+    if one.kind == "angle":
+        return trust.same_part if one.word == two.word else 0.0
+    if one.kind in ("radius", "edge", "length"):
+        return trust.same_part if roles[0] == roles[1] or one.line == two.line else trust.section * 0.6
+    thin = max(a, b) < THIN
+    if one.axis != two.axis and not thin:
+        return 0.0
+    if roles[0] == roles[1]:
+        return trust.same_part
+    return trust.section if thin else trust.other
+
+
+def _role(anchored: Anchored, line: int) -> str:
+    node = anchored.layout.lines[line]
+    return (node.role or node.kind) if isinstance(node, Part) else ""
+
+
+def _angle(anchored: Anchored, line: int) -> float:
+    node = anchored.layout.lines[line]
+    return float(dict(node.keywords).get("tilt", 0.0)) if isinstance(node, Part) else 0.0  # type: ignore[arg-type]
+
+
+def _encloses(anchored: Anchored, loop: int, line: int) -> bool:
+    """Whether a line is the first part inside of a loop."""
+    node = anchored.layout.lines[loop]
+    assert isinstance(node, Group)
+    return line > loop and not any(isinstance(anchored.layout.lines[k], Part) for k in range(loop + 1, line))

@@ -1,11 +1,13 @@
-"""Ties: numbers of a program that hold together are written as expressions of few named ones.
+"""Ties: the numbers of a program that hold together are written with one name.
 
-Relations that nearly hold are priced by what they cost in fit, those worth more than a number are imposed, the numbers
-that stay free are refitted, and so on until no further number is saved.  What is free is then named.
+Parts are placed from the sides of the whole; every face gets an anchor.  Relations between the numbers that nearly
+hold are priced by what they cost in fit, those worth more than a number are imposed, and the numbers that stay free
+are refitted.  What several places share is then named.
 """
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import NamedTuple
 
 import numpy as np
@@ -13,46 +15,57 @@ import torch
 
 from shapeprog.errors import ShapeProgError
 from shapeprog.geometry.arrays import one_tensor_thread
-from shapeprog.geometry.scene import Scene
 from shapeprog.inference.budget import Progress
 from shapeprog.inference.connecting import afloat
 from shapeprog.inference.evidence import Evidence
 from shapeprog.inference.joints import Joints, find_joints
-from shapeprog.inference.ties.alike import alike
-from shapeprog.inference.ties.basis import Basis, simplest
+from shapeprog.inference.ties.anchored import Anchored
+from shapeprog.inference.ties.anchors import AnchorSettings, anchors_of
 from shapeprog.inference.ties.closeness import Closeness
-from shapeprog.inference.ties.contacts import Contacts
-from shapeprog.inference.ties.features import Feature, features
-from shapeprog.inference.ties.fitting import CLOSED, Misfit, refitted, ways_free
-from shapeprog.inference.ties.following import Following
+from shapeprog.inference.ties.expressions import solved
+from shapeprog.inference.ties.layout import LOW, Anchors, Layout
 from shapeprog.inference.ties.leaning import between_ends
-from shapeprog.inference.ties.naming import written
+from shapeprog.inference.ties.model import Misfit, Model
 from shapeprog.inference.ties.pricing import worthwhile
-from shapeprog.inference.ties.relations import INFERRED, WRITTEN, Relation, relations
-from shapeprog.inference.tunable import CELLS, DEGREES, Tunable
+from shapeprog.inference.ties.relations import Relation, Trust, relations
+from shapeprog.inference.ties.text import written
+from shapeprog.inference.tunable import THINNEST
+from shapeprog.language.ast import Part
+from shapeprog.language.convert import placed
+from shapeprog.language.evaluate import evaluated
 from shapeprog.language.free import free_numbers
-from shapeprog.language.program import Draw, Program
+from shapeprog.language.merging import merged
+from shapeprog.language.program import Program
 from shapeprog.language.unroll import unroll
 from shapeprog.space import FloatArray
 
-PRICE = 2e-4
-"""What a number is worth: mean squared distance in cells; chosen on val."""
+PRICE = 3e-4
+"""What a number is worth: mean squared distance in cells; chosen on validation shapes."""
 
-WRITTEN_PRICE = 1.2e-3
-"""The same in a program that somebody wrote, whose numbers are known; chosen on planted programs."""
+FAR = 2.0
+"""Farthest that relations may move a number at once, in cells."""
 
-LOST, CHEAPER, CHEAPEST = 0.03, 3.0, 0.3
-"""How much less of the surface may be near that of the target when numbers are tied; beyond that a number is worth so
-many times less, as long as it is worth more than this share of the usual; the same where parts come apart."""
+KNOWN_PRICE = 1.2e-3
+"""The same in a program that somebody wrote; chosen on planted programs."""
+
+KNOWN = 0.1
+"""Weight of a squared move of a number that somebody wrote."""
+
+LOST, CHEAPER, ATTEMPTS = 0.03, 3.0, 3
+"""How much less of the surface may be near that of the target when numbers are tied; beyond that, or where parts come
+apart, a number is worth so many times less, in so many attempts."""
 
 APART = 0.005
 """Gap in cells from which parts are apart."""
 
-ROUNDS = 3
-"""Most times that relations are looked for."""
+TOUCHING = 0.12
+"""Gap in cells up to which parts should stay together when the whole is changed."""
 
 NOWHERE = -1e6
-"""A floor that no part stands on: standing is found by its own relation."""
+"""A floor that no part stands on: that parts stand is a clearance of zero."""
+
+ROUNDS = 3
+"""Most times that relations are looked for: first contacts, then all."""
 
 
 class Tied(NamedTuple):
@@ -68,130 +81,104 @@ def tie(
     *,
     price: float = 1.0,
     known: bool = False,
-    held: FloatArray | None = None,
+    held: Collection[int] = (),
     seed: int = 0,
     progress: Progress | None = None,
 ) -> Tied:
-    """The same program with names for its free numbers and expressions for all others; the same for the same seed.
+    """The same program placed from the sides, with names for shared numbers; the same for the same seed.
 
     Parameters
     ----------
+    program
+        A program of statements in cells, or a placed one; only the numbers that it evaluates to are read.
     evidence
         What it should fit: how far relations may move its parts.
     price
-        What a number is worth, times the usual ``PRICE`` or ``WRITTEN_PRICE``.
+        What a number is worth, times ``TieSettings.price`` or ``TieSettings.known_price``.
     known
-        Whether somebody wrote the numbers: each is then known, and not only the surface that they come to.
+        Whether somebody wrote the numbers: they are then known, and not only where the surface is.
     held
-        Relations that hold in any case, as rows (R, F) of factors of the numbers that move.
+        Indices of the nodes of its body whose numbers stay what they are: calls of functions draw them.
     """
-    plain = Program(program.body) if held is not None else between_ends(program)
+    plain = Program(program.body) if known or held else between_ends(Program(program.body))
     if not plain.size:
-        return Tied(plain, 0)
-    closeness = Closeness(evidence, seed)
+        return Tied(program, 0)
     with one_tensor_thread(kernels=1):
-        ties = _Ties(plain, Misfit(Tunable(plain), evidence, seed, known=known), closeness, held, seed)
-        worth, trusted = price * (WRITTEN_PRICE if known else PRICE), WRITTEN if known else INFERRED
-        for round_ in range(ROUNDS):
-            imposed = ties.impose(relations(ties.measured(), ties.numbers, ties.touching, trusted), worth)
+        try:
+            source = placed(plain if held else merged(plain)).source
+        except ShapeProgError:  # a statement without a placed form
+            return Tied(program, free_numbers(program))
+        assert source is not None
+        closeness = Closeness(evidence, seed)
+        ties = _Ties(Layout(source), evidence, seed, known=known, held=held)
+        price *= KNOWN_PRICE if known else PRICE
+        before, floating = closeness.of(unroll(plain)), afloat(plain, seed, APART)
+        for attempt in range(ATTEMPTS):
+            tied = ties.tied(price / CHEAPER**attempt)
             if progress:
-                progress("tying numbers", (round_ + 1) / ROUNDS)
-            if not imposed:
+                progress("tying numbers", (attempt + 1) / ATTEMPTS)
+            if known or (before - closeness.of(unroll(tied)) <= LOST and afloat(tied, seed, APART) <= floating):
                 break
-        basis, following = ties.simplest()
-        more = [] if known else list(alike(basis, following, trusted))
-        if more and ties.impose(more, worth):
-            basis, _ = ties.simplest()
-        named = written(ties.tunable, _rounded(basis))
-    found = Tied(named, free_numbers(named))
-    if held is None and not known and price > CHEAPEST:
-        lost = closeness.of(unroll(plain)) - closeness.of(unroll(named))
-        if lost > LOST or afloat(named, seed, APART) > afloat(plain, seed, APART):
-            return tie(program, evidence, price=price / CHEAPER, seed=seed, progress=progress)
-    return found
+    return Tied(tied, free_numbers(tied))
 
 
 class _Ties:
-    """The relations of a program that hold so far.
+    """Everything about a program that does not depend on the price of a number."""
 
-    Attributes
-    ----------
-    numbers, rows
-        Where its numbers and the extents of the whole are (V,), and the relations (M, V) that hold for them.
-    joints, touching
-        Where its parts touch, and the pairs of nodes that do.
-    """
-
-    def __init__(
-        self, program: Program, misfit: Misfit, closeness: Closeness, held: FloatArray | None, seed: int
-    ) -> None:
-        self.tunable, self.misfit, self.closeness = misfit.tunable, misfit, closeness
-        self.numbers = misfit.numbers
-        values = self.tunable.values
-        straight = np.flatnonzero((self.numbers[: len(values)] == 0) & self.tunable.are("angle").numpy())
-        self.rows = np.eye(len(self.numbers))[straight] if held is None else np.pad(held, ((0, 0), (0, 3)))
-        scene = self.tunable.scene(values)
+    def __init__(self, layout: Layout, evidence: Evidence, seed: int, *, known: bool, held: Collection[int]) -> None:
+        flat = Model(Anchored(layout, _from_low(layout)), THINNEST)
+        self.layout, self.trust = layout, Trust()
+        scene = flat.scene(flat.numbers)
         self.joints = _joints(scene, seed)
-        self.touching = touching(self.tunable, scene, self.joints) if self.joints else set()
-        self._contacts = Contacts(self.tunable, self.joints) if self.joints else None
+        self.anchored = Anchored(layout, anchors_of(flat, self.joints, AnchorSettings()))
+        self.model = Model(self.anchored, THINNEST)
+        lines = layout.lines_of(held)
+        fixed = np.array([slot.line in lines for slot in self.anchored.slots])
+        self.misfit = Misfit(self.model, evidence, seed, np.where(fixed, np.inf, KNOWN if known else 0.0))
+        self.fixed = fixed
+        parts = [k for k, line in enumerate(layout.lines) if isinstance(line, Part)]
+        self.touching: set[tuple[int, int]] = set()
+        if self.joints is not None:
+            pairs = scene.block[torch.stack([self.joints.first, self.joints.second], 1)].tolist()
+            self.touching = {(parts[min(pair)], parts[max(pair)]) for pair in pairs}
 
-    def measured(self) -> list[Feature]:
-        """What can be measured of the program."""
-        return features(self.tunable, self.tunable.poses(self._own(self.numbers)))
+    def tied(self, price: float) -> Program:
+        """The program tied at a price of a number, in the unit of the misfit."""
+        numbers, rows = self.model.numbers, self.anchored.fixed()
+        for step in range(ROUNDS):
+            offered = relations(self.anchored, numbers, self.touching, self.trust)
+            offered = [relation for relation in offered if not (relation.row != 0)[self.fixed].any()]
+            if step == 0:
+                offered = [relation for relation in offered if relation.trust == self.trust.contact]
+            before = len(rows)
+            rows, optimum = self._imposed(offered, numbers, rows, price)
+            if step and len(rows) == before:
+                break
+            numbers = self.misfit.refitted(optimum, self._free(rows), self.joints)
+        solution = solved(self.anchored.slots, rows)
+        return evaluated(written(self.anchored, solution, numbers, group=not self.fixed.any()))
 
-    def impose(self, offered: list[Relation], worth: float) -> bool:
-        """Impose the relations that pay at a price per number; returns whether any were added."""
-        before, curvature = len(self.rows), self.misfit.at(self.numbers)[1]
-        self.rows, optimum = worthwhile(
-            offered, self.numbers, curvature, worth, fixed=self.rows, low=self.misfit.low, far=self.misfit.far
-        )
-        if self._contacts:
-            self.rows, optimum = self._contacts.kept(self.rows, before, self.numbers, curvature, worth)
-        self.numbers = self._closest(optimum)
-        return len(self.rows) > before
+    def _imposed(
+        self, offered: Collection[Relation], numbers: FloatArray, rows: FloatArray, price: float
+    ) -> tuple[FloatArray, FloatArray]:
+        curvature = self.misfit.at(numbers)[1]
+        far = FAR / np.maximum(self.misfit.scale, 1.0)
+        return worthwhile([*offered], numbers, curvature, price, fixed=rows, low=self.model.low, far=far)
 
-    def simplest(self) -> tuple[Basis, Following | None]:
-        """The measures that all numbers follow from, and what changes of them part."""
-        ways = ways_free(self.rows, len(self.numbers))
-        lengths = np.append(self.tunable.are("length").numpy(), [False] * 3)
-        following = Following(self.tunable, self.joints, self.numbers) if self.joints else None
-        return simplest(self.measured(), self.numbers, ways, lengths, self.touching, following), following
-
-    def _closest(self, numbers: FloatArray) -> FloatArray:
-        """The numbers (V,) for which the relations hold: as they fit best, as they are, or half-way.
-
-        Where parts come apart as they fit best, what holds them weighs more.
-        """
-        ways = ways_free(self.rows, len(numbers))
-        start = ways @ (ways.T @ numbers)  # all but rounding of what is there
-        fitting = refitted(self.misfit, start, self.rows, self.joints)
-        if self._contacts and not self._contacts.hold(fitting, numbers):
-            fitting = refitted(self.misfit, start, self.rows, self.joints, CLOSED)
-        offered = [fitting, (start + fitting) / 2, start]
-        holding = [each for each in offered if not self._contacts or self._contacts.hold(each, numbers)]
-        return max(holding, key=lambda each: self.closeness.of(self.tunable.scene(self._own(each))), default=numbers)
-
-    def _own(self, numbers: FloatArray) -> torch.Tensor:
-        """Those of numbers and extents that the program writes."""
-        return torch.from_numpy(numbers[: len(self.tunable.values)])
-
-
-def touching(tunable: Tunable, scene: Scene, joints: Joints) -> set[tuple[int, int]]:
-    """Pairs of nodes whose parts touch or nearly do, the smaller number first."""
-    drawn = [n for n, node in enumerate(tunable.nodes) if isinstance(node, Draw)]
-    pairs = zip(scene.block[joints.first].tolist(), scene.block[joints.second].tolist(), strict=True)
-    return {(min(drawn[a], drawn[b]), max(drawn[a], drawn[b])) for a, b in pairs}
+    def _free(self, rows: FloatArray) -> FloatArray:
+        """Orthonormal directions (P, Z) in which relations (M, P) hold."""
+        if not len(rows):
+            return np.eye(len(self.model.numbers))
+        axes, _ = np.linalg.qr(rows.T, mode="complete")
+        return axes[:, len(rows) :]
 
 
-def _joints(scene: Scene, seed: int) -> Joints | None:
+def _from_low(layout: Layout) -> dict[tuple[int, str, int], Anchors]:
+    return {key: (LOW, LOW) if element.kind == "interval" else (LOW,) for key, element in layout.elements.items()}
+
+
+def _joints(scene: object, seed: int) -> Joints | None:
     try:
-        return find_joints(scene, NOWHERE, torch.Generator().manual_seed(seed))
+        return find_joints(scene, NOWHERE, torch.Generator().manual_seed(seed))  # type: ignore[arg-type]
     except ShapeProgError:  # a part without a surface touches nothing
         return None
-
-
-def _rounded(basis: Basis) -> Basis:
-    """The measures with as many decimals as numbers keep."""
-    digits = [DEGREES if group[0].word == "angle" else CELLS for group in basis.chosen]
-    values: FloatArray = np.array([round(value, places) for value, places in zip(basis.values, digits, strict=True)])
-    return Basis(basis.chosen, basis.factors, values)

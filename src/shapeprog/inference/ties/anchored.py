@@ -1,0 +1,163 @@
+"""A program in which every face is measured from its anchor, and every number has a name."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from shapeprog.inference.ties.layout import ALIGNED, ANGLES, HIGH, LOW, MIDDLE, Anchors, Element, Kind, Layout, Slot
+from shapeprog.language.ast import Argument, Assignment, Group, Keywords, Line, Part, Point, body_of
+from shapeprog.language.evaluate import placed_source
+from shapeprog.language.expression import Binary, Name, Value
+from shapeprog.language.placement import AXES, POINTS, ROUND, SIZES
+from shapeprog.space import FloatArray
+
+
+class Anchored:
+    """A layout with an anchor for every end, as the tree of a program in which every number is a name.
+
+    Parameters
+    ----------
+    layout
+        The program.
+    anchors
+        The anchors of every element.
+
+    Attributes
+    ----------
+    slots
+        The numbers, the three sizes of the whole first.
+    source
+        The program, its numbers named by :meth:`name`.
+    """
+
+    def __init__(self, layout: Layout, anchors: dict[tuple[int, str, int], Anchors]) -> None:
+        self.layout, self.anchors = layout, anchors
+        self.slots = [Slot(-1, word, "extent", axis, LOW, layout.extents[axis]) for axis, word in enumerate(SIZES)]
+        self.index: dict[tuple[int, str], int] = {}
+        self._counter = iter(range(len(layout.lines)))
+        body = self._body(layout.source.lines)
+        whole = Assignment(tuple((self.name(axis), layout.extents[axis]) for axis in range(3)))
+        others = tuple((self.name(index), slot.value) for index, slot in enumerate(self.slots))[3:]
+        self.lines: tuple[Line, ...] = (whole, *([Assignment(others)] if others else []), *body)
+        self.source = replace(placed_source(self.lines), scale=layout.source.scale, unit=layout.source.unit)
+
+    def fixed(self) -> FloatArray:
+        """Relations (M, P) that hold in any case: a round part that fills the whole is as wide as it is deep."""
+        rows = []
+        for index, line in enumerate(self.layout.lines):
+            if isinstance(line, Part) and self.layout.fills(line):
+                words = [word for words in AXES[:2] for word in words[:2] if (index, word) in self.index]
+                pairs = [(0, 1), *((self.index[index, words[0]], self.index[index, word]) for word in words[1:])]
+                rows += [np.eye(len(self.slots))[a] - np.eye(len(self.slots))[b] for a, b in pairs]
+        distinct = {row.tobytes(): row for row in rows}
+        return np.array([*distinct.values()]).reshape(-1, len(self.slots))
+
+    def name(self, slot: int) -> str:
+        """The name of a number."""
+        return SIZES[slot] if slot < 3 else f"n{slot}"
+
+    def _slot(self, line: int, word: str, kind: Kind, axis: int, anchor: int, value: float) -> Value:
+        self.index[line, word] = len(self.slots)
+        self.slots.append(Slot(line, word, kind, axis, anchor, value))
+        return Name(self.name(len(self.slots) - 1))
+
+    def _body(self, lines: Sequence[Line]) -> list[Line]:
+        result: list[Line] = []
+        for line in lines:
+            if isinstance(line, Part | Group):
+                index = next(self._counter)
+                new = self._part(index, line) if isinstance(line, Part) else self._group(index, line)
+                result.append(replace(new, body=tuple(self._body(body_of(line)))) if isinstance(new, Group) else new)
+        return result
+
+    def _part(self, index: int, line: Part) -> Part:
+        keywords: list[tuple[str, Argument]] = []
+        given = dict(line.keywords)
+        if "start" in given:
+            keywords += [(word, self._point(index, word)) for word in POINTS if word in given]
+            sizes = [(word, axis) for axis, word in enumerate(SIZES) if word in given]
+            keywords += [(word, self._across(index, word, axis, float(given[word]))) for word, axis in sizes]  # type: ignore[arg-type]
+        else:
+            for axis in range(3):
+                keywords += self._placed(self.layout.elements[index, "", axis])
+        fills = self.layout.fills(line)
+        for word, argument in line.keywords:
+            if not fills and word in ("radius", "edge", "tilt", "lean", "turn"):
+                keywords.append((word, self._plain(index, word, argument)))
+        if line.kind in ROUND and "radius" not in given and not fills:
+            keywords.append(("radius", self._plain(index, "radius", self.layout.radius(line))))
+        return replace(line, keywords=tuple(keywords))
+
+    def _across(self, index: int, word: str, axis: int, size: float) -> Value:
+        """A size of a bar: a number, or what is left of the whole between two equal clearances."""
+        if self.anchors.get((index, "across", axis)) != (LOW, HIGH):
+            return self._slot(index, word, "size", axis, LOW, size)
+        clearance = (self.layout.extents[axis] - size) / 2
+        value = self._slot(index, AXES[axis].low, "clearance", axis, LOW, clearance)
+        return Binary("-", Name(SIZES[axis]), Binary("*", 2.0, value))
+
+    def _plain(self, index: int, word: str, argument: Argument) -> Argument:
+        kind: Kind = "angle" if word in ANGLES else "length" if word == "lean" else word  # type: ignore[assignment]
+        if isinstance(argument, tuple):
+            first, second = (self._slot(index, f"{word}.{end}", kind, -1, LOW, float(argument[end])) for end in (0, 1))  # type: ignore[arg-type]
+            return first, second
+        return self._slot(index, word, kind, -1, LOW, float(argument))  # type: ignore[arg-type]
+
+    def _group(self, index: int, line: Group) -> Group:
+        given = dict(line.keywords)
+        if line.kind == "translate":
+            return replace(line, kind="row", keywords=(("last", self._point(index, "last")),))
+        key = "plane" if line.kind == "mirror" else "centre"
+        keywords: Keywords = self._point(index, key).keywords
+        if "step" in given:
+            keywords = (*keywords, ("step", self._plain(index, "step", given["step"])))
+        return replace(line, keywords=keywords)
+
+    def _point(self, index: int, key: str) -> Point:
+        pairs: list[tuple[str, Value]] = []
+        for axis, words in enumerate(AXES):
+            element = self.layout.elements.get((index, key, axis))
+            if element is None:
+                continue
+            (anchor,), extent = self.anchors[index, key, axis], self.layout.extents[axis]
+            word = (words.low, words.offset, words.high)[anchor]
+            value = (element.low, element.middle - extent / 2, extent - element.high)[anchor]
+            kind: Kind = "offset" if anchor == MIDDLE else "clearance"
+            exactly = key in ("plane", "centre") and anchor == MIDDLE and abs(value) < ALIGNED
+            if exactly:
+                pairs += [(word, 0.0)] if key == "plane" else []
+            else:
+                pairs.append((word, self._slot(index, f"{key}.{word}", kind, axis, anchor, value)))
+        return Point(tuple(pairs))
+
+    def _placed(self, element: Element) -> Iterator[tuple[str, Argument]]:
+        """The keywords of an element: clearances, size and offset, by its anchors."""
+        line, axis, words = element.line, element.axis, AXES[element.axis]
+        extent, size = self.layout.extents[axis], element.high - element.low
+        anchors = self.anchors[line, element.key, axis]
+        first = (element.low, element.middle - extent / 2, extent - element.high)
+        word = (words.low, words.offset, words.high)
+        if element.kind == "round":
+            (anchor,) = anchors
+            kind: Kind = "offset" if anchor == MIDDLE else "clearance"
+            yield word[anchor], self._slot(line, word[anchor], kind, axis, anchor, first[anchor])
+            return
+        low, high = anchors
+        if low == high:
+            kind = "offset" if low == MIDDLE else "clearance"
+            yield word[low], self._slot(line, word[low], kind, axis, low, first[low])
+            yield words.size, self._slot(line, words.size, "size", axis, LOW, size)
+            return
+        if low == LOW:
+            yield words.low, self._slot(line, words.low, "clearance", axis, LOW, element.low)
+        else:  # measured from the middle
+            value = self._slot(line, words.low, "offset", axis, MIDDLE, element.low - extent / 2)
+            yield words.low, Binary("+", Binary("/", Name(SIZES[axis]), 2.0), value)
+        if high == HIGH:
+            yield words.high, self._slot(line, words.high, "clearance", axis, HIGH, extent - element.high)
+        else:
+            value = self._slot(line, words.high, "offset", axis, MIDDLE, extent / 2 - element.high)
+            yield words.high, Binary("+", Binary("/", Name(SIZES[axis]), 2.0), value)

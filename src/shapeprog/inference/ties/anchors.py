@@ -1,0 +1,326 @@
+"""From which side of the whole every face is measured.
+
+A face that is measured from the low side stays where that side is when the whole is made larger, one measured from the
+high side moves with that.  The anchors decide how a program follows ``width``, ``depth`` and ``height``: a part near a
+side should keep its clearance, a part that spans should grow, any other should keep its size, and parts that touch
+should still do so.  This is a labelling of few faces with three labels, solved for each axis alone by iterated
+conditional modes (Besag 1986) from several starts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import product
+from typing import NamedTuple
+
+import numpy as np
+
+from shapeprog.inference.joints import Joints, depths, moved
+from shapeprog.inference.ties.layout import ALIGNED, CENTRED, HIGH, LOW, MIDDLE, Anchors, Element
+from shapeprog.inference.ties.model import Model
+from shapeprog.language.placement import AXES
+from shapeprog.space import Array, FloatArray
+
+
+@dataclass(frozen=True)
+class AnchorSettings:
+    """Costs of anchors; chosen on validation shapes.
+
+    Parameters
+    ----------
+    apart
+        A pair of parts that touch and would come apart.
+    pressed
+        A pair that would be pressed into each other, or come apart when the whole shrinks.
+    side
+        A copy of a part near a side of the whole that does not move with it.
+    reaching
+        The same for one that reaches the side.
+    resized, rigid
+        A part shorter than ``spanning`` of the whole that changes its size, times how much shorter it is; and a copy of
+        one that is longer and keeps it.
+    middle
+        An end measured from the middle, where the middle of the part is not that of the whole.
+    farther
+        An end measured from the farther side, times the difference of the distances as a share of the whole.
+    reach, beyond, spanning
+        Shares of the whole: up to this a face reaches a side; parts wholly beyond this share of the half are near that
+        side; and from this on they span.
+    """
+
+    apart: float = 3.0
+    pressed: float = 0.6
+    side: float = 2.0
+    reaching: float = 8.0
+    resized: float = 2.0
+    rigid: float = 5.0
+    middle: float = 0.5
+    farther: float = 0.4
+    reach: float = 0.02
+    beyond: float = 0.3
+    spanning: float = 0.6
+
+
+SHIFTS = np.array([0.0, 0.5, 1.0])
+"""By how much of what the whole grows an anchor moves, seen from the low side."""
+
+TOUCH = 0.1
+"""Cells by which parts that touch may be apart."""
+
+STEP = 0.3
+"""Cells between the first and last copy of a row up to which it does not run along an axis."""
+
+ROUNDS = 8
+"""Most passes over all elements."""
+
+
+class Contacts(NamedTuple):
+    """Pairs of primitives that touch, and how the gaps of those of which one leans follow from the elements of an axis.
+
+    Parameters
+    ----------
+    first, second
+        The primitives (C,).
+    leaning
+        Which of the pairs lean (L,).
+    gaps
+        The gaps of these (L,), negative where they overlap.
+    slopes, base
+        How these follow from the low and high coordinate of every element (L, K, 2), and from the extent (L,).
+    """
+
+    first: Array
+    second: Array
+    leaning: Array
+    gaps: FloatArray
+    slopes: FloatArray
+    base: FloatArray
+
+
+class AxisAnchors:
+    """The anchors of all elements of one axis.
+
+    Parameters
+    ----------
+    elements
+        The elements (K,) of the axis.
+    axis
+        Which axis.
+    extent
+        The extent of the whole.
+    ends
+        Low and high ends (2, N) of all primitives, from the low side of the whole.
+    slopes
+        How they follow from the low and high coordinate of every element (2, N, K, 2).
+    base
+        How they move with the high side of the whole while all coordinates stay (2, N): mirror images do.
+    contacts
+        Pairs of primitives that touch (C, 2).
+    loops
+        For every element that is the last copy of a row, the element of its first.
+    settings
+        The costs.
+    """
+
+    def __init__(
+        self, elements: list[Element], axis: int, extent: float, ends: FloatArray, slopes: FloatArray,
+        base: FloatArray, contacts: Contacts, rows: dict[int, int], settings: AnchorSettings,
+    ) -> None:  # fmt: skip
+        self.rows = rows
+        places = {(element.line, element.key): k for k, element in enumerate(elements)}
+        self.spans: list[tuple[int, int, float]] = []  # both ends of a rod, and the cost of different anchors
+        for (line, key), k in places.items():
+            if key in ("end", "through") and (line, "start") in places:
+                start = places[line, "start"]
+                length = abs(elements[k].low - elements[start].low) / extent
+                self.spans.append((start, k, settings.resized * max(0.0, 1 - length / settings.spanning)))
+        self.elements, self.axis, self.extent, self.settings = elements, axis, extent, settings
+        self.slopes, self.base = slopes, base
+        self.choices: list[Sequence[Anchors]] = [self._choices(element) for element in elements]
+        for start, end, _ in self.spans:  # ends at equal distances from the middle stay so
+            if axis < 2 and abs(elements[start].low + elements[end].low - extent) < 2 * CENTRED * extent:
+                apart = abs(elements[start].low - elements[end].low) < settings.spanning * extent
+                low, high = ((LOW,), (HIGH,)) if elements[start].low < elements[end].low else ((HIGH,), (LOW,))
+                self.choices[start], self.choices[end] = ([(MIDDLE,)], [(MIDDLE,)]) if apart else ([low], [high])
+        self.unary = [[self._unary(element, anchors) for anchors in choices] for element, choices in
+                      zip(elements, self.choices, strict=True)]  # fmt: skip
+        low, high = ends
+        half = extent / 2
+        self.at_low = (low <= settings.reach * extent) | (high <= half - settings.beyond * half)
+        self.at_high = (high >= (1 - settings.reach) * extent) | (low >= half + settings.beyond * half)
+        if axis == 2:
+            self.at_low, self.at_high = low <= settings.reach * extent, high >= 0.9 * extent
+        self.reaches_low, self.reaches_high = low <= settings.reach * extent, high >= (1 - settings.reach) * extent
+        self.share = np.stack([low, high]) / extent
+        self.long = high - low >= settings.spanning * extent
+        one, two = contacts.first, contacts.second
+        self.contacts = contacts
+        self.lower = np.where(low[one] >= low[two], one, two)  # whose low end begins the overlap
+        self.upper = np.where(high[one] <= high[two], one, two)
+        self.overlap = high[self.upper] - low[self.lower]
+        moved_by = (np.abs(slopes).max((0, 3)) > 0).astype(int)  # (N, K)
+        both = moved_by[one].T @ moved_by[two] if len(one) else np.zeros((len(elements),) * 2)
+        both = both + both.T + (moved_by.T @ moved_by)
+        self._together = [(int(a), int(b)) for a, b in np.argwhere(np.triu(both, 1) > 0)]
+
+    def _choices(self, element: Element) -> Sequence[Anchors]:
+        centred = abs(element.middle - self.extent / 2) < CENTRED * self.extent and self.axis < 2
+        if element.kind != "interval":
+            if self.axis == 2 and element.key != "plane":
+                return [(LOW,), (HIGH,)]
+            return [(MIDDLE,)] if centred and element.key != "last" else [(LOW,), (MIDDLE,), (HIGH,)]
+        if centred and element.kind == "interval":
+            return [(LOW, HIGH), (MIDDLE, MIDDLE)]
+        pairs = [(LOW, LOW), (LOW, HIGH), (HIGH, HIGH)]
+        return pairs + ([(MIDDLE, MIDDLE), (LOW, MIDDLE), (MIDDLE, HIGH)] if self.axis < 2 else [])
+
+    def _unary(self, element: Element, anchors: Anchors) -> float:
+        s, extent = self.settings, self.extent
+        ends = (element.low, element.high) if element.kind == "interval" else (element.middle,)
+        cost = 0.0
+        for end, anchor in zip(ends, anchors, strict=True):
+            if anchor == MIDDLE:
+                cost += s.middle * (abs(end - extent / 2) > CENTRED * extent or len(set(anchors)) > 1)
+            else:
+                distance = end if anchor == LOW else extent - end
+                cost += s.farther * max(0.0, 2 * distance / extent - 1)
+        if element.kind == "interval":
+            size = (element.high - element.low) / extent
+            if anchors[0] != anchors[1]:
+                cost += s.resized * max(0.0, 1 - size / s.spanning)
+        return cost
+
+    def solved(self) -> list[Anchors]:
+        """The anchors of every element."""
+        best: tuple[float, list[int]] | None = None
+        for start in range(3):
+            state = [self._start(unary, start) for unary in self.unary]
+            total = self._cost(state)
+            for _ in range(ROUNDS):
+                before = total
+                for groups in (*([k] for k in range(len(state))), *self._pairs()):
+                    options = product(*(range(len(self.choices[k])) for k in groups))
+                    for option in options:
+                        trial = state.copy()
+                        for k, choice in zip(groups, option, strict=True):
+                            trial[k] = choice
+                        if trial != state and (cost := self._cost(trial)) < total - 1e-9:
+                            state, total = trial, cost
+                if total >= before - 1e-9:
+                    break
+            if best is None or total < best[0] - 1e-9:
+                best = (total, state)
+        assert best is not None
+        return [choices[k] for choices, k in zip(self.choices, best[1], strict=True)]
+
+    def _pairs(self) -> list[tuple[int, int]]:
+        """Elements whose parts touch: they are often better changed together."""
+        return self._together
+
+    @staticmethod
+    def _start(unary: list[float], which: int) -> int:
+        order = np.argsort(unary, kind="stable")
+        return int(order[min(which, len(order) - 1)])
+
+    def _cost(self, state: list[int]) -> float:
+        s = self.settings
+        shifts = np.zeros((len(state), 2))
+        cost = 0.0
+        for k, choice in enumerate(state):
+            anchors = self.choices[k][choice]
+            cost += self.unary[k][choice]
+            shifts[k] = SHIFTS[anchors[0]], SHIFTS[anchors[-1]]
+        for one, two, worth in self.spans:
+            cost += worth * (state[one] != state[two])
+        for last, first in self.rows.items():  # what a row names of its last copy is a side or the middle of it
+            shifts[last] -= SHIFTS[self.choices[last][state[last]][0]] * (shifts[first, 1] - shifts[first, 0])
+        moved = self.base + np.einsum("enkc,kc->en", self.slopes, shifts)
+        low, high = moved
+        far = 0.25 * self.extent
+        # A face near a side moves with it, or keeps its proportion.
+        ask_low = self.at_low & (np.abs(low - np.clip(low, -0.13, np.maximum(self.share[0], 0) + 0.13)) > 1e-9)
+        ask_high = self.at_high & (np.abs(high - np.clip(high, np.minimum(self.share[1], 1) - 0.13, 1.13)) > 1e-9)
+        rigid = self.long & (high - low < self.share[1] - self.share[0] - 0.5)
+        costs = np.where(self.reaches_low, s.reaching, s.side)[ask_low].sum()
+        costs += np.where(self.reaches_high, s.reaching, s.side)[ask_high].sum() + s.rigid * rigid.sum()
+        cost += float(costs) / max(1.0, len(low) / len(state))
+        if len(self.contacts.first):
+            grown = high[self.upper] - low[self.lower]
+            apart = self.overlap + far * grown < np.minimum(self.overlap, 0) - TOUCH
+            pressed = (grown > 1e-9) & (self.overlap < 1.5 * TOUCH)
+            leaning = self.contacts.leaning
+            gap = self.contacts.gaps + far * (self.contacts.base + np.einsum("ckd,kd->c", self.contacts.slopes, shifts))
+            apart[leaning] |= gap > np.maximum(self.contacts.gaps, 0) + TOUCH
+            cost += (s.apart * float(apart.sum()) + s.pressed * float(pressed.sum())) / max(1.0, len(low) / len(state))
+        return cost
+
+
+def anchors_of(model: Model, joints: Joints | None, settings: AnchorSettings) -> dict[tuple[int, str, int], Anchors]:
+    """The anchors of all elements of a program.
+
+    Parameters
+    ----------
+    model
+        The program with all faces measured from the low side.
+    joints
+        Where its parts touch.
+    settings
+        The costs.
+    """
+    layout = model.anchored.layout
+    ends, rows = model.ends(model.numbers)
+    gaps, gap_rows, pairs, leaning = _leaning(model, joints)
+    result: dict[tuple[int, str, int], Anchors] = {}
+    for axis in range(3):
+        elements = [element for element in layout.elements.values() if element.axis == axis]
+        place = {(element.line, element.key): k for k, element in enumerate(elements)}
+        loops = {k: place[layout.first(line)] for (line, key), k in place.items() if key == "last"}
+        extent = layout.extents[axis]
+        slopes = np.moveaxis(_by_element(model, elements, rows[:, axis]), 0, 2)
+        contacts = Contacts(
+            pairs[0], pairs[1], leaning, gaps, np.moveaxis(_by_element(model, elements, gap_rows), 0, 1),
+            gap_rows[:, axis],
+        )  # fmt: skip
+        solver = AxisAnchors(
+            elements, axis, extent, ends[:, axis] + extent / 2, slopes, rows[:, axis, :, axis] + 0.5, contacts, loops,
+            settings,
+        )  # fmt: skip
+        for element, anchors in zip(elements, solver.solved(), strict=True):
+            result[element.line, element.key, axis] = anchors
+        for last, first in loops.items():
+            one, two = elements[last], elements[first]
+            if abs(one.low - two.low) < STEP:  # a row that does not run along this axis
+                result[one.line, one.key, axis] = result[two.line, two.key, axis][:1]
+    return result
+
+
+def _by_element(model: Model, elements: list[Element], rows: FloatArray) -> FloatArray:
+    """Slopes (..., P) by the numbers of a program as those by the low and high coordinates of elements (K, ..., 2)."""
+    index = model.anchored.index
+    found = np.zeros((len(elements), *rows.shape[:-1], 2))
+    for k, element in enumerate(elements):
+        words = AXES[element.axis]
+        if element.kind == "interval":
+            found[k, ..., 1] = rows[..., index[element.line, words.size]]
+            found[k, ..., 0] = -found[k, ..., 1]
+        if element.key != "across":
+            low = f"{element.key}.{words.low}" if element.key else words.low
+            found[k, ..., 0] += rows[..., index[element.line, low]]
+    return found
+
+
+def _leaning(model: Model, joints: Joints | None) -> tuple[FloatArray, FloatArray, tuple[Array, Array], Array]:
+    """The gaps (L,) of touching pairs of which one leans, their slopes (L, P), all pairs, and which of these lean."""
+    count = len(model.numbers)
+    if joints is None or not len(joints.first):
+        nothing = np.zeros(0, np.int64)
+        return np.zeros(0), np.zeros((0, count)), (nothing, nothing), nothing
+    poses = model.poses(model.numbers)
+    rotation = poses.scene.rotation
+    turned = ((rotation - rotation.round()).abs().amax((1, 2)) > ALIGNED).numpy()
+    first, second = joints.first.numpy(), joints.second.numpy()
+    leaning = np.flatnonzero(turned[first] | turned[second])
+    reach = depths(poses.scene, poses.slopes, moved(poses.scene, joints))
+    slopes = reach.slopes.nan_to_num(0).numpy()[leaning]
+    return reach.residual.numpy()[leaning], slopes, (first, second), leaning

@@ -1,0 +1,115 @@
+"""The numbers of a program as expressions of few free ones.
+
+Relations are solved by Gauss-Jordan elimination.  Which numbers stay free is then improved by pivoting, as in the
+simplex method, until no exchange of a free number for another makes the text shorter.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from shapeprog.inference.ties.layout import Slot
+from shapeprog.space import FloatArray
+
+ELIMINATED = {"clearance": 0, "offset": 0, "edge": 1, "radius": 2, "size": 3, "length": 3, "angle": 3, "extent": 9}
+"""Which kinds of numbers rather follow from others: small ones first."""
+
+NOTHING = 1e-7
+"""Factors up to this are zero."""
+
+NEGATIVE = 1.5
+"""Cost of a size that is a difference: it can become negative when a name is changed."""
+
+REPEATED = 0.3
+"""Cost of a sum for every use after the first: it can be named."""
+
+
+@dataclass(frozen=True)
+class Solution:
+    """Free numbers, and how all numbers follow from them.
+
+    Parameters
+    ----------
+    factors
+        Of every number (P,) by how much it follows from each free one (P, Z).
+    free
+        Which numbers are free (Z,).
+    """
+
+    factors: FloatArray
+    free: list[int]
+
+
+def solved(slots: list[Slot], rows: FloatArray) -> Solution:
+    """The free numbers for which the text is short.
+
+    Parameters
+    ----------
+    slots
+        The numbers (P,).
+    rows
+        Relations (M, P): independent rows whose products with the numbers are zero.
+    """
+
+    def order(k: int) -> tuple[int, bool, int, int]:
+        slot = slots[k]
+        return ELIMINATED[slot.kind], not slot.word.startswith(("last", "end", "through")), -slot.line, -k
+
+    columns = sorted(range(len(slots)), key=order)
+    matrix, pivots = rows[:, columns].copy(), list[int]()
+    for column in range(len(columns)):
+        row = len(pivots)
+        if row == len(matrix):
+            break
+        best = row + int(np.abs(matrix[row:, column]).argmax())
+        if abs(matrix[best, column]) < NOTHING:
+            continue
+        matrix[[row, best]] = matrix[[best, row]]
+        matrix[row] /= matrix[row, column]
+        others = np.arange(len(matrix)) != row
+        matrix[others] -= np.outer(matrix[others, column], matrix[row])
+        pivots.append(column)
+    rest = [column for column in range(len(columns)) if column not in set(pivots)]
+    factors = np.zeros((len(slots), len(rest)))
+    factors[[columns[c] for c in rest], np.arange(len(rest))] = 1
+    factors[[columns[c] for c in pivots]] = -matrix[: len(pivots), rest]
+    return _shortened(slots, factors, [columns[c] for c in rest])
+
+
+def _shortened(slots: list[Slot], factors: FloatArray, free: list[int]) -> Solution:
+    """Exchange free numbers for others while the text gets shorter."""
+    factors = _clean(factors)
+    sizes = np.array([slot.kind in ("size", "radius") for slot in slots])
+    fixed = np.array([slot.kind == "extent" for slot in slots])
+    best = _cost(factors, sizes)
+    while True:
+        exchange = None
+        many = (factors != 0).sum(1) > 1
+        for p, z in zip(*np.nonzero((np.abs(np.abs(factors) - 1) < NOTHING) & many[:, None]), strict=True):
+            if fixed[free[z]]:
+                continue
+            new = factors - np.outer(factors[:, z], factors[p] / factors[p, z])
+            new[:, z] = factors[:, z] / factors[p, z]
+            new = _clean(new)
+            if (cost := _cost(new, sizes)) < best - NOTHING:
+                best, exchange = cost, (new, int(p), int(z))
+        if exchange is None:
+            return Solution(factors, free)
+        factors, p, z = exchange
+        free = [*free[:z], p, *free[z + 1 :]]
+
+
+def _clean(factors: FloatArray) -> FloatArray:
+    return np.where(np.abs(factors) < NOTHING, 0.0, factors)
+
+
+def _cost(factors: FloatArray, sizes: np.ndarray) -> float:
+    """Operators of all different sums, and what it costs to repeat them."""
+    used = factors != 0
+    operators = np.maximum(used.sum(1) - 1, 0) + (used & (np.abs(np.abs(factors) - 1) > NOTHING)).sum(1)
+    operators = operators + 0.5 * (factors < 0).sum(1) + NEGATIVE * (sizes & (factors < 0).any(1))
+    several = np.flatnonzero(operators)
+    _, first = np.unique(factors[several].round(6), axis=0, return_index=True)
+    return float(operators[several[first]].sum() + REPEATED * (len(several) - len(first)))

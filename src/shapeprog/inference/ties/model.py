@@ -1,0 +1,184 @@
+"""A placed program as a function of its numbers: its primitives, its misfit, and refits while relations hold."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import torch
+
+from shapeprog.geometry.scene import Scene
+from shapeprog.inference.adjustment import EXPLAINED, of_target
+from shapeprog.inference.evidence import Evidence
+from shapeprog.inference.joints import Joints, moved, needs
+from shapeprog.inference.residuals import Target
+from shapeprog.inference.ties.anchored import Anchored
+from shapeprog.inference.tunable import Poses, Tunable, bounds
+from shapeprog.language.evaluate import expanded, symbolic
+from shapeprog.language.expression import Linear
+from shapeprog.language.program import Program
+from shapeprog.space import FloatArray
+
+DRAWS = 4
+"""Times that pairs of points are drawn for one curvature."""
+
+STEPS = 4
+"""Steps of Gauss and Newton of a refit."""
+
+TOGETHER, CLOSED = 0.03, 0.2
+"""Weights of a squared gap between parts that touched, and of one that is still open at the end."""
+
+FARTHEST = 0.5
+"""Farthest that one step moves a number, in cells."""
+
+PRIOR = {
+    "clearance": 1e-4,
+    "offset": 1e-4,
+    "size": 3e-4,
+    "radius": 3e-4,
+    "edge": 1e-3,
+    "length": 1e-4,
+    "angle": 1e-3,
+    "extent": 1e-2,
+}
+"""Weights of a squared move from the start, by kind: what nothing sees stays where it is."""
+
+
+HELD = 1e6
+"""Weight of a squared move of a number that does not move."""
+
+
+class Model:
+    """A placed program as a function of its numbers (P,), those of :class:`Anchored`.
+
+    Attributes
+    ----------
+    numbers
+        Where they are at the start (P,).
+    low
+        What they must not fall below (P,).
+    """
+
+    def __init__(self, anchored: Anchored, thinnest: float) -> None:
+        self.anchored, self.slots = anchored, anchored.slots
+        self.numbers: FloatArray = np.array([slot.value for slot in self.slots])
+        self.tunable = Tunable(Program(expanded(anchored.source)))
+        names = {anchored.name(k): k for k in range(len(self.slots))}
+        forms = symbolic(anchored.source, {name: Linear.of(name) for name in names}, Linear.of("height") * -0.5)
+        nodes = list(Program(forms).walk())
+        self.jacobian: FloatArray = np.zeros((len(self.tunable.moving), len(self.slots)))
+        offset = np.zeros(len(self.tunable.moving))
+        for row, (n, slot) in enumerate(self.tunable.moving):
+            form = nodes[n].values[slot]
+            if isinstance(form, Linear):
+                offset[row] = form.constant
+                for name, factor in form.factors:
+                    self.jacobian[row, names[name]] = factor
+            else:
+                offset[row] = form
+        self._offset = offset
+        smallest = {"size": thinnest, "radius": thinnest / 2, "edge": 0.0}
+        self.low: FloatArray = np.array([smallest.get(slot.kind, -np.inf) for slot in self.slots])
+        self.movable = np.array([slot.kind != "extent" for slot in self.slots])
+
+    def values(self, numbers: FloatArray) -> torch.Tensor:
+        """The numbers of the statements in cells (F,)."""
+        return torch.from_numpy(self.jacobian @ numbers + self._offset)
+
+    def scene(self, numbers: FloatArray) -> Scene:
+        """The primitives (N,)."""
+        return self.tunable.scene(self.values(numbers))
+
+    def poses(self, numbers: FloatArray) -> Poses:
+        """The primitives, and their slopes (N, 16, P) by the numbers."""
+        poses = self.tunable.poses(self.values(numbers))
+        return Poses(poses.scene, poses.slopes @ torch.from_numpy(self.jacobian))
+
+    def ends(self, numbers: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Low and high ends (2, 3, N) of the primitives along x, y, z, from the middle of the grid, and their slopes
+        (2, 3, N, P)."""
+        poses = self.poses(numbers)
+        value, slope = ends_of(poses.scene)
+        rows = torch.einsum("enr,nrf->enf", slope, poses.slopes).numpy()
+        ends = value.numpy()
+        low, high = [-ends[5], ends[1], ends[0]], [-ends[2], ends[4], ends[3]]
+        low_rows, high_rows = [-rows[5], rows[1], rows[0]], [-rows[2], rows[4], rows[3]]
+        return np.array([low, high]), np.array([low_rows, high_rows])
+
+
+class Misfit:
+    """How far the surface of a model is from that of a target, about its numbers.
+
+    Parameters
+    ----------
+    model
+        The program.
+    evidence
+        The target.
+    seed
+        Of the pairs of points that are drawn.
+    least
+        Least weight (P,) of a squared move of every number; infinite for numbers that are held.
+    """
+
+    def __init__(self, model: Model, evidence: Evidence, seed: int, least: FloatArray) -> None:
+        self.model, self.target = model, Target(evidence)
+        self.width = EXPLAINED * evidence.tolerance
+        self.generator = torch.Generator().manual_seed(seed)
+        self.start = model.numbers
+        scale = np.array([model.tunable.scale.numpy() @ np.abs(model.jacobian[:, k]) for k in range(len(model.slots))])
+        self.scale = np.clip(scale, 1e-3, None)
+        prior = np.maximum([PRIOR[slot.kind] for slot in model.slots], np.minimum(least, HELD))
+        angles = np.array([slot.kind == "angle" for slot in model.slots])
+        self.prior: FloatArray = np.where(angles, prior * self.scale**2, prior)
+
+    def at(
+        self, numbers: FloatArray, draws: int = DRAWS, joints: Joints | None = None, together: float = TOGETHER
+    ) -> tuple[FloatArray, FloatArray]:
+        """Half the slope (P,) and half the curvature (P, P) of the mean squared distance, with the prior and joints."""
+        count = len(numbers)
+        poses = self.model.poses(numbers)
+        slope, curvature = np.zeros(count), np.zeros((count, count))
+        for _ in range(draws):
+            one, two = of_target(poses, self.target.pairs(poses.scene, self.generator), self.width)
+            slope += one.numpy() / draws
+            curvature += two.numpy() / draws
+        if joints is not None and len(joints.first):
+            gaps = needs(poses.scene, poses.slopes, moved(poses.scene, joints))
+            wide = together * gaps.slopes
+            slope += (wide.T @ gaps.residual).numpy()
+            curvature += (wide.T @ gaps.slopes).numpy()
+        slope += self.prior * (numbers - self.start)
+        return slope, curvature + np.diag(self.prior)
+
+    def refitted(
+        self, numbers: FloatArray, free: FloatArray, joints: Joints | None, together: float = TOGETHER
+    ) -> FloatArray:
+        """The numbers (P,) of the least misfit that differ from these along directions (P, Z) only; parts that touched
+        are kept together."""
+        if not free.shape[1]:
+            return numbers
+        farthest = FARTHEST / np.maximum(self.scale, 1.0)
+        low = np.minimum(self.model.low, numbers)
+        for _ in range(STEPS):
+            slope, curvature = self.at(numbers, 1, joints, together)
+            move = free @ -np.linalg.solve(free.T @ curvature @ free, free.T @ slope)
+            onwards = numbers + move / float(np.max(np.abs(move) / farthest, initial=1.0))
+            if (onwards < low).any():
+                break
+            numbers = onwards
+        return numbers
+
+
+def ends_of(scene: Scene) -> tuple[torch.Tensor, torch.Tensor]:
+    """Low and high ends of primitives along the axes (6, N), and their slopes (6, N, 16) by sizes, centre, rotation."""
+    leaves = [each.clone().requires_grad_() for each in (scene.size, scene.centre, scene.rotation)]
+    half = bounds(replace(scene, size=leaves[0]))
+    reach = (leaves[2].abs() @ half[..., None])[..., 0]
+    ends = torch.cat([leaves[1] - reach, leaves[1] + reach], -1).T
+    slopes = []
+    for end in ends:
+        parts = torch.autograd.grad(end.sum(), leaves, retain_graph=True, allow_unused=True)
+        filled = [torch.zeros_like(leaf) if part is None else part for part, leaf in zip(parts, leaves, strict=True)]
+        slopes.append(torch.cat([part.flatten(1) for part in filled], 1))
+    return ends.detach(), torch.stack(slopes)

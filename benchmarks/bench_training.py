@@ -19,7 +19,7 @@ from shapeprog.liang2022.fast import Fast, FastSettings
 from shapeprog.liang2022.generator import Generator, TeacherForcingBatch
 from shapeprog.liang2022.loop import tune_allocator
 from shapeprog.liang2022.pretrain import teacher_forcing
-from shapeprog.liang2022.prior import SyntheticStream, prior
+from shapeprog.liang2022.prior import PRIORS
 from shapeprog.liang2022.tian2019 import PUBLISHED, Tian2019, Tian2019Settings
 
 BATCH, BLOCKS, REPEATS = 32, 10, 3
@@ -41,7 +41,7 @@ def pretraining(generator: Generator, batch: TeacherForcingBatch) -> float:
     optimiser = torch.optim.Adam(generator.parameters(), 1e-4)
 
     def step() -> None:
-        loss = sum(generator.predict(batch).losses().values(), torch.zeros(()))
+        loss = sum(generator.losses(generator.predict(batch)).values(), torch.zeros(()))
         optimiser.zero_grad()
         loss.backward()
         optimiser.step()
@@ -66,8 +66,8 @@ def main() -> None:
     """Print a line for each figure: name, shapes per second, ratio to the published form."""
     tune_allocator()
     torch.manual_seed(0)
-    made = SyntheticStream(prior("narrow"), BATCH, 0, blocks=BLOCKS - 1)[0]
-    live = teacher_forcing(made.voxels, made.code, "written")  # and the end
+    made = PRIORS["narrow"].batch(BATCH, 0, 0)
+    live = teacher_forcing(made.voxels, made.code[:, : BLOCKS - 1], "written")  # and the end
     everything = replace(live, live=torch.ones_like(live.live))
     designs: dict[str, tuple[Generator, TeacherForcingBatch]] = {
         "published": (Tian2019(PUBLISHED), everything),

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import torch
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from torch.nn.functional import one_hot
 
 from shapeprog.geometry.cells import iou, pack, rasterise
@@ -21,8 +22,8 @@ from shapeprog.liang2022.evaluate import scores_on_packs
 from shapeprog.liang2022.experiment import CATEGORIES, ROWS
 from shapeprog.liang2022.generator import IDS, vocabulary
 from shapeprog.liang2022.loop import read_log
-from shapeprog.liang2022.prior import prior
-from shapeprog.liang2022.settings import AdaptSettings
+from shapeprog.liang2022.prior import PRIORS
+from shapeprog.liang2022.settings import LOG, AdaptSettings
 from shapeprog.liang2022.weights import load_executor, load_generator
 
 CURVES = {"guided": "C1.-", "direct": "C0.-", "wide-guided": "C1.--", "wide-direct": "C0.--"}
@@ -30,8 +31,9 @@ CURVES = {"guided": "C1.-", "direct": "C0.-", "wide-guided": "C1.--", "wide-dire
 
 
 def plot_efficiency(packs: Path, results: Path, out: Path) -> None:
-    """CD of validation shapes against shapes seen in adaptation."""
-    figure = Figure((4.5 * len(CATEGORIES), 3.2), layout="tight")
+    """CD of validation shapes against shapes seen in adaptation, a curve for each seed."""
+    figure = Figure((4.5 * len(CATEGORIES), 3.6), layout="constrained")
+    curves: dict[str, Line2D] = {}
     for axis, category in zip(figure.subplots(1, len(CATEGORIES)), CATEGORIES, strict=True):
         packed, cd = packs / f"{category}_val.npz", f"val_{category}_val_cd"
         for row, style in CURVES.items():
@@ -39,11 +41,11 @@ def plot_efficiency(packs: Path, results: Path, out: Path) -> None:
             start = scores_on_packs(load_generator(ROWS[row].initial), [packed], decoder)
             first = {"samples_seen": 0, cd: start[cd.removeprefix("val_")]}
             for folder in sorted(results.glob(f"runs/{row}-{category}-*")):
-                records = [record for record in (first, *read_log(folder)) if cd in record]
+                records = [record for record in (first, *read_log(folder / LOG)) if cd in record]
                 shapes = [record["samples_seen"] for record in records]
-                axis.plot(shapes, [1000 * record[cd] for record in records], style, label=row)
+                curves[row], *_ = axis.plot(shapes, [1000 * record[cd] for record in records], style)
         axis.set(title=category, xlabel="shapes seen", ylabel="CD x 1000", ylim=(0, None))
-        axis.legend()
+    figure.legend(curves.values(), curves.keys(), loc="outside lower center", ncols=len(curves))
     figure.savefig(out, dpi=120)
 
 
@@ -52,7 +54,7 @@ def extrapolation(count: int = 400, seed: int = 0) -> list[tuple[int, float, flo
 
     The IoU of the renderer's continuous primitives comes first, then that of the neural executor.
     """
-    code, _ = prior("narrow").sample(20 * count, seed)
+    code = PRIORS["narrow"].sample(20 * count, seed).code
     ids, numbers = code.ids.flatten(0, 1), code.parameters.flatten(0, 1)
     ids, numbers = ids[ids[:, 0] > 0], numbers[ids[:, 0] > 0]
     table, executor, rng = vocabulary(), load_executor(), torch.Generator().manual_seed(seed)

@@ -23,7 +23,7 @@ from shapeprog.inference.surface import points_of_cells
 from shapeprog.liang2022.fast import Fast, FastSettings
 from shapeprog.liang2022.generator import Generator
 from shapeprog.liang2022.loop import Record, train
-from shapeprog.liang2022.prior import SyntheticStream, prior
+from shapeprog.liang2022.prior import PRIORS
 from shapeprog.liang2022.settings import TrainingSettings
 from shapeprog.liang2022.tian2019 import Tian2019, Tian2019Settings
 
@@ -43,7 +43,7 @@ def small(design: str = "fast") -> Generator:
 
 def targets(count: int = 4) -> Tensor:
     """Cells of synthetic tables and chairs."""
-    return SyntheticStream(prior("narrow"), count, seed=5)[0].voxels
+    return PRIORS["narrow"].batch(count, 5, 0).voxels
 
 
 def write_targets(path: Path, count: int = 4) -> Path:

@@ -160,10 +160,10 @@ def test_the_executor_learns_single_blocks(tmp_path: Path, monkeypatch: pytest.M
     monkeypatch.setattr(executor, "VALIDATION_BLOCKS", 16)
     settings = ExecutorSettings(num_shapes=48, batch_size=8, warm_up=0, learning_rate=3e-3)
     training = executor.ExecutorTask(settings)
-    blocks = training.batch(0)
+    blocks = training.batch(0).code
     assert (blocks.ids > 0).any(-1).all()
-    assert not blocks.numbers[~vocabulary().used[blocks.ids]].any()
-    assert (blocks.numbers <= vocabulary().high[blocks.ids]).all()
+    assert not blocks.parameters[~vocabulary().used[blocks.ids]].any()
+    assert (blocks.parameters <= vocabulary().high[blocks.ids]).all()
     _, records = run(tmp_path, task=training, settings=settings)
     assert records[-1]["cells"] < records[0]["cells"]
     assert {"val_iou", "val_widened"} <= records[-1].keys()
@@ -183,12 +183,12 @@ def test_the_executor_draws_the_union_of_the_blocks_that_draw():
 def test_every_shape_comes_once_before_any_comes_again(room: Path):
     write_targets(room / "five.npz", 5)
     stream = TargetStream([room / "five.npz"], 2, 50, seed=3)
-    grids = torch.cat([stream[index].cells for index in range(5)]).flatten(1)
+    grids = torch.cat([stream[index][0] for index in range(5)]).flatten(1)
     for part in grids.split(5):
         assert len(part.unique(dim=0)) == 5
-    assert torch.equal(stream[3].points, TargetStream([room / "five.npz"], 2, 50, seed=3)[3].points)
-    assert stream[0].points.shape == (2, 50, 3)
-    assert torch.equal(next(iter(stream)).cells, stream[0].cells)
+    assert torch.equal(stream[3][1], TargetStream([room / "five.npz"], 2, 50, seed=3)[3][1])
+    assert stream[0][1].shape == (2, 50, 3)
+    assert torch.equal(next(iter(stream))[0], stream[0][0])
 
 
 def test_the_ten_lines_of_the_manual_adapt(room: Path):

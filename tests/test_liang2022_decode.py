@@ -14,10 +14,10 @@ from shapeprog.language import encode
 from shapeprog.language.parser import parse
 from shapeprog.language.unroll import draw_blocks, unroll
 from shapeprog.liang2022.decode import EXACT_WEIGHT, Decoded, decode
-from shapeprog.liang2022.evaluate import evaluate, scores_on_packs
+from shapeprog.liang2022.evaluate import decode_all, measure, scores_on_packs
 from shapeprog.liang2022.generator import Generator
 from shapeprog.liang2022.pretrain import scheduled_sampling, teacher_forcing
-from shapeprog.liang2022.prior import SyntheticStream, prior
+from shapeprog.liang2022.prior import PRIORS
 from shapeprog.liang2022.weights import load_generator
 
 pytestmark = pytest.mark.paper
@@ -89,7 +89,7 @@ def test_sampling_depends_on_its_seed_alone():
 
 
 def test_blocks_come_in_order_of_what_they_cover_and_those_that_add_nothing_are_dropped():
-    made = SyntheticStream(prior("wide"), 16, seed=2)[0]
+    made = PRIORS["wide"].batch(16, 2, 0)
     batch = teacher_forcing(made.voxels, made.code)
     drawn = draw_blocks(batch.code)
     new = count(drawn & ~batch.canvases)
@@ -108,7 +108,7 @@ def test_blocks_come_in_order_of_what_they_cover_and_those_that_add_nothing_are_
 
 
 def test_scheduled_sampling_asks_for_the_block_that_adds_most_to_a_canvas_of_the_generator():
-    made = SyntheticStream(prior("narrow"), 6, seed=3)[0]
+    made = PRIORS["narrow"].batch(6, 3, 0)
     batch = teacher_forcing(made.voxels, made.code)
     generator = small().train()
     sampled = scheduled_sampling(generator, batch, seeded())
@@ -125,14 +125,14 @@ def test_scheduled_sampling_asks_for_the_block_that_adds_most_to_a_canvas_of_the
 
 def test_measures_are_those_of_the_written_programs_and_an_empty_one_is_a_point(tmp_path):
     path = write_targets(tmp_path / "few.npz", 2)
-    generator = load_generator("fast-narrow")
-    rows = evaluate(generator, list(read_pack(path)), "select")
+    generator, shapes = load_generator("fast-narrow"), list(read_pack(path))
+    rows = list(map(measure, *decode_all(generator, shapes, "select"), shapes))
     assert [row.iou for row in rows] == pytest.approx(decode(generator, targets(2)).iou().tolist())
     scores = scores_on_packs(generator, [path], "select")
     assert scores.keys() == {"few_iou", "few_cd", "few_blocks", "few_cd_median"}
     assert scores["few_cd"] == pytest.approx(sum(row.cd for row in rows) / 2)
     with torch.no_grad():
         generator.id_head[2].bias[0] += 100
-    silent = evaluate(generator, list(read_pack(path)), "argmax")
+    silent = list(map(measure, *decode_all(generator, shapes, "argmax"), shapes))
     assert [row.blocks for row in silent] == [0, 0]
     assert all(0 < row.cd < 1 for row in silent)

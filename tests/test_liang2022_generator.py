@@ -59,9 +59,8 @@ def test_teacher_forcing_gives_the_numbers_and_probabilities_of_decoding(design:
     generator, cells = small(design), targets()
     decoded = decode(generator, cells, decoder="argmax", blocks=6)
     prediction = generator.predict(decoded)
-    code = predicted_code(prediction)
+    code, offsets = predicted_code(prediction), decoded.offsets
     assert torch.equal(code.ids, decoded.code.ids)
-    offsets = decoded.offsets
     torch.testing.assert_close(code.parameters, decoded.code.parameters + offsets, atol=1e-3, rtol=0)
     assert (prediction.logits.argmax(-1) == prediction.ids).all()
     log_prob = prediction.logits.amax(-1).sum(-1)
@@ -82,10 +81,10 @@ def test_fast_remembers_the_block_before_once_its_memory_has_weights():
     generator, cells, code = small(), targets(1).float(), encode([PROGRAM])
     leg = Code(code.ids[:, 1], code.parameters[:, 1])
     none, moved = Code(torch.zeros_like(leg.ids), leg.parameters), Code(leg.ids, leg.parameters + 1)
-    first, second, third = (generator.encode(cells, cells, each, None)[0] for each in (none, leg, moved))
+    first, second, third = (generator.encode(cells, cells, each, ())[0] for each in (none, leg, moved))
     assert not torch.allclose(first, second, atol=1e-3)
     assert not torch.allclose(second, third, atol=1e-4)
     for weight in generator.block_memory.parameters():
         torch.nn.init.zeros_(weight)
-    first, second = (generator.encode(cells, cells, each, None)[0] for each in (none, leg))
+    first, second = (generator.encode(cells, cells, each, ())[0] for each in (none, leg))
     assert torch.equal(first, second)

@@ -24,7 +24,7 @@ SCRIPT = Path(__file__).with_name("liang2022_toys.py")
 
 
 def untimed(folder: Path) -> list[dict[str, float]]:
-    return [{name: value for name, value in each.items() if name != "seconds"} for each in read_log(folder)]
+    return [{name: value for name, value in each.items() if name != "seconds"} for each in read_log(folder / LOG)]
 
 
 def state(folder: Path) -> dict[str, object]:
@@ -54,7 +54,7 @@ def test_two_processes_resume_exactly_with_one_set_of_running_statistics(tmp_pat
     assert one["1.running_mean"].any()
     assert same(state(tmp_path / "whole"), state(tmp_path / "parts"))
     assert untimed(tmp_path / "parts") == untimed(tmp_path / "whole")
-    assert [each["samples_seen"] for each in read_log(tmp_path / "whole")] == list(range(8, 81, 8))
+    assert [each["samples_seen"] for each in read_log(tmp_path / "whole" / LOG)] == list(range(8, 81, 8))
 
 
 def test_changed_settings_are_refused_by_name_and_a_longer_run_is_none(tmp_path: Path):
@@ -64,7 +64,7 @@ def test_changed_settings_are_refused_by_name_and_a_longer_run_is_none(tmp_path:
     longer = replace(TOY, num_shapes=88, validate_every=0)
     assert [each["step"] for each in run(tmp_path, settings=longer)[1]] == [21, 22]
     again = list(train(Toy(), TOY, tmp_path, device="cpu", restart=True))
-    assert len(again) == len(read_log(tmp_path)) == 20
+    assert len(again) == len(read_log(tmp_path / LOG)) == 20
 
 
 def test_records_after_the_saved_state_are_dropped(tmp_path: Path):
@@ -92,7 +92,7 @@ def test_a_damaged_state_or_log_is_named(tmp_path: Path):
             refused += 1
     assert refused > 10
     (tmp_path / STATE).write_bytes(good[:-9])
-    with pytest.raises(InputError, match=r"state\.pt is damaged\n.*--restart"):
+    with pytest.raises(InputError, match=r"state\.pt is damaged, or of another network\n.*--restart"):
         run(tmp_path)
     (tmp_path / STATE).write_bytes(good)
     (tmp_path / LOG).write_text("{\n")
@@ -104,7 +104,7 @@ def test_a_state_of_another_network_is_refused(tmp_path: Path):
     run(tmp_path, stop_at=2)
     other = Toy()
     other.module = torch.nn.Sequential(torch.nn.Linear(8, 1))
-    with pytest.raises(InputError, match=r"state\.pt does not fit"):
+    with pytest.raises(InputError, match=r"state\.pt is damaged, or of another network"):
         run(tmp_path, task=other)
 
 

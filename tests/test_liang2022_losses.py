@@ -12,7 +12,7 @@ from torch import Tensor
 from shapeprog.errors import DeclarationError, ShapeProgError
 from shapeprog.language.parser import parse
 from shapeprog.language.unroll import unroll
-from shapeprog.liang2022.estimators import NvilBaseline, leave_one_out_advantage, reinforce_loss
+from shapeprog.liang2022 import losses
 from shapeprog.liang2022.losses import LOSSES, NEURAL, Comparison, Values, compute, loss, parse_losses
 
 pytestmark = pytest.mark.paper
@@ -105,28 +105,29 @@ def expected(samples: int, estimate: object) -> tuple[Tensor, Tensor]:
 @pytest.mark.parametrize("samples", [2, 3])
 def test_leave_one_out_is_unbiased(samples: int):
     def estimate(log_probs: Tensor, costs: Tensor) -> Tensor:
-        return reinforce_loss(log_probs[:, None, None], leave_one_out_advantage(costs[:, None])[..., None])
+        advantage = losses.leave_one_out_advantage(costs[:, None])[..., None]
+        return losses.reinforce_loss(log_probs[:, None, None], advantage)
 
     torch.testing.assert_close(*expected(samples, estimate), atol=1e-12, rtol=0)
-    assert leave_one_out_advantage(torch.tensor([[1.0], [4.0]])).tolist() == [[-3], [3]]
+    assert losses.leave_one_out_advantage(torch.tensor([[1.0], [4.0]])).tolist() == [[-3], [3]]
 
 
 @pytest.mark.parametrize("variance", [0.5, 9.0])
 def test_nvil_is_unbiased_up_to_its_scale(variance: float):
-    baseline = NvilBaseline(3).double().eval()
+    baseline = losses.NvilBaseline(3).double().eval()
     torch.nn.init.normal_(baseline.layers[2].weight)
     baseline.mean.fill_(0.7), baseline.variance.fill_(variance)
 
     def estimate(log_probs: Tensor, costs: Tensor) -> Tensor:
         advantage, _ = baseline(torch.ones(1, 3), torch.tensor([[False, True]]), costs)
-        return reinforce_loss(log_probs[:, None], advantage[:, 1:])
+        return losses.reinforce_loss(log_probs[:, None], advantage[:, 1:])
 
     result, exact = expected(1, estimate)
     torch.testing.assert_close(result * math.sqrt(max(variance, 1)), exact, atol=1e-12, rtol=0)
 
 
 def test_the_baseline_learns_the_costs():
-    baseline, feature, live = NvilBaseline(4), torch.randn(64, 4), torch.ones(32, 2, dtype=torch.bool)
+    baseline, feature, live = losses.NvilBaseline(4), torch.randn(64, 4), torch.ones(32, 2, dtype=torch.bool)
     feature[1::2] = feature[::2]
     costs, weights = 7 + feature[::2, 0], list(baseline.parameters())
     for _ in range(300):

@@ -12,7 +12,7 @@ from shapeprog.language import standard
 from shapeprog.language.statement import END
 from shapeprog.language.tensors import Code, decode
 from shapeprog.language.unroll import draw_blocks, unroll
-from shapeprog.liang2022.prior import BLOCKS, PRIORS, Prior, SyntheticStream, own_cells, prior, programs
+from shapeprog.liang2022.prior import BLOCKS, PRIORS, Prior, own_cells, programs
 from shapeprog.space import HALF, SPAN
 
 pytestmark = pytest.mark.paper
@@ -37,11 +37,11 @@ def extents(cells: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
 
 @pytest.mark.parametrize(("count", "seed"), [(1, 0), (3, 1), (300, 2)])
 def test_every_sample_is_a_published_program_of_whole_numbers(each: Prior, count: int, seed: int) -> None:
-    code, cells = each.sample(count, seed)
+    code, grids = each.sample(count, seed)
     assert code.ids.shape == (count, BLOCKS, 3)
     assert code.parameters.shape == (count, BLOCKS, 3, 7)
     assert torch.equal(code.parameters, code.parameters.round())
-    assert torch.equal(unpack(cells), voxels(unroll(code)))
+    assert torch.equal(grids, voxels(unroll(code)))
     for program, blocks in zip(decode(code), drawing(code).sum(-1).tolist(), strict=True):
         assert outside_published(program) == []
         assert 1 <= program.blocks == blocks
@@ -56,11 +56,11 @@ def test_empty_blocks_come_last_and_unused_numbers_are_zero(each: Prior) -> None
 
 
 def test_every_block_has_cells_of_its_own(each: Prior) -> None:
-    code, cells = each.sample(300, 1)
+    code, grids = each.sample(300, 1)
     blocks = draw_blocks(code)
     own = (blocks & ~(preceding(blocks) | preceding(blocks.flip(1)).flip(1))).flatten(2).any(-1)
     assert torch.equal(own, drawing(code))
-    assert torch.equal(cells, union(blocks))
+    assert torch.equal(grids, unpack(union(blocks)))
 
 
 def test_hidden_blocks_go_and_the_shape_stays() -> None:
@@ -72,8 +72,8 @@ def test_hidden_blocks_go_and_the_shape_stays() -> None:
 
 
 def test_wide_is_centred_as_large_as_real_shapes_and_uses_every_statement() -> None:
-    code, cells = prior("wide").sample(3000, 3)
-    low, high = extents(unpack(cells))
+    code, grids = PRIORS["wide"].sample(3000, 3)
+    low, high = extents(grids)
     assert ((high - low).amax(-1) == SPAN).float().mean() > 0.85
     assert (high + low).abs().float().mean() < 0.3
     loops = code.parameters[code.ids == TRANSLATE]
@@ -82,7 +82,7 @@ def test_wide_is_centred_as_large_as_real_shapes_and_uses_every_statement() -> N
 
 
 def test_narrow_has_the_published_statistics() -> None:
-    code, _ = prior("narrow").sample(8000, 7)
+    code, _ = PRIORS["narrow"].sample(8000, 7)
     loops = code.parameters[code.ids == TRANSLATE]
     assert (loops[:, 0] == 2).all()
     assert (loops[:, 1] == 0).all(), "no repeat is vertical"
@@ -100,11 +100,10 @@ def test_narrow_has_the_published_statistics() -> None:
 
 
 def test_a_batch_depends_on_prior_seed_and_index_alone(each: Prior) -> None:
-    one, two = SyntheticStream(each, 20, seed=11), SyntheticStream(each, 20, seed=11)
-    last, again = one[3], [two[index] for index in (0, 2, 3)][-1]
+    last, again = each.batch(20, 11, 3), [each.batch(20, 11, index) for index in (0, 2, 3)][-1]
     assert torch.equal(last.code.parameters, again.code.parameters)
     assert torch.equal(last.voxels, again.voxels)
-    for other in (two[2], SyntheticStream(each, 20, seed=12)[3]):
+    for other in (each.batch(20, 11, 2), each.batch(20, 12, 3)):
         assert not torch.equal(last.voxels, other.voxels)
 
 

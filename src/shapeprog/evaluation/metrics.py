@@ -302,7 +302,7 @@ def noise_floor(samples: tuple[Cloud, Cloud], square: float) -> float:
     return float(squared_distance(*samples).mean() + squared_distance(*reversed(samples)).mean()) * square
 
 
-def cloud_distances(sampled: Cloud, surface: Cloud, square: float) -> tuple[float, float, float]:
+def cloud_distances(sampled: Cloud, surface: Float[Tensor, "Q 3"], square: float) -> tuple[float, float, float]:
     """Prediction to target, target to prediction, and F1, of points on both; ``square`` is the area of a cell."""
     to_target, from_target = squared_distance(sampled, surface), squared_distance(surface, sampled)
     precision, recall = float((to_target <= CELL**2).double().mean()), float((from_target <= CELL**2).double().mean())

@@ -24,15 +24,15 @@ class Code:
     ``roles`` are those of the blocks, 0 for none; ``None`` if no block has any, as generators write.
     """
 
-    ids: Int[Tensor, "*batch K J"]
-    parameters: Float[Tensor, "*batch K J slots"]
-    roles: Int[Tensor, "*batch K"] | None = None
+    ids: Int[Tensor, "*steps"]  # (..., K, J), or single blocks or steps
+    parameters: Float[Tensor, "*steps slots"]
+    roles: Int[Tensor, ...] | None = None
 
     def __getitem__(self, index: Any) -> Code:
         """The part at an index of the leading dimensions: an integer, a slice, a mask, or a tuple of these."""
         return Code(self.ids[index], self.parameters[index], None if self.roles is None else self.roles[index])
 
-    def having(self, parameters: Float[Tensor, "*batch K J slots"]) -> Code:
+    def having(self, parameters: Float[Tensor, "*steps slots"]) -> Code:
         """The same statements and roles with other parameters."""
         return replace(self, parameters=parameters)
 

@@ -20,10 +20,9 @@ executor (Tian et al. 2019), *hybrid* adaptation through both.  All weights lear
 from __future__ import annotations
 
 import copy
-import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import TypeAlias
 
 import numpy as np
 import torch
@@ -34,32 +33,30 @@ from shapeprog.data.packs import read_pack
 from shapeprog.errors import ShapeProgError
 from shapeprog.geometry.surface import has_surface
 from shapeprog.inference.surface import points_of_cells
-from shapeprog.language.program import Draw, Program
+from shapeprog.language import Code, Draw, Program, encode, unroll
 from shapeprog.language.statement import EMPTY
-from shapeprog.language.tensors import Code, encode
-from shapeprog.language.unroll import unroll
 from shapeprog.liang2022.decode import Decoded, decode
-from shapeprog.liang2022.estimators import NvilBaseline, leave_one_out_advantage, reinforce_loss
 from shapeprog.liang2022.evaluate import scores_on_packs
 from shapeprog.liang2022.generator import IDS, STEPS, Prediction, TeacherForcingBatch
-from shapeprog.liang2022.losses import Comparison, compute, parse_losses
+from shapeprog.liang2022.losses import (
+    Comparison,
+    NvilBaseline,
+    compute,
+    leave_one_out_advantage,
+    parse_losses,
+    reinforce_loss,
+)
 from shapeprog.liang2022.pretrain import teacher_forcing
-from shapeprog.liang2022.prior import SyntheticStream, prior, scramble
-from shapeprog.liang2022.settings import METHODS, NEURAL, AdaptSettings, Order
+from shapeprog.liang2022.prior import PRIORS, scramble
+from shapeprog.liang2022.settings import METHODS, NEURAL, AdaptSettings
 from shapeprog.liang2022.weights import load_executor, load_generator
 
 REHEARSAL_CANVASES = 3  # canvases of each synthetic shape that a step rehearses
 RLOO_SAMPLES = 4  # programs sampled for each shape by the leave-one-out estimator
 
-DOT = Program((Draw("leg", (-0.1,) * 3 + (0.2,) * 3),))
-"""The smallest part, in the centre of the grid; stands for programs that draw nothing."""
+DOT = Program((Draw("leg", (-0.1,) * 3 + (0.2,) * 3),))  # the smallest part, in the centre; for programs that draw none
 
-
-class Targets(NamedTuple):
-    """Cells of targets, and points on their surfaces in cells."""
-
-    cells: UInt8[Tensor, "B 32 32 32"]
-    points: Float[Tensor, "B P 3"]
+Targets: TypeAlias = tuple[UInt8[Tensor, "B 32 32 32"], Float[Tensor, "B P 3"]]  # cells; points on surfaces, in cells
 
 
 class TargetStream:
@@ -71,23 +68,19 @@ class TargetStream:
             raise ShapeProgError("there are no shapes to adapt to", "give packs made with: shapeprog prepare")
         self._batch_size, self._seed, self._points = batch_size, seed, points
 
-    def __iter__(self) -> Iterator[Targets]:
-        return map(self.__getitem__, itertools.count())
-
     def __getitem__(self, index: int) -> Targets:
         """The batch of an index, 0 or more."""
         count, numbers = len(self._shapes), range(index * self._batch_size, (index + 1) * self._batch_size)
         rounds = {number // count for number in numbers}
         orders = {n: np.random.default_rng((self._seed, 0, n)).permutation(count) for n in rounds}
-        rng = np.random.default_rng((self._seed, 1, index))
-        cells, points = [], []
+        rng, cells, points = np.random.default_rng((self._seed, 1, index)), [], []
         for number in numbers:
             pack, row = self._shapes[orders[number // count][number % count]]
             shape = pack[row]
             cloud = points_of_cells(shape.voxels, 5000) if shape.points is None else shape.points
             cells.append(shape.voxels.astype(np.uint8))
             points.append(np.resize(rng.permutation(cloud)[: self._points], (self._points, 3)))
-        return Targets(torch.from_numpy(np.stack(cells)), torch.from_numpy(np.stack(points).astype(np.float32)))
+        return torch.from_numpy(np.stack(cells)), torch.from_numpy(np.stack(points).astype(np.float32))
 
 
 class AdaptTask:
@@ -106,38 +99,35 @@ class AdaptTask:
                 raise ShapeProgError(f"the design {generator.design} has no offsets", "use --learn all")
             generator.requires_grad_(False)
             generator.offset_head.requires_grad_(True)
-        self._baseline = NvilBaseline(generator.feature_width) if settings.estimator == "nvil" else None
-        learning = {"generator": generator, "baseline": self._baseline}
-        self.module = nn.ModuleDict({name: part for name, part in learning.items() if part is not None})
-        self.network = generator
+        self.network, self.module = generator, nn.ModuleDict({"generator": generator})
+        if settings.estimator == "nvil":
+            self.module["baseline"] = NvilBaseline(generator.feature_width)
         self._targets = TargetStream(settings.train, settings.batch_size, settings.points, settings.seed)
-        rehearsed = settings.rehearsal if settings.learn == "all" else 0
-        self._synthetic = SyntheticStream(prior(settings.prior), rehearsed, settings.seed) if rehearsed else None
         for path in settings.val:  # a missing pack is reported now, not at the first validation
             if not len(read_pack(Path(path))):
                 raise ShapeProgError(f"there are no shapes to validate on in {path}", "leave it out")
 
     def batch(self, index: int) -> tuple[Targets, TeacherForcingBatch | None]:
         """Real shapes, and synthetic ones to rehearse."""
-        if self._synthetic is None:
+        settings = self._settings
+        if not settings.rehearsal or settings.learn == "offsets":
             return self._targets[index], None
-        made = self._synthetic[index]
-        order: Order = "written" if self.network.design == "tian2019" else "coverage"
-        rng = torch.Generator().manual_seed(scramble(self._settings.seed, 2, index))
-        return self._targets[index], teacher_forcing(made.voxels, made.code, order).subset(REHEARSAL_CANVASES, rng)
+        made = PRIORS[settings.prior].batch(settings.rehearsal, settings.seed, index)
+        rng = torch.Generator().manual_seed(scramble(settings.seed, 2, index))
+        rehearsed = teacher_forcing(made.voxels, made.code, self.network.order)
+        return self._targets[index], rehearsed.subset(REHEARSAL_CANVASES, rng)
 
     def losses(
         self, batch: tuple[Targets, TeacherForcingBatch | None], progress: float, rng: torch.Generator
     ) -> dict[str, Tensor]:
         """Losses of the rendered programs, of their ids, and of the rehearsal."""
         settings, generator = self._settings, self.network.eval()  # statistics of the normalisation stay
-        targets = Targets(*(part.to(rng.device) for part in batch[0]))
-        if settings.estimator == "rloo":
-            targets = Targets(*(torch.cat([part] * RLOO_SAMPLES) for part in targets))
-        sampled = settings.estimator != "none"
-        decoded = decode(generator, targets.cells, decoder="sample-ids" if sampled else settings.decoder, rng=rng)
+        repeats = RLOO_SAMPLES if settings.estimator == "rloo" else 1
+        cells, points = (torch.cat([part] * repeats).to(rng.device) for part in batch[0])
+        decoder = settings.decoder if settings.estimator == "none" else "sample-ids"
+        decoded = decode(generator, cells, decoder=decoder, rng=rng)
         prediction = generator.predict(decoded)
-        losses = {name: value.mean() for name, value in self._render_losses(prediction, targets, rng).items()}
+        losses = {name: value.mean() for name, value in self._render_losses(prediction, points, rng).items()}
         losses |= self._id_losses(prediction, decoded)
         if batch[1] is not None:
             rehearsed = generator.losses(generator.predict(batch[1].to(rng.device)))
@@ -145,7 +135,7 @@ class AdaptTask:
         return losses
 
     def _render_losses(
-        self, prediction: Prediction, targets: Targets, rng: torch.Generator
+        self, prediction: Prediction, points: Float[Tensor, "B P 3"], rng: torch.Generator
     ) -> dict[str, Float[Tensor, " B"]]:
         """Losses of predicted programs, with gradient to their numbers.
 
@@ -158,15 +148,14 @@ class AdaptTask:
         ids = torch.where(draws, code.ids, dot.ids.to(code.ids))
         numbers = torch.where(draws[..., None], code.parameters, dot.parameters.to(code.parameters))
         canvas = Code(ids, numbers - draws[..., None] * prediction.scatter(prediction.offsets))
-        scene, num_samples = unroll(Code(ids, numbers)), self._settings.points
-        comparison = Comparison(scene, targets.points, targets.cells, num_samples, rng, canvas)
-        values = compute(comparison, self._losses)
+        scene, cells = unroll(Code(ids, numbers)), prediction.batch.target
+        values = compute(Comparison(scene, points, cells, self._settings.points, rng, canvas), self._losses)
         if self._executor is not None:
             executor, one_hot = self._executor.to(rng.device), torch.nn.functional.one_hot(code.ids, IDS).float()
             logits = executor.union(one_hot, code.parameters, prediction.batch.live & (code.ids[..., 0] != EMPTY))
             logits = logits.clamp(-1e4, 1e4)  # of an empty scene they may be infinite
             of_cells = torch.nn.functional.binary_cross_entropy_with_logits
-            loss = of_cells(logits, targets.cells.to(logits), reduction="none").flatten(1).mean(1)
+            loss = of_cells(logits, cells.to(logits), reduction="none").flatten(1).mean(1)
             values[NEURAL] = self._losses[NEURAL] * loss
         return values
 
@@ -186,14 +175,10 @@ class AdaptTask:
             return losses
         costs = 1 - decoded.iou().to(log_prob)
         if settings.estimator == "rloo":
-            shape = (RLOO_SAMPLES, -1)
-            advantage = leave_one_out_advantage(costs.reshape(shape))[..., None]
-            loss = reinforce_loss(log_prob.unflatten(0, shape), advantage)
+            advantage = leave_one_out_advantage(costs.reshape(RLOO_SAMPLES, -1)).reshape(-1, 1)
         else:
-            assert self._baseline is not None
-            advantage, losses["baseline"] = self._baseline(prediction.feature, prediction.batch.live, costs)
-            loss = reinforce_loss(log_prob, advantage)
-        return losses | {"estimator": loss, "_cost": costs.mean()}
+            advantage, losses["baseline"] = self.module["baseline"](prediction.feature, prediction.batch.live, costs)
+        return losses | {"estimator": reinforce_loss(log_prob, advantage), "_cost": costs.mean()}
 
     def validate(self) -> dict[str, float]:
         """IoU and CD of the programs of each pack; the score is minus the sum of these CD."""

@@ -42,11 +42,12 @@ def infer_command(
 
     Example: shapeprog paper infer examples/bench_kenney.obj
     """
+    import torch
+
     from shapeprog.data import load_all
     from shapeprog.files import make_folder
     from shapeprog.formats import save
     from shapeprog.liang2022.decode import decode
-    from shapeprog.liang2022.evaluate import grids
     from shapeprog.liang2022.weights import load_generator
 
     generator, failed = load_generator(weights), False
@@ -55,7 +56,8 @@ def infer_command(
             terminal.complain(shape)
             failed = True
             continue
-        decoded = decode(generator, grids([shape]), decoder=decoder, blocks=blocks)  # type: ignore[arg-type]
+        cells = torch.from_numpy(shape.voxels).byte()[None]
+        decoded = decode(generator, cells, decoder=decoder, blocks=blocks)  # type: ignore[arg-type]
         (program,) = decoded.programs()
         terminal.output().print(f"# {shape.name}: canvas IoU {float(decoded.iou()):.3f}")
         terminal.print_program(terminal.output(), program)
@@ -158,22 +160,25 @@ def _add_training(name: str, kind: type[Any], task: str, doc: str) -> None:
     ) -> None:
         from rich.progress import Progress
 
+        from shapeprog.data.reading import check_file
         from shapeprog.liang2022.loop import train, tune_allocator
 
         tune_allocator()
-        values: dict[str, Any] = {key: value for key, value in options.items() if value not in (None, [])}
-        settings = kind(**values | {key: tuple(value) for key, value in values.items() if isinstance(value, list)})
-        _load_losses(files or [], options.get("loss") or "")
+        given = {key: value for key, value in options.items() if value not in (None, [])}
+        settings = kind(**{key: tuple(value) if isinstance(value, list) else value for key, value in given.items()})
+        for file in files or []:
+            check_file(file)
+            try:
+                runpy.run_path(str(file))
+            except Exception as error:
+                raise InputError(f"{file} raised {type(error).__name__}: {error}", "correct it") from error
         console, last = terminal.errors(), {"samples_seen": 0.0}
-        with (
-            _stop_event() as stop,
-            Progress(console=console, disable=quiet or not console.is_terminal) as bar,
-        ):
+        bar = Progress(console=console, disable=quiet or not console.is_terminal)
+        with _stop_event() as stop, bar:
             progress = bar.add_task("training", total=settings.num_shapes)
             made = pkgutil.resolve_name(f"shapeprog.liang2022.{task}")(settings)
-            for last in train(
-                made, settings, folder, device=device, restart=restart, stop=stop, command=COMMAND_LINE
-            ):  # fmt: skip
+            steps = train(made, settings, folder, device=device, restart=restart, stop=stop, command=COMMAND_LINE)
+            for last in steps:
                 bar.update(progress, completed=last["samples_seen"], description=f"loss {last['loss']:.3f}")
                 scores = [f"{key[4:]} {value:.4g}" for key, value in last.items() if key.startswith("val_")]
                 if scores and not quiet:
@@ -184,8 +189,7 @@ def _add_training(name: str, kind: type[Any], task: str, doc: str) -> None:
             best = f"; the best on validation: {folder / BEST}" if (folder / BEST).exists() else ""
             terminal.output().print(f"the weights are {folder / WEIGHTS}{best}")
 
-    omitted = {"options"} if kind is AdaptSettings else {"options", "files"}
-    signature = [each for each in inspect.signature(run, eval_str=True).parameters.values() if each.name not in omitted]
+    signature = [each for each in inspect.signature(run, eval_str=True).parameters.values() if each.name != "options"]
     hints, bases = get_type_hints(kind), [base for base in reversed(kind.__mro__) if is_dataclass(base)]
     meanings = {field.name: field.metadata["help"] for base in bases for field in fields(base) if field.metadata}
     for field in fields(kind):
@@ -213,23 +217,6 @@ def _stop_event() -> Iterator[threading.Event]:
             if signal.getsignal(number) != signal.SIG_IGN:
                 restore.callback(signal.signal, number, signal.signal(number, ask))
         yield stop
-
-
-def _load_losses(files: list[Path], option: str) -> None:
-    """Run Python files that declare losses; warn of those that the option ``--loss`` does not name."""
-    from shapeprog.data.reading import check_file
-    from shapeprog.liang2022.losses import LOSSES
-
-    before = set(LOSSES)
-    for file in files:
-        check_file(file)
-        try:
-            runpy.run_path(str(file))
-        except Exception as error:
-            raise InputError(f"{file} raised {type(error).__name__}: {error}", "correct it") from error
-    for name in LOSSES.keys() - before:
-        if name not in option:
-            terminal.errors().print(f"The loss {name!r} is declared, and --loss does not use it.", style="yellow")
 
 
 _add_training("pretrain", PretrainSettings, "pretrain.PretrainTask", """Pretrain a generator on synthetic shapes.

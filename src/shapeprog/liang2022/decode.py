@@ -2,20 +2,16 @@
 
 Each block is drawn on the canvas, with rounded numbers, before the next is written.  Decoders, by name:
 
-``argmax``
-    The likeliest id at each step, as published.
-``novel``
-    The likeliest of a few blocks that draws a new cell, or the end.  It depends on the canvas, never on the target.
-``select``
-    Render and select: of a few blocks the one that agrees best with the target, or the end where none helps.
-``sample``
-    Ids and numbers sampled.  ``sample-ids`` samples ids alone.
+- ``argmax``: the likeliest id at each step, as published;
+- ``novel``: the likeliest of a few blocks that draws a new cell, or the end; it looks at the canvas, not at the target;
+- ``select``: render and select: of a few blocks the one that agrees best with the target, or the end where none helps;
+- ``sample``: ids and numbers sampled; ``sample-ids``: ids alone.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Literal, get_args
+from typing import Literal, get_args
 
 import torch
 from jaxtyping import Float, Int, UInt8
@@ -24,11 +20,10 @@ from torch import Tensor
 from shapeprog.errors import ShapeProgError, did_you_mean
 from shapeprog.geometry.cells import Cells, count, iou, pack, union, unpack
 from shapeprog.kernels.bits import WORD
-from shapeprog.language.program import Program
+from shapeprog.language import Code, Program, unroll
+from shapeprog.language import decode as programs_of
 from shapeprog.language.statement import EMPTY, SLOTS
-from shapeprog.language.tensors import Code
-from shapeprog.language.tensors import decode as programs_of
-from shapeprog.language.unroll import draw_blocks, unroll
+from shapeprog.language.unroll import draw_blocks
 from shapeprog.liang2022.generator import STEPS, Generator, TeacherForcingBatch, live_blocks, preceding_blocks, take
 from shapeprog.liang2022.settings import Decoder
 from shapeprog.space import HALF
@@ -74,7 +69,8 @@ def decode(
     offsets = torch.zeros_like(numbers)
     code = Code(ids, numbers)
     canvases = torch.zeros(size, blocks + 1, *target.shape[1:3], dtype=torch.int32, device=device)
-    active, dense, cells, state = torch.arange(size, device=device), target.float(), pack(target), None
+    active, dense, cells = torch.arange(size, device=device), target.float(), pack(target)
+    state: tuple[Tensor, ...] = ()
     for k in range(blocks):
         canvas = canvases[active, k]
         feature, state = generator.encode(dense[active], unpack(canvas).float(), code[active, k - 1], state)
@@ -87,11 +83,10 @@ def decode(
         if generator.offset_head is not None:
             hidden = generator.steps(feature, block)[1]
             offsets[active, k] = generator.offsets(hidden, block.ids, block.parameters)
-        canvases[:, k + 1] = canvases[:, k]
+        canvases[:, k + 1 :] = canvases[:, k : k + 1]
         going = block.ids[:, 0] != EMPTY
-        active, state = active[going], _rows(state, going)
+        active, state = active[going], tuple(part[going] for part in state)
         if not len(active):
-            canvases[:, k + 1 :] = canvases[:, k : k + 1]
             break
         canvases[active, k + 1] |= draw_blocks(block[going][:, None])[:, 0]
     return Decoded(target, canvases[:, :-1], preceding_blocks(code), code, live_blocks(ids), offsets)
@@ -100,12 +95,9 @@ def decode(
 def _candidates(
     generator: Generator, feature: Float[Tensor, "N F"], decoder: AnyDecoder, rng: torch.Generator | None
 ) -> tuple[Code, Float[Tensor, "N W"]]:
-    """The likeliest blocks (N, W, J) by a beam over their steps, likeliest first, or one block by arg-max or sampling.
-
-    With their log-probabilities, which sampling leaves at 0.
-    """
-    size, state = len(feature), None
-    log_prob = feature.new_zeros(size, 1)
+    """The likeliest blocks (N, W, J) by a beam over steps, or one by sampling; log-probabilities, 0 of sampled ones."""
+    size, log_prob = len(feature), feature.new_zeros(len(feature), 1)
+    state: tuple[Tensor, ...] = ()
     ids = torch.zeros(size, 1, 0, dtype=torch.long, device=feature.device)
     numbers = feature.new_zeros(size, 1, 0, SLOTS)
     shape = torch.arange(size, device=feature.device)[:, None]
@@ -121,13 +113,10 @@ def _candidates(
             choice = torch.multinomial(logits.exp(), 1, generator=rng)
         parent, selected = choice.div(logits.shape[-1], rounding_mode="floor"), choice % logits.shape[-1]
         row = (shape * lanes + parent).flatten()
-        if rng is not None and decoder == "sample":
-            values = generator.sample_numbers(hidden[row], selected.flatten(), rng)
-        else:
-            values = generator.numbers(hidden[row], selected.flatten())
+        values = generator.numbers(hidden[row], selected.flatten(), None, rng if decoder == "sample" else None)
         ids = torch.cat([ids[shape, parent], selected[..., None]], -1)
         numbers = torch.cat([numbers[shape, parent], values.float().unflatten(0, selected.shape)[:, :, None]], 2)
-        state = _rows(state, row)
+        state = tuple(part[row] for part in state)
     return Code(ids, numbers), log_prob
 
 
@@ -144,27 +133,16 @@ def _choose(
     new = drawn & ~before
     ends = candidates.ids[..., 0] == EMPTY
     if target_cells is None:
-        qualifies = ((count(new) > 0) | ends) & log_prob.isfinite()
-        best = qualifies.int().argmax(-1)
+        score = (((count(new) > 0) | ends) & log_prob.isfinite()).float()
     else:
         target = target_cells[:, None]
         exact = 2 * count(new & target) - count(new)
         nearby = count(target & widen(drawn) & ~widen(before)) - count(new & ~widen(target))
         scene = unroll(Code(candidates.ids.flatten(0, 1)[:, None], candidates.parameters.flatten(0, 1)[:, None]))
         inside = ((scene.centre.abs() <= HALF).all(-1) | ~scene.mask).all(-1).reshape(ends.shape)
-        qualifies = inside & log_prob.isfinite() & ~ends
-        score = (EXACT_WEIGHT * exact + nearby).masked_fill(~qualifies, 0.0)
-        best = score.argmax(-1)  # the likeliest of equals
-        qualifies = score > 0
-    best = best[:, None]
-    return take(candidates, best, qualifies.gather(1, best))[:, 0]
-
-
-def _rows(state: Any, index: Tensor) -> Any:
-    """The state of some of the programs: ``None``, a tensor or a tuple of tensors with the batch first."""
-    if isinstance(state, tuple):
-        return tuple(part[index] for part in state)
-    return state if state is None else state[index]
+        score = (EXACT_WEIGHT * exact + nearby) * (inside & log_prob.isfinite() & ~ends)
+    best = score.argmax(-1, keepdim=True)  # the likeliest of equals
+    return take(candidates, best, score.gather(1, best) > 0)[:, 0]
 
 
 def widen(cells: Cells) -> Cells:

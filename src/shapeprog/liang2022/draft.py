@@ -11,11 +11,8 @@ from shapeprog.space import UP
 
 T = TypeVar("T")
 Triple = tuple[int, ...]  # three numbers along up, depth and left-right
-Repeats = Sequence[tuple[int, Triple]]
-"""Translations, outermost first: number of copies, and the shift from one to the next."""
-
-ODD = {"top_rectangle": "locker", "layer": "horizontal_bar", "sideboard": "vertical_board"}
-"""Statements that take half extents, and those for boxes with odd ones."""
+Repeats = Sequence[tuple[int, Triple]]  # translations, outermost first: number of copies, shift from one to the next
+ODD = {"top_rectangle": "locker", "layer": "horizontal_bar", "sideboard": "vertical_board"}  # where extents are odd
 
 
 class Rng(random.Random):

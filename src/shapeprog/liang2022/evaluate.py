@@ -9,13 +9,10 @@ from typing import Any
 
 import numpy as np
 import torch
-from jaxtyping import UInt8
-from torch import Tensor
 
-from shapeprog.data.packs import read_pack
-from shapeprog.data.shape import Shape
+from shapeprog.data import Shape, read_pack
 from shapeprog.evaluation.metrics import Metrics, evaluate_program, summarise, target_samples, world_scale
-from shapeprog.language.program import Program
+from shapeprog.language import Program
 from shapeprog.liang2022.decode import decode
 from shapeprog.liang2022.generator import Generator
 from shapeprog.liang2022.settings import Decoder
@@ -23,26 +20,16 @@ from shapeprog.liang2022.settings import Decoder
 BATCH_SIZE = 64
 
 
-def evaluate(generator: Generator, shapes: Sequence[Shape], decoder: Decoder) -> list[Metrics]:
-    """Measures of the programs that a decoder writes; IoU is of the canvas."""
-    return list(map(measure, *decode_all(generator, shapes, decoder), shapes))
-
-
 def decode_all(generator: Generator, shapes: Sequence[Shape], decoder: Decoder) -> tuple[list[Program], list[Program]]:
     """Programs with numbers to a hundredth of a cell, and with whole numbers as drawn on the canvas."""
-    target = grids(shapes).to(next(generator.parameters()).device)
+    target = torch.from_numpy(np.stack([shape.voxels for shape in shapes])).to(generator.used.device, torch.uint8)
     parts = [decode(generator, part, decoder=decoder) for part in target.split(BATCH_SIZE)]
     fine, whole = ([program for part in parts for program in part.programs(whole)] for whole in (False, True))
     return fine, whole
 
 
-def grids(shapes: Sequence[Shape]) -> UInt8[Tensor, "B 32 32 32"]:
-    """Cells of shapes."""
-    return torch.from_numpy(np.stack([shape.voxels for shape in shapes]).astype(np.uint8))
-
-
 def measure(program: Program, whole: Program, shape: Shape, seed: int = 0) -> Metrics:
-    """Measures of a program; one that draws nothing counts as a point in the centre of the grid."""
+    """Measures of a program, IoU as drawn on the canvas; one that draws nothing counts as a point in the centre."""
     row = evaluate_program(program, shape, whole, seed=seed)
     if np.isfinite(row.cd) or (samples := target_samples(shape, 5000, seed)) is None:
         return row
@@ -55,7 +42,8 @@ def scores_on_packs(generator: Generator, packs: Sequence[str | Path], decoder: 
     """Mean IoU and CD, median CD and mean number of blocks of the shapes of each pack."""
     scores: dict[str, float] = {}
     for path in map(Path, packs):
-        summary = summarise(evaluate(generator, list(read_pack(path)), decoder))
+        shapes = list(read_pack(path))
+        summary = summarise(list(map(measure, *decode_all(generator, shapes, decoder), shapes)))
         scores |= {f"{path.stem}_{key}": summary[key].mean for key in ("iou", "cd", "blocks")}
         scores[f"{path.stem}_cd_median"] = summary["cd"].median
     return scores

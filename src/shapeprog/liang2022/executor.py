@@ -1,16 +1,13 @@
 """The neural executor of Tian et al. 2019, which draws a block whose ids are probabilities, and its training.
 
-Guided adaptation differentiates through it.  The published one was trained on 27 million blocks; to learn from a
-hundredth of that, blocks are endless, the Dice loss is added to the cross-entropy, and occupied cells weigh more at the
-start: few cells belong to a block, and a network that has learned to draw none does not recover.
+The published one was trained on 27 million blocks; to learn from a hundredth of that, blocks are endless, the Dice loss
+is added, and occupied cells weigh more at first: a network that has learned to draw none does not recover.
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import torch
-from jaxtyping import Bool, Float, Int, UInt8
+from jaxtyping import Bool, Float, Int
 from torch import Tensor, nn
 from torch.nn.functional import one_hot
 
@@ -19,14 +16,13 @@ from shapeprog.language.statement import SLOTS
 from shapeprog.language.tensors import Code
 from shapeprog.language.unroll import draw_blocks
 from shapeprog.liang2022.generator import IDS, vocabulary
-from shapeprog.liang2022.prior import SyntheticStream, prior, scramble
+from shapeprog.liang2022.prior import PRIORS, SyntheticBatch, scramble
 from shapeprog.liang2022.settings import ExecutorSettings
 
 INITIAL_SCALE = 0.1  # scale of the initial weights of numbers, which reach 32 and would saturate the LSTM
 EMPTY_LOGIT = -20.0  # logit of a cell that no block draws; its cross-entropy stays finite
 OCCUPIED_WEIGHT = (30.0, 5.0)  # weight of an occupied cell at the start of training, and at its end as published
 MOVED_BY, MAX_COUNT = 6, 8  # cells that a widened number is moved by at most, and its largest loop count
-
 VALIDATION_BLOCKS = 512
 
 
@@ -60,21 +56,10 @@ class NeuralExecutor(nn.Module):
     def union(
         self, ids: Float[Tensor, "B K J V"], numbers: Float[Tensor, "B K J 7"], draws: Bool[Tensor, "B K"]
     ) -> Float[Tensor, "B 32 32 32"]:
-        """Logits of the union of the blocks that draw.
-
-        The sigmoid of the largest logit is the largest probability, which is the published union.
-        """
+        """Logits of the union of the blocks that draw: the largest, as published the largest probability."""
         rows = self(ids[draws], numbers[draws])
         full = rows.new_full((*draws.shape, *rows.shape[1:]), EMPTY_LOGIT)
         return full.masked_scatter(draws[..., None, None, None], rows).amax(1)
-
-
-class Blocks(NamedTuple):
-    """Single blocks and their cells."""
-
-    ids: Int[Tensor, "N J"]
-    numbers: Float[Tensor, "N J 7"]
-    cells: UInt8[Tensor, "N 32 32 32"]
 
 
 class ExecutorTask:
@@ -84,29 +69,27 @@ class ExecutorTask:
         torch.manual_seed(settings.seed)
         self.module = self.network = NeuralExecutor()
         self.data = f"synthetic blocks, prior {settings.prior}, {settings.widened:.0%} widened"
-        self._settings = settings
-        self._stream = SyntheticStream(prior(settings.prior), settings.batch_size, settings.seed)
-        held_out = SyntheticStream(prior(settings.prior), VALIDATION_BLOCKS, -1)
-        self._validation = {name: self._blocks(held_out, 0, share) for name, share in (("iou", 0.0), ("widened", 1.0))}
+        self._settings, shares = settings, {"iou": 0.0, "widened": 1.0}
+        self._validation = {name: self._blocks(VALIDATION_BLOCKS, -1, 0, share) for name, share in shares.items()}
 
-    def batch(self, index: int) -> Blocks:
-        """One block of each synthetic program, a share of them widened."""
-        return self._blocks(self._stream, index, self._settings.widened)
+    def batch(self, index: int) -> SyntheticBatch:
+        """One block (N, J) of each synthetic program, a share of them widened, and their cells."""
+        return self._blocks(self._settings.batch_size, self._settings.seed, index, self._settings.widened)
 
-    def _blocks(self, stream: SyntheticStream, index: int, share: float) -> Blocks:
-        code = stream[index].code
+    def _blocks(self, count: int, seed: int, index: int, share: float) -> SyntheticBatch:
+        code = PRIORS[self._settings.prior].batch(count, seed, index).code
         rng = torch.Generator().manual_seed(scramble(self._settings.seed, 1, index))
         block = torch.multinomial((code.ids > 0).any(-1).float(), 1, generator=rng)[:, 0]
         row, widened = torch.arange(len(block)), round(share * len(block))
         ids, numbers = code.ids[row, block], code.parameters[row, block]
         numbers[:widened] = _widened(ids, numbers, rng)[:widened]
-        return Blocks(ids, numbers, unpack(draw_blocks(Code(ids[:, None], numbers[:, None]))[:, 0]))
+        cells = draw_blocks(Code(ids[:, None], numbers[:, None]))[:, 0]
+        return SyntheticBatch(Code(ids, numbers), unpack(cells))
 
-    def losses(self, batch: Blocks, progress: float, rng: torch.Generator) -> dict[str, Tensor]:
+    def losses(self, batch: SyntheticBatch, progress: float, rng: torch.Generator) -> dict[str, Tensor]:
         """Weighted cross-entropy of the cells, and the Dice loss (Milletari et al. 2016)."""
-        logits = self._logits(batch)
-        cells = batch.cells.to(logits)
-        first, last = OCCUPIED_WEIGHT
+        logits = self._logits(batch.code)
+        cells, (first, last) = batch.voxels.to(logits), OCCUPIED_WEIGHT
         weights = 1 + (first + (last - first) * progress - 1) * cells
         overlap, size = (part.flatten(1).sum(-1) for part in (logits.sigmoid() * cells, logits.sigmoid() + cells))
         dice = (2 * overlap + 1) / (size + 1)
@@ -114,17 +97,17 @@ class ExecutorTask:
         cross_entropy = total / weights.sum()
         return {"cells": cross_entropy, "dice": 1 - dice.mean()}
 
-    def _logits(self, blocks: Blocks) -> Float[Tensor, "N 32 32 32"]:
+    def _logits(self, blocks: Code) -> Float[Tensor, "N 32 32 32"]:
         device = self.module.param_embed.weight.device
-        logits: Tensor = self.module(one_hot(blocks.ids, IDS).float().to(device), blocks.numbers.to(device))
+        logits: Tensor = self.module(one_hot(blocks.ids, IDS).float().to(device), blocks.parameters.to(device))
         return logits.float()
 
     def validate(self) -> dict[str, float]:
         """Mean IoU of blocks of the prior (``iou``) and of widened ones, where they draw something."""
         scores = {}
-        for name, blocks in self._validation.items():
-            overlap = iou(pack(self._logits(blocks).cpu() > 0), pack(blocks.cells))
-            scores[name] = float(overlap[blocks.cells.flatten(1).amax(-1) > 0].mean())
+        for name, (blocks, cells) in self._validation.items():
+            overlap = iou(pack(self._logits(blocks).cpu() > 0), pack(cells))
+            scores[name] = float(overlap[cells.flatten(1).amax(-1) > 0].mean())
         return {**scores, "score": scores["iou"]}
 
 

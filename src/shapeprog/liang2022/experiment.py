@@ -1,7 +1,6 @@
-"""The experiment: Table 1 of the paper and the rows that go beyond it, trained, measured and printed.
+"""Table 1 of the paper and the rows that go beyond it, each a set of weights and an adaptation.
 
-Every row is a set of weights and an adaptation.  Finished runs and measurements are reused.  Settings were
-chosen on the validation shapes; test shapes are measured once.
+Finished runs and measures are reused.  Settings were chosen on validation shapes; test shapes are measured once.
 """
 
 from __future__ import annotations
@@ -25,14 +24,14 @@ from shapeprog.liang2022.adapt import AdaptTask
 from shapeprog.liang2022.evaluate import decode_all, measure
 from shapeprog.liang2022.loop import append_line, read_log, train
 from shapeprog.liang2022.prior import programs
-from shapeprog.liang2022.settings import BEST, STATE, AdaptSettings, Decoder
+from shapeprog.liang2022.settings import BEST, LOG, STATE, AdaptSettings, Decoder
 from shapeprog.liang2022.weights import load_generator
 
 CATEGORIES = ("bench", "cabinet")
 DECODERS: tuple[Decoder, ...] = get_args(Decoder)
-PAPER = {"tian2019-none": (0.0135, 0.0104), "tian2019-guided": (0.0078, 0.0092), "tian2019-direct": (0.0035, 0.0043)}
-"""CD of Table 1 as published: bench, cabinet."""
+PAPER = {"tian2019-none": (13.5, 10.4), "tian2019-guided": (7.8, 9.2), "tian2019-direct": (3.5, 4.3)}  # CD x 1000
 
+MEASURED = "rows.jsonl"  # file of the measures, one line a shape
 REFINED_SHAPES = 40  # test shapes of rows with test-time refinement, which takes seconds a shape
 
 
@@ -48,9 +47,8 @@ class Row:
     refine: bool = False  # refine the numbers of each program by chamfer at test time
 
 
+# As published: programs by arg-max, and no loss of ids but one that keeps them near those of the start.
 PUBLISHED: dict[str, Any] = {"prior": "narrow", "decoder": "argmax", "decoded_ids": 0.0, "kl": 1.0}
-"""The published way: programs by arg-max, no loss of the ids but one that keeps them near those of the start."""
-
 TIAN: dict[str, Any] = PUBLISHED | {"num_shapes": 480, "batch_size": 8, "rehearsal": 4, "warm_up": 48}
 GUIDED: dict[str, Any] = {"learning_rate": 3e-5}
 
@@ -87,9 +85,8 @@ def run_table(
     """Train and measure rows, then yield the table as lines of Markdown.
 
     ``packs`` is a folder of ``{bench,cabinet}_{train,val,test}.npz``, ``None`` for synthetic targets in the ``quick``
-    version of three rows, one category and few shapes; ``results`` gets all that is made; ``only`` names the rows to
-    make; ``seeds`` counts those of rows with adaptation; with ``measure`` nothing is trained.  Raises an ``InputError``
-    if there is no such row, or no packs.
+    version of three rows and few shapes; ``results`` gets all that is made; ``only`` names the rows to make; ``seeds``
+    counts those of rows with adaptation; ``measure`` trains nothing.  Raises an ``InputError`` for no such row or pack.
     """
     for name in only or ():
         if name not in ROWS:
@@ -97,8 +94,7 @@ def run_table(
     categories: tuple[str, ...] = CATEGORIES
     if packs is None:
         if not quick:
-            cure = "make them with 'shapeprog prepare', or give --quick"
-            raise InputError("the table needs packs of ShapeNet shapes", cure)
+            raise InputError("the table needs packs of shapes", "make them with 'shapeprog prepare', or give --quick")
         packs, categories = _synthetic_packs(make_folder(results / "packs")), ("synthetic",)
     for category in categories:
         for name in only or (QUICK_ROWS if quick else ROWS):
@@ -121,7 +117,7 @@ def _adapted(name: str, category: str, packs: Path, results: Path, seed: int, qu
         train=(str(packs / f"{category}_train.npz"),), val=(str(packs / f"{category}_val.npz"),), initial=initial,
         seed=seed, validate_every=400, method=row.method, **{**row.options, **(QUICK if quick else {})},
     )  # fmt: skip
-    log = read_log(folder) if (folder / STATE).exists() else []
+    log = read_log(folder / LOG) if (folder / STATE).exists() else []
     if not log or log[-1]["samples_seen"] < settings.num_shapes:
         if measure:
             return None
@@ -134,8 +130,8 @@ def _measured(
     name: str, category: str, packs: Path, results: Path, seed: int, weights: str, quick: bool
 ) -> Iterator[str]:
     """Measure a row on the test shapes, one line of JSON a shape, where that is missing."""
-    row, path = ROWS[name], make_folder(results) / "rows.jsonl"
-    known = {(record["row"], record["category"], record["seed"], record["decoder"]) for record in rows_of(results)}
+    row, path = ROWS[name], make_folder(results) / MEASURED
+    known = {(record["row"], record["category"], record["seed"], record["decoder"]) for record in read_log(path)}
     count = QUICK_SHAPES if quick else REFINED_SHAPES if row.refine else None
     for decoder in [decoder for decoder in row.decoders if (name, category, seed, decoder) not in known]:
         shapes, made = list(read_pack(packs / f"{category}_test.npz"))[:count], []
@@ -153,15 +149,9 @@ def _measured(
         yield f"{name}, {category}, seed {seed}, {decoder}: CD {np.mean([record['cd'] for record in made]):.5f}"
 
 
-def rows_of(results: Path) -> list[dict[str, Any]]:
-    """All measured shapes."""
-    path = results / "rows.jsonl"
-    return [json.loads(line) for line in path.read_text().splitlines()] if path.exists() else []
-
-
 def table(results: Path, categories: Sequence[str] = CATEGORIES) -> Iterator[str]:
     """The table as Markdown: CD x 1000 (mean and standard error, median) and IoU by decoder, and the paper's CD."""
-    measured = rows_of(results)
+    measured = read_log(results / MEASURED)
     for index, category in enumerate(categories):
         yield f"\n**{category}** CD x 1000 (median), IoU\n"
         yield "| row | seeds | paper | " + " | ".join(DECODERS) + " |"
@@ -169,7 +159,7 @@ def table(results: Path, categories: Sequence[str] = CATEGORIES) -> Iterator[str
         for name, row in ROWS.items():
             records = [record for record in measured if (record["row"], record["category"]) == (name, category)]
             if records:
-                paper = f"{1000 * PAPER[name][index]:.1f}" if name in PAPER and len(categories) > 1 else ""
+                paper = f"{PAPER[name][index]}" if name in PAPER and len(categories) > 1 else ""
                 cells = [_cell([r for r in records if r["decoder"] == decoder]) for decoder in DECODERS]
                 yield f"| {row.label} | {len({r['seed'] for r in records})} | {paper} | {' | '.join(cells)} |"
 

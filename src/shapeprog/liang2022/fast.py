@@ -11,7 +11,6 @@ regression; both reach all layers.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import torch
 from jaxtyping import Bool, Float, Int
@@ -21,7 +20,7 @@ from shapeprog.errors import ShapeProgError
 from shapeprog.geometry.cells import unpack
 from shapeprog.language.statement import SLOTS
 from shapeprog.language.tensors import Code
-from shapeprog.liang2022.generator import IDS, Generator, Grid, Ids, Slots, StepOutput, TeacherForcingBatch
+from shapeprog.liang2022.generator import IDS, Generator, Grid, Ids, Slots, State, Step, TeacherForcingBatch
 
 WINDOW = 2  # values on either side of the mode over which the mean is taken
 LEAST_SMOOTHING = 0.1  # cells; a whole label is as good as not smoothed
@@ -31,11 +30,7 @@ LARGEST_SIZE = 1024  # bound of all sizes, so that a damaged file cannot ask for
 
 @dataclass(frozen=True)
 class FastSettings:
-    """Sizes of the network, and the smoothing of its labels.
-
-    The mean of a distribution that is too sharp has next to no gradient, so adaptation moves its offsets; one that is
-    smoothed moves the numbers too.
-    """
+    """Sizes of the network, and the smoothing of its labels, without which adaptation moves offsets and no numbers."""
 
     widths: tuple[int, int, int] = (16, 32, 64)  # channels at 16^3, 8^3 and 4^3 cells
     squeeze: int = 48  # channels of the last 4^3 cells, which are read one by one
@@ -89,10 +84,10 @@ class Fast(Generator):
         in_range = (self.bins >= self.low[..., None]) & (self.bins <= self.high[..., None])
         self.register_buffer("in_range", in_range | ~in_range.any(-1, keepdim=True), persistent=False)
 
-    def encode(self, target: Grid, canvas: Grid, previous: Code, state: Any) -> tuple[Float[Tensor, "B F"], Any]:
+    def encode(self, target: Grid, canvas: Grid, previous: Code, state: State) -> tuple[Float[Tensor, "B F"], State]:
         """The block feature; the state is the memory."""
-        memory = self._remember(previous) + (0 if state is None else state)
-        return self._encode(torch.stack([target, canvas], 1), memory), memory
+        memory = self._remember(previous) + (state[0] if state else 0)
+        return self._encode(torch.stack([target, canvas], 1), memory), (memory,)
 
     def encode_all(self, batch: TeacherForcingBatch) -> Float[Tensor, "M F"]:
         """Features of the live blocks."""
@@ -114,22 +109,18 @@ class Fast(Generator):
         numbers = self.number_embedding(self._row(step.parameters)) * self.used[step.ids][..., None]
         return self.id_embedding(step.ids) + numbers.sum(-2)
 
-    def step(self, feature: Float[Tensor, "M F"], previous: Code | None, index: int, state: Any) -> StepOutput:
+    def step(self, feature: Float[Tensor, "M F"], previous: Code | None, index: int, state: State) -> Step:
         """One step; its hidden features join the LSTM output and the block feature."""
-        state = self.step_lstm(feature if previous is None else self._embed(previous), state)
+        state = self.step_lstm(feature if previous is None else self._embed(previous), state or None)
         hidden = torch.cat([state[0], feature], -1)
-        return StepOutput(self.legal_logits(self.id_head(hidden), previous, index), hidden, state)
+        return self.legal_logits(self.id_head(hidden), previous, index), hidden, state
 
-    def numbers(self, hidden: Tensor, ids: Ids, given: Slots | None = None) -> Slots:
-        """The mean of the distribution around its mode; counts and quarter turns are the mode itself."""
+    def numbers(self, hidden: Tensor, ids: Ids, given: Slots | None, rng: torch.Generator | None = None) -> Slots:
+        """The mean of the distribution around its mode, the mode of counts and quarter turns, or whole samples."""
         if given is None:
-            return self._autoregressive(hidden, ids, None)
+            return self._autoregressive(hidden, ids, rng)
         scores = self._scores(self._mixed(hidden, ids, given), self.in_range[ids])
         return self._mode(scores, self.discrete[ids]) * self.used[ids]
-
-    def sample_numbers(self, hidden: Tensor, ids: Ids, rng: torch.Generator) -> Slots:
-        """Whole numbers sampled slot by slot."""
-        return self._autoregressive(hidden, ids, rng)
 
     def offsets(self, hidden: Tensor, ids: Ids, given: Slots) -> Slots:
         """Offsets below one cell that keep numbers in their range; none of counts and quarter turns."""

@@ -11,7 +11,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple, TypeAlias
 
 import torch
 from jaxtyping import Bool, Float, Int, UInt8
@@ -21,6 +21,7 @@ from torch.nn.functional import pad
 from shapeprog.language.program import PUBLISHED_DEPTH
 from shapeprog.language.statement import EMPTY, END, SLOTS, language
 from shapeprog.language.tensors import Code
+from shapeprog.liang2022.settings import Order
 
 STEPS = PUBLISHED_DEPTH  # steps J of a block: up to two loops and one drawing statement
 IDS = END + 1  # number of statement ids V
@@ -28,6 +29,8 @@ IDS = END + 1  # number of statement ids V
 Ids = Int[Tensor, "*batch"]
 Slots = Float[Tensor, "*batch 7"]
 Grid = Float[Tensor, "B 32 32 32"]
+State: TypeAlias = tuple[Tensor, ...]  # of a network, a row for each program or block; empty before the first
+Step: TypeAlias = tuple[Float[Tensor, "M V"], Tensor, State]  # log-probabilities of ids, features of numbers, state
 
 
 class Vocabulary(NamedTuple):
@@ -89,33 +92,17 @@ class TeacherForcingBatch:
         return TeacherForcingBatch(target, canvases, previous, code, live)
 
 
-class StepOutput(NamedTuple):
-    """Log-probabilities of the ids of one step, the features its numbers are read from, and the LSTM state."""
-
-    logits: Float[Tensor, "M V"]
-    hidden: Tensor
-    state: Any
-
-
 @dataclass(frozen=True)
 class Prediction:
     """Teacher-forced output for the live blocks of a batch: log-probabilities, and features of numbers and blocks."""
 
     generator: Generator
     batch: TeacherForcingBatch
+    ids: Int[Tensor, "M J"]  # of the live blocks
+    given: Float[Tensor, "M J 7"]  # their numbers in the input, without gradient
     logits: Float[Tensor, "M J V"]
     hidden: Tensor
     feature: Float[Tensor, "M F"]
-
-    @property
-    def ids(self) -> Int[Tensor, "M J"]:
-        """Ids of the live blocks."""
-        return self.batch.code.ids[self.batch.live]
-
-    @property
-    def given(self) -> Float[Tensor, "M J 7"]:
-        """Numbers of the live blocks in the input, without gradient."""
-        return self.batch.code.parameters[self.batch.live].detach()
 
     @cached_property
     def numbers(self) -> Float[Tensor, "M J 7"]:
@@ -147,6 +134,7 @@ class Generator(nn.Module, ABC):
     """A network that writes programs block by block; its settings are a frozen dataclass of JSON values."""
 
     design: ClassVar[str]
+    order: ClassVar[Order] = "coverage"  # of the blocks that it rehearses in adaptation
     Settings: ClassVar[Any]
     feature_width: int
     used: Tensor
@@ -163,31 +151,24 @@ class Generator(nn.Module, ABC):
             self.register_buffer(name, table.clone(), persistent=False)
 
     @abstractmethod
-    def encode(self, target: Grid, canvas: Grid, previous: Code, state: Any) -> tuple[Float[Tensor, "B F"], Any]:
-        """The feature of the next block, and the state after it; ``state`` is ``None`` before the first.
-
-        ``previous`` is the block (B, J) written before, empty before the first.
-        """
+    def encode(self, target: Grid, canvas: Grid, previous: Code, state: State) -> tuple[Float[Tensor, "B F"], State]:
+        """The feature of the next block and the state after it, from the block (B, J) before, empty for the first."""
 
     @abstractmethod
     def encode_all(self, batch: TeacherForcingBatch) -> Float[Tensor, "M F"]:
         """Features of all live blocks at once."""
 
     @abstractmethod
-    def step(self, feature: Float[Tensor, "M F"], previous: Code | None, index: int, state: Any) -> StepOutput:
+    def step(self, feature: Float[Tensor, "M F"], previous: Code | None, index: int, state: State) -> Step:
         """Step ``index`` of each block after the step before it (ids (M,), numbers (M, 7)); ``None`` at the first."""
 
     @abstractmethod
-    def numbers(self, hidden: Tensor, ids: Ids, given: Slots | None = None) -> Slots:
-        """Numbers for the ids, with gradient; autoregressive designs condition on ``given`` where it is known."""
+    def numbers(self, hidden: Tensor, ids: Ids, given: Slots | None, rng: torch.Generator | None = None) -> Slots:
+        """Numbers for the ids, with gradient; of designs that predict distributions, given those before, or sampled."""
 
     @abstractmethod
     def number_loss(self, hidden: Tensor, ids: Ids, values: Slots) -> Slots:
         """Supervised loss of each number: negative log-likelihood, or a squared error."""
-
-    def sample_numbers(self, hidden: Tensor, ids: Ids, rng: torch.Generator) -> Slots:
-        """Numbers sampled from the predicted distribution; those of ``numbers`` for designs without one."""
-        return self.numbers(hidden, ids)
 
     def offsets(self, hidden: Tensor, ids: Ids, given: Slots) -> Slots:
         """Offsets of the surface from the numbers, with gradient; the canvas is drawn without them."""
@@ -200,17 +181,19 @@ class Generator(nn.Module, ABC):
 
     def predict(self, batch: TeacherForcingBatch) -> Prediction:
         """Teacher forcing: the output for given canvases and programs, with gradient."""
-        feature, block = self.encode_all(batch), batch.code[batch.live]
-        return Prediction(self, batch, *self.steps(feature, block.having(block.parameters.detach())), feature)
+        feature, ids = self.encode_all(batch), batch.code.ids[batch.live]
+        given = batch.code.parameters[batch.live].detach()
+        return Prediction(self, batch, ids, given, *self.steps(feature, Code(ids, given)), feature)
 
     def steps(self, feature: Float[Tensor, "M F"], block: Code) -> tuple[Float[Tensor, "M J V"], Tensor]:
         """Log-probabilities and hidden features of all steps, each after the steps of the block before it."""
-        outputs: list[StepOutput] = []
+        state: State = ()
+        outputs = []
         for j in range(STEPS):
-            previous = block[:, j - 1] if j else None
-            outputs.append(self.step(feature, previous, j, outputs[-1].state if outputs else None))
-        logits = torch.stack([output.logits for output in outputs], 1)
-        return logits, torch.stack([output.hidden for output in outputs], 1)
+            *output, state = self.step(feature, block[:, j - 1] if j else None, j, state)
+            outputs.append(output)
+        logits, hidden = (torch.stack(part, 1) for part in zip(*outputs, strict=True))
+        return logits, hidden
 
     def losses(self, prediction: Prediction) -> dict[str, Float[Tensor, ""]]:
         """Cross-entropy of the ids and loss of the numbers in use, as means over live steps."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import ctypes
 import io
+import itertools
 import json
 import math
 import os
@@ -16,12 +17,11 @@ import sys
 import threading
 import time
 import zipfile
-from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any, Protocol, TypeVar
+from typing import Any, Protocol, runtime_checkable
 
 import torch
 import torch.distributed as dist
@@ -36,11 +36,12 @@ from shapeprog.liang2022.weights import save_weights
 SAVE_SECONDS = 120.0  # time between saved states
 Record = dict[str, float]  # values of one step by name, step and samples_seen among them
 
-Made = TypeVar("Made")
 
-
+@runtime_checkable
 class Task(Protocol):
     """A network, its data and its losses."""
+
+    data: str  # what it learns from, for the card of the weights
 
     @property
     def module(self) -> nn.Module:
@@ -49,10 +50,6 @@ class Task(Protocol):
     @property
     def network(self) -> nn.Module:
         """The part that is saved."""
-
-    @property
-    def data(self) -> str:
-        """What it learns from, for the card of the weights."""
 
     def batch(self, index: int) -> Any:
         """The batch of an index, always the same; called from another thread."""
@@ -73,10 +70,9 @@ def train(
     The folder gets ``state.pt`` (weights, optimiser, step, settings), ``log.jsonl``, and after each validation
     ``weights.safetensors``, and ``best.safetensors`` where the score is the best so far.  A run in it is resumed, or
     with ``restart`` overwritten.  The device is ``auto``, ``cpu`` or ``cuda``.  Once ``stop`` is set, the state is
-    saved after the current step and training ends.  The card of the weights holds ``command``.
-
-    Raises a ``ShapeProgError`` if the saved run has other settings, another process trains there, or the loss is not
-    finite; an ``OutputError`` if a file cannot be written; the last state stays.
+    saved after the current step and training ends.  The card of the weights holds ``command``.  Raises a
+    ``ShapeProgError`` if the saved run has other settings, another process trains there, the loss is not finite, or a
+    file cannot be written; the last state stays.
     """
     rank, world, where = _processes(device)
     module = task.module.to(where).to(memory_format=torch.channels_last_3d).train()  # type: ignore[call-overload]
@@ -87,11 +83,13 @@ def train(
     )
     together = settings.batch_size * world
     steps, step, best = math.ceil(settings.num_shapes / together), 0, -math.inf
-    with _locked(folder, rank == 0):
+    with (make_folder(folder) / "lock").open("a") as stream:
+        if rank == 0 and not lock(stream.fileno()):
+            raise ShapeProgError(f"another process trains in {folder}", "wait for it, or choose another folder")
         if (folder / STATE).exists() and not restart:
             step, best = _resume(folder / STATE, settings, module, optimiser)
         if rank == 0:
-            records = [record for record in read_log(folder) if record["step"] <= step] if step else []
+            records = [record for record in read_log(folder / LOG) if record["step"] <= step] if step else []
             write_text(folder / LOG, "".join(f"{json.dumps(record)}\n" for record in records))
         saved_at = clock = time.monotonic()
         for batch in _prefetch(task.batch, range(step * world + rank, steps * world, world)):
@@ -113,10 +111,8 @@ def train(
             norm = float(torch.nn.utils.clip_grad_norm_(weights, settings.clip_norm or math.inf))
             total, stopped, *parts = values.tolist()
             if not math.isfinite(total + norm):
-                raise ShapeProgError(
-                    f"the loss of step {step + 1} is {total}, the norm of its gradient {norm}",
-                    f"lower the learning rate; {folder} holds the state before",
-                )
+                cause = f"the loss of step {step + 1} is {total}, the norm of its gradient {norm}"
+                raise ShapeProgError(cause, f"lower the learning rate; {folder} holds the state before")
             optimiser.step()
             step += 1
             record = {"step": step, "samples_seen": step * together, "loss": total, "gradient_norm": norm}
@@ -150,9 +146,8 @@ def train(
             clock = time.monotonic()
 
 
-def read_log(folder: Path) -> list[Record]:
-    """Records of a run, in order; a last line that was cut short is left out."""
-    path = folder / LOG
+def read_log(path: Path) -> list[Any]:
+    """Records of a file, one a line, none if it is missing; a last line that was cut short is left out."""
     lines = path.read_text().splitlines(keepends=True) if path.exists() else []
     try:
         return [json.loads(line) for line in lines if line.endswith("\n")]
@@ -192,27 +187,12 @@ def _average(tensors: Sequence[Tensor]) -> None:
         tensor.copy_(mean.view(tensor.shape) / dist.get_world_size())
 
 
-def _prefetch(make: Callable[[int], Made], indices: Iterable[int]) -> Iterator[Made]:
+def _prefetch(make: Callable[[int], Any], indices: Iterable[int]) -> Iterator[Any]:
     """Batches of indices in order; the next is made in another thread."""
     with ThreadPoolExecutor(1) as pool:
-        coming: deque[Future[Made]] = deque()
-        for index in indices:
-            coming.append(pool.submit(make, index))
-            if len(coming) > 1:
-                yield coming.popleft().result()
-        yield from (batch.result() for batch in coming)
-
-
-@contextlib.contextmanager
-def _locked(folder: Path, writes: bool) -> Iterator[None]:
-    """The folder, made if missing, for this process alone."""
-    if not writes:
-        yield
-        return
-    with (make_folder(folder) / "lock").open("a") as stream:
-        if not lock(stream.fileno()):
-            raise ShapeProgError(f"another process trains in {folder}", "wait for it, or choose another folder")
-        yield
+        coming: Iterator[Any] = (pool.submit(make, index) for index in indices)
+        for batch, _ in itertools.pairwise(itertools.chain(coming, [None])):
+            yield batch.result()
 
 
 def _resume(
@@ -223,16 +203,14 @@ def _resume(
         if zipfile.ZipFile(path).testzip():  # torch does not compare the checksums
             raise ValueError
         state = torch.load(path, map_location="cpu", weights_only=True)
-        saved, step, best = state["settings"], int(state["step"]), float(state["best"])
-    except Exception as error:  # no list of what torch raises for a damaged file
-        raise InputError(f"{path} is damaged", "start over with --restart") from error
-    settings.check_resumable(saved, str(path.parent))
-    try:
+        settings.check_resumable(state["settings"], str(path.parent))
         module.load_state_dict(state["module"])
         optimiser.load_state_dict(state["optimiser"])
-    except Exception as error:  # no list of what torch raises for a state that does not fit
-        raise InputError(f"{path} does not fit the network, or is damaged", "start over with --restart") from error
-    return step, best
+        return int(state["step"]), float(state["best"])
+    except ShapeProgError:
+        raise
+    except Exception as error:  # no list of what torch raises for a state that is damaged or does not fit
+        raise InputError(f"{path} is damaged, or of another network", "start over with --restart") from error
 
 
 def append_line(path: str | Path, line: str) -> None:

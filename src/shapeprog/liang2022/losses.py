@@ -1,7 +1,10 @@
-"""Losses of adaptation (section 4.3), each a function of a :class:`Comparison` declared by :func:`loss`.
+"""Losses of adaptation: of renderings (section 4.3), and of ids, which a renderer gives no gradient (end of 4.2).
 
-A loss is one value for each shape of the batch; lengths are in cells, and ``scene.distance`` is 0 inside.  README.md
-has an example.
+A loss of renderings is a function of a :class:`Comparison`, declared by :func:`loss`, with one value for each shape of
+the batch; lengths are in cells, and ``scene.distance`` is 0 inside.  README.md has an example.  The gradient of ids is
+estimated: programs are sampled, and the log-probability of their ids is weighed by the advantage, the cost above a
+baseline (REINFORCE, Williams 1992).  The cost in adaptation is 1 - IoU of the canvas.  The baseline is a network (NVIL,
+Mnih and Gregor 2014) or the mean cost of the other samples of the same shape (leave one out, Kool et al. 2019).
 """
 
 from __future__ import annotations
@@ -12,21 +15,21 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import torch
-from jaxtyping import Float, UInt8
-from torch import Tensor
+from jaxtyping import Bool, Float, UInt8
+from torch import Tensor, nn
 
 from shapeprog.errors import DeclarationError, ShapeProgError, did_you_mean
 from shapeprog.geometry import losses
 from shapeprog.geometry.distance import signed_distance
 from shapeprog.geometry.scene import Scene
 from shapeprog.geometry.surface import SurfaceSample, sample_surface
+from shapeprog.language import Code, unroll
 from shapeprog.language.statement import is_word
-from shapeprog.language.tensors import Code
-from shapeprog.language.unroll import unroll
 from shapeprog.liang2022.settings import NEURAL
 from shapeprog.space import HALF, RESOLUTION
 
 SHARPNESS = 4.0  # slope of the logit of a soft cell, per cell of distance
+DECAY = 0.9  # decay of the running mean and variance of costs, as published for NVIL
 
 
 @dataclass(frozen=True)
@@ -84,10 +87,7 @@ def coverage(comparison: Comparison) -> Values:
 
 @loss("soft_iou")
 def soft_iou(comparison: Comparison) -> Values:
-    """One minus the IoU of soft cells, estimated from as many occupied as empty cells of the target.
-
-    The logit of a soft cell is minus its sharpness times the distance of its centre to the canvas.
-    """
+    """One minus the IoU of cells with logits ``-SHARPNESS * distance``, from as many occupied as empty target cells."""
     flat, half, index, weight = comparison.cells.flatten(1), max(1, comparison.num_samples // 2), [], []
     for value in (1, 0):
         mask = (flat == value).float()
@@ -144,3 +144,49 @@ def compute(comparison: Comparison, weights: Mapping[str, float]) -> dict[str, V
             raise ShapeProgError(f"the loss {name!r} has no gradient", "compute it from comparison.scene")
         values[name] = weights[name] * value
     return values
+
+
+class NvilBaseline(nn.Module):
+    """Predicts the cost of a program from the feature, of width F, of a block (NVIL, Mnih and Gregor 2014)."""
+
+    mean: Tensor
+    variance: Tensor
+
+    def __init__(self, width: int) -> None:
+        super().__init__()
+        last = nn.Linear(64, 1)
+        nn.init.zeros_(last.weight)
+        self.layers = nn.Sequential(nn.Linear(width, 64), nn.Tanh(), last)
+        self.register_buffer("mean", torch.zeros(()))
+        self.register_buffer("variance", torch.ones(()))
+
+    def forward(
+        self, feature: Float[Tensor, "M F"], live: Bool[Tensor, "B K"], costs: Float[Tensor, " B"]
+    ) -> tuple[Float[Tensor, "B K"], Float[Tensor, ""]]:
+        """The advantage of the ids of every block, without gradient, and the loss that trains the baseline.
+
+        From the features of the M live blocks and the cost of every program.  The advantage is the cost minus running
+        mean and prediction, divided by the running standard deviation where that is above 1, and 0 where no block was
+        sampled; the loss is the mean squared error of the prediction.  Running statistics change in training alone.
+        """
+        centred = (costs - self.mean)[:, None].expand(live.shape)[live]
+        predicted = self.layers(feature.detach().to(self.mean))[:, 0]
+        with torch.no_grad():
+            advantage = (centred - predicted) / self.variance.sqrt().clamp(min=1)
+            if self.training:
+                self.mean.lerp_(costs.mean(), 1 - DECAY)
+                self.variance.lerp_((centred - predicted).square().mean(), 1 - DECAY)
+        return advantage.new_zeros(live.shape).masked_scatter(live, advantage), (predicted - centred).square().mean()
+
+
+def leave_one_out_advantage(costs: Float[Tensor, "S B"]) -> Float[Tensor, "S B"]:
+    """The cost of each of S > 1 samples minus the mean cost of the others (Kool et al. 2019)."""
+    return (costs - costs.mean(0)) * (len(costs) / (len(costs) - 1))
+
+
+def reinforce_loss(log_probs: Float[Tensor, "*S B K"], advantage: Float[Tensor, "*S B #K"]) -> Float[Tensor, ""]:
+    """A loss whose gradient estimates that of the expected cost: a sum over blocks, a mean over programs.
+
+    Log-probabilities of the ids of every block times the advantage of block or program, which gets no gradient.
+    """
+    return (log_probs * advantage.detach()).sum(-1).mean()

@@ -122,5 +122,4 @@ CHAIRS = {"legs": 50000, "cross": 20000, "star": 5000, "boards": 5000}
 TEMPLATES: dict[Template, float] = {
     **{partial(table, top=top, support=support): 4000 for top, support in TABLES},
     **{partial(chair, support=support): count for support, count in CHAIRS.items()},
-}
-"""Templates and the number of shapes that the published data has of them."""
+}  # and the number of shapes that the published data has of each

@@ -20,7 +20,7 @@ from shapeprog.language.tensors import Code
 from shapeprog.language.unroll import draw_blocks
 from shapeprog.liang2022.decode import decode
 from shapeprog.liang2022.generator import Generator, TeacherForcingBatch, live_blocks, preceding_blocks, take
-from shapeprog.liang2022.prior import SyntheticStream, prior
+from shapeprog.liang2022.prior import PRIORS
 from shapeprog.liang2022.settings import Order, PretrainSettings
 from shapeprog.liang2022.weights import build_generator, load_generator
 
@@ -35,20 +35,16 @@ class PretrainTask:
         self._settings = settings
         origin = f", from {Path(settings.initial).stem}" if settings.initial else ""
         self.data = f"synthetic, prior {settings.prior}{origin}"
-        self.module = load_generator(settings.initial) if settings.initial else build_generator(settings.design)
-        self.network = self.module
-        if self.module.design != settings.design:
-            raise ShapeProgError(
-                f"{settings.initial} holds the design {self.module.design}", f"give --design {self.module.design}"
-            )
-        self._stream = SyntheticStream(prior(settings.prior), settings.batch_size, settings.seed)
-        held_out = SyntheticStream(prior(settings.prior), 64, -1)
-        batches = [held_out[index] for index in range(VALIDATION_BATCHES)]
+        generator = load_generator(settings.initial) if settings.initial else build_generator(settings.design)
+        self.module = self.network = generator
+        if (design := generator.design) != settings.design:
+            raise ShapeProgError(f"{settings.initial} holds the design {design}", f"give --design {design}")
+        batches = [PRIORS[settings.prior].batch(64, -1, index) for index in range(VALIDATION_BATCHES)]
         self._validation = [teacher_forcing(batch.voxels, batch.code, settings.order) for batch in batches]
 
     def batch(self, index: int) -> TeacherForcingBatch:
         """Synthetic shapes, canvases and blocks."""
-        made = self._stream[index]
+        made = PRIORS[self._settings.prior].batch(self._settings.batch_size, self._settings.seed, index)
         return teacher_forcing(made.voxels, made.code, self._settings.order)
 
     def losses(self, batch: TeacherForcingBatch, progress: float, rng: torch.Generator) -> dict[str, Tensor]:
@@ -64,18 +60,14 @@ class PretrainTask:
 
     def validate(self) -> dict[str, float]:
         """Accuracy of ids, mean error of numbers in cells, and IoU of programs decoded by arg-max: the score."""
-        generator, right, steps, error, slots = self.module, 0.0, 0.0, 0.0, 0.0
-        overlaps: list[Tensor] = []
-        device = next(generator.parameters()).device
-        for batch in (held_out.to(device) for held_out in self._validation):
+        generator, measured = self.module, []
+        for batch in (held_out.to(generator.used.device) for held_out in self._validation):
             prediction = generator.predict(batch)
-            used = generator.used[prediction.ids]
-            right += float((prediction.logits.argmax(-1) == prediction.ids).sum())
-            error += float(((prediction.numbers - prediction.given).abs() * used).sum())
-            steps, slots = steps + prediction.ids.numel(), slots + float(used.sum())
-            overlaps.append(decode(generator, batch.target, decoder="argmax").iou())
-        iou = float(torch.cat(overlaps).mean())
-        return {"ids": right / steps, "numbers": error / slots, "iou": iou, "score": iou}
+            right = (prediction.logits.argmax(-1) == prediction.ids).double().flatten()
+            error = (prediction.numbers - prediction.given).abs()[generator.used[prediction.ids]]
+            measured.append((right, error, decode(generator, batch.target, decoder="argmax").iou()))
+        ids, numbers, iou = (float(torch.cat(part).mean()) for part in zip(*measured, strict=True))
+        return {"ids": ids, "numbers": numbers, "iou": iou, "score": iou}
 
 
 def teacher_forcing(target: UInt8[Tensor, "B 32 32 32"], code: Code, order: Order = "coverage") -> TeacherForcingBatch:
@@ -101,8 +93,7 @@ def scheduled_sampling(generator: Generator, batch: TeacherForcingBatch, rng: to
     decoded = decode(generator.eval(), batch.target, blocks=batch.code.ids.shape[1], decoder="sample", rng=rng)
     generator.train(training)
     code = take(batch.code, *_best(draw_blocks(batch.code), decoded.canvases))
-    live = live_blocks(decoded.code.ids)
-    return TeacherForcingBatch(batch.target, decoded.canvases, preceding_blocks(decoded.code), code, live)
+    return TeacherForcingBatch(batch.target, decoded.canvases, decoded.previous, code, decoded.live)
 
 
 def _best(

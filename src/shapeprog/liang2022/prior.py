@@ -1,4 +1,4 @@
-"""Priors over programs: mixtures of templates without hidden blocks, as samples and as endless streams."""
+"""Priors over programs: mixtures of templates without hidden blocks."""
 
 from __future__ import annotations
 
@@ -11,16 +11,22 @@ from jaxtyping import Bool, Int, UInt8
 from torch import Tensor
 
 from shapeprog.errors import InputError, did_you_mean
-from shapeprog.geometry.cells import Cells, preceding, union, unpack
+from shapeprog.geometry.cells import preceding, union, unpack
 from shapeprog.kernels.bits import FIRST, GOLDEN
-from shapeprog.language.program import Program
-from shapeprog.language.tensors import Code, decode, encode
+from shapeprog.language import Code, Program, decode, encode
 from shapeprog.language.unroll import draw_blocks
 from shapeprog.liang2022 import narrow, wide
 from shapeprog.liang2022.draft import Draft, Rng, Template
 from shapeprog.liang2022.generator import take
 
 BLOCKS = 10  # largest number of blocks K of a program
+
+
+class SyntheticBatch(NamedTuple):
+    """Programs (B, K, 3) in whole numbers, and the cells that they draw."""
+
+    code: Code
+    voxels: UInt8[Tensor, "B 32 32 32"]
 
 
 @dataclass(frozen=True)
@@ -31,17 +37,19 @@ class Prior:
     off_centre: float = 0.0  # share that is moved by up to a cell along each axis
     details: float = 0.0  # share that gets small parts beyond its template
 
-    def sample(self, count: int, seed: int) -> tuple[Code, Cells]:
-        """Programs (count, K, 3) and their packed cells (count, 32, 32), the same for the same seed.
-
-        Every block draws cells that no other does; empty blocks come last.
-        """
+    def sample(self, count: int, seed: int) -> SyntheticBatch:
+        """So many programs, the same for the same seed; every block draws cells of its own, empty ones come last."""
         rng = Rng(seed)
         code = encode([self._program(rng) for _ in range(count)], blocks=BLOCKS)
         cells = draw_blocks(code)
         keep = own_cells(cells)
         order = torch.argsort(~keep, stable=True)
-        return take(code, order, keep.gather(1, order)), union(cells * keep[..., None, None])
+        voxels = unpack(union(cells * keep[..., None, None]))
+        return SyntheticBatch(take(code, order, keep.gather(1, order)), voxels)
+
+    def batch(self, count: int, seed: int, index: int) -> SyntheticBatch:
+        """The batch of an index, 0 or more, of the endless stream of a seed."""
+        return self.sample(count, (seed * GOLDEN + index * FIRST + 1) % 2**63)
 
     def _program(self, rng: Rng) -> Program:
         moved = rng.chance(self.off_centre)
@@ -56,35 +64,11 @@ PRIORS = {"narrow": Prior(narrow.TEMPLATES), "wide": Prior(wide.TEMPLATES, off_c
 """The mix of the published synthetic data, and furniture of many kinds."""
 
 
-def prior(name: str) -> Prior:
-    """The prior of a name; an ``InputError`` with the nearest name if there is none."""
+def programs(name: str, count: int, seed: int = 0) -> list[Program]:
+    """Programs of a prior, the same for the same seed; an ``InputError`` with the nearest name if there is none."""
     if name not in PRIORS:
         raise InputError(f"there is no prior {name!r}", did_you_mean(name, list(PRIORS), quoted=True))
-    return PRIORS[name]
-
-
-def programs(name: str, count: int, seed: int = 0) -> list[Program]:
-    """Programs of the prior of a name, the same for the same seed."""
-    return decode(prior(name).sample(count, seed)[0])
-
-
-class SyntheticBatch(NamedTuple):
-    """Programs in whole numbers, and the cells that they draw."""
-
-    code: Code
-    voxels: UInt8[Tensor, "B 32 32 32"]
-
-
-class SyntheticStream:
-    """Batches of shapes, each of which depends on the prior, the seed and its index alone."""
-
-    def __init__(self, prior: Prior, batch_size: int, seed: int = 0) -> None:
-        self.prior, self.batch_size, self.seed = prior, batch_size, seed
-
-    def __getitem__(self, index: int) -> SyntheticBatch:
-        """The batch of an index, 0 or more."""
-        code, cells = self.prior.sample(self.batch_size, (self.seed * GOLDEN + index * FIRST + 1) % 2**63)
-        return SyntheticBatch(code, unpack(cells))
+    return decode(PRIORS[name].sample(count, seed).code)
 
 
 def scramble(*numbers: int) -> int:

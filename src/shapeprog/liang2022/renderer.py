@@ -17,9 +17,7 @@ from torch import Tensor
 from shapeprog.errors import ShapeProgError
 
 RECTANGLE, SQUARE, ROUND = (2, 5), (3, 7, 9), (4, 6, 8)
-CROSS, SIDEBOARD, BACK, LINE, TRANSLATE, ROTATE, END = 10, 11, 15, 17, 19, 20, 21
-"""Ids of statements; those not named here are cuboids by corner and extents."""
-
+CROSS, SIDEBOARD, BACK, LINE, TRANSLATE, ROTATE, END = 10, 11, 15, 17, 19, 20, 21  # the other statements are cuboids
 SKIN = 1e-4  # share of its size by which a point is moved off its primitive to see whether another one hides it
 
 Points = Float[Tensor, "P 3"]
@@ -126,10 +124,7 @@ def cuboid_distance(points: Points, size: Float[Tensor, " 3"]) -> Distances:
 
 
 def cylinder_distance(points: Points, size: Float[Tensor, " 2"]) -> Distances:
-    """Appendix A, mended: distance to a cylinder of half height h and radius r; 0 inside.
-
-    The published algorithm compares with the full and the half height in turn, and y^2 with s_x^2 instead of r^2.
-    """
+    """Appendix A, mended as README.md says: distance to a cylinder of half height h and radius r; 0 inside."""
     height_and_radius = torch.stack([points[:, 0].abs(), points[:, 1:].norm(dim=-1)], -1)
     return (height_and_radius - size).clamp(min=0).norm(dim=-1)
 
@@ -214,10 +209,7 @@ def sample(primitives: Sequence[Primitive], n: int, rng: torch.Generator | None 
 
 
 def chamfer(points: Points, target: Float[Tensor, "Q 3"], weights: Distances | None = None) -> Float[Tensor, ""]:
-    """Section 4.3.1: squared distances to the nearest point of the other cloud, forward and backward score added.
-
-    Means over points, where the paper has sums: only those fit the values of its tables.
-    """
+    """Section 4.3.1: mean squared distances, not sums, to the nearest point of the other cloud, both ways added."""
     squared = ((points[:, None] - target) ** 2).sum(-1)
     weights = torch.ones_like(points[:, 0]) if weights is None else weights
     return (weights * squared.amin(1)).sum() / weights.sum() + squared.amin(0).mean()

@@ -1,7 +1,4 @@
-"""Settings of training, saved with every run so that it can be resumed; command line options are made from them.
-
-Nothing heavy is imported here.  Shapes are counted each time they are seen.
-"""
+"""Settings of training, saved with every run and made into options; shapes are counted each time they are seen."""
 
 from __future__ import annotations
 
@@ -14,9 +11,7 @@ from shapeprog.errors import ShapeProgError
 
 NEURAL = "neural"  # reserved name of the loss through the neural executor, which compares predictions and not scenes
 
-METHODS = {"direct": "chamfer", "guided": f"{NEURAL}=30", "hybrid": f"chamfer=1,{NEURAL}=10"}
-"""Losses of each method of adaptation: through the renderer, the neural executor, or both."""
-
+METHODS = {"direct": "chamfer", "guided": f"{NEURAL}=30", "hybrid": f"chamfer=1,{NEURAL}=10"}  # their losses
 STATE, WEIGHTS, BEST, LOG = "state.pt", "weights.safetensors", "best.safetensors", "log.jsonl"  # files of a run
 Decoder = Literal["argmax", "novel", "select"]  # how programs are written; see decode.py
 Order = Literal["coverage", "written"]  # of the blocks in teacher forcing; see pretrain.py
@@ -41,8 +36,7 @@ class TrainingSettings:
     seed: int = option(0, "Seed of the initial weights, the data and every sample.")
     validate_every: int = option(0, "Shapes between validations; 0 for one at the end.")
 
-    MAY_CHANGE: ClassVar[frozenset[str]] = frozenset({"num_shapes", "validate_every", "val"})
-    """Settings that a resumed run may change."""
+    MAY_CHANGE: ClassVar[frozenset[str]] = frozenset({"num_shapes", "validate_every", "val"})  # by a resumed run
 
     def __post_init__(self) -> None:
         hints = get_type_hints(type(self))
@@ -121,9 +115,7 @@ class AdaptSettings(TrainingSettings):
     method: Literal["direct", "guided", "hybrid"] = option("direct", "Adaptation: direct, guided or hybrid.")
     loss: str = option("", "Losses and weights, such as chamfer=1,soft_iou=3; by default those of the method.")
     executor: str = option("executor", "Weights of the neural executor, for the loss neural.")
-    learn: Literal["all", "offsets"] = option(
-        "all", "all weights, or offsets alone: a shortcut that is not the paper's."
-    )
+    learn: Literal["all", "offsets"] = option("all", "all weights, or offsets alone, which is not the paper's way.")
     decoder: Decoder = option("select", "Decoder: argmax, novel or select; with an estimator in validation alone.")  # noqa: RUF009
     decoded_ids: float = option(1.0, "Weight of the cross-entropy to decoded ids (self-training); 0 with an estimator.")
     kl: float = option(0.0, "Weight of the KL divergence of the ids from those of the initial weights.")

@@ -8,7 +8,6 @@ published network, so its checkpoints load.  For departures see :class:`Tian2019
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import torch
 import torch.nn.functional as F
@@ -18,7 +17,7 @@ from torch import Tensor, nn
 from shapeprog.geometry.cells import unpack
 from shapeprog.language.statement import SLOTS
 from shapeprog.language.tensors import Code
-from shapeprog.liang2022.generator import IDS, Generator, Grid, Ids, Prediction, Slots, StepOutput, TeacherForcingBatch
+from shapeprog.liang2022.generator import IDS, Generator, Grid, Ids, Prediction, Slots, State, Step, TeacherForcingBatch
 
 WIDTH = 64  # width of the feature, of both LSTMs and of the heads
 
@@ -32,11 +31,7 @@ MOMENTUM = 0.02  # weight of a batch in the running statistics
 
 @dataclass(frozen=True)
 class Tian2019Settings:
-    """Whether to follow the published network in everything.
-
-    It normalises by the statistics of the batch in evaluation too, so that a prediction depends on the other shapes in
-    it, and it allows illegal blocks, which draw nothing.  Otherwise running statistics and legal blocks.
-    """
+    """Whether to normalise by the statistics of the batch in evaluation too, and to allow illegal blocks."""
 
     published: bool = False
 
@@ -93,19 +88,15 @@ class StepNet(nn.Module):
             nn.init.zeros_(head.bias)
 
 
-def lstm_step(lstm: nn.LSTM, value: Tensor, state: tuple[Tensor, Tensor] | None) -> tuple[Tensor, Tensor]:
+def lstm_step(lstm: nn.LSTM, value: Tensor, state: State) -> State:
     """One step of a single-layer LSTM without biases; the state is output and cell, each (M, width)."""
-    if state is None:
-        zero = value.new_zeros(len(value), lstm.hidden_size)
-        state = (zero, zero)
-    input_weight, hidden_weight = lstm.all_weights[0]
-    return torch.lstm_cell(value, state, input_weight, hidden_weight)
+    return torch.lstm_cell(value, state or [value.new_zeros(len(value), lstm.hidden_size)] * 2, *lstm.all_weights[0])
 
 
 class Tian2019(Generator):
     """The published network; see the module."""
 
-    design = "tian2019"
+    design, order = "tian2019", "written"
     Settings = Tian2019Settings
     feature_width = WIDTH
 
@@ -115,12 +106,12 @@ class Tian2019(Generator):
         self.core = nn.LSTM(WIDTH, WIDTH, bias=False, batch_first=True)
         self.inner_net = StepNet()
 
-    def encode(self, target: Grid, canvas: Grid, previous: Code, state: Any) -> tuple[Float[Tensor, "B 64"], Any]:
+    def encode(self, target: Grid, canvas: Grid, previous: Code, state: State) -> tuple[Float[Tensor, "B 64"], State]:
         """The block feature; the state holds the first convolution of the target and that of the block LSTM."""
         encoder = self.shape_feat
-        of_target = encoder.convolve_grid(target, 0) if state is None else state[0]
+        of_target = state[0] if state else encoder.convolve_grid(target, 0)
         feature = encoder.features(encoder.convolve_grid(canvas, 1) + of_target)
-        lstm = lstm_step(self.core, feature, None if state is None else state[1:])
+        lstm = lstm_step(self.core, feature, state[1:])
         return lstm[0].relu(), (of_target, *lstm)
 
     def encode_all(self, batch: TeacherForcingBatch) -> Float[Tensor, "M 64"]:
@@ -133,26 +124,23 @@ class Tian2019(Generator):
         features = rows.new_zeros(*needed.shape, WIDTH).masked_scatter(needed[..., None], rows)
         return self.core(features)[0][batch.live].relu()
 
-    def step(self, feature: Float[Tensor, "M 64"], previous: Code | None, index: int, state: Any) -> StepOutput:
-        """One step; its hidden features are the numbers of every id (M, V, 7).
-
-        The heads of the numbers read the probabilities of the ids, without gradient.
-        """
+    def step(self, feature: Float[Tensor, "M 64"], previous: Code | None, index: int, state: State) -> Step:
+        """One step; its hidden features are the numbers of every id (M, V, 7), read from the ids without gradient."""
         net = self.inner_net
         state = lstm_step(net.core, feature if previous is None else net.pgm_embed(previous.ids), state)
         scores = net.logit2(net.logit1(state[0]).relu())
         inputs = torch.cat([scores.detach().softmax(-1), net.regress1(state[0]).relu()], -1)
         rows = net.regress2(inputs).unflatten(-1, (IDS, SLOTS))
         logits = scores.log_softmax(-1) if self.settings.published else self.legal_logits(scores, previous, index)
-        return StepOutput(logits, rows, state)
+        return logits, rows, state
 
-    def numbers(self, hidden: Tensor, ids: Ids, given: Slots | None = None) -> Slots:
-        """The row of each id."""
+    def numbers(self, hidden: Tensor, ids: Ids, given: Slots | None, rng: torch.Generator | None = None) -> Slots:
+        """The row of each id, which is no distribution."""
         return hidden.gather(-2, ids[..., None, None].expand(*ids.shape, 1, SLOTS))[..., 0, :]
 
     def number_loss(self, hidden: Tensor, ids: Ids, values: Slots) -> Slots:
         """Half the squared error; the target of an unused slot is zero."""
-        return 0.5 * (self.numbers(hidden, ids) - values * self.used[ids]) ** 2
+        return 0.5 * (self.numbers(hidden, ids, None) - values * self.used[ids]) ** 2
 
     def losses(self, prediction: Prediction) -> dict[str, Float[Tensor, ""]]:
         """The published losses, as means over steps and over the numbers in use."""

@@ -124,10 +124,9 @@ def load_executor(name: str | os.PathLike[str] = "executor") -> NeuralExecutor:
 
 
 def read_published(path: str | os.PathLike[str]) -> nn.Module:
-    """The generator or executor of a published ``.t7`` file; nothing in it is run.
+    """The generator, with statistics of the batch, or executor of a published ``.t7`` file; nothing in it is run.
 
-    The generator normalises by the statistics of the batch.  Raises an ``InputError`` for a file that cannot be read,
-    holds more than weights, or fits neither network.
+    Raises an ``InputError`` for a file that cannot be read, holds more than weights, or fits neither network.
     """
     path = Path(path)
     check_file(path)

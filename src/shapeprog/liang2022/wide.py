@@ -1,7 +1,4 @@
-"""Synthetic furniture of many kinds: seats, tables, cases and beds, with small parts beyond these.
-
-Some are the published tables and chairs, which have round tops and central supports.
-"""
+"""Synthetic furniture of many kinds: seats, tables, cases and beds with small parts, and the published ones."""
 
 from __future__ import annotations
 
@@ -11,8 +8,7 @@ from shapeprog.liang2022 import narrow
 from shapeprog.liang2022.draft import Draft, Rng, Template, Triple
 from shapeprog.space import DEPTH, SIDE, UP
 
-SMALL, THIN = {1: 0.4, 2: 0.45, 3: 0.15}, {1: 0.7, 2: 0.3}
-"""Thicknesses in cells with their weights: of legs and panels, and of boards."""
+SMALL, THIN = {1: 0.4, 2: 0.45, 3: 0.15}, {1: 0.7, 2: 0.3}  # thicknesses in cells: of legs and panels, of boards
 
 
 def seating(
@@ -190,5 +186,4 @@ TEMPLATES: dict[Template, float] = {
     partial(case, smallest=(24, 4, 8), largest=(24, 12, 24), solid=0.0): 0.06,  # bookshelves
     partial(seating, smallest=(6, 24, 12), largest=(16, 24, 24), armed=0.0, body=0.6, footed=0.6): 0.04,  # beds
     **{template: shapes / 2e6 for template, shapes in narrow.TEMPLATES.items()},
-}
-"""Templates and their weights, with the smallest and largest extents; the longest is that of all shapes in the grid."""
+}  # and their weights, with the smallest and largest extents; the longest is that of all shapes in the grid

@@ -44,9 +44,9 @@ def measure(task: Task) -> list[dict[str, Any]]:
     from shapeprog.data import read_pack
     from shapeprog.evaluation.metrics import evaluate_program
     from shapeprog.inference import greedy_boxes, infer, refine, snapped_from
+    from shapeprog.inference.cells.refine import REACH
     from shapeprog.inference.infer import prepare_kernels
-    from shapeprog.inference.refine import REACH
-    from shapeprog.inference.surface import points_of_cells
+    from shapeprog.inference.surface.cells import points_of_cells
 
     torch.set_num_threads(1)
     prepare_kernels()

@@ -139,7 +139,7 @@ def measure(task: Task) -> dict[str, Any]:
 def inferred(task: Task, shape: Any) -> tuple[Any, Any]:
     """The program of an object, and its whole-numbered form where it has one."""
     from shapeprog.inference import infer
-    from shapeprog.inference.evidence import evidence_of
+    from shapeprog.inference.surface.evidence import evidence_of
     from shapeprog.inference.ties.tying import tie
     from shapeprog.language.merging import merged
     from shapeprog.language.parser import parse

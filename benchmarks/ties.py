@@ -116,7 +116,7 @@ def measure(task: Task) -> dict[str, Any]:
 def of_furniture(task: Task) -> dict[str, Any]:
     """How many ties of a planted program are found again."""
     from shapeprog.data.synthetic.furniture import furniture
-    from shapeprog.inference.evidence import evidence_of_program
+    from shapeprog.inference.surface.evidence import evidence_of_program
     from shapeprog.inference.ties.tying import tie
     from shapeprog.language.printer import format_program
 
@@ -150,7 +150,7 @@ def of_furniture(task: Task) -> dict[str, Any]:
 def redrawn(number: int, seed: int) -> Any:
     """The features (K, F) of furniture that is designed as that of a number is, which comes first."""
     from shapeprog.data.synthetic.furniture import furniture
-    from shapeprog.inference.tunable import Tunable
+    from shapeprog.inference.fit.tunable import Tunable
     from shapeprog.language.unroll import unroll
 
     tunable = Tunable(furniture(number, seed))
@@ -171,7 +171,7 @@ def with_noise(program: Any, random: np.random.Generator) -> Any:
     """The plain program with noise on every number that may move."""
     import torch
 
-    from shapeprog.inference.tunable import Tunable
+    from shapeprog.inference.fit.tunable import Tunable
 
     tunable = Tunable(program)
     noise = NOISE * random.normal(size=len(tunable.values)) / tunable.scale.numpy()
@@ -182,7 +182,7 @@ def with_noise(program: Any, random: np.random.Generator) -> Any:
 def sides(scene: Any) -> tuple[Any, Any]:
     """Of every primitive of a scene the low and high sides and the two least half sizes, and the same with the ends of
     its axis for sides (N, 2, 8); its kind and block, and whether it is a slender one that runs aslant (N, 3)."""
-    from shapeprog.inference.tunable import bounds
+    from shapeprog.inference.fit.tunable import bounds
 
     drawn = scene.mask.numpy()
     local, turned, centre = (each.numpy()[drawn] for each in (bounds(scene), scene.rotation, scene.centre))
@@ -249,7 +249,7 @@ def plain_slopes(program: Any) -> Any:
     """How the features of a plain program (F, Z) follow from its numbers, and from lifting it."""
     import torch
 
-    from shapeprog.inference.tunable import Tunable
+    from shapeprog.inference.fit.tunable import Tunable
 
     tunable = Tunable(program)
     start = features(tunable.scene(tunable.values))
@@ -319,7 +319,7 @@ def of_group(task: Task) -> dict[str, Any]:
     from shapeprog.data.placement import shape_from_mesh
     from shapeprog.formats.parts import parts
     from shapeprog.inference import infer
-    from shapeprog.inference.evidence import evidence_of_program
+    from shapeprog.inference.surface.evidence import evidence_of_program
     from shapeprog.inference.ties.tying import tie
     from shapeprog.language.parser import parse
     from shapeprog.language.printer import format_program
@@ -474,7 +474,7 @@ def boxes_of(pack: Path, number: int) -> tuple[list[Any], Any]:
 def shaken(program: Any) -> tuple[int, Any]:
     """The number of free numbers; and the sizes of the boxes of all primitives (K, N, 3), smallest first, as they are
     and where all free numbers are others."""
-    from shapeprog.inference.tunable import bounds
+    from shapeprog.inference.fit.tunable import bounds
     from shapeprog.language.free import free_numbers, multiplied
     from shapeprog.language.unroll import unroll
 

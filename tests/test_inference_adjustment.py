@@ -12,11 +12,11 @@ from shapeprog.data.shape import Shape
 from shapeprog.evaluation.likeness import Triangles
 from shapeprog.evaluation.structure import one_piece
 from shapeprog.geometry.mesh import union_mesh
-from shapeprog.inference.adjustment import adjust
 from shapeprog.inference.budget import Deadline
-from shapeprog.inference.evidence import Evidence, evidence_of
-from shapeprog.inference.joints import find_joints, needs
-from shapeprog.inference.tunable import THINNEST, Tunable
+from shapeprog.inference.fit.adjustment import adjust
+from shapeprog.inference.fit.joints import find_joints, needs
+from shapeprog.inference.fit.tunable import THINNEST, Tunable
+from shapeprog.inference.surface.evidence import Evidence, evidence_of
 from shapeprog.language.parser import parse
 from shapeprog.language.program import Program
 from shapeprog.language.tensors import encode

@@ -18,11 +18,11 @@ from shapeprog.evaluation.metrics import evaluate_program
 from shapeprog.formats.parts import parts, solid
 from shapeprog.geometry.batch import Solids
 from shapeprog.inference.assembly import assemble
-from shapeprog.inference.candidates import at_the_far_side, distinct, looks, plain
-from shapeprog.inference.evidence import evidence_of_program
-from shapeprog.inference.images import images
-from shapeprog.inference.repeating import repeated
-from shapeprog.inference.tunable import bounds
+from shapeprog.inference.candidates.candidates import at_the_far_side, distinct, looks, plain
+from shapeprog.inference.candidates.images import images
+from shapeprog.inference.candidates.repeating import repeated
+from shapeprog.inference.fit.tunable import bounds
+from shapeprog.inference.surface.evidence import evidence_of_program
 from shapeprog.language import Draw, Language, Loop, Program, language, standard, statement, using
 from shapeprog.language.hints import Box
 from shapeprog.language.parameters import Length, Position, Radius

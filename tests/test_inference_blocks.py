@@ -7,7 +7,7 @@ import pytest
 
 from shapeprog.data.random import outside_published
 from shapeprog.geometry.cells import pack, rasterise, voxels, words_of
-from shapeprog.inference.block_layout import (
+from shapeprog.inference.cells.block_layout import (
     BACK,
     BOX,
     COUNT1,
@@ -25,9 +25,9 @@ from shapeprog.inference.block_layout import (
     TILT,
     WIDTH,
 )
-from shapeprog.inference.blocks import to_program
-from shapeprog.inference.descent_kernels import layers
-from shapeprog.inference.drawing import cells_shared, draw_all, draw_each, places
+from shapeprog.inference.cells.blocks import to_program
+from shapeprog.inference.cells.descent_kernels import layers
+from shapeprog.inference.cells.drawing import cells_shared, draw_all, draw_each, places
 from shapeprog.language.unroll import unroll
 
 

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from shapeprog.geometry.cells import voxels as voxels_of
-from shapeprog.inference.box_kernels import heaviest
-from shapeprog.inference.families import MIRROR, families
-from shapeprog.inference.fold_kernels import VOLUMES, mirrors, search_family
-from shapeprog.inference.greedy import greedy_boxes
+from shapeprog.inference.cells.box_kernels import heaviest
+from shapeprog.inference.cells.families import MIRROR, families
+from shapeprog.inference.cells.fold_kernels import VOLUMES, mirrors, search_family
+from shapeprog.inference.cells.greedy import greedy_boxes
 from shapeprog.language.unroll import unroll
 
 ANY = 1 << 20

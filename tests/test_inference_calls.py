@@ -9,9 +9,8 @@ import shapeprog as sp
 from shapeprog.data.placement import shape_from_mesh
 from shapeprog.data.shape import Shape
 from shapeprog.formats.parts import parts
-from shapeprog.inference.adjustment import adjust
 from shapeprog.inference.budget import Deadline
-from shapeprog.inference.calls import (
+from shapeprog.inference.candidates.calls import (
     Called,
     drawn,
     moved,
@@ -21,12 +20,13 @@ from shapeprog.inference.calls import (
     regrouped,
     relations,
 )
-from shapeprog.inference.connecting import connected
-from shapeprog.inference.coverage import Prices
-from shapeprog.inference.evidence import evidence_of_program
-from shapeprog.inference.recognition import proposed
+from shapeprog.inference.candidates.recognition import proposed
+from shapeprog.inference.choice.connecting import connected
+from shapeprog.inference.choice.coverage import Prices
+from shapeprog.inference.fit.adjustment import adjust
+from shapeprog.inference.fit.tunable import Tunable
+from shapeprog.inference.surface.evidence import evidence_of_program
 from shapeprog.inference.ties.tying import tie
-from shapeprog.inference.tunable import Tunable
 from shapeprog.language.ast import Call
 from shapeprog.language.free import numbers, numbers_outside
 from shapeprog.language.parser import parse

@@ -13,9 +13,8 @@ from shapeprog.data.placement import shape_from_mesh, shape_from_points, shape_f
 from shapeprog.data.sampling import sample_surface
 from shapeprog.data.shape import Shape
 from shapeprog.geometry.mesh import union_mesh
-from shapeprog.inference import evidence as seen
-from shapeprog.inference.choice import Choice, choose, explained, value
-from shapeprog.inference.coverage import (
+from shapeprog.inference.choice.choice import Choice, choose, explained, value
+from shapeprog.inference.choice.coverage import (
     Covers,
     Prices,
     covers,
@@ -27,8 +26,9 @@ from shapeprog.inference.coverage import (
     shares,
     shares_twin,
 )  # fmt: skip
-from shapeprog.inference.coverage_kernels import TURNED
-from shapeprog.inference.evidence import Evidence, evidence_of
+from shapeprog.inference.choice.coverage_kernels import TURNED
+from shapeprog.inference.surface import evidence as seen
+from shapeprog.inference.surface.evidence import Evidence, evidence_of
 from shapeprog.language.parser import parse
 from shapeprog.language.program import Program
 from shapeprog.language.unroll import unroll

@@ -14,10 +14,10 @@ from shapeprog.data.placement import shape_from_mesh
 from shapeprog.formats.parts import parts
 from shapeprog.geometry.distance import signed_distance
 from shapeprog.geometry.surface import sample_surface
-from shapeprog.inference import candidates
-from shapeprog.inference.candidates import single_candidates
-from shapeprog.inference.fitting import Target, fit, improve, starts
-from shapeprog.inference.pieces import Pieces, find_pieces
+from shapeprog.inference.candidates import candidates
+from shapeprog.inference.candidates.candidates import single_candidates
+from shapeprog.inference.candidates.fitting import Target, fit, improve, starts
+from shapeprog.inference.pieces.pieces import Pieces, find_pieces
 from shapeprog.language import Draw, Language, Program, Statement, standard, using
 from shapeprog.language.hints import Box
 from shapeprog.language.parameters import Extent

@@ -9,12 +9,12 @@ import pytest
 
 from shapeprog.data.placement import shape_from_mesh
 from shapeprog.geometry.mesh import pieces, union_mesh
-from shapeprog.inference.adjustment import adjust, tidy
-from shapeprog.inference.choice import choose
-from shapeprog.inference.connecting import connected, floating
-from shapeprog.inference.coverage import Prices, covers
-from shapeprog.inference.evidence import Evidence, evidence_of
-from shapeprog.inference.neighbours import neighbours
+from shapeprog.inference.candidates.neighbours import neighbours
+from shapeprog.inference.choice.choice import choose
+from shapeprog.inference.choice.connecting import connected, floating
+from shapeprog.inference.choice.coverage import Prices, covers
+from shapeprog.inference.fit.adjustment import adjust, tidy
+from shapeprog.inference.surface.evidence import Evidence, evidence_of
 from shapeprog.language import Draw, Loop, Program
 from shapeprog.language.parser import parse
 from shapeprog.language.program import Node

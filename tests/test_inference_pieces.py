@@ -14,14 +14,14 @@ from shapeprog.data.placement import shape_from_mesh, shape_from_points
 from shapeprog.data.sampling import sample_surface
 from shapeprog.data.shape import Shape
 from shapeprog.geometry.mesh import union_mesh
-from shapeprog.inference.cloud import cloud_of
-from shapeprog.inference.components import align_copies, components, solid_sides
-from shapeprog.inference.limbs import limbs
-from shapeprog.inference.oriented import Boxes, bounds, boxes_around
-from shapeprog.inference.pieces import Pieces, Source, find_pieces
-from shapeprog.inference.scans import points_of_scan
-from shapeprog.inference.stacks import stacks
-from shapeprog.inference.strands import REACHES, strands
+from shapeprog.inference.cells.stacks import stacks
+from shapeprog.inference.pieces.limbs import limbs
+from shapeprog.inference.pieces.oriented import Boxes, bounds, boxes_around
+from shapeprog.inference.pieces.pieces import Pieces, Source, find_pieces
+from shapeprog.inference.pieces.strands import REACHES, strands
+from shapeprog.inference.surface.cloud import cloud_of
+from shapeprog.inference.surface.components import align_copies, components, solid_sides
+from shapeprog.inference.surface.scans import points_of_scan
 from shapeprog.space import Array, FloatArray, Frame
 
 Mesh = tuple[FloatArray, Array]

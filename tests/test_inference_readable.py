@@ -19,7 +19,7 @@ from shapeprog.errors import ShapeProgError
 from shapeprog.formats import export, load_with_frame, save
 from shapeprog.geometry.mesh import part_meshes
 from shapeprog.inference import Settings, infer
-from shapeprog.inference.connecting import floating
+from shapeprog.inference.choice.connecting import floating
 from shapeprog.inference.readable import TOLERANCES, in_readable_unit, unit_of_result
 from shapeprog.language.named import names
 from shapeprog.language.parser import parse

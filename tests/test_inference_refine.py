@@ -13,7 +13,7 @@ from shapeprog.geometry.cells import voxels as voxels_of
 from shapeprog.geometry.surface import sample_surface
 from shapeprog.inference import Schedule, Settings, infer, refine, snap, snapped_from
 from shapeprog.inference.budget import Deadline
-from shapeprog.inference.tunable import THINNEST
+from shapeprog.inference.fit.tunable import THINNEST
 from shapeprog.language.parser import parse
 from shapeprog.language.tensors import Code, decode, encode
 from shapeprog.language.unroll import unroll

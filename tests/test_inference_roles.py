@@ -8,8 +8,8 @@ import torch
 
 import shapeprog as sp
 from shapeprog.geometry.primitive import primitives
-from shapeprog.inference import roles
-from shapeprog.inference.roles import in_order, with_roles
+from shapeprog.inference.roles import roles
+from shapeprog.inference.roles.roles import in_order, with_roles
 from shapeprog.language.hints import Box, straight_bar, upright_box
 from shapeprog.language.program import Draw, Program
 from shapeprog.language.statement import language

@@ -8,14 +8,14 @@ import pytest
 from shapeprog.data.random import outside_published
 from shapeprog.geometry.cells import pack, words_of
 from shapeprog.geometry.cells import voxels as voxels_of
-from shapeprog.inference import editing
-from shapeprog.inference.blocks import to_program
 from shapeprog.inference.budget import Deadline
-from shapeprog.inference.chance_kernels import start
-from shapeprog.inference.descent_kernels import moves, statements, valid
-from shapeprog.inference.drawing import draw_all
-from shapeprog.inference.families import families
-from shapeprog.inference.structure import MOST_COPIES, PLANES, Settings, search_structure
+from shapeprog.inference.cells import editing
+from shapeprog.inference.cells.blocks import to_program
+from shapeprog.inference.cells.chance_kernels import start
+from shapeprog.inference.cells.descent_kernels import moves, statements, valid
+from shapeprog.inference.cells.drawing import draw_all
+from shapeprog.inference.cells.families import families
+from shapeprog.inference.cells.structure import MOST_COPIES, PLANES, Settings, search_structure
 from shapeprog.language.parser import parse
 from shapeprog.language.unroll import unroll
 

@@ -10,8 +10,8 @@ from declared import LANGUAGE, without_the_paper
 from test_inference_assembly import apart
 
 from shapeprog.inference.assembly import assemble
-from shapeprog.inference.candidates import alike, as_unhinted, drawings, is_unhinted, plain, solid_boxes
-from shapeprog.inference.stretching import OFF, stretched
+from shapeprog.inference.candidates.candidates import alike, as_unhinted, drawings, is_unhinted, plain, solid_boxes
+from shapeprog.inference.candidates.stretching import OFF, stretched
 from shapeprog.language.hints import Box
 from shapeprog.language.program import Draw, Loop
 from shapeprog.language.statement import language, using

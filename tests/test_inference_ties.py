@@ -16,8 +16,8 @@ import shapeprog as sp
 from shapeprog.cli.app import app
 from shapeprog.evaluation.editing import edit_scores
 from shapeprog.geometry.mesh import pieces, union_mesh
-from shapeprog.inference.evidence import evidence_of_program
-from shapeprog.inference.joints import Joints
+from shapeprog.inference.fit.joints import Joints
+from shapeprog.inference.surface.evidence import evidence_of_program
 from shapeprog.inference.ties.anchored import Anchored
 from shapeprog.inference.ties.anchors import AnchorSettings, anchors_of
 from shapeprog.inference.ties.closeness import Closeness

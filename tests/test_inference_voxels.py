@@ -14,11 +14,11 @@ from shapeprog.formats.parts import solid
 from shapeprog.geometry.cells import rasterise, unpack
 from shapeprog.inference import Schedule, Settings
 from shapeprog.inference.assembly import assemble
-from shapeprog.inference.cell_coverage import choose_on_cells, cost_on_cells, covers_of_cells
-from shapeprog.inference.coverage import Prices
-from shapeprog.inference.evidence import evidence_of
-from shapeprog.inference.residuals import Target
-from shapeprog.inference.tunable import Tunable
+from shapeprog.inference.choice.cell_coverage import choose_on_cells, cost_on_cells, covers_of_cells
+from shapeprog.inference.choice.coverage import Prices
+from shapeprog.inference.fit.residuals import Target
+from shapeprog.inference.fit.tunable import Tunable
+from shapeprog.inference.surface.evidence import evidence_of
 from shapeprog.language import Program
 from shapeprog.language.parser import parse
 from shapeprog.language.printer import numbers_written

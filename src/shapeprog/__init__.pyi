@@ -10,8 +10,8 @@ from .formats.plugins import load_statements
 from .geometry.losses import chamfer, coverage
 from .geometry.scene import Scene
 from .geometry.surface import sample
+from .inference.cells.refine import refine
 from .inference.infer import infer
-from .inference.refine import refine
 from .language.ast import Source
 from .language.dimensions import in_unit
 from .language.evaluate import evaluated

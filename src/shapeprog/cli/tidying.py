@@ -34,8 +34,8 @@ def tidy_command(
     The remaining numbers get names; changing one moves every part that depends on it.
     """
     from shapeprog.formats import save
-    from shapeprog.inference.evidence import evidence_of_program
     from shapeprog.inference.readable import in_readable_unit
+    from shapeprog.inference.surface.evidence import evidence_of_program
     from shapeprog.inference.ties.tying import tie
     from shapeprog.language.ast import Function
     from shapeprog.language.free import numbers

@@ -1,7 +1,7 @@
-from .greedy import greedy_boxes
+from .cells.greedy import greedy_boxes
+from .cells.refine import Schedule, refine
+from .cells.snapping import snap, snapped_from
+from .cells.structure import Settings
 from .infer import Result, infer
-from .refine import Schedule, refine
-from .snapping import snap, snapped_from
-from .structure import Settings
 
 __all__ = ["Result", "Schedule", "Settings", "greedy_boxes", "infer", "refine", "snap", "snapped_from"]

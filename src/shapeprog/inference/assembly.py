@@ -15,21 +15,38 @@ import numpy as np
 import numpy.typing as npt
 
 from shapeprog.data.shape import Shape
-from shapeprog.inference.adjustment import adjust, tidy
 from shapeprog.inference.budget import NEVER, Deadline, Progress
-from shapeprog.inference.calls import Called, Part, drawn, moved, named, placed, program_of, regrouped, relations
-from shapeprog.inference.candidates import as_unhinted, at_the_far_side, distinct, looks, plain, single_candidates
-from shapeprog.inference.cell_coverage import choose_on_cells, cost_on_cells, covers_of_cells
-from shapeprog.inference.choice import Choice, choose, explained, missed, value
-from shapeprog.inference.connecting import connected
-from shapeprog.inference.coverage import Covers, Prices, covers
-from shapeprog.inference.evidence import Evidence, evidence_of
-from shapeprog.inference.images import images
-from shapeprog.inference.neighbours import neighbours
-from shapeprog.inference.pieces import find_pieces
-from shapeprog.inference.recognition import proposed
-from shapeprog.inference.repeating import repeated
-from shapeprog.inference.roles import in_order
+from shapeprog.inference.candidates.calls import (
+    Called,
+    Part,
+    drawn,
+    moved,
+    named,
+    placed,
+    program_of,
+    regrouped,
+    relations,
+)
+from shapeprog.inference.candidates.candidates import (
+    as_unhinted,
+    at_the_far_side,
+    distinct,
+    looks,
+    plain,
+    single_candidates,
+)
+from shapeprog.inference.candidates.images import images
+from shapeprog.inference.candidates.neighbours import neighbours
+from shapeprog.inference.candidates.recognition import proposed
+from shapeprog.inference.candidates.repeating import repeated
+from shapeprog.inference.choice.cell_coverage import choose_on_cells, cost_on_cells, covers_of_cells
+from shapeprog.inference.choice.choice import Choice, choose, explained, missed, value
+from shapeprog.inference.choice.connecting import connected
+from shapeprog.inference.choice.coverage import Covers, Prices, covers
+from shapeprog.inference.fit.adjustment import adjust, tidy
+from shapeprog.inference.pieces.pieces import find_pieces
+from shapeprog.inference.roles.roles import in_order
+from shapeprog.inference.surface.evidence import Evidence, evidence_of
 from shapeprog.language.free import numbers_outside
 from shapeprog.language.program import Node, Program
 from shapeprog.library.matching import Pattern

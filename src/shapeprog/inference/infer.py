@@ -25,15 +25,15 @@ from shapeprog.geometry.arrays import one_tensor_thread
 from shapeprog.geometry.cells import iou, pack
 from shapeprog.geometry.distance import nearest_primitive
 from shapeprog.inference.assembly import TradeOff, assemble
-from shapeprog.inference.blocks import to_program
 from shapeprog.inference.budget import BUDGET, Deadline, Progress
-from shapeprog.inference.calls import recognised
-from shapeprog.inference.cell_coverage import cost_on_cells
+from shapeprog.inference.candidates.calls import recognised
+from shapeprog.inference.cells.blocks import to_program
+from shapeprog.inference.cells.refine import REACH, Schedule, refine
+from shapeprog.inference.cells.structure import Settings, search_structure
+from shapeprog.inference.choice.cell_coverage import cost_on_cells
 from shapeprog.inference.readable import CELLS, in_readable_unit, unit_of_result
-from shapeprog.inference.refine import REACH, Schedule, refine
-from shapeprog.inference.roles import named_anew
-from shapeprog.inference.structure import Settings, search_structure
-from shapeprog.inference.surface import points_of_cells
+from shapeprog.inference.roles.roles import named_anew
+from shapeprog.inference.surface.cells import points_of_cells
 from shapeprog.inference.ties.tying import tie
 from shapeprog.language.convert import placed_if_possible
 from shapeprog.language.free import numbers

@@ -15,8 +15,8 @@ from torch import Tensor
 
 from shapeprog.data.shape import Shape
 from shapeprog.errors import ShapeProgError
-from shapeprog.inference.connecting import afloat
-from shapeprog.inference.tunable import bounds
+from shapeprog.inference.choice.connecting import afloat
+from shapeprog.inference.fit.tunable import bounds
 from shapeprog.language.dimensions import in_unit, literal_lengths
 from shapeprog.language.parameters import to_float32
 from shapeprog.language.program import Program

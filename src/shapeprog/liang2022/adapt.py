@@ -32,7 +32,7 @@ from torch import Tensor, nn
 from shapeprog.data.packs import read_pack
 from shapeprog.errors import ShapeProgError
 from shapeprog.geometry.surface import has_surface
-from shapeprog.inference.surface import points_of_cells
+from shapeprog.inference.surface.cells import points_of_cells
 from shapeprog.language import Code, Draw, Program, encode, unroll
 from shapeprog.language.statement import EMPTY
 from shapeprog.liang2022.decode import Decoded, decode

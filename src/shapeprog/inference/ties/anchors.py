@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from shapeprog.inference.joints import Joints, depths, moved
+from shapeprog.inference.fit.joints import Joints, depths, moved
 from shapeprog.inference.ties.layout import ALIGNED, CENTRED, HIGH, LOW, MIDDLE, Anchors, Element
 from shapeprog.inference.ties.model import Model
 from shapeprog.language.placement import AXES

@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 from shapeprog.geometry.distance import signed_distance
 from shapeprog.geometry.scene import Scene
 from shapeprog.geometry.surface import sample_surface
-from shapeprog.inference.evidence import Evidence
+from shapeprog.inference.surface.evidence import Evidence
 
 POINTS, SAMPLES = 4_000, 4_000
 """Points of the target, and samples of the surface of the program."""

@@ -8,12 +8,12 @@ import numpy as np
 import torch
 
 from shapeprog.geometry.scene import Scene
-from shapeprog.inference.adjustment import EXPLAINED, of_target
-from shapeprog.inference.evidence import Evidence
-from shapeprog.inference.joints import Joints, moved, needs
-from shapeprog.inference.residuals import Target
+from shapeprog.inference.fit.adjustment import EXPLAINED, of_target
+from shapeprog.inference.fit.joints import Joints, moved, needs
+from shapeprog.inference.fit.residuals import Target
+from shapeprog.inference.fit.tunable import Poses, Tunable, bounds
+from shapeprog.inference.surface.evidence import Evidence
 from shapeprog.inference.ties.anchored import Anchored
-from shapeprog.inference.tunable import Poses, Tunable, bounds
 from shapeprog.language.evaluate import expanded, symbolic
 from shapeprog.language.expression import Linear
 from shapeprog.language.program import Program

@@ -16,9 +16,10 @@ import torch
 from shapeprog.errors import ShapeProgError
 from shapeprog.geometry.arrays import one_tensor_thread
 from shapeprog.inference.budget import Progress
-from shapeprog.inference.connecting import afloat
-from shapeprog.inference.evidence import Evidence
-from shapeprog.inference.joints import Joints, find_joints
+from shapeprog.inference.choice.connecting import afloat
+from shapeprog.inference.fit.joints import Joints, find_joints
+from shapeprog.inference.fit.tunable import THINNEST
+from shapeprog.inference.surface.evidence import Evidence
 from shapeprog.inference.ties.anchored import Anchored
 from shapeprog.inference.ties.anchors import AnchorSettings, anchors_of
 from shapeprog.inference.ties.closeness import Closeness
@@ -29,7 +30,6 @@ from shapeprog.inference.ties.model import Misfit, Model
 from shapeprog.inference.ties.pricing import worthwhile
 from shapeprog.inference.ties.relations import Relation, Trust, relations
 from shapeprog.inference.ties.text import written
-from shapeprog.inference.tunable import THINNEST
 from shapeprog.language.ast import Part
 from shapeprog.language.convert import placed
 from shapeprog.language.evaluate import evaluated

@@ -1,0 +1,263 @@
+"""Calls of functions among the blocks of a program: what each draws competes as one, at the price of one line.
+
+What a function draws is linear in its measures once its counts are known, so the numbers of its blocks move together as
+these relations ask for, and the call that is nearest to moved blocks follows by least squares.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from scipy.linalg import block_diag
+
+from shapeprog.errors import ShapeProgError
+from shapeprog.inference.fit.tunable import CELLS, Tunable, least
+from shapeprog.inference.roles.roles import with_roles
+from shapeprog.language.ast import Call, Source
+from shapeprog.language.evaluate import expanded
+from shapeprog.language.expression import Expression, Value
+from shapeprog.language.parameters import to_float32
+from shapeprog.language.program import Draw, Loop, Node, Program, nest
+from shapeprog.language.statement import language
+from shapeprog.library.blocks import Block, forms_of
+from shapeprog.library.matching import EXACT, Form, Pattern
+from shapeprog.library.rewriting import offers, within
+from shapeprog.library.store import Library
+from shapeprog.space import FloatArray
+
+FOLLOWS = 1e-6
+"""Factor of a relation below which it is none: the relation follows from others."""
+
+
+@dataclass(frozen=True)
+class Called:
+    """A call of a function, with a number for each of its parameters, and the loops around it, without bodies."""
+
+    pattern: Pattern
+    numbers: tuple[float, ...]
+    around: tuple[Loop, ...] = ()
+
+    @staticmethod
+    def of(pattern: Pattern, numbers: Mapping[str, float], around: tuple[Loop, ...] = ()) -> Called | None:
+        """The call with these numbers, tidy, and with defaults where they are near; none if it draws nothing."""
+        tidy = [round(numbers[name], CELLS) + 0.0 for name in pattern.parameters]
+        for place, (_, default) in enumerate(pattern.function.parameters):
+            if isinstance(default, float) and abs(tidy[place] - default) <= EXACT:
+                tidy[place] = default
+        found = Called(pattern, tuple(map(to_float32, tidy)), around)
+        try:
+            return found if found.forms and all(map(_solid, found.program.walk())) else None
+        except ShapeProgError:  # a number that does not fit its place
+            return None
+
+    @cached_property
+    def program(self) -> Program:
+        """The program that is this call alone."""
+        pairs = zip(self.pattern.function.parameters, self.numbers, strict=True)
+        call = Call(
+            self.pattern.function.name, tuple((name, value) for (name, usual), value in pairs if value != usual)
+        )
+        loops = [Loop(loop.name, loop.values, ()) for loop in self.around]
+        source = Source((*self.pattern.others, self.pattern.function, within(loops, call)))
+        return Program(expanded(source), source)
+
+    @cached_property
+    def nodes(self) -> tuple[Node, ...]:
+        """What it draws, one block each."""
+        return self.program.flat().body
+
+    @cached_property
+    def forms(self) -> tuple[Form, ...]:
+        """The blocks within its loops as they follow from its measures."""
+        return self.pattern.forms_at(self._table)
+
+    @property
+    def _table(self) -> dict[str, float]:
+        return dict(zip(self.pattern.parameters, self.numbers, strict=True))
+
+    @property
+    def _linear(self) -> tuple[FloatArray, FloatArray]:
+        """Factors (M, P) and constants (M,) by which the numbers of its forms follow from its measures."""
+        factors, constants = zip(*((form.factors, form.constants) for form in self.forms), strict=True)
+        return np.concatenate(factors), np.concatenate(constants)
+
+    def moved(self, nodes: Sequence[Node]) -> Called:
+        """The call that draws what is nearest to its blocks as they are now; itself if there is none."""
+        factors, constants = self._linear
+        values = np.concatenate([each.values for each in self._blocks(nodes)])
+        here = np.array([self._table[name] for name in self.pattern.measures])
+        found = here + np.linalg.pinv(factors) @ (values - constants - factors @ here)
+        chains = Program(tuple(nodes)).chains
+        loops = [
+            replace(
+                loop, values=tuple(to_float32(value) for value in np.mean([chain[k].values for chain in chains], 0))
+            )
+            for k, loop in enumerate(self.around)
+        ]
+        table = self._table | dict(zip(self.pattern.measures, found.tolist(), strict=True))
+        return Called.of(self.pattern, table, tuple(loops)) or self
+
+    def relations(self, nodes: Sequence[Node]) -> FloatArray:
+        """What holds between the numbers (V,) of its blocks, written one after another, as rows (R, V) of factors.
+
+        Where a function has numbers of its own, their ratios hold.
+        """
+        factors, constants = self._linear
+        across = np.linalg.svd(factors)[0].T[np.linalg.matrix_rank(factors) :]
+        blocks = self._blocks(nodes)
+        unequal = across @ (constants - np.concatenate([each.rows[:, -1] for each in blocks]))
+        if np.abs(unequal).max(initial=0) > EXACT:
+            across = np.linalg.svd(unequal[:, None])[0].T[1:] @ across
+        outer = sum(len(loop.values) for loop in self.around)
+        inner = block_diag(*(np.pad(each.rows[:, :-1], ((0, 0), (outer, 0))) for each in blocks))
+        ends = np.cumsum([0, *(outer + each.rows.shape[1] - 1 for each in blocks)])
+        every = np.eye(ends[-1])
+        alike = [every[start : start + outer] - every[:outer] for start in ends[1:-1]]
+        return np.concatenate([across @ inner, *alike])
+
+    def _blocks(self, nodes: Sequence[Node]) -> list[Block]:
+        """The blocks within its loops in the form that its function has them in."""
+        chains = [chain[len(self.around) :] for chain in Program(tuple(nodes)).chains]
+        return [
+            next(each for each in forms_of(chain) if replace(each.kind, word=form.block.kind.word) == form.block.kind)
+            for chain, form in zip(chains, self.forms, strict=True)
+        ]
+
+
+def _solid(node: Node) -> bool:
+    """Whether no part is thinner than parts may be."""
+    quantities = language()[node.name].quantities
+    return all(value >= least(quantity) for value, quantity in zip(node.values, quantities, strict=True))
+
+
+Part = Node | Called
+"""What is chosen from: blocks, and calls of functions that draw several."""
+
+
+class Placed(NamedTuple):
+    """A call, and the places of its blocks among those of a program."""
+
+    call: Called
+    places: Sequence[int]
+
+
+def program_of(part: Part) -> Program:
+    """The program that is a part alone."""
+    return part.program if isinstance(part, Called) else Program((part,))
+
+
+def drawn(parts: Sequence[Part]) -> Program:
+    """The plain program of some parts, whose nodes are one block each."""
+    return Program(tuple(node for part in parts for node in _nodes(part)))
+
+
+def _nodes(part: Part) -> tuple[Node, ...]:
+    return part.nodes if isinstance(part, Called) else (part,)
+
+
+def placed(parts: Sequence[Part]) -> list[Placed]:
+    """The calls among some parts, and where their blocks are in the program of all."""
+    starts = np.cumsum([0, *(len(_nodes(part)) for part in parts)]).tolist()
+    ranges = itertools.pairwise(starts)
+    return [Placed(part, range(*ends)) for part, ends in zip(parts, ranges, strict=True) if isinstance(part, Called)]
+
+
+def recognised(program: Program, libraries: Sequence[Library]) -> list[Placed]:
+    """The calls that a program of single blocks can be written with, see :func:`shapeprog.library.with_library`."""
+    found: list[Placed] = []
+    for library in libraries:
+        patterns = {pattern.function.name: pattern for pattern in library.patterns}
+        for offer in offers(program, library):
+            pattern = patterns[offer.call.name]
+            usual = {name: value for name, value in pattern.function.parameters if isinstance(value, float)}
+            loops = tuple(Loop(loop.name, _plain(loop.values), ()) for loop in offer.around)
+            words, measures = zip(*offer.call.arguments, strict=True) if offer.call.arguments else ((), ())
+            call = Called.of(pattern, usual | dict(zip(words, _plain(measures), strict=True)), loops)
+            if call and not any({*offer.lines} & {*each.places} for each in found):
+                found.append(Placed(call, offer.lines))
+    return found
+
+
+def _plain(values: Sequence[Value]) -> tuple[float, ...]:
+    """The numbers that stand in a program without names."""
+    return tuple(value for value in values if not isinstance(value, Expression))
+
+
+def relations(program: Program, calls: Sequence[Placed]) -> FloatArray:
+    """What holds between the numbers that move of a program with calls, as independent rows (R, F) of factors."""
+    tunable = Tunable(program)
+    if not calls:
+        return np.zeros((0, len(tunable.moving)))
+    starts = np.cumsum([0, *(len(node.values) for node in tunable.nodes)])
+    widths = [sum(len(node.values) for node in chain) for chain in program.chains]
+    firsts = np.cumsum([0, *widths])
+    rows: list[FloatArray] = []
+    for call, places in calls:
+        own = call.relations([program.body[place] for place in places])
+        rows.append(np.zeros((len(own), starts[-1])))
+        rows[-1][:, np.concatenate([firsts[place] + np.arange(widths[place]) for place in places])] = own
+    return _reduced(np.concatenate(rows)[:, [starts[n] + slot for n, slot in tunable.moving]])
+
+
+def _reduced(rows: FloatArray) -> FloatArray:
+    """Independent rows that ask for the same, as few numbers in each as elimination gives (Gauss and Jordan)."""
+    rows, count = rows.copy(), 0
+    for column in range(rows.shape[1]):
+        if count < len(rows) and np.abs(rows[count:, column]).max() > FOLLOWS:
+            pivot = count + int(np.abs(rows[count:, column]).argmax())
+            rows[[count, pivot]] = rows[[pivot, count]]
+            rows[count] /= rows[count, column]
+            others = np.arange(len(rows)) != count
+            rows[others] -= np.outer(rows[others, column], rows[count])
+            rows[np.abs(rows) < FOLLOWS] = 0
+            count += 1
+    return rows[:count]
+
+
+def moved(parts: Sequence[Part], program: Program) -> list[Part]:
+    """The same parts where their blocks, in the same order, have other numbers."""
+    nodes = iter(program.body)
+    return [
+        part.moved([next(nodes) for _ in part.nodes]) if isinstance(part, Called) else next(nodes) for part in parts
+    ]
+
+
+def regrouped(parts: Sequence[Part], program: Program) -> list[Part]:
+    """The parts of a program in which single blocks were changed or left out, and calls are as they were."""
+    waiting = [part for part in parts if isinstance(part, Called)]
+    found: list[Part] = []
+    place = 0
+    while place < len(program.body):
+        following = program.body[place : place + len(waiting[0].nodes)] if waiting else ()
+        if waiting and following == waiting[0].nodes:
+            found.append(waiting.pop(0))
+            place += len(following)
+        else:
+            found.append(program.body[place])
+            place += 1
+    return found
+
+
+def named(parts: Sequence[Part], program: Program) -> Program:
+    """The program of some parts with roles; all that a function leaves open has the commonest one in each call."""
+    chains, roles = program.chains, with_roles(program)
+    nodes = list(roles.body)
+    first = 0
+    for part in parts:
+        blocks = range(first, first + len(_nodes(part)))
+        first = blocks.stop
+        if isinstance(part, Called):
+            free = [k for k, form in zip(blocks, part.forms, strict=True) if not form.block.kind.word]
+            words = Counter(roles.chains[k][-1].word for k in free)  # type: ignore[union-attr]
+            for k in free:
+                *loops, draw = chains[k]
+                assert isinstance(draw, Draw)
+                role = words.most_common(1)[0][0]
+                nodes[k] = nest((*loops, replace(draw, role="" if role == draw.name else role)))
+    return Program(tuple(nodes))

@@ -1,0 +1,197 @@
+"""Neighbours of a program: blocks a little different from its own, among which the next choice may find better ones.
+
+What was chosen first was found piece by piece.  Only when all of it is known can a block end where the next begins, two
+halves of a board become one, a mirror image be missed, or a run be one copy too short.  All of it works on boxes around
+what is drawn and on loops; how a box is drawn is for the hints of the statements to say.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+import torch
+
+from shapeprog.inference.candidates.candidates import alike, drawings, redrawn, solid_boxes
+from shapeprog.inference.candidates.repeating import mirrors, repeated
+from shapeprog.language.hints import STRAIGHT, Box
+from shapeprog.language.program import Chain, Draw, Loop, Node, Program, nest
+from shapeprog.language.statement import language
+from shapeprog.language.tensors import encode
+from shapeprog.language.unroll import unroll
+from shapeprog.space import DEPTH, SIDE, FloatArray
+
+REACH = 4.0
+"""Cells by which a face moves at most to meet another part."""
+
+INTO = 0.05
+"""How far in cells a part that is extended to another reaches into it."""
+
+SHORTEST = 0.2
+"""Least length in cells that is left of a part."""
+
+WITHIN = 0.8
+"""Share of a face, along each side, within which lines across it are followed."""
+
+GAP = 1.5
+"""Cells between two parts up to which they may be one."""
+
+OFF_LEAST, OFF_MOST = 0.02, 2.5
+"""Cells by which the middle of a part is off that of the shape when it may be meant to be there."""
+
+CORNERS = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
+
+
+def neighbours(program: Program) -> list[Node]:
+    """Blocks close to those of a program, whose nodes are one block each; each once, none of them its own."""
+    chains = program.chains
+    if not chains:
+        return []
+    drawn = [drawing_of(chain) for chain in chains]
+    boxes = [each[0] if len(each) == 1 else None for each in solid_boxes(drawn)]
+    others = solid_boxes(program.body)
+    found: list[Node] = [*repeated([*drawn, *program.body])]
+    for place, (chain, box) in enumerate(zip(chains, boxes, strict=True)):
+        found += _unlooped(chain)
+        found += _mirrored(chain)
+        if box is not None:
+            parts = [part for other, each in enumerate(others) if other != place for part in each]
+            found += [with_drawing(chain, other) for other in drawings(box)]
+            edited = list(met(box, parts))
+            edited += [middle for each in [box, *edited] for middle in centred(each)]
+            found += [with_drawing(chain, other) for each in edited for other in alike(drawing_of(chain), each)]
+            found += _recounted(chain, box)
+            found += _filled(chain)
+    for (one, first), (two, second) in itertools.combinations(zip(chains, boxes, strict=True), 2):
+        if first is not None and second is not None and _loops(one) == _loops(two):
+            found += [with_drawing(one, other) for merged in _merged(first, second) for other in drawings(merged)]
+    known = set(program.body)
+    return [node for node in dict.fromkeys(found) if node not in known]
+
+
+def drawing_of(chain: Chain) -> Draw:
+    """What a block draws in its loops."""
+    drawn = chain[-1]
+    assert isinstance(drawn, Draw)
+    return drawn
+
+
+def with_drawing(chain: Chain, drawn: Draw) -> Node:
+    """A block with another drawing in its loops."""
+    return nest((*chain[:-1], drawn))
+
+
+def _loops(chain: Chain) -> tuple[tuple[str, int], ...]:
+    return tuple((node.name, node.count) for node in chain[:-1] if isinstance(node, Loop))
+
+
+def _unlooped(chain: Chain) -> Iterator[Node]:
+    """A block without one of its loops."""
+    for place in range(len(chain) - 1):
+        yield nest((*chain[:place], *chain[place + 1 :]))
+
+
+def _mirrored(chain: Chain) -> Iterator[Node]:
+    """A block and its mirror image about the middle of the shape; and the same for what its first loop repeats."""
+    for axis in (SIDE, DEPTH):
+        if not any(mirrors(node, axis) for node in chain):
+            mirror = Loop("mirror", (2.0, float(axis), 0.0), ())
+            yield nest((mirror, *chain))
+            if len(chain) > 1:
+                yield nest((mirror, *chain[1:]))
+
+
+def _recounted(chain: Chain, box: Box) -> Iterator[Node]:
+    """A run with one copy more or one less, at its end or at its beginning."""
+    for place, loop in enumerate(chain[:-1]):
+        if not (isinstance(loop, Loop) and language()[loop.name].quantities[0].written_out):
+            continue
+        first, second = _places(nest((Loop(loop.name, (2.0, *loop.values[1:]), ()), chain[-1])))[:2]
+        for more in (-1, 1):
+            if loop.count + more < 2:
+                continue
+            other = (*chain[:place], Loop(loop.name, (loop.count + float(more), *loop.values[1:]), ()))
+            rest = chain[place + 1 :]
+            yield nest((*other, *rest))
+            moved = box._replace(centre=box.centre - more * (second - first))
+            for drawn in redrawn(drawing_of(chain), moved):
+                yield nest((*other, *rest[:-1], drawn))
+
+
+def _places(node: Node) -> FloatArray:
+    found: FloatArray = unroll(encode(Program((node,)), dtype=torch.float64)).centre.numpy()
+    return found
+
+
+def _filled(chain: Chain) -> Iterator[Node]:
+    """A board in the place of a run."""
+    for place in range(len(chain) - 1):
+        (parts,) = solid_boxes([nest(chain[place:])])
+        around = _around(parts[0], parts)
+        for drawn in drawings(around):
+            yield nest((*chain[:place], drawn))
+
+
+def _merged(one: Box, two: Box) -> Iterator[Box]:
+    """The box around two that nearly touch, in the directions of the larger."""
+    if one.half.prod() < two.half.prod():
+        one, two = two, one
+    inner = np.abs((two.centre - one.centre) @ one.rotation)
+    reach = np.abs(one.rotation.T @ two.rotation) @ two.half
+    if (inner <= one.half + reach + GAP).all():
+        yield _around(one, [one, two])
+
+
+def _around(frame: Box, parts: Sequence[Box]) -> Box:
+    """The smallest box in the directions of one that holds several."""
+    corners = np.concatenate([part.centre + (CORNERS * part.half) @ part.rotation.T for part in parts])
+    local = corners @ frame.rotation
+    low, high = local.min(0), local.max(0)
+    return Box(frame.rotation @ ((low + high) / 2), frame.rotation, (high - low) / 2)
+
+
+def met(box: Box, parts: Sequence[Box], within: Sequence[float] = (WITHIN,), *, longer: bool = False) -> Iterator[Box]:
+    """A box with one face moved to where a line across the face, at its middle or near a corner, enters a part.
+
+    ``within`` says how near a corner, as shares of the face; ``longer`` that the face moves outwards only.
+    """
+    for axis in range(3):
+        corners = CORNERS * box.half * (np.arange(3) != axis)
+        starts = (
+            box.centre + np.concatenate([np.zeros((1, 3)), *(share * corners for share in within)]) @ box.rotation.T
+        )
+        least = box.half[axis] if longer else -np.inf
+        for sign in (-1.0, 1.0):
+            along = sign * box.rotation[:, axis]
+            ends = {end for part in parts for end in _crossed(starts, along, part) if end > least}
+            for end in sorted(ends, key=lambda end: abs(end - box.half[axis]))[:4]:
+                length = (box.half[axis] + end) / 2
+                if abs(end - box.half[axis]) <= REACH and length >= SHORTEST / 2:
+                    half = box.half.copy()
+                    half[axis] = length
+                    yield Box(box.centre + (end - box.half[axis]) / 2 * along, box.rotation, half)
+
+
+def centred(box: Box) -> Iterator[Box]:
+    """A box that is a little off the middle plane of the shape, left to right or in depth: as far on both sides as it
+    is on one of them."""
+    for axis in (SIDE, DEPTH):
+        along = int(np.abs(box.rotation[axis]).argmax())
+        off = abs(float(box.centre[axis]))
+        if np.abs(box.rotation[axis, along]) >= STRAIGHT and OFF_LEAST < off < min(OFF_MOST, box.half[along] / 2):
+            for more in (-off, off):
+                centre, half = box.centre.copy(), box.half.copy()
+                centre[axis] = 0
+                half[along] += more
+                yield Box(centre, box.rotation, half)
+
+
+def _crossed(starts: FloatArray, along: FloatArray, part: Box) -> set[float]:
+    """How far along lines (L, 3) of one direction these enter a box, and a little deeper for a joint."""
+    at, step = (starts - part.centre) @ part.rotation, along @ part.rotation
+    step = np.where(np.abs(step) < 1e-9, 1e-9, step)
+    one, two = (-part.half - at) / step, (part.half - at) / step
+    enters, leaves = np.minimum(one, two).max(1), np.maximum(one, two).min(1)
+    through = enters < leaves
+    return set(np.minimum(enters + INTO, leaves)[through].round(2).tolist())

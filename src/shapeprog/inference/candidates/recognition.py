@@ -1,0 +1,207 @@
+"""Recognition: where blocks that were found on their own may be what one call of a function draws.
+
+What a function draws is linear in its measures once its counts are known.  So some blocks of the right kinds give them
+by least squares, and the residual tells whether these belong together; a block that nobody found follows from the rest.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from shapeprog.inference.budget import NEVER, Deadline
+from shapeprog.inference.candidates.calls import Called
+from shapeprog.inference.candidates.candidates import looks_of, solid_boxes
+from shapeprog.inference.candidates.neighbours import CORNERS
+from shapeprog.inference.candidates.repeating import rows_and_pairs
+from shapeprog.inference.fit.tunable import CELLS
+from shapeprog.language.hints import Box
+from shapeprog.language.parameters import to_float32
+from shapeprog.language.program import Chain, Draw, Node, Program
+from shapeprog.language.statement import language
+from shapeprog.library.blocks import Kind, forms_of
+from shapeprog.library.matching import Form, Pattern
+from shapeprog.space import FloatArray
+
+LOOSE = 0.6
+"""How far in cells a block that was found may be from where a function draws it."""
+
+MISSED = 0.3
+"""What a block that nobody found counts, in cells of such a distance."""
+
+FOLLOWED = 128
+"""Most ways to take blocks for some of a function that are followed up."""
+
+ALIKE = 400
+"""Most blocks of one kind that are looked at, the first of those found."""
+
+OFFERED, GUESSED = 48, 96
+"""Most calls of one function that compete: those all of whose blocks were found, and others."""
+
+GUESSES = 2.0 * np.array([k for k in range(-12, 13) if k])
+"""Where a number that found blocks say nothing about may be, in cells from what is usual."""
+
+HIDDEN = 0.1
+"""How far in cells a part may stand out of another part and still be hidden in it."""
+
+SAME = 0.05
+"""Difference of arguments in cells below which two calls are the same."""
+
+
+def proposed(patterns: Sequence[Pattern], nodes: Sequence[Node], deadline: Deadline = NEVER) -> list[Called]:
+    """Calls of functions that draw about what some blocks draw, the nearest of each function first."""
+    if not patterns or not nodes:
+        return []
+    pool = _Pool(nodes, patterns)
+    found = [call for pattern in patterns for call in _calls(pattern, pool, deadline)]
+    boxes = iter(solid_boxes([node for call in found for node in call.nodes]) if found else ())
+    drawn = [[box for _ in call.nodes for box in next(boxes)] for call in found]
+    return [call for call, parts in zip(found, drawn, strict=True) if not _hides(parts)]
+
+
+def _hides(parts: Sequence[Box]) -> bool:
+    """Whether one of the parts of a call lies inside another: nobody would say a solid block as a drawer in a case."""
+    corners = [part.centre + (CORNERS * part.half) @ part.rotation.T for part in parts]
+    return any(
+        bool((np.abs((corner - around.centre) @ around.rotation) <= around.half + HIDDEN).all())
+        for place, corner in enumerate(corners)
+        for other, around in enumerate(parts)
+        if place != other
+    )
+
+
+class _Pool:
+    """The numbers of blocks by their kind, whatever their role, and by their counts.
+
+    A function may draw a block by another statement than the one that wrote it best on its own, so those that it draws
+    by are tried on the boxes of all blocks.
+    """
+
+    def __init__(self, nodes: Sequence[Node], patterns: Sequence[Pattern]) -> None:
+        self._rows: dict[tuple[Kind, tuple[int, ...]], dict[bytes, FloatArray]] = {}
+        chains = Program(tuple(nodes)).chains
+        for chain in chains:
+            self._add(chain)
+        hints = {name: hint for name in _pointed(patterns) if (hint := language()[name].hint) is not None}
+        boxes = solid_boxes([chain[-1] for chain in chains]) if hints else []
+        for chain, own in zip(chains, boxes, strict=False):
+            for name, hint in hints.items():
+                if len(own) == 1 and name != chain[-1].name:
+                    for values in hint(own[0]):
+                        self._add((*chain[:-1], Draw(name, tuple(map(to_float32, values)))))
+        self.counts = {counts for _, counts in self._rows}
+
+    def _add(self, chain: Chain) -> None:
+        for block in forms_of(chain):
+            rows = self._rows.setdefault((replace(block.kind, word=""), block.counts), {})
+            if len(rows) < ALIKE:
+                rows.setdefault(np.round(block.values, CELLS).tobytes(), block.values)
+
+    def like(self, form: Form) -> FloatArray:
+        """The numbers (N, M) of those that are of the kind of a form."""
+        rows = self._rows.get((replace(form.block.kind, word=""), form.block.counts), {})
+        return np.array([*rows.values()]).reshape(len(rows), len(form.constants))
+
+
+def _pointed(patterns: Sequence[Pattern]) -> list[str]:
+    """The statements by which functions draw what is not told by the box around it."""
+    every = (form for pattern in patterns for form in pattern.forms_at(pattern.arguments))
+    return sorted({form.block.kind.shape for form in every if not form.block.kind.boxed})
+
+
+def _calls(pattern: Pattern, pool: _Pool, deadline: Deadline) -> list[Called]:
+    """The calls of one function that are nearest to blocks of a pool, and loops around them."""
+    found: list[tuple[float, dict[str, float]]] = []
+    for given in pattern.choices(pool.counts):
+        if deadline.passed("the search for calls of functions"):
+            break
+        usual = pattern.arguments | given
+        start = np.array([usual[name] for name in pattern.measures])
+        for wanted in pattern.forms(given):
+            offered = [pool.like(form) for form in wanted]
+            if pattern.counts and any(
+                form.block.counts and not len(each) for form, each in zip(wanted, offered, strict=True)
+            ):
+                continue  # only blocks that are found tell how often they are repeated
+            for cost, values in _nearest(wanted, offered, start):
+                found.append((cost, usual | dict(zip(pattern.measures, values, strict=True))))
+    found.sort(key=lambda each: each[0])
+    whole = _tidy(pattern, (numbers for cost, numbers in found if cost < MISSED), OFFERED)
+    guessed = _tidy(pattern, (numbers for cost, numbers in found if cost >= MISSED), GUESSED)
+    return [*whole, *_repeated(whole), *guessed]
+
+
+def _tidy(pattern: Pattern, found: Iterable[dict[str, float]], most: int) -> list[Called]:
+    """The first calls with these numbers, each once."""
+    calls: list[Called] = []
+    for numbers in found:
+        call = Called.of(pattern, numbers)
+        if call and not any(np.abs(np.subtract(call.numbers, each.numbers)).max() < SAME for each in calls):
+            calls.append(call)
+        if len(calls) == most:
+            break
+    return calls
+
+
+def _repeated(calls: Sequence[Called]) -> Iterator[Called]:
+    """Runs and mirror images of calls that draw the same."""
+    seen = looks_of([call.program for call in calls]) if len(calls) > 1 else None
+    for one, loop in rows_and_pairs(seen) if seen else ():
+        yield replace(calls[one], around=(loop,))
+
+
+class _Taken(NamedTuple):
+    """Blocks taken for some forms of a function, in S ways: their numbers (S, M), and what each way costs (S,)."""
+
+    forms: tuple[int, ...]
+    values: FloatArray
+    costs: FloatArray
+
+
+def _nearest(
+    wanted: Sequence[Form], offered: Sequence[FloatArray], start: FloatArray
+) -> Iterator[tuple[float, list[float]]]:
+    """What it costs to take some of the blocks offered for each form of a function, and the measures that they give.
+
+    What they leave open of the measures is as at the ``start``.
+    """
+    ways = [_Taken((), np.zeros((1, 0)), np.zeros(1))]
+    for k, blocks in enumerate(offered):
+        longer = [way._replace(costs=way.costs + MISSED) for way in ways]
+        for way in ways if len(blocks) else ():
+            forms = (*way.forms, k)
+            old, new = np.repeat(way.values, len(blocks), 0), np.tile(blocks, (len(way.values), 1))
+            values = np.hstack([old, new])
+            _, off = _solved([wanted[each] for each in forms], values, start)
+            kept = np.flatnonzero(off <= LOOSE)
+            longer.append(_Taken(forms, values[kept], np.round(off[kept] + MISSED * (k - len(way.forms)), CELLS)))
+        cheap = np.argsort(np.concatenate([way.costs for way in longer]), kind="stable")[:FOLLOWED]
+        ends = np.cumsum([0, *(len(way.costs) for way in longer)])
+        inside = [np.sort(cheap[(cheap >= low) & (cheap < high)]) - low for low, high in itertools.pairwise(ends)]
+        ways = [_Taken(way.forms, way.values[k], way.costs[k]) for way, k in zip(longer, inside, strict=True) if len(k)]
+    for way in ways:
+        if way.forms:
+            taken = [wanted[k] for k in way.forms]
+            found, _ = _solved(taken, way.values, start)
+            for cost, numbers in zip(way.costs.tolist(), found, strict=True):
+                yield from ((cost, guess.tolist()) for guess in (numbers, *(numbers + _unsaid(taken))))
+
+
+def _unsaid(forms: Sequence[Form]) -> FloatArray:
+    """Changes (G, P) of measures that forms say nothing about, if that leaves one number open."""
+    factors = np.concatenate([form.factors for form in forms])
+    rest = np.linalg.svd(factors)[2][np.linalg.matrix_rank(factors) :]
+    return np.outer(GUESSES, rest[0] / np.abs(rest[0]).max()) if len(rest) == 1 else np.zeros((0, factors.shape[1]))
+
+
+def _solved(forms: Sequence[Form], values: FloatArray, start: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """The measures (S, P) nearest to a start that make blocks of these numbers (S, M); how far off these are (S,)."""
+    factors = np.concatenate([form.factors for form in forms])
+    constants = np.concatenate([form.constants for form in forms])
+    away = values - constants - factors @ start
+    change = away @ np.linalg.pinv(factors).T
+    return start + change, np.abs(change @ factors.T - away).max(1, initial=0)

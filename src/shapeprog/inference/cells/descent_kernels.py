@@ -1,0 +1,211 @@
+"""Kernels that improve one block by local search on IoU minus price x statements, the other blocks fixed."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from shapeprog.inference.cells.block_layout import (
+    BACK,
+    BOX,
+    COUNT1,
+    COUNT2,
+    DISC,
+    EXTENT,
+    FIRST,
+    FORM,
+    LINE,
+    RADIUS,
+    ROTATE,
+    TILT,
+)
+from shapeprog.inference.cells.raster_kernels import draw_block
+from shapeprog.kernels.bits import ones
+from shapeprog.kernels.compile import helper, kernel
+from shapeprog.kernels.rows import REACH
+
+MOST_MOVES = 200
+"""At least the number of neighbours that any block has."""
+
+LOOP = COUNT2 - COUNT1
+"""Numbers of one translation loop."""
+
+LAYER = 16
+"""Words of 64 cells in one horizontal layer."""
+
+MOST_STEPS = 60
+"""Most steps of one descent."""
+
+MOST_COPIES = 64
+"""Most copies of one block."""
+
+GAIN = 1e-9
+"""Least rise of the objective that counts, above the noise of rounding."""
+
+
+@helper
+def statements(block):
+    """Statements of a block: itself and its loops; from Python also those of the columns of many."""
+    return 1 + (block[COUNT1] > 1) + (block[COUNT2] > 1) + (block[ROTATE] > 1)
+
+
+@helper
+def valid(block):
+    """Whether the lengths are positive and no two neighbouring copies of a loop are drawn over each other."""
+    form = int(block[FORM])
+    if block[COUNT1] < 1 or block[COUNT2] < 1 or block[COUNT1] * block[COUNT2] > MOST_COPIES:
+        return False
+    for level in range(COUNT1, ROTATE, LOOP):
+        if block[level] > 1:
+            apart = False
+            for axis in range(3):
+                if form in (BOX, BACK):
+                    extent = block[EXTENT + axis]
+                elif form == DISC:
+                    extent = block[EXTENT] if axis == 0 else 2 * block[RADIUS]
+                else:
+                    extent = 2.0
+                apart = apart or abs(block[level + 1 + axis]) >= extent
+            if not apart:
+                return False
+    if form in (BOX, BACK):
+        return block[EXTENT] >= 1 and block[EXTENT + 1] >= 1 and block[EXTENT + 2] >= 1
+    if form == LINE:
+        return block[TILT] >= 1
+    return block[EXTENT] >= 1 and block[RADIUS] >= 1
+
+
+@helper
+def layers(block):
+    """First layer of the grid that a block can touch, and the one after the last."""
+    start, end = block[FIRST], block[FIRST] + block[EXTENT]
+    if block[FORM] == LINE:
+        margin = REACH * block[TILT] + 2
+        start, end = min(block[FIRST], block[EXTENT]) - margin, max(block[FIRST], block[EXTENT]) + margin
+    for level in range(COUNT1, ROTATE, LOOP):
+        reach = (block[level] - 1) * block[level + 1]
+        start += min(reach, 0.0)
+        end += max(reach, 0.0)
+    return max(int(np.floor(start)) + 16, 0), min(int(np.ceil(end)) + 16, 32)
+
+
+@helper
+def put(out, n, block, slot, by, slot2, by2):
+    """Write the block with two of its numbers changed as neighbour n; returns the next n."""
+    for i in range(len(block)):
+        out[n, i] = block[i]
+    out[n, slot] += by
+    out[n, slot2] += by2
+    return n + 1
+
+
+@helper
+def put_loop(out, n, block, slot, by, shift, share):
+    """Write the block with one number of a loop changed and its first copy moved; returns the next n.
+
+    Along the axis of ``shift`` (or all three for -1) the copy moves back by ``share``.
+    """
+    n = put(out, n, block, slot, by, slot, 0.0)
+    for axis in range(3):
+        if shift < 0 or shift == axis:
+            back = share * block[slot + 1 + axis] if shift < 0 else share
+            out[n - 1, FIRST + axis] -= back
+            if block[FORM] == LINE:
+                out[n - 1, EXTENT + axis] -= back
+    return n
+
+
+@helper
+def moves(block, out, far):
+    """Neighbours of a block: faces, places, ends, spacings and counts moved by up to ``far``; their number."""
+    n = 0
+    form = int(block[FORM])
+    last = RADIUS if form == DISC else (TILT if form == LINE else TILT - 1)
+    for which in range(2 * far):
+        delta = (which // 2 + 1.0) * (1.0 if which % 2 else -1.0)
+        if form in (BOX, BACK):
+            for axis in range(3):
+                place, extent = FIRST + axis, EXTENT + axis
+                n = put(out, n, block, place, delta, place, 0.0)
+                n = put(out, n, block, extent, delta, extent, 0.0)
+                n = put(out, n, block, place, delta, extent, -delta)
+                if which < 2:
+                    n = put(out, n, block, place, -delta, extent, 2 * delta)
+            if form == BACK:
+                n = put(out, n, block, TILT, delta, TILT, 0.0)
+                n = put(out, n, block, TILT, delta, FIRST + 1, -delta)
+        else:
+            for slot in range(FIRST, last + 1):
+                n = put(out, n, block, slot, delta, slot, 0.0)
+            if form == LINE:
+                for axis in range(3):
+                    n = put(out, n, block, FIRST + axis, delta, EXTENT + axis, delta)
+            else:
+                n = put(out, n, block, FIRST, delta, EXTENT, -delta)
+        for level in range(COUNT1, ROTATE, LOOP):
+            if block[level] > 1:
+                for axis in range(3):
+                    step = level + 1 + axis
+                    if block[step] != 0 or which < 2:
+                        n = put(out, n, block, step, delta, step, 0.0)
+                        n = put_loop(out, n, block, step, delta, axis, delta)
+                        if block[level] > 2:
+                            n = put_loop(out, n, block, step, delta, axis, np.rint(delta * (block[level] - 1) / 2))
+                if which < 2:
+                    n = put(out, n, block, level, delta, level, 0.0)
+                    n = put_loop(out, n, block, level, delta, -1, delta)
+        if block[ROTATE] > 0 and which < 2:
+            n = put(out, n, block, ROTATE, delta, ROTATE, 0.0)
+    return n
+
+
+@kernel("f8(f8[::1], u8[::1], u8[::1], f8, i8, u4[:, ::1], u8[:, ::1], f8[:, ::1])")
+def descend(block, occupied, others, price, far, scratch_rows, scratch_words, around):
+    """Best-improvement descent of one block in its place; its objective.
+
+    Parameters
+    ----------
+    block
+        The block, which is moved.
+    occupied, others
+        The solid, and what the other blocks cover, as words (512).
+    price, far
+        IoU that one statement has to earn, and most cells that one move goes.
+    scratch_rows, scratch_words, around
+        Scratch: the same three times 1024 words of 32 cells as 512 of 64, and room for all neighbours (M, 20).
+    """
+    rows, words, gained, wasted = scratch_rows[0], scratch_words[0], scratch_words[1], scratch_words[2]
+    inter = 0
+    union = 0
+    for i in range(len(occupied)):
+        gained[i] = occupied[i] & ~others[i]
+        wasted[i] = ~occupied[i] & ~others[i]
+        inter += ones(occupied[i] & others[i])
+        union += ones(occupied[i] | others[i])
+    best = -np.inf
+    for slot in range(len(block)):
+        around[0, slot] = block[slot]
+    number = 1  # first the block alone, then with its neighbours
+    for step in range(MOST_STEPS + 1):
+        chosen = -1
+        for m in range(number):
+            if step > 0 and not valid(around[m]):
+                continue
+            first, last = layers(around[m])
+            for i in range(first * LAYER, last * LAYER):
+                words[i] = 0
+            draw_block(rows, around[m])
+            good = inter
+            bad = union
+            for i in range(first * LAYER, last * LAYER):
+                good += ones(words[i] & gained[i])
+                bad += ones(words[i] & wasted[i])
+            value = good / max(bad, 1) - price * statements(around[m])
+            if value > best + GAIN:
+                best = value
+                chosen = m
+        if chosen < 0:
+            break
+        for slot in range(len(block)):
+            block[slot] = around[chosen, slot]
+        number = moves(block, around, far)
+    return best

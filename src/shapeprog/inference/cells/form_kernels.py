@@ -1,0 +1,151 @@
+"""Kernels that guess what is no upright box: discs, sheared backs, oblique bars, stars and crosses."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from shapeprog.inference.cells.block_layout import (
+    BACK,
+    BOX,
+    COUNT1,
+    COUNT2,
+    CROSS,
+    DISC,
+    EXTENT,
+    FIRST,
+    FORM,
+    LINE,
+    RADIUS,
+    ROTATE,
+    TILT,
+)
+from shapeprog.inference.cells.chance_kernels import one_of
+from shapeprog.inference.cells.descent_kernels import valid
+from shapeprog.kernels.compile import helper, kernel
+
+
+@kernel("i8(i8, i8[:, ::1], f8[::1], f8[:, ::1])")
+def guess(form, cells, box, out):
+    """Rough blocks of a form, each from two random cells or from a proposed box; how many descent can start from.
+
+    Parameters
+    ----------
+    form
+        ``LINE``, ``BACK``, ``DISC``, ``CROSS``, or one more for a star of lines.
+    cells
+        Low corners (n, 3) of the cells to choose from.
+    box
+        The proposed box.
+    out
+        As many blocks (G, 20) as are guessed; the first ones are written, those that descent can start from.
+    """
+    found = 0
+    for _ in range(len(out)):
+        block = out[found]
+        for slot in range(len(block)):
+            block[slot] = 0
+        block[FORM], block[COUNT1], block[COUNT2] = form, 1, 1
+        a = cells[one_of(len(cells))]
+        b = cells[one_of(len(cells))]
+        if form == LINE:
+            guess_line(block, a, b, box)
+        elif form == BACK:
+            guess_back(block, a, b, box)
+        elif form == DISC:
+            guess_disc(block, a, b, box)
+        else:
+            guess_star(block, a, cells)
+        if valid(block):
+            found += 1
+    return found
+
+
+@helper
+def guess_line(block, a, b, box):
+    """A bar along the middle of a box and repeated like it, or from one cell to the other."""
+    if np.random.random() < 0.4 and box[FORM] == BOX and box[EXTENT] > 0:
+        long = 0
+        for axis in range(3):
+            middle = int(box[FIRST + axis] + (box[EXTENT + axis] - 1) / 2)
+            block[FIRST + axis], block[EXTENT + axis] = middle, middle
+            if box[EXTENT + axis] > box[EXTENT + long]:
+                long = axis
+        block[FIRST + long] = box[FIRST + long]
+        block[EXTENT + long] = box[FIRST + long] + box[EXTENT + long] - 1
+        copy_loops(block, box)
+    else:
+        for axis in range(3):
+            block[FIRST + axis], block[EXTENT + axis] = a[axis], b[axis]
+    block[TILT] = 1 + (np.random.random() < 0.2)
+
+
+@helper
+def guess_back(block, a, b, box):
+    """A board that leans from the lower to the higher of two cells, or a box with a random tilt in or beyond it."""
+    if box[EXTENT] <= 0 or np.random.random() < 0.5:
+        low, high = (a, b) if a[0] <= b[0] else (b, a)
+        block[FIRST], block[EXTENT] = low[0], high[0] - low[0] + 1
+        block[FIRST + 1] = low[1] - one_of(2)
+        block[EXTENT + 1] = 1 + one_of(3)
+        block[FIRST + 2], block[EXTENT + 2] = min(a[2], b[2]), abs(a[2] - b[2]) + 1
+        block[TILT] = high[1] - low[1] + one_of(3) - 1
+        return
+    copy_loops(block, box)
+    for axis in range(3):
+        block[FIRST + axis], block[EXTENT + axis] = box[FIRST + axis], box[EXTENT + axis]
+    tilt = (1 + one_of(5)) * (1 if np.random.random() < 0.7 else -1)
+    block[TILT] = tilt
+    if np.random.random() < 0.5 and block[EXTENT + 1] > abs(tilt):
+        block[EXTENT + 1] -= abs(tilt)
+        if tilt < 0:
+            block[FIRST + 1] -= tilt
+
+
+@helper
+def guess_disc(block, a, b, box):
+    """An upright cylinder inside a box or between two cells."""
+    copy_loops(block, box)
+    if box[EXTENT] > 0 and np.random.random() < 0.6:
+        block[FIRST], block[EXTENT] = box[FIRST], box[EXTENT]
+        block[RADIUS] = max(1, int(np.rint((box[EXTENT + 1] + box[EXTENT + 2]) / 4)))
+        for axis in range(1, 3):
+            block[FIRST + axis] = np.rint(box[FIRST + axis] + box[EXTENT + axis] / 2)
+    else:
+        block[FIRST], block[EXTENT] = min(a[0], b[0]), abs(a[0] - b[0]) + 1
+        for axis in range(1, 3):
+            block[FIRST + axis] = np.rint((a[axis] + b[axis] + 1) / 2)
+        block[RADIUS] = max(1, int(max(abs(a[1] - b[1]), abs(a[2] - b[2])) / 2) + one_of(2))
+
+
+@helper
+def guess_star(block, a, cells):
+    """A cross, or a star of bars where the form says a bar, around the middle of the grid or of the cells."""
+    centre1, centre2 = 0.0, 0.0
+    for i in range(len(cells)):
+        centre1 += cells[i, 1]
+        centre2 += cells[i, 2]
+    centre1, centre2 = centre1 / len(cells) + 0.5, centre2 / len(cells) + 0.5
+    if np.random.random() < 0.5:
+        centre1, centre2 = 0.0, 0.0
+    block[FIRST] = a[0]
+    if block[FORM] == CROSS:
+        block[FIRST + 1], block[FIRST + 2] = np.rint(centre1), np.rint(centre2)
+        block[EXTENT] = 1 + one_of(3)
+        block[RADIUS] = max(2.0, np.rint(np.sqrt((a[1] - centre1) ** 2 + (a[2] - centre2) ** 2)))
+        block[RADIUS + 1] = one_of(4)
+        block[ROTATE] = 4
+    else:
+        block[FORM] = LINE
+        block[FIRST + 1], block[FIRST + 2] = np.floor(centre1), np.floor(centre2)
+        for axis in range(3):
+            block[EXTENT + axis] = a[axis]
+        block[FIRST] = a[0] + one_of(4)
+        block[TILT] = 1
+        block[ROTATE] = 3 + one_of(4)
+
+
+@helper
+def copy_loops(block, box):
+    """Give a block the translation loops of another."""
+    for slot in range(COUNT1, ROTATE):
+        block[slot] = box[slot]

@@ -1,0 +1,149 @@
+"""Kernels that draw blocks of whole-numbered parameters as rows of bits, one word for the 32 cells of a row."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from shapeprog.inference.cells.block_layout import (
+    BACK,
+    BOX,
+    COUNT1,
+    COUNT2,
+    DISC,
+    EXTENT,
+    FIRST,
+    FORM,
+    LINE,
+    RADIUS,
+    ROTATE,
+    SHIFT1,
+    SHIFT2,
+    TILT,
+)  # fmt: skip
+from shapeprog.kernels.bits import ones, span
+from shapeprog.kernels.compile import helper, kernel
+from shapeprog.kernels.rows import CAP, REACH
+
+ROWS = 1024
+"""Rows of the grid: row 32 i + j holds the cells at height i and depth j."""
+
+ARM = 2
+"""Cells that an arm of a cross base is wide."""
+
+
+@helper
+def draw_back(rows, a, b, c, ta, tb, tc, tilt):
+    """Set the cells of a box whose layers are shifted in depth by up to ``tilt``; an upright box has none."""
+    bits = span(c + 16, c + 16 + tc)
+    if bits == 0:
+        return
+    for i in range(max(-a - 16, 0), min(16 - a, ta)):
+        low = b + 16 if tilt == 0 else int(np.rint(b + tilt * i / ta)) + 16
+        for j in range(max(low, 0), min(low + tb, 32)):
+            rows[(a + i + 16) * 32 + j] |= bits
+
+
+@helper
+def draw_disc(rows, a, yc, zc, t, r):
+    """Set the cells of an upright cylinder: centres within ``REACH`` radii of its axis."""
+    if r <= 0:
+        return
+    limit = (REACH * r) ** 2
+    for j in range(max(0, yc + 16 - r - 1), min(32, yc + 16 + r + 1)):
+        rest = limit - (j - 15.5 - yc) ** 2
+        if rest < 0:
+            continue
+        reach = np.sqrt(rest)
+        bits = span(int(np.ceil(zc + 15.5 - reach)), int(np.floor(zc + 15.5 + reach)) + 1)
+        for i in range(max(a + 16, 0), min(a + 16 + t, 32)):
+            rows[i * 32 + j] |= bits
+
+
+@helper
+def draw_line(rows, s0, s1, s2, e0, e1, e2, r):
+    """Cells whose centre lies within ``REACH`` radii of the axis, between the flat caps."""
+    d0, d1, d2 = e0 - s0, e1 - s1, e2 - s2
+    length = np.sqrt(d0 * d0 + d1 * d1 + d2 * d2)
+    if length < 1e-9:
+        d0, d1, d2 = 1.0, 0.0, 0.0
+    else:
+        d0, d1, d2 = d0 / length, d1 / length, d2 / length
+    limit = (REACH * r) ** 2
+    m0, m1, m2 = (s0 + e0) / 2 + 0.5, (s1 + e1) / 2 + 0.5, (s2 + e2) / 2 + 0.5
+    half = length / 2
+    lo0, hi0 = reached(m0, d0, half, r)
+    lo1, hi1 = reached(m1, d1, half, r)
+    lo2, hi2 = reached(m2, d2, half, r)
+    for i in range(lo0, hi0 + 1):
+        p0 = i - 15.5 - m0
+        for j in range(lo1, hi1 + 1):
+            p1 = j - 15.5 - m1
+            bits = np.uint32(0)
+            for k in range(lo2, hi2 + 1):
+                p2 = k - 15.5 - m2
+                along = p0 * d0 + p1 * d1 + p2 * d2
+                if abs(along) <= half + CAP and p0 * p0 + p1 * p1 + p2 * p2 - along * along <= limit:
+                    bits |= np.uint32(1) << np.uint32(k)
+            rows[i * 32 + j] |= bits
+
+
+@helper
+def reached(middle, slope, half, r):
+    """First and last cell along one axis of the grid that a bar can touch."""
+    reach = half * abs(slope) + REACH * r * np.sqrt(max(0.0, 1 - slope * slope)) + 0.01
+    return max(0, int(np.ceil(middle + 15.5 - reach))), min(31, int(np.floor(middle + 15.5 + reach)))
+
+
+@helper
+def draw_block(rows, block):
+    """Set the cells of all copies of a block, clipped to the grid."""
+    form = int(block[FORM])
+    p0, p1, p2 = block[FIRST], block[FIRST + 1], block[FIRST + 2]
+    p3, p4, p5, radius = block[EXTENT], block[RADIUS], block[EXTENT + 2], block[TILT]
+    ta, tb, tc = int(p3), int(p4), int(p5)
+    turns = int(block[ROTATE])
+    for i1 in range(int(block[COUNT1])):
+        for i2 in range(int(block[COUNT2])):
+            s0 = int(i1 * block[SHIFT1] + i2 * block[SHIFT2])
+            s1 = int(i1 * block[SHIFT1 + 1] + i2 * block[SHIFT2 + 1])
+            s2 = int(i1 * block[SHIFT1 + 2] + i2 * block[SHIFT2 + 2])
+            a, b, c = int(p0) + s0, int(p1) + s1, int(p2) + s2
+            if form in (BOX, BACK):
+                draw_back(rows, a, b, c, ta, tb, tc, int(radius) if form == BACK else 0)
+                continue
+            if form == DISC:
+                draw_disc(rows, a, b, c, ta, tb)
+                continue
+            y, z = p4 - p1, p5 - p2
+            for turn in range(max(turns, 1)):
+                if form == LINE:
+                    cos, sin = 1.0, 0.0
+                    if turns > 0:
+                        angle = 2 * np.pi * turn / turns
+                        cos, sin = np.cos(angle), np.sin(angle)
+                    end1, end2 = p1 + y * cos - z * sin, p2 + y * sin + z * cos
+                    draw_line(rows, p0 + s0, p1 + s1, p2 + s2, p3 + s0, end1 + s1, end2 + s2, radius)
+                else:  # one arm of a cross, in the direction of a quarter turn
+                    quarter = (tc + turn) % 4
+                    along = quarter % 2 == 0  # sideways, else in depth
+                    near, left = (1, tb if quarter == 0 else 0) if along else (tb if quarter == 3 else 0, 1)
+                    draw_back(rows, a, b - near, c - left, ta, ARM if along else tb, tb if along else ARM, 0)
+
+
+@kernel("void(f8[:, ::1], u4[:, ::1])")
+def draw_blocks(blocks, rows):
+    """Set the cells of block k in row k of ``rows`` (P, 1024), or those of all blocks in its only row."""
+    step = 1 if len(rows) > 1 else 0
+    for k in range(len(blocks)):
+        draw_block(rows[k * step], blocks[k])
+
+
+@kernel("void(u8[:, ::1], u8[::1], u8[::1], i8[:, ::1])")
+def count_cells(drawn, first, second, counts):
+    """Write how many cells each row of words (P, 512) shares with either of two sets of cells: (P, 2)."""
+    for k in range(len(drawn)):
+        one, other = 0, 0
+        for i in range(drawn.shape[1]):
+            one += ones(drawn[k, i] & first[i])
+            other += ones(drawn[k, i] & second[i])
+        counts[k, 0], counts[k, 1] = one, other

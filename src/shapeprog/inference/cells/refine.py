@@ -1,0 +1,219 @@
+"""Refinement: all continuous parameters of a program together, by gradient through the renderer.
+
+The loss has both directions of a chamfer distance, one of them exact: target points to the surface of the union by
+signed distance, and points sampled on the visible surface to their nearest target points.  Parts that touch on the
+grid are asked to keep touching, which no point can tell: contact faces are hidden.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+import torch
+from jaxtyping import Bool, Float, Int
+from torch import Tensor
+
+from shapeprog.errors import InputError
+from shapeprog.geometry.arrays import one_tensor_thread
+from shapeprog.geometry.distance import signed_distance
+from shapeprog.geometry.nearest import squared_distance
+from shapeprog.geometry.primitive import primitives
+from shapeprog.geometry.scene import Scene
+from shapeprog.geometry.surface import sample_surface
+from shapeprog.inference.budget import NEVER, Deadline, Progress
+from shapeprog.inference.fit.tunable import least
+from shapeprog.language.program import Program
+from shapeprog.language.statement import language
+from shapeprog.language.tensors import Code, decode, encode
+from shapeprog.language.unroll import Plan
+from shapeprog.space import HALF
+
+DECIMALS = 2
+"""Decimals of a cell that refined parameters keep: a hundredth is .04 % of the longest side."""
+
+BETAS = (0.8, 0.95)
+"""Memory of Adam for slopes and for their squares."""
+
+REACH = 1.49
+"""Farthest that refinement moves a parameter from a whole number, in cells: rounding and one step lead back."""
+
+
+TOUCH = 0.03
+"""Weight of a squared gap between two parts that touch on the grid, against squared distances of points."""
+
+
+OCCUPANCY = 0.3
+"""Weight of the cross-entropy of a touched cell against squared distances of points."""
+
+SHARPNESS = 6.0
+"""How fast a soft cell fills, per cell of distance."""
+
+
+@dataclass(frozen=True)
+class Schedule:
+    """How long and how boldly to refine; chosen on val.
+
+    Parameters
+    ----------
+    steps
+        Gradient steps.
+    rate
+        First step size of Adam in cells; it falls to a tenth by a cosine.
+    points
+        Target points that one step looks at, drawn at random.
+    samples
+        Points sampled on the surface of the program in one step.
+    cells
+        Cells near the surface whose occupancy one step looks at, where the target has cells.
+    """
+
+    steps: int = 50
+    rate: float = 0.12
+    points: int = 1000
+    samples: int = 1000
+    cells: int = 1000
+
+
+def refine(
+    program: Program,
+    target: Float[Tensor, "P 3"],
+    *,
+    voxels: npt.NDArray[np.bool_] | None = None,
+    schedule: Schedule | None = None,
+    reach: float | None = None,
+    seed: int = 0,
+    deadline: Deadline = NEVER,
+    progress: Progress | None = None,
+) -> Program:
+    """The same program with parameters that fit target points (P, 3) on a surface, in the grid frame.
+
+    Parameters
+    ----------
+    voxels
+        Touched cells (32, 32, 32) of the target, whose soft occupancy the program should match as well; for targets
+        that are known by their cells.
+    schedule
+        Steps, step size and numbers of points.
+    reach
+        Farthest that any parameter may move from where it is, in cells; anywhere by default.
+    deadline
+        When no further step starts.
+
+    Raises
+    ------
+    InputError
+        If there are no target points or some are not finite.
+    """
+    plan = schedule or Schedule()
+    points = torch.as_tensor(target, dtype=torch.float32)
+    if not len(points) or not bool(torch.isfinite(points).all()):
+        raise InputError("refinement needs finite target points", "load the target with shapeprog.load_shape")
+    if not program.size:
+        return program
+    start = encode(program.flat())
+    free, low = _slots(start)
+    values = start.parameters.clone()
+    high = torch.full_like(low, torch.inf)
+    if reach is not None:
+        low, high = torch.maximum(low, values - reach), values + reach
+    moved = values.clone().requires_grad_()
+    render = Plan(start)
+    mean, square = torch.zeros_like(values), torch.zeros_like(values)
+    generator = torch.Generator().manual_seed(seed)
+    touching = _contacts(render.scene(values))
+    shell = None if voxels is None else _shell(voxels)
+    with one_tensor_thread(kernels=1):
+        for step in range(plan.steps):
+            if deadline.passed(f"the refinement after {step} of {plan.steps} steps"):
+                break
+            scene = render.scene(moved)
+            if not bool(scene.mask.any()):
+                break
+            some = points[torch.randint(len(points), (plan.points,), generator=generator)]
+            sample = sample_surface(scene, plan.samples, generator)
+            there = (squared_distance(sample.points, points) * sample.weights).mean()
+            loss = (signed_distance(scene, some) ** 2).mean() + there + TOUCH * _gaps(scene, touching)
+            if shell is not None:
+                cells = torch.randint(len(shell), (plan.cells,), generator=generator)
+                loss = loss + OCCUPANCY * _occupancy_loss(scene, shell[cells])
+            moved.grad = None
+            loss.backward()
+            assert moved.grad is not None
+            slope = moved.grad.nan_to_num_(0).mul_(free)
+            # Adam (Kingma & Ba 2015) by hand: the first use of torch.optim imports its compiler, for 1.5 s.
+            mean.lerp_(slope, 1 - BETAS[0])
+            square.lerp_(slope**2, 1 - BETAS[1])
+            rate = plan.rate * (0.55 + 0.45 * math.cos(math.pi * step / plan.steps)) / (1 - BETAS[0] ** (step + 1))
+            with torch.no_grad():
+                moved.sub_(rate * mean / ((square / (1 - BETAS[1] ** (step + 1))).sqrt() + 1e-8))
+                moved.copy_(torch.where(free, torch.minimum(torch.maximum(moved, low), high), values))
+            if progress:
+                progress("refining", (step + 1) / plan.steps)
+    tidy = torch.where(free, moved.detach().double().round(decimals=DECIMALS).to(values), values)
+    return decode(start.having(tidy))[0]
+
+
+def _slots(code: Code) -> tuple[Bool[Tensor, "K J slots"], Float[Tensor, "K J slots"]]:
+    """Which slots of a program may move, and the least value of each, so that no part vanishes.
+
+    Continuous parameters move; a shift that is exactly zero stays zero, so that a loop along an axis keeps to it.
+    """
+    free = torch.zeros(code.parameters.shape, dtype=torch.bool)
+    low = torch.full_like(code.parameters, -torch.inf)
+    for declared in language():
+        here = code.ids == declared.id
+        if not bool(here.any()):
+            continue
+        for slot, quantity in enumerate(declared.quantities):
+            still = (code.parameters[..., slot] == 0) & (quantity.kind == "shift")
+            free[..., slot] |= here & (not quantity.discrete) & ~still
+            low[..., slot] = torch.where(here, least(quantity), low[..., slot])
+    return free, low
+
+
+def _ends(scene: Scene) -> tuple[Float[Tensor, "N 3"], Float[Tensor, "N 3"]]:
+    """Low and high corners of the boxes around all primitives, for those that stand upright on the grid."""
+    bounds = torch.zeros_like(scene.centre)
+    for kind in torch.unique(scene.kind).tolist():
+        here = (scene.kind == kind)[:, None]
+        bounds = torch.where(here, primitives[kind].bound(scene.size), bounds)
+    return scene.centre - bounds, scene.centre + bounds
+
+
+def _contacts(scene: Scene) -> Int[Tensor, "C 3"]:
+    """Pairs of primitives and the axis along which the first ends where the second begins: (below, above, axis)."""
+    upright = scene.mask & (scene.rotation.diagonal(dim1=-2, dim2=-1) > 0.999).all(-1)
+    low, high = _ends(scene)
+    overlap = torch.minimum(high[:, None], high[None]) - torch.maximum(low[:, None], low[None])
+    meets = (high[:, None] - low[None]).abs() < 1e-3
+    beside = torch.stack([(overlap[..., [a for a in range(3) if a != axis]] > 0.5).all(-1) for axis in range(3)], -1)
+    return (meets & beside & (upright[:, None] & upright[None])[..., None]).nonzero()
+
+
+def _gaps(scene: Scene, touching: Int[Tensor, "C 3"]) -> Float[Tensor, ""]:
+    """Sum of the squared gaps, in cells, between primitives that are to touch."""
+    if not len(touching):
+        return scene.centre.new_zeros(())
+    low, high = _ends(scene)
+    below, above, axis = touching.unbind(-1)
+    return ((low[above, axis] - high[below, axis]).clamp(min=0) ** 2).sum()
+
+
+def _shell(voxels: npt.NDArray[np.bool_]) -> Float[Tensor, "S 4"]:
+    """Centres of the cells on either side of the boundary of a solid of cells, and whether they are in it."""
+    from scipy import ndimage
+
+    inner = ndimage.binary_erosion(voxels)
+    outer = ndimage.binary_dilation(voxels)
+    cells = np.argwhere(outer & ~inner)
+    inside = voxels[tuple(cells.T)]
+    return torch.from_numpy(np.column_stack([cells - HALF + 0.5, inside]).astype(np.float32))
+
+
+def _occupancy_loss(scene: Scene, cells: Float[Tensor, "S 4"]) -> Float[Tensor, ""]:
+    """Cross-entropy of touched cells: a solid touches a cell when it comes within half a cell of its centre."""
+    logits = SHARPNESS * (0.5 - signed_distance(scene, cells[:, :3]))
+    return torch.nn.functional.binary_cross_entropy_with_logits(logits, cells[:, 3])

@@ -1,0 +1,168 @@
+"""Adjustment: all continuous numbers of a program together, so that its surface lies on that of a target.
+
+A few steps of Gauss and Newton through the renderer.  Residuals are distances along normals, joints between parts are
+kept closed, and every number is drawn very gently to where it started: what the target says nothing about, such as the
+thickness behind a sheet, stays as it was.
+"""
+
+from __future__ import annotations
+
+import torch
+from jaxtyping import Bool, Float
+from torch import Tensor
+
+from shapeprog.geometry.arrays import one_tensor_thread
+from shapeprog.inference.budget import NEVER, Deadline, Progress
+from shapeprog.inference.fit.joints import NEARLY, Joints, find_joints, joining, moved, needs
+from shapeprog.inference.fit.residuals import Pairs, Target, pull
+from shapeprog.inference.fit.tunable import Poses, Tunable
+from shapeprog.inference.surface.evidence import TOLERANCE, Evidence
+from shapeprog.language.program import Program
+from shapeprog.space import FloatArray
+
+STEPS, LAST = 12, 5
+"""Steps, of which the last ones keep angles as they are written and close what is still open."""
+
+CAPTURE, EXPLAINED = 1.2, 2.0
+"""Width of the weights of residuals: in cells at first, and in tolerances of the evidence at the end."""
+
+GENTLE = {"length": 3e-5, "angle": 3e-5}
+PLACE = 1e-6
+"""Weights, against that of the whole target, of a squared move in cells from the start: of lengths and angles, which
+nothing else may hold, and of places."""
+
+FARTHEST = 0.7
+"""Farthest that one step moves the surface by one number, in cells."""
+
+KEPT, CLOSED = 0.003, 0.03
+"""Weight of a squared gap, while parts still move and at the end: it stretches a leg, but does not lift a seat."""
+
+WIDEST = 1.0
+"""Gap in cells up to which parts that touched at the start are brought together again at the end."""
+
+OPEN = 0.15
+"""Height in cells up to which feet are put on the floor at the end, whatever it costs."""
+
+UPRIGHT = 0.7
+"""Degrees below which an angle is none."""
+
+SAME = 1e-6
+"""Singular value of relations below which one follows from others."""
+
+
+def adjust(
+    program: Program,
+    evidence: Evidence,
+    *,
+    steps: int = STEPS,
+    relations: FloatArray | None = None,
+    seed: int = 0,
+    deadline: Deadline = NEVER,
+    progress: Progress | None = None,
+) -> Program:
+    """The same program with numbers that fit the evidence, tidy: hundredths of cells, tenths of degrees.
+
+    Parameters
+    ----------
+    steps
+        Steps of Gauss and Newton, at least ``LAST`` of them with fixed angles.
+    relations
+        Rows (R, F) of factors: these sums of the numbers that move stay what they are.
+    seed
+        Of the samples that each step draws.
+    deadline
+        When no further step starts.
+    """
+    if not program.size:
+        return program
+    tunable = Tunable(program)
+    values, held = tunable.values, torch.zeros(len(tunable.values), dtype=torch.bool)
+    generator, target, angles = torch.Generator().manual_seed(seed), Target(evidence), tunable.are("angle")
+    narrow = EXPLAINED * evidence.tolerance
+    ways = _ways(relations, held)
+    wide = max(CAPTURE, narrow)
+    with one_tensor_thread(kernels=1):
+        poses = tunable.poses(values)
+        known = find_joints(poses.scene, _floor(evidence), generator)
+        for step in range(steps):
+            if deadline.passed(f"the adjustment after {step} of {steps} steps"):
+                break
+            done = min(step / max(steps - LAST, 1), 1.0)
+            if done == 1 and not held.any():
+                held = angles
+                ways = _ways(relations, held)
+                values = torch.where(held, tunable.rounded(values * (values.abs() >= UPRIGHT)), values)
+                poses = tunable.poses(values)
+            known = moved(poses.scene, known)
+            pairs = target.pairs(poses.scene, generator)
+            systems = [
+                of_target(poses, pairs, wide ** (1 - done) * narrow**done),
+                of_joints(poses, known, closing=done == 1),
+            ]
+            onwards = torch.maximum(values + _move(systems, tunable, values, ways), tunable.low)
+            values = onwards if relations is None else values + ways @ (ways.T @ (onwards - values))
+            poses = tunable.poses(values)
+            if progress:
+                progress("adjusting", (step + 1) / steps)
+    return tunable.settled(values)
+
+
+def tidy(program: Program) -> Program:
+    """The same program in hundredths of cells and tenths of degrees."""
+    if not program.size:
+        return program
+    tunable = Tunable(program)
+    return tunable.settled(tunable.values)
+
+
+System = tuple[Float[Tensor, " F"], Float[Tensor, "F F"]]
+"""Half the slope of a sum of squares, and half its curvature by Gauss and Newton."""
+
+
+def of_target(poses: Poses, pairs: Pairs, width: float) -> System:
+    """The part of the distances to the target, where residuals of ``width`` cells count for a quarter."""
+    asked, by = pull(poses.scene, pairs, width), poses.slopes
+    slope = (by * asked.slope[..., None]).sum((0, 1))
+    return slope, (by.mT @ asked.curvature @ by).sum(0)
+
+
+def of_joints(poses: Poses, known: Joints, *, closing: bool) -> System:
+    """Of gaps; one that the target insists on opens: its weight falls.  At the end all are closed that it takes to
+    keep the program in one piece, and all feet are put on the floor."""
+    gaps = needs(poses.scene, poses.slopes, known)
+    weight = KEPT * (NEARLY**2 / (NEARLY**2 + gaps.residual**2)) ** 2
+    if closing:
+        count = len(known.first)
+        needed = joining(known.first, known.second, gaps.residual[:count], len(poses.scene.mask), WIDEST)
+        needed = torch.cat([needed, gaps.residual[count:].abs() < OPEN])
+        weight = torch.where(needed, CLOSED, weight)
+    weighted = weight[:, None] * gaps.slopes
+    return weighted.T @ gaps.residual, weighted.T @ gaps.slopes
+
+
+def _ways(relations: FloatArray | None, held: Bool[Tensor, " F"]) -> Float[Tensor, "F Z"]:
+    """Orthonormal directions in which numbers may move: not those that are held, nor against relations."""
+    single = torch.eye(len(held), dtype=torch.float64)
+    if relations is None:
+        return single[:, ~held]
+    _, sizes, directions = torch.linalg.svd(torch.cat([torch.from_numpy(relations), single[held]]))
+    return directions[int((sizes > SAME).sum()) :].T
+
+
+def _move(
+    systems: list[System], tunable: Tunable, values: Float[Tensor, " F"], ways: Float[Tensor, "F Z"]
+) -> Float[Tensor, " F"]:
+    """The step to the least of the sum of squares, with what draws every number to its start."""
+    slope, curvature = (sum(parts) for parts in zip(*systems, strict=True))
+    gentle = torch.tensor([GENTLE.get(kind, PLACE) for kind in tunable.kinds]).double() * tunable.scale**2
+    slope = slope + gentle * (values - tunable.values)
+    curvature = curvature + torch.diag(gentle)
+    move = ways @ -torch.linalg.solve(ways.T @ curvature @ ways, ways.T @ slope)
+    farthest = FARTHEST / tunable.scale
+    return torch.minimum(torch.maximum(move, -farthest), farthest)
+
+
+def _floor(evidence: Evidence) -> float:
+    """Height of the lowest point; of scans, whose lowest points are noise, a tolerance above it."""
+    above = evidence.tolerance if evidence.tolerance > TOLERANCE else 0.0
+    return float(evidence.surface[:, 0].min()) + above

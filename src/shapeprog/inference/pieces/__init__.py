@@ -1,0 +1,1 @@
+"""Oriented boxes that a target may consist of: ``find_pieces(shape)`` gives components, rods and slabs."""

@@ -1,0 +1,108 @@
+"""Limbs: long or flat stretches of a solid, straight or bent, found by the balls that fit in it.
+
+The largest ball inside a solid that touches its surface at a point (the shrinking ball of Ma, Bae and Choi 2012) has
+its centre on the middle line of a bar and on the middle sheet of a board.  Where these centres run on in one direction,
+the points that they belong to are one limb; where a leg meets a seat, the direction ends.  Where it goes on beyond what
+it meets, the two stretches are one limb, too.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+from shapeprog.inference.pieces.strands import in_line
+from shapeprog.inference.surface.cloud import Cloud
+from shapeprog.space import FloatArray
+
+COUNT = 5000
+"""Points whose balls are found."""
+
+LARGEST = 3.0
+"""Radius of the largest ball in cells."""
+
+SHRINKS = 8
+"""Rounds of shrinking a ball until no point is within it."""
+
+MERGED, STEP = 0.25, 0.25
+"""Distance in cells, and in logarithms of the radius, within which balls are made one."""
+
+NEAREST = 24
+"""Centres among which the direction is found."""
+
+LINEAR = 0.3
+"""Standard deviation across a line of centres, as a share of that along it, at most."""
+
+BEND = 25.0
+"""Degrees between the directions of neighbours in one limb, at most."""
+
+LEAST = 20
+"""Points of the smallest limb."""
+
+
+def limbs(cloud: Cloud) -> list[npt.NDArray[np.int64]]:
+    """The points of each limb, as indices of the evidence, largest first."""
+    step = -(-len(cloud.points) // COUNT)
+    which: npt.NDArray[np.int64] = np.arange(0, len(cloud.points), step, dtype=np.int64)
+    centre, radius = inner_balls(cloud, which)
+    fine = (radius > 0) & (radius < LARGEST)
+    which, centre, radius = which[fine], centre[fine], radius[fine]
+    if not len(which):
+        return []
+    name, centre, radius = merged(centre, radius)
+    distance, near = cKDTree(centre).query(centre, k=range(1, min(NEAREST, len(centre)) + 1), workers=2)
+    reach = 2 * radius[:, None] + 2.5 * MERGED
+    linked = (distance < reach) & (np.abs(np.log(radius[near] / radius[:, None])) < 2 * STEP)
+    weight = linked.astype(np.float64)[..., None]
+    off = (centre[near] - (centre[near] * weight).sum(1, keepdims=True) / weight.sum(1, keepdims=True)) * weight
+    spread, axes = np.linalg.eigh(off.transpose(0, 2, 1) @ off)
+    spread = np.sqrt(np.maximum(spread, 0))
+    found = list[npt.NDArray[np.int64]]()
+    line = spread[:, 1] < LINEAR * spread[:, 2]
+    for kind, direction in ((line, axes[:, :, 2]), (~line & (spread[:, 0] < LINEAR * spread[:, 1]), axes[:, :, 0])):
+        facing = np.abs(np.einsum("nki,ni->nk", direction[near], direction)) > np.cos(np.radians(BEND))
+        i, k = np.nonzero(linked & facing & kind[:, None] & kind[near])
+        graph = coo_matrix((np.ones(len(i), np.bool_), (i, near[i, k])), shape=(len(near), len(near)))
+        _, label = connected_components(graph, directed=False)
+        of_point = label[name]
+        mine = [which[of_point == each] for each in np.flatnonzero(np.bincount(of_point) >= LEAST)]
+        found += [*mine, *(in_line(cloud.points, mine) if kind is line else [])]
+    return sorted(found, key=len, reverse=True)
+
+
+def merged(centre: FloatArray, radius: FloatArray) -> tuple[npt.NDArray[np.int64], FloatArray, FloatArray]:
+    """Balls of about the same place and size made one: the new number of each, new centres and radii."""
+    cell = np.concatenate([np.round(centre / MERGED), np.round(np.log(radius) / STEP)[:, None]], 1).astype(np.int64)
+    _, name, count = np.unique(cell, axis=0, return_inverse=True, return_counts=True)
+    name = name.reshape(-1)
+    mean = [np.bincount(name, column) / count for column in (*centre.T, radius)]
+    return name, np.stack(mean[:3], 1), mean[3]
+
+
+def inner_balls(cloud: Cloud, which: npt.NDArray[np.int64]) -> tuple[FloatArray, FloatArray]:
+    """Centres (N, 3) and radii (N,) of the largest empty balls that touch the surface at some of its points.
+
+    Of the two balls at a point the smaller one counts: normals may have either sign, and furniture is thin.
+    """
+    tree = cKDTree(cloud.points)
+    points = np.concatenate([cloud.points[which]] * 2)
+    normals = np.concatenate([cloud.normals[which], -cloud.normals[which]])
+    radius = np.full(len(points), LARGEST)
+    going = np.arange(len(points))
+    for _ in range(SHRINKS):
+        middle = points[going] - normals[going] * radius[going, None]
+        distance, nearest = tree.query(middle, workers=2)
+        off = points[going] - cloud.points[nearest]
+        along = np.einsum("ni,ni->n", off, normals[going])
+        square = np.einsum("ni,ni->n", off, off)
+        smaller = (distance < radius[going] * 0.98 - 0.01) & (along > 0.15 * np.sqrt(square)) & (square > 1e-8)
+        going = going[smaller]
+        radius[going] = square[smaller] / (2 * along[smaller])
+        if not len(going):
+            break
+    half = len(which)
+    better = np.where(radius[:half] <= radius[half:], 0, half) + np.arange(half)
+    return points[better] - normals[better] * radius[better, None], radius[better]

@@ -1,0 +1,137 @@
+"""Planar patches of a surface known by points and normals, as rectangles."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from scipy.ndimage import label as label_regions
+
+from shapeprog.inference.pieces.oriented import bounds, rectangles_around
+from shapeprog.inference.pieces.patch_kernels import grow_patches
+from shapeprog.inference.surface.cloud import NOISY, Cloud, tolerance
+from shapeprog.space import Array, FloatArray
+
+LEAST = 16
+"""Points of the smallest patch."""
+
+SNAP = 3.0
+"""Degrees within which the normal of a patch counts as one of the world's axes."""
+
+FULL = 0.8
+"""Share of a rectangle that its patch fills; below, the bars that it consists of are found too."""
+
+RUNS = (0.6, 0.25, 0.1)
+"""Lengths of bars, as shares of the rectangle they lie in."""
+
+BAR = 0.7
+"""Share of its rectangle that a bar fills."""
+
+MOST = 160
+"""Patches kept, the largest."""
+
+
+class Patches(NamedTuple):
+    """Rectangles: centres (P, 3), frames (P, 3, 3) whose last column is the normal, half sides (P, 2)."""
+
+    centre: FloatArray
+    frame: FloatArray
+    half: FloatArray
+
+
+def planar_patches(cloud: Cloud) -> Patches:
+    """The planar patches of a surface and the bars that they consist of, largest first."""
+    order = np.argsort(flatness(cloud), kind="stable")
+    label = np.empty(len(cloud.points), np.int64)
+    angle = np.cos(np.radians(25 if cloud.noise > NOISY else 15))
+    count = grow_patches(cloud.points, cloud.normals, cloud.neighbours, order, angle, tolerance(cloud), LEAST, label)
+    sizes = np.bincount(label[label >= 0], minlength=count)
+    kept = np.argsort(-sizes, kind="stable")[:MOST]
+    sequence = np.argsort(label, kind="stable")
+    first = np.searchsorted(label[sequence], np.arange(count + 1))
+    members = [sequence[first[k] : first[k + 1]] for k in kept]
+    found = rectangles(cloud, members)
+    return bars(cloud, members, found)
+
+
+def flatness(cloud: Cloud) -> FloatArray:
+    """How much the normals around each point differ (N,)."""
+    facing = np.abs(np.einsum("nki,ni->nk", cloud.normals[cloud.neighbours], cloud.normals))
+    return np.round(1 - facing.mean(1), 6)
+
+
+def rectangles(cloud: Cloud, members: list[npt.NDArray[np.int64]]) -> Patches:
+    """The rectangle around each planar set of points, along the world's axes where near."""
+    count = np.array([len(each) for each in members], np.int64)
+    if not len(count):
+        return Patches(np.zeros((0, 3)), np.zeros((0, 3, 3)), np.zeros((0, 2)))
+    start = bounds(members)
+    points = cloud.points[np.concatenate(members)]
+    mean = np.add.reduceat(points, start[:-1]) / count[:, None]
+    off = points - np.repeat(mean, count, axis=0)
+    moments = np.add.reduceat(off[:, :, None] * off[:, None], start[:-1])
+    normal = np.linalg.eigh(moments)[1][:, :, 0]
+    found = rectangles_around(points, start, upright(normal), 2 * cloud.spacing)
+    return Patches(found.centre, found.rotation, found.half[:, :2] + cloud.spacing / 4)
+
+
+def upright(normal: FloatArray) -> FloatArray:
+    """Frames (P, 3, 3) about normals (P, 3), which snap to near axes of the world; so do the first columns."""
+    normal = normal * np.sign(np.take_along_axis(normal, np.abs(normal).argmax(1)[:, None], 1))
+    nearest = np.eye(3)[np.abs(normal).argmax(1)]
+    snapped = np.abs(normal).max(1) > np.cos(np.radians(SNAP))
+    normal = np.where(snapped[:, None], nearest, normal)
+    least = np.eye(3)[np.abs(normal).argmin(1)]
+    across = least - normal * np.sum(least * normal, 1, keepdims=True)
+    across /= np.linalg.norm(across, axis=1, keepdims=True)
+    return np.stack([across, np.cross(normal, across), normal], 2)
+
+
+def bars(cloud: Cloud, members: list[npt.NDArray[np.int64]], whole: Patches) -> Patches:
+    """The rectangles, and those of the bars in patches that fill their rectangle badly, such as frames."""
+    centre, frame, half = list(whole.centre), list(whole.frame), list(whole.half)
+    side = 1.8 * cloud.spacing
+    for each, middle, axes, reach in zip(members, *whole, strict=True):
+        flat = (cloud.points[each] - middle) @ axes[:, :2] + reach
+        shape = np.maximum(np.ceil(2 * reach / side).astype(int), 1)
+        grid = np.zeros(shape, np.bool_)
+        at = np.minimum((flat / (2 * reach) * shape).astype(int), shape - 1)
+        grid[at[:, 0], at[:, 1]] = True
+        if grid.mean() > FULL or shape.max() < 6:
+            continue
+        for low, high in bars_of(grid):
+            ends = np.stack([low, high]) / shape * 2 * reach - reach
+            centre.append(middle + axes[:, :2] @ ends.mean(0))
+            frame.append(axes)
+            half.append((ends[1] - ends[0]) / 2)
+    return Patches(np.array(centre).reshape(-1, 3), np.array(frame).reshape(-1, 3, 3), np.array(half).reshape(-1, 2))
+
+
+def bars_of(grid: npt.NDArray[np.bool_]) -> list[tuple[Array, Array]]:
+    """Rectangles of cells, low and high corners, that long runs along either axis of a grid make up."""
+    found: dict[tuple[int, ...], None] = {}
+    for axis in range(2):
+        length = run_lengths(grid if axis else grid.T)
+        length = length if axis else length.T
+        for share in RUNS:
+            least = max(share * grid.shape[axis], 3)
+            regions, count = label_regions(length >= least)
+            for k in range(1, count + 1):
+                cells = np.argwhere(regions == k)
+                low, high = cells.min(0), cells.max(0) + 1
+                if len(cells) >= BAR * np.prod(high - low):
+                    found[(*low.tolist(), *high.tolist())] = None
+    return [(np.array(key[:2]), np.array(key[2:])) for key in found]
+
+
+def run_lengths(grid: npt.NDArray[np.bool_]) -> npt.NDArray[np.int64]:
+    """For each cell the length of the run of set cells along the last axis that it is in, 0 where it is not set."""
+    padded = np.pad(grid, ((0, 0), (1, 1))).astype(np.int8)
+    change = np.diff(padded, axis=1)
+    row, first = np.nonzero(change == 1)
+    last = np.nonzero(change == -1)[1]
+    length = np.zeros(grid.shape, np.int64)
+    for i, a, b in zip(row, first, last, strict=True):
+        length[i, a:b] = b - a
+    return length

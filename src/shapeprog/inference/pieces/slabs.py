@@ -1,0 +1,73 @@
+"""Boards and bars between two planar patches that face each other."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from shapeprog.inference.pieces.oriented import Boxes
+from shapeprog.inference.pieces.patches import Patches
+from shapeprog.space import SPAN, Array, FloatArray
+
+PARALLEL = 8.0
+"""Degrees between the normals of two patches of a pair, at most."""
+
+THICKNESS = (0.004 * SPAN, 0.35 * SPAN)
+"""Least and largest distance between them, in cells."""
+
+SHARED = 0.5
+"""Share of the smaller patch that the larger one faces, at least."""
+
+STRETCH = 1.6
+"""Thickness of a pair as a multiple of the middle side of its box, at most: else other faces tell of it better."""
+
+
+def slabs(patches: Patches) -> Boxes:
+    """Boxes between pairs of patches: what both cover, what either covers, and what each of them covers."""
+    normal = patches.frame[:, :, 2]
+    apart = np.einsum("ijk,ik->ij", patches.centre[None] - patches.centre[:, None], normal)
+    parallel = np.abs(normal @ normal.T) > np.cos(np.radians(PARALLEL))
+    larger = patches.half.prod(1)[:, None] >= patches.half.prod(1)[None]
+    thick = np.abs(apart)
+    i, j = np.nonzero(parallel & larger & (thick >= THICKNESS[0]) & (thick <= THICKNESS[1]))
+    i, j = i[i != j], j[i != j]
+    corner = corners(patches)[j] - patches.centre[i][:, None]
+    flat = np.einsum("nck,nka->nca", corner, patches.frame[i][:, :, :2])
+    low, high = flat.min(1), flat.max(1)
+    own = patches.half[i]
+    inner = np.maximum(low, -own), np.minimum(high, own)
+    shared = np.maximum(inner[1] - inner[0], 0).prod(1)
+    keep = shared >= SHARED * np.minimum(4 * own.prod(1), (high - low).prod(1))
+    i, j, low, high, own = i[keep], j[keep], low[keep], high[keep], own[keep]
+    spans = [
+        (inner[0][keep], inner[1][keep]),
+        (np.minimum(low, -own), np.maximum(high, own)),
+        (-own, own),
+        (low, high),
+    ]
+    return _between(patches, i, apart[i, j], spans)
+
+
+def sheets(patches: Patches, count: int) -> Boxes:
+    """Thin boxes about the largest patches."""
+    first = np.argsort(-np.round(patches.half.prod(1), 6), kind="stable")[:count]
+    half = np.concatenate([patches.half[first], np.full((len(first), 1), THICKNESS[0] / 2)], 1)
+    return Boxes(patches.centre[first], patches.frame[first], half)
+
+
+def corners(patches: Patches) -> FloatArray:
+    """The corners (P, 4, 3) of the rectangles."""
+    signs = np.array([[-1, -1], [-1, 1], [1, -1], [1, 1]], np.float64)
+    offset = np.einsum("pka,pca->pck", patches.frame[:, :, :2], signs * patches.half[:, None])
+    return patches.centre[:, None] + offset
+
+
+def _between(patches: Patches, i: Array, depth: FloatArray, spans: list[tuple[FloatArray, FloatArray]]) -> Boxes:
+    """Boxes over spans (n, 2) in the planes of patches ``i``, as deep as the distance along their normals."""
+    middle = np.concatenate([(low + high) / 2 for low, high in spans])
+    half = np.concatenate([(high - low) / 2 for low, high in spans])
+    frame, deep = np.tile(patches.frame[i], (len(spans), 1, 1)), np.tile(depth, len(spans))
+    local = np.concatenate([middle, deep[:, None] / 2], 1)
+    centre = np.tile(patches.centre[i], (len(spans), 1)) + np.einsum("nij,nj->ni", frame, local)
+    box = Boxes(centre, frame, np.concatenate([half, np.abs(deep)[:, None] / 2], 1))
+    sides = np.sort(box.half, 1)
+    return box.take((box.half > 0).all(1) & (box.half[:, 2] <= STRETCH * sides[:, 1]))

@@ -1,0 +1,1 @@
+"""Roles of parts: ``with_roles(program)`` names each by its place and proportions."""

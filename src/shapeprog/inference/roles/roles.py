@@ -1,0 +1,267 @@
+"""What the parts of a program are for: a role for every drawing statement, by rules that look at its solids alone.
+
+First it is seen what the whole is: something to sit on has a main surface that something rises behind, as a bed has, or
+on either side of; unless it stands between walls as high as the whole.  All else is a table or a case.  A chair may
+face any way.  Then the first rule of its list that fits a solid gives it a role: copies of one statement have one, that
+of most of their surface, or one that says both what the one and what the other is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from shapeprog.geometry.scene import Scene
+from shapeprog.inference.candidates.candidates import plain
+from shapeprog.inference.roles.measures import Mask, Parts
+from shapeprog.language.program import Draw, Loop, Node, Program, nest
+from shapeprog.language.statement import language
+from shapeprog.language.unroll import unroll
+from shapeprog.space import DEPTH, SIDE, UP, Array, FloatArray
+
+Rule = tuple[str, Callable[[Parts], Mask]]
+
+BACKED = 0.12
+"""Share of the height by which the back of a seat rises above it."""
+
+BROAD = 0.4
+"""Share of the width of the main surface that a back is wide, with all its posts and rails."""
+
+ENCLOSED, CASED = 0.9, 0.6
+"""Walls at both sides that end at this share of the height, or higher, and are themselves so high, make a case: what is
+behind its main surface is no back to lean on."""
+
+LOW = 0.6
+"""A bed is at most this share of its depth high."""
+
+ONE_SIDED = 0.5
+"""A back has at most this share of its surface on the other side of the seat, as arm rests that end there."""
+
+MANY = 3
+"""So many equal parts are slats."""
+
+
+def anything(p: Parts) -> Mask:
+    """Whatever is left."""
+    return np.ones(p.count, bool)
+
+
+STANDING: tuple[Rule, ...] = (
+    # What carries a main surface, or hangs below it.
+    ("pedestal", lambda p: p.below & p.central & p.upright),
+    ("foot", lambda p: p.below & p.grounded & ~p.level & p.small),
+    ("leg", lambda p: p.below & p.upright),
+    ("base", lambda p: p.below & p.slender & (p.grounded | p.on_pedestal)),
+    ("apron", lambda p: (p.below | p.beside) & p.level & (p.top >= p.main_low[UP] - 1.5 * p.near)),
+    ("stretcher", lambda p: p.below & p.level),
+    ("leg", lambda p: p.below & p.slender & p.grounded),
+    ("brace", lambda p: p.below & p.slender),
+    ("leg", lambda p: p.below & p.facing_side & (p.aside > 0.25)),
+    ("panel", lambda p: p.below & (p.facing_side | p.facing_front)),
+    ("stretcher", lambda p: p.below & ~p.grounded & p.lying),
+    ("leg", lambda p: p.below),
+)
+
+SEATING: tuple[Rule, ...] = (
+    ("base", lambda p: p.below & p.grounded & (p.top < p.main_high[UP] + p.near) & (p.span > 0.3) & ~p.slender),
+    ("shelf", lambda p: p.wide & p.below & (p.top < p.main_low[UP] - 1.5 * p.near)),
+    ("cushion", lambda p: p.wide & p.beside & p.padded & (p.bottom >= p.main_low[UP] - p.near)),
+    ("base", lambda p: p.main & ~p.lying & p.grounded),
+    ("seat", lambda p: p.main | (p.wide & (p.beside | p.below) & (p.top <= p.main_high[UP] + 2 * p.near))),
+    # What goes on above the seat from the ground is a leg all the same.
+    ("leg", lambda p: p.rising & p.grounded & p.upright),
+    # Behind: a back, its rails and slats, its posts.
+    ("slat", lambda p: p.rising & p.behind & (p.span >= 0.5) & p.level & (p.equal >= MANY)),
+    ("rail", lambda p: p.rising & p.behind & (p.span >= 0.5) & p.level & (p.up <= 0.5 * p.rest)),
+    ("back", lambda p: p.rising & p.behind & (p.span >= 0.5)),
+    # Beside: arm rests and what carries them.
+    ("arm_post", lambda p: p.rising & (p.aside > 0.3) & (p.rear < 0.25) & p.upright),
+    ("arm", lambda p: p.rising & (p.aside > 0.3) & ((p.rear < 0.25) | (p.run > 0.5))),
+    ("arm", lambda p: (p.top >= p.main_high[UP]) & ~p.slender & (p.aside > 0.4) & (p.run > 0.5)),
+    ("slat", lambda p: p.rising & p.upright & (p.aside < 0.35) & (p.equal >= MANY)),
+    ("post", lambda p: p.rising & p.slender),
+    ("back", lambda p: p.rising),
+    *STANDING,
+    ("panel", lambda p: p.facing_side | p.facing_front),
+    ("block", anything),
+)
+
+BED: tuple[Rule, ...] = (
+    ("headboard", lambda p: p.rising & p.facing_front & (p.span >= 0.6) & (p.rear > 0.25)),
+    ("footboard", lambda p: p.facing_front & (p.span >= 0.6) & (p.rear < -0.25)),
+    ("footboard", lambda p: p.level & (p.up > 2 * p.depth) & (p.span >= 0.6) & (p.rear < -0.4)),
+    ("base", lambda p: p.below & p.wide & p.grounded),
+    ("mattress", lambda p: p.wide & ~p.below & (p.top <= p.main_high[UP] + 2 * p.near)),
+    ("base", lambda p: p.below & p.wide),
+    ("pillow", lambda p: p.above & ~p.slender & (p.run <= 0.5)),
+    ("rail", lambda p: p.rising & p.behind & p.level),
+    ("slat", lambda p: p.rising & p.behind & p.upright & (p.aside < 0.35)),
+    ("post", lambda p: p.rising & p.slender),
+    ("side", lambda p: (p.aside > 0.3) & (p.run >= 0.5)),
+    ("slat", lambda p: p.level & (p.equal >= MANY)),
+    *STANDING,
+    ("body", anything),
+)
+
+CASE: tuple[Rule, ...] = (
+    # Lying boards: the highest is the top, one on the ground the base.
+    ("top", lambda p: (p.wide | p.main) & (p.top >= p.floor + p.size[UP] - p.near) & (p.up <= 0.3 * p.size[UP])),
+    ("base", lambda p: p.wide & p.flat & (p.grounded | (p.cased & p.lowest))),
+    ("base", lambda p: p.wide & p.grounded & (p.up <= 0.2 * p.size[UP])),
+    ("shelf", lambda p: p.wide & p.flat),
+    ("body", lambda p: p.bulky),
+    # Standing boards: at the sides, within, behind and in front.
+    ("side", lambda p: p.wall & p.outermost & (p.long >= 0.3 * p.size[UP])),
+    ("panel", lambda p: p.wall),
+    ("base", lambda p: p.front & p.in_front & p.grounded & (p.up <= 0.2 * p.size[UP])),
+    ("door", lambda p: p.front & p.in_front & p.cased & ((p.up >= p.side) | (p.up > 0.5 * p.size[UP]))),
+    ("drawer", lambda p: p.front & p.in_front & p.cased),
+    ("side", lambda p: p.front & p.grounded & (np.abs(p.rear) > 0.25) & (p.equal > 1) & ~p.cased),
+    ("panel", lambda p: p.front),
+    # Sticks.
+    ("handle", lambda p: p.small & (p.rear < -0.4) & ~p.grounded),
+    ("foot", lambda p: p.grounded & ~p.level & p.small),
+    ("pedestal", lambda p: p.upright & p.central),
+    ("post", lambda p: p.upright & p.walled & (p.top >= p.floor + 0.6 * p.size[UP])),
+    ("leg", lambda p: p.grounded & (p.upright | p.stubby)),
+    ("post", lambda p: p.upright),
+    ("base", lambda p: p.level & p.grounded),
+    ("leg", lambda p: p.slender & p.grounded),
+    ("rail", lambda p: p.level & p.cased),
+    ("apron", lambda p: p.level & (p.top >= p.floor + 0.8 * p.size[UP])),
+    ("stretcher", lambda p: p.level),
+    ("brace", lambda p: p.slender),
+    # What is left.
+    ("top", lambda p: p.lying & (p.top >= p.floor + p.size[UP] - p.near) & (p.up <= 0.3 * p.size[UP])),
+    ("base", lambda p: p.lying & p.flat & p.grounded),
+    ("shelf", lambda p: p.lying & p.flat),
+    ("drawer", lambda p: p.cased & p.in_front & ~p.grounded),
+    ("block", anything),
+)
+
+MIXED = ({"top", "base", "shelf"}, "shelf"), ({"door", "drawer", "panel", "side"}, "panel")
+"""What copies are called that lie, or stand, in places of several names, as the top and the base of one loop."""
+
+MOSTLY = 0.75
+"""Share of the surface of its copies from which a role is that of the block."""
+
+
+def with_roles(program: Program) -> Program:
+    """The program with a role for every plain solid; what has a role, or is a statement of one, keeps it.
+
+    A box that is a leg is written as the statement ``leg``.
+    """
+    roles = iter(roles_of_blocks(program))
+    return Program(tuple(_named(node, roles) for node in program.body))
+
+
+def named_anew(program: Program) -> Program:
+    """The program with each block drawn by the plainest statement, named by what it stands beside, and in order; what
+    it was called before counts for nothing."""
+    return in_order(with_roles(Program(tuple(_unnamed(plain(nest(chain))) for chain in program.chains))))
+
+
+def _unnamed(node: Node) -> Node:
+    if isinstance(node, Loop):
+        return replace(node, body=tuple(map(_unnamed, node.body)))
+    return replace(node, role="")
+
+
+def in_order(program: Program) -> Program:
+    """The program with its blocks as a person would list them: the main surface, then from the floor up.
+
+    At one height the larger come first.
+    """
+    scene = unroll(program)
+    if not scene.mask.any():
+        return program
+    parts, last = Parts(scene), 0
+    ranks: list[tuple[int, int, float]] = []
+    for node in program.body:
+        first, last = last, last + Program((node,)).blocks
+        mine = (parts.block >= first) & (parts.block < last)
+        level = round(float((parts.bottom[mine] - parts.floor).min(initial=parts.size[UP])) / parts.near)
+        ranks.append((int(not parts.main[mine].any()), level, -float(parts.surface[mine].sum())))
+    order = sorted(range(len(ranks)), key=ranks.__getitem__)
+    return Program(tuple(program.body[place] for place in order))
+
+
+def roles_of(parts: Parts) -> Array:
+    """The role of each part (N,)."""
+    found = np.full(parts.count, "", object)
+    for role, fits in (("body", anything),) if parts.count == 1 else _kind(parts):
+        found[(found == "") & fits(parts)] = role
+    return found
+
+
+def roles_of_blocks(program: Program) -> list[str]:
+    """The role of each block: that of most of the surface of its copies, none where it draws nothing."""
+    scene = unroll(program)
+    shares: list[dict[str, float]] = [{} for _ in range(program.blocks)]
+    if scene.mask.any():
+        parts = _facing(scene)
+        for block, role, surface in zip(parts.block.tolist(), roles_of(parts), parts.surface.tolist(), strict=True):
+            shares[block][role] = shares[block].get(role, 0.0) + surface
+    return [_common(share) for share in shares]
+
+
+def _common(share: dict[str, float]) -> str:
+    """One role for copies that have so much surface in each of several."""
+    role = max(share, key=share.__getitem__, default="")
+    if role and share[role] < MOSTLY * sum(share.values()):
+        return next((common for names, common in MIXED if set(share) <= names), role)
+    return role
+
+
+def _named(node: Node, roles: Iterator[str]) -> Node:
+    """The node with the next roles, which are those of the drawing statements in it, in their order."""
+    if isinstance(node, Loop):
+        return replace(node, body=tuple(_named(inner, roles) for inner in node.body))
+    role = next(roles)
+    if node.role or role not in language().roles or language()[node.name].hint is None:
+        return node
+    if (node.name, role) == ("box", "leg"):
+        return Draw("leg", node.values)
+    return replace(node, role="" if role == node.name else role)
+
+
+def _facing(scene: Scene) -> Parts:
+    """The parts as given, or in a frame turned by quarters so that the back, which is on one side alone, is behind."""
+    given = Parts(scene)
+    if _leaned_on(given) > 0:
+        return given
+    return max((given, *(Parts(scene, turns) for turns in (2, 1, 3))), key=_leaned_on)  # as given where all are 0
+
+
+def _leaned_on(p: Parts) -> float:
+    """How much surface rises behind the main surface and not before it, if the whole has a back there; 0 if not."""
+    behind = float(p.surface[p.rising & (p.rear > 0.25)].sum())
+    before = float(p.surface[p.rising & (p.rear < -0.25)].sum())
+    return behind - before if _kind(p) is not CASE and before < ONE_SIDED * behind else 0.0
+
+
+def _kind(p: Parts) -> tuple[Rule, ...]:
+    """The rules for what the whole seems to be."""
+    walls = p.wall & p.outermost & (p.run >= 0.5) & (p.up >= CASED * p.size[UP])
+    walls &= p.top >= p.floor + ENCLOSED * p.size[UP]
+    open_above = not (p.main & p.flat).any() and not (p.wide & p.above).any()  # a deep seat between wings
+    if not p.main.any() or (walls.sum() > 1 and not open_above):
+        return CASE
+    back, height = p.rising & (p.rear > 0.1) & (p.aside < 0.6), p.top - p.main_high[UP]
+    if _backed(p, back, height):
+        if p.size[DEPTH] <= p.size[SIDE] or p.size[UP] >= LOW * p.size[DEPTH]:
+            return SEATING
+        return CASE if (p.rising & p.bulky).any() else BED
+    arms = p.rising & (p.aside > 0.3) & (height >= BACKED * p.size[UP])
+    middle = p.low[:, SIDE] + p.high[:, SIDE] - p.main_low[SIDE] - p.main_high[SIDE]
+    return SEATING if (arms & (middle < 0)).any() and (arms & (middle > 0)).any() and not p.cased.any() else CASE
+
+
+def _backed(p: Parts, back: Mask, height: FloatArray) -> bool:
+    """Whether parts that rise above the main surface, so high (N,), make a back."""
+    if not back.any():
+        return False
+    width = p.high[back, SIDE].max() - p.low[back, SIDE].min()
+    return bool(height[back].max() >= BACKED * p.size[UP] and width >= BROAD * (p.main_high[SIDE] - p.main_low[SIDE]))

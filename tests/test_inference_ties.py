@@ -450,6 +450,19 @@ def test_copies_that_are_off_their_line_by_hundredths_lie_in_it():
     assert len(set(unroll(tied).centre[:, 1].tolist())) == 1
 
 
+def test_numbers_of_calls_stay_where_loops_could_be_merged():
+    program = sp.parse("""
+for i in mirror(side):
+    leg(box(at=(-6, 6, 10), size=(11, 1.48, 1.48)))
+top(box(at=(5, -8, -12), size=(1, 16, 24)))
+for i in mirror(side):
+    leg(box(at=(-6, -7.5, 10), size=(11, 1.52, 1.53)))
+""")
+    tied = tie(program, evidence_of_program(program), held={2}).program
+    sizes = {tuple(np.round(node.values[4:6], 2)) for node in tied.flat().walk() if getattr(node, "role", "") == "leg"}
+    assert (1.52, 1.53) in sizes
+
+
 # ---- anchors -------------------------------------------------------------------------------------------------------
 
 CABINET = """
@@ -490,7 +503,7 @@ def test_long_parts_span_and_short_ones_keep_their_size(end: float, expected: tu
     )
     layout = Layout(source.source)
     flat = {key: (0, 0) if element.kind == "interval" else (0,) for key, element in layout.elements.items()}
-    found = anchors_of(Model(Anchored(layout, flat), 0.1), None, AnchorSettings())
+    found = anchors_of(Model(Anchored(layout, flat)), None, AnchorSettings())
     assert found[0, "", 0] == expected
     assert found[1, "", 0] == (2, 2)
 

@@ -91,6 +91,11 @@ MOST_SOLIDS = 1 << 17  # most solids, and most evaluated bodies
 LEAST_ALONG = 0.25  # least share of its length that a bar covers along the axis that its two sizes leave open
 
 
+def axis_of(word: str) -> int:
+    """The axis of a keyword of a box: 0, 1 or 2."""
+    return next(axis for axis, words in enumerate(AXES) if word in words)
+
+
 def is_sized(keywords: Iterable[str], axis: int) -> bool:
     """Whether keywords determine the size along an axis."""
     words, (low, high, size, _) = set(keywords), AXES[axis]

@@ -66,11 +66,11 @@ class Needs(NamedTuple):
     slopes: Float[Tensor, "R F"]
 
 
-def find_joints(scene: Scene, floor: float, generator: torch.Generator, touching: float = TOUCHING) -> Joints:
+def find_joints(scene: Scene, floor: float, generator: torch.Generator) -> Joints:
     """The joints of a scene: of parts that touch, and of those that nearly touch where nothing else joins them."""
     count = len(scene.mask)
     first, second, points, gap = gaps(scene, generator)
-    chosen = (joining(first, second, gap, count, NEARLY) | (gap <= touching)).nonzero()[:, 0]
+    chosen = (joining(first, second, gap, count, NEARLY) | (gap <= TOUCHING)).nonzero()[:, 0]
     lowest = _lowest(scene, torch.arange(count))[:, 0]
     standing = ((lowest - floor).abs() <= NEARLY).nonzero()[:, 0]
     inner = _inner(scene, first[chosen], points[chosen])

@@ -125,9 +125,9 @@ class AxisAnchors:
 
     def __init__(
         self, elements: list[Element], axis: int, extent: float, ends: FloatArray, slopes: FloatArray,
-        base: FloatArray, contacts: Contacts, rows: dict[int, int], settings: AnchorSettings,
+        base: FloatArray, contacts: Contacts, loops: dict[int, int], settings: AnchorSettings,
     ) -> None:  # fmt: skip
-        self.rows = rows
+        self.loops = loops
         places = {(element.line, element.key): k for k, element in enumerate(elements)}
         self.spans: list[tuple[int, int, float]] = []  # both ends of a rod, and the cost of different anchors
         for (line, key), k in places.items():
@@ -162,7 +162,9 @@ class AxisAnchors:
         moved_by = (np.abs(slopes).max((0, 3)) > 0).astype(int)  # (N, K)
         both = moved_by[one].T @ moved_by[two] if len(one) else np.zeros((len(elements),) * 2)
         both = both + both.T + (moved_by.T @ moved_by)
-        self._together = [(int(a), int(b)) for a, b in np.argwhere(np.triu(both, 1) > 0)]
+        self.together = [  # elements whose parts touch: they are often better changed together
+            (int(a), int(b)) for a, b in np.argwhere(np.triu(both, 1) > 0)
+        ]
 
     def _choices(self, element: Element) -> Sequence[Anchors]:
         centred = abs(element.middle - self.extent / 2) < CENTRED * self.extent and self.axis < 2
@@ -170,7 +172,7 @@ class AxisAnchors:
             if self.axis == 2 and element.key != "plane":
                 return [(LOW,), (HIGH,)]
             return [(MIDDLE,)] if centred and element.key != "last" else [(LOW,), (MIDDLE,), (HIGH,)]
-        if centred and element.kind == "interval":
+        if centred:
             return [(LOW, HIGH), (MIDDLE, MIDDLE)]
         pairs = [(LOW, LOW), (LOW, HIGH), (HIGH, HIGH)]
         return pairs + ([(MIDDLE, MIDDLE), (LOW, MIDDLE), (MIDDLE, HIGH)] if self.axis < 2 else [])
@@ -199,7 +201,7 @@ class AxisAnchors:
             total = self._cost(state)
             for _ in range(ROUNDS):
                 before = total
-                for groups in (*([k] for k in range(len(state))), *self._pairs()):
+                for groups in (*([k] for k in range(len(state))), *self.together):
                     options = product(*(range(len(self.choices[k])) for k in groups))
                     for option in options:
                         trial = state.copy()
@@ -213,10 +215,6 @@ class AxisAnchors:
                 best = (total, state)
         assert best is not None
         return [choices[k] for choices, k in zip(self.choices, best[1], strict=True)]
-
-    def _pairs(self) -> list[tuple[int, int]]:
-        """Elements whose parts touch: they are often better changed together."""
-        return self._together
 
     @staticmethod
     def _start(unary: list[float], which: int) -> int:
@@ -233,7 +231,7 @@ class AxisAnchors:
             shifts[k] = SHIFTS[anchors[0]], SHIFTS[anchors[-1]]
         for one, two, worth in self.spans:
             cost += worth * (state[one] != state[two])
-        for last, first in self.rows.items():  # what a row names of its last copy is a side or the middle of it
+        for last, first in self.loops.items():  # what a row names of its last copy is a side or the middle of it
             shifts[last] -= SHIFTS[self.choices[last][state[last]][0]] * (shifts[first, 1] - shifts[first, 0])
         moved = self.base + np.einsum("enkc,kc->en", self.slopes, shifts)
         low, high = moved
@@ -244,7 +242,8 @@ class AxisAnchors:
         rigid = self.long & (high - low < self.share[1] - self.share[0] - 0.5)
         costs = np.where(self.reaches_low, s.reaching, s.side)[ask_low].sum()
         costs += np.where(self.reaches_high, s.reaching, s.side)[ask_high].sum() + s.rigid * rigid.sum()
-        cost += float(costs) / max(1.0, len(low) / len(state))
+        copies = max(1.0, len(low) / len(state))
+        cost += float(costs) / copies
         if len(self.contacts.first):
             grown = high[self.upper] - low[self.lower]
             apart = self.overlap + far * grown < np.minimum(self.overlap, 0) - TOUCH
@@ -252,7 +251,7 @@ class AxisAnchors:
             leaning = self.contacts.leaning
             gap = self.contacts.gaps + far * (self.contacts.base + np.einsum("ckd,kd->c", self.contacts.slopes, shifts))
             apart[leaning] |= gap > np.maximum(self.contacts.gaps, 0) + TOUCH
-            cost += (s.apart * float(apart.sum()) + s.pressed * float(pressed.sum())) / max(1.0, len(low) / len(state))
+            cost += (s.apart * float(apart.sum()) + s.pressed * float(pressed.sum())) / copies
         return cost
 
 

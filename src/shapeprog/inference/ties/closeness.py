@@ -1,7 +1,7 @@
 """How much of the surface of a program lies near that of its target, and the other way round: what a change is worth.
 
-A misfit of squares says where numbers are best as long as it is known what they should fit.  Of thin parts and sheets
-that is in doubt, and there it may fall while parts leave the surface that they stood for.
+The squared misfit assumes that points are assigned to the right parts.  For thin parts and sheets they may not be; the
+misfit can then fall while a part leaves its surface.
 """
 
 from __future__ import annotations

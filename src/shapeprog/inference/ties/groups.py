@@ -7,12 +7,13 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import combinations
 
-from shapeprog.language.ast import Argument, Group, Keywords, Line, Part, Point, body_of, changed_lines, values
+from shapeprog.language.ast import Argument, Group, Keywords, Line, Part, Point, Source, changed_lines, values
 from shapeprog.language.convert.loops import with_joined_mirrors
-from shapeprog.language.expression import Binary, Expression, Name, Value, names_in
+from shapeprog.language.convert.parts import ordered
+from shapeprog.language.expression import Binary, Expression, Name, Value, names_in, value_at
 from shapeprog.language.merging import merged_lines
 from shapeprog.language.parameters import to_float32
-from shapeprog.language.placement import AXES, SIZES
+from shapeprog.language.placement import AXES, BOX, SIZES, axis_of
 
 BOXES = ("box", "cushion")
 GAP, LEAST = 0.25, 2.0
@@ -80,7 +81,7 @@ def _mirrored(row: Group) -> Group:
     if row.kind != "row" or others or row.count != 2 or not isinstance(last, Point) or len(last.keywords) != 1:
         return row
     (word, value), *_ = last.keywords
-    axis = next(axis for axis, words in enumerate(AXES) if word in words)
+    axis = axis_of(word)
     words, first = AXES[axis], _only_part(row)
     if axis == 2 or first is None or word == words.offset or {"tilt", "lean", "turn"} & dict(first.keywords).keys():
         return row
@@ -104,7 +105,7 @@ def _divided(loop: Group, numbers: dict[str, float]) -> Group:
     keywords = dict(part.keywords)
     if loop.kind == "mirror" and len(loop.keywords) == 1:
         (word, plane), *_ = loop.keywords
-        axis = next(axis for axis, words in enumerate(AXES) if word in words)
+        axis = axis_of(word)
         words, middle = AXES[axis], Binary("/", Name(SIZES[axis]), 2.0)
         if word != words.offset or plane != 0 or words.size in keywords:
             return loop
@@ -122,7 +123,7 @@ def _divided(loop: Group, numbers: dict[str, float]) -> Group:
     if not isinstance(last, Point) or len(last.keywords) != 1:
         return loop
     (word, value), *_ = last.keywords
-    axis = next(axis for axis, words in enumerate(AXES) if word in words)
+    axis = axis_of(word)
     words = AXES[axis]
     size = keywords.get(words.size)
     first_word = words.high if word == words.low else words.low if word == words.high else ""
@@ -133,10 +134,8 @@ def _divided(loop: Group, numbers: dict[str, float]) -> Group:
     ):
         return loop
     clearances = {word: value, first_word: keywords.get(first_word, 0.0)}
-    known = [_number(clearance, numbers) for clearance in clearances.values()]
-    if None in known:
-        return loop
-    gap = (numbers[SIZES[axis]] - sum(known) - loop.count * size) / (loop.count - 1)  # type: ignore[arg-type]
+    taken = sum(value_at(clearance, numbers) for clearance in clearances.values())  # type: ignore[arg-type]
+    gap = (numbers[SIZES[axis]] - taken - loop.count * size) / (loop.count - 1)
     if not 0 <= round(gap, 2) <= GAP * size:
         return loop
     return _division(part, axis, float(loop.count), (clearances[words.low], clearances[words.high]), round(gap, 2))
@@ -145,30 +144,20 @@ def _divided(loop: Group, numbers: dict[str, float]) -> Group:
 def _division(part: Part, axis: int, count: float, clearances: tuple[Argument, Argument], gap: float) -> Group:
     words = AXES[axis]
     mine = [(word, value) for word, value in zip(words[:2], clearances, strict=True) if value != 0]
-    others = [
-        (word, value) for word, value in part.keywords if any(word in each for each in AXES) and word not in words
-    ]
-    rest = tuple((word, value) for word, value in part.keywords if not any(word in each for each in AXES))
-    order = {word: k for k, word in enumerate(word for each in AXES for word in each)}
-    box = sorted([*mine, *others], key=lambda pair: order[pair[0]])
-    keywords: Keywords = (*([("gap", to_float32(gap))] if gap else []), *box)
+    others = [(word, value) for word, value in part.keywords if word in BOX and word not in words]
+    rest = tuple((word, value) for word, value in part.keywords if word not in BOX)
+    keywords: Keywords = (*([("gap", to_float32(gap))] if gap else []), *ordered((*mine, *others)))
     return Group("divide", keywords, (replace(part, keywords=rest),), count, "xyz"[axis])
 
 
-def _number(value: Argument, numbers: dict[str, float]) -> float | None:
-    if isinstance(value, Expression):
-        return float(value.at(numbers))
-    return float(value) if isinstance(value, float | int) else None
-
-
 def _solids(line: Line) -> Iterator[Part]:
-    return (inner for inner in _walk(line) if isinstance(inner, Part))
+    return (inner for inner in Source((line,)).walk() if isinstance(inner, Part))
 
 
 def _only_part(line: Line) -> Part | None:
     """The only part inside of loops that mirror; none if there are several lines in them."""
     while isinstance(line, Group):
-        if len(line.body) != 1 or (line is not None and line.kind not in ("row", "mirror")):
+        if len(line.body) != 1 or line.kind not in ("row", "mirror"):
             return None
         line = line.body[0]
     return line if isinstance(line, Part) else None
@@ -236,7 +225,7 @@ def _fits(line: Line, frame: dict[str, str]) -> bool:
         if not {words.low, words.high} & frame.keys():
             continue
         even = frame.get(words.low) == frame.get(words.high)
-        for inner in _walk(line):
+        for inner in Source((line,)).walk():
             if any(SIZES[axis] in names_in(value) for value in values(inner)):
                 return False
             if isinstance(inner, Group) and inner.kind not in ("divide", "mirror"):
@@ -272,7 +261,7 @@ def _saved(line: Line, frame: dict[str, str]) -> int:
         given = dict(part.keywords)
         for word, text in frame.items():
             if str(given.get(word)) == text:
-                axis = next(axis for axis, words in enumerate(AXES) if word in words)
+                axis = axis_of(word)
                 sized = AXES[axis].size in given and not (axis == 2 and word == "bottom")
                 total += len(text.split()) - 1 if sized else 1 + len(text.split())
     return total
@@ -292,13 +281,7 @@ def _inside(line: Line, frame: dict[str, str]) -> Line:
         if str(value) != frame.get(word):
             kept.append((word, value))
             continue
-        axis = next(axis for axis, words in enumerate(AXES) if word in words)
+        axis = axis_of(word)
         if AXES[axis].size in given and word != "bottom":
             kept.append((word, 0.0))
     return replace(line, keywords=tuple(kept))
-
-
-def _walk(line: Line) -> Iterator[Line]:
-    yield line
-    for inner in body_of(line):
-        yield from _walk(inner)

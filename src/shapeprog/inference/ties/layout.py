@@ -108,6 +108,8 @@ class Layout:
         The parts and loops, in the order of the text.
     extents
         Width, depth and height of the whole.
+    loops_around
+        For every line the numbers of the loops around it.
     elements
         All elements, by line, key and axis.
     """
@@ -119,19 +121,14 @@ class Layout:
         self.lines = [line for line in source.walk() if isinstance(line, Part | Group)]
         if any(isinstance(line, Part) and self.fills(line) for line in self.lines):
             self.extents = (self.extents[0], self.extents[0], self.extents[2])
+        self.loops_around: list[list[int]] = [[] for _ in self.lines]
+        for index, loop in enumerate(self.lines):
+            for inner in range(index + 1, index + sum(1 for _ in Source((loop,)).walk())):
+                self.loops_around[inner].append(index)
         self.elements: dict[tuple[int, str, int], Element] = {}
         for index, line in enumerate(self.lines):
             for element in self._elements(index, line):
                 self.elements[index, element.key, element.axis] = element
-
-    def loops_around(self, line: int) -> list[int]:
-        """The numbers of the loops around a line."""
-        result = []
-        for index, loop in enumerate(self.lines[:line]):
-            inside = sum(isinstance(inner, Part | Group) for inner in Source((loop,)).walk()) - 1
-            if isinstance(loop, Group) and line <= index + inside:
-                result.append(index)
-        return result
 
     def lines_of(self, top: Collection[int]) -> set[int]:
         """The numbers of the lines at the top level with these indices, and of all lines inside of them."""

@@ -1,7 +1,7 @@
-"""Boards that lean, as bars between the middles of their ends: where such a part ends is then a number it writes.
+"""Leaning boards as bars between the middles of their ends.
 
-A board says where its lower edge is and by how many degrees it leans, and no sum of numbers says where its upper edge
-is.  Nothing could be tied to it, and it would leave what it holds when the height is changed.
+A board is given by its lower edge and its angle; its upper edge is not linear in these numbers, so nothing could be
+tied to it.  A bar gives both ends.
 """
 
 from __future__ import annotations

@@ -11,7 +11,7 @@ from shapeprog.geometry.scene import Scene
 from shapeprog.inference.fit.adjustment import EXPLAINED, of_target
 from shapeprog.inference.fit.joints import Joints, moved, needs
 from shapeprog.inference.fit.residuals import Target
-from shapeprog.inference.fit.tunable import Poses, Tunable, bounds
+from shapeprog.inference.fit.tunable import THINNEST, Poses, Tunable, bounds
 from shapeprog.inference.surface.evidence import Evidence
 from shapeprog.inference.ties.anchored import Anchored
 from shapeprog.language.evaluate import expanded, symbolic
@@ -25,8 +25,8 @@ DRAWS = 4
 STEPS = 4
 """Steps of Gauss and Newton of a refit."""
 
-TOGETHER, CLOSED = 0.03, 0.2
-"""Weights of a squared gap between parts that touched, and of one that is still open at the end."""
+TOGETHER = 0.03
+"""Weight of a squared gap between parts that touched."""
 
 FARTHEST = 0.5
 """Farthest that one step moves a number, in cells."""
@@ -43,7 +43,6 @@ PRIOR = {
 }
 """Weights of a squared move from the start, by kind: what nothing sees stays where it is."""
 
-
 HELD = 1e6
 """Weight of a squared move of a number that does not move."""
 
@@ -59,7 +58,7 @@ class Model:
         What they must not fall below (P,).
     """
 
-    def __init__(self, anchored: Anchored, thinnest: float) -> None:
+    def __init__(self, anchored: Anchored) -> None:
         self.anchored, self.slots = anchored, anchored.slots
         self.numbers: FloatArray = np.array([slot.value for slot in self.slots])
         self.tunable = Tunable(Program(expanded(anchored.source)))
@@ -77,9 +76,8 @@ class Model:
             else:
                 offset[row] = form
         self._offset = offset
-        smallest = {"size": thinnest, "radius": thinnest / 2, "edge": 0.0}
+        smallest = {"size": THINNEST, "radius": THINNEST / 2, "edge": 0.0}
         self.low: FloatArray = np.array([smallest.get(slot.kind, -np.inf) for slot in self.slots])
-        self.movable = np.array([slot.kind != "extent" for slot in self.slots])
 
     def values(self, numbers: FloatArray) -> torch.Tensor:
         """The numbers of the statements in cells (F,)."""
@@ -133,7 +131,7 @@ class Misfit:
         self.prior: FloatArray = np.where(angles, prior * self.scale**2, prior)
 
     def at(
-        self, numbers: FloatArray, draws: int = DRAWS, joints: Joints | None = None, together: float = TOGETHER
+        self, numbers: FloatArray, draws: int = DRAWS, joints: Joints | None = None
     ) -> tuple[FloatArray, FloatArray]:
         """Half the slope (P,) and half the curvature (P, P) of the mean squared distance, with the prior and joints."""
         count = len(numbers)
@@ -145,15 +143,13 @@ class Misfit:
             curvature += two.numpy() / draws
         if joints is not None and len(joints.first):
             gaps = needs(poses.scene, poses.slopes, moved(poses.scene, joints))
-            wide = together * gaps.slopes
+            wide = TOGETHER * gaps.slopes
             slope += (wide.T @ gaps.residual).numpy()
             curvature += (wide.T @ gaps.slopes).numpy()
         slope += self.prior * (numbers - self.start)
         return slope, curvature + np.diag(self.prior)
 
-    def refitted(
-        self, numbers: FloatArray, free: FloatArray, joints: Joints | None, together: float = TOGETHER
-    ) -> FloatArray:
+    def refitted(self, numbers: FloatArray, free: FloatArray, joints: Joints | None) -> FloatArray:
         """The numbers (P,) of the least misfit that differ from these along directions (P, Z) only; parts that touched
         are kept together."""
         if not free.shape[1]:
@@ -161,7 +157,7 @@ class Misfit:
         farthest = FARTHEST / np.maximum(self.scale, 1.0)
         low = np.minimum(self.model.low, numbers)
         for _ in range(STEPS):
-            slope, curvature = self.at(numbers, 1, joints, together)
+            slope, curvature = self.at(numbers, 1, joints)
             move = free @ -np.linalg.solve(free.T @ curvature @ free, free.T @ slope)
             onwards = numbers + move / float(np.max(np.abs(move) / farthest, initial=1.0))
             if (onwards < low).any():

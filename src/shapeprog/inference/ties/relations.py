@@ -15,7 +15,7 @@ import numpy as np
 
 from shapeprog.inference.ties.anchored import Anchored
 from shapeprog.inference.ties.layout import HIGH, LOW, MIDDLE, Element, Slot
-from shapeprog.language.ast import Group, Part
+from shapeprog.language.ast import Part
 from shapeprog.language.placement import AXES
 from shapeprog.space import FloatArray
 
@@ -166,7 +166,7 @@ def _is_mirrored(anchored: Anchored, element: Element) -> bool:
     if element.key not in ("", "start", "through", "end"):
         return False
     layout, axis = anchored.layout, element.axis
-    planes = (layout.elements.get((loop, "plane", axis)) for loop in layout.loops_around(element.line))
+    planes = (layout.elements.get((loop, "plane", axis)) for loop in layout.loops_around[element.line])
     return any(plane is not None and abs(plane.low - layout.extents[axis] / 2) < WITHIN for plane in planes)
 
 
@@ -177,17 +177,13 @@ def _image(face: Face, numbers: FloatArray) -> Face:
     return face._replace(anchor=2 - face.anchor, row=row, at=extent - face.at, facing=-face.facing)
 
 
-def relations(
-    anchored: Anchored, numbers: FloatArray, touching: set[tuple[int, int]], trust: Trust, reach: float = 1.0
-) -> list[Relation]:
+def relations(anchored: Anchored, numbers: FloatArray, touching: set[tuple[int, int]], trust: Trust) -> list[Relation]:
     """Relations that nearly hold, each once, with the highest trust that any of its readings has.
 
     Parameters
     ----------
     touching
         Pairs of lines, the smaller first, whose parts touch.
-    reach
-        Multiplies by how much relations may be off.
     """
     best: dict[bytes, Relation] = {}
     angles = np.array([slot.kind == "angle" for slot in anchored.slots])
@@ -197,9 +193,9 @@ def relations(
             continue
         row = row / row[used[0]]
         off = abs(float(row @ numbers)) / float(np.abs(row).max())
-        limit = DEGREES if angles[used].all() else WITHIN * reach
+        limit = DEGREES if angles[used].all() else WITHIN
         if off > limit:
-            if not hidden or off > HIDDEN * reach:
+            if not hidden or off > HIDDEN:
                 continue
             worth = trust.hidden if worth < trust.centred else 1.3
         key = np.round(row, 6).tobytes()
@@ -223,8 +219,9 @@ def _candidates(
             yield eye[k], trust.centred if slot.axis == 0 else trust.even, slot.axis == 0
         elif slot.kind == "angle" and not slot.word.startswith("step"):
             yield eye[k], trust.zero, False
+    all_faces = faces(anchored, numbers)
     for axis in range(3):
-        here = [face for face in faces(anchored, numbers) if face.element.axis == axis]
+        here = [face for face in all_faces if face.element.axis == axis]
         for one, two in combinations(here, 2):
             yield from _pair(anchored, one, two, touching, trust, upright)
     lengths = [k for k, slot in enumerate(slots) if slot.kind in ("size", "radius", "edge", "angle", "length")]
@@ -322,7 +319,7 @@ def _other(anchored: Anchored, face: Face) -> FloatArray:
 
 
 def _equal(anchored: Anchored, one: Slot, two: Slot, a: float, b: float, trust: Trust) -> float:
-    """What it is worth that two sizes are equal; 0 for sizes that are not compared."""
+    """The trust in the equality of two sizes; 0 for sizes that are not compared."""
     if one.kind != two.kind:
         return 0.0
     if one.kind != "angle" and abs(a - b) > ALIKE * max(a, b) + ROUNDING:
@@ -348,10 +345,3 @@ def _role(anchored: Anchored, line: int) -> str:
 def _angle(anchored: Anchored, line: int) -> float:
     node = anchored.layout.lines[line]
     return float(dict(node.keywords).get("tilt", 0.0)) if isinstance(node, Part) else 0.0  # type: ignore[arg-type]
-
-
-def _encloses(anchored: Anchored, loop: int, line: int) -> bool:
-    """Whether a line is the first part inside of a loop."""
-    node = anchored.layout.lines[loop]
-    assert isinstance(node, Group)
-    return line > loop and not any(isinstance(anchored.layout.lines[k], Part) for k in range(loop + 1, line))

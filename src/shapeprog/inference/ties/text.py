@@ -1,4 +1,4 @@
-"""The text of a tied program: expressions in place of numbers, names for what is shared, and no keyword too many."""
+"""The text of a tied program: names for shared numbers, expressions for dependent ones, no redundant keywords."""
 
 from __future__ import annotations
 
@@ -57,24 +57,22 @@ def written(anchored: Anchored, solution: Solution, numbers: FloatArray, *, grou
     for p in range(3, len(slots)):
         if factors[p].any():
             users.setdefault(factors[p].round(6).tobytes(), []).append(p)
-    terms: list[Value] = []
+    terms: list[Value] = [0.0] * len(free)
     named: list[tuple[str, Value]] = []
     order = sorted(range(len(free)), key=lambda z: (slots[free[z]].line, free[z]))
-    values_: dict[int, Value] = {}
     for z in order:
         k = free[z]
         unit = np.zeros(len(free))
         unit[z] = 1
         members = users.get(unit.tobytes(), [k])
         if k < 3:
-            values_[z] = Name("diameter" if k < 2 and np.array_equal(factors[0], factors[1]) else SIZES[k])
+            terms[z] = Name("diameter" if k < 2 and np.array_equal(factors[0], factors[1]) else SIZES[k])
         elif (factors[3:, z] != 0).sum() > 1:
             name = namer.name(members)
             named.append((name, to_float32(rounded[z])))
-            values_[z] = Name(name)
+            terms[z] = Name(name)
         else:
-            values_[z] = to_float32(rounded[z])
-    terms = [values_[z] for z in range(len(free))]
+            terms[z] = to_float32(rounded[z])
     table: dict[str, Value] = {}
     sums: list[tuple[str, Value]] = []
     for members in users.values():

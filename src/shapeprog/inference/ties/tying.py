@@ -15,10 +15,10 @@ import torch
 
 from shapeprog.errors import ShapeProgError
 from shapeprog.geometry.arrays import one_tensor_thread
+from shapeprog.geometry.scene import Scene
 from shapeprog.inference.budget import Progress
 from shapeprog.inference.choice.connecting import afloat
 from shapeprog.inference.fit.joints import Joints, find_joints
-from shapeprog.inference.fit.tunable import THINNEST
 from shapeprog.inference.surface.evidence import Evidence
 from shapeprog.inference.ties.anchored import Anchored
 from shapeprog.inference.ties.anchors import AnchorSettings, anchors_of
@@ -40,7 +40,7 @@ from shapeprog.language.unroll import unroll
 from shapeprog.space import FloatArray
 
 PRICE = 3e-4
-"""What a number is worth: mean squared distance in cells; chosen on validation shapes."""
+"""Price of a free number, as a mean squared distance in cells; chosen on validation shapes."""
 
 FAR = 2.0
 """Farthest that relations may move a number at once, in cells."""
@@ -57,9 +57,6 @@ apart, a number is worth so many times less, in so many attempts."""
 
 APART = 0.005
 """Gap in cells from which parts are apart."""
-
-TOUCHING = 0.12
-"""Gap in cells up to which parts should stay together when the whole is changed."""
 
 NOWHERE = -1e6
 """A floor that no part stands on: that parts stand is a clearance of zero."""
@@ -94,7 +91,7 @@ def tie(
     evidence
         What it should fit: how far relations may move its parts.
     price
-        What a number is worth, times ``TieSettings.price`` or ``TieSettings.known_price``.
+        Price of a free number, as a multiple of ``PRICE``, or ``KNOWN_PRICE`` if the numbers are known.
     known
         Whether somebody wrote the numbers: they are then known, and not only where the surface is.
     held
@@ -105,20 +102,22 @@ def tie(
         return Tied(program, 0)
     with one_tensor_thread(kernels=1):
         try:
-            source = placed(plain if held else merged(plain)).source
+            source = placed(plain if held else merged(plain), merge=not held).source
         except ShapeProgError:  # a statement without a placed form
             return Tied(program, free_numbers(program))
         assert source is not None
-        closeness = Closeness(evidence, seed)
         ties = _Ties(Layout(source), evidence, seed, known=known, held=held)
         price *= KNOWN_PRICE if known else PRICE
-        before, floating = closeness.of(unroll(plain)), afloat(plain, seed, APART)
-        for attempt in range(ATTEMPTS):
-            tied = ties.tied(price / CHEAPER**attempt)
-            if progress:
-                progress("tying numbers", (attempt + 1) / ATTEMPTS)
-            if known or (before - closeness.of(unroll(tied)) <= LOST and afloat(tied, seed, APART) <= floating):
-                break
+        tied = ties.tied(price)
+        if not known:
+            closeness = Closeness(evidence, seed)
+            before, floating = closeness.of(unroll(plain)), afloat(plain, seed, APART)
+            for attempt in range(1, ATTEMPTS):
+                if before - closeness.of(unroll(tied)) <= LOST and afloat(tied, seed, APART) <= floating:
+                    break
+                tied = ties.tied(price / CHEAPER**attempt)
+        if progress:
+            progress("tying numbers", 1.0)
     return Tied(tied, free_numbers(tied))
 
 
@@ -126,12 +125,12 @@ class _Ties:
     """Everything about a program that does not depend on the price of a number."""
 
     def __init__(self, layout: Layout, evidence: Evidence, seed: int, *, known: bool, held: Collection[int]) -> None:
-        flat = Model(Anchored(layout, _from_low(layout)), THINNEST)
-        self.layout, self.trust = layout, Trust()
+        flat = Model(Anchored(layout, _from_low(layout)))
+        self.trust = Trust()
         scene = flat.scene(flat.numbers)
         self.joints = _joints(scene, seed)
         self.anchored = Anchored(layout, anchors_of(flat, self.joints, AnchorSettings()))
-        self.model = Model(self.anchored, THINNEST)
+        self.model = Model(self.anchored)
         lines = layout.lines_of(held)
         fixed = np.array([slot.line in lines for slot in self.anchored.slots])
         self.misfit = Misfit(self.model, evidence, seed, np.where(fixed, np.inf, KNOWN if known else 0.0))
@@ -177,8 +176,8 @@ def _from_low(layout: Layout) -> dict[tuple[int, str, int], Anchors]:
     return {key: (LOW, LOW) if element.kind == "interval" else (LOW,) for key, element in layout.elements.items()}
 
 
-def _joints(scene: object, seed: int) -> Joints | None:
+def _joints(scene: Scene, seed: int) -> Joints | None:
     try:
-        return find_joints(scene, NOWHERE, torch.Generator().manual_seed(seed))  # type: ignore[arg-type]
+        return find_joints(scene, NOWHERE, torch.Generator().manual_seed(seed))
     except ShapeProgError:  # a part without a surface touches nothing
         return None

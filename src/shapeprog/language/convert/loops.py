@@ -25,7 +25,7 @@ from shapeprog.language.builtin import CELL_CENTRE
 from shapeprog.language.convert.forms import Triple, cost
 from shapeprog.language.convert.parts import Converted, Parts, ordered
 from shapeprog.language.expression import Binary, Linear, Value
-from shapeprog.language.placement import AXES
+from shapeprog.language.placement import AXES, axis_of
 from shapeprog.space import DEPTH, SIDE, UP
 
 PIVOTED = ("line", "base_cross")
@@ -202,9 +202,7 @@ def with_joined_mirrors(lines: Iterable[Line]) -> tuple[Line, ...]:
         if isinstance(line, Group) and line.kind == "mirror" and len(line.body) == 1:
             (inner,) = line.body
             if isinstance(inner, Group) and inner.kind == "mirror" and not inner.note:
-                axes = [
-                    next(a for a, words in enumerate(AXES) if w in words) for w, _ in (*line.keywords, *inner.keywords)
-                ]
+                axes = [axis_of(word) for word, _ in (*line.keywords, *inner.keywords)]
                 if len(set(axes)) == len(axes):
                     line = replace(line, keywords=ordered((*line.keywords, *inner.keywords)), body=inner.body)
         result.append(line)

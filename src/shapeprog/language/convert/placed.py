@@ -33,11 +33,18 @@ from shapeprog.lazy_torch import torch
 from shapeprog.space import DEPTH, SIDE, UP
 
 
-def placed(program: Program) -> Program:
+def placed(program: Program, *, merge: bool = True) -> Program:
     """The same shape with its parts placed from the sides of the whole.
 
     The whole is the box that the names ``width``, ``depth`` and ``height`` give, or else the bounding box.  Names that
     nothing uses afterwards are left out; names that are words of the language are changed.
+
+    Parameters
+    ----------
+    program
+        The program, in either notation.
+    merge
+        Whether loops that repeat in the same way become one; otherwise lines keep their order.
 
     Raises
     ------
@@ -45,7 +52,7 @@ def placed(program: Program) -> Program:
         If a statement or loop has no placed form, as those that users declare, or a part has no thickness.
     """
     source = source_of(program)
-    return program if source.placed else evaluated(_Converter(program, with_legal_names(source)).source())
+    return program if source.placed else evaluated(_Converter(program, with_legal_names(source)).source(merge=merge))
 
 
 def placed_if_possible(program: Program) -> Program:
@@ -68,8 +75,8 @@ class _Converter(Loops):
         self.versions: dict[str, dict[tuple[object, ...], Function]] = {}
         self.calls = 0
 
-    def source(self) -> Source:
-        """The placed program."""
+    def source(self, *, merge: bool) -> Source:
+        """The placed program, with equal loops merged or in the order of its lines."""
         named_lines = self._whole()
         lines: list[Line] = []
         for line in named_lines:
@@ -89,8 +96,9 @@ class _Converter(Loops):
         cells = 1 / self.per_cell
         unit = self.original.unit
         scale = Scale(cells, -height * cells / 2)
+        joined = with_joined_mirrors(result)
         return Source(
-            without_unused(merged_lines(with_joined_mirrors(result))),
+            without_unused(merged_lines(joined) if merge else joined),
             Unit(unit.name if unit else "", self.per_cell),
             scale,
         )

@@ -196,8 +196,11 @@ class AxisAnchors:
     def solved(self) -> list[Anchors]:
         """The anchors of every element."""
         best: tuple[float, list[int]] | None = None
-        for start in range(3):
-            state = [self._start(unary, start) for unary in self.unary]
+        starts = [[self._start(unary, which) for unary in self.unary] for which in range(3)]
+        for side in ((LOW, LOW), (HIGH, HIGH)):  # all faces measured from one side
+            near = [[choice[:1] + choice[-1:] == side for choice in choices] for choices in self.choices]
+            starts.append([flags.index(True) if any(flags) else 0 for flags in near])
+        for state in starts:
             total = self._cost(state)
             for _ in range(ROUNDS):
                 before = total

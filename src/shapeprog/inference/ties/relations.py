@@ -194,6 +194,8 @@ def relations(anchored: Anchored, numbers: FloatArray, touching: set[tuple[int, 
         row = row / row[used[0]]
         off = abs(float(row @ numbers)) / float(np.abs(row).max())
         limit = DEGREES if angles[used].all() else WITHIN
+        if worth == trust.floor and len(used) == 1:
+            limit = max(limit, FLOOR * numbers[2])
         if off > limit:
             if not hidden or off > HIDDEN:
                 continue

@@ -71,6 +71,9 @@ TOUCH = 0.1
 STEP = 0.3
 """Cells between the first and last copy of a row up to which it does not run along an axis."""
 
+MOST = 6
+"""Most choices of an element."""
+
 ROUNDS = 8
 """Most passes over all elements."""
 
@@ -145,6 +148,11 @@ class AxisAnchors:
                 self.choices[start], self.choices[end] = ([(MIDDLE,)], [(MIDDLE,)]) if apart else ([low], [high])
         self.unary = [[self._unary(element, anchors) for anchors in choices] for element, choices in
                       zip(elements, self.choices, strict=True)]  # fmt: skip
+        self.costs = np.full((len(elements), MOST), np.inf)
+        self.shifts = np.zeros((len(elements), MOST, 2))  # how low and high coordinates move with each choice
+        for k, (costs, choices) in enumerate(zip(self.unary, self.choices, strict=True)):
+            self.costs[k, : len(costs)] = costs
+            self.shifts[k, : len(choices)] = [(SHIFTS[ends[0]], SHIFTS[ends[-1]]) for ends in choices]
         low, high = ends
         half = extent / 2
         self.at_low = (low <= settings.reach * extent) | (high <= half - settings.beyond * half)
@@ -195,67 +203,55 @@ class AxisAnchors:
 
     def solved(self) -> list[Anchors]:
         """The anchors of every element."""
-        best: tuple[float, list[int]] | None = None
-        starts = [[self._start(unary, which) for unary in self.unary] for which in range(3)]
+        order = [np.argsort(unary, kind="stable") for unary in self.unary]
+        starts = [[int(ranks[min(which, len(ranks) - 1)]) for ranks in order] for which in range(3)]
         for side in ((LOW, LOW), (HIGH, HIGH)):  # all faces measured from one side
             near = [[choice[:1] + choice[-1:] == side for choice in choices] for choices in self.choices]
             starts.append([flags.index(True) if any(flags) else 0 for flags in near])
-        for state in starts:
-            total = self._cost(state)
-            for _ in range(ROUNDS):
-                before = total
-                for groups in (*([k] for k in range(len(state))), *self.together):
-                    options = product(*(range(len(self.choices[k])) for k in groups))
-                    for option in options:
-                        trial = state.copy()
-                        for k, choice in zip(groups, option, strict=True):
-                            trial[k] = choice
-                        if trial != state and (cost := self._cost(trial)) < total - 1e-9:
-                            state, total = trial, cost
-                if total >= before - 1e-9:
-                    break
-            if best is None or total < best[0] - 1e-9:
-                best = (total, state)
-        assert best is not None
+        best = min((self._descent(np.array(start)) for start in starts), key=lambda result: round(result[0], 6))
         return [choices[k] for choices, k in zip(self.choices, best[1], strict=True)]
 
-    @staticmethod
-    def _start(unary: list[float], which: int) -> int:
-        order = np.argsort(unary, kind="stable")
-        return int(order[min(which, len(order) - 1)])
+    def _descent(self, state: Array) -> tuple[float, Array]:
+        """The cost and state (K,) from which no change of an element, or of two that touch, is cheaper."""
+        total = float(self._costs(state[None])[0])
+        for _ in range(ROUNDS):
+            before = total
+            for group in (*([k] for k in range(len(state))), *self.together):
+                options = np.array([*product(*(range(len(self.choices[k])) for k in group))])
+                trials = np.repeat(state[None], len(options), 0)
+                trials[:, group] = options
+                costs = self._costs(trials)
+                if costs.min() < total - 1e-9:
+                    state, total = trials[costs.argmin()], float(costs.min())
+            if total >= before - 1e-9:
+                break
+        return total, state
 
-    def _cost(self, state: list[int]) -> float:
-        s = self.settings
-        shifts = np.zeros((len(state), 2))
-        cost = 0.0
-        for k, choice in enumerate(state):
-            anchors = self.choices[k][choice]
-            cost += self.unary[k][choice]
-            shifts[k] = SHIFTS[anchors[0]], SHIFTS[anchors[-1]]
+    def _costs(self, states: Array) -> FloatArray:
+        """The costs (S,) of choices of anchors (S, K)."""
+        s, elements = self.settings, np.arange(states.shape[1])
+        shifts, cost = self.shifts[elements, states], self.costs[elements, states].sum(1)  # (S, K, 2), (S,)
         for one, two, worth in self.spans:
-            cost += worth * (state[one] != state[two])
+            cost += worth * (states[:, one] != states[:, two])
         for last, first in self.loops.items():  # what a row names of its last copy is a side or the middle of it
-            shifts[last] -= SHIFTS[self.choices[last][state[last]][0]] * (shifts[first, 1] - shifts[first, 0])
-        moved = self.base + np.einsum("enkc,kc->en", self.slopes, shifts)
-        low, high = moved
+            shifts[:, last] -= shifts[:, last, :1] * (shifts[:, first, 1:] - shifts[:, first, :1])
+        low, high = (self.base[end] + np.tensordot(shifts, self.slopes[end], ((1, 2), (1, 2))) for end in (0, 1))
         far = 0.25 * self.extent
         # A face near a side moves with it, or keeps its proportion.
         ask_low = self.at_low & (np.abs(low - np.clip(low, -0.13, np.maximum(self.share[0], 0) + 0.13)) > 1e-9)
         ask_high = self.at_high & (np.abs(high - np.clip(high, np.minimum(self.share[1], 1) - 0.13, 1.13)) > 1e-9)
         rigid = self.long & (high - low < self.share[1] - self.share[0] - 0.5)
-        costs = np.where(self.reaches_low, s.reaching, s.side)[ask_low].sum()
-        costs += np.where(self.reaches_high, s.reaching, s.side)[ask_high].sum() + s.rigid * rigid.sum()
-        copies = max(1.0, len(low) / len(state))
-        cost += float(costs) / copies
+        each = ask_low @ np.where(self.reaches_low, s.reaching, s.side) + s.rigid * rigid.sum(1)
+        each += ask_high @ np.where(self.reaches_high, s.reaching, s.side)
         if len(self.contacts.first):
-            grown = high[self.upper] - low[self.lower]
+            grown = high[:, self.upper] - low[:, self.lower]
             apart = self.overlap + far * grown < np.minimum(self.overlap, 0) - TOUCH
             pressed = (grown > 1e-9) & (self.overlap < 1.5 * TOUCH)
-            leaning = self.contacts.leaning
-            gap = self.contacts.gaps + far * (self.contacts.base + np.einsum("ckd,kd->c", self.contacts.slopes, shifts))
-            apart[leaning] |= gap > np.maximum(self.contacts.gaps, 0) + TOUCH
-            cost += (s.apart * float(apart.sum()) + s.pressed * float(pressed.sum())) / copies
-        return cost
+            contacts = self.contacts
+            opened = contacts.base + np.tensordot(shifts, contacts.slopes, ((1, 2), (1, 2)))
+            apart[:, contacts.leaning] |= contacts.gaps + far * opened > np.maximum(contacts.gaps, 0) + TOUCH
+            each += s.apart * apart.sum(1) + s.pressed * pressed.sum(1)
+        return cost + each / max(1.0, low.shape[1] / len(elements))
 
 
 def anchors_of(model: Model, joints: Joints | None, settings: AnchorSettings) -> dict[tuple[int, str, int], Anchors]:

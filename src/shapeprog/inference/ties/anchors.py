@@ -42,21 +42,23 @@ class AnchorSettings:
         one that is longer and keeps it.
     middle
         An end measured from the middle, where the middle of the part is not that of the whole.
-    farther
-        An end measured from the farther side, times the difference of the distances as a share of the whole.
+    farther, hanging
+        An end measured from the farther side, times the difference of the distances as a share of the whole; and a
+        height measured from the top, times the distance as a share of the whole, less a tenth.
     reach, beyond, spanning
         Shares of the whole: up to this a face reaches a side; parts wholly beyond this share of the half are near that
         side; and from this on they span.
     """
 
-    apart: float = 3.0
+    apart: float = 5.0
     pressed: float = 0.6
     side: float = 2.0
     reaching: float = 8.0
     resized: float = 2.0
     rigid: float = 5.0
     middle: float = 0.5
-    farther: float = 0.4
+    farther: float = 1.0
+    hanging: float = 0.3
     reach: float = 0.02
     beyond: float = 0.3
     spanning: float = 0.6
@@ -163,10 +165,8 @@ class AxisAnchors:
         self.share = np.stack([low, high]) / extent
         self.long = high - low >= settings.spanning * extent
         one, two = contacts.first, contacts.second
-        self.contacts = contacts
-        self.lower = np.where(low[one] >= low[two], one, two)  # whose low end begins the overlap
-        self.upper = np.where(high[one] <= high[two], one, two)
-        self.overlap = high[self.upper] - low[self.lower]
+        self.contacts, self.ends = contacts, ends
+        self.overlap = self._overlaps(low, high)
         moved_by = (np.abs(slopes).max((0, 3)) > 0).astype(int)  # (N, K)
         both = moved_by[one].T @ moved_by[two] if len(one) else np.zeros((len(elements),) * 2)
         both = both + both.T + (moved_by.T @ moved_by)
@@ -194,7 +194,12 @@ class AxisAnchors:
                 cost += s.middle * (abs(end - extent / 2) > CENTRED * extent or len(set(anchors)) > 1)
             else:
                 distance = end if anchor == LOW else extent - end
-                cost += s.farther * max(0.0, 2 * distance / extent - 1)
+                if (
+                    self.axis == 2 and element.key != "last"
+                ):  # heights are measured from the floor, but for what hangs from the top
+                    cost += s.hanging * (anchor == HIGH) * max(0.0, distance / extent - 0.1)
+                else:
+                    cost += s.farther * max(0.0, 2 * distance / extent - 1)
         if element.kind == "interval":
             size = (element.high - element.low) / extent
             if anchors[0] != anchors[1]:
@@ -227,6 +232,11 @@ class AxisAnchors:
                 break
         return total, state
 
+    def _overlaps(self, low: FloatArray, high: FloatArray) -> FloatArray:
+        """How far pairs (..., C) of primitives that touch overlap along the axis, from their ends (..., N)."""
+        one, two = self.contacts.first, self.contacts.second
+        return np.minimum(high[..., one], high[..., two]) - np.maximum(low[..., one], low[..., two])
+
     def _costs(self, states: Array) -> FloatArray:
         """The costs (S,) of choices of anchors (S, K)."""
         s, elements = self.settings, np.arange(states.shape[1])
@@ -244,10 +254,10 @@ class AxisAnchors:
         each = ask_low @ np.where(self.reaches_low, s.reaching, s.side) + s.rigid * rigid.sum(1)
         each += ask_high @ np.where(self.reaches_high, s.reaching, s.side)
         if len(self.contacts.first):
-            grown = high[:, self.upper] - low[:, self.lower]
-            apart = self.overlap + far * grown < np.minimum(self.overlap, 0) - TOUCH
-            pressed = (grown > 1e-9) & (self.overlap < 1.5 * TOUCH)
             contacts = self.contacts
+            grown = self._overlaps(self.ends[0] + far * low, self.ends[1] + far * high) - self.overlap
+            apart = self.overlap + grown < np.minimum(self.overlap, 0) - TOUCH
+            pressed = (grown > 1e-9) & (self.overlap < 1.5 * TOUCH)
             opened = contacts.base + np.tensordot(shifts, contacts.slopes, ((1, 2), (1, 2)))
             apart[:, contacts.leaning] |= contacts.gaps + far * opened > np.maximum(contacts.gaps, 0) + TOUCH
             each += s.apart * apart.sum(1) + s.pressed * pressed.sum(1)

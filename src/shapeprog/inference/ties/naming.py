@@ -75,6 +75,9 @@ class Namer:
         kind = max(kinds, key=lambda word: (kinds[word], -[*kinds].index(word)))
         if len(roles) > 1 and kind in ("thickness", "radius", "inset", "setback", "edge", "tilt"):
             yield kind
+        elif len(roles) > 1 and kind in SIZES:  # a number that no single part owns
+            lines = [self.slots[k].line for k in chosen]
+            yield "section" if len(set(lines)) < len(lines) else "board_width"
         for role, _ in roles.most_common():
             own = Counter(self._kind(self.slots[k]) for k in chosen if self._role(self.slots[k].line) == role)
             yield f"{role}_{own.most_common(1)[0][0]}"
@@ -103,7 +106,7 @@ class Namer:
         if slot.kind == "size":
             return self._size(slot)
         if slot.kind == "clearance":
-            return "inset" if slot.axis == 0 else "setback" if slot.axis == 1 else word
+            return "inset" if slot.axis == 0 else "setback" if slot.axis == 1 else "drop" if word == "top" else word
         if slot.kind == "offset":
             return "offset"
         return slot.kind if slot.kind in ("radius", "edge") else slot.word.partition(".")[0]

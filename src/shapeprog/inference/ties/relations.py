@@ -63,14 +63,12 @@ class Trust:
         Faces in one plane of parts that touch, of which one is a sum.
     half
         An edge that is half a thin side of its part.
-    far
-        Faces in one plane of parts that do not touch, of which one is a sum.
     hidden
         Contacts and centred parts off by so much that only hidden surfaces can be meant.
     """
 
     zero: float = 1.0
-    floor: float = 4.0
+    floor: float = 6.0
     centred: float = 4.0
     even: float = 2.0
     contact: float = 2.0
@@ -85,7 +83,6 @@ class Trust:
     centre: float = 1.5
     middle: float = 0.4
     half: float = 0.5
-    far: float = 0.4
     hidden: float = 0.6
 
 
@@ -297,10 +294,8 @@ def _pair(
     elif one.facing == two.facing and straight:
         if one.single and two.single:
             yield row, trust.flush if touches else trust.aligned, False
-        else:
-            yield row, trust.middle if touches else trust.far, False
-    elif one.facing * two.facing == -1 and straight:
-        yield row, trust.far, False
+        elif touches:
+            yield row, trust.middle, False
     if touches and axis < 2 and (first.kind, second.kind) in (("coordinate", "interval"), ("interval", "coordinate")):
         point, box = (one, two) if first.kind == "coordinate" else (two, one)
         if not box.single and box.facing:  # the middle of a box that it touches

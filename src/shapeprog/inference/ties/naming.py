@@ -76,8 +76,8 @@ class Namer:
         if len(roles) > 1 and kind in ("thickness", "radius", "inset", "setback", "edge", "tilt"):
             yield kind
         elif len(roles) > 1 and kind in SIZES:  # a number that no single part owns
-            lines = [self.slots[k].line for k in chosen]
-            yield "section" if len(set(lines)) < len(lines) else "board_width"
+            uses = Counter(self.slots[k].line for k in chosen).most_common(1)[0]
+            yield f"{self._role(uses[0])}_width" if uses[1] > 1 else "board_width"  # that of a square section
         for role, _ in roles.most_common():
             own = Counter(self._kind(self.slots[k]) for k in chosen if self._role(self.slots[k].line) == role)
             yield f"{role}_{own.most_common(1)[0][0]}"

@@ -160,9 +160,8 @@ def test_counts_and_unions_are_those_of_single_cells(resolution):
     assert count(preceding(first)[0]) == 0
 
 
-@pytest.mark.parametrize("resolution", RESOLUTIONS)
-def test_widened_cells_reach_one_cell_through_every_face(resolution):
-    cells = random_cells(resolution, (), seed=3) & (random_cells(resolution, (), seed=4))
+def test_widened_cells_reach_one_cell_through_every_face():
+    cells = random_cells(32, (), seed=3) & (random_cells(32, (), seed=4))
     wide = np.pad(cells.numpy(), 1)
     moved = [np.roll(wide, step, axis) for axis in range(3) for step in (-1, 1)]
     expected = np.logical_or.reduce([wide, *moved])[1:-1, 1:-1, 1:-1]

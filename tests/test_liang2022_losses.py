@@ -105,11 +105,11 @@ def expected(samples: int, estimate: object) -> tuple[Tensor, Tensor]:
 @pytest.mark.parametrize("samples", [2, 3])
 def test_leave_one_out_is_unbiased(samples: int):
     def estimate(log_probs: Tensor, costs: Tensor) -> Tensor:
-        advantage = losses.leave_one_out_advantage(costs[:, None])[..., None]
+        advantage = losses.leave_one_out(costs[:, None])[..., None]
         return losses.reinforce_loss(log_probs[:, None, None], advantage)
 
     torch.testing.assert_close(*expected(samples, estimate), atol=1e-12, rtol=0)
-    assert losses.leave_one_out_advantage(torch.tensor([[1.0], [4.0]])).tolist() == [[-3], [3]]
+    assert losses.leave_one_out(torch.tensor([[1.0], [4.0]])).tolist() == [[-3], [3]]
 
 
 @pytest.mark.parametrize("variance", [0.5, 9.0])

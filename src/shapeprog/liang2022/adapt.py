@@ -38,14 +38,7 @@ from shapeprog.language.statement import EMPTY
 from shapeprog.liang2022.decode import Decoded, decode
 from shapeprog.liang2022.evaluate import scores_on_packs
 from shapeprog.liang2022.generator import IDS, STEPS, Prediction, TeacherForcingBatch
-from shapeprog.liang2022.losses import (
-    Comparison,
-    NvilBaseline,
-    compute,
-    leave_one_out_advantage,
-    parse_losses,
-    reinforce_loss,
-)
+from shapeprog.liang2022.losses import Comparison, NvilBaseline, compute, leave_one_out, parse_losses, reinforce_loss
 from shapeprog.liang2022.pretrain import teacher_forcing
 from shapeprog.liang2022.prior import PRIORS, scramble
 from shapeprog.liang2022.settings import METHODS, NEURAL, AdaptSettings
@@ -57,6 +50,7 @@ RLOO_SAMPLES = 4  # programs sampled for each shape by the leave-one-out estimat
 DOT = Program((Draw("leg", (-0.1,) * 3 + (0.2,) * 3),))  # the smallest part, in the centre; for programs that draw none
 
 Targets: TypeAlias = tuple[UInt8[Tensor, "B 32 32 32"], Float[Tensor, "B P 3"]]  # cells; points on surfaces, in cells
+AdaptBatch: TypeAlias = tuple[Targets, TeacherForcingBatch | None]  # real shapes, and synthetic ones to rehearse
 
 
 class TargetStream:
@@ -70,12 +64,10 @@ class TargetStream:
 
     def __getitem__(self, index: int) -> Targets:
         """The batch of an index, 0 or more."""
-        count, numbers = len(self._shapes), range(index * self._batch_size, (index + 1) * self._batch_size)
-        rounds = {number // count for number in numbers}
-        orders = {n: np.random.default_rng((self._seed, 0, n)).permutation(count) for n in rounds}
-        rng, cells, points = np.random.default_rng((self._seed, 1, index)), [], []
-        for number in numbers:
-            pack, row = self._shapes[orders[number // count][number % count]]
+        count, rng, cells, points = len(self._shapes), np.random.default_rng((self._seed, 1, index)), [], []
+        for number in range(index * self._batch_size, (index + 1) * self._batch_size):
+            order = np.random.default_rng((self._seed, 0, number // count)).permutation(count)
+            pack, row = self._shapes[order[number % count]]
             shape = pack[row]
             cloud = points_of_cells(shape.voxels, 5000) if shape.points is None else shape.points
             cells.append(shape.voxels.astype(np.uint8))
@@ -107,7 +99,7 @@ class AdaptTask:
             if not len(read_pack(Path(path))):
                 raise ShapeProgError(f"there are no shapes to validate on in {path}", "leave it out")
 
-    def batch(self, index: int) -> tuple[Targets, TeacherForcingBatch | None]:
+    def batch(self, index: int) -> AdaptBatch:
         """Real shapes, and synthetic ones to rehearse."""
         settings = self._settings
         if not settings.rehearsal or settings.learn == "offsets":
@@ -117,9 +109,7 @@ class AdaptTask:
         rehearsed = teacher_forcing(made.voxels, made.code, self.network.order)
         return self._targets[index], rehearsed.subset(REHEARSAL_CANVASES, rng)
 
-    def losses(
-        self, batch: tuple[Targets, TeacherForcingBatch | None], progress: float, rng: torch.Generator
-    ) -> dict[str, Tensor]:
+    def losses(self, batch: AdaptBatch, progress: float, rng: torch.Generator) -> dict[str, Tensor]:
         """Losses of the rendered programs, of their ids, and of the rehearsal."""
         settings, generator = self._settings, self.network.eval()  # statistics of the normalisation stay
         repeats = RLOO_SAMPLES if settings.estimator == "rloo" else 1
@@ -175,7 +165,7 @@ class AdaptTask:
             return losses
         costs = 1 - decoded.iou().to(log_prob)
         if settings.estimator == "rloo":
-            advantage = leave_one_out_advantage(costs.reshape(RLOO_SAMPLES, -1)).reshape(-1, 1)
+            advantage = leave_one_out(costs.reshape(RLOO_SAMPLES, -1)).reshape(-1, 1)
         else:
             advantage, losses["baseline"] = self.module["baseline"](prediction.feature, prediction.batch.live, costs)
         return losses | {"estimator": reinforce_loss(log_prob, advantage), "_cost": costs.mean()}

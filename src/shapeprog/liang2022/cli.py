@@ -47,8 +47,7 @@ def infer_command(
     from shapeprog.data import load_all
     from shapeprog.files import make_folder
     from shapeprog.formats import save
-    from shapeprog.liang2022.decode import decode
-    from shapeprog.liang2022.weights import load_generator
+    from shapeprog.liang2022 import decode, load_generator
 
     generator, failed = load_generator(weights), False
     for _, shape in load_all(inputs):
@@ -81,8 +80,7 @@ def sample_command(
     """
     from shapeprog.liang2022.prior import programs
 
-    samples = programs(prior, count, seed)
-    write_samples(prior, samples, seed, out=out)
+    write_samples(prior, programs(prior, count, seed), seed, out=out)
 
 
 @app.command("models")
@@ -158,8 +156,6 @@ def _add_training(name: str, kind: type[Any], task: str, doc: str) -> None:
         files: Annotated[list[Path] | None, typer.Option("--with", help="Python files that declare losses.")] = None,
         **options: Any,
     ) -> None:
-        from rich.progress import Progress
-
         from shapeprog.data.reading import check_file
         from shapeprog.liang2022.loop import train, tune_allocator
 
@@ -172,17 +168,15 @@ def _add_training(name: str, kind: type[Any], task: str, doc: str) -> None:
                 runpy.run_path(str(file))
             except Exception as error:
                 raise InputError(f"{file} raised {type(error).__name__}: {error}", "correct it") from error
-        console, last = terminal.errors(), {"samples_seen": 0.0}
-        bar = Progress(console=console, disable=quiet or not console.is_terminal)
-        with _stop_event() as stop, bar:
-            progress = bar.add_task("training", total=settings.num_shapes)
-            made = pkgutil.resolve_name(f"shapeprog.liang2022.{task}")(settings)
+        last = {"samples_seen": 0.0}
+        with _stop_event() as stop, terminal.progress(not quiet) as begin:
+            update, made = begin("training"), pkgutil.resolve_name(f"shapeprog.liang2022.{task}")(settings)
             steps = train(made, settings, folder, device=device, restart=restart, stop=stop, command=COMMAND_LINE)
             for last in steps:
-                bar.update(progress, completed=last["samples_seen"], description=f"loss {last['loss']:.3f}")
+                update(f"loss {last['loss']:.3f}", last["samples_seen"] / settings.num_shapes)
                 scores = [f"{key[4:]} {value:.4g}" for key, value in last.items() if key.startswith("val_")]
                 if scores and not quiet:
-                    console.print(f"{last['samples_seen']:.0f} shapes: {', '.join(scores)}", markup=False)
+                    terminal.errors().print(f"{last['samples_seen']:.0f} shapes: {', '.join(scores)}", markup=False)
         if stop.is_set() and last["samples_seen"] < settings.num_shapes:
             raise terminal.Interrupted(f"{folder} holds the run; the same command resumes it")
         if not quiet:

@@ -18,8 +18,7 @@ from jaxtyping import Float, Int, UInt8
 from torch import Tensor
 
 from shapeprog.errors import ShapeProgError, did_you_mean
-from shapeprog.geometry.cells import Cells, count, iou, pack, union, unpack
-from shapeprog.kernels.bits import WORD
+from shapeprog.geometry.cells import count, iou, pack, union, unpack
 from shapeprog.language import Code, Program, unroll
 from shapeprog.language import decode as programs_of
 from shapeprog.language.statement import EMPTY, SLOTS
@@ -145,17 +144,11 @@ def _choose(
     return take(candidates, best, score.gather(1, best) > 0)[:, 0]
 
 
-def widen(cells: Cells) -> Cells:
+def widen(cells: Int[Tensor, "*batch 32 32"]) -> Int[Tensor, "*batch 32 32"]:
     """All cells that share a face with a filled one, and these themselves."""
-    resolution = cells.shape[-1]
-    words = cells.unflatten(-2, (-1, resolution))
-    wide = words | (words << 1) | ((words >> 1) & 0x7FFFFFFF)  # the sign must not be drawn in
-    wide[..., 1:, :, :] |= (words[..., :-1, :, :] >> 31) & 1
-    wide[..., :-1, :, :] |= words[..., 1:, :, :] << 31
-    if resolution % WORD:
-        wide[..., -1, :, :] &= (1 << resolution % WORD) - 1
-    wide[..., 1:, :] |= words[..., :-1, :]
-    wide[..., :-1, :] |= words[..., 1:, :]
-    wide[..., 1:] |= words[..., :-1]
-    wide[..., :-1] |= words[..., 1:]
-    return wide.flatten(-3, -2)
+    wide = cells | (cells << 1) | ((cells >> 1) & 0x7FFFFFFF)  # the sign must not be drawn in
+    wide[..., 1:, :] |= cells[..., :-1, :]
+    wide[..., :-1, :] |= cells[..., 1:, :]
+    wide[..., 1:] |= cells[..., :-1]
+    wide[..., :-1] |= cells[..., 1:]
+    return wide

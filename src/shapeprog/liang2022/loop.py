@@ -26,6 +26,7 @@ from typing import Any, Protocol, runtime_checkable
 import torch
 import torch.distributed as dist
 from torch import Tensor, nn
+from torch.optim import AdamW
 
 from shapeprog.errors import InputError, ShapeProgError
 from shapeprog.files import lock, make_folder, output_error, write_bytes, write_text
@@ -78,9 +79,7 @@ def train(
     module = task.module.to(where).to(memory_format=torch.channels_last_3d).train()  # type: ignore[call-overload]
     weights = [weight for weight in module.parameters() if weight.requires_grad]
     buffers = [buffer for buffer in module.buffers() if buffer.is_floating_point()]
-    optimiser = torch.optim.AdamW(
-        weights, lr=settings.learning_rate, betas=(settings.beta1, 0.999), weight_decay=settings.weight_decay
-    )
+    optimiser = AdamW(weights, betas=(settings.beta1, 0.999), weight_decay=settings.weight_decay)
     together = settings.batch_size * world
     steps, step, best = math.ceil(settings.num_shapes / together), 0, -math.inf
     with (make_folder(folder) / "lock").open("a") as stream:
@@ -195,9 +194,7 @@ def _prefetch(make: Callable[[int], Any], indices: Iterable[int]) -> Iterator[An
             yield batch.result()
 
 
-def _resume(
-    path: Path, settings: TrainingSettings, module: nn.Module, optimiser: torch.optim.Optimizer
-) -> tuple[int, float]:
+def _resume(path: Path, settings: TrainingSettings, module: nn.Module, optimiser: AdamW) -> tuple[int, float]:
     """Load the state of a run, by torch's reader that runs no code; its step and best score."""
     try:
         if zipfile.ZipFile(path).testzip():  # torch does not compare the checksums
@@ -214,13 +211,7 @@ def _resume(
 
 
 def append_line(path: str | Path, line: str) -> None:
-    """Add a line to a file; a line that was added in part, because the disk became full, lacks its line feed.
-
-    Raises
-    ------
-    OutputError
-        If it cannot be written.
-    """
+    """Add a line to a file; an ``OutputError`` if it does not fit on the disk, where it may lack its end."""
     remaining = f"{line}\n".encode()
     try:
         with Path(path).open("ab", buffering=0) as stream:  # a buffer would fail again when it is closed

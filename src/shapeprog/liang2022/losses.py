@@ -56,10 +56,7 @@ LOSSES: dict[str, Loss] = {}  # declared losses by name
 
 
 def loss(name: str) -> Callable[[Loss], Loss]:
-    """Declare the decorated function as a loss, called by its name in settings such as ``chamfer=1``.
-
-    Raises a ``DeclarationError`` if the name is taken, or cannot be written in settings.
-    """
+    """Declare a loss by its name in settings such as ``chamfer=1``; a ``DeclarationError`` if taken or no word."""
     if name in LOSSES or name == NEURAL:
         raise DeclarationError(f"the loss {name!r} is declared twice", "give one of them another name")
     if not is_word(name):
@@ -104,10 +101,7 @@ def soft_iou(comparison: Comparison) -> Values:
 
 
 def parse_losses(text: str) -> dict[str, float]:
-    """Weights by name from text such as ``chamfer=1,soft_iou=3``; a name alone weighs 1.
-
-    Raises a ``ShapeProgError`` if a name is unknown or given twice, or a weight is not a positive number.
-    """
+    """Weights by name from text such as ``chamfer=1,soft_iou=3``, 1 by default; a ``ShapeProgError`` if it has none."""
     weights: dict[str, float] = {}
     known = [*LOSSES, NEURAL]
     for part in text.split(","):
@@ -127,10 +121,7 @@ def parse_losses(text: str) -> dict[str, float]:
 
 
 def compute(comparison: Comparison, weights: Mapping[str, float]) -> dict[str, Values]:
-    """Weighted losses by name, all but that of the neural executor.
-
-    Raises a ``ShapeProgError`` if a loss fails, does not return one value for each shape, or has no gradient.
-    """
+    """Weighted losses by name but that of the neural executor; a ``ShapeProgError`` if one has no value or gradient."""
     values = {}
     for name in [name for name in weights if name != NEURAL]:
         try:
@@ -165,9 +156,8 @@ class NvilBaseline(nn.Module):
     ) -> tuple[Float[Tensor, "B K"], Float[Tensor, ""]]:
         """The advantage of the ids of every block, without gradient, and the loss that trains the baseline.
 
-        From the features of the M live blocks and the cost of every program.  The advantage is the cost minus running
-        mean and prediction, divided by the running standard deviation where that is above 1, and 0 where no block was
-        sampled; the loss is the mean squared error of the prediction.  Running statistics change in training alone.
+        The advantage is the cost minus running mean and prediction, divided by the running standard deviation where
+        that is above 1, and 0 where no block was sampled.  Running statistics change in training alone.
         """
         centred = (costs - self.mean)[:, None].expand(live.shape)[live]
         predicted = self.layers(feature.detach().to(self.mean))[:, 0]
@@ -179,7 +169,7 @@ class NvilBaseline(nn.Module):
         return advantage.new_zeros(live.shape).masked_scatter(live, advantage), (predicted - centred).square().mean()
 
 
-def leave_one_out_advantage(costs: Float[Tensor, "S B"]) -> Float[Tensor, "S B"]:
+def leave_one_out(costs: Float[Tensor, "S B"]) -> Float[Tensor, "S B"]:
     """The cost of each of S > 1 samples minus the mean cost of the others (Kool et al. 2019)."""
     return (costs - costs.mean(0)) * (len(costs) / (len(costs) - 1))
 

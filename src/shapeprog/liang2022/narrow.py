@@ -1,9 +1,4 @@
-"""The published synthetic tables and chairs: ten kinds and four (Tian et al., ICLR 2019).
-
-Every translation repeats exactly twice.  Half extents of tops are 4 to 12 cells, their thickness 1 to 5; legs are 1 to
-3 wide and 5 to 24 high; backs 1 to 3 thick and tilted by 0 to 4; supports have radii of 1 to 11, lines of 1; rotations
-make 3 to 6 copies.
-"""
+"""The published synthetic tables and chairs: ten kinds and four (Tian et al., ICLR 2019); translations repeat twice."""
 
 from __future__ import annotations
 

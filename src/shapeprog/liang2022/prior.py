@@ -61,7 +61,6 @@ class Prior:
 
 
 PRIORS = {"narrow": Prior(narrow.TEMPLATES), "wide": Prior(wide.TEMPLATES, off_centre=0.05, details=0.6)}
-"""The mix of the published synthetic data, and furniture of many kinds."""
 
 
 def programs(name: str, count: int, seed: int = 0) -> list[Program]:

@@ -60,10 +60,8 @@ class TrainingSettings:
         current = {name: value for name, value in asdict(self).items() if name not in self.MAY_CHANGE}
         changed = [f"{k} was {saved.get(k)!r}, is now {v!r}" for k, v in current.items() if saved.get(k) != v]
         if changed:
-            raise ShapeProgError(
-                f"the run in {folder} has other settings: {'; '.join(changed)}",
-                "give the same settings, choose another folder, or start over with --restart",
-            )
+            cure = "give the same settings, choose another folder, or start over with --restart"
+            raise ShapeProgError(f"the run in {folder} has other settings: {'; '.join(changed)}", cure)
 
 
 @dataclass(frozen=True, kw_only=True)

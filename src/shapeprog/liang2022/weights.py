@@ -66,9 +66,7 @@ def save_weights(path: str | os.PathLike[str], module: nn.Module, *, half: bool 
     """
     from shapeprog import __version__
 
-    design, settings = "executor", {}
-    if isinstance(module, Generator):
-        design, settings = module.design, asdict(module.settings)
+    design, settings = (module.design, asdict(module.settings)) if isinstance(module, Generator) else ("executor", {})
     card = Card(design, settings, version=__version__, **card_fields)
     tensors = {}
     for name, value in module.state_dict().items():
@@ -94,10 +92,7 @@ def read_card(path: str | os.PathLike[str]) -> Card:
 
 
 def load_weights(name: str | os.PathLike[str]) -> tuple[nn.Module, Card]:
-    """The network of a file or of a bare name that ships, in evaluation mode, and its card.
-
-    Raises an ``InputError`` for a file that is missing, damaged or of another network.
-    """
+    """The network of a file or of a bare name, in evaluation mode, and its card; an ``InputError`` if it is damaged."""
     path = _path(name)
     card = read_card(path)
     with in_words(path, "weights"), safe_open(path, "pt") as file:
@@ -124,10 +119,7 @@ def load_executor(name: str | os.PathLike[str] = "executor") -> NeuralExecutor:
 
 
 def read_published(path: str | os.PathLike[str]) -> nn.Module:
-    """The generator, with statistics of the batch, or executor of a published ``.t7`` file; nothing in it is run.
-
-    Raises an ``InputError`` for a file that cannot be read, holds more than weights, or fits neither network.
-    """
+    """The generator or executor of a published ``.t7`` file, in which nothing is run; else an ``InputError``."""
     path = Path(path)
     check_file(path)
     check_count(path.name, "bytes", path.stat().st_size, LARGEST_PUBLISHED)

@@ -141,7 +141,7 @@ def test_adaptation_validates_keeps_the_best_and_resumes_exactly(room: Path, tmp
     assert (tmp_path / "two" / BEST).is_file()
 
 
-def test_pretraining_learns_and_says_what_its_weights_are(room: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def test_pretraining_learns_and_describes_its_weights(room: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(pretrain, "VALIDATION_BATCHES", 1)
     options = {"initial": str(room / "fast.safetensors"), "batch_size": 8, "warm_up": 0}
     settings = PretrainSettings(**options, num_shapes=160, learning_rate=0.01)  # type: ignore[arg-type]
@@ -211,7 +211,7 @@ def refuse(room: Path, message: str, method: str = "direct", **options: Any) -> 
         task(room, method, **options)
 
 
-def test_what_cannot_be_adapted_is_said_before_it_begins(room: Path, tmp_path: Path):
+def test_what_cannot_be_adapted_is_an_error_before_it_begins(room: Path, tmp_path: Path):
     write_pack(tmp_path / "empty.npz", [])
     empty, gone = (str(tmp_path / name) for name in ("empty.npz", "gone.npz"))
     refuse(room, r"there is no pack .*gone\.npz", train=(gone,))

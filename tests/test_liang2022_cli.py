@@ -105,7 +105,7 @@ def test_a_users_loss_adapts_and_an_interrupted_run_is_resumed_by_the_same_comma
         (["paper", "import", "table.obj", "--out", "a.safetensors"], "nothing in it was run"),
     ],
 )
-def test_mistakes_are_told_in_a_sentence(run: Run, here: Path, words: list[str], message: str):
+def test_mistakes_are_explained_in_a_sentence(run: Run, here: Path, words: list[str], message: str):
     ended = run(*words)
     assert ended.code == 2
     assert message in " ".join(ended.err.split())

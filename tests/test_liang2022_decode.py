@@ -42,7 +42,7 @@ def test_canvases_are_the_cells_of_the_blocks_before(decoder: str):
     torch.testing.assert_close(result.iou().double(), both / either.double())
     live = result.live
     assert not result.code.ids[~live].any(), "nothing follows the end"
-    whole = encode(result.programs(whole=True), blocks=10)
+    whole = encode(result.programs(rounded=True), blocks=10)
     assert torch.equal(union(draw_blocks(whole)), union(drawn))
 
 

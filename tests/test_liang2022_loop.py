@@ -1,4 +1,4 @@
-"""The training loop: it resumes exactly, on one process and on two, and says in a sentence what is wrong."""
+"""The training loop: it resumes exactly, on one process and on two, and explains errors in a sentence."""
 
 from __future__ import annotations
 

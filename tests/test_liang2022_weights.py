@@ -73,7 +73,7 @@ def test_files_of_the_other_network_and_names_that_do_not_ship_are_refused(tmp_p
             reader(name)
 
 
-def test_a_run_without_a_validation_has_no_weights_yet_and_says_so(tmp_path: Path):
+def test_a_run_without_a_validation_is_an_error_with_a_cure(tmp_path: Path):
     run(tmp_path / "executor", stop_at=2)
     for name in ("executor/weights.safetensors", "executor"):
         with pytest.raises(InputError, match=r"the run in .*executor has no weights yet\n.*--validate-every"):

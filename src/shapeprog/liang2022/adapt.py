@@ -179,5 +179,5 @@ class AdaptTask:
 
 def predicted_code(prediction: Prediction, base: bool = True) -> Code:
     """Decoded programs with the predicted numbers, with gradient to all weights, or without ``base`` to offsets."""
-    numbers = (prediction.numbers if base else prediction.given) + prediction.offsets
+    numbers = (prediction.numbers if base else prediction.inputs) + prediction.offsets
     return Code(prediction.batch.code.ids, prediction.scatter(numbers.float()))

@@ -160,8 +160,8 @@ def _add_training(name: str, kind: type[Any], task: str, doc: str) -> None:
         from shapeprog.liang2022.loop import train, tune_allocator
 
         tune_allocator()
-        given = {key: value for key, value in options.items() if value not in (None, [])}
-        settings = kind(**{key: tuple(value) if isinstance(value, list) else value for key, value in given.items()})
+        values = {key: value for key, value in options.items() if value not in (None, [])}
+        settings = kind(**{key: tuple(value) if isinstance(value, list) else value for key, value in values.items()})
         for file in files or []:
             check_file(file)
             try:

@@ -39,9 +39,9 @@ class Decoded(TeacherForcingBatch):
 
     offsets: Float[Tensor, "B K J 7"]  # sub-cell offsets of the surfaces from the numbers, which the canvas has not
 
-    def programs(self, whole: bool = False) -> list[Program]:
-        """Programs with numbers to a hundredth of a cell, or ``whole`` numbers as drawn on the canvas."""
-        numbers = (self.code.parameters + (0 if whole else self.offsets)).double().round(decimals=0 if whole else 2)
+    def programs(self, rounded: bool = False) -> list[Program]:
+        """Programs with numbers to a hundredth of a cell, or ``rounded`` as drawn on the canvas."""
+        numbers = (self.code.parameters + (0 if rounded else self.offsets)).double().round(decimals=0 if rounded else 2)
         return programs_of(self.code.having(numbers + 0.0))  # no minus zero
 
     def iou(self) -> Float[Tensor, " B"]:

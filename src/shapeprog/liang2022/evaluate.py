@@ -24,13 +24,13 @@ def decode_all(generator: Generator, shapes: Sequence[Shape], decoder: Decoder) 
     """Programs with numbers to a hundredth of a cell, and with whole numbers as drawn on the canvas."""
     target = torch.from_numpy(np.stack([shape.voxels for shape in shapes])).to(generator.used.device, torch.uint8)
     parts = [decode(generator, part, decoder=decoder) for part in target.split(BATCH_SIZE)]
-    fine, whole = ([program for part in parts for program in part.programs(whole)] for whole in (False, True))
-    return fine, whole
+    fine, on_canvas = ([program for part in parts for program in part.programs(flag)] for flag in (False, True))
+    return fine, on_canvas
 
 
-def measure(program: Program, whole: Program, shape: Shape, seed: int = 0) -> Metrics:
+def measure(program: Program, on_canvas: Program, shape: Shape, seed: int = 0) -> Metrics:
     """Measures of a program, IoU as drawn on the canvas; one that draws nothing counts as a point in the centre."""
-    row = evaluate_program(program, shape, whole, seed=seed)
+    row = evaluate_program(program, shape, on_canvas, seed=seed)
     if np.isfinite(row.cd) or (samples := target_samples(shape, 5000, seed)) is None:
         return row
     squared = (samples[0] ** 2).sum(-1) * world_scale(shape) ** 2

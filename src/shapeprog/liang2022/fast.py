@@ -41,8 +41,8 @@ class FastSettings:
 
     def __post_init__(self) -> None:
         sizes = (*self.widths, self.squeeze, self.feature, self.high - self.low)
-        whole = all(type(size) is int and 0 < size <= LARGEST_SIZE for size in sizes) and type(self.low) is int
-        if not whole or abs(self.low) > LARGEST_SIZE or not 0 <= self.smoothing <= LARGEST_SIZE:
+        integers = all(type(size) is int and 0 < size <= LARGEST_SIZE for size in sizes) and type(self.low) is int
+        if not integers or abs(self.low) > LARGEST_SIZE or not 0 <= self.smoothing <= LARGEST_SIZE:
             raise ShapeProgError("sizes of the network fast are out of range", f"use numbers up to {LARGEST_SIZE}")
 
 
@@ -115,18 +115,18 @@ class Fast(Generator):
         hidden = torch.cat([state[0], feature], -1)
         return self.legal_logits(self.id_head(hidden), previous, index), hidden, state
 
-    def numbers(self, hidden: Tensor, ids: Ids, given: Slots | None, rng: torch.Generator | None = None) -> Slots:
+    def numbers(self, hidden: Tensor, ids: Ids, inputs: Slots | None, rng: torch.Generator | None = None) -> Slots:
         """The mean of the distribution around its mode, the mode of counts and quarter turns, or whole samples."""
-        if given is None:
+        if inputs is None:
             return self._autoregressive(hidden, ids, rng)
-        scores = self._scores(self._mixed(hidden, ids, given), self.in_range[ids])
+        scores = self._scores(self._mixed(hidden, ids, inputs), self.in_range[ids])
         return self._mode(scores, self.discrete[ids]) * self.used[ids]
 
-    def offsets(self, hidden: Tensor, ids: Ids, given: Slots) -> Slots:
+    def offsets(self, hidden: Tensor, ids: Ids, inputs: Slots) -> Slots:
         """Offsets below one cell that keep numbers in their range; none of counts and quarter turns."""
         free = self.used[ids] & ~self.discrete[ids]
-        offset = LARGEST_OFFSET * self.offset_head(self._mixed(hidden, ids, given))[..., 0].tanh() * free
-        low, high = (self.low[ids] - given).clamp(max=0), (self.high[ids] - given).clamp(min=0)
+        offset = LARGEST_OFFSET * self.offset_head(self._mixed(hidden, ids, inputs))[..., 0].tanh() * free
+        low, high = (self.low[ids] - inputs).clamp(max=0), (self.high[ids] - inputs).clamp(min=0)
         return torch.minimum(torch.maximum(offset, low), high)
 
     def number_loss(self, hidden: Tensor, ids: Ids, values: Slots) -> Slots:
@@ -137,9 +137,9 @@ class Fast(Generator):
         label = (-0.5 * ((self.bins - inside[..., None]) / width) ** 2).masked_fill(~self.in_range[ids], -torch.inf)
         return -(label.softmax(-1) * log_probs.clamp(min=-1e4)).sum(-1)
 
-    def _mixed(self, hidden: Tensor, ids: Ids, given: Slots) -> Float[Tensor, "*batch 7 F"]:
+    def _mixed(self, hidden: Tensor, ids: Ids, inputs: Slots) -> Float[Tensor, "*batch 7 F"]:
         """Features of each slot given the numbers of the slots before it."""
-        links = self.number_link(self._row(given)) * self.used[ids][..., None]
+        links = self.number_link(self._row(inputs)) * self.used[ids][..., None]
         start = self.number_input(hidden) + self.number_id(ids)
         return (start[..., None, :] + self.number_slot + links.cumsum(-2) - links).relu()
 

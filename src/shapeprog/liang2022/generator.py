@@ -99,7 +99,7 @@ class Prediction:
     generator: Generator
     batch: TeacherForcingBatch
     ids: Int[Tensor, "M J"]  # of the live blocks
-    given: Float[Tensor, "M J 7"]  # their numbers in the input, without gradient
+    inputs: Float[Tensor, "M J 7"]  # their numbers in the input, without gradient
     logits: Float[Tensor, "M J V"]
     hidden: Tensor
     feature: Float[Tensor, "M F"]
@@ -107,12 +107,12 @@ class Prediction:
     @cached_property
     def numbers(self) -> Float[Tensor, "M J 7"]:
         """Numbers that the network predicts for the ids of the input, with gradient to all its weights."""
-        return self.generator.numbers(self.hidden, self.ids, self.given)
+        return self.generator.numbers(self.hidden, self.ids, self.inputs)
 
     @cached_property
     def offsets(self) -> Float[Tensor, "M J 7"]:
         """Sub-cell offsets of the surface from these numbers, with gradient; zero for designs without them."""
-        return self.generator.offsets(self.hidden, self.ids, self.given)
+        return self.generator.offsets(self.hidden, self.ids, self.inputs)
 
     def scatter(self, rows: Float[Tensor, "M ..."]) -> Float[Tensor, "B K ..."]:
         """Values of live blocks at their positions in the batch, zero elsewhere."""
@@ -126,7 +126,7 @@ class Prediction:
 
     def number_log_prob(self) -> Float[Tensor, "B K"]:
         """Log-probability of the numbers of each block, for designs that predict a distribution."""
-        nll = self.generator.number_loss(self.hidden, self.ids, self.given)
+        nll = self.generator.number_loss(self.hidden, self.ids, self.inputs)
         return self.scatter(-(nll * self.generator.used[self.ids]).sum((-1, -2)))
 
 
@@ -163,16 +163,16 @@ class Generator(nn.Module, ABC):
         """Step ``index`` of each block after the step before it (ids (M,), numbers (M, 7)); ``None`` at the first."""
 
     @abstractmethod
-    def numbers(self, hidden: Tensor, ids: Ids, given: Slots | None, rng: torch.Generator | None = None) -> Slots:
+    def numbers(self, hidden: Tensor, ids: Ids, inputs: Slots | None, rng: torch.Generator | None = None) -> Slots:
         """Numbers for the ids, with gradient; of designs that predict distributions, given those before, or sampled."""
 
     @abstractmethod
     def number_loss(self, hidden: Tensor, ids: Ids, values: Slots) -> Slots:
         """Supervised loss of each number: negative log-likelihood, or a squared error."""
 
-    def offsets(self, hidden: Tensor, ids: Ids, given: Slots) -> Slots:
+    def offsets(self, hidden: Tensor, ids: Ids, inputs: Slots) -> Slots:
         """Offsets of the surface from the numbers, with gradient; the canvas is drawn without them."""
-        return torch.zeros_like(given)
+        return torch.zeros_like(inputs)
 
     def legal_logits(self, scores: Float[Tensor, "M V"], previous: Code | None, index: int) -> Float[Tensor, "M V"]:
         """Log-probabilities over the ids that are legal at a step after the previous one."""
@@ -182,8 +182,8 @@ class Generator(nn.Module, ABC):
     def predict(self, batch: TeacherForcingBatch) -> Prediction:
         """Teacher forcing: the output for given canvases and programs, with gradient."""
         feature, ids = self.encode_all(batch), batch.code.ids[batch.live]
-        given = batch.code.parameters[batch.live].detach()
-        return Prediction(self, batch, ids, given, *self.steps(feature, Code(ids, given)), feature)
+        inputs = batch.code.parameters[batch.live].detach()
+        return Prediction(self, batch, ids, inputs, *self.steps(feature, Code(ids, inputs)), feature)
 
     def steps(self, feature: Float[Tensor, "M F"], block: Code) -> tuple[Float[Tensor, "M J V"], Tensor]:
         """Log-probabilities and hidden features of all steps, each after the steps of the block before it."""
@@ -198,7 +198,7 @@ class Generator(nn.Module, ABC):
     def losses(self, prediction: Prediction) -> dict[str, Float[Tensor, ""]]:
         """Cross-entropy of the ids and loss of the numbers in use, as means over live steps."""
         nll = -prediction.logits.gather(-1, prediction.ids[..., None])[..., 0]
-        off = self.number_loss(prediction.hidden, prediction.ids, prediction.given) * self.used[prediction.ids]
+        off = self.number_loss(prediction.hidden, prediction.ids, prediction.inputs) * self.used[prediction.ids]
         return {"ids": nll.mean(), "numbers": off.sum(-1).mean()}
 
 

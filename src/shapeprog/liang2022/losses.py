@@ -103,11 +103,11 @@ def soft_iou(comparison: Comparison) -> Values:
 def parse_losses(text: str) -> dict[str, float]:
     """Weights by name from text such as ``chamfer=1,soft_iou=3``, 1 by default; a ``ShapeProgError`` if it has none."""
     weights: dict[str, float] = {}
-    known = [*LOSSES, NEURAL]
+    names = [*LOSSES, NEURAL]
     for part in text.split(","):
         name, _, number = (piece.strip() for piece in part.partition("="))
-        if name not in known:
-            hint = did_you_mean(name, known, f"choose from {', '.join(known)}", quoted=True)
+        if name not in names:
+            hint = did_you_mean(name, names, f"choose from {', '.join(names)}", quoted=True)
             raise ShapeProgError(f"unknown loss {name!r}", hint)
         if name in weights:
             raise ShapeProgError(f"the loss {name!r} is given twice", "add the weights")

@@ -64,7 +64,7 @@ class PretrainTask:
         for batch in (held_out.to(generator.used.device) for held_out in self._validation):
             prediction = generator.predict(batch)
             right = (prediction.logits.argmax(-1) == prediction.ids).double().flatten()
-            error = (prediction.numbers - prediction.given).abs()[generator.used[prediction.ids]]
+            error = (prediction.numbers - prediction.inputs).abs()[generator.used[prediction.ids]]
             measured.append((right, error, decode(generator, batch.target, decoder="argmax").iou()))
         ids, numbers, iou = (float(torch.cat(part).mean()) for part in zip(*measured, strict=True))
         return {"ids": ids, "numbers": numbers, "iou": iou, "score": iou}

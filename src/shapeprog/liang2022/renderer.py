@@ -124,7 +124,7 @@ def cuboid_distance(points: Points, size: Float[Tensor, " 3"]) -> Distances:
 
 
 def cylinder_distance(points: Points, size: Float[Tensor, " 2"]) -> Distances:
-    """Appendix A, mended as README.md says: distance to a cylinder of half height h and radius r; 0 inside."""
+    """Appendix A, corrected (see README.md): distance to a cylinder of half height h and radius r; 0 inside."""
     height_and_radius = torch.stack([points[:, 0].abs(), points[:, 1:].norm(dim=-1)], -1)
     return (height_and_radius - size).clamp(min=0).norm(dim=-1)
 

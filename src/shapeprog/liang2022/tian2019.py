@@ -134,7 +134,7 @@ class Tian2019(Generator):
         logits = scores.log_softmax(-1) if self.settings.published else self.legal_logits(scores, previous, index)
         return logits, rows, state
 
-    def numbers(self, hidden: Tensor, ids: Ids, given: Slots | None, rng: torch.Generator | None = None) -> Slots:
+    def numbers(self, hidden: Tensor, ids: Ids, inputs: Slots | None, rng: torch.Generator | None = None) -> Slots:
         """The row of each id, which is no distribution."""
         return hidden.gather(-2, ids[..., None, None].expand(*ids.shape, 1, SLOTS))[..., 0, :]
 
@@ -145,5 +145,5 @@ class Tian2019(Generator):
     def losses(self, prediction: Prediction) -> dict[str, Float[Tensor, ""]]:
         """The published losses, as means over steps and over the numbers in use."""
         used = self.used[prediction.ids]
-        off = self.number_loss(prediction.hidden, prediction.ids, prediction.given) * used
+        off = self.number_loss(prediction.hidden, prediction.ids, prediction.inputs) * used
         return super().losses(prediction) | {"numbers": off.sum() / used.sum().clamp(min=1)}

@@ -26,7 +26,7 @@ from shapeprog.liang2022.prior import PRIORS
 from shapeprog.liang2022.settings import LOG, AdaptSettings
 from shapeprog.liang2022.weights import load_executor, load_generator
 
-CURVES = {"guided": "C1.-", "direct": "C0.-", "wide-guided": "C1.--", "wide-direct": "C0.--"}
+CURVES = {"guided-long": "C1.-", "direct-long": "C0.-", "wide-guided": "C1.--", "wide-direct": "C0.--"}
 """Rows whose adaptation is plotted, with matplotlib's format of their curves."""
 
 

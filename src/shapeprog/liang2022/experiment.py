@@ -50,7 +50,9 @@ class Row:
 # As published: programs by arg-max, and no loss of ids but one that keeps them near those of the start.
 PUBLISHED: dict[str, Any] = {"prior": "narrow", "decoder": "argmax", "decoded_ids": 0.0, "kl": 1.0}
 TIAN: dict[str, Any] = PUBLISHED | {"num_shapes": 480, "batch_size": 8, "rehearsal": 4, "warm_up": 48}
+LONG: dict[str, Any] = PUBLISHED | {"kl": 3.0, "num_shapes": 3200, "validate_every": 800}
 GUIDED: dict[str, Any] = {"learning_rate": 3e-5}
+GUIDED_LONG: dict[str, Any] = LONG | {"learning_rate": 1e-5, "validate_every": 400}
 
 ROWS: dict[str, Row] = {
     "boxes": Row("greedy boxes"),
@@ -58,6 +60,8 @@ ROWS: dict[str, Row] = {
     "none": Row("`fast`, narrow prior", "fast-narrow", decoders=DECODERS),
     "guided": Row("`fast`, narrow prior, guided", "fast-narrow", "guided", PUBLISHED | GUIDED, DECODERS),
     "direct": Row("`fast`, narrow prior, direct", "fast-narrow", "direct", PUBLISHED, DECODERS),
+    "guided-long": Row("`fast`, narrow prior, guided, 3,200 shapes", "fast-narrow", "guided", GUIDED_LONG, DECODERS),
+    "direct-long": Row("`fast`, narrow prior, direct, 3,200 shapes", "fast-narrow", "direct", LONG, DECODERS),
     "tian2019-none": Row("`tian2019`", "tian2019-narrow", decoders=DECODERS),
     "tian2019-guided": Row("`tian2019`, guided, 480 shapes", "tian2019-narrow", "guided", TIAN | GUIDED, DECODERS),
     "tian2019-direct": Row("`tian2019`, direct, 480 shapes", "tian2019-narrow", "direct", TIAN, DECODERS),
@@ -115,7 +119,7 @@ def _adapted(name: str, category: str, packs: Path, results: Path, seed: int, qu
     folder = results / "runs" / f"{name}-{category}-{seed}"
     settings = AdaptSettings(
         train=(str(packs / f"{category}_train.npz"),), val=(str(packs / f"{category}_val.npz"),), initial=initial,
-        seed=seed, validate_every=400, method=row.method, **{**row.options, **(QUICK if quick else {})},
+        seed=seed, method=row.method, **({"validate_every": 400} | dict(row.options) | (QUICK if quick else {})),
     )  # fmt: skip
     log = read_log(folder / LOG) if (folder / STATE).exists() else []
     if not log or log[-1]["samples_seen"] < settings.num_shapes:
@@ -131,15 +135,15 @@ def _measured(
 ) -> Iterator[str]:
     """Measure a row on the test shapes, one line of JSON a shape, where that is missing."""
     row, path = ROWS[name], make_folder(results) / MEASURED
-    known = {(record["row"], record["category"], record["seed"], record["decoder"]) for record in read_log(path)}
+    measured = {(record["row"], record["category"], record["seed"], record["decoder"]) for record in read_log(path)}
     count = QUICK_SHAPES if quick else REFINED_SHAPES if row.refine else None
-    for decoder in [decoder for decoder in row.decoders if (name, category, seed, decoder) not in known]:
+    for decoder in [decoder for decoder in row.decoders if (name, category, seed, decoder) not in measured]:
         shapes, made = list(read_pack(packs / f"{category}_test.npz"))[:count], []
         if weights:
-            fine, whole = decode_all(load_generator(weights), shapes, decoder)
+            fine, rounded = decode_all(load_generator(weights), shapes, decoder)
         else:
-            fine = whole = [greedy_boxes(shape.voxels) for shape in shapes]
-        for program, on_canvas, shape in zip(fine, whole, shapes, strict=True):
+            fine = rounded = [greedy_boxes(shape.voxels) for shape in shapes]
+        for program, on_canvas, shape in zip(fine, rounded, shapes, strict=True):
             if row.refine:
                 program = refine(program, torch.from_numpy(np.array(shape.points)), reach=REACH, seed=seed)
             key = {"row": name, "category": category, "seed": seed, "decoder": decoder}

@@ -126,11 +126,9 @@ def train(
                     module.train()
                     record |= {f"val_{name}": value for name, value in scores.items()}
                     improved = scores.get("score", -math.inf) > best
+                    card: dict[str, Any] = {"data": task.data, "seed": settings.seed, "command": command}
                     for name in (WEIGHTS, BEST) if improved else (WEIGHTS,):
-                        save_weights(
-                            folder / name, task.network, data=task.data, seed=settings.seed, command=command,
-                            samples_seen=step * together, scores=scores,
-                        )  # fmt: skip
+                        save_weights(folder / name, task.network, samples_seen=step * together, scores=scores, **card)
                     best = max(best, scores.get("score", -math.inf))
                 append_line(folder / LOG, json.dumps({k: v for k, v in record.items() if math.isfinite(v)}))
                 if last or stopped or time.monotonic() - saved_at >= SAVE_SECONDS:

@@ -10,7 +10,6 @@ from typing import Any, ClassVar, Literal, get_args, get_origin, get_type_hints
 from shapeprog.errors import ShapeProgError
 
 NEURAL = "neural"  # reserved name of the loss through the neural executor, which compares predictions and not scenes
-
 METHODS = {"direct": "chamfer", "guided": f"{NEURAL}=30", "hybrid": f"chamfer=1,{NEURAL}=10"}  # their losses
 STATE, WEIGHTS, BEST, LOG = "state.pt", "weights.safetensors", "best.safetensors", "log.jsonl"  # files of a run
 Decoder = Literal["argmax", "novel", "select"]  # how programs are written; see decode.py

@@ -22,7 +22,6 @@ from shapeprog.files import write_text
 from shapeprog.formats import export, load_with_frame, save
 from shapeprog.formats.frames import frame_from, frame_in
 from shapeprog.formats.json_form import program_from_json, read_result, result_json
-from shapeprog.formats.notation import parse_notation
 from shapeprog.formats.parts import crease_normals, parts
 from shapeprog.formats.shape import LARGEST_FILE, read_text
 from shapeprog.language import Draw, Loop, Program, unroll
@@ -66,30 +65,6 @@ def test_what_is_nested_deeply_is_refused_in_words(depth: int, tmp_path: Path) -
         parse(f"leg(at={'-' * depth}1)")
 
 
-def seconds(text: str) -> float:
-    started = time.process_time()
-    with pytest.raises(ProgramError):
-        parse_notation(text)
-    return time.process_time() - started
-
-
-@pytest.mark.parametrize(
-    "text",
-    [
-        "draw('Leg', 'Cub', P=(1, 2, 3{}x",
-        "draw('Leg', 'Cub', P=1{}x",
-        "draw('Leg', 'Cub', P=(1, 2, 3)+i*u{}x",
-        "draw('Leg', 'Cub', P=(1, 2, 3), G=(1, 2, 3)){}x",
-        "draw('Leg'{}x",
-        "for(i<2{}x",
-        "for(i<2, 'Trans', u=(1, 2, 3){}x",
-    ],
-)
-def test_long_blanks_in_the_notation_are_passed_over_once(text: str) -> None:
-    # A reader that goes back over blanks takes minutes for a million of them; one that does not, a tenth of a second.
-    assert seconds(text.format(" " * 1_000_000)) < 5
-
-
 def test_keys_that_are_given_twice_are_found_in_one_pass() -> None:
     text = '{"format": "shapeprog", ' + "".join(f'"{number}": 0, ' for number in range(200_000)) + '"7": 1}'
     started = time.process_time()
@@ -113,10 +88,10 @@ def test_only_regular_files_of_a_programs_size_are_read(tmp_path: Path) -> None:
     (tmp_path / "endless.json").symlink_to("/dev/zero")
     with pytest.raises(InputError, match="not a regular file"):
         load_with_frame(tmp_path / "endless.json")
-    with open(tmp_path / "large.notation", "wb") as file:
+    with open(tmp_path / "large.shape", "wb") as file:
         file.truncate(LARGEST_FILE + 1)
     with pytest.raises(InputError, match="larger than 16 MB"):
-        load_with_frame(tmp_path / "large.notation")
+        load_with_frame(tmp_path / "large.shape")
     for name in ("a\0b.shape", "a" * 5000 + ".shape"):
         with pytest.raises(InputError):
             read_text(name)
@@ -214,7 +189,7 @@ def test_an_ascii_terminal_shows_every_letter_somehow(tmp_path: Path, monkeypatc
     name = tmp_path / "t\N{LATIN SMALL LETTER O WITH DIAERESIS}p.json"
     save(PROGRAM, name)
     for words in (
-        ["export", str(name), str(name.with_suffix(".notation"))],
+        ["export", str(name), str(name.with_suffix(".shape"))],
         ["paper", "models", str(name)],
         ["--help"],
     ):

@@ -12,7 +12,6 @@ from declared import MODULES
 
 from shapeprog.data.random import random_program
 from shapeprog.errors import DeclarationError, InputError, ShapeProgError
-from shapeprog.formats.notation import format_notation, parse_notation
 from shapeprog.formats.plugins import load_statements
 from shapeprog.geometry import Primitive, Solids, primitives
 from shapeprog.geometry.primitives import built_in_names
@@ -49,7 +48,6 @@ def test_a_language_without_the_built_in_library_still_works(empty: Language) ->
     program = random_program(torch.Generator().manual_seed(0), blocks=5)
     assert parse(format_program(program)) == program
     assert decode(encode(program)) == [program]
-    assert parse_notation(format_notation(program)) == program
     assert int(unroll(program).mask.sum()) == program.size
     assert "A crate." in manual("crate")
     with pytest.raises(ShapeProgError, match="did you mean crate"):

@@ -8,7 +8,6 @@ import pytest
 
 from shapeprog.errors import InputError, ProgramError, ShapeProgError
 from shapeprog.formats.json_form import program_from_json
-from shapeprog.formats.notation import parse_notation
 from shapeprog.language import Draw, Language, Loop, Program, decode, encode, using
 from shapeprog.language.parser import parse
 from shapeprog.language.printer import format_program
@@ -190,33 +189,6 @@ def test_programs_made_wrongly_are_refused_in_words() -> None:
         format_program(Program((Draw("leg", (1.0, 2.0)),)))
     with using(Language()), pytest.raises(ProgramError, match="unknown statement 'leg'"):
         parse(LEG)
-
-
-@pytest.mark.parametrize(
-    ("text", "line", "column", "words"),
-    [
-        ("draw('Legg', 'Cub', P=(1,2,3), G=(1,2,3))", 1, 1, "did you mean 'Leg', 'Cub'"),
-        ("draw('Leg', 'Cub', P=(1,2,3))", 1, 1, "G of leg is missing"),
-        ("draw('Leg', 'Cub', P=(1,2), G=(1,2,3))", 1, 1, "P of leg has 2 numbers"),
-        ("draw('Leg', 'Cub', P=(1,2,3), G=(1,2,3), H=1)", 1, 1, "leg has no group H"),
-        ("draw('Leg', 'Cub', P=(1,2,3), G=(1,2,3), count=1)", 1, 1, "leg has no group count"),
-        ("draw('Leg', 'Cub', P=(1,2,x), G=(1,2,3))", 1, 22, "neither a quoted word"),
-        ("draw('Leg', 'Cub', P=(1,2,3), P=(1,2,3))", 1, 31, "given twice"),
-        ("draw('Leg', 'Cub', P=(1,2,3), G=(1,2,3)", 1, 5, "never closed"),
-        ("draw('Leg', 'Cub', P=(1,2,3), G=(1,2,3)) + 4", 1, 1, "a line is draw"),
-        ("draw('Leg', 'Cub', P=(1,2,3), G=(1,2,1e999))", 1, 1, "too large"),
-        ("leg(at=(1, 2, 3))", 1, 1, "a line is draw"),
-        ("for(i<2, 'Trans', u=(0,0,1))", 1, 1, "no body"),
-        ("for(i<2.5, 'Trans', u=(0,0,1))\n  draw()", 1, 1, "must be whole"),
-        ("for(i<2, 'Trans', u=(0,0,1))\n draw('Leg','Cub',P=(1,2,3),G=(1,2,3))\n  draw()", 3, 3, "unexpected indent"),
-        ("end", 1, 1, "a line is draw"),
-        ("for(i<2, 'Rot', axis=(1,2,3))\n  draw()", 1, 1, "has no group axis"),
-    ],
-)
-def test_places_in_the_notation(text: str, line: int, column: int, words: str) -> None:
-    with pytest.raises(ProgramError, match=words) as caught:
-        parse_notation(text)
-    assert (caught.value.line, caught.value.column) == (line, column)
 
 
 @pytest.mark.parametrize(

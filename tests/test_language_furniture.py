@@ -10,7 +10,6 @@ import torch
 import shapeprog as sp
 from shapeprog.errors import DeclarationError, ProgramError, ShapeProgError
 from shapeprog.formats.json_form import program_to_json
-from shapeprog.formats.notation import format_notation, parse_notation
 from shapeprog.geometry.primitive import primitives
 from shapeprog.language import Draw, Language, Loop, Program, decode, encode, language, using
 from shapeprog.language.hints import Box
@@ -122,12 +121,9 @@ def test_mistakes_with_roles_and_mirrors_are_told(text, said):
 @pytest.mark.parametrize("word", ["leg", "cushion"])
 def test_no_form_calls_a_part_what_it_is(word):
     leg = Program((Draw(word, (1.0,) * language()[word].size, word),))
-    for write in (format_program, format_notation, program_to_json):
+    for write in (format_program, program_to_json):
         with pytest.raises(ShapeProgError, match="redundant role"):
             write(leg)
-    numbers = "P=(1, 1, 1), G=(1, 1, 1)" if word == "leg" else "P=(1, 1, 1), G=(1, 1, 1, 1)"
-    with pytest.raises(ProgramError, match=f"'{word}', '{word}'"):
-        parse_notation(f"draw('{word}', '{word}', {numbers})")
 
 
 def test_a_role_is_refused_that_is_there_or_no_word():

@@ -16,7 +16,6 @@ import shapeprog as sp
 from shapeprog.data.random import outside_published, random_program
 from shapeprog.formats import load, save
 from shapeprog.formats.json_form import program_from_json, program_to_json
-from shapeprog.formats.notation import format_notation, parse_notation
 from shapeprog.language import Draw, Loop, Program, Statement, decode, encode, using
 from shapeprog.language.parameters import shortest, to_float32
 from shapeprog.language.parser import parse
@@ -47,11 +46,9 @@ def test_programs_survive_every_form(program: Program) -> None:
 def survives(program: Program) -> None:
     """Exactly, the sign of zero included: hence the comparison of representations."""
     assert repr(parse(format_program(program))) == repr(program)
-    assert repr(parse_notation(format_notation(program))) == repr(program)
     assert repr(program_from_json(program_to_json(program))) == repr(program)
     flat = program.flat()
     assert repr(decode(encode(program))) == repr([flat])
-    assert repr(parse_notation(format_notation(flat))) == repr(flat)
 
 
 @given(st.floats(width=32, allow_nan=False, allow_infinity=False))
@@ -82,29 +79,6 @@ def test_canonical_text_is_pinned() -> None:
     assert format_program(parse(f"# a table\n\n{loose}  # the end")) == text
     assert format_program(Program()) == ""
     assert parse("for i in translate(2, by=(0, 0, 1)):\n    pass\n").body[0] == Loop("translate", (2, 0, 0, 1), ())
-
-
-def test_the_notation_is_pinned() -> None:
-    program = parse(
-        "for i in translate(2, by=(0, 0, 18)):\n"
-        "    for j in translate(2, by=(0, 14, 0)):\n"
-        "        leg(at=(-12, -8, -10), size=(16, 2, 2))\n"
-        "for i in rotate(4, step=1):\n"
-        "    base_cross(at=(1, 2, 3), thickness=1, length=6, turn=2)\n"
-        "back(at=(0, 8, -9), size=(14, 2, 18), tilt=3)\n"
-        "line(start=(1, 2, 3), end=(4, 5, 6), radius=1.5)\n"
-        "arch(at=(1, 2, 3), size=(4, 5, 6), thickness=2)\n"
-    )
-    assert format_notation(program) == (
-        "for(i<2, 'Trans', u1=(0, 0, 18))\n"
-        "    for(j<2, 'Trans', u2=(0, 14, 0))\n"
-        "        draw('Leg', 'Cub', P=(-12, -8, -10)+i*u1+j*u2, G=(16, 2, 2))\n"
-        "for(i<4, 'Rot', step=1)\n"
-        "    draw('Base', 'Line', P=(1, 2, 3), G=(1, 6), turn=2)\n"
-        "draw('Back', 'Cub', P=(0, 8, -9), G=(14, 2, 18), tilt=3)\n"
-        "draw('Connect', 'Line', P1=(1, 2, 3), P2=(4, 5, 6), G=1.5)\n"
-        "draw('arch', P=(1, 2, 3), G=(4, 5, 6, 2))\n"
-    )
 
 
 @pytest.mark.parametrize("declared", [*STATEMENTS, *LOOPS], ids=name_of)

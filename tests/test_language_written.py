@@ -12,7 +12,6 @@ from written import written_program
 import shapeprog as sp
 from shapeprog.errors import ProgramError, ShapeProgError
 from shapeprog.formats.json_form import program_from_json, program_to_json
-from shapeprog.formats.notation import format_notation, parse_notation
 from shapeprog.language import Program, evaluated
 from shapeprog.language.ast import Assignment, Call, Comment, Draw, Function, Loop, Source
 from shapeprog.language.expression import Binary, Expression, Linear, Name, Negative, combined
@@ -90,7 +89,6 @@ def test_written_programs_survive_as_text_and_as_json(seed: int) -> None:
     program = written_program(seed)
     assert repr(parse(format_program(program))) == repr(program)
     assert repr(program_from_json(program_to_json(program))) == repr(program)
-    assert parse_notation(format_notation(program)) == sp.inline(program)
 
 
 @pytest.mark.nightly

@@ -5,7 +5,6 @@ from .data.shape import Shape
 from .errors import InputError, OutputError, ProgramError, ShapeProgError
 from .formats.files import export, load, load_with_frame, save
 from .formats.json_form import program_from_json, program_to_json
-from .formats.notation import format_notation, parse_notation
 from .formats.plugins import load_statements
 from .geometry.losses import chamfer, coverage
 from .geometry.scene import Scene
@@ -33,9 +32,9 @@ __version__: str
 __all__ = [
     "Code", "Draw", "Expression", "Frame", "InputError", "Library", "Linear", "Loop", "Name", "Named", "OutputError",
     "Parametric", "Program", "ProgramError", "Scene", "Shape", "ShapeProgError", "Source", "Unit",
-    "chamfer", "coverage", "decode", "encode", "evaluated", "export", "format_notation", "format_program", "in_unit",
+    "chamfer", "coverage", "decode", "encode", "evaluated", "export", "format_program", "in_unit",
     "infer", "inline", "learn", "liang2022", "load", "load_library", "load_shape", "load_statements",
-    "load_with_frame", "loop", "names", "parse", "parse_notation", "program_from_json", "program_to_json",
+    "load_with_frame", "loop", "names", "parse", "program_from_json", "program_to_json",
     "random_program", "refine", "sample", "save", "save_library", "set", "statement", "unroll", "using",
     "with_library",
 ]  # fmt: skip

@@ -56,14 +56,6 @@ JSON_AXES = (
     '"side"', '["side"]', '"left"', "null", "0", "2.5", "3", "-1", "1e999", "true", '["side", "up"]', "[]", '{"a": 1}',
     "[[0]]",
 )  # fmt: skip
-NOTED_ROLES = (
-    "'seat', 'box'", "'leg', 'leg'", "'leg', 'Cub'", "'box', 'seat'", "'seat', 'seat'", "'seat', 'box', 'box'",
-    "'sofa', 'box'",
-)  # fmt: skip
-NOTED_MIRRORS = (
-    "2, 'mirror', axis=1, at=0", "3, 'mirror', axis=1, at=0", "2, 'mirror', axis=3, at=0",
-    "2, 'mirror', axis=side, at=0", "2, 'mirror'", "2, 'mirror', axis=-0.0, at=1e38", "2, 'mirror', axis=1e999, at=0",
-)  # fmt: skip
 
 
 def crafted() -> Iterator[tuple[str, bytes]]:
@@ -92,9 +84,3 @@ def crafted() -> Iterator[tuple[str, bytes]]:
         ("mirror", [f"{mirror.replace('AXIS', axis)}[{box}}}]}}" for axis in JSON_AXES]),
     ):
         yield from ((f"{kind}-{number}.json", (start + text + end).encode()) for number, text in enumerate(texts))
-    drawn = "P=(0, 0, 0), G=(1, 1, 1))"
-    for kind, texts in (
-        ("role", [f"draw({words}, {drawn}" for words in NOTED_ROLES]),
-        ("mirror", [f"for(i<{words})\n    draw('box', {drawn}" for words in NOTED_MIRRORS]),
-    ):
-        yield from ((f"{kind}-{number}.notation", text.encode()) for number, text in enumerate(texts))

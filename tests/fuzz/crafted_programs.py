@@ -72,28 +72,7 @@ def crafted() -> Iterator[tuple[str, bytes]]:
         ("wide", '{"format"'.encode("utf-16").decode("latin-1")),
     ):
         yield f"{name}.json", text.encode()
-    blanks = " " * 100_000
-    for name, text in (
-        ("blanks-in-group", f"draw('Leg', 'Cub', P=(1, 2,{blanks}x"),
-        ("blanks-after-number", f"draw('Leg', 'Cub', P=1{blanks}x"),
-        ("blanks-after-copies", f"draw('Leg', 'Cub', P=(1, 2, 3)+i*u{blanks}x"),
-        ("blanks-after-end", f"draw('Leg', 'Cub', P=(1, 2, 3), G=(1, 2, 3)){blanks}x"),
-        ("blanks-after-word", f"draw('Leg'{blanks}x"),
-        ("blanks-in-for", f"for(i<2{blanks}x"),
-        ("many-copies", "draw('Leg', 'Cub', P=(1, 2, 3)" + "+i*u" * 100_000 + "x"),
-        ("many-numbers", "draw('Leg', 'Cub', P=(" + "1," * 100_000 + "x"),
-        ("long-number", "draw('Leg', 'Cub', P=(" + "1" * 100_000 + "x"),
-        ("many-words", "draw(" + "'Leg', " * 100_000),
-        ("open-quote", "draw('" + "a" * 100_000),
-        ("deep-loops", "".join(f"{' ' * n}for(i<2, 'Trans', u=(0, 0, 1))\n" for n in range(2000))),
-        (
-            "count-beyond-numbers",
-            "for(i<1e999, 'Rot', step=1)\n    draw('Leg', 'Cub', P=(0, 0, 0), G=(1, 1, 1))",
-        ),
-        ("deep-frame", f"# frame: {'[' * deep}\n"),
-        ("blank-frame", "#" + "\n" * 200_000 + "frame:\n"),
-    ):
-        yield f"{name}.notation", text.encode()
+    yield "blank-frame.shape", ("#" + "\n" * 200_000 + "frame:\n").encode()
 
 
 def nested(loops: list[str], drawn: str) -> str:

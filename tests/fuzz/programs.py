@@ -1,4 +1,4 @@
-"""Programs as text, JSON and in the notation of the paper: valid ones, and broken or extreme ones."""
+"""Programs as text and JSON: valid ones, and broken or extreme ones."""
 
 from __future__ import annotations
 
@@ -34,7 +34,6 @@ def write_name(random: Random, content: bytes) -> bytes:
 NUMBERS: tuple[Mutation, ...] = (*4 * (write_number,), *4 * (count_otherwise,), *2 * (write_name,), change_words)
 WAYS: dict[str, tuple[Mutation, ...]] = {
     ".shape": (*BYTES, *TEXT, *2 * NUMBERS),
-    ".notation": (*BYTES, *TEXT, *2 * NUMBERS),
     ".json": (*BYTES, *TEXT, *NUMBERS, *10 * (change_json,)),
 }
 
@@ -124,5 +123,4 @@ def seeds() -> dict[str, bytes]:
         more = {"snapped": "", "scores": {"iou": 0.5}, "reason": "done", "source": "stool.obj"}
         found[f"{name}.json"] = result_json(program, frame, **more).encode()
         found[f"{name}.shape"] = (frame_comment(frame, program) + sp.format_program(program)).encode()
-        found[f"{name}.notation"] = sp.format_notation(program).encode()
     return found

@@ -14,7 +14,7 @@ from shapeprog.errors import InputError
 
 
 def tidy_command(
-    program: Annotated[Path, typer.Argument(metavar="PROGRAM", help="Program file: .shape .json .notation .txt")],
+    program: Annotated[Path, typer.Argument(metavar="PROGRAM", help="Program file: .shape .json .txt")],
     out: Annotated[Path | None, typer.Argument(metavar="OUTPUT", help="File to write: .shape .json")] = None,
     file_unit: FileUnit = None,
     price: Annotated[

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 _SAMPLES = " ".join(suffixes("sample"))
 
-WRITTEN, WITHOUT_UNIT = (".shape", ".json"), (".notation", ".npy")
+WRITTEN, WITHOUT_UNIT = (".shape", ".json"), (".npy",)
 """Files whose numbers are written in the unit that is asked for, and files whose lengths are in cells always."""
 
 ProgramFile = Annotated[Path, typer.Argument(metavar="PROGRAM", help=f"Program file: {' '.join(program_suffixes())}")]

@@ -18,7 +18,7 @@ FLOOR = "floor"  # what programs in cells call the level on which the whole stan
 
 
 def load(path: str | os.PathLike[str]) -> Program:
-    """The program in a file: program text, JSON or the notation of the paper, by its suffix.
+    """The program in a file: program text or JSON, by its suffix.
 
     Raises
     ------
@@ -79,7 +79,7 @@ def save(program: Program, path: str | os.PathLike[str], frame: Frame | None = N
     program
         What to write.
     path
-        Where to; ends in .shape, .json or .notation.
+        Where to; ends in .shape or .json.
     frame
         From the grid to the coordinates of the input, if it is to be stored.
 
@@ -91,8 +91,7 @@ def save(program: Program, path: str | os.PathLike[str], frame: Frame | None = N
     if Path(path).suffix.lower() not in suffixes("program"):
         endings = " or ".join(suffixes("program"))
         raise OutputError(f"{path} could not be read back as a program", f"name a {endings} file, or use export")
-    is_old = program.source is not None and bool({*SIZES, FLOOR} & program.source.numbers.keys())
-    if is_old and Path(path).suffix.lower() in (".shape", ".json"):
+    if program.source is not None and {*SIZES, FLOOR} & program.source.numbers.keys():
         program = placed_if_possible(program)
     export(program, path, frame)
 

@@ -87,8 +87,6 @@ FORMATS = (
         reader="shape:read_shape", writer="shape:write_shape"),
     Format("JSON", "program", (".json",), None, "the text with a list of the solids that it draws, for other programs",
         reader="json_form:read_json", writer="json_form:write_json"),
-    Format("notation", "program", (".notation",), None, "the same in the notation of the paper",
-        reader="notation:read_notation", writer="notation:write_notation"),
     Format("plain text", "program", (".txt",), None, "program text under another suffix",
         reader="shape:read_shape"),
     Format("GLB", "solid", (".glb",), Y_UP, "one named node per part, coloured by statement",

@@ -1,6 +1,7 @@
 """Scenes for the tests of geometry, and a primitive of a user's own."""
 
 import dataclasses
+import itertools
 from contextlib import contextmanager
 
 import numpy as np
@@ -10,6 +11,7 @@ import torch
 from shapeprog.geometry.primitive import Primitive, primitives, safe_norm
 from shapeprog.geometry.primitives import BUILT_IN, built_in_names
 from shapeprog.geometry.scene import Scene
+from shapeprog.space import HALF, Frame
 
 NAMES = tuple(primitive.name for primitive in BUILT_IN)
 
@@ -144,3 +146,19 @@ def primitives_in_another_order():
     finally:
         primitives._kinds[:] = known
         primitives.names.update(names)
+
+
+def write_binvox(path, voxels, frame=None):
+    """Cells (R, R, R) of the grid as a binvox file in the coordinates that a frame maps them to."""
+    frame = frame or Frame()
+    axes, size = np.asarray(frame.axes), len(voxels)
+    order = np.abs(axes).argmax(1)  # the grid axis that runs along each world axis
+    turned = np.flip(voxels.transpose(order), tuple(axis for axis in range(3) if axes[axis, order[axis]] < 0))
+    flat = turned.transpose(0, 2, 1).reshape(-1)
+    runs = bytearray()
+    for value, group in itertools.groupby(flat.tolist()):
+        full, partial = divmod(sum(1 for _ in group), 255)
+        runs += bytes((value, 255)) * full + (bytes((value, partial)) if partial else b"")
+    translate = " ".join(str(number) for number in np.asarray(frame.centre) - frame.scale * HALF)
+    head = f"#binvox 1\ndim {size} {size} {size}\ntranslate {translate}\nscale {frame.scale * 2 * HALF}\ndata\n"
+    path.write_bytes(head.encode() + bytes(runs))

@@ -8,6 +8,7 @@ import trimesh
 
 from shapeprog.data import load, load_all, read_pack
 from shapeprog.errors import InputError
+from tests.geometry_helpers import write_binvox
 
 BOX = trimesh.creation.box()
 
@@ -51,8 +52,6 @@ def test_truncated_obj_whose_vertices_are_missing(tmp_path):
 @pytest.mark.parametrize("suffix", ["npy", "npz", "binvox", "h5"])
 @pytest.mark.parametrize("part", [0.2, 0.5, 0.9])
 def test_truncated_arrays(tmp_path, suffix, part):
-    from shapeprog.formats.samples import write_binvox
-
     cells = np.random.default_rng(0).random((32, 32, 32)) < 0.3
     path = tmp_path / f"a.{suffix}"
     if suffix == "npy":

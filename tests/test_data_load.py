@@ -13,8 +13,8 @@ from shapeprog.data import load, load_all
 from shapeprog.data.binvox import read_binvox
 from shapeprog.data.orientation import axes_of, default_axes
 from shapeprog.errors import InputError, ShapeProgError
-from shapeprog.formats.samples import write_binvox
 from shapeprog.space import Frame, grid_axes
+from tests.geometry_helpers import write_binvox
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
 

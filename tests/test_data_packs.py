@@ -11,8 +11,8 @@ import trimesh
 from shapeprog.data import Pack, Shape, load, load_all, prepare, read_pack, shape_from_mesh, write_pack
 from shapeprog.data.preparation import split_of
 from shapeprog.errors import InputError, OutputError
-from shapeprog.formats.samples import write_binvox
 from shapeprog.space import Frame
+from tests.geometry_helpers import write_binvox
 
 
 def box(sides, **options):

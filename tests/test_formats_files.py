@@ -101,7 +101,7 @@ def test_ply_colours_its_vertices(tmp_path: Path):
 
 
 def test_a_program_without_a_frame_stands_upright_for_the_loader(tmp_path: Path):
-    for suffix in (*MESHES, ".binvox"):
+    for suffix in MESHES:
         shape = load(export(PROGRAM, tmp_path / f"table{suffix}"))
         occupied = np.argwhere(shape.voxels)
         assert (occupied.max(0) - occupied.min(0) + 1).tolist() == pytest.approx([24, 24, 18], abs=1), suffix
@@ -114,28 +114,6 @@ def test_text_and_json_come_back_with_their_frame(tmp_path: Path):
         assert load_with_frame(export(PROGRAM, tmp_path / f"b{suffix}")) == (PROGRAM, None)
     assert (tmp_path / "b.shape").read_text() == format_program(PROGRAM)
     assert json.loads(result_json(PROGRAM, FRAME, reason="done"))["reason"] == "done"
-
-
-def test_binvox_lies_where_the_input_lies(tmp_path: Path):
-    from shapeprog.data.binvox import read_binvox
-
-    cells, corner, cell = read_binvox(export(PROGRAM, tmp_path / "table.binvox", FRAME))
-    low, high = np.argwhere(cells).min(0), np.argwhere(cells).max(0) + 1
-    wanted = np.concatenate([part.vertices for part in parts(PROGRAM.snap(), FRAME)])
-    np.testing.assert_allclose([corner + cell * low, corner + cell * high], [wanted.min(0), wanted.max(0)], atol=1e-5)
-
-
-def test_arrays_hold_everything_and_load_back(tmp_path: Path):
-    path = export(PROGRAM, tmp_path / "table.npz", FRAME)
-    with np.load(path, allow_pickle=False) as arrays:
-        assert arrays["points"].shape == (5000, 3)
-        assert arrays["ids"].tolist() == [[2, 0, 0], [19, 19, 1], [17, 0, 0]]
-        world = FRAME.to_world(arrays["points"])
-        np.testing.assert_allclose(
-            [world.min(0), world.max(0)], trimesh.Trimesh(*solid(PROGRAM, FRAME)).bounds, atol=0.05
-        )
-        voxels = arrays["voxels"]
-    assert (load(path).voxels == voxels).all()
 
 
 @pytest.mark.parametrize("suffix", [s for s in suffixes() if s not in (".step", ".stp")])

@@ -59,7 +59,7 @@ def _write_programs(folder: Path) -> None:
     program = sp.parse(
         "top_rectangle(at=(4, 0, 0), thickness=2, half=(9, 11))\nleg(at=(-12, -8, -10), size=(16, 2, 2))"
     )
-    for suffix in (".glb", ".obj", ".ply", ".stl", ".binvox", ".npz"):
+    for suffix in (".glb", ".obj", ".ply", ".stl"):
         sp.export(program, folder / f"program{suffix}")
     sp.export(program, folder / "program.npy", resolution=8)
     sp.export(program, folder / "program.xyz", points=40)

@@ -26,7 +26,7 @@ from shapeprog.errors import InputError, OutputError, ProgramError
 from shapeprog.formats import FORMATS, Format, export, format_of, listed, load_with_frame, suffixes
 from shapeprog.formats.colours import colour
 from shapeprog.formats.frames import frame_comment, frame_in, frame_of_grid, placement, scale_of
-from shapeprog.formats.json_form import result_from_json, result_json
+from shapeprog.formats.json_form import program_to_json, result_from_json
 from shapeprog.formats.parts import crease_normals, parts, solid
 from shapeprog.formats.shape import program_in, program_text
 from shapeprog.geometry.primitives.cylinder import mesh as cylinder_mesh
@@ -113,7 +113,7 @@ def test_text_and_json_come_back_with_their_frame(tmp_path: Path):
         assert load_with_frame(export(PROGRAM, tmp_path / f"a{suffix}", FRAME)) == (PROGRAM, FRAME)
         assert load_with_frame(export(PROGRAM, tmp_path / f"b{suffix}")) == (PROGRAM, None)
     assert (tmp_path / "b.shape").read_text() == format_program(PROGRAM)
-    assert json.loads(result_json(PROGRAM, FRAME, reason="done"))["reason"] == "done"
+    assert json.loads(program_to_json(PROGRAM, FRAME, reason="done"))["reason"] == "done"
 
 
 @pytest.mark.parametrize("suffix", [s for s in suffixes() if s not in (".step", ".stp")])
@@ -144,7 +144,7 @@ def test_errors_say_what_to_do(tmp_path: Path):
         export(parse("leg(at=(0, 0, 0), size=(0, 2, 2))"), tmp_path / "table.stl")
     with pytest.raises(InputError, match="frame"):
         frame_in('# frame: {"scale": -1, "centre": [0, 0, 0], "axes": []}')
-    (tmp_path / "cut.json").write_text(result_json(PROGRAM)[:-30])
+    (tmp_path / "cut.json").write_text(program_to_json(PROGRAM)[:-30])
     with pytest.raises(ProgramError, match="cut off"):
         load_with_frame(tmp_path / "cut.json")
     with pytest.raises(InputError, match=r"\.shape or \.json"):
@@ -275,7 +275,7 @@ def test_what_is_saved_and_loaded_lies_at_the_same_place_in_the_world(
     frame = Frame(scale, tuple(scale * value for value in middle), tuple(map(tuple, rotation)))
     text = program_text(program, frame)
     assert text.startswith("# frame: {" if axes is None else f"# placed: up {axes[0]}, front {axes[1]}, origin ")
-    read, kept = program_in(text, "x") if suffix == ".shape" else both(result_json(program, frame))
+    read, kept = program_in(text, "x") if suffix == ".shape" else both(program_to_json(program, frame))
     assert kept is not None
     for one, two in zip(parts(program), parts(read), strict=True):
         there, back = frame.to_world(one.vertices), kept.to_world(two.vertices)
@@ -320,7 +320,7 @@ def test_a_wrong_frame_of_a_placed_text_has_its_place(entries: str, column: int,
 
 
 def test_json_lists_the_solids_with_their_lines_and_bounds():
-    content = json.loads(result_json(parse(PLACED), lies(".stl"), scores={"iou": 0.5}))
+    content = json.loads(program_to_json(parse(PLACED), lies(".stl"), scores={"iou": 0.5}))
     lines = content["text"].splitlines()
     assert (content["unit"], content["scores"], "frame" in content) == ("cm", {"iou": 0.5}, True)
     found = [(lines[each["line"] - 1].strip(), each["role"], each["kind"]) for each in content["solids"]]
@@ -332,14 +332,14 @@ def test_json_lists_the_solids_with_their_lines_and_bounds():
     assert ([-22, -21, 0], [-18, -17, 45]) in bounds[:4]
     assert ([18, 17, 0], [22, 21, 45]) in bounds[:4]
     assert bounds[4] == ([18, -2, 50], [22, 2, 54])
-    in_cells = json.loads(result_json(PROGRAM))
+    in_cells = json.loads(program_to_json(PROGRAM))
     assert (in_cells["unit"], in_cells["solids"][0]["kind"]) == ("cells", "top_rectangle")
     assert in_cells["solids"][1] | {"role": "leg", "low": [6, -11, -12], "high": [8, -9, 10]} == in_cells["solids"][1]
 
 
 def test_json_of_very_many_solids_has_no_list_of_them():
     program = parse("for i in translate(20000, by=(0.001, 0, 0)):\n    leg(at=(0, 0, 0), size=(1, 1, 1))\n")
-    assert "solids" not in json.loads(result_json(program))
+    assert "solids" not in json.loads(program_to_json(program))
 
 
 def test_creases_are_sharp_and_rounds_are_smooth():

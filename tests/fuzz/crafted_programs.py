@@ -17,7 +17,7 @@ COPIES = (
 
 def crafted() -> Iterator[tuple[str, bytes]]:
     """Names and contents of such files."""
-    from shapeprog.formats.json_form import result_json
+    from shapeprog.formats.json_form import program_to_json
     from shapeprog.language.parser import parse
     from shapeprog.space import Frame
 
@@ -46,7 +46,7 @@ def crafted() -> Iterator[tuple[str, bytes]]:
     ):
         yield f"{name}.shape", text.encode("latin-1" if name == "latin" else "utf-8")
     start = '{"format": "shapeprog", "version": 4, "text": '
-    good = result_json(parse(LEG), Frame(0.25, (1.0, -2.0, 3.5)))[:-2]
+    good = program_to_json(parse(LEG), Frame(0.25, (1.0, -2.0, 3.5)))[:-2]
     for name, text in (
         ("deep-lists", start + "[" * deep),
         ("deep-program", start + "[" * 990 + "]" * 990 + "}"),

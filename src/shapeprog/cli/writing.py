@@ -288,22 +288,14 @@ def _input_of(result: Result, named: Path | None) -> Shape | None:
 
     if named is not None and not named.is_dir():
         return load(named)
-    if result.source is None:
-        return None
-    place, mark, member = result.source.partition("#")
-    try:
-        home = (Path(result.name).parent if named is None else named).resolve()
-        parts = Path(place).parts
-        # the inputs may have been copied with the programs: the longest end of the path that is there counts
-        ends = ((home / Path(*parts[start:])).resolve() for start in range(len(parts)))
-        allowed = (each for each in ends if each.parent == home or (named is not None and each.is_relative_to(home)))
-        source = next((each for each in allowed if each.exists()), None)
-    except (OSError, ValueError, RuntimeError):
-        return None  # no file can have such a name
-    if source is None:
+    place, mark, member = (result.source or "").partition("#")
+    wanted = Path(place).name
+    files = Path(result.name).parent.iterdir() if named is None else named.rglob("*")
+    found = sorted(file for file in files if file.name == wanted and file.is_file() and not file.is_symlink())
+    if not found:
         return None
     try:
-        shape = load(f"{source}{mark}{member}")
+        shape = load(f"{found[0]}{mark}{member}")
     except ShapeProgError:
         return None  # a picture without the input is better than none
     if result.frame is None or shape.vertices is None or result.frame.axes == shape.frame.axes:

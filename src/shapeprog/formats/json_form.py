@@ -13,15 +13,14 @@ coordinates of the input: origin + scale * axes @ (x, y, z).
 from __future__ import annotations
 
 import json
-from collections import Counter
 from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
 from reprlib import repr as shortened
 from types import MappingProxyType
-from typing import Any, NamedTuple, NoReturn
+from typing import Any, NamedTuple
 
-from shapeprog.errors import InputError, ProgramError, ShapeProgError
+from shapeprog.errors import InputError, ShapeProgError
 from shapeprog.files import write_text
 from shapeprog.formats.frames import frame_of_text, scale_of
 from shapeprog.formats.shape import LARGEST_FILE, program_in, program_text, read_text
@@ -31,7 +30,7 @@ from shapeprog.language.parameters import LARGEST
 from shapeprog.language.printer import printed, source_of
 from shapeprog.language.program import Program
 from shapeprog.language.statement import language
-from shapeprog.language.text import proper_text
+from shapeprog.language.text import Text
 from shapeprog.lazy_torch import torch
 from shapeprog.space import Frame
 
@@ -98,22 +97,26 @@ def read_json(path: Path) -> tuple[Program, Frame | None]:
 
 def write_json(program: Program, path: Path, frame: Frame | None) -> None:
     """Write the JSON form."""
-    write_text(path, result_json(program, frame))
+    write_text(path, program_to_json(program, frame))
 
 
-def program_to_json(program: Program) -> str:
-    """A program as JSON text; numbers have the fewest digits that read back exactly.
+def program_to_json(program: Program, frame: Frame | None = None, **more: Any) -> str:
+    """A program as JSON text, with a line for each solid; numbers of its text have the fewest digits that are exact.
+
+    Parameters
+    ----------
+    program
+        What to write.
+    frame
+        From the grid to the coordinates of the input, if it is known.
+    more
+        Further entries, such as ``scores``.
 
     Raises
     ------
     ShapeProgError
         As for :func:`shapeprog.format_program`.
     """
-    return result_json(program)
-
-
-def result_json(program: Program, frame: Frame | None = None, **more: Any) -> str:
-    """The JSON form of a program with its frame and further entries, such as scores; a line for each solid."""
     text, unit = program_text(program, frame), program.unit
     content = {"format": FORMAT, "version": VERSION, "text": text, "unit": "cells" if unit is None else unit.name}
     if frame is not None:
@@ -169,37 +172,19 @@ def program_from_json(text: str, name: str = "<json>") -> Program:
 
 
 def _document(text: str, name: str) -> dict[str, Any]:
-    def refuse(constant: str) -> NoReturn:
-        raise InputError(f"{name}: {constant} is not a number of a program", "write finite numbers")
-
-    def unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-        result = dict(pairs)
-        if len(result) != len(pairs):
-            twice, _ = Counter(word for word, _ in pairs).most_common(1)[0]
-            raise InputError(f"{name}: {shortened(twice)} is given twice in one entry", "leave one of them out")
-        return result
-
-    text = proper_text(text, name)
+    """The entries of a JSON text that holds a program of this version."""
+    source = Text(text, name)
     try:
-        content = json.loads(text, parse_constant=refuse, object_pairs_hook=unique)
+        content = json.loads(source.text)
     except json.JSONDecodeError as error:
-        lines = text.split("\n")
-        source = lines[min(error.lineno, len(lines)) - 1]
-        raise ProgramError(
-            f"this is not JSON: {error.msg}", line=error.lineno, column=error.colno, source=source,
-            hint="was the file cut off?", name=name,
-        ) from None  # fmt: skip
+        raise source.at(error.lineno, error.colno, f"this is not JSON: {error.msg}", "was the file cut off?") from None
     except RecursionError:
         raise InputError(f"{name}: this is nested too deeply to be a program", "loops nest at most 64 deep") from None
     except ValueError as error:  # raised by Python for integers of thousands of digits
         raise InputError(f"{name}: a number has too many digits to be read", "write shorter numbers") from error
     if not isinstance(content, dict) or content.get("format") != FORMAT:
         raise InputError(f"{name}: this JSON holds no program", f'it begins {{"format": "{FORMAT}", ...')
-    version = content.get("version")
-    if version in (1, 2, 3):
-        message = f"{name}: version {version} of the program format is no longer read"
+    if (version := content.get("version")) != VERSION:
+        message = f"{name}: version {shortened(version)} of the program format is not read, only version {VERSION}"
         raise InputError(message, "read the .shape file that was written with it, or infer the shape again")
-    if version != VERSION:
-        reason = f"{name}: unknown version {shortened(version)} of the program format"
-        raise InputError(reason, f"this release reads version {VERSION}; a newer one may read it")
     return content

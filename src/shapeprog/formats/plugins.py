@@ -6,21 +6,21 @@ import importlib.util
 import os
 import sys
 import traceback
-from dataclasses import replace
 from pathlib import Path
+from weakref import WeakKeyDictionary
 
 from shapeprog.errors import DeclarationError, InputError, ShapeProgError
 from shapeprog.geometry.primitive import primitives
-from shapeprog.language.statement import Role, Statement, language
+from shapeprog.language.statement import Language, Statement, language
 
-_loaded: dict[Path, tuple[tuple[Statement, ...], tuple[Role, ...], dict[str, int]]] = {}
+_loaded: WeakKeyDictionary[Language, dict[Path, tuple[Statement, ...]]] = WeakKeyDictionary()
 
 
 def load_statements(path: str | os.PathLike[str]) -> tuple[Statement, ...]:
     """Run a module of declarations and return the statements and loops that it declares.
 
     The module is trusted: it is executed as Python.  If it fails, none of its declarations remain.  Loading a file
-    again has no effect; in another language it declares the same statements there.
+    again in the same language has no effect.
 
     Raises
     ------
@@ -30,18 +30,18 @@ def load_statements(path: str | os.PathLike[str]) -> tuple[Statement, ...]:
         If the module fails or declares nothing, with the cause and its line.
     """
     file = Path(path).resolve()
-    if file in _loaded:
-        return _declare_again(file)
+    loaded = _loaded.setdefault(language(), {})
+    if file in loaded:
+        return loaded[file]
     if not file.is_file():
         result = "a folder" if file.is_dir() else "no file"
         raise InputError(f"{path} is {result}", "give the path of a Python file that declares statements")
     before, roles, solids = set(language().names), set(language().roles), dict(primitives.names)
-    module_name = f"shapeprog_statements_{len(_loaded)}_{file.stem}"
+    module_name = f"shapeprog_statements_{len(loaded)}_{file.stem}"
     try:
         _run(file, module_name)
         declared = tuple(declaration for declaration in language() if declaration.name not in before)
-        played = tuple(role for name, role in language().roles.items() if name not in roles)
-        if not declared and not played:
+        if not declared and not language().roles.keys() - roles:
             raise DeclarationError(f"{path} declares no statement", "decorate a function with @statement or @loop")
     except BaseException as cause:
         for name in set(language().names) - before:
@@ -54,7 +54,7 @@ def load_statements(path: str | os.PathLike[str]) -> tuple[Statement, ...]:
         if isinstance(cause, (Exception, SystemExit)):
             raise _in_words(path, file, cause) from cause
         raise
-    _loaded[file] = declared, played, {name: kind for name, kind in primitives.names.items() if name not in solids}
+    loaded[file] = declared
     return declared
 
 
@@ -65,23 +65,6 @@ def _run(file: Path, module_name: str) -> None:
     module.__file__ = str(file)
     sys.modules[module_name] = module
     exec(compile(file.read_bytes(), str(file), "exec"), module.__dict__)
-
-
-def _declare_again(file: Path) -> tuple[Statement, ...]:
-    registry = language()
-    declared = []
-    statements, roles, solids = _loaded[file]
-    primitives.names.update(solids)
-    for declaration in statements:
-        if declaration.name not in registry:
-            registry.register(
-                replace(declaration, id=registry.free_id()) if declaration.id in registry else declaration
-            )
-        declared.append(registry[declaration.name])
-    for role in roles:
-        if role.name not in registry.roles:
-            registry.add_role(role.name, role.doc, role.label)
-    return tuple(declared)
 
 
 def _in_words(path: str | os.PathLike[str], file: Path, cause: BaseException) -> DeclarationError:

@@ -13,7 +13,7 @@ from shapeprog.errors import ShapeProgError
 from shapeprog.evaluation.metrics import evaluate_program
 from shapeprog.files import write_text
 from shapeprog.formats import export
-from shapeprog.formats.json_form import read_result, result_json
+from shapeprog.formats.json_form import program_to_json, read_result
 from shapeprog.inference.infer import Result
 from shapeprog.language.printer import format_program
 
@@ -33,7 +33,7 @@ def measured(result: Result, shape: Shape, seed: int) -> Result:
 def document(result: Result, shape: Shape) -> str:
     """The JSON of a result; without its seconds, so that the same seed writes the same bytes."""
     whole = {} if result.snapped is None else {"snapped": format_program(result.snapped)}
-    return result_json(
+    return program_to_json(
         result.program, shape.frame, scores=result.scores, reason=result.reason, source=_source(shape), **whole
     )
 

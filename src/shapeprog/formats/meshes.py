@@ -101,13 +101,10 @@ def write_ply(program: Program, path: Path, frame: Frame) -> None:
 
 def write_stl(program: Program, path: Path, frame: Frame) -> None:
     """The union of all parts as one watertight solid, ready to print."""
-    vertices, faces = solid(program, frame)
-    corners = vertices[faces]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    rows = np.zeros(len(faces), [("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
-    rows["normal"] = normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
-    rows["corners"] = corners
-    write_bytes(path, b"binary STL".ljust(80) + np.uint32(len(faces)).astype("<u4").tobytes() + rows.tobytes())
+    import trimesh
+
+    content: Any = trimesh.Trimesh(*solid(program, frame), process=False).export(file_type="stl")
+    write_bytes(path, content)
 
 
 def write_3mf(program: Program, path: Path, frame: Frame, unit: str = "") -> None:

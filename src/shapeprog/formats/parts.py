@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -22,11 +22,6 @@ from shapeprog.space import Frame
 
 Vertices = npt.NDArray[np.float64]
 Faces = npt.NDArray[np.int64]
-
-_LARGEST_FAN = 400
-"""Vertices with more corners keep the normals of their triangles, since all pairs of corners are compared."""
-
-_AT_ONCE = 1 << 15  # triangles whose pairs of corners are compared together
 
 
 @dataclass(frozen=True)
@@ -115,66 +110,43 @@ def solid(program: Program, frame: Frame | None = None) -> tuple[Vertices, Faces
     return placed(vertices, frame), faces
 
 
-def part_normals(solids: Sequence[Part]) -> Iterator[Vertices]:
-    """The :func:`crease_normals` of every part; many small parts are worked on together."""
-    start = 0
-    while start < len(solids):
-        stop, triangles = start + 1, len(solids[start].faces)
-        while stop < len(solids) and triangles + len(solids[stop].faces) <= _AT_ONCE:
-            triangles += len(solids[stop].faces)
-            stop += 1
-        some = solids[start:stop]
-        vertices, faces = joined([(part.vertices, part.faces) for part in some])
-        owner = np.repeat(range(len(some)), [len(part.vertices) for part in some])
-        normals = crease_normals(vertices, faces, owner=owner)
-        yield from np.split(normals, np.cumsum([len(part.faces) for part in some[:-1]]))
-        start = stop
+def part_normals(solids: Sequence[Part]) -> list[Vertices]:
+    """The :func:`crease_normals` of every part."""
+    if not solids:
+        return []
+    normals = crease_normals(*joined([(part.vertices, part.faces) for part in solids]))
+    return np.split(normals, np.cumsum([len(part.faces) for part in solids[:-1]]))
 
 
-def crease_normals(
-    vertices: npt.NDArray[Any], faces: npt.NDArray[Any], angle: float = 40.0, owner: npt.NDArray[np.int64] | None = None
-) -> Vertices:
+def crease_normals(vertices: Vertices, faces: Faces, angle: float = 40.0) -> Vertices:
     """Unit normals (F, 3, 3) of the corners of every triangle: smooth across shallow edges, sharp across steep ones.
 
-    The normal of a corner is the area-weighted mean over the triangles at its vertex whose own normals are within
-    ``angle`` degrees of its triangle's.  Vertices at one place are taken as one, if they have the same ``owner`` (V,),
-    in rising order.
+    The normal of a corner is the area-weighted mean over the triangles at its vertex that belong to the same smooth
+    surface: those that are connected by edges with less than ``angle`` degrees between the normals on both sides.
     """
-    corners = np.asarray(vertices, np.float64)[faces]
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    area, flat = triangle_normals(vertices, faces)
+    ends = np.sort(np.stack([faces, np.roll(faces, -1, 1)], -1), -1).reshape(-1, 2)
+    edge = ends[:, 0] * len(vertices) + ends[:, 1]
+    order = np.argsort(edge, kind="stable")
+    shared = edge[order[1:]] == edge[order[:-1]]
+    pairs = np.stack([order[:-1][shared], order[1:][shared]]) // 3
+    pairs = pairs[:, (flat[pairs[0]] * flat[pairs[1]]).sum(1) > np.cos(np.radians(angle))]
+    links = coo_array((np.ones(pairs.shape[1]), pairs), (len(faces), len(faces)))
+    _, surface = connected_components(links, directed=False)
+    _, corner = np.unique(faces * len(faces) + surface[:, None], return_inverse=True)
+    corner = corner.reshape(-1)
+    total = np.stack([np.bincount(corner, np.repeat(area[:, axis], 3)) for axis in range(3)], 1)[corner]
+    size = np.linalg.norm(total, axis=1, keepdims=True)
+    normals: Vertices = np.where(size > 1e-30, total / np.where(size > 1e-30, size, 1), np.repeat(flat, 3, 0))
+    return normals.reshape(-1, 3, 3)
+
+
+def triangle_normals(vertices: Vertices, faces: Faces) -> tuple[Vertices, Vertices]:
+    """Normals (F, 3) of triangles, as long as twice their area, and of unit length; 0 for triangles without area."""
+    corners = vertices[faces]
     area = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     length = np.linalg.norm(area, axis=1, keepdims=True)
-    flat = area / np.where(length > 0, length, 1)
-    vertex = _places(np.asarray(vertices, np.float64), owner)[faces].reshape(-1)
-    order = np.argsort(vertex, kind="stable")
-    starts = np.flatnonzero(np.diff(vertex[order], prepend=-1))
-    counts = np.diff(starts, append=len(order))
-    group = np.repeat(np.arange(len(starts)), counts)
-    # All pairs of corners that share a place, without a loop over places.
-    repeats = np.where(counts < _LARGEST_FAN, counts, 0)[group]
-    first = np.repeat(np.arange(len(order)), repeats)
-    within = np.arange(len(first)) - np.repeat(np.cumsum(repeats) - repeats, repeats)
-    corner, partner = order[first], order[starts[group[first]] + within]
-    smooth = np.einsum("pc,pc->p", flat[corner // 3], flat[partner // 3]) > np.cos(np.radians(angle))
-    total = np.zeros((len(faces) * 3, 3))
-    for axis in range(3):
-        total[:, axis] = np.bincount(corner[smooth], area[partner[smooth] // 3, axis], minlength=len(total))
-    size = np.linalg.norm(total, axis=1, keepdims=True)
-    fallback = np.repeat(flat, 3, axis=0)
-    normals: Vertices = np.where(size > 1e-30, total / np.where(size > 1e-30, size, 1), fallback).reshape(-1, 3, 3)
-    return normals
-
-
-def _places(vertices: Vertices, owner: npt.NDArray[np.int64] | None) -> npt.NDArray[np.int64]:
-    """A number for each vertex, the same for those of one owner within a millionth of its extent."""
-    if not len(vertices):
-        return np.zeros(0, np.int64)
-    owner = np.zeros(len(vertices), np.int64) if owner is None else owner
-    first = np.flatnonzero(np.diff(owner, prepend=-1))
-    low, counts = np.minimum.reduceat(vertices, first), np.diff(first, append=len(owner))
-    extent = (np.maximum.reduceat(vertices, first) - low).max(-1)
-    scale = np.repeat(np.maximum(extent, 1e-30), counts)[:, None]
-    keys = np.column_stack([owner, np.rint((vertices - np.repeat(low, counts, 0)) / scale * 1e6).astype(np.int64)])
-    order = np.lexsort(keys.T[::-1])
-    result = np.empty(len(vertices), np.int64)
-    result[order] = np.cumsum((np.diff(keys[order], axis=0, prepend=keys[order[:1]]) != 0).any(-1))
-    return result
+    return area, area / np.where(length > 0, length, 1)

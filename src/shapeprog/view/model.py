@@ -10,7 +10,7 @@ import numpy as np
 
 from shapeprog.data.shape import Shape
 from shapeprog.formats.colours import colour
-from shapeprog.formats.parts import Part, crease_normals, part_normals
+from shapeprog.formats.parts import Part, crease_normals, part_normals, triangle_normals
 from shapeprog.geometry.mesh import joined
 from shapeprog.space import RESOLUTION, Array
 
@@ -48,7 +48,7 @@ def of_parts(parts: Sequence[Part]) -> Model:
         return _empty()
     return Model(
         *joined([(part.vertices, part.faces) for part in parts]),
-        np.concatenate(list(part_normals(parts))),
+        np.concatenate(part_normals(parts)),
         np.concatenate([np.tile(colour(part.statement), (len(part.faces), 1)) for part in parts]),
         np.concatenate([np.full(len(part.faces), number) for number, part in enumerate(parts)]),
     )
@@ -64,8 +64,17 @@ def of_shape(shape: Shape) -> Model:
 
 
 def of_mesh(vertices: Array, faces: Array) -> Model:
-    """A mesh in one colour."""
-    return _plain(np.asarray(vertices, np.float64), np.asarray(faces, np.int64))
+    """A mesh in one colour; vertices at one place are taken as one."""
+    import trimesh
+
+    vertices, faces = np.asarray(vertices, np.float64), np.asarray(faces, np.int64)
+    if len(faces) >= FINE:
+        _, flat = triangle_normals(vertices, faces)
+        return _plain(vertices, faces, np.broadcast_to(flat[:, None], (len(faces), 3, 3)))
+    extent = max(float(np.ptp(vertices, axis=0).max(initial=0)), 1e-30)
+    unique_rows: Any = trimesh.grouping.unique_rows
+    first, place = unique_rows((vertices - vertices.min(0, initial=np.inf)) / extent, digits=6)
+    return _plain(vertices, faces, crease_normals(vertices[first], place[faces]))
 
 
 def of_cells(cells: Array) -> Model:
@@ -104,19 +113,10 @@ def of_points(points: Array) -> Model:
     return _plain(vertices, all_faces, np.tile(unit[faces], (len(sample), 1, 1)))
 
 
-def _plain(vertices: Array, faces: Array, normals: Array | None = None) -> Model:
-    if normals is None:
-        normals = crease_normals(vertices, faces) if len(faces) < FINE else _flat_normals(vertices, faces)
+def _plain(vertices: Array, faces: Array, normals: Array) -> Model:
+    """A model in one colour and one part."""
     colours = np.broadcast_to(np.array(INPUT_COLOUR, np.uint8), (len(faces), 3))
     return Model(vertices, faces, normals, colours, np.zeros(len(faces), np.int64))
-
-
-def _flat_normals(vertices: Array, faces: Array) -> Array:
-    corners = vertices[faces]
-    area = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    length = np.linalg.norm(area, axis=1, keepdims=True)
-    flat: Array = (area / np.where(length > 0, length, 1)).astype(np.float32)
-    return np.broadcast_to(flat[:, None], (len(faces), 3, 3))
 
 
 def _empty() -> Model:

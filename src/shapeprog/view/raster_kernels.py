@@ -48,9 +48,13 @@ def covered(wb, wc, step_b, step_c, first, last):
     return math.ceil(low), math.floor(high)
 
 
-@helper
-def draw_faces(points, faces, tolerance, face, depth):
-    """Keep the face of the largest depth of every pixel, see :func:`nearest_faces`."""
+@kernel("void(f8[:, ::1], i8[:, ::1], f8, i4[:, ::1], f8[:, ::1])")
+def nearest_faces(points, faces, tolerance, face, depth):
+    """The face of the largest depth at every pixel, and that depth; of faces in one place the first in the list shows.
+
+    ``points`` (V, 3) are pixel coordinates and a depth that is linear across the screen.  ``face`` and ``depth``
+    (H, W) come filled with ``BACKGROUND`` and the lowest depth.
+    """
     height, width = face.shape
     for f in range(len(faces)):
         a, b, c = points[faces[f, 0]], points[faces[f, 1]], points[faces[f, 2]]
@@ -75,66 +79,24 @@ def draw_faces(points, faces, tolerance, face, depth):
                     face[y, x] = f
 
 
-@kernel("void(f8[:, ::1], i8[:, ::1], f8, i4[:, ::1], f8[:, ::1])")
-def nearest_faces(points, faces, tolerance, face, depth):
-    """Face and inverse depth of every pixel; of faces in one place the first in the list shows.
-
-    ``points`` (V, 3) are pixel coordinates and inverse depth, which is linear across the screen.  ``face`` and
-    ``depth`` (H, W) come filled with ``BACKGROUND`` and 0.
-    """
-    draw_faces(points, faces, tolerance, face, depth)
-
-
-@kernel("void(f8[:, ::1], i8[:, ::1], f8[:, :, ::1], f8, f8[:, ::1], f4[:, :, ::1])")
-def light_maps(vertices, faces, frames, radius, placed, maps):
-    """For each light the height of the highest surface below it, seen along its direction.
-
-    ``frames`` (L, 3, 3) hold two axes across the light and the direction towards it as rows; ``radius`` is half the
-    side of the square that a map covers; ``placed`` (V, 3) is scratch; ``maps`` (L, size, size) come filled with
-    the lowest height.
-    """
-    size = maps.shape[1]
-    scale, face = size / (2 * radius), np.empty((size, size), np.int32)
-    for light in range(len(frames)):
-        frame = frames[light]
-        for v in range(len(vertices)):
-            for axis in range(3):
-                placed[v, axis] = (
-                    frame[axis, 0] * vertices[v, 0] + frame[axis, 1] * vertices[v, 1] + frame[axis, 2] * vertices[v, 2]
-                )
-            placed[v, 0] = (placed[v, 0] + radius) * scale
-            placed[v, 1] = (placed[v, 1] + radius) * scale
-        draw_faces(placed, faces, 0.0, face, maps[light])
-
-
-@kernel(
-    "void(i4[:, ::1], f8[:, ::1], f8[:, ::1], i8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8, b1,"
-    " f4[:, :, ::1], f4[:, :, ::1])"
-)
-def surface(face, depth, points, faces, normals, view, ground, everywhere, position, normal):
-    """Position and normal towards the eye of every pixel; without a face, and if ``everywhere``, those of the ground.
+@kernel("void(i4[:, ::1], f8[:, ::1], f8[:, ::1], i8[:, ::1], f8[:, :, ::1], f8[:, ::1], f4[:, :, ::1], f4[:, :, ::1])")
+def surface(face, depth, points, faces, normals, view, position, normal):
+    """Position and normal towards the eye (H, W, 3) of every pixel that shows a face.
 
     ``view`` holds as rows the eye and the corner, across and down of its rays: that of pixel (x, y) is
-    ``corner + x * across + y * down``.  Depth is inverse, along the axis of view.  ``position`` and ``normal``
-    (H, W, 3) are written for pixels with a face or ground.
+    ``corner + x * across + y * down``.  Depth is inverse, along the axis of view.
     """
     height, width = face.shape
     eye, corner, across, down = view[0], view[1], view[2], view[3]
     ray, direction = np.empty(3), np.empty(3)
     for y in range(height):
         for x in range(width):
-            if face[y, x] == BACKGROUND and not everywhere:
+            f = face[y, x]
+            if f == BACKGROUND:
                 continue
             px, py = x + 0.5, y + 0.5
             for axis in range(3):
                 ray[axis] = corner[axis] + px * across[axis] + py * down[axis]
-            f = face[y, x]
-            if f == BACKGROUND:
-                along = (ground - eye[0]) / ray[0] if ray[0] < -1e-6 else 1e6
-                for axis in range(3):
-                    position[y, x, axis] = eye[axis] + along * ray[axis]
-                    normal[y, x, axis] = 1.0 if axis == 0 else 0.0
-                continue
             a, b, c = points[faces[f, 0]], points[faces[f, 1]], points[faces[f, 2]]
             area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
             wb = ((px - a[0]) * (c[1] - a[1]) - (py - a[1]) * (c[0] - a[0])) / area * b[2]
@@ -185,37 +147,6 @@ def irradiance(position, normal, skip, maps, frames, weights, radius, samples, b
                         continue
                 arrived += weights[light] * slope
             lit[y, x] = arrived * shares
-
-
-@kernel("void(i4[:, ::1], i8[::1], f4[:, :, ::1], f4[:, :, ::1], i8, f8, u1[:, ::1])")
-def edges(face, groups, position, normal, reach, gap, lines):
-    """Lines to draw: 2 where another part or the ground begins or the surface jumps, 1 at creases, 0 elsewhere."""
-    height, width = face.shape
-    for y in range(height):
-        for x in range(width):
-            mine, line = face[y, x], 0
-            for dy in range(-reach, reach + 1):
-                for dx in range(-reach, reach + 1):
-                    yy, xx = y + dy, x + dx
-                    if dx * dx + dy * dy > reach * reach + 0.5 or line == 2:
-                        continue
-                    if yy < 0 or xx < 0 or yy >= height or xx >= width or face[yy, xx] == mine:
-                        continue
-                    neighbour = face[yy, xx]
-                    if neighbour < 0 or mine < 0 or groups[neighbour] != groups[mine]:
-                        line = 2
-                        continue
-                    cosine, off, away = 0.0, 0.0, 0.0
-                    for axis in range(3):
-                        step = position[yy, xx, axis] - position[y, x, axis]
-                        cosine += normal[y, x, axis] * normal[yy, xx, axis]
-                        off += step * normal[y, x, axis]
-                        away += step * normal[yy, xx, axis]
-                    if abs(off) > gap and abs(away) > gap:
-                        line = 2
-                    elif cosine < 0.8:
-                        line = max(line, 1)
-            lines[y, x] = line
 
 
 @kernel("void(i4[:, ::1], f4[:, ::1], f4[:, ::1], u1[:, ::1], f8[::1], f8, f4[:, ::1], i8, f4[:, :, ::1])")

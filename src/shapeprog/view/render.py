@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -124,34 +125,24 @@ def render(model: Model, camera: Camera, width: int, height: int, samples: int =
     faces = np.ascontiguousarray(model.faces, np.int64)
     shown = np.ascontiguousarray(model.normals, np.float64)
     points = camera.project(vertices, wide, tall)
-    face, depth = np.full((tall, wide), kernels.BACKGROUND, np.int32), np.zeros((tall, wide))
-    kernels.nearest_faces(points, faces, 1e-6, face, depth)
+    face, depth = _nearest(points, faces, (tall, wide), 0.0, 1e-6)
     scale = camera.focal * wide
     across, down = camera.right / scale, -camera.up / scale
     corner = camera.ahead + camera.right * camera.middle[0] + camera.up * camera.middle[1]
     corner = corner - across * wide / 2 - down * tall / 2
-    solid = (points, faces, shown)
-    position, normal = _surface(face, depth, solid, np.stack([camera.eye, corner, across, down]), camera.low, False)
+    position, normal = (np.zeros((tall, wide, 3), np.float32) for _ in range(2))
+    view = np.stack([camera.eye, corner, across, down])
+    kernels.surface(face, depth, points, faces, shown, view, position, normal)
     large = int(width >= LARGE)
     lights = samples**2 * max(1, min(LIGHTS[large], WORK // max(len(faces), 1)) // samples**2)
     frames, weights = _sky(lights)
-    maps = np.full((lights, MAP_SIZE[large], MAP_SIZE[large]), -1e9, np.float32)
-    kernels.light_maps(vertices, faces, frames, camera.radius, np.empty_like(vertices), maps)
+    maps = np.stack([_height_map(vertices, faces, frame, camera.radius, MAP_SIZE[large]) for frame in frames])
     bias = 2.2 * camera.radius / MAP_SIZE[large]
     sky = (maps, frames, weights, camera.radius)
     lit = np.zeros((tall, wide), np.float32)
     kernels.irradiance(position, normal, face, *sky, samples, bias, lit)
-    # The ground is smooth: few places, all lights at each.
-    few = np.full((height // COARSE + 1, width // COARSE + 1), kernels.BACKGROUND, np.int32)
-    step = COARSE * samples
-    coarse = np.stack([camera.eye, corner, across * step, down * step])
-    ground_position, upward = _surface(few, few.astype(np.float64), solid, coarse, camera.low, True)
-    sunlit = np.zeros(few.shape, np.float32)
-    kernels.irradiance(ground_position, upward, -few, *sky, 1, bias, sunlit)
-    ground = (1 - SHADOW * (1 - _enlarged(sunlit, height, width))).astype(np.float32)
-    lines = np.zeros((tall, wide), np.uint8)
-    groups = np.asarray(model.group, np.int64)
-    kernels.edges(face, groups, position, normal, max(1, samples // 2), 0.3, lines)
+    ground = _ground(view * [[1], [1], [samples], [samples]], camera.low, sky, bias, height, width)
+    lines = _lines(face, np.asarray(model.group, np.int64), position, normal)
     colours = (np.ascontiguousarray(model.colours, np.float32).reshape(-1, 3) / 255) ** GAMMA
     total = np.zeros((height, width, 3), np.float32)
     kernels.develop(face, colours, lit, lines, INKS, AMBIENT, ground, samples, total)
@@ -159,35 +150,70 @@ def render(model: Model, camera: Camera, width: int, height: int, samples: int =
     return (np.clip(linear, 0, 1) ** (1 / GAMMA) * 255 + 0.5).astype(np.uint8)
 
 
-def _surface(face: Array, depth: Array, solid: Sequence[Array], view: Array, low: float, ground: bool) -> list[Array]:
-    """Position and normal (H, W, 3) of every pixel; without a face, and if ``ground``, those of the ground."""
-    from shapeprog.view.raster_kernels import surface
+def _nearest(
+    points: Array, faces: Array, shape: tuple[int, int], lowest: float, tolerance: float
+) -> tuple[Array, Array]:
+    """The face and the depth of every pixel; without one, ``BACKGROUND`` and the lowest depth."""
+    from shapeprog.view import raster_kernels as kernels
 
-    position, normal = (np.empty((*face.shape, 3), np.float32) for _ in range(2))
-    surface(face, depth, *solid, view, low, ground, position, normal)
-    return [position, normal]
+    face, depth = np.full(shape, kernels.BACKGROUND, np.int32), np.full(shape, lowest)
+    kernels.nearest_faces(np.ascontiguousarray(points), faces, tolerance, face, depth)
+    return face, depth
 
 
-def _enlarged(coarse: Array, height: int, width: int) -> Array:
-    """A brightness known for coarse squares at every pixel, smooth and fading to white at the border."""
+def _height_map(vertices: Array, faces: Array, frame: Array, radius: float, size: int) -> Array:
+    """The height (size, size) of the highest surface below a light, along its direction, the last row of ``frame``."""
+    seen = vertices @ frame.T
+    seen[:, :2] = (seen[:, :2] + radius) * size / (2 * radius)
+    return _nearest(seen, faces, (size, size), -1e9, 0.0)[1].astype(np.float32)
+
+
+def _lines(face: Array, groups: Array, position: Array, normal: Array) -> Array:
+    """Lines (H, W) between pixels: 2 where another part or the ground begins or the surface jumps, 1 at creases."""
+    width = face.shape[1]
+    lines = np.zeros(face.shape, np.uint8)
+    flat, drawn, place, facing = face.reshape(-1), lines.reshape(-1), position.reshape(-1, 3), normal.reshape(-1, 3)
+    for step, borders in ((1, face[:, 1:] != face[:, :-1]), (width, face[1:] != face[:-1])):
+        rows, columns = np.nonzero(borders)
+        first = rows * width + columns
+        second = first + step
+        part = (flat[first] < 0) | (flat[second] < 0) | (groups[flat[first]] != groups[flat[second]])
+        offset = place[second] - place[first]
+        gaps = [np.abs((offset * facing[pixel]).sum(1)) for pixel in (first, second)]
+        crease = (facing[first] * facing[second]).sum(1) < 0.8
+        kind = np.where(part | (np.minimum(*gaps) > 0.3), 2, crease).astype(np.uint8)
+        for pixel in (first, second):
+            drawn[pixel] = np.maximum(drawn[pixel], kind)
+    return lines
+
+
+def _ground(view: Array, low: float, sky: Sequence[Any], bias: float, height: int, width: int) -> Array:
+    """Brightness (H, W) of the ground, smooth and fading to white at the border.
+
+    It is computed for coarse squares, but with all lights of the sky, and blurred.  ``view`` holds as rows the eye, and
+    the corner, across and down of its rays, in pixels of the picture; ``low`` is the height of the ground.
+    """
     from PIL import Image as Pillow
+    from scipy.ndimage import gaussian_filter
 
-    tall, wide = coarse.shape
-    large = Pillow.fromarray(_blurred(_blurred(coarse).T).T).resize(
-        (wide * COARSE, tall * COARSE), Pillow.Resampling.BICUBIC
-    )
+    from shapeprog.view.raster_kernels import irradiance
+
+    eye, corner, across, down = view
+    x, y = np.meshgrid(np.arange(width // COARSE + 1) + 0.5, np.arange(height // COARSE + 1) + 0.5)
+    rays: Array = corner + COARSE * (x[..., None] * across + y[..., None] * down)
+    along = np.where(rays[..., 0] < -1e-6, (low - eye[0]) / np.minimum(rays[..., 0], -1e-6), 1e6)
+    position = (eye + along[..., None] * rays).astype(np.float32)
+    upward = np.zeros_like(position)
+    upward[..., 0] = 1
+    lit = np.zeros(along.shape, np.float32)
+    irradiance(position, upward, np.zeros(along.shape, np.int32), *sky, 1, bias, lit)
+    tall, wide = rays.shape[:2]
+    blurred = Pillow.fromarray(gaussian_filter(lit, BLUR, mode="nearest"))
+    large = blurred.resize((wide * COARSE, tall * COARSE), Pillow.Resampling.BICUBIC)
     field = np.clip(np.asarray(large), 0, 1)[:height, :width]
-    across, down = (np.minimum(np.arange(n), np.arange(n)[::-1]) / (FADE * n) for n in (width, height))
-    inside = np.minimum(np.minimum.outer(down, across), 1)
-    return (1 - (1 - field) * inside**2 * (3 - 2 * inside)).astype(np.float32)
-
-
-def _blurred(image: Array) -> Array:
-    """A Gaussian filter down the columns of an image, whose border is repeated outside."""
-    offset = np.arange(-int(4 * BLUR + 0.5), int(4 * BLUR + 0.5) + 1)
-    weights = np.exp(-0.5 * (offset / BLUR) ** 2)
-    rows = np.clip(np.arange(len(image)) + offset[:, None], 0, len(image) - 1)
-    return np.tensordot(weights / weights.sum(), image[rows].astype(np.float64), 1).astype(np.float32)
+    columns, rows = (np.minimum(np.arange(n), np.arange(n)[::-1]) / (FADE * n) for n in (width, height))
+    inside = np.minimum(np.minimum.outer(rows, columns), 1)
+    return (1 - SHADOW * (1 - field) * inside**2 * (3 - 2 * inside)).astype(np.float32)
 
 
 @lru_cache(maxsize=8)

@@ -315,7 +315,7 @@ def test_show_and_sheet_write_a_page_and_a_picture(run: Run, tmp_path: Path, pro
     assert run("show", program).code == 0
     page = (tmp_path / "table.html").read_text()
     assert "top_rectangle" in page
-    assert '"frame":"# frame: {' in page, "what is copied keeps its way to the input"
+    assert '"frame":"# placed: up ' in page, "what is copied keeps its way to the input"
     assert "pages end in .html" in run("show", program, "a.png").err
     (tmp_path / "cut.json").write_text(program.read_text()[:100])
     ended = run("sheet", ".", "sheet.png")

@@ -19,10 +19,9 @@ from shapeprog.cli import main, writing
 from shapeprog.errors import InputError, OutputError, ProgramError, ShapeProgError
 from shapeprog.files import write_text
 from shapeprog.formats import export, load_with_frame, save
-from shapeprog.formats.frames import frame_from, frame_in
 from shapeprog.formats.json_form import program_from_json, program_to_json, read_result
 from shapeprog.formats.parts import crease_normals, parts
-from shapeprog.formats.shape import LARGEST_FILE, read_text
+from shapeprog.formats.shape import LARGEST_FILE, program_in, read_text
 from shapeprog.language import Draw, Loop, Program, unroll
 from shapeprog.language.parser import parse
 from shapeprog.language.printer import format_program
@@ -45,17 +44,13 @@ def test_whole_numbers_of_any_length_are_refused_in_words(digits: int) -> None:
         program_from_json(program_to_json(PROGRAM).replace("(1, ", f"({number}, "))
     with pytest.raises(ShapeProgError, match=words):
         parse(LEG.replace("1", number))
-    with pytest.raises(InputError, match="frame"):
-        frame_in(f'# frame: {{"scale": {number + "0" * 300}, "centre": [0, 0, 0], "axes": []}}')
-    with pytest.raises(InputError, match="not a scale, a centre and a rotation"):
-        frame_from({"scale": 10**400, "centre": [0, 0, 0], "axes": [[1, 0, 0]]}, "x")
+    with pytest.raises(ProgramError, match="not a positive number"):
+        program_in(f"# placed: up y, front z, origin 0 0 0, 1 unit = {number + '0' * 300}\n{LEG}", "x")
 
 
 @pytest.mark.parametrize("depth", [500, 990, 100_000])
 def test_what_is_nested_deeply_is_refused_in_words(depth: int, tmp_path: Path) -> None:
     nested = "[" * depth + "]" * depth
-    with pytest.raises(InputError, match="frame"):
-        frame_in(f'# frame: {{"scale": {nested}}}\n{LEG}')
     text = program_to_json(PROGRAM)[:-3]
     (tmp_path / "one.json").write_text(f'{text}, "snapped": {nested}}}')
     with pytest.raises(InputError, match=r"nested too deeply|not a string"):

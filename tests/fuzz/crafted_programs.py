@@ -33,10 +33,8 @@ def crafted() -> Iterator[tuple[str, bytes]]:
         ("deep-loops", "".join(f"{' ' * n}for i in translate(2, by=(0, 0, 1)):\n" for n in range(99)) + " " * 99 + LEG),
         ("deepest-loops", nested(["translate(1, by=(0, 0, 1))"] * 64, LEG)),
         ("many-lines", f"{LEG}\n" * 2000),
-        ("deep-frame", f"# frame: {'[' * deep}\n{LEG}"),
-        ("deep-frame-object", f'# frame: {{"scale": {"[" * 990}{"]" * 990}}}\n{LEG}'),
-        ("long-frame-number", f'# frame: {{"scale": {"9" * 400}}}\n{LEG}'),
-        ("longer-frame-number", f'# frame: {{"scale": {"9" * 5000}}}\n{LEG}'),
+        ("long-frame-number", f"# placed: up y, front z, origin 0 0 0, 1 unit = {'9' * 5000}\n{LEG}"),
+        ("long-direction", f"# placed: up {'9' * 400} 0 0, front z, origin 0 0 0, 1 unit = 1\n{LEG}"),
         ("long-name", "a" * 900_000),
         ("long-text", "a\n" * 600_000),
         ("many-names", "a;" * 400_000),
@@ -72,7 +70,7 @@ def crafted() -> Iterator[tuple[str, bytes]]:
         ("wide", '{"format"'.encode("utf-16").decode("latin-1")),
     ):
         yield f"{name}.json", text.encode()
-    yield "blank-frame.shape", ("#" + "\n" * 200_000 + "frame:\n").encode()
+    yield "blank-frame.shape", ("#" + "\n" * 200_000 + "placed:\n").encode()
 
 
 def nested(loops: list[str], drawn: str) -> str:

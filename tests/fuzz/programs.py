@@ -15,7 +15,8 @@ from .mutations import BYTES, TEXT, Mutation, change_words, count_otherwise, mut
 NAMES = (
     "leg", "legg", "translate", "rotate", "at", "size", "by", "count", "step", "pass", "end", "for", "draw",
     "import os", "__import__('os')", "lambda: 0", "\U0001f600", "e\u0301", "\u202e", "\x1b[2J", "\x00", "\ufeff",
-    "'Leg', 'Cub'", "P", "G", "theta*i", "axis", "# frame:", "# frame: {", '# frame: {"scale": 0}', "statement", "body",
+    "'Leg', 'Cub'", "P", "G", "theta*i", "axis", "# placed:", "# placed: up y, ", "1 unit = 1",
+    "statement", "body",
     "box", "taper", "bent_rod", "cushion", "mirror", "seat", "seat(box", "leg(leg", "through", "edge", "side", "role",
     "null", "true", "\t", "\\", ";", ":", "(", ")", "[", "]", "{", "}", "'", '"', "\r", "\x0c", "\u2028", "=", "==",
     "*", "**", "...", "async ", "$",
@@ -37,7 +38,7 @@ WAYS: dict[str, tuple[Mutation, ...]] = {
     ".json": (*BYTES, *TEXT, *NUMBERS, *10 * (change_json,)),
 }
 
-TABLE = """# frame: {"scale": 0.04, "centre": [0, 0.5, 0], "axes": [[0, 0, 1], [1, 0, 0], [0, 1, 0]]}
+TABLE = """# placed: up y, front z, origin 0 0.5 0, 1 unit = 0.04
 top_rectangle(at=(4, 0, 0), thickness=2, half=(9, 11))
 for i in translate(2, by=(0, 0, 18)):
     for j in translate(2, by=(0, 14, 0)):

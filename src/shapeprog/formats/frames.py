@@ -6,11 +6,9 @@ A ``.shape`` file may keep the frame of the input in a comment above its first s
 
     # placed: up y, front z, origin 0 0.5 0, 1 unit = 0.01 m
 
-``up`` and ``front`` are axes of the input; ``origin`` is where the point x = 0, y = 0, z = 0 of the text, the middle of
-the floor, lies in it; the last entry is the length of a unit of the text in the unit of the input.  Frames along other
-axes, and those of statements in cells, are JSON:
-
-    # frame: {"scale": 0.0417, "centre": [0, 0.5, 0], "axes": [[0, 0, 1], [1, 0, 0], [0, 1, 0]]}
+``up`` and ``front`` are axes of the input, or directions of three numbers each; ``origin`` is where the point x = 0,
+y = 0, z = 0 of the text lies in it, which is the middle of the floor, or for statements in cells that of the grid; the
+last entry is the length of a unit of the text in the unit of the input.
 
 Without a frame one unit of the file is one of the program (a cell unless it has another unit), the centre of the grid
 is the origin, and the axes are those of the format.
@@ -18,19 +16,16 @@ is the origin, and the axes are those of the format.
 
 from __future__ import annotations
 
-import json
 import math
 import re
-from dataclasses import asdict
 from reprlib import repr as shortened
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from shapeprog.errors import InputError
 from shapeprog.formats.format import Format
 from shapeprog.language.ast import Scale
-from shapeprog.language.evaluate import placed_source
 from shapeprog.language.placement import LONGEST_SIDE
 from shapeprog.language.program import Program
 from shapeprog.language.text import Text
@@ -39,19 +34,16 @@ from shapeprog.space import SPAN, Array, FloatArray, Frame, grid_axes
 
 CELLS = "cells"  # the word for lengths in cells
 
-_HEADER = re.compile(r"^#[ \t]*frame:(.*)$", re.MULTILINE)
-_CURE = (
-    'write it as # frame: {"scale": 1, "centre": [0, 0, 0], "axes": [[1, 0, 0], [0, 1, 0], [0, 0, 1]]}, or remove it'
-)
 _LINE = re.compile(r"([^\r\n]*)(?:\r\n|\r|\n)")
 _PLACED = re.compile(r"#[ \t]*placed:[ \t]*([^\r\n]*)")
+_DIRECTION = r"([+-]?[xyz]|\S+ +\S+ +\S+)"
 _ENTRIES = re.compile(
-    r"up +([+-]?[xyz]) *, *front +([+-]?[xyz]) *, *origin +(\S+) +(\S+) +(\S+) *, *1 unit *= *(\S+)(?: +[a-z]+)?\s*"
+    rf"up +{_DIRECTION} *, *front +{_DIRECTION} *, *origin +(\S+) +(\S+) +(\S+) *, *1 unit *= *(\S+)(?: +[a-z]+)?\s*"
 )
 _PLACED_CURE = "write it as # placed: up y, front z, origin 0 0.5 0, 1 unit = 1, or remove it"
 
-_ALIGNED = 1e-9  # largest difference of the axes of a frame from those of the input where they are written by name
-_ROUNDED = 1e-7  # share of the longest side by which the frame of a placed text is rounded
+_ALIGNED = 1e-9  # largest difference of a direction from the axis as which it is written
+_ROUNDED = 1e-7  # share of the longest side by which the origin of a text is rounded
 
 _GRID = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
 """Directions x, y, z of a text in the axes of the grid, as columns."""
@@ -152,23 +144,6 @@ def _ground(program: Program) -> FloatArray:
     return np.array([low[0], *(low[1:] + high[1:]) / 2])
 
 
-def frame_from(data: Any, name: str) -> Frame:
-    """The frame of such a comment; an ``InputError`` if numbers are missing or not finite, the scale is not
-    positive or the axes are not a rotation."""
-    try:
-        scale, centre = float(data["scale"]), [float(value) for value in data["centre"]]
-        axes = [[float(value) for value in row] for row in data["axes"]]
-        matrix = np.array(axes)
-        good = matrix.shape == (3, 3) and len(centre) == 3 and scale > 0
-        good = good and all(map(math.isfinite, [scale, *centre])) and (np.abs(matrix) < 2).all()
-        good = good and np.allclose(matrix @ matrix.T, np.eye(3), atol=1e-6) and np.linalg.det(matrix) > 0
-    except (KeyError, TypeError, ValueError, OverflowError):
-        good = False
-    if not good:
-        raise InputError(f"{name}: the frame {shortened(data)} is not a scale, a centre and a rotation", _CURE)
-    return Frame(scale, (centre[0], centre[1], centre[2]), tuple((a, b, c) for a, b, c in axes))
-
-
 def frame_of_text(frame: Frame, scale: Scale) -> Frame:
     """The map from x, y, z of a text to the world, given that from the grid."""
     axes = np.asarray(frame.axes) @ _GRID
@@ -187,69 +162,50 @@ def scale_of(program: Program) -> Scale:
     return program.scale or Scale(1.0 if program.unit is None else 1 / program.unit.per_cell, 0.0)
 
 
-def frame_comment(frame: Frame | None, program: Program | None = None) -> str:
-    """The comment line that stores a frame above program text; empty without a frame.
-
-    Parameters
-    ----------
-    frame
-        The map from the grid to the world.
-    program
-        The program of the text, if its parts may be placed: then the line states where the origin of the text lies.
-    """
+def frame_comment(frame: Frame | None, program: Program) -> str:
+    """The comment line above the text of a program that stores the map from the grid to the world; empty without it."""
     if frame is None:
         return ""
-    if program is None or program.source is None or program.scale is None:
-        return f"# frame: {json.dumps(asdict(frame))}\n"
-    source, text = program.source, frame_of_text(frame, program.scale)
-    read = placed_source(source.lines).scale  # the program may lie in another grid than its text
-    assert read is not None
-    axes, step = np.asarray(text.axes), _ROUNDED * text.scale * LONGEST_SIDE / read.cells_per_unit
-    if np.abs(axes - np.rint(axes)).max() > _ALIGNED or not 1e-300 < step < 1e300:
-        return frame_comment(frame_of_grid(text, read))
-    size, own = f"{text.scale:.8g}", source.unit.name if source.unit else ""
+    scale = scale_of(program)
+    text, own = frame_of_text(frame, scale), "" if program.unit is None else program.unit.name
+    size = f"{text.scale:.8g}"
     factors = {name: METRES[own] / length for name, length in METRES.items()} if own else {"": 1.0}
     for name, factor in factors.items():
         if math.isclose(factor, text.scale, rel_tol=2e-7):
             size = f"{factor:.8g} {name}".rstrip()
-    digits = -math.ceil(math.log10(step))
+    step = _ROUNDED * text.scale * LONGEST_SIDE / scale.cells_per_unit
+    digits = -math.ceil(math.log10(max(step, 1e-300)))
     origin = " ".join(f"{round(value, digits) + 0.0:.15g}" for value in text.centre)
-    up, front = _axis_name(axes[:, 2]), _axis_name(-axes[:, 1])
+    axes = np.asarray(text.axes)
+    up, front = _direction_text(axes[:, 2]), _direction_text(-axes[:, 1])
     return f"# placed: up {up}, front {front}, origin {origin}, 1 unit = {size}\n"
 
 
 def without_frame(text: str) -> str:
     """Program text without the comment that stores its frame; line numbers do not change."""
     _, placed = _placed_comment(text)
-    return _HEADER.sub("", text if placed is None else text[: placed.start()] + text[placed.end() :])
+    return text if placed is None else text[: placed.start()] + text[placed.end() :]
 
 
-def frame_in(text: str, name: str = "<program>", program: Program | None = None) -> Frame | None:
-    """The frame stored in program text, or None.
+def frame_in(text: str, name: str, program: Program) -> Frame | None:
+    """The frame stored in the text of a program, or None.
 
     Parameters
     ----------
     text, name
         The text, and its name in errors.
     program
-        The program of the text, if its parts may be placed.
+        The program of the text.
 
     Raises
     ------
-    InputError, ProgramError
+    ProgramError
         If the comment cannot be read.
     """
     row, placed = _placed_comment(text)
-    if placed is not None and program is not None and program.scale is not None:
-        return frame_of_grid(_placed_frame(placed, Text(text, name), row), program.scale)
-    match = _HEADER.search(text)
-    if not match:
+    if placed is None:
         return None
-    try:
-        data = json.loads(match.group(1))
-    except (ValueError, RecursionError) as error:
-        raise InputError(f"{name}: the comment '# frame:' holds no JSON", _CURE) from error
-    return frame_from(data, name)
+    return frame_of_grid(_placed_frame(placed, Text(text, name), row), scale_of(program))
 
 
 def _placed_comment(text: str) -> tuple[int, re.Match[str] | None]:
@@ -268,10 +224,10 @@ def _placed_frame(comment: re.Match[str], text: Text, row: int) -> Frame:
     entries = _ENTRIES.fullmatch(comment[1])
     if entries is None:
         raise text.at(row, start + 1, "this is no frame of a text", _PLACED_CURE)
-    try:
-        axes = grid_axes(entries[1], entries[2]) @ _GRID
-    except ValueError as error:
-        raise text.at(row, start + 1, str(error), _PLACED_CURE) from None
+    up, rear = _direction(entries[1]), -_direction(entries[2])
+    rotation = np.stack([up, rear, np.cross(up, rear)], 1)
+    if not np.allclose(rotation.T @ rotation, np.eye(3), atol=1e-6):
+        raise text.at(row, start + 1, "up and front are not perpendicular unit directions", _PLACED_CURE)
     numbers = []
     for group in (3, 4, 5, 6):
         try:
@@ -283,7 +239,7 @@ def _placed_frame(comment: re.Match[str], text: Text, row: int) -> Frame:
             raise text.at(
                 row, start + entries.start(group) + 1, f"{shortened(entries[group])} is not {what}", _PLACED_CURE
             )
-    return _frame(numbers[3], np.array(numbers[:3]), axes)
+    return _frame(numbers[3], np.array(numbers[:3]), rotation @ _GRID)
 
 
 def _frame(scale: float, centre: Array, axes: Array) -> Frame:
@@ -291,6 +247,21 @@ def _frame(scale: float, centre: Array, axes: Array) -> Frame:
     return Frame(float(scale), (x, y, z), tuple((a, b, c) for a, b, c in axes.tolist()))
 
 
-def _axis_name(direction: Array) -> str:
+def _direction(text: str) -> FloatArray:
+    """A signed axis, or a direction of three numbers; 0 if one of them is no number or not in -2 to 2."""
+    words = text.split()
+    if len(words) == 1:
+        return (-1.0 if text.startswith("-") else 1.0) * np.eye(3)["xyz".index(text[-1])]
+    try:
+        direction = np.array([float(word) for word in words])
+    except ValueError:
+        return np.zeros(3)
+    return direction if (np.abs(direction) <= 2).all() else np.zeros(3)
+
+
+def _direction_text(direction: FloatArray) -> str:
+    """The same as text."""
     axis = int(np.abs(direction).argmax())
+    if np.abs(direction - np.rint(direction)).max() > _ALIGNED:
+        return " ".join(f"{value:.9g}" for value in direction)
     return ("-" if direction[axis] < 0 else "") + "xyz"[axis]

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 import re
 import subprocess
@@ -375,8 +373,6 @@ def test_evaluate_measures_programs_and_meshes_alike(run: Run, tmp_path: Path, p
     assert "noise floor" in shown.out
     assert "IoU@32" not in shown.out
     assert "IoU@32" in run("evaluate", "programs", "targets", "--all").out
-    rows = list(csv.DictReader(io.StringIO(run("evaluate", "programs", "targets", "--csv").out)))
-    assert rows[0]["name"] == "table"
 
 
 def test_evaluate_tells_how_many_physical_parts_have_a_primitive_of_their_own(run: Run, tmp_path: Path, program: Path):

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import csv
-import sys
 from collections.abc import Sequence
-from contextlib import nullcontext
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -51,19 +48,15 @@ def prepare_command(
 
     Shapes with equal voxels are in the same split.
     """
-    from rich.progress import Progress
-
     from shapeprog.data import prepare
 
     terminal.check_axes(up, front)
     last = None
-    bar = None if quiet else Progress(console=terminal.errors(), transient=True)
-    with bar or nullcontext():
-        task = bar.add_task("preparing", total=None) if bar else None
+    with terminal.progress(not quiet) as begin:
+        report = begin("preparing")
         try:
             for last in prepare(directory, output, points=points, seed=seed, up=up, front=front):
-                if bar and task is not None:
-                    bar.update(task, completed=last.done, total=last.total)
+                report(f"{last.done} of {last.total}", last.done / max(last.total, 1))
         except KeyboardInterrupt:
             raise terminal.Interrupted(f"finished categories are kept in {output}") from None
     assert last is not None
@@ -93,7 +86,6 @@ def evaluate_command(
     per_shape: Annotated[bool, typer.Option("--each", help="Also print a row per shape.")] = False,
     every: Annotated[bool, typer.Option("--all", help="Print all measures, not only the main ones.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print rows and summary as JSON.")] = False,
-    as_csv: Annotated[bool, typer.Option("--csv", help="Print a row per shape as CSV.")] = False,
     modules: terminal.With = None,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Show no progress bar.")] = False,
 ) -> None:
@@ -132,7 +124,7 @@ def evaluate_command(
     shapes, failures = scoring.read_targets(targets, up, front, points, seed)
     listed = list(scoring.predictions(predictions))
     rows: list[Metrics] = []
-    silent = quiet or as_json or as_csv
+    silent = quiet or as_json
     for path, name, prediction in track(listed, "measuring", console=terminal.errors(), transient=True, disable=silent):
         target = next(iter(shapes.values())) if len(shapes) == len(listed) == 1 else shapes.get(name)
         if isinstance(prediction, tuple):
@@ -157,10 +149,6 @@ def evaluate_command(
         totals = {name: terminal.plain(asdict(value)) for name, value in summary.items()}
         shown = [terminal.plain(asdict(row)) for row in rows]
         terminal.print_json({"seed": seed, "rows": shown, "summary": totals, "missing": missing_names})
-    elif as_csv:
-        writer = csv.DictWriter(sys.stdout, asdict(rows[0]).keys(), lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(asdict(row) for row in rows)
     else:
         _table(rows, summary if every else {name: summary[name] for name in _MAIN if name in summary}, per_shape, seed)
     if missing_names:

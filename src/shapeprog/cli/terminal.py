@@ -80,11 +80,6 @@ def guarded(command: Command) -> Command:
         try:
             command(*args, **kwargs)
             sys.stdout.flush()
-        except ShapeProgError as error:
-            if debugging:
-                raise
-            complain(error)
-            raise typer.Exit(MISTAKE) from None
         except KeyboardInterrupt as stop:
             note = str(stop) if isinstance(stop, Interrupted) else "no file is incomplete"
             errors().print(f"Interrupted; {note}.", style="yellow", markup=False, highlight=False)
@@ -93,19 +88,25 @@ def guarded(command: Command) -> Command:
             # The reader of a pipe has gone; keep Python from complaining about it at exit.
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
             raise typer.Exit(0) from None
-        except ModuleNotFoundError as error:
-            name = (error.name or "").partition(".")[0]
-            if debugging or name in ("", "shapeprog"):
-                raise
-            complain(InputError(f"this needs the package {name}, which is not installed", f"pip install {name}"))
-            raise typer.Exit(MISTAKE) from None
-        except OSError as error:
+        except (ShapeProgError, ModuleNotFoundError, OSError) as error:
             if debugging:
                 raise
-            complain(output_error(Path(error.filename or "the standard output"), error))
+            complain(_explained(error))
             raise typer.Exit(MISTAKE) from None
 
     return run  # type: ignore[return-value]
+
+
+def _explained(error: Exception) -> ShapeProgError:
+    """The message for an error; raises the error itself if it is a fault of the package."""
+    if isinstance(error, ShapeProgError):
+        return error
+    if isinstance(error, OSError):
+        return output_error(Path(error.filename or "the standard output"), error)
+    name = (getattr(error, "name", None) or "").partition(".")[0]
+    if name in ("", "shapeprog"):
+        raise error
+    return InputError(f"this needs the package {name}, which is not installed", f"pip install {name}")
 
 
 def with_options(run: Callable[[Any], None], kind: type[Any]) -> Callable[..., None]:

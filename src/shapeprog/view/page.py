@@ -33,6 +33,7 @@ SMALL = (216, 204)  # width and height of one view in a contact sheet
 LARGEST, SMALLEST = 17, 9  # sizes of type for the lines of a program
 
 COLUMNS = 4
+LEGEND = 160  # width of an entry of the legend of a contact sheet
 SUFFIXES = (".png", ".jpg", ".jpeg", ".webp", ".tif", ".tiff", ".pdf")
 
 _INK, _FAINT, _RULE = (38, 40, 44), (124, 128, 136), (222, 224, 228)
@@ -94,16 +95,15 @@ def png(program: Program, scores: Mapping[str, float] | None = None) -> bytes:
 
 def _picture(shape: Shape | None, program: Program, title: str, scores: Mapping[str, float] | None, view: int) -> Any:
     views = _views(shape, parts(program), view, view)
-    panel = _Panel(program, scores, int(view * 1.12), view)
-    head = 44
-    width = view * len(views) + panel.width + 2 * _PAD
+    head, column = 44, int(view * 1.12)
+    width = view * len(views) + column + 2 * _PAD
     page, draw = _sheet(width, view + head + 20)
     name = title or (shape.name if shape is not None else "")
     names = [name, "reconstruction"][: len(views)]
     for index, (image, name) in enumerate(zip(views, names, strict=True)):
         _paste(page, image, index * view, head)
         draw.text((index * view + view / 2, 16), _cut(name, 46), _FAINT, typeface(19), "ma")
-    panel.draw(draw, view * len(views) + _PAD, head)
+    _panel(draw, program, scores, (view * len(views) + _PAD, head), (column, view))
     return page
 
 
@@ -129,16 +129,16 @@ def contact_sheet(
     cell, row = wide + input_width + _PAD, tall + 52
     words = sorted({statement for _, _, used in pairs for statement in used})
     width = across * cell + _PAD
-    legend = _legend_rows(words, width - 2 * _PAD)
-    head = (54 if title else 14) + 30 * len(legend)
+    per_row = max(1, (width - 2 * _PAD) // LEGEND)
+    top = 54 if title else 14
+    head = top + 30 * -(-len(words) // per_row)
     page, draw = _sheet(width, head + row * -(-len(items) // across) + 8)
     if title:
         draw.text((_PAD, 16), title, _INK, typeface(22, bold=True))
-    for line, entries in enumerate(legend):
-        for offset, statement in entries:
-            _swatch(draw, _PAD + offset, head - 30 * (len(legend) - line) + 4, 13, statement)
-            corner = (_PAD + offset + 20, head - 30 * (len(legend) - line))
-            draw.text(corner, language().word(statement), _INK, typeface(15))
+    for number, statement in enumerate(words):
+        x, y = _PAD + LEGEND * (number % per_row), top + 30 * (number // per_row)
+        _swatch(draw, x, y + 4, 13, statement)
+        draw.text((x + 20, y), language().word(statement), _INK, typeface(15))
     for number, (item, (input_image, reconstruction, _)) in enumerate(zip(items, pairs, strict=True)):
         x, y = _PAD + number % across * cell, head + number // across * row
         for offset, image in ((0, input_image), (input_width, reconstruction)):
@@ -153,36 +153,36 @@ def contact_sheet(
     return target
 
 
-class _Panel:
-    """The program as text, fitted into a column."""
-
-    def __init__(self, program: Program, scores: Mapping[str, float] | None, width: int, height: int) -> None:
-        self.lines = listing(program)
-        self.scores = scores_text(scores, program)
-        self.width, self.height = width, height
-
-    def draw(self, draw: ImageDraw, x: int, y: int) -> None:
-        room = self.height - 84
-        for size in range(LARGEST, SMALLEST - 1, -1):  # the largest type size in which all of it fits
-            step, advance = int(size * 1.55), typeface(size, "Mono").getlength("m" * 10) / 10
-            lines = [part for line in self.lines for part in wrapped(line, int((self.width - 30) / advance))]
-            if len(lines) * step <= room:
-                break
-        fits = max(1, room // step)
-        shown = lines if len(lines) <= fits else lines[: fits - 1]
-        top = y + max(0, (room - step * len(lines)) // 2)
-        for number, line in enumerate(shown):
-            corner = (x + 24, top + number * step)
-            if line.statement is not None and line.word:
-                _swatch(draw, x, corner[1] + size * 0.28, int(size * 0.72), line.statement)
-            _line(draw, corner, line, size, advance)
-        if len(shown) < len(lines):
-            remainder = f"... and {len(lines) - len(shown)} more lines"
-            draw.text((x + 24, top + len(shown) * step), remainder, _FAINT, typeface(size, "Mono"))
-        foot = y + self.height - 62
-        draw.line([(x, foot), (x + self.width - 8, foot)], fill=_RULE, width=1)
-        for number, text in enumerate(self.scores):
-            draw.text((x, foot + 12 + 24 * number), text, _INK if number == 0 else _FAINT, typeface(16))
+def _panel(
+    draw: ImageDraw,
+    program: Program,
+    scores: Mapping[str, float] | None,
+    corner: tuple[int, int],
+    extent: tuple[int, int],
+) -> None:
+    """Draw the text of a program into a rectangle, in the largest type in which all of it fits, with its scores."""
+    (x, y), (width, height) = corner, extent
+    rows, room = listing(program), height - 84
+    for size in range(LARGEST, SMALLEST - 1, -1):
+        step, advance = int(size * 1.55), typeface(size, "Mono").getlength("m" * 10) / 10
+        lines = [part for line in rows for part in wrapped(line, int((width - 30) / advance))]
+        if len(lines) * step <= room:
+            break
+    fits = max(1, room // step)
+    shown = lines if len(lines) <= fits else lines[: fits - 1]
+    top = y + max(0, (room - step * len(lines)) // 2)
+    for number, line in enumerate(shown):
+        start = (x + 24, top + number * step)
+        if line.statement is not None and line.word:
+            _swatch(draw, x, start[1] + size * 0.28, int(size * 0.72), line.statement)
+        _line(draw, start, line, size, advance)
+    if len(shown) < len(lines):
+        remainder = f"... and {len(lines) - len(shown)} more lines"
+        draw.text((x + 24, top + len(shown) * step), remainder, _FAINT, typeface(size, "Mono"))
+    foot = y + height - 62
+    draw.line([(x, foot), (x + width - 8, foot)], fill=_RULE, width=1)
+    for number, text in enumerate(scores_text(scores, program)):
+        draw.text((x, foot + 12 + 24 * number), text, _INK if number == 0 else _FAINT, typeface(16))
 
 
 def scores_text(scores: Mapping[str, float] | None, program: Program) -> list[str]:
@@ -213,19 +213,6 @@ def _pair(item: Item) -> tuple[Image | None, Image, set[int]]:
     solids = parts(item.program)
     views = _views(item.shape, solids, *SMALL)
     return (views[0] if len(views) > 1 else None), views[-1], {part.statement for part in solids}
-
-
-def _legend_rows(words: Sequence[int], width: int) -> list[list[tuple[int, int]]]:
-    rows: list[list[tuple[int, int]]] = [[]]
-    offset = 0
-    for statement in words:
-        wide = int(typeface(15).getlength(language().word(statement))) + 44
-        if offset and offset + wide > width:
-            rows.append([])
-            offset = 0
-        rows[-1].append((offset, statement))
-        offset += wide
-    return rows
 
 
 def _line(draw: ImageDraw, corner: tuple[float, float], line: Row, size: int, advance: float) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -13,8 +13,8 @@ from shapeprog.files import write_text
 from shapeprog.formats.scripts import Script, needed, number, prelude, script
 from shapeprog.geometry.primitives.cylinder import SEGMENTS
 from shapeprog.language.ast import Argument, Assignment, Call, Comment, Function, Group, Keywords, Line, Part, Point
-from shapeprog.language.expression import Expression, Value, text_of
-from shapeprog.language.placement import AXES, BOX, ROUND
+from shapeprog.language.expression import Expression, text_of
+from shapeprog.language.placement import BOX, ROUND, SIZES
 from shapeprog.language.program import Program
 from shapeprog.space import Frame
 
@@ -148,59 +148,34 @@ def _group(line: Group) -> str:
     words += [f'"{line.axis}"'] if line.axis else []
     keywords = line.keywords
     if line.kind == "row":
-        words.append(f"in_box({_keywords(_first(line.body) or ())})")
+        words.append(_first(line.body) or "in_box()")
         keywords = dict(keywords)["last"].keywords  # type: ignore[union-attr]
     words += [_keywords(keywords)] if keywords else []
     return f"{_GROUPS.get(line.kind, line.kind)}({', '.join(words)})"
 
 
-def _first(body: tuple[Line, ...]) -> Keywords | None:
-    """The keywords of the box to which a row refers: that of the first part, call or group in its body."""
+def _first(body: tuple[Line, ...]) -> str:
+    """The box to which a row refers: that of the first part, call or group in its body; empty if there is none."""
     for line in body:
         match line:
             case Group(kind="inside" | "divide", keywords=keywords) | Call(arguments=keywords):
-                return tuple((word, value) for word, value in keywords if word in BOX)
-            case Group():
-                if (inner := _first(line.body)) is not None:
-                    return inner
-            case Part():
-                return _reference(line)
-    return None
+                return _box("in_box", keywords, BOX)
+            case Part(kind=kind, keywords=keywords):
+                start = dict(keywords).get("start")
+                if isinstance(start, Point):  # a box without size
+                    return _box("in_box", (*start.keywords, *((size, 0.0) for size in SIZES)), BOX)
+                return _box("round_box", keywords, (*BOX, "radius")) if kind in ROUND else _box("in_box", keywords, BOX)
+            case Group() if box := _first(line.body):
+                return box
+    return ""
 
 
-def _reference(line: Part) -> Keywords:
-    """The box of a part; the box of a solid between points is its start."""
-    keywords = dict(line.keywords)
-    if isinstance(start := keywords.get("start"), Point):
-        return (*start.keywords, *((words.size, 0.0) for words in AXES))
-    sides = {word: value for word, value in keywords.items() if word in BOX}
-    if line.kind in ROUND:
-        across: Value | None = None
-        if "radius" in keywords:
-            across = _Text(f"2 * max({_argument(keywords['radius'])})")
-        else:
-            by = [words.size in sides or {words.low, words.high} <= sides.keys() for words in AXES[:2]]
-            if by[0] != by[1]:
-                words, size = AXES[by.index(True)], AXES[by.index(True)].size
-                across = sides.get(size, _Text(f"${size} - ({text_of(sides.get(words.low, 0.0))})"))  # type: ignore[assignment,arg-type]
-                if size not in sides:
-                    across = _Text(f"{across} - ({text_of(sides[words.high])})")  # type: ignore[arg-type]
-        if across is not None:
-            sides |= {words.size: across for words in AXES[:2] if not {words.low, words.high} <= sides.keys()}
-    return tuple(sides.items())
+def _box(function: str, keywords: Keywords, words: Collection[str]) -> str:
+    """The intervals of a box by some of its keywords."""
+    return f"{function}({_keywords([pair for pair in keywords if pair[0] in words])})"
 
 
-class _Text(Expression):
-    """An expression that only OpenSCAD has."""
-
-    def __init__(self, text: str) -> None:
-        self.text = text
-
-    def __str__(self) -> str:
-        return self.text
-
-
-def _keywords(keywords: Keywords) -> str:
+def _keywords(keywords: Iterable[tuple[str, Argument]]) -> str:
     return ", ".join(f"{word} = {_argument(argument)}" for word, argument in keywords)
 
 

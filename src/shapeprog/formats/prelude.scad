@@ -123,13 +123,21 @@ module rounded(size, edge) {
   } else if (min(size) > 0) cube(size);
 }
 
+// The width and depth of an upright round solid, which has a radius, or the size of a box along x or y.
+function round_size(left, right, width, x, front, rear, depth, y, radius) = !is_undef(radius) ? 2 * max(radius) :
+  let (by_x = !is_undef(width) || !(is_undef(left) || is_undef(right)),
+    by_y = !is_undef(depth) || !(is_undef(front) || is_undef(rear)),
+    side = by_y && !by_x ? span(front, rear, depth, y, $depth, (1 / 2)) : span(left, right, width, x, $width, (1 / 2)))
+  side[1] - side[0];
+
+// The intervals of the box of an upright round solid.
+function round_box(left, right, width, x, front, rear, depth, y, bottom, top, height, z, radius) =
+  let (across = round_size(left, right, width, x, front, rear, depth, y, radius))
+  in_box(left, right, across, x, front, rear, across, y, bottom, top, height, z);
+
 // An upright round solid, by radius or by the size of its box; a taper has two radii, [bottom, top].
 module upright(kind, left, right, width, x, front, rear, depth, y, bottom, top, height, z, radius, tilt = 0) {
-  across = !is_undef(radius) ? 2 * max(radius) :
-    let (by_x = !is_undef(width) || !(is_undef(left) || is_undef(right)),
-      by_y = !is_undef(depth) || !(is_undef(front) || is_undef(rear)),
-      sides = in_box(left, right, width, x, front, rear, depth, y, bottom, top, height, z))
-    by_y && !by_x ? sides[1][1] - sides[1][0] : sides[0][1] - sides[0][0];
+  across = round_size(left, right, width, x, front, rear, depth, y, radius);
   inside(left, right, across, x, front, rear, across, y, bottom, top, height, z, tilt) painted(kind)
     between(middle(), [$width / 2, $depth / 2, $height], is_undef(radius) ? across / 2 : radius);
 }

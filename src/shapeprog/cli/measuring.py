@@ -157,10 +157,7 @@ def evaluate_command(
             f"{len(missing_names)} of {len(shapes)} targets have no prediction and are not counted: {names}",
             markup=False,
         )
-    for error in failures:
-        terminal.complain(error)
-    if failures:
-        raise typer.Exit(1)
+    terminal.finish(failures)
 
 
 def _table(rows: Sequence[Metrics], summary: dict[str, Summary], per_shape: bool, seed: int) -> None:

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 debugging = False  # whether errors show their traceback
 WIDTH = 120  # columns of a table where the output is no terminal
-MISTAKE, INTERRUPTED = 2, 130  # exit codes
+FAILED, MISTAKE, INTERRUPTED = 1, 2, 130  # exit codes
 
 Command = TypeVar("Command", bound=Callable[..., None])
 
@@ -172,6 +172,14 @@ def complain(error: ShapeProgError) -> None:
     console.print(text, style="red", markup=False)
     if error.hint:
         console.print(f"hint: {error.hint}", markup=False)
+
+
+def finish(failures: Sequence[ShapeProgError]) -> None:
+    """Print errors, and end with the exit code of a failure if there are some."""
+    for error in failures:
+        complain(error)
+    if failures:
+        raise typer.Exit(FAILED)
 
 
 def at(path: Path, error: ShapeProgError) -> ShapeProgError:

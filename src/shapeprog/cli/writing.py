@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -144,10 +144,8 @@ def render_command(
     loaded, frame = terminal.read_program_file(program, changes)
     suffix, chosen = output.suffix.lower(), format_of(output)
     if suffix in SUFFIXES:
-        result = _result(program, changes)
-        beside = _input_of(result, shape)
-        _tell_hidden([result], [beside], quiet)
-        picture(beside, loaded, output, title=program.stem, scores=result.scores)
+        beside, scores = _input_and_scores(program, changes, shape, quiet)
+        picture(beside, loaded, output, title=program.stem, scores=scores)
     elif chosen is not None and chosen.kind == "sample":
         given: dict[str, Any] = {"resolution": resolution, "points": points, "seed": seed}
         export(loaded, output, frame, **{name: given[name] for name in chosen.options})
@@ -182,10 +180,8 @@ def show_command(
     page = output or Path(f"{program.stem}.html")
     if page.suffix.lower() not in (".html", ".htm"):
         raise OutputError(f"{page} is not an HTML file", "pages end in .html; for pictures use 'shapeprog render'")
-    result = _result(program, changes)
-    beside = _input_of(result, shape)
-    _tell_hidden([result], [beside], quiet)
-    viewer(loaded, page, shape=beside, title=program.stem, scores=result.scores, frame=frame)
+    beside, scores = _input_and_scores(program, changes, shape, quiet)
+    viewer(loaded, page, shape=beside, title=program.stem, scores=scores, frame=frame)
     if not quiet:
         terminal.output().print(f"wrote {page}")
     if browse:
@@ -219,7 +215,6 @@ def sheet_command(
 
     terminal.load_modules(modules)
     items: list[Item] = []
-    results: list[Result] = []
     failures: list[ShapeProgError] = []
     for path in program_files(folder):
         if len(items) == most:
@@ -229,17 +224,12 @@ def sheet_command(
         except ShapeProgError as error:
             failures.append(error)
             continue
-        results.append(_result(path))
-        note = scores_text(results[-1].scores, loaded)[0]
-        items.append(Item(path.stem, _input_of(results[-1], shape), loaded, note))
-    _tell_hidden(results, [item.shape for item in items], quiet)
+        beside, scores = _input_and_scores(path, None, shape, quiet=True)
+        items.append(Item(path.stem, beside, loaded, scores_text(scores, loaded)[0]))
     contact_sheet(items, output, columns=columns, title=title)
     if not quiet:
         terminal.output().print(f"wrote {output}: {len(items)} programs")
-    for problem in failures:
-        terminal.complain(problem)
-    if failures:
-        raise typer.Exit(1)
+    terminal.finish(failures)
 
 
 def statements_command(
@@ -259,13 +249,20 @@ def statements_command(
     terminal.output().print("\n".join(pages).rstrip("\n"))
 
 
-def _result(path: Path, changes: Sequence[str] | None = None) -> Result:
-    """Scores and input of a .json file; empty for other formats and for programs changed by ``--set``."""
+def _input_and_scores(
+    path: Path, changes: Sequence[str] | None, named: Path | None, quiet: bool
+) -> tuple[Shape | None, Mapping[str, float]]:
+    """The input of a program, see :func:`_input_of`, and the scores in its .json file, unless ``--set`` changes it."""
     from shapeprog.formats.json_form import Result, read_result
     from shapeprog.language.program import Program
 
     is_empty = changes or path.suffix.lower() != ".json"
-    return Result(str(path), Program()) if is_empty else read_result(path)
+    result = Result(str(path), Program()) if is_empty else read_result(path)
+    shape = _input_of(result, named)
+    if result.source and shape is None and not quiet:
+        message = "The input is not shown: it was not found, or cannot be read. Give it with --shape."
+        terminal.errors().print(message, style="dim", markup=False)
+    return shape, result.scores
 
 
 def _input_of(result: Result, named: Path | None) -> Shape | None:
@@ -295,10 +292,3 @@ def _input_of(result: Result, named: Path | None) -> Shape | None:
     # It was inferred with --up or --front: show it as it was seen then.
     seen = result.frame.to_grid(shape.frame.to_world(shape.vertices))
     return replace(shape, vertices=seen.astype(shape.vertices.dtype))
-
-
-def _tell_hidden(results: list[Result], shapes: list[Shape | None], quiet: bool) -> None:
-    """Say that inputs are not shown, where programs name some and none was found."""
-    if any(result.source for result in results) and not any(shapes) and not quiet:
-        message = "Inputs are not shown: none was found and readable. Give them with --shape."
-        terminal.errors().print(message, style="dim", markup=False)

@@ -26,7 +26,6 @@ from shapeprog.language.named import set as set_names
 from shapeprog.language.parser import parse
 from shapeprog.language.printer import format_program
 from shapeprog.language.program import Loop, Program
-from shapeprog.language.statement import language
 from shapeprog.language.unit import Unit
 from shapeprog.view import Item, contact_sheet, picture, viewer
 from shapeprog.view import raster_kernels as kernels
@@ -121,7 +120,7 @@ def test_shape_comes_in_colour_on_white_with_a_shadow():
     lifted = of_parts(parts(parse("leg(at=(-12, 0, 0), size=(1, 1, 1))")))
     image = render(model, camera_for([model, lifted]), 160, 160).astype(float)
     assert (image[:4] == 255).all()
-    gold = np.array(colour(2), float)
+    gold = np.array(colour("top_rectangle"), float)
     close = np.abs(image / image.max(-1, keepdims=True) - gold / gold.max()).max(-1) < 0.15
     assert close.mean() > 0.15
     grey = (np.ptp(image, axis=-1) < 3) & (image[..., 0] < 250)
@@ -198,7 +197,7 @@ def test_listing_knows_which_line_draws_what():
     lines = listing(PROGRAM, None)
     assert "\n".join(line.text for line in lines) + "\n" == format_program(PROGRAM)
     assert [line.blocks for line in lines] == [(0,), (1, 2), (1,), (1,), (2,)]
-    assert [line.statement for line in lines] == [2, None, None, 1, 12]
+    assert [line.role for line in lines] == ["top_rectangle", "", "", "leg", "horizontal_bar"]
     assert ["".join(parted(line)) for line in lines] == [line.text for line in lines]
     assert all(parted(line)[1] == line.word for line in lines)
     assert "size=(1.24, 14, 1)" in listing(PROGRAM)[-1].text
@@ -212,7 +211,7 @@ def test_rows_of_placed_text_know_what_they_draw_and_in_which_colour():
     assert "\n".join(row.text for row in rows) + "\n" == format_program(program) == PLACED
     assert ["".join(parted(row)) for row in rows] == [row.text for row in rows]
     assert all(parted(row)[1] == row.word for row in rows)
-    found = [(row.word, row.blocks, row.statement is not None) for row in rows if row.word]
+    found = [(row.word, row.blocks, row.role != "") for row in rows if row.word]
     assert found == [
         ("upright", (2, 3), False), ("box", (2, 3), True), ("top", (0,), True), ("mirror", (1,), False),
         ("leg", (1,), True), ("leg", (2,), True), ("upright", (3,), False), ("inside", (4, 5), False),
@@ -220,9 +219,9 @@ def test_rows_of_placed_text_know_what_they_draw_and_in_which_colour():
         ("handle", (6,), True),
     ]  # fmt: skip
     for row in rows:
-        if row.statement is not None:
-            colours = {part.statement for part in drawn if part.block in row.blocks[:1]}
-            assert colours <= {row.statement}, "a line has the colour of its parts"
+        if row.role:
+            colours = {part.word for part in drawn if part.block in row.blocks[:1]}
+            assert colours <= {row.role}, "a line has the colour of its parts"
     assert "60.12," in listing(program)[1].text
 
 
@@ -250,7 +249,7 @@ def test_roles_that_occur_together_have_distinct_colours():
     drawn = [[part.word for part in parts(furniture(number, 0))] for number in range(20)]
     for words in (*families, *drawn):
         for one, two in itertools.combinations(sorted(set(words)), 2):
-            apart = np.linalg.norm(lab(colour(language().called(one).id)) - lab(colour(language().called(two).id)))
+            apart = np.linalg.norm(lab(colour(one)) - lab(colour(two)))
             assert apart > 25, (one, two, apart)
 
 

@@ -275,7 +275,7 @@ def print_program(console: Console, program: Program) -> None:
 
     for line in listing(program):
         before, word, after = parted(line)
-        style = "dim" if line.statement is None else f"bold {hexadecimal(line.statement)}"
+        style = f"bold {hexadecimal(line.role)}" if line.role else "dim"
         console.print(Text.assemble((before, "dim"), (word, style), after))
 
 

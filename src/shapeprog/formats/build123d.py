@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import ast
 import builtins
 import importlib.util
+import re
 from collections.abc import Iterator
 from dataclasses import replace
 from functools import cache
@@ -122,19 +122,12 @@ def _with_role(line: Line, roles: dict[str, str]) -> Line:
 
 @cache
 def _reserved() -> set[str]:
-    """Reserved words of these scripts."""
-    result = {*dir(builtins), "scale", "world", "corner", "colours"}
-    for node in ast.parse(HEAD + TOOLS + TAIL.replace("@UNIT@", "MM")).body:
-        match node:
-            case ast.ImportFrom(_, aliases):
-                result |= {alias.name for alias in aliases}
-            case ast.FunctionDef(name):
-                result.add(name)
-            case ast.Assign(targets):
-                result |= {name.id for target in targets for name in ast.walk(target) if isinstance(name, ast.Name)}
-            case ast.For(target=ast.Name(name)):
-                result.add(name)
-    return result
+    """Reserved words of these scripts: imports, functions and variables at their top level."""
+    _, _, imports = HEAD.split('"""')
+    functions = re.findall(r"^def (\w+)", TOOLS + TAIL, re.MULTILINE)
+    variables = re.findall(r"^(?:for )?(\w+(?:, \w+)*)(?: = | in )", TOOLS + TAIL, re.MULTILINE)
+    names = re.findall(r"\w+", " ".join([imports, *functions, *variables]))
+    return {*dir(builtins), *names, "scale", "world", "corner", "colours"}
 
 
 def _tuple(values: Any) -> str:

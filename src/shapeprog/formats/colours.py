@@ -8,9 +8,8 @@ in a piece of furniture are at least 25 apart.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import lru_cache
 
-from shapeprog.language.statement import Language, language
+from shapeprog.language.statement import language
 
 Colour = tuple[int, int, int]  # red, green and blue from 0 to 255
 
@@ -34,18 +33,12 @@ _OTHERS = ("#66CCEE", "#EE6677", "#228833", "#CCBB44", "#AA3377", "#EE7733", "#0
 """Colours of a user's own statements and roles, by their id."""
 
 
-def colour(statement: int) -> Colour:
-    """The colour of the role or statement with this id, built in or a user's own."""
-    text = _by_id(language()).get(statement, _OTHERS[statement % len(_OTHERS)])
+def colour(word: str) -> Colour:
+    """The colour of a role or statement, built in or a user's own."""
+    text = _BY_NAME.get(word) or _OTHERS[language().called(word).id % len(_OTHERS)]
     return (int(text[1:3], 16), int(text[3:5], 16), int(text[5:7], 16))
 
 
-def hexadecimal(statement: int) -> str:
+def hexadecimal(word: str) -> str:
     """The same colour as ``#rrggbb``."""
-    return "#{:02x}{:02x}{:02x}".format(*colour(statement))
-
-
-@lru_cache(maxsize=4)
-def _by_id(known: Language) -> dict[int, str]:
-    names = {*known.names, *known.roles}
-    return {known.called(name).id: text for name, text in _BY_NAME.items() if name in names}
+    return "#{:02x}{:02x}{:02x}".format(*colour(word))

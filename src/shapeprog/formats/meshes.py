@@ -60,7 +60,7 @@ def write_glb(program: Program, path: Path, frame: Frame) -> None:
     for part, of_corners in zip(each, part_normals(each), strict=True):
         if part.word not in materials:
             materials[part.word] = make_material(
-                name=part.word, baseColorFactor=[*colour(part.statement), 255], metallicFactor=0.0, roughnessFactor=0.7
+                name=part.word, baseColorFactor=[*colour(part.word), 255], metallicFactor=0.0, roughnessFactor=0.7
             )
         vertices, normals, faces = _split(part, of_corners)
         mesh = trimesh.Trimesh(vertices, faces, vertex_normals=normals, process=False)
@@ -81,8 +81,8 @@ def write_obj(program: Program, path: Path, frame: Frame) -> None:
         lines += ["f {} {} {}".format(*face) for face in (part.faces + first).tolist()]
         first += len(part.vertices)
     materials = []
-    for word, statement in {part.word: part.statement for part in each}.items():
-        materials.append("newmtl {}\nKd {:.4f} {:.4f} {:.4f}\n".format(word, *(c / 255 for c in colour(statement))))
+    for word in dict.fromkeys(part.word for part in each):
+        materials.append("newmtl {}\nKd {:.4f} {:.4f} {:.4f}\n".format(word, *(c / 255 for c in colour(word))))
     write_text(library, "\n".join(materials))
     write_text(path, "\n".join([*lines, ""]))
 
@@ -92,7 +92,7 @@ def write_ply(program: Program, path: Path, frame: Frame) -> None:
     import trimesh
 
     each = drawn_parts(program, frame)
-    colours = [np.tile([*colour(part.statement), 255], (len(part.vertices), 1)) for part in each]
+    colours = [np.tile([*colour(part.word), 255], (len(part.vertices), 1)) for part in each]
     vertices, faces = joined([(part.vertices, part.faces) for part in each])
     mesh = trimesh.Trimesh(vertices, faces, vertex_colors=np.concatenate(colours).astype(np.uint8), process=False)
     content: Any = mesh.export(file_type="ply")
@@ -123,10 +123,9 @@ def write_3mf(program: Program, path: Path, frame: Frame, unit: str = "") -> Non
 def _model(program: Program, frame: Frame, unit: str) -> Iterator[str]:
     solids = drawn_parts(program, frame)
     words = list(dict.fromkeys(part.word for part in solids))
-    statements = {part.word: part.statement for part in solids}
     yield f'{_HEAD}<model unit="{unit}" xml:lang="en-US" xmlns="{_CORE}"><resources><basematerials id="1">'
     for word in words:
-        yield f'<base name={quoteattr(word)} displaycolor="{hexadecimal(statements[word]).upper()}"/>'
+        yield f'<base name={quoteattr(word)} displaycolor="{hexadecimal(word).upper()}"/>'
     yield "</basematerials>"
     for number, part in enumerate(solids, 2):
         pindex = words.index(part.word)

@@ -14,7 +14,6 @@ from shapeprog.errors import OutputError, ShapeProgError
 from shapeprog.geometry.mesh import joined, part_meshes, union_mesh
 from shapeprog.language.parameters import LARGEST
 from shapeprog.language.program import Program
-from shapeprog.language.statement import language
 from shapeprog.language.tensors import encode
 from shapeprog.language.unroll import on_numpy_if_shipped, unroll
 from shapeprog.lazy_torch import torch
@@ -32,10 +31,8 @@ class Part:
     ----------
     name
         Role or statement and number, such as ``leg_3``.
-    statement
-        Id of that role or statement.
     word
-        Its name.
+        That role or statement.
     block
         Which of the program's drawing statements, in the order of the text, from 0.
     vertices, faces
@@ -43,7 +40,6 @@ class Part:
     """
 
     name: str
-    statement: int
     word: str
     block: int
     vertices: Vertices
@@ -67,13 +63,12 @@ def parts(program: Program, frame: Frame | None = None) -> list[Part]:
         blocks, meshes = scene.block.tolist(), part_meshes(scene)
     numbers: Counter[str] = Counter()
     result = []
-    called = [language().called(draw.word) for draw in program.draws]
+    words = [draw.word for draw in program.draws]
     for slot, vertices, faces in meshes:
         block = blocks[slot]
-        word = called[block].name
+        word = words[block]
         numbers[word] += 1
-        where = placed(vertices, frame)
-        result.append(Part(f"{word}_{numbers[word]}", called[block].id, word, block, where, faces))
+        result.append(Part(f"{word}_{numbers[word]}", word, block, placed(vertices, frame), faces))
     return result
 
 

@@ -32,7 +32,6 @@ from shapeprog.language.dimensions import Counts
 from shapeprog.language.expression import Expression, Name
 from shapeprog.language.placement import LONGEST_SIDE, SIZES
 from shapeprog.language.program import Program
-from shapeprog.language.statement import language
 from shapeprog.space import FloatArray, Frame
 
 _DEFINED = re.compile(r"^(?:module|function|def|class) (\w+)", re.MULTILINE)
@@ -187,4 +186,4 @@ def _free_names(names: Sequence[str], reserved: Collection[str]) -> dict[str, st
 
 
 def _colours(words: Collection[str]) -> dict[str, str]:
-    return {word: hexadecimal(language().called(word).id) for word in sorted(words)}
+    return {word: hexadecimal(word) for word in sorted(words)}

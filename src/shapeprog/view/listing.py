@@ -21,7 +21,6 @@ from shapeprog.language.evaluate import provenance
 from shapeprog.language.expression import Name, Value, replaced
 from shapeprog.language.printer import printed, source_of
 from shapeprog.language.program import Program
-from shapeprog.language.statement import language
 from shapeprog.language.unit import Unit
 
 DIGITS = 2  # decimals shown of numbers in cells; files have all of them
@@ -37,15 +36,15 @@ class Row:
         As printed.
     word
         The role, statement, loop, group or function on it; empty if there is none.
-    statement
-        The id of the role or statement in whose colour it is shown if it draws, else None.
+    role
+        The role or statement in whose colour it is shown, if it draws, else empty.
     blocks
         Indices, from 0, of the drawing statements of the expanded program that it draws or repeats.
     """
 
     text: str
     word: str = ""
-    statement: int | None = None
+    role: str = ""
     blocks: tuple[int, ...] = ()
 
 
@@ -62,12 +61,12 @@ def listing(program: Program, digits: int | None = DIGITS) -> list[Row]:
             rows.append(Row(text))
             continue
         block_numbers = tuple(blocks.get(id(line), ()))
-        word, called = _word(line), ""
+        word, role = _word(line), ""
         if isinstance(line, Draw | Part):
-            called = words[block_numbers[0]] if block_numbers else word
+            role = words[block_numbers[0]] if block_numbers else word
         elif isinstance(line, Call):
-            called = line.role
-        rows.append(Row(text, word, language().called(called).id if called else None, block_numbers))
+            role = line.role
+        rows.append(Row(text, word, role, block_numbers))
     return rows
 
 

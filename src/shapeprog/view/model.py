@@ -49,7 +49,7 @@ def of_parts(parts: Sequence[Part]) -> Model:
     return Model(
         *joined([(part.vertices, part.faces) for part in parts]),
         np.concatenate(part_normals(parts)),
-        np.concatenate([np.tile(colour(part.statement), (len(part.faces), 1)) for part in parts]),
+        np.concatenate([np.tile(colour(part.word), (len(part.faces), 1)) for part in parts]),
         np.concatenate([np.full(len(part.faces), number) for number, part in enumerate(parts)]),
     )
 

@@ -19,7 +19,6 @@ from shapeprog.files import atomic_path
 from shapeprog.formats.colours import colour
 from shapeprog.formats.parts import Part, parts
 from shapeprog.language.program import Program
-from shapeprog.language.statement import language
 from shapeprog.view.listing import Row, listing, parted, wrapped
 from shapeprog.view.model import of_parts, of_shape
 from shapeprog.view.render import Image, camera_for, render
@@ -127,7 +126,7 @@ def contact_sheet(
         wide if any(image is not None for image, _, _ in pairs) else 0
     )  # room for inputs only where there are any
     cell, row = wide + input_width + _PAD, tall + 52
-    words = sorted({statement for _, _, used in pairs for statement in used})
+    words = sorted({word for _, _, used in pairs for word in used})
     width = across * cell + _PAD
     per_row = max(1, (width - 2 * _PAD) // LEGEND)
     top = 54 if title else 14
@@ -135,10 +134,10 @@ def contact_sheet(
     page, draw = _sheet(width, head + row * -(-len(items) // across) + 8)
     if title:
         draw.text((_PAD, 16), title, _INK, typeface(22, bold=True))
-    for number, statement in enumerate(words):
+    for number, word in enumerate(words):
         x, y = _PAD + LEGEND * (number % per_row), top + 30 * (number // per_row)
-        _swatch(draw, x, y + 4, 13, statement)
-        draw.text((x + 20, y), language().word(statement), _INK, typeface(15))
+        _swatch(draw, x, y + 4, 13, word)
+        draw.text((x + 20, y), word, _INK, typeface(15))
     for number, (item, (input_image, reconstruction, _)) in enumerate(zip(items, pairs, strict=True)):
         x, y = _PAD + number % across * cell, head + number // across * row
         for offset, image in ((0, input_image), (input_width, reconstruction)):
@@ -173,8 +172,8 @@ def _panel(
     top = y + max(0, (room - step * len(lines)) // 2)
     for number, line in enumerate(shown):
         start = (x + 24, top + number * step)
-        if line.statement is not None and line.word:
-            _swatch(draw, x, start[1] + size * 0.28, int(size * 0.72), line.statement)
+        if line.role and line.word:
+            _swatch(draw, x, start[1] + size * 0.28, int(size * 0.72), line.role)
         _line(draw, start, line, size, advance)
     if len(shown) < len(lines):
         remainder = f"... and {len(lines) - len(shown)} more lines"
@@ -209,24 +208,24 @@ def _views(shape: Shape | None, drawn: Sequence[Part], width: int, height: int) 
         return list(pool.map(lambda model: render(model, camera, width, height), models))
 
 
-def _pair(item: Item) -> tuple[Image | None, Image, set[int]]:
+def _pair(item: Item) -> tuple[Image | None, Image, set[str]]:
     solids = parts(item.program)
     views = _views(item.shape, solids, *SMALL)
-    return (views[0] if len(views) > 1 else None), views[-1], {part.statement for part in solids}
+    return (views[0] if len(views) > 1 else None), views[-1], {part.word for part in solids}
 
 
 def _line(draw: ImageDraw, corner: tuple[float, float], line: Row, size: int, advance: float) -> None:
     before, word, after = parted(line)
     x, y = corner
-    shade = _FAINT if line.statement is None else readable(line.statement)
+    shade = readable(line.role) if line.role else _FAINT
     draw.text((x, y), before, _FAINT, typeface(size, "Mono"))
-    draw.text((x + advance * len(before), y), word, shade, typeface(size, "Mono", bold=line.statement is not None))
+    draw.text((x + advance * len(before), y), word, shade, typeface(size, "Mono", bold=bool(line.role)))
     draw.text((x + advance * (len(before) + len(word)), y), after, _INK, typeface(size, "Mono"))
 
 
-def readable(statement: int) -> tuple[int, int, int]:
-    """The colour of a statement, dark enough for text on white."""
-    red, green, blue = colour(statement)
+def readable(word: str) -> tuple[int, int, int]:
+    """The colour of a role or statement, dark enough for text on white."""
+    red, green, blue = colour(word)
     light = (0.3 * red + 0.59 * green + 0.11 * blue) / 255
     scale = min(1.0, 0.46 / max(light, 1e-6))
     return (int(red * scale), int(green * scale), int(blue * scale))
@@ -241,8 +240,8 @@ def typeface(size: int, face: str = "", bold: bool = False) -> Any:
     return ImageFont.truetype(str(font), size)
 
 
-def _swatch(draw: ImageDraw, x: float, y: float, size: int, statement: int) -> None:
-    draw.rounded_rectangle([x, y, x + size, y + size], 3, fill=colour(statement))
+def _swatch(draw: ImageDraw, x: float, y: float, size: int, word: str) -> None:
+    draw.rounded_rectangle([x, y, x + size, y + size], 3, fill=colour(word))
 
 
 def _cut(text: str, length: int) -> str:

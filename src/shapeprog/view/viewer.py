@@ -81,7 +81,7 @@ def viewer(
         "radius": max(1.0, float(np.linalg.norm(high - low)) / 2),
         "lines": [_line(line, [slider.name for slider in movable]) for line in listing(program, None)],
         "parts": [
-            {"name": part.name, "block": part.block, "colour": [channel / 255 for channel in colour(part.statement)]}
+            {"name": part.name, "block": part.block, "colour": [channel / 255 for channel in colour(part.word)]}
             | _buffers(corners)
             for part, corners in zip(shown_parts, corners_of(shown_parts), strict=True)
         ],
@@ -98,9 +98,9 @@ def viewer(
 def _line(line: Any, movable: list[str]) -> dict[str, Any]:
     before, word, after = parted(line)
     record = {"before": before, "word": word, "after": after, "blocks": list(line.blocks), "colour": None, "ink": None}
-    if line.statement is not None:
-        record["colour"] = "rgb({}, {}, {})".format(*colour(line.statement))
-        record["ink"] = "rgb({}, {}, {})".format(*readable(line.statement))
+    if line.role:
+        record["colour"] = "rgb({}, {}, {})".format(*colour(line.role))
+        record["ink"] = "rgb({}, {}, {})".format(*readable(line.role))
     return record | {"pieces": pieces(line.text, movable)}
 
 

@@ -283,10 +283,10 @@ def test_units_and_axes_of_files(tmp_path: Path):
     stool = parse(STOOL)
     for name, asked, high in (
         ("a.glb", {}, [0.36, 0.45, 0.36]),
-        ("b.glb", {"unit": "cm"}, [36, 45, 36]),
+        ("b.glb", {"unit": "cm", "up": "z"}, [36, 36, 45]),
         ("a.obj", {}, [0.36, 0.45, 0.36]),
         ("a.ply", {"unit": "in"}, [0.36 / 0.0254, 0.45 / 0.0254, 0.36 / 0.0254]),
-        ("a.stl", {"unit": "cm"}, [36, 36, 45]),
+        ("a.stl", {"unit": "cm", "up": "y"}, [36, 45, 36]),
         ("b.stl", {"unit": "cells"}, [19.2, 19.2, 24]),
         ("a.3mf", {"unit": "in"}, [0.36 / 0.0254, 0.36 / 0.0254, 0.45 / 0.0254]),
     ):
@@ -323,24 +323,25 @@ rail(bent_rod(start=at(left=0), through=at(x=0, bottom=40), end=at(right=0), rad
 def test_a_cut_list_has_each_distinct_part_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
     program = parse(CABINET)
     found = cut_list(program, upright(program, "a.csv"), "cm")
-    rows = {(count, cut.role, cut.length, cut.width, cut.thickness, cut.shape) for cut, count in found}
+    rows = {(count, cut.role, cut.size, cut.shape) for cut, count in found.cuts}
     arc = 2 * 40 * math.atan2(40, 40) * 2
     assert rows == {
-        (2, "side", 60, 40, 1.8, "board"),
-        (1, "panel", 76, 60, 0.8, "board"),  # its copy lies in the same place
-        (1, "shelf", 76.4, 40, 1.8, "board"),
-        (4, "foot", 10, 4, 4, "round"),
-        (4, "foot", 8, 4, 4, "tapered from 2 to 4"),
-        (1, "seat", 80, 40, 6, "rounded edges 2"),
-        (1, "back", 80, 60, 2, "leaning by 5"),
-        (1, "rail", round(arc, 2), 2, 2, "bent"),
+        (2, "side", "60 x 40 x 1.8", "board"),
+        (1, "panel", "76 x 60 x 0.8", "board"),
+        (1, "shelf", "76.4 x 40 x 1.8", "board"),
+        (4, "foot", "⌀ 4 x 10", "round"),
+        (4, "foot", "⌀ 4 x 8", "tapered from 2 to 4"),
+        (1, "seat", "80 x 40 x 6", "rounded edges 2"),
+        (1, "back", "80 x 60 x 2", "leaning by 5"),
+        (1, "rail", f"⌀ 2 x {round(arc, 2):g}", "bent"),
     }
+    assert found.coinciding == 1
+    assert found.area == "1.24 m²"  # two sides, a panel, a shelf
     program_file = tmp_path / "cabinet.shape"
     program_file.write_text(CABINET.lstrip())
     with pytest.raises(SystemExit, match="0"):
         main(["export", str(program_file), str(tmp_path / "cuts.csv"), "--unit", "mm"])
-    printed = [line.split() for line in capsys.readouterr().out.splitlines()]
-    assert ["4", "foot", "100", "40", "round"] in printed
+    assert "1 copies lie where others lie" in capsys.readouterr().out
     lines = (tmp_path / "cuts.csv").read_text().splitlines()
     assert lines[0] == "count,role,length (mm),width (mm),thickness (mm),diameter (mm),shape"
     assert "2,side,600,400,18,,board" in lines

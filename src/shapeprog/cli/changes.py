@@ -7,6 +7,8 @@ import re
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
+import typer
+
 from shapeprog.cli.help import GroupedCommand
 from shapeprog.errors import InputError
 
@@ -14,6 +16,7 @@ if TYPE_CHECKING:
     from shapeprog.language.program import Program
 
 _CHANGE = re.compile(r"([^\W\d]\w*)\s*([-+*/]?)=\s*(.*)", re.DOTALL)
+_SPACED = re.compile(r"([^\W\d]\w*)\b ?(?:([-+*/]?)= ?)?(-?[\d.]+)(?: .*)?", re.DOTALL)
 _APPLY = {"+": operator.add, "-": operator.sub, "*": operator.mul, "/": operator.truediv}
 
 
@@ -23,7 +26,11 @@ class ChangingCommand(GroupedCommand):
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Read the words of the command line, with the option before each change."""
         words: list[str] = []
-        for word in args:
+        for index, word in enumerate(args):
+            spaced = _SPACED.fullmatch(" ".join(args[index + 1 : index + 4]))
+            if word == "--set" and spaced and not re.search("=.", args[index + 1]):
+                name, sign, number = spaced.groups(default="")
+                raise typer.BadParameter(f"--set {name} lacks its number; write --set {name}{sign}={number}", ctx)
             following = len(words) > 1 and words[-2] == "--set" and _CHANGE.fullmatch(word)
             words += ["--set", word] if following else [word]
         return super().parse_args(ctx, words)

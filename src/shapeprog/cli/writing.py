@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -18,6 +17,8 @@ from shapeprog.formats.format import format_of, program_suffixes, suffixes
 if TYPE_CHECKING:
     from shapeprog.data.shape import Shape
     from shapeprog.formats.json_form import Result
+    from shapeprog.language.program import Program
+    from shapeprog.space import Frame
 
 _SAMPLES = " ".join(suffixes("sample"))
 
@@ -44,6 +45,9 @@ def export_command(
     modules: terminal.With = None,
     unit: AsUnit = None,
     file_unit: FileUnit = None,
+    up: Annotated[
+        str, terminal.about_program("--up", metavar="AXIS", help="Axis of the file that points up: x, y or z.")
+    ] = "",
     on_input: Annotated[
         bool | None,
         terminal.about_input("--on-input/--upright", help="Lie on the input. Default: .glb .obj .ply and samples."),
@@ -56,7 +60,7 @@ def export_command(
     Example: shapeprog export chair.shape tall.stl tall.scad --set leg_height=58
 
     .stl, .3mf, .scad, .py and .step are in millimetres, z up, on the floor; .glb is in metres, y up. If the program
-    file stores its frame (all files by infer do), .glb, .obj and .ply lie on the input. --unit, --on-input and
+    file stores its frame (all files by infer do), .glb, .obj and .ply lie on the input. --unit, --up, --on-input and
     --upright change that. A .csv is a cut list, which is printed too. --set uses the unit of the program file.
     """
     from shapeprog.formats import export
@@ -82,27 +86,31 @@ def export_command(
             from shapeprog.inference.readable import in_readable_unit
 
             written = in_readable_unit(loaded, asked_unit(loaded.unit, frame, program, unit, file_unit))
+        asked: dict[str, Any] = {"unit": unit or "", "file_unit": file_unit or "", "up": up, "on_input": on_input}
         try:
-            export(written, path, frame, unit=unit or "", file_unit=file_unit or "", on_input=on_input)
+            export(written, path, frame, **asked)
         except ShapeProgError as error:  # the other files do not depend on this one
             failures.append(error)
             continue
         if not quiet:
             terminal.output().print(f"wrote {path}")
             if path.suffix.lower() == ".csv":
-                _print_rows(path)
+                terminal.output().print(_cut_table(loaded, path, frame, asked), markup=False, highlight=False)
     for failure in failures[:-1]:
         terminal.complain(failure)
     if failures:
         raise failures[-1]
 
 
-def _print_rows(path: Path) -> None:
-    """Print a CSV file with aligned columns."""
-    rows = list(csv.reader(path.read_text(encoding="utf-8").splitlines()))
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    for row in rows:
-        terminal.output().print("  ".join(map(str.ljust, row, widths)).rstrip())
+def _cut_table(program: Program, path: Path, frame: Frame | None, asked: Mapping[str, Any]) -> str:
+    from shapeprog.formats.cuts import cut_list
+    from shapeprog.formats.frames import placement
+
+    chosen = format_of(path)
+    assert chosen is not None
+    lies = placement(chosen, program, frame, **asked)
+    assert lies.frame is not None
+    return cut_list(program, lies.frame, lies.unit).table
 
 
 def _refuse_programs(program: Path, outputs: Sequence[Path]) -> None:

@@ -1,4 +1,4 @@
-"""Cut lists: count, role and size of each distinct part, as CSV."""
+"""Cut lists: count, role and size of each distinct part, as CSV and as a table."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import math
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -23,7 +24,7 @@ from shapeprog.lazy_torch import torch
 from shapeprog.space import FloatArray, Frame
 
 FINEST = 1e-4  # metres to which sizes are rounded
-DIGITS = 3  # significant digits of sizes whose unit is not known, but for one more
+DIGITS = 3  # significant digits of sizes whose unit is not known, and of areas
 BOARD = "board"  # the shape of a box whose thickness is at most half its width
 SAME = 1e-3  # cells within which two copies coincide
 FLAT = 1e-5  # share of its size by which a part leans, or is bent, at least
@@ -52,24 +53,58 @@ class Cut:
     thickness: float
     round: bool = False
 
+    @property
+    def size(self) -> str:
+        """Its sizes as text."""
+        if self.round:
+            return f"⌀ {self.width:g} x {self.length:g}"
+        return f"{self.length:g} x {self.width:g} x {self.thickness:g}"
 
-def cut_list(program: Program, frame: Frame, unit: str = "") -> list[tuple[Cut, int]]:
-    """The distinct parts of a program with their counts, largest first.
 
-    Copies that lie where another one lies are counted once.
+@dataclass(frozen=True)
+class CutList:
+    """The distinct parts of a program with their counts, largest first, in a unit.
 
-    Parameters
-    ----------
-    program
-        What to list.
-    frame
-        Its scale is the size of a cell in ``unit``.
-    unit
-        Unit of the sizes; empty if it is not known.
+    ``coinciding`` copies lie where another one lies, and are not counted.
     """
+
+    cuts: tuple[tuple[Cut, int], ...]
+    unit: str
+    coinciding: int
+
+    @property
+    def area(self) -> str:
+        """Total length x width of all boards."""
+        total = sum(count * cut.length * cut.width for cut, count in self.cuts if cut.shape == BOARD)
+        if self.unit:
+            return f"{_digits(total * METRES[self.unit] ** 2):g} m²"
+        return f"{_digits(total):g} square units"
+
+    @property
+    def table(self) -> str:
+        """The list as a table of plain text, with the total area of its boards and a warning of coinciding copies."""
+        rows = [(f"{count}", cut.role, cut.size, cut.shape) for cut, count in self.cuts]
+        rows.insert(0, ("count", "role", f"size{f' ({self.unit})' if self.unit else ''}", "shape"))
+        widths = [max(len(row[column]) for row in rows) for column in range(3)]
+        lines = [
+            f"{row[0]:>{widths[0]}}  {row[1]:<{widths[1]}}  {row[2]:<{widths[2]}}  {row[3]}".rstrip() for row in rows
+        ]
+        lines.append(f"Area of boards, length x width: {self.area}")
+        if self.coinciding:
+            lines.append(f"Warning: {self.coinciding} copies lie where others lie (a mirror through the part?).")
+        return "\n".join(lines)
+
+
+@lru_cache(maxsize=1)  # the command writes and prints the same list
+def cut_list(program: Program, frame: Frame, unit: str = "") -> CutList:
+    """The distinct parts of a program; ``frame.scale`` is the size of a cell in ``unit``, which is empty if unknown."""
     with on_numpy_if_shipped(program):
-        counts = Counter(cut for cut, _ in set(_cuts(program, frame.scale, unit)))
-    return sorted(counts.items(), key=lambda row: (row[0].round, -row[0].thickness, -row[0].length, row[0]))
+        cuts = list(_cuts(program, frame.scale, unit))
+    counts: Counter[Cut] = Counter()
+    for cut, _ in set(cuts):
+        counts[cut] += 1
+    rows = sorted(counts.items(), key=lambda row: (row[0].round, -row[0].thickness, -row[0].length, row[0]))
+    return CutList(tuple(rows), unit, len(cuts) - len(set(cuts)))
 
 
 def write_cuts(program: Program, path: Path, frame: Frame, unit: str = "") -> None:
@@ -77,12 +112,12 @@ def write_cuts(program: Program, path: Path, frame: Frame, unit: str = "") -> No
     text = io.StringIO()
     rows = csv.writer(text, lineterminator="\n")
     behind = f" ({unit})" if unit else ""
-    sizes = [f"{word}{behind}" for word in ("length", "width", "thickness", "diameter")]
-    rows.writerow(["count", "role", *sizes, "shape"])
-    for cut, count in cut_list(program, frame, unit):
-        length, width, thickness = (f"{size:g}" for size in (cut.length, cut.width, cut.thickness))
-        sizes = [length, "", "", width] if cut.round else [length, width, thickness, ""]
-        rows.writerow([count, cut.role, *sizes, cut.shape])
+    rows.writerow(
+        ["count", "role", *(f"{word}{behind}" for word in ("length", "width", "thickness", "diameter")), "shape"]
+    )
+    for cut, count in cut_list(program, frame, unit).cuts:
+        sizes = [cut.length, "", "", cut.width] if cut.round else [cut.length, cut.width, cut.thickness, ""]
+        rows.writerow([count, cut.role, *(value if value == "" else f"{value:g}" for value in sizes), cut.shape])
     write_text(path, text.getvalue())
 
 
@@ -135,3 +170,7 @@ def _rounded(value: float, unit: str) -> float:
     if unit:
         return round(value, -math.floor(math.log10(FINEST / METRES[unit]) + 1e-9)) + 0.0
     return round(value, DIGITS - math.floor(math.log10(max(abs(value), 1e-30)))) + 0.0
+
+
+def _digits(value: float) -> float:
+    return float(f"{value:.{DIGITS}g}")

@@ -103,6 +103,7 @@ def export(
     *,
     unit: str = "",
     file_unit: str = "",
+    up: str = "",
     on_input: bool | None = None,
     **options: int,
 ) -> Path:
@@ -122,7 +123,7 @@ def export(
         From the grid to the coordinates of the input, so that the export lies on it; without it the shape stands
         upright in the axes of the format.  Formats for makers (.stl .3mf .scad .py .step) are upright, z up, on z = 0
         and in millimetres in any case (:mod:`shapeprog.formats.frames`).
-    unit, file_unit, on_input
+    unit, file_unit, up, on_input
         Other coordinates than those of the format, see :func:`~shapeprog.formats.frames.placement`.
     options
         For .npy the ``resolution`` in cells along each side (32), for .xyz how many ``points`` (5000) and their
@@ -141,7 +142,7 @@ def export(
     for name in options:
         if name not in file_format.options:
             raise OutputError(f"{suffix} takes no {name}", f"it takes {', '.join(file_format.options) or 'no options'}")
-    lies = placement(file_format, program, frame, unit=unit, file_unit=file_unit, on_input=on_input)
+    lies = placement(file_format, program, frame, unit=unit, file_unit=file_unit, up=up, on_input=on_input)
     named = {"unit": lies.unit} if file_format.takes_unit else {}
     try:
         file_format.write(program, target, lies.frame, **options, **named)

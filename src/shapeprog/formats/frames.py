@@ -24,7 +24,7 @@ from typing import NamedTuple
 import numpy as np
 
 from shapeprog.errors import InputError
-from shapeprog.formats.format import Format
+from shapeprog.formats.format import GRID, Y_UP, Z_UP, Format
 from shapeprog.language.ast import Scale
 from shapeprog.language.placement import LONGEST_SIDE
 from shapeprog.language.program import Program
@@ -49,6 +49,9 @@ _GRID = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
 """Directions x, y, z of a text in the axes of the grid, as columns."""
 
 
+UP = {"x": GRID, "y": Y_UP, "z": Z_UP}  # up and front axes of a file by the axis that points up
+
+
 class Placement(NamedTuple):
     """How a file lies: the map from the grid to its coordinates, and their unit, empty if it is not known."""
 
@@ -63,6 +66,7 @@ def placement(
     *,
     unit: str = "",
     file_unit: str = "",
+    up: str = "",
     on_input: bool | None = None,
 ) -> Placement:
     """How a program lies in a file: on its input, or upright.
@@ -80,26 +84,30 @@ def placement(
     file_unit
         Unit of the coordinates of the input; by default metres, or millimetres or centimetres if it would be larger
         than 10 m.
+    up
+        Axis of the file that points up: ``x``, ``y`` or ``z``; empty for that of the format, or of the input.
     on_input
         Whether the file lies on the input; by default if the input is known, except for formats in millimetres.
 
     Raises
     ------
     InputError
-        If the input or the size of the object is not known.
+        If the input, the axis or the size of the object is not known.
     """
     if chosen.axes is None:
         return Placement(frame)
+    if up and up.removeprefix("+") not in UP:
+        raise InputError(f"{up!r} is no axis that points up", "use x, y or z")
     if on_input and frame is None:
         raise InputError("the program does not say how its input lies", "export a program that infer has written")
-    lies = frame is not None and (not chosen.maker if on_input is None else on_input)
+    lies = frame is not None and not up and (not chosen.maker if on_input is None else on_input)
     if lies and not unit and chosen.unit != "text":
         return Placement(frame)
     per_cell, name = _cell_size(chosen, program, frame, unit, file_unit)
     if lies:
         assert frame is not None
         return Placement(_frame(per_cell, per_cell / frame.scale * np.array(frame.centre), np.array(frame.axes)), name)
-    matrix = grid_axes(*chosen.axes)
+    matrix = grid_axes(*(UP[up.removeprefix("+")] if up else chosen.axes))
     centre = -per_cell * (matrix @ _ground(program)) + 0.0 if chosen.maker else np.zeros(3)
     return Placement(_frame(per_cell, centre, matrix), name)
 

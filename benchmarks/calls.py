@@ -45,21 +45,19 @@ BUDGET = 3600.0
 """Seconds that no program takes, however busy the machine: nothing is cut short."""
 
 LIBRARY = """\
-def pull_out(bottom, height, front, width, thickness, grip):
-    drawer(box(at=(bottom, front, -width / 2), size=(height, thickness, width)))
-    handle(box(at=(bottom + height / 2 - grip / 2, front - grip, -width / 4), size=(grip, grip, width / 2)))
+def pull_out(grip):
+    drawer()
+    handle(width=width / 2, z=0, height=grip, front=-grip, depth=grip)
 
-def ladder(count, bottom, height, front, width, thickness, rung):
-    for i in mirror(side):
-        post(box(at=(bottom, front, width / 2 - thickness), size=(height, thickness, thickness)))
-    for i in translate(count, by=((height - rung) / count, 0, 0)):
-        rail(box(
-            at=(bottom + (height - rung) / count, front, thickness - width / 2),
-            size=(rung, thickness / 2, width - 2 * thickness)))
+def ladder(count, thickness, rung):
+    for _ in mirror(x=0):
+        post(left=0, width=thickness, front=0, depth=thickness)
+    for _ in row(count, last=at(top=0)):
+        rail(left=thickness, right=thickness, depth=thickness / 2, bottom=rung, height=rung)
 
-def trumpet(bottom, height, width, thickness):
-    base(cylinder(at=(bottom, 0, 0), height=thickness, radius=width / 2))
-    pedestal(taper(start=(bottom + thickness, 0, 0), end=(bottom + height, 0, 0), radius=(width / 4, thickness)))
+def trumpet(thickness):
+    base(height=thickness)
+    pedestal(taper(bottom=thickness, radius=(width / 4, thickness)))
 """
 """What a user might have written: a drawer with a handle, the back of a chair, the foot of a table."""
 
@@ -86,29 +84,32 @@ def planted(number: int) -> str:
     wide, deep, thick = some(14, 22), some(10, 14), some(0.6, 1.4)
     if number % 3 == 0:
         count, high = int(random.integers(2, 5)), some(16, 22)
-        lines = [f"body(box(at=(0, 0, {-wide / 2}), size=({high}, {deep}, {wide})))"]
         front, grip, step = some(0.6, 1.2), some(0.5, 0.9), high / count
+        lines = ["body()"]
         lines += [
-            f"pull_out(bottom={step * k + 0.4:.2f}, height={step - 0.8:.2f}, front={-front}, width={wide - 1:.2f}, "
-            f"thickness={front}, grip={grip})"
+            f"pull_out(width={wide - 1:.2f}, front={-front}, depth={front}, bottom={step * k + 0.4:.2f}, "
+            f"height={step - 0.8:.2f}, grip={grip})"
             for k in range(count)
         ]
     elif number % 3 == 1:
         seat, tall, wide = some(8, 11), some(8, 12), some(10, 14)
+        high = seat + thick + tall
         lines = [
-            f"seat(box(at=({seat}, {-deep / 2}, {-wide / 2}), size=({thick}, {deep}, {wide})))",
-            "for i in mirror(depth):", "    for j in mirror(side):",
-            f"        leg(at=(0, {deep / 2 - 1.2}, {wide / 2 - 1.2}), size=({seat}, {some(0.8, 1.2)}, 1.2))",
-            f"ladder(count={int(random.integers(3, 6))}, bottom={seat + thick:.2f}, height={tall}, "
-            f"front={deep / 2 - 1.2}, width={wide}, thickness=1.2, rung={some(0.7, 1.3)})",
-        ]  # fmt: skip
+            f"seat(bottom={seat}, height={thick})",
+            "for _ in mirror(x=0, y=0):",
+            f"    leg(left=0, width=1.2, front=0, depth={some(0.8, 1.2)}, height={seat})",
+            f"ladder(rear=0, depth=1.2, bottom={seat + thick:.2f}, count={int(random.integers(3, 6))}, thickness=1.2, "
+            f"rung={some(0.7, 1.3)})",
+        ]
     else:
         tall, foot = some(10, 16), some(7, 12)
+        high = tall + thick
         lines = [
-            f"trumpet(bottom=0, height={tall}, width={foot}, thickness={thick})",
-            f"top(box(at=({tall}, {-deep / 2}, {-wide / 2}), size=({thick}, {deep}, {wide})))",
+            f"trumpet(width={foot}, depth={foot}, top={thick}, thickness={thick})",
+            f"top(top=0, height={thick})",
         ]
-    return LIBRARY + "\n" + "\n".join(lines) + "\n"
+    lines.insert(0, f"width, depth, height = {wide}, {deep}, {high:.2f}\n{LIBRARY}")
+    return "\n".join(lines) + "\n"
 
 
 def measure(task: Task) -> dict[str, Any]:
@@ -126,7 +127,7 @@ def measure(task: Task) -> dict[str, Any]:
     torch.set_num_threads(1)
     own = task.set == "planted"
     text = planted(int(task.name)) if own else ""
-    library = library_of(parse(LIBRARY)) if own else load_library(task.library)
+    library = library_of(parse(f"width, depth, height = 1, 1, 1\n{LIBRARY}")) if own else load_library(task.library)
     parts, shape = _apart(text) if own else given(Object(task.set, task.name, task.files, seed=task.seed))
     cpu = time.process_time()
     offered = [library] if task.method == "proposed" else []

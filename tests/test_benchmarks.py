@@ -12,8 +12,10 @@ from declared import LANGUAGE
 import shapeprog as sp
 from benchmarks import labels, library, planted, ties
 from shapeprog.language import standard, using
+from shapeprog.language.ast import Assignment
+from shapeprog.language.expression import Name
 from shapeprog.language.parser import parse
-from shapeprog.language.printer import source_of
+from shapeprog.language.program import Draw, Loop
 
 TABLE = """\
 box(at=(6, -9, -12), size=(2, 18, 24))
@@ -74,9 +76,10 @@ def test_labels_are_counted_by_declared_words_fitted_words_and_blocks(tmp_path: 
 
 
 def test_what_stitch_calls_counts_as_a_statement_where_it_holds_any() -> None:
-    text = "a = 3\nfor i in mirror(side):\n    arm(box(at=(0, a / 2, 1 - a), size=(1, -a, 2)))\n"
-    text += "leg(at=(0, 0, 0), size=(1, 1, 1))\n"
-    lines = source_of(parse(text)).lines
+    a = Name("a")
+    arm = Draw("box", (0.0, a / 2, 1 - a, 1.0, -a, 2.0), "arm")
+    leg = Draw("leg", (0.0, 0.0, 0.0, 1.0, 1.0, 1.0))
+    lines = (Assignment((("a", 3.0),)), Loop("mirror", (2.0, 2.0, 0.0), (arm,)), leg)
     arms = "(mirror 2 side 0 (arm_of (box 0 (/ a 2) (- 1 a) 1 (neg a) 2)))"
     assert library.expression(lines, whole=False) == f"(seq {arms} (leg 0 0 0 1 1 1))"
     assert library.expression(lines[2:], whole=True) == "(leg 0 0 0 1 1 1)"
@@ -86,9 +89,10 @@ def test_what_stitch_calls_counts_as_a_statement_where_it_holds_any() -> None:
 
 
 NAMED = """\
-width, thick = 10, 1
-box(at=(0, -width / 2, 2), size=(thick, width, 3))
-box(at=(thick + 4, -width / 2, 0), size=(thick, width, 3.5))
+width, depth, height = 10, 8, 24
+thick = 1
+box(left=3, width=3, depth=thick, bottom=2, height=4)
+box(left=3, width=5, depth=thick, bottom=7, height=5)
 """
 
 
@@ -96,11 +100,11 @@ def test_features_follow_from_names_and_plain_numbers() -> None:
     program = parse(NAMED)
     plain = sp.inline(program)
     ways, own = ties.slopes(program, plain), ties.plain_slopes(plain)
-    assert ways.shape == (2 * ties.PER, 1 + 6)  # lifting, two names and four numbers; zeros are not free
+    assert ways.shape == (2 * ties.PER, 1 + 12)  # lifting, four names and eight numbers
     assert own.shape == (2 * ties.PER, 1 + 12)
     rows = ties.relations_written(len(own))
     held = rows[np.abs(rows @ ways).max(1) < 1e-3]
-    assert ties.rank(held @ own) == 5  # two middles and one side at zero, equal thickness and equal width
+    assert ties.rank(held @ own) == 3  # two middles at zero and equal thickness
 
 
 def test_parts_are_compared_wherever_they_are_written() -> None:

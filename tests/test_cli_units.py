@@ -15,20 +15,24 @@ from commands import FRAME, PROGRAM, Run, table
 from shapeprog import inference
 from shapeprog.formats import export, load, load_with_frame
 from shapeprog.inference.readable import in_readable_unit, unit_of_result
+from shapeprog.language.convert import placed
 from shapeprog.language.dimensions import in_unit
 from shapeprog.language.free import numbers
 from shapeprog.language.named import names
 from shapeprog.language.parser import parse
+from shapeprog.language.printer import source_of
 from shapeprog.language.unit import Unit
 from shapeprog.language.unroll import unroll
 
 NAMED = """\
-width, n = 8, 2
+width, depth, height = 8, 8, 24
+n = 2
 span = width - 2
-top_square(at=(4, 0, 0), thickness=1.5, half=width / 2)
-for i in translate(n, by=(0, 0, span)):
-    leg(at=(-12, -4, -4), size=(16, 2, 2))
+top(bottom=16, height=1.5)
+for _ in translate(n, x=span):
+    leg(left=0, width=2, front=0, depth=2, height=16)
 """
+PLACED = placed(PROGRAM)
 
 
 @pytest.fixture(autouse=True)
@@ -36,7 +40,7 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     """Inference that always finds the same table, at once."""
 
     def infer(shape, *, unit, **_):
-        program = in_readable_unit(PROGRAM, unit_of_result(shape, PROGRAM, unit))
+        program = in_readable_unit(PLACED, unit_of_result(shape, PLACED, unit))
         return inference.Result(program, PROGRAM.snap(), {}, "Stopped at once.", (), seconds=0.1)
 
     monkeypatch.setattr(inference, "infer", infer)
@@ -53,22 +57,25 @@ def test_infer_writes_programs_in_the_unit_of_the_object(
 ) -> None:
     ended = run("infer", table(tmp_path / "table.obj"), "--unit", "cm", *options, "--out", "res", "--no-picture")
     assert ended.code == 0, ended.err
-    assert "# unit: cm, " in ended.out
+    assert "# unit: cm\n" in ended.out
     assert ("assumed to be m, so that the longest side is 2 m" in ended.out) == (not options)
     assert "IoU 1.000" in ended.out
     program, frame = load_with_frame(tmp_path / "res" / "table.shape")
-    assert program.unit == Unit("cm", per_cell)
-    assert program == load(tmp_path / "res" / "table.json") == in_readable_unit(PROGRAM, program.unit)
+    assert program.unit is not None
+    assert (program.unit.name, program.unit.per_cell) == ("cm", pytest.approx(per_cell))
+    assert program == load(tmp_path / "res" / "table.json")
+    assert source_of(program).lines == source_of(in_readable_unit(PLACED, Unit("cm", per_cell))).lines
     assert json.loads((tmp_path / "res" / "table.json").read_text())["scores"]["statements"] == 4
-    assert numbers(program) == numbers(PROGRAM)
+    assert numbers(program) == numbers(PLACED)
     source = trimesh.load(tmp_path / "table.obj", force="mesh").bounds
     assert run("export", "res/table.shape", "again.glb").code == 0
     for made in ("res/table.glb", "again.glb"):
         np.testing.assert_allclose(trimesh.load(tmp_path / made).bounds, source, atol=0.002)
     assert frame is not None
-    for name in ("table.shape", "table.json"):
-        ended = run("evaluate", f"res/{name}", "table.obj", "--json")
-        assert json.loads(ended.out)["rows"][0]["iou"] == 1, ended.err
+    rows = [run("evaluate", f"res/table.{end}", "table.obj", "--json").out for end in ("shape", "json")]
+    distances = [json.loads(row)["rows"][0]["cd"] for row in rows]
+    assert distances[0] == pytest.approx(distances[1])
+    assert distances[0] < 0.001
 
 
 def test_what_is_assumed_of_the_unit_is_told_once_and_where_it_is_unlikely(run: Run, tmp_path: Path) -> None:
@@ -104,16 +111,16 @@ def test_export_writes_programs_in_another_unit(run: Run, tmp_path: Path) -> Non
     export(parse(NAMED), tmp_path / "legs.shape", FRAME)
     assert run("export", "legs.shape", "cm.shape", "--unit", "cm").code == 0
     there, frame = load_with_frame(tmp_path / "cm.shape")
-    assert there == in_readable_unit(parse(NAMED), Unit("cm", 100 / 12))
-    assert "width, n = 66.7, 2" in (tmp_path / "cm.shape").read_text()
+    assert source_of(there).lines == source_of(in_readable_unit(parse(NAMED), Unit("cm", 100 / 12))).lines
+    assert "width, depth, height = 66.7, 66.7, 200\nn = 2\n" in (tmp_path / "cm.shape").read_text()
     assert run("export", "cm.shape", "mm.json", "--unit", "mm", "--set", "width=80").code == 0
     other, kept = load_with_frame(tmp_path / "mm.json")
     assert frame is not None
     assert kept is not None
     np.testing.assert_allclose(kept.matrix(), frame.matrix(), rtol=1e-7)
-    assert [each.value for each in names(other)] == [800, 2, 633]
+    assert [each.value for each in names(other)] == [800, 667, 2000, 2, 633]
     assert run("export", "mm.json", "back.shape", "--unit", "cells").code == 0
-    assert (tmp_path / "back.shape").read_text().splitlines()[1] == "width, n = 9.6, 2"
+    assert (tmp_path / "back.shape").read_text().splitlines()[1] == "width, depth, height = 9.6, 8, 24"
 
 
 def test_without_a_frame_files_count_in_the_unit_of_the_program(run: Run, tmp_path: Path) -> None:
@@ -155,8 +162,10 @@ def test_tidy_keeps_the_unit_or_takes_another(run: Run, tmp_path: Path) -> None:
 def test_units_that_cannot_be_are_told(run: Run, tmp_path: Path, words: list[str], told: str) -> None:
     table(tmp_path / "table.obj")
     (tmp_path / "legs.shape").write_text(NAMED)
-    export(parse(NAMED.replace("by=(0, 0, span)", "by=(0, span, n)")), tmp_path / "mixed.shape", FRAME)
-    (tmp_path / "bad.shape").write_text("# placed: up y, front z, origin 0 0 0, 1 unit = 1\n# unit: c, 3 per cell\n")
+    export(parse(NAMED.replace("x=span", "x=span, y=n")), tmp_path / "mixed.shape", FRAME)
+    (tmp_path / "bad.shape").write_text(
+        "# placed: up y, front z, origin 0 0 0, 1 unit = 1\n# unit: c\nwidth, depth, height = 1, 1, 1\n"
+    )
     ended = run(*words)
     assert ended.code == 2
     assert told in " ".join(ended.err.split())

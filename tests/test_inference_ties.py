@@ -115,13 +115,13 @@ def rear_ends(program: Program) -> tuple[float, float]:
 
 
 def test_symmetry_is_that_of_nearly_the_whole_surface_and_an_edit_may_not_lose_more():
-    knob = "handle(box(at=(4, -8.3, {at}), size=(0.3, 0.3, 0.3)))\n"  # far below 1 % of the surface
-    assert edit_scores(sp.parse("width = 24\n" + MIDDLE + knob.format(at="width / 4"))).symmetry == 1
-    assert edit_scores(sp.parse("width = 24\n" + MIDDLE.replace("-width / 2", "-12"))).symmetry == pytest.approx(4 / 6)
+    whole, knob = (
+        "width, depth, height = 24, 16, 12\n",
+        "handle(x=width / 4, width=0.3, y=0, depth=0.3, z=0, height=0.3)\n",
+    )
+    assert edit_scores(sp.parse(f"{whole}top(top=0, height=2)\n{knob}")).symmetry == 1
+    assert edit_scores(sp.parse(f"{whole}wide = 24\ntop(left=0, width=wide, height=2)")).symmetry < 1
     assert np.isnan(edit_scores(sp.parse("box(at=(4, -8, -11), size=(2, 16, 24))")).symmetry)
-
-
-MIDDLE = "top(box(at=(4, -8, -width / 2), size=(2, 16, width)))\n"
 
 
 def test_tidy_writes_what_was_tied(tmp_path: Path):
@@ -210,35 +210,37 @@ def test_a_row_stays_between_what_it_lies_between():
 
 
 def test_what_says_how_often_something_is_repeated_is_no_free_number():
-    text = "pairs, wide = 2, 7\n\ndef row(n, gap):\n    for i in translate(n, by=(0, gap, 0)):\n"
-    text += "        leg(at=(0, 0, 0), size=(3, 1, 1))\n\ndef rows(n, gap):\n    row(n=n, gap=gap)\n\n"
-    text += "rows(n=3, gap=2)\nrow(n=pairs, gap=wide)\n"
+    text = "width, depth, height = 9, 9, 24\npairs, wide = 2, 7\n\ndef line_up(n, gap):\n"
+    text += "    for _ in translate(n, y=gap):\n        leg(width=4, height=3)\n\n"
+    text += "def rows(n, gap):\n    line_up(n=n, gap=gap)\n\nrows(n=3, gap=2)\nline_up(n=pairs, gap=wide)\n"
     program = sp.parse(text)
-    assert free_values(program) == [7, 3, 1, 1, 2]
-    assert multiplied(program, 4, 1.5).body[0].values == (3, 0, 3, 0)
+    assert free_values(program) == [9, 9, 24, 7, 4, 3, 2]
+    assert multiplied(program, 6, 1.5).body[0].values == (3, 0, 3, 0)
 
 
 def test_free_numbers_are_those_that_nothing_else_gives():
     program = sp.parse("""
+width, depth, height = 24, 24, 24
 a, b = 4, 2
 c = a / 2
-for i in translate(3, by=(0, 0, c)):
-    box(at=(-a, 0, 1.5), size=(b, a, 1))
+for _ in translate(3, x=c):
+    box(left=1.5, width=1, depth=a, bottom=0, height=b)
 """)
-    assert free_numbers(program) == numbers(program) == 4  # a, b, 1.5 and 1; no zero, no count
-    scene = unroll(multiplied(program, 0, 2.0))
+    assert free_numbers(program) == numbers(program) == 7  # three sizes, a, b, 1.5 and 1; no zero, no count
+    scene = unroll(multiplied(program, 3, 2.0))
     assert (2 * scene.size[0, :3]).tolist() == [2, 8, 1]
-    assert (scene.centre[1] - scene.centre[0]).tolist() == [0, 0, 4]
+    assert (scene.centre[1] - scene.centre[0]).tolist() == [0, 0, -4]
 
 
 def test_what_an_expression_adds_is_free_and_what_it_multiplies_by_is_not():
-    program = sp.parse("a, b = 3, 4\nbox(at=(a + 1.5, -(b - 2), 0), size=(2 * (a - 0.5), b / 2, 4 - a))\n")
-    assert free_values(program) == [3, 4, 1.5, 2, 0.5, 4]
-    changed = [multiplied(program, place, 2.0).body[0].values for place in range(6)]
-    assert changed[2] == (6, -2, 0, 5, 2, 1)
-    assert changed[3] == (4.5, 0, 0, 5, 2, 1)
-    assert changed[4] == (4.5, -2, 0, 4, 2, 1)
-    assert changed[5] == (4.5, -2, 0, 5, 2, 5)
+    text = "width, depth, height = 24, 24, 24\na, b = 3, 4\n"
+    program = sp.parse(text + "box(x=0, width=9 - a, y=-(b - 2), depth=b / 2, z=a + 1.5, height=2 * (a - 0.5))\n")
+    assert free_values(program) == [24, 24, 24, 3, 4, 9, 2, 1.5, 0.5]
+    changed = [multiplied(program, place, 2.0).body[0].values for place in range(9)]
+    assert changed[5] == (2, -3, -7.5, 5, 2, 15)
+    assert changed[6] == (2, -1, -3, 5, 2, 6)
+    assert changed[7] == (3.5, -3, -3, 5, 2, 6)
+    assert changed[8] == (2.5, -3, -3, 4, 2, 6)
 
 
 def test_edits_of_two_boxes_that_touch_are_as_known():

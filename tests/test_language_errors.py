@@ -142,7 +142,7 @@ def test_messages(text: str, message: str) -> None:
         ("leg(at=(1, 2, 3j), size=(1, 2, 3))", 1, 15, "not a number"),
         ("leg(at=(1, 2, ~3), size=(1, 2, 3))", 1, 15, "not a number"),
         ("leg(at=(1, 2, 1 ** 1), size=(1, 2, 3))", 1, 15, "not a number"),
-        ("leg(at=(1, 2, nan), size=(1, 2, 3))", 1, 15, "unknown name 'nan'"),
+        ("leg(at=(1, 2, nan), size=(1, 2, 3))", 1, 15, "holds nan, which is not a number"),
         ("leg(at=(1, 2, 1e999), size=(1, 2, 3))", 1, 15, "too large"),
         (f"leg(at=(1, 2, 1{'0' * 400}), size=(1, 2, 3))", 1, 15, "too large"),
         (f"leg(at=(1, 2, 1{'0' * 5000}), size=(1, 2, 3))", 1, 1, "invalid syntax"),

@@ -6,42 +6,52 @@ from collections import Counter
 from dataclasses import replace
 
 import pytest
-from written import written_program
+from placed import placed_text
 
 import shapeprog as sp
 from shapeprog.language.evaluate import evaluated
-from shapeprog.language.merging import merged
+from shapeprog.language.merging import merged, separate_loops
 from shapeprog.language.printer import format_program, source_of
 from shapeprog.language.program import Program
-from shapeprog.library.rewriting import separate_loops
+
+WHOLE = "width, depth, height = 24, 10, 12\n"
 
 CHAIR = """\
-width, depth = 12, 10
+width, depth, height = 12, 10, 24
 thick = 1
-for i in mirror(side):
-    leg(at=(-8, depth / 2 - thick, width / 2 - thick), size=(16, thick, thick))
-seat(box(at=(0, -depth / 2, -width / 2), size=(thick, depth, width)))
-for i in mirror(side):
-    for j in translate(2, by=(3, 0, 0)):
-        rail(box(at=(-5, -depth / 2, width / 2 - thick), size=(thick, depth, thick)))
-for i in translate(2, by=(thick, 0, 0)):
-    slat(box(at=(3, depth / 2 - thick, -width / 2), size=(thick, thick, width)))
-for i in mirror(side):
-    for j in translate(2, by=(3, 0, 0)):
-        arm(box(at=(4, -depth / 2, width / 2), size=(thick, depth, thick)))
+for _ in mirror(x=0):
+    leg(left=0, width=thick, rear=0, depth=thick, height=16)
+seat(bottom=12, height=thick)
+for _ in mirror(x=0):
+    for _ in translate(2, z=3):
+        rail(left=0, width=thick, bottom=7, height=thick)
+for _ in translate(2, z=thick):
+    slat(rear=0, depth=thick, bottom=15, height=thick)
+for _ in mirror(x=0):
+    for _ in translate(2, z=3):
+        arm(left=0, width=thick, bottom=16, height=thick)
 """
 
 MERGED = """\
-width, depth = 12, 10
+width, depth, height = 12, 10, 24
 thick = 1
+for _ in mirror(x=0):
+    leg(left=0, width=thick, rear=0, depth=thick, height=16)
+    for _ in translate(2, z=3):
+        rail(left=0, width=thick, bottom=7, height=thick)
+        arm(left=0, width=thick, bottom=16, height=thick)
+seat(bottom=12, height=thick)
+for _ in translate(2, z=thick):
+    slat(rear=0, depth=thick, bottom=15, height=thick)
+"""
+
+CELLS = """\
 for i in mirror(side):
-    leg(at=(-8, depth / 2 - thick, width / 2 - thick), size=(16, thick, thick))
+    leg(at=(-8, 4, 5), size=(16, 1, 1))
     for j in translate(2, by=(3, 0, 0)):
-        rail(box(at=(-5, -depth / 2, width / 2 - thick), size=(thick, depth, thick)))
-        arm(box(at=(4, -depth / 2, width / 2), size=(thick, depth, thick)))
-seat(box(at=(0, -depth / 2, -width / 2), size=(thick, depth, width)))
-for i in translate(2, by=(thick, 0, 0)):
-    slat(box(at=(3, depth / 2 - thick, -width / 2), size=(thick, thick, width)))
+        rail(box(at=(-5, -5, 5), size=(1, 10, 1)))
+        arm(box(at=(4, -5, 6), size=(1, 10, 1)))
+seat(box(at=(0, -5, -6), size=(1, 10, 12)))
 """
 
 
@@ -56,30 +66,32 @@ def test_equal_loops_become_one_at_the_place_of_the_first():
 
 
 def test_loops_apart_have_one_statement_each():
-    found = format_program(separate(sp.parse(MERGED)))
+    found = format_program(separate(sp.parse(CELLS)))
     assert found.count("for i in mirror(side):") == 3
-    assert format_program(merged(sp.parse(found))) == MERGED
+    assert format_program(merged(sp.parse(found))) == CELLS
 
 
 def test_a_comment_between_loops_keeps_them_apart():
-    text = "for i in mirror(side):\n    box(at=(0, 0, 1), size=(thick, 1, 1))\n"
-    commented = sp.parse(f"thick = 2\n{text}# the back\n{text.replace('0, 0, 1', '4, 0, 1')}")
+    text = "for _ in mirror(x=0):\n    box(left=0, width=2)\n"
+    other = text.replace("left=0", "left=4")
+    commented = sp.parse(f"{WHOLE}{text}# the back\n{other}")
     assert merged(commented) == commented
-    other = text.replace("0, 0, 1", "4, 0, 1").replace("side):", "side):  # the back")
-    noted = sp.parse(f"thick = 2\n{text}{other}")
+    noted = sp.parse(f"{WHOLE}{text}{other.replace('x=0):', 'x=0):  # the back')}")
     assert merged(noted) == noted
+    assert merged(sp.parse(f"{WHOLE}{text}{other}")).statements == 3
 
 
 def test_no_loop_moves_above_a_name_that_it_needs():
-    lines = "for i in mirror(side):\n    leg(at=({0}, 0, 1), size=(1, {0}, 1))\n"
-    program = sp.parse(f"low = 3\n{lines.format('low')}high = 5\n{lines.format('high')}")
+    lines = "for _ in mirror(x=0):\n    leg(left={0}, width=1)\n"
+    program = sp.parse(f"{WHOLE}low = 3\n{lines.format('low')}high = 5\n{lines.format('high')}")
     assert merged(program) == program
 
 
 @pytest.mark.parametrize("seed", range(60))
 def test_whatever_is_written_draws_the_same_blocks(seed: int):
-    program = written_program(seed)
-    for found in (merged(program), separate(program), merged(separate(program))):
-        assert Counter(found.chains) == Counter(program.chains)
+    program = sp.parse(placed_text(seed))
+    cells = sp.inline(program)
+    for given, found in ((program, merged(program)), (cells, separate(cells)), (cells, merged(separate(cells)))):
+        assert Counter(found.chains) == Counter(given.chains)
         assert sp.parse(format_program(found)) == found
     assert merged(merged(program)) == merged(program)

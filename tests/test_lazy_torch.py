@@ -12,11 +12,12 @@ from shapeprog.geometry import primitive
 from shapeprog.geometry.primitives import BUILT_IN
 from shapeprog.language.statement import _try, standard
 
-PROGRAM = """n, width = 3, 9
-for i in rotate(n, step=1):
-    for j in mirror(side):
-        leg(taper(start=(-9, 2, width / 2), end=(4, 3, width / 2 + 1), radius=(0.5, 1)))
-seat(box(at=(4, -5, -width / 2), size=(2, 10, width)))
+PROGRAM = """width, depth, height = 9, 10, 24
+n = 3
+for _ in rotate(n):
+    for _ in mirror(x=0):
+        leg(taper(start=at(left=0, rear=3), end=at(left=-1, rear=2, top=8), radius=(0.5, 1)))
+seat(bottom=16, height=2)
 """
 
 BOTH_WAYS = """

@@ -58,29 +58,31 @@ for i in mirror(side):
 for i in translate(4, by=(0, 0, 5)):
     slat(box(at=(2, 9, -8), size=(9, 0.5, 1)))
 """
-NAMED = """# unit: cm, 3.75 per cell
+NAMED = """# unit: cm
 # a bookcase on legs that are said once
 width, depth, height = 60, 36.5, 90
-shelves, shelf_span, thick = 4, 60, 2.5  # as many as there shall be
-floor = -height / 2
+shelves, leg_height, thick = 4, 10, 2.5  # as many as there shall be
 
 
-def legs(long, at, thick=2):
-    for i in mirror(side):
-        leg(at=(floor, at, width / 2 - thick), size=(long, thick, thick))
+def legs(inset, thick=2):
+    for _ in mirror(x=0):
+        leg(left=inset, width=thick, depth=thick)
 
 
-def pair(long, out):
-    legs(long=long, at=-out)
-    legs(long=long, at=out - 3, thick=3)
+def pair(out):
+    legs(inset=0, rear=out, depth=3)
+    legs(inset=out - 3, front=out, depth=3, thick=3)
 
 
-for i in translate(shelves, by=(shelf_span / (shelves - 1), 0, 0)):
-    shelf(box(at=(floor + 15, -depth / 2, thick - width / 2), size=(thick, depth, width - 2 * thick)))
-for i in mirror(side):
-    side(box(at=(floor + 10, -depth / 2, width / 2 - thick), size=(height - 10, depth, thick)))
-foot(pair(long=10, out=depth / 2))
-post(bar(start=(floor, 0, 0), end=(floor + 10, 0, (width + depth) * 0.1), section=(thick, thick / 2), turn=-30))
+with inside(bottom=leg_height):
+    for _ in row(shelves, last=at(top=0)):
+        shelf(left=thick, right=thick, height=thick)
+    for _ in mirror(x=0):
+        side(left=0, width=thick)
+    for _ in divide(shelves - 1, z, gap=thick, front=0, depth=thick / 2):
+        door(left=thick, right=thick)
+foot(pair(height=leg_height, out=depth / 8))
+post(bar(start=at(), end=at(x=(width + depth) * 0.1, bottom=10), width=thick, depth=thick / 2, turn=-30))
 """
 
 

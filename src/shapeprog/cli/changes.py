@@ -67,14 +67,3 @@ def changed(program: Program, changes: Sequence[str]) -> Program:
         except ZeroDivisionError:
             raise InputError(f"{change!r} divides by zero", "divide by another number") from None
     return set_numbers(program, wanted)
-
-
-def vanished(before: Program, after: Program) -> list[str]:
-    """What parts are called that have a volume in a program, and none with other numbers in it."""
-    from shapeprog.language.unroll import on_numpy_if_shipped, unroll
-
-    with on_numpy_if_shipped(before):
-        scenes = [unroll(program) for program in (before, after)]
-        flat = [set(scene.block[~scene.mask].tolist()) for scene in scenes]
-    draws = after.draws
-    return [draws[block].word for block in sorted(flat[1] - flat[0])]

@@ -170,6 +170,7 @@ def _inference(options: InferOptions) -> Inference:
     from shapeprog.inference import Result, Settings, greedy_boxes, infer
     from shapeprog.inference.readable import in_readable_unit, unit_of_result
     from shapeprog.inference.results import measured
+    from shapeprog.language.convert import placed_if_possible
 
     settings = None if options.rounds is None else Settings(rounds=options.rounds)
     libraries = terminal.load_libraries(options.modules, options.library)
@@ -179,7 +180,8 @@ def _inference(options: InferOptions) -> Inference:
             started = time.monotonic()
             boxes = greedy_boxes(shape.voxels, options.blocks).snap()
             reason = "Greedy boxes: one box per drawing statement, without search."
-            program = in_readable_unit(boxes, unit_of_result(shape, boxes, options.unit or ""), options.seed)
+            program = placed_if_possible(boxes)
+            program = in_readable_unit(program, unit_of_result(shape, program, options.unit or ""), options.seed)
             result = Result(program, boxes, {}, reason, (), time.monotonic() - started)
         else:
             result = infer(

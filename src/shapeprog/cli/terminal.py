@@ -236,24 +236,13 @@ def read_program_file(path: Path, changes: Sequence[str] | None = None) -> tuple
     InputError
         Where the file holds a shape instead, with the command that makes a program of it.
     """
-    from shapeprog.cli.changes import changed, vanished
+    from shapeprog.cli.changes import changed
     from shapeprog.formats import load_with_frame, program_suffixes
 
     try:
         program, frame = load_with_frame(path)
         warn(path, program)
-        if not changes:
-            return program, frame
-        from shapeprog.language.named import names
-
-        edited = changed(program, changes)
-        for named in names(edited):
-            if named.name in ("width", "depth", "height") and named.value <= 0:
-                raise InputError(f"{named.name} would be {named.value:g}", "give a positive size")
-        if missing := vanished(program, edited):
-            note = f"Parts without volume at these numbers are left out: {', '.join(dict.fromkeys(missing))}."
-            errors().print(note, style="yellow", markup=False)
-        return edited, frame
+        return changed(program, changes or ()), frame
     except InputError as error:
         if path.is_file() and path.suffix.lower() not in program_suffixes():
             raise InputError(error.message, f"infer a program first: shapeprog infer {path}") from None

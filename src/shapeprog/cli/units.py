@@ -66,5 +66,5 @@ def asked_unit(
         return own.to(unit)
     if frame is None:
         message = f"cannot write {path} in {unit}: the size of its cells is unknown"
-        raise InputError(message, "infer it with --unit, or add its size at the top, as in '# unit: cm, 3.75 per cell'")
+        raise InputError(message, "infer it with --unit, or name its unit at the top, as in '# unit: cm'")
     return Unit.of(frame, unit, file_unit or "")

@@ -9,12 +9,8 @@ from shapeprog.errors import InputError, OutputError, did_you_mean
 from shapeprog.files import output_error
 from shapeprog.formats.format import format_of, listed, program_suffixes, suffixes
 from shapeprog.formats.frames import placement
-from shapeprog.language.convert import placed_if_possible
-from shapeprog.language.placement import SIZES
 from shapeprog.language.program import Program
 from shapeprog.space import Frame
-
-FLOOR = "floor"  # what programs in cells call the level on which the whole stands
 
 
 def load(path: str | os.PathLike[str]) -> Program:
@@ -91,8 +87,6 @@ def save(program: Program, path: str | os.PathLike[str], frame: Frame | None = N
     if Path(path).suffix.lower() not in suffixes("program"):
         endings = " or ".join(suffixes("program"))
         raise OutputError(f"{path} could not be read back as a program", f"name a {endings} file, or use export")
-    if program.source is not None and {*SIZES, FLOOR} & program.source.numbers.keys():
-        program = placed_if_possible(program)
     export(program, path, frame)
 
 

@@ -49,15 +49,14 @@ def unit_of_result(shape: Shape, program: Program, name: str = "") -> Unit | Non
     Parameters
     ----------
     name
-        Name of the unit, or ``cells``; empty for that of the file, which may have no name.  Voxels, and statements
-        in cells, are then left in cells unless somebody has named the unit of the file.
+        Name of the unit, or ``cells``; empty for that of the file, which may have no name.  Voxels are then left in
+        cells unless somebody has named the unit of the file.  Statements in cells have no unit.
     """
-    if name == CELLS:
+    if name == CELLS or program.scale is None:
         return None
     if name:
         return Unit.of(shape.frame, name, shape.file_unit)
-    placed = program.source is not None and program.source.placed
-    if not shape.unit and (not placed or shape.kind == "voxels"):
+    if not shape.unit and shape.kind == "voxels":
         return None
     return Unit(shape.file_unit, shape.frame.scale)
 

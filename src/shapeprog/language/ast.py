@@ -7,12 +7,12 @@ placed program is evaluated to statements and loops in cells, see :mod:`shapepro
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, TypeAlias
 
 from shapeprog.errors import ShapeProgError
-from shapeprog.language.expression import Expression, Value, value_at
+from shapeprog.language.expression import Expression, Value, names_in, value_at
 from shapeprog.language.unit import Unit
 
 
@@ -119,14 +119,13 @@ class Call:
 class Function:
     """``def legs(height, thick=2):`` with the lines of its body; ``None`` is a parameter without a default.
 
-    With ``box``, its first parameters in cells are the box in which its lines are drawn, which placed calls have.
+    In cells its first parameters are the box in which its lines are drawn, which placed calls have.
     """
 
     name: str
     parameters: tuple[tuple[str, Value | None], ...]
     body: tuple[Line, ...]
     note: str = ""
-    box: bool = field(default=False, compare=False, repr=False)
 
     @property
     def names(self) -> set[str]:
@@ -155,7 +154,7 @@ class Source:
     lines
         The lines at the top level.
     unit
-        Unit of its lengths; for statements in cells with their size, ``None`` for cells.
+        Unit of its lengths, if its parts are placed.
     scale
         How it lies in the grid, if its parts are placed; ``None`` for statements in cells.
     warnings
@@ -267,6 +266,18 @@ def with_values(line: Line, new_values: Iterable[Value]) -> Line:
             return replace(line, count=None if count is None else next(new), keywords=_with_arguments(keywords, new))
         case _:
             return line
+
+
+def used_names(lines: Iterable[Line]) -> set[str]:
+    """The names in the numbers of lines, not in those inside of them."""
+    return {name for line in lines for value in values(line) for name in names_in(value)}
+
+
+def assignments(lines: Iterable[Line], names: Collection[str]) -> Iterator[Assignment]:
+    """The assignments among lines, with some of their names alone."""
+    for line in lines:
+        if isinstance(line, Assignment) and (pairs := tuple(pair for pair in line.numbers if pair[0] in names)):
+            yield replace(line, numbers=pairs)
 
 
 def names_of(source: Source) -> set[str]:

@@ -122,7 +122,7 @@ class Counts:
 
 
 def in_unit(program: Program, unit: Unit | None, *, digits: int | None = None) -> Program:
-    """The same program with its lengths written in a unit, or in cells; unchanged if it is in this unit.
+    """The same placed program with its lengths in a unit, or in cells; unchanged if it is in this unit.
 
     Parameters
     ----------
@@ -132,19 +132,19 @@ def in_unit(program: Program, unit: Unit | None, *, digits: int | None = None) -
     Raises
     ------
     ShapeProgError
-        If a name is a length in one use, and another number elsewhere.
+        If a name is a length in one use, and another number elsewhere, or the program is in cells and has no unit.
     """
-    source = source_of(program)
-    if source.placed and unit is None:
-        unit = Unit("", 1.0)
+    source, unit = source_of(program), unit or Unit("", 1.0)
+    if source.unit is None:
+        raise ShapeProgError("statements in cells have no unit", "shapeprog tidy places them from sides")
     if source.unit == unit:
         return program
-    before, after = (1.0 if system is None else system.per_cell for system in (source.unit, unit))
+    factor = unit.per_cell / source.unit.per_cell
 
     def change(number: float, power: float) -> float:
         if not power or not number:
             return number
-        new = number * (after / before) ** power
+        new = number * factor**power
         if digits is None or power != 1:
             return to_float32(float(f"{new:.{DIGITS}g}"))
         return to_float32(round(new, max(digits, FEWEST - 1 - math.floor(math.log10(abs(new))))))
@@ -182,10 +182,9 @@ def _is_length(number: float, power: float) -> bool:
 
 def _scaled(source: Source) -> Program:
     """The program of a syntax tree whose unit or sizes have changed: a cell is as large as its unit has it."""
-    if source.placed and source.unit is not None:
-        cells = 1 / source.unit.per_cell
-        source = replace(source, scale=Scale(cells, -source.evaluated_numbers()["height"] * cells / 2))
-    return evaluated(source)
+    assert source.unit is not None
+    cells = 1 / source.unit.per_cell
+    return evaluated(replace(source, scale=Scale(cells, -source.evaluated_numbers()["height"] * cells / 2)))
 
 
 def lengths(program: Program) -> frozenset[str]:
@@ -206,7 +205,7 @@ class _Powers:
     """
 
     def __init__(self, source: Source) -> None:
-        self._known = dict.fromkeys(SIZES, 1.0) if source.placed else {}
+        self._known = dict.fromkeys(SIZES, 1.0)
         for self._plain in (False, True):
             learned = -1
             while learned < len(self._known):

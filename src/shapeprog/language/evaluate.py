@@ -41,14 +41,14 @@ MOST_STATEMENTS = 1 << 16
 
 
 def evaluated(source: Source) -> Program:
-    """The program of a syntax tree; statements in cells without names, functions and a unit have no source.
+    """The program of a syntax tree; statements in cells without names and functions have no source.
 
     Raises
     ------
     Fault
         If a name, function, argument or number in it is wrong.
     """
-    if source.plain and source.unit is None:
+    if source.plain:
         return Program(expanded(source))
     source = replace(source, lines=without_double_blanks(source.lines))
     return Program(expanded(source), source)
@@ -83,11 +83,6 @@ def expanded(source: Source) -> tuple[Node, ...]:
     """The statements and loops of a program in cells, with numbers in place of expressions; a ``Fault`` if an
     expression has no value, a number does not fit its place, or there are more than ``MOST_STATEMENTS``."""
     return tuple(_Evaluator(source, None).program())
-
-
-def in_own_unit(source: Source) -> tuple[Node, ...]:
-    """The same with lengths in the unit of the text instead of cells."""
-    return expanded(replace(source, unit=None, scale=source.scale and replace(source.scale, cells_per_unit=1.0)))
 
 
 def symbolic(source: Source, values: Mapping[str, Any], floor: Any = None) -> tuple[Node, ...]:
@@ -240,11 +235,9 @@ class _Evaluator(Lowering):
         except ShapeProgError as error:
             raise Fault(line, error.message, error.hint) from None
         if not any(isinstance(value, Expression) for value in line.values):
-            return self._in_cells(line, line.values)
+            return line.values
         numbers = [self.at(line, slot, value, scope) for slot, value in enumerate(line.values)]
-        if not self.exact:
-            return self._in_cells(line, numbers)
-        for parameter in declared.parameters:
+        for parameter in declared.parameters if self.exact else ():
             slots = parameter.slots
             written = [isinstance(value, Expression) for value in line.values[slots]]
             if any(written):
@@ -253,23 +246,7 @@ class _Evaluator(Lowering):
                 except ShapeProgError as error:
                     key = slots.start + written.index(True)
                     raise Fault(line, error.message, error.hint, key) from None
-        return self._in_cells(line, numbers)
-
-    def _in_cells(self, line: Draw | Loop, numbers: Sequence[Any]) -> tuple[Any, ...]:
-        """The values of a statement or loop with coordinates and lengths in cells instead of the unit of the text."""
-        unit = self.source.unit
-        if unit is None:
-            return tuple(numbers)
-        result = list(numbers)
-        for slot, quantity in enumerate(language()[line.name].quantities):
-            if quantity.spatial:
-                result[slot] = numbers[slot] / unit.per_cell
-                if self.exact:
-                    try:
-                        result[slot] = to_float32(result[slot])
-                    except ShapeProgError as error:
-                        raise Fault(line, "in cells this number is too large", error.hint, slot) from None
-        return tuple(result)
+        return tuple(numbers)
 
 
 def _decisions(source: Source) -> list[int]:

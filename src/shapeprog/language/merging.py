@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
 from shapeprog.language.ast import Assignment, Comment, Function, Group, Line, Loop
@@ -39,6 +39,15 @@ def merged_lines(lines: Iterable[Line]) -> tuple[Line, ...]:
     return tuple(
         replace(line, body=merged_lines(line.body)) if isinstance(line, Loop | Group) else line for line in result
     )
+
+
+def separate_loops(lines: Iterable[Line]) -> Iterator[Line]:
+    """The lines with each loop in cells around several statements as that loop around each."""
+    for line in lines:
+        if isinstance(line, Loop):
+            yield from (replace(line, body=(inner,)) for inner in separate_loops(line.body))
+        else:
+            yield line
 
 
 def _merges(line: Loop | Group) -> bool:

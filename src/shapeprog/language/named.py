@@ -9,7 +9,7 @@ from functools import cache, partial
 from shapeprog.errors import ShapeProgError, did_you_mean
 from shapeprog.language.ast import Assignment, Fault, Line, Source
 from shapeprog.language.dimensions import Counts
-from shapeprog.language.evaluate import evaluated, in_own_unit
+from shapeprog.language.evaluate import evaluated
 from shapeprog.language.expression import names_in, text_of
 from shapeprog.language.parameters import LARGEST, to_float32
 from shapeprog.language.printer import printed
@@ -50,10 +50,8 @@ class Named:
 
 
 def inline(program: Program) -> Program:
-    """The program written out: statements and loops with plain numbers, in the unit of its text."""
-    if program.source is None or program.unit is None or not program.unit.name:
-        return Program(program.body)
-    return evaluated(Source(in_own_unit(program.source), program.unit))
+    """The program written out: statements and loops in cells with plain numbers."""
+    return Program(program.body)
 
 
 def names(program: Program) -> list[Named]:

@@ -16,7 +16,6 @@ from shapeprog.language.ast import Argument, Call, Fault, Group, Line, Part, Poi
 from shapeprog.language.cells_parser import parse_cells
 from shapeprog.language.evaluate import evaluated, placed_source
 from shapeprog.language.placement import (
-    ATTRIBUTES,
     AXES,
     BETWEEN,
     BOX,
@@ -24,19 +23,17 @@ from shapeprog.language.placement import (
     IN_BOX,
     POINT,
     POINTS,
-    RESERVED,
     ROUND,
     ROUND_ROLES,
     SIZES,
     is_sized,
 )
 from shapeprog.language.program import Program
-from shapeprog.language.reader import Block, Comments, Names, Reader
+from shapeprog.language.reader import BEGIN, Block, Comments, Names, Reader, is_reserved
 from shapeprog.language.statement import language
 from shapeprog.language.text import Node, Text
 from shapeprog.language.unit import METRES
 
-BEGIN = "begin with width, depth, height = ..."
 _IN_CELLS = {"at", "size", "by", "section"}
 _ONLY_PLACED = {"at", "inside", "divide", "row"}
 _SIDES = {word for words in AXES for word in (words.low, words.high)}
@@ -63,7 +60,7 @@ def parse(text: str, name: str = "<program>") -> Program:
     """
     whole = Text(text, name)
     tree = whole.tree()
-    if _is_in_cells(whole, tree):
+    if _is_in_cells(tree):
         return parse_cells(whole, tree)
     unit, lines = _unit(whole, tree)
     reader = _Reader(whole, tree, Comments(lines))
@@ -80,23 +77,20 @@ def parse(text: str, name: str = "<program>") -> Program:
         raise whole.at(1, 1, "the program is nested too deeply", "use fewer levels") from None
 
 
-def _is_in_cells(text: Text, tree: ast.Module) -> bool:
+def _is_in_cells(tree: ast.Module) -> bool:
     """Whether a text holds statements in cells: it has coordinates, or no size of the whole and no placed words."""
     nodes = list(ast.walk(tree))
-    assigned = {node.id for node in nodes if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)}
+    if set(SIZES) <= {node.id for node in nodes if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)}:
+        return False
     calls = [node for node in nodes if isinstance(node, ast.Call)]
     functions = {node.name for node in nodes if isinstance(node, ast.FunctionDef)}
     called = {node.func.id for node in calls if isinstance(node.func, ast.Name)} - functions
     keywords = {word.arg for node in calls if getattr(node.func, "id", "") not in functions for word in node.keywords}
-    known = {word for word in called if word in language() and not _is_reserved(word)}
-    if assigned & set(SIZES) and any(map(_UNIT.fullmatch, text.lines)):  # in cells, it says "per cell"
-        return False
-    in_cells = "floor" in assigned or keywords & _IN_CELLS or known
-    if in_cells or not tree.body or any(" per cell" in line and line.startswith("#") for line in text.lines):
+    known = {word for word in called if word in language() and not is_reserved(word)}
+    if keywords & _IN_CELLS or known or not tree.body:
         return True
-    if assigned & set(SIZES) or called & _ONLY_PLACED or keywords & _SIDES:
-        return False
-    return any(node.args or node.keywords for node in calls)
+    is_placed = called & _ONLY_PLACED or keywords & _SIDES
+    return not is_placed and any(node.args or node.keywords for node in calls)
 
 
 def _unit(text: Text, tree: ast.Module) -> tuple[str, Sequence[str]]:
@@ -113,29 +107,7 @@ def _unit(text: Text, tree: ast.Module) -> tuple[str, Sequence[str]]:
 
 
 class _Reader(Reader):
-    """Reads placed parts."""
-
-    has_whole = declares_whole = False
-
-    def reserved(self, word: str, kind: str) -> str:
-        """Words of the language; in the line that declares the whole, its sizes are none."""
-        free = not _is_reserved(word) or (kind == "name" and self.declares_whole and word in SIZES)
-        free = free and not (kind == "function" and word in ATTRIBUTES)
-        free = free and not (kind == "parameter" and word == "tilt")  # a call takes tilt itself
-        return "" if free else f"{word!r} is a word of the language"
-
-    def assigned(self, words: list[str], local: bool) -> None:
-        """The first line with width, depth and height declares the whole."""
-        self.declares_whole = not local and not self.has_whole and set(SIZES) <= set(words)
-        self.has_whole = self.has_whole or self.declares_whole
-
-    def ready(self, node: ast.stmt) -> None:
-        """The whole must be declared."""
-        self.require(self.has_whole, node, "the size is not declared yet", BEGIN)
-
-    def visible_in_defaults(self) -> Names:
-        """All names but the sizes of the whole, which are those of the box of a call."""
-        return {word: entry for word, entry in self.names.items() if word not in SIZES}
+    """Reads placed parts, loops and groups."""
 
     def loop(self, node: ast.For | ast.With, block: Block) -> Line:
         """A loop or a group."""
@@ -296,11 +268,6 @@ class _Reader(Reader):
                 hint = f"keep two of {low}, {high}, {size}; or {offset} and {size}"
                 hint = f"keep one of {low}, {high}, {offset}" if has_radius else hint
                 raise self.error(last, f"{_listed(words + ['radius'] * has_radius)} exclude each other", hint)
-
-
-def _is_reserved(word: str) -> bool:
-    """Whether a word of the language cannot be declared as a name."""
-    return word in RESERVED or word in language().roles
 
 
 def _listed(words: Sequence[str]) -> str:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator
+from itertools import takewhile
 
 from shapeprog.errors import ShapeProgError, did_you_mean
 from shapeprog.language.ast import (
@@ -57,21 +58,13 @@ def format_source(source: Source) -> str:
 
 def printed(source: Source) -> list[tuple[str, Line | None]]:
     """The rows of the canonical text, and of each the line that it is; ``None`` for its unit and the word ``pass``."""
-    unit = source.unit
-    head = [] if unit is None else [unit.header] if not source.placed else [f"# {HEAD} {unit.name}"] * bool(unit.name)
-    for line in source.lines:
-        if source.placed and (head or not isinstance(line, Comment)):  # only the first comments, and only one of them
-            break
-        if isinstance(line, Comment) and _is_unit(line, source):
+    head: list[tuple[str, Line | None]] = []
+    if source.unit and source.unit.name:
+        head.append((f"# {HEAD} {source.unit.name}", None))
+    for line in () if head else takewhile(lambda line: isinstance(line, Comment), source.lines):
+        if isinstance(line, Comment) and re.fullmatch(rf"{HEAD}[ \t]*\S+", line.text):
             raise ShapeProgError(f"the comment {line.text!r} would be read as the unit of the text", "reword it")
-    return [*((line, None) for line in head), *_lines(source.lines, 0, 0, names_of(source) | {*source.functions})]
-
-
-def _is_unit(comment: Comment, source: Source) -> bool:
-    """Whether a comment would be read as the unit of a text that has no other above it."""
-    if source.placed:
-        return re.fullmatch(rf"{HEAD}[ \t]*\S+", comment.text) is not None
-    return comment.text.startswith(HEAD)
+    return [*head, *_lines(source.lines, 0, 0, names_of(source) | {*source.functions})]
 
 
 def source_of(program: Program) -> Source:

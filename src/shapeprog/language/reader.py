@@ -1,4 +1,4 @@
-"""What both notations have in common: names and their scopes, functions, comments, and the places of mistakes."""
+"""Names and their scopes, functions and comments of placed text, and the places of mistakes."""
 
 from __future__ import annotations
 
@@ -11,14 +11,16 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple, TypeAlias
 
-from shapeprog.errors import ProgramError, ShapeProgError, did_you_mean
+from shapeprog.errors import ProgramError, did_you_mean
 from shapeprog.language.ast import Assignment, Comment, Fault, Function, Line, without_double_blanks
 from shapeprog.language.expression import Binary, Expression, Name, Operator, Value
 from shapeprog.language.parameters import to_float32
-from shapeprog.language.placement import SIZES
+from shapeprog.language.placement import ATTRIBUTES, RESERVED, SIZES
 from shapeprog.language.program import DEEPEST
+from shapeprog.language.statement import language
 from shapeprog.language.text import Node, Text
 
+BEGIN = "begin with width, depth, height = ..."
 _OPERATORS: dict[type[ast.operator], Operator] = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/"}
 
 
@@ -61,12 +63,7 @@ class Reader(ABC):
         self.names: Names = {}
         self.function_names: Names = {}
         self.declared: list[tuple[str, Declared]] = []
-        self.variables: dict[str, ast.expr] = {}
-        self.later = {node.name for node in tree.body if isinstance(node, ast.FunctionDef)}
-
-    @abstractmethod
-    def reserved(self, word: str, kind: str) -> str:
-        """Why a word cannot be declared as a ``name``, ``parameter`` or ``function``; empty if it can."""
+        self.has_whole = self.declares_whole = False
 
     @abstractmethod
     def element(self, call: ast.Call, scope: Names) -> Line:
@@ -75,12 +72,6 @@ class Reader(ABC):
     @abstractmethod
     def loop(self, node: ast.For | ast.With, block: Block) -> Line:
         """A loop or a group."""
-
-    def ready(self, node: ast.stmt) -> None:  # noqa: B027  nothing need stand above
-        """Refuse a line that draws or defines before what must stand above it."""
-
-    def assigned(self, words: list[str], local: bool) -> None:  # noqa: B027
-        """Take note of the names of an assignment."""
 
     # ---- lines --------------------------------------------------------------------------------------------------
 
@@ -131,7 +122,7 @@ class Reader(ABC):
         known = known or (isinstance(node, ast.Expr) and isinstance(node.value, ast.Call))
         hint = "use a part, a loop, with inside(...), a function or name = number"
         self.require(known, node, "this is no statement of a program", hint)
-        self.ready(node)
+        self.require(self.has_whole, node, "the size is not declared yet", BEGIN)
         if isinstance(node, ast.Expr) and isinstance(node.value, ast.Call):
             return self.element(node.value, block.scope)
         if isinstance(node, ast.For | ast.With):
@@ -152,7 +143,8 @@ class Reader(ABC):
         self.require(len(targets) == len(values), node, message, "write as many numbers as names")
         words = [getattr(name, "id", "") for name in targets]
         pairs = [(word, self.value(word, number, scope)) for word, number in zip(words, values, strict=True)]
-        self.assigned(words, local)
+        self.declares_whole = not local and not self.has_whole and set(SIZES) <= set(words)
+        self.has_whole = self.has_whole or self.declares_whole
         for name, word in zip(targets, words, strict=True):
             self.require(word, name, f"{self.text.shown(name)} is not a name", "write name = number")
             self.declare(word, name, scope)
@@ -163,24 +155,22 @@ class Reader(ABC):
         """Add a name to a scope; a parameter may hide a name of the program."""
         taken = not parameter and (word in scope or word in self.functions)
         self.require(not taken, node, f"{word!r} is declared twice", "use another name")
-        if why := self.reserved(word, "parameter" if parameter else "name"):
-            hint = f"use another name, such as {word}_size"
-            raise self.error(node, why, "width, depth, height = ... is one line" if word in SIZES else hint)
-        if word in self.variables:
-            message = f"the variable {word} of this loop has the name of a number or function"
-            raise self.error(self.variables[word], message, "give the variable another name, such as i")
+        free = not is_reserved(word) or (self.declares_whole and word in SIZES and not parameter)
+        free = free and not (parameter and word == "tilt")  # a call takes tilt itself
+        hint = "width, depth, height = ... is one line" if word in SIZES else f"use another name, such as {word}_size"
+        self.require(free, node, f"{word!r} is a word of the language", hint)
         scope[word] = Declared(node, used=word in SIZES)  # the sizes of the whole always count as used
         self.declared.append((word, scope[word]))
 
     def _function(self, node: ast.FunctionDef, end: float) -> Line:
         """A function, which is known below its definition only, so that there is no recursion."""
         head, name = node.args, node.name
-        taken = self.reserved(name, "function") or name in self.functions or name in self.names
+        taken = is_reserved(name) or name in ATTRIBUTES or name in self.functions or name in self.names
         self.require(not taken, node, f"{name!r} has a meaning already", "use another name")
         extra = [head.posonlyargs, head.vararg, head.kwonlyargs, head.kwarg, node.decorator_list, node.returns]
         extra += [*(argument.annotation for argument in head.args), getattr(node, "type_params", None)]
         self.require(not any(extra), node, "parameters are name or name=number", "remove the rest")
-        outer = self.visible_in_defaults()
+        outer = {word: entry for word, entry in self.names.items() if word not in SIZES}
         defaults: list[ast.expr | None] = [*[None] * (len(head.args) - len(head.defaults)), *head.defaults]
         scope, parameters = dict(self.names), dict[str, Value | None]()
         self.function_names[name] = Declared(node)
@@ -197,10 +187,6 @@ class Reader(ABC):
         self.functions[name] = function
         return self.recorded(function, node, {argument.arg: argument for argument in head.args})
 
-    def visible_in_defaults(self) -> Names:
-        """The names that the default of a parameter may use."""
-        return self.names
-
     # ---- numbers ------------------------------------------------------------------------------------------------
 
     def value(self, word: str, node: ast.expr, scope: Mapping[str, Declared]) -> Value:
@@ -216,13 +202,8 @@ class Reader(ABC):
             raise self.error(node, message, "give a part of it a name of its own")
         result: Value
         match node:
-            case ast.Constant(float() | int() as literal) if not isinstance(literal, bool):
-                try:
-                    to_float32(float(literal))
-                except (OverflowError, ShapeProgError):
-                    message = f"{word} holds {self.text.shown(node)}, which is too large"
-                    raise self.error(node, message, "numbers end at 3.4028235e+38") from None
-                return float(literal)
+            case ast.Constant() if (literal := self.text.literal(word, node)) is not None:
+                return literal
             case ast.Name(name):
                 result = Name(name)
             case ast.UnaryOp(ast.UAdd(), inner):
@@ -242,15 +223,10 @@ class Reader(ABC):
         """Refuse names that are not in a scope, and take note of those that are."""
         for name in value.names() if isinstance(value, Expression) else ():
             if name.name not in scope:
-                raise self.error(self.expressions[id(name)], *self._undefined(name, scope))
+                otherwise = f"declare it above: {name.name} = ..."
+                hint = did_you_mean(name.name, scope, otherwise) if scope else otherwise
+                raise self.error(self.expressions[id(name)], f"unknown name {name.name!r}", hint)
             scope[name.name].used = True
-
-    def _undefined(self, name: Name, scope: Mapping[str, Declared]) -> tuple[str, str]:
-        if name.name in self.variables:
-            message = f"unknown name {name.name!r}: it is the variable of a loop, not a number"
-            return message, "the keywords of the loop say how it moves its copies"
-        otherwise = f"declare it above: {name.name} = ..."
-        return f"unknown name {name.name!r}", did_you_mean(name.name, scope, otherwise) if scope else otherwise
 
     def note(self, node: ast.expr | ast.stmt) -> str:
         """The comment behind a line."""
@@ -261,6 +237,11 @@ class Reader(ABC):
         self.places |= {(id(line), key): place for key, place in places.items()}
         self.places[id(line), ""] = node
         return line
+
+
+def is_reserved(word: str) -> bool:
+    """Whether a word of the language cannot be declared as a name."""
+    return word in RESERVED or word in language().roles
 
 
 class _Remark(NamedTuple):
@@ -274,7 +255,7 @@ class _Remark(NamedTuple):
 class Comments:
     """Those of a text, as its lines, that have not been handed out yet."""
 
-    def __init__(self, lines: Sequence[str] = ()) -> None:
+    def __init__(self, lines: Sequence[str]) -> None:
         self._rest = list(_remarks(lines))
 
     def before(self, row: int) -> tuple[Comment, ...]:

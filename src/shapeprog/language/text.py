@@ -7,7 +7,8 @@ import re
 import warnings
 from typing import TypeAlias
 
-from shapeprog.errors import ProgramError
+from shapeprog.errors import ProgramError, ShapeProgError
+from shapeprog.language.parameters import to_float32
 
 LONGEST = 500_000  # letters of the longest text: a syntax tree takes a thousand times the memory of its text
 
@@ -80,6 +81,17 @@ class Text:
         end = node.end_col_offset if node.end_lineno == node.lineno else None
         text = raw[node.col_offset : end].decode(errors="replace").strip()
         return text if len(text) <= _SHOWN else text[:_SHOWN] + "..."
+
+    def literal(self, word: str, node: ast.Constant) -> float | None:
+        """The number that a constant is, ``None`` for other constants; ``word`` is what holds it, in errors."""
+        if isinstance(node.value, bool) or not isinstance(node.value, float | int):
+            return None
+        try:
+            to_float32(float(node.value))
+        except (OverflowError, ShapeProgError):
+            message = f"{word} holds {self.shown(node)}, which is too large"
+            raise self.error(node, message, "numbers end at 3.4028235e+38") from None
+        return float(node.value)
 
     def error(self, node: Node, message: str, hint: str) -> ProgramError:
         """What is wrong at a piece of syntax."""

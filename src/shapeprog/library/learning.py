@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from shapeprog.language.ast import Assignment, Call, Comment, Function, Line, Source
-from shapeprog.language.convert import in_cells, placed, placed_if_possible
+from shapeprog.language.convert import in_cells, placed_function, placed_if_possible
 from shapeprog.language.evaluate import evaluated, placed_source
 from shapeprog.language.placement import BOX_IN_CELLS, SIZES
 from shapeprog.language.printer import format_source, source_of
@@ -52,7 +52,7 @@ def learn(given: Sequence[Program], most: int = MOST) -> Library:
 
     Comments tell how often each is used by the programs, and a typical call.
     """
-    found = list(_functions([in_cells(program) for program in given], most))
+    found = list(_functions([in_cells(program, named=False) for program in given], most))
     if not found:
         return Library(Source())
     given = [placed_if_possible(program) for program in given]
@@ -83,9 +83,11 @@ def _used(given: Sequence[Program], library: Library) -> tuple[Library, list[Pro
 
 def _library(found: Sequence[Learned]) -> Library:
     """The functions as placed text, each below its call."""
-    examples = (replace(each.example, role="") for each in found)  # which would be that of cushions in it
-    program = evaluated(Source((*(each.function for each in found), *examples)))
-    functions = source_of(placed(program)).functions.values()
+    functions = []
+    for each in found:
+        defaults = {name: value for name, value in each.function.parameters if isinstance(value, float)}
+        typical = {name: value for name, value in each.example.arguments if isinstance(value, float)}
+        functions.append(placed_function(each.function, defaults | typical))
     source = placed_source((Assignment(tuple((size, BOARD) for size in SIZES)), *functions))
     lines: list[Line] = [*source.lines[:1]]
     for each, written in zip(found, functions, strict=True):

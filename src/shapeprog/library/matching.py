@@ -22,6 +22,7 @@ from shapeprog.language.ast import Assignment, Call, Function, Source
 from shapeprog.language.dimensions import Counts
 from shapeprog.language.evaluate import expanded, symbolic
 from shapeprog.language.expression import Linear, Name, Value, combined, value_at
+from shapeprog.language.placement import SIZES
 from shapeprog.language.program import Program
 from shapeprog.library.blocks import Block, Kind, blocks_of
 from shapeprog.library.independence import independent
@@ -190,33 +191,6 @@ def _linear(value: Any) -> Linear:
     return value if isinstance(value, Linear) else Linear(float(value))
 
 
-class Sums:
-    """Values that are linear in the names of a program, written as short as can be.
-
-    Parameters
-    ----------
-    names
-        The names that are free.
-    others
-        Names that follow from them, with their factors and constant (N + 1,).
-    """
-
-    def __init__(self, names: Sequence[str], others: Mapping[str, FloatArray]) -> None:
-        self.names, self.others = names, others
-
-    def shortest(self, row: FloatArray) -> Value:
-        """The shortest expression of a row (N + 1,): factors of the free names, and a constant."""
-        options = [self._sum(row, ())]
-        options += [self._sum(row - own, ((Name(name), 1.0),)) for name, own in self.others.items()]
-        return min(options, key=terms)
-
-    def _sum(self, row: FloatArray, first: tuple[tuple[Value, float], ...]) -> Value:
-        row = np.round(row, 5) + 0.0
-        parts = [*first, *((Name(name), float(factor)) for name, factor in zip(self.names, row, strict=False))]
-        parts = sorted((part for part in parts if part[1]), key=lambda part: part[1] < 0)
-        return combined(round(float(row[-1]), 4) + 0.0, parts)
-
-
 class Matcher:
     """The blocks of one program, and where functions fit them.
 
@@ -226,14 +200,13 @@ class Matcher:
         Its blocks, linear in its free names.
     units
         For each block the line that it is of: a call takes all blocks of a line or none.
-    values
-        The numbers that the free names stand for (N,).
-    sums
-        How values are written in its names.
+    numbers
+        Its names, and the N numbers that they stand for.
     """
 
-    def __init__(self, forms: Sequence[Form], units: Sequence[int], values: FloatArray, sums: Sums) -> None:
-        self.forms, self.units, self.values, self.sums = forms, units, values, sums
+    def __init__(self, forms: Sequence[Form], units: Sequence[int], numbers: Mapping[str, float]) -> None:
+        self.forms, self.units, self.numbers = forms, units, numbers
+        self.values = np.array([*numbers.values()])
 
     def matches(self, pattern: Pattern) -> Iterator[Match]:
         """All ways in which blocks of the program are a call of a function."""
@@ -296,19 +269,15 @@ class Matcher:
         for place, default in enumerate(defaults):
             if free[place] and isinstance(default, float) and abs(found[place] - default) <= EXACT:
                 written[place] = default
-        exact = np.array([value_at(value, self._numbers) for value in written])
+        exact = np.array([value_at(value, self.numbers) for value in written])
         error = float(np.abs(factors @ exact + constants - values).max(initial=0))
-        if error > TOLERANCE:
+        sizes = [value for name, value in zip(pattern.measures, exact, strict=True) if name in SIZES]
+        if error > TOLERANCE or min(sizes) <= 0:
             return None
         table: dict[str, Value] = {**dict(zip(pattern.measures, written, strict=True)), **counts}
         roles = (form.block.kind.word for form, want in zip(mine, wanted, strict=True) if not want.block.kind.word)
         said = tuple((name, table[name]) for name, default in pattern.function.parameters if table[name] != default)
         return int((exact < -TOLERANCE).sum()), Match(blocks, next(roles, ""), said, error)
-
-    @property
-    def _numbers(self) -> dict[str, float]:
-        free = dict(zip(self.sums.names, self.values.tolist(), strict=True))
-        return free | {name: float(row[:-1] @ self.values + row[-1]) for name, row in self.sums.others.items()}
 
     def _written(self, factors: FloatArray, rows: FloatArray, near: FloatArray) -> list[Value]:
         """The shortest expressions for parameters (P) whose factors (M, P) come to rows (M, N + 1) of the program.
@@ -325,8 +294,14 @@ class Matcher:
                 options.setdefault((np.round(row, 5) + 0.0).tobytes(), row)
         found: list[Value] = []
         for options, wanted in zip(offered, near, strict=True):
-            values = [self.sums.shortest(row) for row in options.values()]
+            values = [self._sum(row) for row in options.values()]
             away = [abs(float(row[:-1] @ self.values + row[-1] - wanted)) for row in options.values()]
             best = min(range(len(values)), key=lambda k: (terms(values[k]), away[k]))
             found.append(values[best])
         return found
+
+    def _sum(self, row: FloatArray) -> Value:
+        """The expression of a row (N + 1,): factors of the names, and a constant."""
+        parts = [(Name(name), factor) for name, factor in zip(self.numbers, np.round(row, 5).tolist(), strict=False)]
+        parts = sorted((part for part in parts if part[1]), key=lambda part: part[1] < 0)
+        return combined(round(float(row[-1]), 4) + 0.0, parts)

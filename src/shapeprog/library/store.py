@@ -36,17 +36,10 @@ class Library:
 
     @cached_property
     def functions(self) -> tuple[Function, ...]:
-        """The functions in cells, in the order of the text; those of placed text have their box as parameters."""
-        functions = tuple(self.source.functions.values())
-        if not self.placed:
-            return functions
+        """The functions in cells, in the order of the text; their box is among their parameters."""
+        functions = self.source.functions.values()
         shown = {name: dict(call.arguments) for name, call in self.examples.items()}
         return tuple(function_in_cells(self.source, each.name, shown.get(each.name, {})) for each in functions)
-
-    @property
-    def placed(self) -> bool:
-        """Whether its functions are placed; the first line of the text then gives any size of a whole."""
-        return self.source.placed
 
     @cached_property
     def comments(self) -> dict[str, tuple[str, ...]]:
@@ -73,14 +66,12 @@ class Library:
                 continue
             if not isinstance(shown, Call) or shown.name != function.name:
                 continue
-            if self.placed:
-                given = dict(shown.arguments)
-                if not given.keys() >= {*SIZES} or not all(isinstance(given[size], float) for size in SIZES):
-                    continue
-                low = {"bottom": 0.0, "front": -given["depth"] / 2, "left": -given["width"] / 2}
-                pairs = {word: (low | given)[word] for word in BOX_IN_CELLS} | given
-                shown = replace(shown, arguments=tuple(pairs.items()))
-            found[function.name] = shown
+            given = dict(shown.arguments)
+            if not given.keys() >= {*SIZES} or not all(isinstance(given[size], float) for size in SIZES):
+                continue
+            low = {"bottom": 0.0, "front": -given["depth"] / 2, "left": -given["width"] / 2}
+            pairs = {word: (low | given)[word] for word in BOX_IN_CELLS} | given
+            found[function.name] = replace(shown, arguments=tuple(pairs.items()))
         return found
 
     @cached_property
@@ -110,14 +101,14 @@ def library_of(program: Program, name: str = "<library>") -> Library:
     """The library that is a program of functions alone; an ``InputError`` if it is none."""
     source = source_of(program)
     more = next((line for line in source.lines if not isinstance(line, Comment | Function)), None)
-    if source.placed and isinstance(more, Assignment) and {*SIZES} == source.numbers.keys():
+    if isinstance(more, Assignment) and {*SIZES} == source.numbers.keys():
         more = next((line for line in source.lines if not isinstance(line, Assignment | Comment | Function)), None)
     if more is not None:
         what = "numbers of its own" if isinstance(more, Assignment) else "statements outside of functions"
         raise InputError(f"{name} is not a library: it has {what}", "a library holds only functions")
     if source.unit is not None and source.unit.name:
         said = f"{name} is not a library: its lengths are in {source.unit.name} of one object"
-        raise InputError(said, "write them in cells, and leave out the line '# unit:'; programs may be in any unit")
+        raise InputError(said, "leave out the line '# unit:'; programs may be in any unit")
     if not source.functions:
         raise InputError(f"{name} holds no functions", "write def name(parameter, ...): with what it draws below")
     return Library(source)

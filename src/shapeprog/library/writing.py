@@ -74,7 +74,7 @@ def function(name: str, group: Group, made: Basis, draws: Sequence[tuple[str, st
     needed = [(word, None) for k, word in enumerate(made.names) if len(box) <= k < said and word in used]
     others = [(word, 0.0) for k, word in enumerate(made.names) if k >= said and word in used]
     parameters = (*box, *needed, *((count, PAIR) for count in counts), *others)
-    return Function(name, parameters, tuple(lines), box=True)
+    return Function(name, parameters, tuple(lines))
 
 
 def _block(

@@ -3,4 +3,5 @@
 from shapeprog.language.convert.cells import function_in_cells as function_in_cells
 from shapeprog.language.convert.cells import in_cells as in_cells
 from shapeprog.language.convert.placed import placed as placed
+from shapeprog.language.convert.placed import placed_function as placed_function
 from shapeprog.language.convert.placed import placed_if_possible as placed_if_possible

@@ -8,10 +8,21 @@ from typing import Any
 
 import numpy as np
 
-from shapeprog.errors import ShapeProgError
-from shapeprog.language.ast import Assignment, Call, Draw, Function, Line, Loop, Scale, Source, values, with_values
+from shapeprog.language.ast import (
+    Assignment,
+    Call,
+    Draw,
+    Function,
+    Line,
+    Loop,
+    Scale,
+    Source,
+    assignments,
+    used_names,
+    values,
+    with_values,
+)
 from shapeprog.language.convert.forms import Forms
-from shapeprog.language.convert.names import NOTHING, pruned, used_names
 from shapeprog.language.dimensions import Counts, in_unit
 from shapeprog.language.evaluate import evaluated, expanded, symbolic
 from shapeprog.language.expression import Expression, Linear, Name, combined
@@ -23,31 +34,28 @@ EVEN = 1e-4
 """Degrees by which the copies of a rotation may miss a full circle."""
 
 
-def in_cells(program: Program) -> Program:
-    """A placed program as statements in cells, with its names; functions and groups are written out.
+def in_cells(program: Program, *, named: bool = True) -> Program:
+    """A placed program as statements in cells; functions and groups are written out.
 
-    If its numbers are not linear in its names, it has plain numbers.
+    Parameters
+    ----------
+    named
+        Whether it has the names of plain numbers; otherwise it is plain.
+
+    Raises
+    ------
+    ShapeProgError
+        If its numbers are not linear in these names, or a name is a length in one place only.
     """
-    if program.source is None or not program.source.placed:
+    if program.scale is None:
         return program
-    if program.unit is not None and not program.unit.name:
-        program = in_unit(program, None)
-    source = source_of(program)
-    assert source.scale is not None
-    names = {name: Linear.of(name) for name, v in source.numbers.items() if not isinstance(v, Expression)}
-    floor = source.scale.floor / source.scale.cells_per_unit
-    try:
-        form: Any = floor
-        if abs(floor + source.evaluated_numbers()["height"] / 2) < NOTHING:
-            form = source.evaluated_numbers(names)["height"] / -2.0
-        nodes = symbolic(replace(source, unit=None, scale=Scale(1.0, floor)), names, form)
-    except ShapeProgError:
+    if not named:
         return Program(tuple(_published(node, node) for node in program.body))
+    source = source_of(in_unit(program, None))
+    names = {name: Linear.of(name) for name, v in source.numbers.items() if not isinstance(v, Expression)}
+    nodes = symbolic(source, names, source.evaluated_numbers(names)["height"] / -2.0)
     lines = tuple(_published(_written(node), plain) for node, plain in zip(nodes, program.body, strict=True))
-    used = used_names(Source(lines).walk())
-    header = [line for line in source.lines if isinstance(line, Assignment)]
-    unit = source.unit if source.unit and source.unit.name else None
-    return evaluated(Source((*pruned(header, used & names.keys(), {}), *lines), unit))
+    return evaluated(Source((*assignments(source.lines, used_names(Source(lines).walk())), *lines)))
 
 
 def function_in_cells(source: Source, name: str, example: Mapping[str, Any]) -> Function:
@@ -83,7 +91,8 @@ def function_in_cells(source: Source, name: str, example: Mapping[str, Any]) -> 
     lines: tuple[Line, ...] = (header, *source.functions.values(), Call(name, tuple(keywords.items())))
     placed = Source(lines, scale=Scale(1.0, 0.0))
     nodes = symbolic(placed, box | {f"own {word}": Name(word) for word in words})
-    forms = Forms(Source())
+    nothing = Linear()
+    forms = Forms((nothing, nothing, nothing), {})
 
     def clean(line: Any) -> Any:
         line = with_values(line, [forms.written(forms.form(value), exact=True) for value in values(line)])
@@ -91,7 +100,7 @@ def function_in_cells(source: Source, name: str, example: Mapping[str, Any]) -> 
 
     body = tuple(_published(clean(node), plain) for node, plain in zip(nodes, expanded(placed), strict=True))
     sides = tuple((word, None) for word in BOX_IN_CELLS)
-    return replace(function, parameters=(*sides, *function.parameters), body=body, box=True)
+    return replace(function, parameters=(*sides, *function.parameters), body=body)
 
 
 def _written(node: Node) -> Node:

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from types import MappingProxyType
 from typing import NamedTuple, TypeAlias
 
 from shapeprog.errors import ShapeProgError
-from shapeprog.language.ast import Keywords, Point, Source
-from shapeprog.language.convert.names import NOTHING
+from shapeprog.language.ast import Keywords, Point
 from shapeprog.language.expression import Binary, Expression, Linear, Name, Negative, Value, combined, value_at
 from shapeprog.language.parameters import shortest, to_float32
 from shapeprog.language.placement import AXES
+
+NOTHING = 2e-6  # cells; a length up to this is none
 
 Triple: TypeAlias = tuple[Linear, Linear, Linear]
 """Along x, y and z, measured from the middle of the whole."""
@@ -36,19 +38,19 @@ class Forms:
 
     Parameters
     ----------
-    source
-        A program in cells.
+    sizes
+        Width, depth and height of the box around all parts.
+    scope
+        The values of names, in cells.
+    inlined
+        Linear forms of some names.
     """
 
-    def __init__(self, source: Source) -> None:
-        self.original = source
-        self.per_cell = 1.0 if source.unit is None else source.unit.per_cell
-        self.nothing = NOTHING * self.per_cell
+    def __init__(
+        self, sizes: Triple, scope: Mapping[str, float], inlined: Mapping[str, Linear] = MappingProxyType({})
+    ) -> None:
+        self.sizes, self.scope, self.inlined = sizes, scope, inlined
         self.atoms: dict[str, Expression] = {}
-        self.inlined: dict[str, Linear] = {}
-        self.names = source.evaluated_numbers()
-        self.scope = dict(self.names)
-        self.sizes: Triple = (Linear(), Linear(), Linear())
 
     # ---- numbers ------------------------------------------------------------------------------------------------
 
@@ -94,7 +96,7 @@ class Forms:
 
     def _clean(self, form: Linear) -> Linear:
         factors = tuple((name, factor) for name, factor in form.factors if abs(factor) > 1e-9)
-        return Linear(form.constant if abs(form.constant) > self.nothing else 0.0, factors)
+        return Linear(form.constant if abs(form.constant) > NOTHING else 0.0, factors)
 
     def _zero(self, form: Linear) -> bool:
         form = self._clean(form)

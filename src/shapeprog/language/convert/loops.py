@@ -2,77 +2,75 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 from shapeprog.errors import ShapeProgError
-from shapeprog.language.ast import (
-    Assignment,
-    Call,
-    Comment,
-    Draw,
-    Function,
-    Group,
-    Keywords,
-    Line,
-    Loop,
-    Part,
-    Point,
-    Source,
-)
+from shapeprog.language.ast import Call, Draw, Function, Group, Keywords, Line, Loop, Part, Point, Source
 from shapeprog.language.builtin import CELL_CENTRE
-from shapeprog.language.convert.forms import Triple, cost
-from shapeprog.language.convert.parts import Converted, Parts, ordered
+from shapeprog.language.convert.forms import NOTHING, Triple, cost
+from shapeprog.language.convert.parts import Converted, Parts, from_corner, ordered
 from shapeprog.language.expression import Binary, Linear, Value
-from shapeprog.language.placement import AXES, axis_of
+from shapeprog.language.merging import separate_loops
+from shapeprog.language.placement import AXES, BOX_IN_CELLS, axis_of
+from shapeprog.language.program import Node
 from shapeprog.space import DEPTH, SIDE, UP
 
 PIVOTED = ("line", "base_cross")
 """Statements that published rotations turn about themselves."""
 
 
-class Loops(Parts, ABC):
+class Loops(Parts):
     """The conversion of loops."""
 
-    @abstractmethod
-    def line(self, line: Line, role: str) -> Converted:
-        """The placed lines of one line; none for a part that draws nothing."""
+    def line(self, line: Node | Call) -> Converted:
+        """The placed lines of a statement, a loop or a call with a box; none for a part that draws nothing."""
+        if isinstance(line, Draw):
+            return self._draw(line)
+        return self._call(line) if isinstance(line, Call) else self._loop(line)
 
-    def lines(self, lines: Iterable[Line], role: str) -> Converted:
-        """Some lines, in order; ``role`` is the one around the call that they belong to."""
-        return self._joined([self.line(line, role) for line in lines])
+    def lines(self, lines: Iterable[Node | Call]) -> Converted:
+        """Some lines, in order."""
+        return self._joined([self.line(line) for line in lines])
 
     def _joined(self, results: Sequence[Converted]) -> Converted:
-        drawing = [
-            result for result in results if any(not isinstance(line, Comment | Assignment) for line in result.lines)
-        ]
+        drawing = [result for result in results if result.lines]
         middles: list[Linear | None] = []
         for axis in range(3):
             first, *following = [result.middles[axis] for result in drawing] or [None]
             same = first is not None and all(middle is not None and self._zero(first - middle) for middle in following)
             middles.append(first if same else None)
         first_box = drawing[0].first if drawing else None
-        return Converted(tuple(line for result in results for line in result.lines), first_box, tuple(middles))  # type: ignore[arg-type]
+        return Converted(tuple(line for result in drawing for line in result.lines), first_box, tuple(middles))  # type: ignore[arg-type]
 
-    def _loop(self, line: Loop, role: str) -> Converted:
-        body = self.lines(line.body, role)
-        if all(isinstance(inner, Comment) for inner in body.lines):
-            return Converted(body.lines)
+    def _call(self, line: Call) -> Converted:
+        """A call, whose first arguments in cells are its box."""
+        forms = {word: self.form(value) for word, value in line.arguments}
+        box = [forms.pop(word) for word in BOX_IN_CELLS]
+        spans = from_corner(box[:3], box[3:])
+        keywords = [pair for axis, span in enumerate(spans) for pair in self.interval(axis, span)]
+        more = [(word, self.written(form, exact=True)) for word, form in forms.items()]
+        return Converted((replace(line, arguments=(*keywords, *more)),), spans)  # type: ignore[arg-type]
+
+    def _loop(self, line: Loop) -> Converted:
+        if line.name == "rotate":
+            return self._rotate(line)
+        body = self.lines(line.body)
+        if not body.lines:
+            return body
         v = [self.form(value) for value in line.values]
         match line.name:
             case "mirror":
                 axis = {UP: 2, DEPTH: 1, SIDE: 0}[round(self.number(v[1]))]
-                self.decisions.append(axis)
-                return self._mirror(line, role, axis, (-v[2] if axis == 0 else v[2]) + self.shift[axis])
+                return self._mirror(line.body, axis, -v[2] if axis == 0 else v[2])
             case "translate":
-                return self._translate(body, line, role, v[0], (-v[3], v[2], v[1]))
+                return self._translate(body, line, v[0], (-v[3], v[2], v[1]))
             case "tilt_about":
                 return self._tilted(body, v)
             case "rotate_about":
                 point = self.point((-v[3], v[2], self.sizes[2] / -2.0)).keywords
                 keywords = (*point, ("step", self.written(v[1])))
-                return Converted((Group("rotate", keywords, body.lines, self.written(v[0]), "", line.note),))
+                return Converted((Group("rotate", keywords, body.lines, self.written(v[0])),))
         raise ShapeProgError(f"{line.name} has no placed form", "keep this program as statements in cells")
 
     def _tilted(self, body: Converted, v: list[Linear]) -> Converted:
@@ -85,25 +83,26 @@ class Loops(Parts, ABC):
                 return Converted((part,), box, (body.middles[0], None, None))
         raise ShapeProgError("this tilt has no placed form", "keep this program as statements in cells")
 
-    def _mirror(self, line: Loop, role: str, axis: int, plane: Linear) -> Converted:
+    def _mirror(self, lines: Iterable[Node | Call], axis: int, plane: Linear) -> Converted:
         """A mirror; a part that may be on either side of it is written at the left, the front or the bottom."""
+        plane = plane + self.shift[axis]
         results = []
-        for inner in line.body:
-            result = self.line(inner, role)
+        for inner in lines:
+            result = self.line(inner)
             middle = result.middles[axis]
-            if middle is not None and self.number(middle - plane) > self.nothing:
+            if middle is not None and self.number(middle - plane) > NOTHING:
                 before, shift = self.shift, list(self.shift)
                 shift[axis] = shift[axis] + (plane - middle) * 2.0
                 self.shift = shift[0], shift[1], shift[2]
-                result = self.line(inner, role)
+                result = self.line(inner)
                 self.shift = before
             results.append(result)
         body = self._joined(results)
         middles = tuple(plane if index == axis else middle for index, middle in enumerate(body.middles))
-        group = Group("mirror", self._single(axis, plane), body.lines, note=line.note)
+        group = Group("mirror", self._single(axis, plane), body.lines)
         return Converted((group,), body.first, middles)  # type: ignore[arg-type]
 
-    def _translate(self, body: Converted, line: Loop, role: str, count: Linear, step: Triple) -> Converted:
+    def _translate(self, body: Converted, line: Loop, count: Linear, step: Triple) -> Converted:
         """A loop with fixed steps, a row, or a mirror, whichever is shortest."""
         moving = [axis for axis in range(3) if not self._zero(step[axis])]
         number = None if count.factors else max(0, round(count.constant))
@@ -114,7 +113,7 @@ class Loops(Parts, ABC):
             middles[axis] = middle + step[axis] * ((number - 1) / 2) if determined else None  # type: ignore[operator]
         written, moved = self.written(count), tuple(middles)
         by = tuple(pair for axis in moving for pair in self._extra("xyz"[axis], step[axis])) or (("x", 0.0),)
-        options = [Group("translate", by, body.lines, written, note=line.note)]
+        options = [Group("translate", by, body.lines, written)]
         ways = [self._way(step[axis], count, number) for axis in moving]
         if body.first and moving and all(way is not None for way in ways):
             last: list[tuple[str, Value]] = []
@@ -127,11 +126,11 @@ class Loops(Parts, ABC):
                 if self.number(low) > self.number(high):
                     sides.reverse()
                 last += self._best([*sides, ((AXES[axis].offset, span.middle + way),)])  # type: ignore[arg-type]
-            options.append(Group("row", (("last", Point(tuple(last))),), body.lines, written, note=line.note))
+            options.append(Group("row", (("last", Point(tuple(last))),), body.lines, written))
         best = min(options, key=lambda group: cost(group.keywords))
         result = Converted((best,), body.first, moved)  # type: ignore[arg-type]
         if number == 2 and len(moving) == 1 and (middle := body.middles[moving[0]]) is not None:
-            mirror = self._mirror(line, role, moving[0], middle + step[moving[0]] / 2.0)
+            mirror = self._mirror(line.body, moving[0], middle + step[moving[0]] / 2.0 - self.shift[moving[0]])
             group = mirror.lines[0]
             assert isinstance(group, Group)
             if cost(group.keywords) < cost(best.keywords):
@@ -148,49 +147,25 @@ class Loops(Parts, ABC):
                 return self.form(total) * factor if self._zero(self.form(steps) - count + 1.0) else None
         return None
 
-    def _rotate(self, line: Loop, role: str) -> Converted:
+    def _rotate(self, line: Loop) -> Converted:
         """A published rotation: about the axis of the whole, or about that of the statement inside."""
-        pivots = [draw for draw in Source(line.body).walk() if isinstance(draw, Draw) and draw.name in PIVOTED]
-        draws = list(self._drawn(line.body))
-        if sum(draw.name in PIVOTED for draw in draws) > len(pivots):
-            message = "a rotation around a call has no placed form if it turns about what the function draws"
-            raise ShapeProgError(message, "write the function out")
+        draws = [draw for draw in Source(line.body).walk() if isinstance(draw, Draw)]
+        pivots = [draw for draw in draws if draw.name in PIVOTED]
         if pivots and len(draws) > 1:
-            single_loops = [
-                replace(line, body=(inner,), note="" if n else line.note) for n, inner in enumerate(_apart(line))
-            ]
-            return Converted(tuple(placed for inner in single_loops for placed in self._rotate(inner, role).lines))
-        body = self.lines(line.body, role).lines
-        if all(isinstance(inner, Comment) for inner in body):
-            return Converted(body)
+            apart = (inner for inner in separate_loops((line,)) if isinstance(inner, Loop))
+            return Converted(tuple(placed for inner in apart for placed in self._rotate(inner).lines))
+        body = self.lines(line.body).lines
+        if not body:
+            return Converted(())
         count, step = (self.form(value) for value in line.values)
         keywords: Keywords = ()
         for draw in pivots:
-            shift = CELL_CENTRE * self.per_cell if draw.name == "line" else 0.0
+            shift = CELL_CENTRE if draw.name == "line" else 0.0
             _, depth, side = (self.form(value) + shift for value in draw.values[:3])
             keywords = self.point((-side, depth, self.sizes[2] / -2.0)).keywords
             if draw.name == "base_cross":
                 keywords = (*keywords, ("step", self.written(step * 90.0)))
-        return Converted((Group("rotate", keywords, body, self.written(count), "", line.note),))
-
-    def _drawn(self, lines: Iterable[Line]) -> Iterator[Draw]:
-        """The drawing statements of lines, those of functions that they call included."""
-        for line in Source(tuple(lines)).walk():
-            if isinstance(line, Draw):
-                yield line
-            elif isinstance(line, Call):
-                yield from self._drawn(self.original.functions[line.name].body)
-
-
-def _apart(line: Loop) -> Iterator[Line]:
-    """The body of a loop as chains of loops around one line."""
-    for inner in line.body:
-        if isinstance(inner, Loop):
-            yield from (
-                replace(inner, body=(nested,), note="" if n else inner.note) for n, nested in enumerate(_apart(inner))
-            )
-        else:
-            yield inner
+        return Converted((Group("rotate", keywords, body, self.written(count)),))
 
 
 def with_joined_mirrors(lines: Iterable[Line]) -> tuple[Line, ...]:

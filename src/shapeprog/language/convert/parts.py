@@ -9,12 +9,11 @@ from typing import NamedTuple
 import numpy as np
 
 from shapeprog.errors import ShapeProgError
-from shapeprog.language.ast import Argument, Draw, Keywords, Line, Part, Source
+from shapeprog.language.ast import Argument, Draw, Keywords, Line, Part
 from shapeprog.language.builtin import ARM_HALF_WIDTH, CELL_CENTRE
 from shapeprog.language.convert.forms import Cost, Forms, Span, Triple, cost
-from shapeprog.language.expression import Linear, Value, value_at
+from shapeprog.language.expression import Linear, value_at
 from shapeprog.language.lowering import SMALLEST
-from shapeprog.language.parameters import to_float32
 from shapeprog.language.placement import AXES, SIZES
 from shapeprog.language.statement import language
 from shapeprog.space import DEPTH, SIDE, UP
@@ -36,26 +35,13 @@ class Converted(NamedTuple):
 
 
 class Parts(Forms):
-    """The conversion of drawing statements.
+    """The conversion of drawing statements; ``shift`` is the offset of all coordinates."""
 
-    Attributes
-    ----------
-    decisions
-        The decisions that depend on the values of numbers, in order; calls of a function that differ in them need
-        separate functions.
-    shift
-        The offset of all coordinates.
-    """
+    shift: Triple = (Linear(), Linear(), Linear())
 
-    def __init__(self, source: Source) -> None:
-        super().__init__(source)
-        self.decisions: list[object] = []
-        self.shift: Triple = (Linear(), Linear(), Linear())
-
-    def _draw(self, line: Draw, role: str) -> Converted:
+    def _draw(self, line: Draw) -> Converted:
         name, v = line.name, [self.form(value) for value in line.values]
-        line_role = line.role or ("" if name == role else language().own_role(name))
-        cell = Linear(self.per_cell)
+        role = line.role or language().own_role(name)
         keywords: Keywords = ()
         kind = "box"
         straight = (True, True, True)
@@ -64,10 +50,8 @@ class Parts(Forms):
                 spans = from_corner(v[:3], v[3:6])
                 if name == "cushion":
                     kind, keywords = "cushion", (("edge", self.written(v[6])),)
-                    if not line_role and role:
-                        self.decisions.append(role)
-                    line_role = line_role or role or "cushion"
-                    if self._is_negative(v[6]):
+                    role = role or "cushion"
+                    if self.number(v[6]) < 0:
                         kind, keywords = "box", ()
                 elif name != "box":
                     keywords = self._extra("tilt" if name == "board" else "lean", v[6])
@@ -81,20 +65,20 @@ class Parts(Forms):
             case "sideboard":
                 spans = from_corner([v[0], v[1] - v[4], v[2]], [v[3], v[4] * 2.0, v[5]])
             case "base_cross":
-                spans = self._arm(line, v, cell)
+                spans = self._arm(v)
             case _ if name in _ROUND:
-                return self._round(line, line_role, (-v[2], v[1]), Span(v[0], v[3]), v[4])
+                return self._round(role, (-v[2], v[1]), Span(v[0], v[3]), v[4])
             case "line" | "rod" | "taper" | "bent_rod" | "bar" | "beam":
-                shift = cell * (CELL_CENTRE if name == "line" else 0.0)
+                shift = CELL_CENTRE if name == "line" else 0.0
                 count = 3 if name == "bent_rod" else 2
                 points = [self._end([coordinate + shift for coordinate in v[3 * i : 3 * i + 3]]) for i in range(count)]
-                return self._between(line, line_role, points, v[3 * count :])
+                return self._between(line, role, points, v[3 * count :])
             case _:
                 raise ShapeProgError(f"{name} has no placed form", "keep this program as statements in cells")
         if any(self._draws_nothing(span.size) for span in spans):
             return Converted(())
         x, y, z = (Span(span.low + by, span.size) for span, by in zip(spans, self.shift, strict=True))
-        return self._box(kind, (x, y, z), keywords, line_role, line.note, straight)
+        return self._box(kind, (x, y, z), keywords, role, straight)
 
     def _box(
         self,
@@ -102,12 +86,11 @@ class Parts(Forms):
         spans: tuple[Span, Span, Span],
         keywords: Keywords,
         role: str,
-        note: str,
         straight: tuple[bool, bool, bool] = (True, True, True),
     ) -> Converted:
         placed = [pair for axis, span in enumerate(spans) for pair in self.interval(axis, span)]
         middles = tuple(span.middle if is_straight else None for span, is_straight in zip(spans, straight, strict=True))
-        return Converted((Part(kind, (*placed, *keywords), role, note),), spans, middles)  # type: ignore[arg-type]
+        return Converted((Part(kind, (*placed, *keywords), role),), spans, middles)  # type: ignore[arg-type]
 
     def _end(self, at: Sequence[Linear]) -> Triple:
         """A point along x, y, z from one along up, depth, side."""
@@ -118,24 +101,19 @@ class Parts(Forms):
         """Whether a length is negative, so that the part is not drawn; a length of zero has no placed form."""
         if not zero and 0 <= self.number(size) < SMALLEST:
             raise ShapeProgError("a part without thickness has no placed form", "make it a little thicker")
-        return self._is_negative(size)
+        return self.number(size) < 0
 
-    def _is_negative(self, size: Linear) -> bool:
-        self.decisions.append(self.number(size) < 0)
-        return bool(self.decisions[-1])
-
-    def _arm(self, line: Draw, v: list[Linear], cell: Linear) -> tuple[Span, Span, Span]:
+    def _arm(self, v: list[Linear]) -> tuple[Span, Span, Span]:
         """The box of an arm of a cross base."""
         turn = round(self.number(v[5])) % 4
-        self.decisions.append(turn)
-        half, low, long = cell * ARM_HALF_WIDTH, v[1:3], v[4]
+        low, long = v[1:3], v[4]
         along, ahead = (0, turn == 1) if turn % 2 else (1, turn == 2)
-        start = [coordinate - half for coordinate in low]
-        size = [half * 2.0, half * 2.0]
+        start = [coordinate - ARM_HALF_WIDTH for coordinate in low]
+        size = [Linear(2 * ARM_HALF_WIDTH)] * 2
         start[along], size[along] = low[along] if ahead else low[along] - long, long
         return from_corner([v[0], *start], [v[3], *size])
 
-    def _round(self, line: Draw, role: str, middle: tuple[Linear, Linear], vertical: Span, radius: Linear) -> Converted:
+    def _round(self, role: str, middle: tuple[Linear, Linear], vertical: Span, radius: Linear) -> Converted:
         """An upright cylinder."""
         if self._draws_nothing(radius) or self._draws_nothing(vertical.size):
             return Converted(())
@@ -143,7 +121,7 @@ class Parts(Forms):
         vertical = Span(vertical.low + self.shift[2], vertical.size)
         spans = (*(Span(coordinate - radius, radius * 2.0) for coordinate in middle), vertical)
         keywords = self._upright(middle, spans[:2], (("radius", self.written(radius)),), radius, sized=True)
-        part = Part("cylinder", (*keywords, *self.interval(2, vertical)), role, line.note)
+        part = Part("cylinder", (*keywords, *self.interval(2, vertical)), role)
         part = replace(part, keywords=ordered(part.keywords))
         middles = (*middle, vertical.middle)
         return Converted((part,), spans, middles)  # type: ignore[arg-type]
@@ -186,11 +164,10 @@ class Parts(Forms):
             kind, sizes = "rod", sizes[:1]
         radii = [self.written(radius) for radius in sizes]
         radius: Argument = radii[0] if len(radii) == 1 else (radii[0], radii[1])
-        part = Part(kind, (*words, ("radius", radius)), role, line.note)
+        part = Part(kind, (*words, ("radius", radius)), role)
         result = Converted((part,), first, middles)  # type: ignore[arg-type]
         if kind in ("rod", "taper") and straight[0] and straight[1]:
             rises = self.number(end[2] - start[2]) > 0
-            self.decisions.append(rises)
             if kind == "rod" or rises:
                 result = min(result, self._standing(part, points, sizes, rises), key=_cost_of)
         return result
@@ -201,8 +178,7 @@ class Parts(Forms):
         vertical = Span(low, high - low)
         largest = radii[0]
         if len(radii) == 2:
-            self.decisions.append(self.number(radii[1]) > self.number(radii[0]))
-            largest = radii[1] if self.decisions[-1] else radii[0]
+            largest = max(radii, key=self.number)
         spans = (Span(x - largest, largest * 2.0), Span(y - largest, largest * 2.0), vertical)
         keywords = self._upright((x, y), spans[:2], (part.keywords[-1],), largest, sized=len(radii) == 1)
         part = replace(part, keywords=ordered((*keywords, *self.interval(2, vertical))))
@@ -224,10 +200,9 @@ class Parts(Forms):
         if line.name == "beam":
             axis, turn = round(self.number(numbers[2])), numbers[3]
         else:
-            ends = np.array([[self._as_float32(value) for value in line.values[i : i + 3]] for i in (0, 3)], np.float32)
-            axis, turn = int(np.abs(ends[1] - ends[0]).argmax()), numbers[2]
+            ends = np.array([value_at(value, self.scope) for value in line.values[:6]], np.float32)
+            axis, turn = int(np.abs(ends[3:] - ends[:3]).argmax()), numbers[2]
         main = {UP: 2, DEPTH: 1, SIDE: 0}[axis]
-        self.decisions.append(main)
         across = [
             (2 - grid_axis, size) for grid_axis, size in zip([a for a in range(3) if a != axis], numbers, strict=False)
         ]
@@ -237,20 +212,15 @@ class Parts(Forms):
         turned = not self._zero(turn)
         middles = tuple(None if turned or not straight[a] else start[a] for a in range(3))
         first = tuple(Span(coordinate, Linear()) for coordinate in start)
-        bar = Converted((Part("bar", keywords, role, line.note),), first, middles)  # type: ignore[arg-type]
+        bar = Converted((Part("bar", keywords, role),), first, middles)  # type: ignore[arg-type]
         if turned or not all(straight[a] for a in range(3) if a != main):
             return bar
         forward = self.number(end[main] - start[main]) > 0
-        self.decisions.append(forward)
         low, high = (start, end) if forward else (end, start)
         spans = [Span(low[main], high[main] - low[main])] * 3
         for index, size in across:
             spans[index] = Span(start[index] - size / 2.0, size)
-        return min(bar, self._box("box", (spans[0], spans[1], spans[2]), (), role, line.note), key=_cost_of)
-
-    def _as_float32(self, value: Value) -> float:
-        """A coordinate in cells, as evaluation rounds it."""
-        return to_float32(value_at(value, self.scope) / self.per_cell)
+        return min(bar, self._box("box", (spans[0], spans[1], spans[2]), (), role), key=_cost_of)
 
 
 def _cost_of(converted: Converted) -> Cost:

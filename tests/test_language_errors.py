@@ -74,10 +74,10 @@ PINNED = [
     ),
     (
         "leg(at=(1, 2, 3), size=(1, 2, width))",
-        "t.shape, line 1, column 31: unknown name 'width'\n"
+        "t.shape, line 1, column 31: size of leg holds width, which is not a number\n"
         "  leg(at=(1, 2, 3), size=(1, 2, width))\n"
         "                                ^\n"
-        "  hint: declare it above: width = ...",
+        "  hint: write numbers such as 4 or -2.5: names and expressions are for parts placed by keywords",
     ),
     (
         "leg(at=(1, 2, 1e39), size=(1, 2, 3))",

@@ -28,7 +28,7 @@ from shapeprog.language.ast import (
     without_double_blanks,
 )
 from shapeprog.language.convert import placed_if_possible
-from shapeprog.language.dimensions import Counts
+from shapeprog.language.dimensions import counted_names
 from shapeprog.language.expression import Expression, Name
 from shapeprog.language.placement import LONGEST_SIDE, SIZES
 from shapeprog.language.program import Program
@@ -104,7 +104,7 @@ def script(program: Program, frame: Frame, reserved: Collection[str], inner: str
     kinds = {line.kind for line in source.walk() if isinstance(line, Part)}
     first = next((k for k, line in enumerate(lines) if not isinstance(line, Assignment | Comment)), len(lines))
     body = tuple(line for line in lines[first:] if not isinstance(line, Assignment))
-    counts = frozenset(words[name] for name in Counts(source).outside)
+    counts = frozenset(words[name] for name in counted_names(source) & source.numbers.keys())
     world = world_of(source, frame)
     return Script(source.unit.name, _numbers(lines, first), counts, body, world, _colours(roles | kinds))
 

@@ -7,7 +7,7 @@ in products, powers of length add up.  Lengths are rescaled when a program is wr
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from dataclasses import replace
 from typing import Literal, NamedTuple, TypeAlias
 
@@ -25,6 +25,7 @@ from shapeprog.language.ast import (
     Point,
     Scale,
     Source,
+    body_of,
     with_values,
 )
 from shapeprog.language.evaluate import evaluated
@@ -85,40 +86,30 @@ def _keywords(keywords: Keywords) -> Iterator[Use]:
             yield Use(value, "plain" if word in _PLAIN else "length")
 
 
-class Counts:
-    """Names and parameters that are written for a count, turn or axis of a loop, or passed on to one.
+def counted_names(source: Source) -> set[str]:
+    """Names that stand for a count, turn or axis of a loop, or are passed on to one; parameters of functions and names
+    in them are ``function.name``."""
+    result: set[str] = set()
+    known = -1
+    while known < len(result):
+        known = len(result)
+        for use, scope in _scoped_uses(source.lines, str):
+            if isinstance(use.value, Name) and is_count(use, result):
+                result.add(scope(use.value.name))
+    return result
 
-    Attributes
-    ----------
-    of
-        The parameters of each function, and names in it, by the name of the function.
-    outside
-        The names of the program itself.
-    """
 
-    def __init__(self, source: Source) -> None:
-        self.of: dict[str, set[str]] = {}
-        for function in source.functions.values():  # each calls those above it
-            self.of[function.name] = self._within(function.body)
-        self.outside = self._within(tuple(line for line in source.lines if not isinstance(line, Function)))
-        for function in source.functions.values():
-            self.outside |= self.of[function.name] - {name for name, _ in function.parameters}
+def is_count(use: Use, counted: Collection[str]) -> bool:
+    """Whether a number is a count, turn or axis of a loop, or stands for one by its name."""
+    return use.kind == "count" or use.name in counted
 
-    def has(self, use: Use) -> bool:
-        """Whether a number is a count."""
-        function, _, name = use.name.rpartition(".")
-        return use.kind == "count" or (use.kind == "named" and name in self.of.get(function, self.outside))
 
-    def _within(self, lines: tuple[Line, ...]) -> set[str]:
-        counted = (use for line in Source(lines).walk() for use in uses(line) if use.kind == "count" or "." in use.name)
-        return {
-            use.value.name
-            for use in counted
-            if isinstance(use.value, Name) and (use.kind == "count" or use.name.rpartition(".")[2] in self._of(use))
-        }
-
-    def _of(self, use: Use) -> set[str]:
-        return self.of.get(use.name.rpartition(".")[0], set())
+def _scoped_uses(lines: Iterable[Line], scope: Scope) -> Iterator[tuple[Use, Scope]]:
+    """The uses of all numbers, in loops and functions too, and the scope of the names in them."""
+    for line in lines:
+        for use in uses(line):
+            yield use if "." in use.name else use._replace(name=scope(use.name)), scope
+        yield from _scoped_uses(body_of(line), _inside(line, scope))
 
 
 def in_unit(program: Program, unit: Unit | None, *, digits: int | None = None) -> Program:

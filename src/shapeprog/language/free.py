@@ -12,7 +12,7 @@ from dataclasses import replace
 from itertools import count
 
 from shapeprog.language.ast import Function, Line, Source, changed_lines, with_values
-from shapeprog.language.dimensions import Counts, uses
+from shapeprog.language.dimensions import counted_names, is_count, uses
 from shapeprog.language.evaluate import evaluated
 from shapeprog.language.expression import Binary, Expression, Negative, Value
 from shapeprog.language.parameters import to_float32
@@ -44,7 +44,7 @@ def free_values(program: Program, functions: bool = True) -> list[float]:
     Defaults of parameters are not free.
     """
     source, result = source_of(program), list[float]()
-    counts = Counts(source)
+    counted = counted_names(source)
 
     def noted(number: float) -> float:
         result.append(number)
@@ -52,7 +52,7 @@ def free_values(program: Program, functions: bool = True) -> list[float]:
 
     for line in Source(tuple(line for line in source.lines if functions or not isinstance(line, Function))).walk():
         for use in () if isinstance(line, Function) else uses(line):
-            if not counts.has(use):
+            if not is_count(use, counted):
                 _mapped(use.value, noted)
     return result
 
@@ -63,7 +63,7 @@ def multiplied(program: Program, place: int, factor: float) -> Program:
     A ``ShapeProgError`` if that is no program, as when an expression then divides by zero.
     """
     source, counter = source_of(program), count()
-    counts = Counts(source)
+    counted = counted_names(source)
 
     def change(number: float) -> float:
         return to_float32(number * factor) if next(counter) == place else number
@@ -71,7 +71,9 @@ def multiplied(program: Program, place: int, factor: float) -> Program:
     def changed(line: Line) -> Line:
         if isinstance(line, Function):
             return line
-        return with_values(line, [use.value if counts.has(use) else _mapped(use.value, change) for use in uses(line)])
+        return with_values(
+            line, [use.value if is_count(use, counted) else _mapped(use.value, change) for use in uses(line)]
+        )
 
     return evaluated(replace(source, lines=changed_lines(source.lines, changed)))
 

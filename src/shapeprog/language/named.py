@@ -1,20 +1,26 @@
-"""The named numbers of a program: their values, the lines that use them, and programs with other values."""
+"""The named numbers of a program: their values, programs with other values, and how far each can be changed."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cache, partial
+from functools import cache
 
 from shapeprog.errors import ShapeProgError, did_you_mean
+from shapeprog.geometry.contacts import contact_groups
 from shapeprog.language.ast import Assignment, Fault, Line, Source
-from shapeprog.language.dimensions import Counts
+from shapeprog.language.dimensions import counted_names
 from shapeprog.language.evaluate import evaluated
 from shapeprog.language.expression import names_in, text_of
 from shapeprog.language.parameters import LARGEST, to_float32
 from shapeprog.language.printer import printed
 from shapeprog.language.program import Program
-from shapeprog.language.ranges import Number, ranges
+from shapeprog.language.unroll import on_numpy_if_shipped, unroll
+
+FARTHEST = 3.0  # multiple of a number up to which it is tried
+LEAST = 1.0  # magnitude assumed for smaller numbers, in cells
+STEPS, HALVINGS = 4, 4  # values tried on either side of a number, and bisections between the last good and first bad
+MOST = 256  # most primitives of a program whose contacts are examined
 
 
 @dataclass(frozen=True)
@@ -62,16 +68,15 @@ def names(program: Program) -> list[Named]:
     if program.source is None:
         return []
     numbers = program.source.evaluated_numbers()
-    counted = Counts(program.source).outside
+    counted = counted_names(program.source)
     result: list[Named] = []
 
     @cache
-    def found() -> dict[str, tuple[float, float]]:
-        free = [Number(named.name, named.value, named.whole) for named in result if named.free]
-        return ranges(program, free, partial(_edited, program))
+    def ranges() -> dict[str, tuple[float, float]]:
+        return _ranges(program, [named for named in result if named.free])
 
     for name, value in program.source.numbers.items():
-        result.append(Named(name, numbers[name], text_of(value), not names_in(value), name in counted, found))
+        result.append(Named(name, numbers[name], text_of(value), not names_in(value), name in counted, ranges))
     return result
 
 
@@ -104,15 +109,84 @@ def set(program: Program, changes: Mapping[str, float] | None = None, /, **numbe
         raise ShapeProgError(f"{fault.message}, in {text}", fault.hint) from None
 
 
-def _edited(program: Program, name: str, value: float) -> Program | None:
-    try:
-        return set(program, {name: value})
-    except ShapeProgError:
-        return None
-
-
 def _set(line: Line, replacements: Mapping[str, float]) -> Line:
     if not isinstance(line, Assignment):
         return line
     pairs = ((name, to_float32(replacements[name]) if name in replacements else value) for name, value in line.numbers)
     return replace(line, numbers=tuple(pairs))
+
+
+# ---- ranges ---------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class _Search:
+    """A number that is changed in one direction: the last good value, and the next that is bad or the last to try."""
+
+    number: Named
+    good: float
+    bad: float
+
+    def between(self, share: float) -> float:
+        """A value between both."""
+        value = self.good + (self.bad - self.good) * share
+        return float(round(value)) if self.number.whole else value
+
+
+def _ranges(program: Program, numbers: Sequence[Named]) -> dict[str, tuple[float, float]]:
+    """The values of numbers within which no size is negative, no part vanishes and the parts hang together.
+
+    Each number is changed alone, from nothing to three times its value.  The ends are values that were tried, within a
+    few percent of the last good one.  A program whose parts form several groups that touch may keep as many.
+    """
+    least = LEAST * (1.0 if program.unit is None else program.unit.per_cell)
+    searches = []
+    for number in numbers:
+        size = max(abs(number.value), 1.0 if number.whole else least)
+        low = min(1.0, number.value) if number.whole else number.value - size
+        ends = low, number.value + (FARTHEST - 1) * size
+        searches += [_Search(number, number.value, end) for end in ends]
+    with on_numpy_if_shipped(program):
+        check = _Check(program)
+        values = [[search.between(step / STEPS) for step in range(STEPS + 1)] for search in searches]
+        tried = [(search.number, at) for search, row in zip(searches, values, strict=True) for at in row[1:]]
+        good = iter(check(tried))
+        for place, row in enumerate(values):
+            results = [next(good) for _ in row[1:]]
+            reached = results.index(False) if False in results else STEPS
+            searches[place] = replace(searches[place], good=row[reached], bad=row[min(reached + 1, STEPS)])
+        for _ in range(HALVINGS):
+            pending = [place for place, search in enumerate(searches) if search.good != search.bad]
+            tried = [(searches[place].number, searches[place].between(0.5)) for place in pending]
+            for place, (_, at), fits in zip(pending, tried, check(tried), strict=True):
+                search = searches[place]
+                searches[place] = replace(search, good=at) if fits else replace(search, bad=at)
+    return {low.number.name: (low.good, high.good) for low, high in zip(searches[::2], searches[1::2], strict=True)}
+
+
+class _Check:
+    """Whether a program holds together with other values of its numbers."""
+
+    def __init__(self, program: Program) -> None:
+        self.program, self.most = program, max(MOST, program.size)
+        scene = unroll([program])
+        self.parts = int(scene.mask.sum())
+        self.groups = contact_groups(scene)[0] if program.size <= MOST else None
+
+    def __call__(self, changes: Sequence[tuple[Named, float]]) -> list[bool]:
+        drawn: dict[int, Program] = {}
+        for place, (number, value) in enumerate(changes):
+            try:
+                edited = set(self.program, {number.name: value})
+            except ShapeProgError:
+                continue
+            if edited.size <= self.most:
+                drawn[place] = edited
+        results = [False] * len(changes)
+        if drawn:
+            scenes = unroll(list(drawn.values()))
+            groups = [None] * len(drawn) if self.groups is None else contact_groups(scenes)
+            for place, parts, count in zip(drawn, scenes.mask.sum(-1).tolist(), groups, strict=True):
+                whole = parts >= self.parts or changes[place][0].whole
+                results[place] = whole and (count is None or self.groups is None or count <= self.groups)
+        return results

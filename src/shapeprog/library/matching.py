@@ -19,7 +19,7 @@ import numpy.typing as npt
 
 from shapeprog.errors import ShapeProgError
 from shapeprog.language.ast import Assignment, Call, Function, Source
-from shapeprog.language.dimensions import Counts
+from shapeprog.language.dimensions import counted_names
 from shapeprog.language.evaluate import expanded, symbolic
 from shapeprog.language.expression import Linear, Name, Value, combined, value_at
 from shapeprog.language.placement import SIZES
@@ -77,8 +77,8 @@ class Pattern:
     @cached_property
     def counts(self) -> tuple[str, ...]:
         """Parameters that say how often something is repeated."""
-        whole = Counts(Source((*self.others, self.function))).of[self.function.name]
-        return tuple(name for name in self.parameters if name in whole)
+        counted = counted_names(Source((*self.others, self.function)))
+        return tuple(name for name in self.parameters if f"{self.function.name}.{name}" in counted)
 
     @property
     def measures(self) -> tuple[str, ...]:

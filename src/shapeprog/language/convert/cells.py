@@ -23,7 +23,7 @@ from shapeprog.language.ast import (
     with_values,
 )
 from shapeprog.language.convert.forms import Forms
-from shapeprog.language.dimensions import Counts, in_unit
+from shapeprog.language.dimensions import counted_names, in_unit
 from shapeprog.language.evaluate import evaluated, expanded, symbolic
 from shapeprog.language.expression import Expression, Linear, Name, combined
 from shapeprog.language.placement import BOX_IN_CELLS, SIZES
@@ -76,7 +76,7 @@ def function_in_cells(source: Source, name: str, example: Mapping[str, Any]) -> 
         If its shape is not linear in its box and its lengths.
     """
     function = source.functions[name]
-    counts = Counts(source).of[name]
+    counted = counted_names(source)
     words = [word for word, _ in function.parameters]
     box = {f"box {word}": Name(word) for word in BOX_IN_CELLS}
     up, depth, side, *sizes = (Name(word) for word in box)
@@ -84,7 +84,7 @@ def function_in_cells(source: Source, name: str, example: Mapping[str, Any]) -> 
     keywords = (
         placement | dict(zip(BOX_IN_CELLS[3:], sizes, strict=True)) | {word: Name(f"own {word}") for word in words}
     )
-    usual = dict.fromkeys(BOX_IN_CELLS, 12.0) | {word: 3.0 if word in counts else 1.0 for word in words}
+    usual = dict.fromkeys(BOX_IN_CELLS, 12.0) | {word: 3.0 if f"{name}.{word}" in counted else 1.0 for word in words}
     usual |= {word: value for word, value in function.parameters if isinstance(value, float)} | dict(example)
     numbers = [(f"box {word}", usual[word]) for word in BOX_IN_CELLS] + [(f"own {word}", usual[word]) for word in words]
     header = Assignment((*((size, 1.0) for size in SIZES), *numbers))

@@ -89,13 +89,14 @@ def _keywords(keywords: Keywords) -> Iterator[Use]:
 def counted_names(source: Source) -> set[str]:
     """Names that stand for a count, turn or axis of a loop, or are passed on to one; parameters of functions and names
     in them are ``function.name``."""
+    names = [
+        (use, scope(use.value.name)) for use, scope in _scoped_uses(source.lines, str) if isinstance(use.value, Name)
+    ]
     result: set[str] = set()
     known = -1
     while known < len(result):
         known = len(result)
-        for use, scope in _scoped_uses(source.lines, str):
-            if isinstance(use.value, Name) and is_count(use, result):
-                result.add(scope(use.value.name))
+        result |= {name for use, name in names if is_count(use, result)}
     return result
 
 

@@ -8,7 +8,7 @@ import torch
 import shapeprog as sp
 from shapeprog.data.random import random_program
 from shapeprog.data.synthetic.furniture import furniture
-from shapeprog.language.convert import in_cells, placed
+from shapeprog.language.convert import in_cells, named_cells, placed, placed_again
 from shapeprog.language.free import numbers
 from shapeprog.language.printer import format_program, source_of
 from shapeprog.language.program import Program
@@ -161,8 +161,7 @@ def converted(program: Program) -> Program:
 
 def test_names_of_a_placed_program_stay_in_cells_and_when_it_is_placed_again() -> None:
     given = sp.parse(CHAIR)
-    cells = in_cells(given)
-    again = placed(cells)
+    again = placed_again(named_cells(given))
     assert format_program(again).startswith(CHAIR[: CHAIR.index("def")])
     assert numbers(again) == numbers(given)
     for name, value in {"width": 14, "depth": 9, "leg_height": 10, "thick": 1}.items():

@@ -228,7 +228,7 @@ def test_the_library_that_ships_holds_at_most_twelve_functions_each_with_a_call_
     assert max(len(function.parameters) for function in shipped.source.functions.values()) <= PARAMETERS
     for pattern in shipped.patterns:
         assert pattern.example is not None
-        program = evaluated(Source((pattern.function, pattern.example)))
+        program = Program(pattern.drawn(pattern.arguments))
         assert unroll(program).mask.all()
         (call,) = calls(with_library(inline(program), shipped)) or [None]
         assert call is not None, pattern.function.name

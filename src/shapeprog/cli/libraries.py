@@ -92,17 +92,15 @@ def _draw(library: Library, sheet: Path | None) -> None:
 
 def _items(library: Library) -> Iterator[Item]:
     """Each function as its typical call draws it."""
-    from shapeprog.language.ast import Call, Source
-    from shapeprog.language.evaluate import evaluated
+    from shapeprog.language.program import Program
     from shapeprog.view import Item
 
     for pattern in library.patterns:
-        function = pattern.function
-        spare = Call(function.name, tuple((name, pattern.arguments[name]) for name, _ in function.parameters))
+        name = pattern.function.name
         try:
-            program = evaluated(Source((*pattern.others, function, pattern.example or spare)))
+            program = Program(pattern.drawn(pattern.arguments))
         except ShapeProgError as fault:
-            message = f"{function.name} cannot be drawn: {fault.message}"
+            message = f"{name} cannot be drawn: {fault.message}"
             raise InputError(message, "show a typical call in a comment above it") from None
-        used = next((line for line in library.comments[function.name] if line.startswith("used ")), "")
-        yield Item(function.name, None, program, used.removesuffix(", such as"))
+        used = next((line for line in library.comments[name] if line.startswith("used ")), "")
+        yield Item(name, None, program, used.removesuffix(", such as"))

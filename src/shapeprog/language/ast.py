@@ -172,12 +172,6 @@ class Source:
         return self.scale is not None
 
     @property
-    def plain(self) -> bool:
-        """Whether plain numbers in statements and loops in cells are all there is, beside comments."""
-        cells = all(isinstance(line, Comment | Draw | Loop) for line in self.walk())
-        return cells and not any(isinstance(value, Expression) for line in self.walk() for value in values(line))
-
-    @property
     def functions(self) -> dict[str, Function]:
         """The functions by name."""
         return {line.name: line for line in self.lines if isinstance(line, Function)}
@@ -273,11 +267,15 @@ def used_names(lines: Iterable[Line]) -> set[str]:
     return {name for line in lines for value in values(line) for name in names_in(value)}
 
 
-def assignments(lines: Iterable[Line], names: Collection[str]) -> Iterator[Assignment]:
-    """The assignments among lines, with some of their names alone."""
-    for line in lines:
-        if isinstance(line, Assignment) and (pairs := tuple(pair for pair in line.numbers if pair[0] in names)):
-            yield replace(line, numbers=pairs)
+def assignments(lines: Iterable[Line], names: Collection[str]) -> tuple[Assignment, ...]:
+    """The assignments among lines, of some names and those that they depend on."""
+    result: list[Assignment] = []
+    needed = {*names}
+    for line in reversed([line for line in lines if isinstance(line, Assignment)]):
+        if pairs := tuple(pair for pair in line.numbers if pair[0] in needed):
+            needed.update(name for _, value in pairs for name in names_in(value))
+            result.append(replace(line, numbers=pairs))
+    return tuple(result[::-1])
 
 
 def names_of(source: Source) -> set[str]:

@@ -28,9 +28,8 @@ from shapeprog.language.ast import (
     Source,
     without_double_blanks,
 )
-from shapeprog.language.expression import Expression, value_at
-from shapeprog.language.lowering import Context, Drawn, Lowering, Placed, Scope, sizes_of
-from shapeprog.language.parameters import to_float32
+from shapeprog.language.expression import value_at
+from shapeprog.language.lowering import Context, Drawn, Lowering, Placed, Scope, sizes_of, too_deep
 from shapeprog.language.placement import LONGEST_SIDE, MOST_SOLIDS, SIZES
 from shapeprog.language.program import DEEPEST, Node, Program
 from shapeprog.language.statement import language
@@ -41,14 +40,14 @@ MOST_STATEMENTS = 1 << 16
 
 
 def evaluated(source: Source) -> Program:
-    """The program of a syntax tree; statements in cells without names and functions have no source.
+    """The program of a syntax tree; one of statements in cells has no source.
 
     Raises
     ------
     Fault
         If a name, function, argument or number in it is wrong.
     """
-    if source.plain:
+    if not source.placed:
         return Program(expanded(source))
     source = replace(source, lines=without_double_blanks(source.lines))
     return Program(expanded(source), source)
@@ -117,7 +116,7 @@ class _Evaluator(Lowering):
 
     def __init__(self, source: Source, values: Mapping[str, Any] | None) -> None:
         exact = values is None
-        super().__init__(source, exact, iter(() if exact or not source.placed else _decisions(source)))
+        super().__init__(source, exact, iter(() if exact else _decisions(source)))
         self.given = values
         self.functions = source.functions
         self.outermost: Scope = {}
@@ -133,6 +132,7 @@ class _Evaluator(Lowering):
     def lines(self, lines: Sequence[Line], context: Context) -> Drawn:
         """Evaluate the lines of a program, function, loop or group; names are added to the scope of the context."""
         nodes: list[Any] = []
+        new: list[Any]
         scope, calls = context.scope, context.calls
         first = None
         self.bodies += 1
@@ -145,16 +145,19 @@ class _Evaluator(Lowering):
                     continue
                 case Assignment():
                     scope |= self._named(line, scope, calls)
-                    if self.source.placed and context.box is None and not calls and set(SIZES) <= scope.keys():
+                    if context.box is None and not calls and set(SIZES) <= scope.keys():
                         context = context._replace(box=self.whole(scope))
                     continue
                 case Draw():
-                    self._count(line, calls)
+                    _check(line)
                     self.drawn += 1
-                    role = _role(line, context.role)
-                    new = [Draw(line.name, self._values(line, scope), "" if role == line.name else role)]
+                    new = [replace(line, role="" if line.role == line.name else line.role)]
                 case Loop():
-                    new = self._cells_loop(line, context)
+                    _check(line)
+                    if context.loops >= DEEPEST:
+                        raise too_deep(line)
+                    body = self.lines(line.body, context._replace(loops=context.loops + 1)).nodes
+                    new = [replace(line, body=tuple(body))]
                 case Call():
                     new, element = self._call(line, context)
                     first = first or element
@@ -169,14 +172,6 @@ class _Evaluator(Lowering):
             nodes += new
         return Drawn(nodes, first)
 
-    def _cells_loop(self, line: Loop, context: Context) -> list[Any]:
-        self._count(line, context.calls)
-        if context.loops >= DEEPEST:
-            raise Fault(line, f"loops are nested more than {DEEPEST} deep", "put some of them side by side")
-        body = tuple(self.lines(line.body, context._replace(loops=context.loops + 1)).nodes)
-        loop = Loop(line.name, self._values(line, context.scope), body)
-        return list(body) if context.calls and _is_single(loop) else [loop]
-
     def _call(self, line: Call, context: Context) -> Drawn:
         self._count(line, context.calls + 1)
         if context.calls >= DEEPEST:
@@ -184,15 +179,11 @@ class _Evaluator(Lowering):
         if line.name not in self.functions:
             raise Fault(line, f"undefined function {line.name!r}", did_you_mean(line.name, self.functions))
         function, scope = self.functions[line.name], self._arguments(line, context.scope)
-        start, element = self.drawn, None
-        if context.box is not None:
-            call = Placed.of(line, context)
-            element = self.box(call)
-            scope |= sizes_of(element)
+        call, start = Placed.of(line, context), self.drawn
+        element = self.box(call)
+        scope |= sizes_of(element)
         inner = Context(scope, element, context.loops, context.calls + 1, line.role or context.role)
-        nodes = self.lines(function.body, inner).nodes
-        if element is not None:
-            nodes = self.tilted(call, nodes, element)
+        nodes = self.tilted(call, self.lines(function.body, inner).nodes, element)
         self.blocks[id(function)] += range(start, self.drawn)
         return Drawn(nodes, element)
 
@@ -208,7 +199,7 @@ class _Evaluator(Lowering):
         values = {name: self.at(line, name, value, scope) for name, value in line.numbers}
         if not calls:
             values |= {name: number for name, number in (self.given or {}).items() if name in values}
-            for name in SIZES if self.source.placed and self.exact else ():
+            for name in SIZES if self.exact else ():
                 if name in values and not values[name] > 0:
                     message = f"the {name} of the whole is {values[name]:g}"
                     raise Fault(line, message, "a size must be positive")
@@ -227,27 +218,6 @@ class _Evaluator(Lowering):
                 given[name] = self.at(function, name, default, self.outermost)
         return self.outermost | given
 
-    # ---- statements in cells ----------------------------------------------------------------------------------------
-
-    def _values(self, line: Draw | Loop, scope: Scope) -> tuple[Any, ...]:
-        try:
-            declared = language().declaration(line.name, len(line.values))
-        except ShapeProgError as error:
-            raise Fault(line, error.message, error.hint) from None
-        if not any(isinstance(value, Expression) for value in line.values):
-            return line.values
-        numbers = [self.at(line, slot, value, scope) for slot, value in enumerate(line.values)]
-        for parameter in declared.parameters if self.exact else ():
-            slots = parameter.slots
-            written = [isinstance(value, Expression) for value in line.values[slots]]
-            if any(written):
-                try:
-                    numbers[slots] = parameter.checked(line.name, [to_float32(number) for number in numbers[slots]])
-                except ShapeProgError as error:
-                    key = slots.start + written.index(True)
-                    raise Fault(line, error.message, error.hint, key) from None
-        return tuple(numbers)
-
 
 def _decisions(source: Source) -> list[int]:
     """The counts of loops, and which radius of each upright taper is the larger, in the order of evaluation."""
@@ -256,11 +226,9 @@ def _decisions(source: Source) -> list[int]:
     return evaluator.decisions
 
 
-def _is_single(loop: Loop) -> bool:
-    """Whether a loop draws its body once, where it stands: a function may be called for a row of one."""
-    return loop.name == "translate" and isinstance(loop.values[0], float) and loop.values[0] == 1
-
-
-def _role(line: Draw, around: str) -> str:
-    """The role of a part in cells: its own, that of its statement, which is not written, or the one around the call."""
-    return line.role or ("" if line.name == around or language().own_role(line.name) else around)
+def _check(line: Draw | Loop) -> None:
+    """Refuse a statement or loop in cells that is not declared, or with other numbers."""
+    try:
+        language().declaration(line.name, len(line.values))
+    except ShapeProgError as error:
+        raise Fault(line, error.message, error.hint) from None

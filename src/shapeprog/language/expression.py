@@ -212,6 +212,10 @@ class Linear:
         """The name itself."""
         return Linear(0.0, ((name, 1.0),))
 
+    def at(self, numbers: Mapping[str, float]) -> float:
+        """Its value for these named numbers."""
+        return self.constant + sum(factor * numbers[name] for name, factor in self.factors)
+
     def __add__(self, other: Linear | float) -> Linear:
         if not isinstance(other, Linear):
             return replace(self, constant=self.constant + other)

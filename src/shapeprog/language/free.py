@@ -23,7 +23,7 @@ from shapeprog.language.program import Program
 def numbers(program: Program) -> int:
     """How many continuous numbers make a program: all that are written, or those that are free where others follow from
     names; counts and steps of loops are none."""
-    if program.source is not None and not program.source.plain:
+    if program.source is not None:
         return free_numbers(program)
     return sum(numbers_written(node) for node in program.walk())
 

@@ -100,7 +100,7 @@ class Lowering(ABC):
             number = value_at(value, scope)
         except ExpressionError as error:
             raise Fault(line, error.message, error.hint, key, error.expression) from None
-        if self.exact and self.source.placed and not abs(number) < TOO_LARGE:
+        if self.exact and not abs(number) < TOO_LARGE:
             expression = value if isinstance(value, Expression) else None
             raise Fault(line, f"{text_of(value)} is too large", "numbers end at 1e12", key, expression)
         return number
@@ -176,7 +176,7 @@ class Lowering(ABC):
         group = Placed.of(line, context)
         inner = context._replace(loops=context.loops + 1)
         if context.loops >= DEEPEST:
-            raise Fault(line, f"loops are nested more than {DEEPEST} deep", "put some of them side by side")
+            raise too_deep(line)
         if line.kind == "inside":
             outer = self.box(group)
             nodes = self.lines(line.body, inner._replace(scope=group.scope | sizes_of(outer), box=outer)).nodes
@@ -204,7 +204,7 @@ class Lowering(ABC):
             steps: Vector = tuple(self._number(group, word, 0.0) for word in ("x", "y", "z"))
         else:
             steps = self._row_step(group, count, first)
-        return Drawn([self._translate(line, count, steps, nodes)], first)
+        return Drawn(self._translate(line, count, steps, nodes, context), first)
 
     def _divide(self, line: Group, group: Placed, count: int, context: Context) -> Drawn:
         """The body in ``count`` equal boxes along an axis: the first box, repeated."""
@@ -219,7 +219,7 @@ class Lowering(ABC):
         inner = tuple((low, low + size) if index == axis else span for index, span in enumerate(outer))
         nodes = self.lines(line.body, context._replace(scope=group.scope | sizes_of(inner), box=inner)).nodes
         step = tuple(size + gap if index == axis else 0.0 for index in range(3))
-        return Drawn(self.tilted(group, [self._translate(line, count, step, nodes)], outer), outer)
+        return Drawn(self.tilted(group, self._translate(line, count, step, nodes, context), outer), outer)
 
     def _row_step(self, row: Placed, count: int, first: Box | None) -> Vector:
         """From one copy of a row to the next: the last copy of its first element is where ``last`` says."""
@@ -237,9 +237,12 @@ class Lowering(ABC):
                     step[axis] = (target[axis] - reference) / _at_least_one(count - 1)
         return tuple(step)
 
-    def _translate(self, line: Group, count: int, step: Vector, nodes: Sequence[Any]) -> Loop:
+    def _translate(self, line: Group, count: int, step: Vector, nodes: list[Any], context: Context) -> list[Any]:
+        """Copies; in a function, which may be called for a row of one, a single copy is the body itself."""
+        if context.calls and not isinstance(count, Expression) and count == 1:
+            return nodes
         by = [self._length(value) for value in (step[2], step[1], -step[0])]
-        return Loop("translate", self._numbers(line, [count, *by]), tuple(nodes))
+        return [Loop("translate", self._numbers(line, [count, *by]), tuple(nodes))]
 
     def tilted(self, part: Placed, nodes: list[Any], box: Box) -> list[Any]:
         """Statements leaned back about the bottom front edge of a box, if there is a ``tilt``."""
@@ -375,6 +378,11 @@ class Lowering(ABC):
             return tuple(to_float32(value) + 0.0 for value in values)
         except ShapeProgError as error:
             raise Fault(line, error.message, error.hint) from None
+
+
+def too_deep(line: Line) -> Fault:
+    """The mistake of a loop inside of too many others."""
+    return Fault(line, f"loops are nested more than {DEEPEST} deep", "put some of them side by side")
 
 
 def sizes_of(box: Box) -> Scope:

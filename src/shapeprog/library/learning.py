@@ -52,7 +52,7 @@ def learn(given: Sequence[Program], most: int = MOST) -> Library:
 
     Comments tell how often each is used by the programs, and a typical call.
     """
-    found = list(_functions([in_cells(program, named=False) for program in given], most))
+    found = list(_functions([in_cells(program) for program in given], most))
     if not found:
         return Library(Source())
     given = [placed_if_possible(program) for program in given]

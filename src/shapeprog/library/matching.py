@@ -18,12 +18,13 @@ import numpy as np
 import numpy.typing as npt
 
 from shapeprog.errors import ShapeProgError
-from shapeprog.language.ast import Assignment, Call, Function, Source
+from shapeprog.language.ast import Call, Function, Source
+from shapeprog.language.convert import call_in_cells
 from shapeprog.language.dimensions import counted_names
-from shapeprog.language.evaluate import expanded, symbolic
 from shapeprog.language.expression import Linear, Name, Value, combined, value_at
-from shapeprog.language.placement import SIZES
-from shapeprog.language.program import Program
+from shapeprog.language.parameters import to_float32
+from shapeprog.language.placement import BOX_IN_CELLS, SIZES
+from shapeprog.language.program import Loop, Node, Program
 from shapeprog.library.blocks import Block, Kind, blocks_of
 from shapeprog.library.independence import independent
 from shapeprog.library.length import terms, written
@@ -31,6 +32,9 @@ from shapeprog.space import FloatArray
 
 TOLERANCE = 0.05
 """How far in cells a number may be from what a function makes of its arguments."""
+
+BOX = 12.0
+"""Sides of the box of a parameter without an example, where that decides what lies above or beside what."""
 
 GENERIC = 7.0
 """What a parameter without an example is tried with."""
@@ -59,25 +63,32 @@ class Pattern:
 
     Parameters
     ----------
-    function, others
-        The function, and those above it in its library, which it may call.
+    source
+        The library, whose functions it may call.
+    function
+        The function.
     example
         A typical call, if one is known.
     """
 
+    source: Source
     function: Function
-    others: tuple[Function, ...] = ()
     example: Call | None = None
+
+    @property
+    def defaults(self) -> dict[str, Value | None]:
+        """The defaults of its parameters, of which those of its box come first; ``None`` for those without one."""
+        return dict.fromkeys(BOX_IN_CELLS) | dict(self.function.parameters)
 
     @property
     def parameters(self) -> tuple[str, ...]:
         """Names of its parameters."""
-        return tuple(name for name, _ in self.function.parameters)
+        return tuple(self.defaults)
 
     @cached_property
     def counts(self) -> tuple[str, ...]:
         """Parameters that say how often something is repeated."""
-        counted = counted_names(Source((*self.others, self.function)))
+        counted = counted_names(self.source)
         return tuple(name for name in self.parameters if f"{self.function.name}.{name}" in counted)
 
     @property
@@ -96,8 +107,8 @@ class Pattern:
         What draws one block repeats it as some block is.
         """
         known = {tuple(sorted(counts)): Counter(counts) for counts in seen}
-        defaults, every = dict(self.function.parameters), sorted({float(n) for counts in known for n in counts})
-        options = [sorted({1.0, *every}) if defaults[name] == 1 else every for name in self.counts]
+        every = sorted({float(n) for counts in known for n in counts})
+        options = [sorted({1.0, *every}) if self.defaults[name] == 1 else every for name in self.counts]
         for counts in itertools.product(*options):
             several = Counter(count for count in counts if count > 1)
             if self.blocks > 1 or any(several <= one for one in known.values()):
@@ -137,18 +148,48 @@ class Pattern:
         return {}
 
     def _assumed(self, any_: Callable[[int], float]) -> dict[str, float]:
-        shown = self.function.parameters + (self.example.arguments if self.example else ())
-        known = {name: value for name, value in shown if isinstance(value, float)}
+        known = self._shown
         return {name: 3.0 if name in self.counts else any_(n) for n, name in enumerate(self.parameters)} | known
+
+    @property
+    def _shown(self) -> dict[str, float]:
+        """The parameters that have a default, or are in the example."""
+        shown = (*self.defaults.items(), *(self.example.arguments if self.example else ()))
+        return {name: value for name, value in shown if isinstance(value, float)}
+
+    @cached_property
+    def _drawn(self) -> dict[tuple[float, ...], tuple[Node, ...]]:
+        return {}
+
+    def nodes(self, numbers: Mapping[str, float]) -> tuple[Node, ...]:
+        """What it draws for the counts among these numbers, with linear forms of its measures.
+
+        A ``ShapeProgError`` if it is not linear in them.
+        """
+        counts = {name: numbers[name] for name in self.counts}
+        key = tuple(counts.values())
+        if key not in self._drawn:
+            usual = {name: BOX if name in BOX_IN_CELLS else 1.0 for name in self.parameters} | self._shown | counts
+            self._drawn[key] = call_in_cells(self.source, self.function.name, usual)
+        return self._drawn[key]
+
+    def drawn(self, numbers: Mapping[str, float]) -> tuple[Node, ...]:
+        """What it draws with these numbers; a ``ShapeProgError`` as for :meth:`nodes`."""
+        return tuple(_at(node, numbers) for node in self.nodes(numbers))
 
     def forms_at(self, numbers: Mapping[str, float]) -> tuple[Form, ...]:
         """What it draws about these numbers, one for each parameter; nothing if that is not linear in its measures."""
-        source = Source((*self.others, Assignment(tuple(numbers.items())), *self.function.body))
-        given = {name: Linear.of(name) if name in self.measures else numbers[name] for name in numbers}
         try:
-            return tuple(form for (form,) in forms(source, given, self.measures))
+            return tuple(form for (form,) in forms(self.nodes(numbers), numbers, self.measures))
         except (ShapeProgError, ZeroDivisionError):
             return ()
+
+
+def _at(node: Node, numbers: Mapping[str, float]) -> Node:
+    """A statement or loop with the values of its linear forms."""
+    values = (to_float32(_linear(value).at(numbers)) for value in node.values)
+    node = replace(node, values=tuple(values))
+    return replace(node, body=tuple(_at(inner, numbers) for inner in node.body)) if isinstance(node, Loop) else node
 
 
 def _key(found: Sequence[Form]) -> tuple[tuple[Kind, bytes, bytes], ...]:
@@ -165,20 +206,22 @@ class Match(NamedTuple):
 
 
 def forms(
-    source: Source, given: Mapping[str, Any], names: Sequence[str], ways: Sequence[Sequence[int]] = ((),)
+    nodes: Iterable[Node], numbers: Mapping[str, float], names: Sequence[str], ways: Sequence[Sequence[int]] = ((),)
 ) -> Iterator[tuple[Form, ...]]:
-    """The blocks of the text of a program, linear in ``names``; ``given`` has the values of its names.
+    """The blocks of statements and loops, linear in ``names``, as they are with these numbers.
 
     Each block has several forms: with mirror images as rows of two along these axes, where both draw the same.
     """
-    chains = Program(expanded(source)).chains
-    parts = Program(symbolic(source, given)).chains
-    for chain, part in zip(chains, parts, strict=True):
-        numbers = [_linear(value) for node in part for value in node.values]
-        factors = np.array([[dict(each.factors).get(name, 0.0) for name in names] for each in numbers])
-        constants = np.array([each.constant for each in numbers])
-        factors = factors.reshape(len(numbers), len(names))
-        yield tuple(_form(next(blocks_of(chain, rows)), factors, constants) for rows in ways)
+    given = {name: Linear.of(name) for name in names}
+    for chain in Program(tuple(nodes)).chains:
+        rows = [[_linear(value_at(value, given)) for value in node.values] for node in chain]
+        values = (tuple(form.at(numbers) for form in row) for row in rows)
+        plain = tuple(replace(node, values=new) for node, new in zip(chain, values, strict=True))
+        every = [form for row in rows for form in row]
+        factors = np.array([[dict(form.factors).get(name, 0.0) for name in names] for form in every])
+        constants = np.array([form.constant for form in every])
+        factors = factors.reshape(len(every), len(names))
+        yield tuple(_form(next(blocks_of(plain, repeated)), factors, constants) for repeated in ways)
 
 
 def _form(block: Block, factors: FloatArray, constants: FloatArray) -> Form:
@@ -251,7 +294,7 @@ class Matcher:
         factors = np.vstack([form.factors for form in wanted])
         constants = np.concatenate([form.constants for form in wanted])
         values = np.concatenate([form.block.values for form in mine])
-        defaults = [dict(pattern.function.parameters)[name] for name in pattern.measures]
+        defaults = [pattern.defaults[name] for name in pattern.measures]
         free: npt.NDArray[np.bool_] = np.any(factors, 0)  # the spacing of a row of one is not
         if np.linalg.matrix_rank(factors) < free.sum() or any(
             default is None for default, told in zip(defaults, free, strict=True) if not told
@@ -276,7 +319,7 @@ class Matcher:
             return None
         table: dict[str, Value] = {**dict(zip(pattern.measures, written, strict=True)), **counts}
         roles = (form.block.kind.word for form, want in zip(mine, wanted, strict=True) if not want.block.kind.word)
-        said = tuple((name, table[name]) for name, default in pattern.function.parameters if table[name] != default)
+        said = tuple((name, table[name]) for name, default in pattern.defaults.items() if table[name] != default)
         return int((exact < -TOLERANCE).sum()), Match(blocks, next(roles, ""), said, error)
 
     def _written(self, factors: FloatArray, rows: FloatArray, near: FloatArray) -> list[Value]:

@@ -10,7 +10,6 @@ import numpy as np
 
 from shapeprog.errors import ShapeProgError
 from shapeprog.language.ast import (
-    Assignment,
     Call,
     Draw,
     Function,
@@ -21,11 +20,11 @@ from shapeprog.language.ast import (
     changed_lines,
     names_of,
 )
-from shapeprog.language.convert import in_cells, placed, placed_if_possible
+from shapeprog.language.convert import named_cells, placed, placed_again
 from shapeprog.language.dimensions import in_unit
 from shapeprog.language.evaluate import evaluated
-from shapeprog.language.expression import Linear
-from shapeprog.language.merging import merged, separate_loops
+from shapeprog.language.expression import Expression
+from shapeprog.language.merging import merged_lines, separate_loops
 from shapeprog.language.printer import source_of
 from shapeprog.language.program import Program
 from shapeprog.library.blocks import ROWS
@@ -43,16 +42,17 @@ def with_library(program: Program, library: Library) -> Program:
     """
     try:
         given = placed(program)
-        cells = in_cells(given)
+        cells = _apart(named_cells(given))
     except ShapeProgError:
         return program
-    source, chosen = _apart(cells), _with_one_role(offers(cells, library), library)
+    chosen = _with_one_role(_offered(cells, library), library)
 
     def written_with(some: Sequence[Offer]) -> tuple[float, Program]:
-        if not some:
-            return _length(given), given
-        found = placed_if_possible(merged(_rewritten(source, some, library.functions)), _called(some, library))
-        return np.inf if found.scale is None else _length(found), found
+        try:
+            found = placed_again(_rewritten(cells, some), _called(some, library)) if some else given
+        except ShapeProgError:
+            return np.inf, given
+        return _length(found), found
 
     best = written_with(chosen)
     for offer in reversed(chosen):
@@ -87,7 +87,7 @@ def _is_cushion(line: Line) -> bool:
     return isinstance(line, Part) and line.role == line.kind == "cushion"
 
 
-def _called(chosen: Sequence[Offer], library: Library) -> dict[str, Function]:
+def _called(chosen: Sequence[Offer], library: Library) -> list[Function]:
     """The placed functions that calls need, in the order of the library; cushions in them have the role of the call."""
     roles = {offer.call.name: offer.call.role for offer in chosen}
     wanted = {*roles}
@@ -99,12 +99,11 @@ def _called(chosen: Sequence[Offer], library: Library) -> dict[str, Function]:
         role = roles.get(function.name) or "cushion"
         return replace(function, body=changed_lines(function.body, lambda line: _as_cushion(line, role)))
 
-    return {name: with_role(each) for name, each in library.source.functions.items() if name in wanted}
+    return [with_role(each) for name, each in library.source.functions.items() if name in wanted]
 
 
-def _apart(program: Program) -> Source:
-    """A program as it is written, but with one statement in each nest of loops."""
-    source = source_of(program)
+def _apart(source: Source) -> Source:
+    """A program in cells with one statement in each nest of loops."""
     return replace(source, lines=tuple(separate_loops(source.lines)))
 
 
@@ -122,16 +121,14 @@ class Offer(NamedTuple):
 
 
 def offers(program: Program, library: Library) -> list[Offer]:
-    """The calls of functions of a library that shorten a program most, none of which shares a line with another."""
-    source = _apart(program)
-    words = {*names_of(source), *source.functions}
-    usable = [
-        pattern
-        for pattern in library.patterns
-        if words.isdisjoint([pattern.function.name, *(each.name for each in pattern.others)])
-        and source.functions.keys().isdisjoint(pattern.parameters)
-    ]
-    return _chosen(source, usable)
+    """The calls of functions of a library that shorten a plain program most, none of which shares a line with
+    another."""
+    return _offered(_apart(source_of(program)), library)
+
+
+def _offered(cells: Source, library: Library) -> list[Offer]:
+    names = names_of(cells)
+    return _chosen(cells, [pattern for pattern in library.patterns if pattern.function.name not in names])
 
 
 def matchers_of(source: Source) -> Iterator[tuple[Matcher, tuple[Loop, ...]]]:
@@ -139,10 +136,9 @@ def matchers_of(source: Source) -> Iterator[tuple[Matcher, tuple[Loop, ...]]]:
 
     With each come the loops that stay around, without bodies.  None if its numbers are not linear in its names.
     """
-    named = tuple(line for line in source.lines if isinstance(line, Assignment))
-    names = [*source.numbers]
-    given = {name: Linear.of(name) for name in names}
-    values = source.evaluated_numbers()
+    numbers = source.evaluated_numbers()
+    names = [name for name, value in source.numbers.items() if not isinstance(value, Expression)]
+    free = {name: numbers[name] for name in names}
 
     def of(lines: Sequence[tuple[int, Line]], *around: Loop) -> Iterator[tuple[Matcher, tuple[Loop, ...]]]:
         found: list[list[Form]] = [[] for _ in ROWS]
@@ -150,14 +146,14 @@ def matchers_of(source: Source) -> Iterator[tuple[Matcher, tuple[Loop, ...]]]:
         inner: dict[Loop, list[tuple[int, Line]]] = {}
         for number, line in lines:
             if isinstance(line, Draw | Loop):
-                for read in forms(Source((*named, line)), given, names, ROWS):
+                for read in forms([line], numbers, names, ROWS):
                     units.append(number)
                     for some, form in zip(found, read, strict=True):
                         some.append(form)
             if isinstance(line, Loop) and len(line.body) == 1:
-                inner.setdefault(replace(line, body=(), note=""), []).append((number, line.body[0]))
+                inner.setdefault(replace(line, body=()), []).append((number, line.body[0]))
         for some in {tuple(form.block.kind for form in some): some for some in found}.values():
-            yield Matcher(some, units, values), around
+            yield Matcher(some, units, free), around
         for loop, within_it in inner.items():
             if len(within_it) > 1 or isinstance(within_it[0][1], Loop):
                 yield from of(within_it, *around, loop)
@@ -198,10 +194,9 @@ def within(around: Sequence[Loop], line: Line) -> Line:
     return line
 
 
-def _rewritten(source: Source, chosen: Sequence[Offer], functions: Sequence[Function]) -> Program:
-    """The program in cells with calls, the functions of which stand in front."""
+def _rewritten(source: Source, chosen: Sequence[Offer]) -> Source:
+    """The program in cells with calls, equal loops written once."""
     calls = {min(offer.lines): within(offer.around, offer.call) for offer in chosen}
     gone = {number for offer in chosen for number in offer.lines} - calls.keys()
-    body = [calls.get(number, line) for number, line in enumerate(source.lines) if number not in gone]
-    wanted = {offer.call.name for offer in chosen}
-    return evaluated(Source((*(each for each in functions if each.name in wanted), *body)))
+    lines = [calls.get(number, line) for number, line in enumerate(source.lines) if number not in gone]
+    return replace(source, lines=merged_lines(lines))

@@ -11,7 +11,6 @@ from shapeprog.errors import InputError, OutputError, ShapeProgError
 from shapeprog.files import write_text
 from shapeprog.formats.files import load
 from shapeprog.language.ast import Assignment, Call, Comment, Function, Source
-from shapeprog.language.convert import function_in_cells
 from shapeprog.language.parser import parse
 from shapeprog.language.placement import BOX_IN_CELLS, SIZES
 from shapeprog.language.printer import format_source, source_of
@@ -34,12 +33,10 @@ class Library:
 
     source: Source
 
-    @cached_property
+    @property
     def functions(self) -> tuple[Function, ...]:
-        """The functions in cells, in the order of the text; their box is among their parameters."""
-        functions = self.source.functions.values()
-        shown = {name: dict(call.arguments) for name, call in self.examples.items()}
-        return tuple(function_in_cells(self.source, each.name, shown.get(each.name, {})) for each in functions)
+        """The functions, in the order of the text."""
+        return tuple(self.source.functions.values())
 
     @cached_property
     def comments(self) -> dict[str, tuple[str, ...]]:
@@ -77,10 +74,7 @@ class Library:
     @cached_property
     def patterns(self) -> tuple[Pattern, ...]:
         """The functions as what they draw."""
-        return tuple(
-            Pattern(function, self.functions[:place], self.examples.get(function.name))
-            for place, function in enumerate(self.functions)
-        )
+        return tuple(Pattern(self.source, each, self.examples.get(each.name)) for each in self.functions)
 
 
 def load_library(path: str | os.PathLike[str] | None = None) -> Library:

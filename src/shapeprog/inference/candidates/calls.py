@@ -20,7 +20,6 @@ from shapeprog.errors import ShapeProgError
 from shapeprog.inference.fit.tunable import CELLS, Tunable, least
 from shapeprog.inference.roles.roles import with_roles
 from shapeprog.language.ast import Call, Source
-from shapeprog.language.evaluate import expanded
 from shapeprog.language.expression import Expression, Value
 from shapeprog.language.parameters import to_float32
 from shapeprog.language.program import Draw, Loop, Node, Program, nest
@@ -47,7 +46,7 @@ class Called:
     def of(pattern: Pattern, numbers: Mapping[str, float], around: tuple[Loop, ...] = ()) -> Called | None:
         """The call with these numbers, tidy, and with defaults where they are near; none if it draws nothing."""
         tidy = [round(numbers[name], CELLS) + 0.0 for name in pattern.parameters]
-        for place, (_, default) in enumerate(pattern.function.parameters):
+        for place, default in enumerate(pattern.defaults.values()):
             if isinstance(default, float) and abs(tidy[place] - default) <= EXACT:
                 tidy[place] = default
         found = Called(pattern, tuple(map(to_float32, tidy)), around)
@@ -59,13 +58,13 @@ class Called:
     @cached_property
     def program(self) -> Program:
         """The program that is this call alone."""
-        pairs = zip(self.pattern.function.parameters, self.numbers, strict=True)
+        pairs = zip(self.pattern.defaults.items(), self.numbers, strict=True)
         call = Call(
             self.pattern.function.name, tuple((name, value) for (name, usual), value in pairs if value != usual)
         )
         loops = [Loop(loop.name, loop.values, ()) for loop in self.around]
-        source = Source((*self.pattern.others, self.pattern.function, within(loops, call)))
-        return Program(expanded(source), source)
+        nodes = (within(loops, node) for node in self.pattern.drawn(self._table))
+        return Program(tuple(nodes), Source((self.pattern.function, within(loops, call))))  # type: ignore[arg-type]
 
     @cached_property
     def nodes(self) -> tuple[Node, ...]:
@@ -175,7 +174,7 @@ def recognised(program: Program, libraries: Sequence[Library]) -> list[Placed]:
         patterns = {pattern.function.name: pattern for pattern in library.patterns}
         for offer in offers(program, library):
             pattern = patterns[offer.call.name]
-            usual = {name: value for name, value in pattern.function.parameters if isinstance(value, float)}
+            usual = {name: value for name, value in pattern.defaults.items() if isinstance(value, float)}
             loops = tuple(Loop(loop.name, _plain(loop.values), ()) for loop in offer.around)
             words, measures = zip(*offer.call.arguments, strict=True) if offer.call.arguments else ((), ())
             call = Called.of(pattern, usual | dict(zip(words, _plain(measures), strict=True)), loops)

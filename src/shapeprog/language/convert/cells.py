@@ -1,4 +1,4 @@
-"""Placed programs as statements in cells."""
+"""Placed programs and functions as statements in cells, whose numbers are linear in names."""
 
 from __future__ import annotations
 
@@ -8,23 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from shapeprog.language.ast import (
-    Assignment,
-    Call,
-    Draw,
-    Function,
-    Line,
-    Loop,
-    Scale,
-    Source,
-    assignments,
-    used_names,
-    values,
-    with_values,
-)
-from shapeprog.language.convert.forms import Forms
+from shapeprog.language.ast import Assignment, Call, Draw, Loop, Scale, Source, assignments, used_names
 from shapeprog.language.dimensions import counted_names, in_unit
-from shapeprog.language.evaluate import evaluated, expanded, symbolic
+from shapeprog.language.evaluate import symbolic
 from shapeprog.language.expression import Expression, Linear, Name, combined
 from shapeprog.language.placement import BOX_IN_CELLS, SIZES
 from shapeprog.language.printer import source_of
@@ -34,32 +20,30 @@ EVEN = 1e-4
 """Degrees by which the copies of a rotation may miss a full circle."""
 
 
-def in_cells(program: Program, *, named: bool = True) -> Program:
-    """A placed program as statements in cells; functions and groups are written out.
+def in_cells(program: Program) -> Program:
+    """A placed program as plain statements of published names, where they have one; functions are written out."""
+    return Program(tuple(_published(node, {}) for node in program.body))
 
-    Parameters
-    ----------
-    named
-        Whether it has the names of plain numbers; otherwise it is plain.
+
+def named_cells(program: Program) -> Source:
+    """A placed program as its names, and statements and loops in cells whose values are expressions of them.
 
     Raises
     ------
     ShapeProgError
-        If its numbers are not linear in these names, or a name is a length in one place only.
+        If its numbers are not linear in the names of plain numbers, or a name is a length in one place only.
     """
-    if program.scale is None:
-        return program
-    if not named:
-        return Program(tuple(_published(node, node) for node in program.body))
     source = source_of(in_unit(program, None))
-    names = {name: Linear.of(name) for name, v in source.numbers.items() if not isinstance(v, Expression)}
+    numbers = source.evaluated_numbers()
+    names = {name: Linear.of(name) for name, value in source.numbers.items() if not isinstance(value, Expression)}
     nodes = symbolic(source, names, source.evaluated_numbers(names)["height"] / -2.0)
-    lines = tuple(_published(_written(node), plain) for node, plain in zip(nodes, program.body, strict=True))
-    return evaluated(Source((*assignments(source.lines, used_names(Source(lines).walk())), *lines)))
+    lines = tuple(_written(_published(node, numbers)) for node in nodes)
+    return Source((*assignments(source.lines, used_names(Source(lines).walk()) | {*SIZES}), *lines))
 
 
-def function_in_cells(source: Source, name: str, example: Mapping[str, Any]) -> Function:
-    """A function of a placed program as one in cells, whose first parameters are its box.
+def call_in_cells(source: Source, name: str, numbers: Mapping[str, float]) -> tuple[Node, ...]:
+    """What a function of a placed program draws, as statements and loops in cells with linear forms of its
+    parameters other than counts.
 
     Parameters
     ----------
@@ -67,40 +51,25 @@ def function_in_cells(source: Source, name: str, example: Mapping[str, Any]) -> 
         The program.
     name
         The function.
-    example
-        Numbers for the parameters in cells of which it draws something; others have the usual ones.
+    numbers
+        Its parameters, those of its box first: typical values, which decide what lies above or beside what, and counts.
 
     Raises
     ------
     ShapeProgError
-        If its shape is not linear in its box and its lengths.
+        If it cannot be drawn so, or is not linear in its box and its other parameters.
     """
-    function = source.functions[name]
+    inner = {word: f"own {word}" for word in numbers}  # which the program does not use itself
+    up, depth, side, *sizes = (Name(inner[word]) for word in BOX_IN_CELLS)
+    place = {"bottom": up, "y": depth + sizes[1] / 2.0, "x": -(side + sizes[2] / 2.0)}
+    keywords = {word: Name(inner[word]) for word in numbers if word not in BOX_IN_CELLS[:3]} | place
+    header = Assignment((*((size, 1.0) for size in SIZES), *((inner[word], numbers[word]) for word in numbers)))
+    call = Call(name, tuple(keywords.items()))
+    placed = Source((header, *source.functions.values(), call), scale=Scale(1.0, 0.0))
     counted = counted_names(source)
-    words = [word for word, _ in function.parameters]
-    box = {f"box {word}": Name(word) for word in BOX_IN_CELLS}
-    up, depth, side, *sizes = (Name(word) for word in box)
-    placement = {"bottom": up, "y": depth + sizes[1] / 2.0, "x": -(side + sizes[2] / 2.0)}
-    keywords = (
-        placement | dict(zip(BOX_IN_CELLS[3:], sizes, strict=True)) | {word: Name(f"own {word}") for word in words}
-    )
-    usual = dict.fromkeys(BOX_IN_CELLS, 12.0) | {word: 3.0 if f"{name}.{word}" in counted else 1.0 for word in words}
-    usual |= {word: value for word, value in function.parameters if isinstance(value, float)} | dict(example)
-    numbers = [(f"box {word}", usual[word]) for word in BOX_IN_CELLS] + [(f"own {word}", usual[word]) for word in words]
-    header = Assignment((*((size, 1.0) for size in SIZES), *numbers))
-    lines: tuple[Line, ...] = (header, *source.functions.values(), Call(name, tuple(keywords.items())))
-    placed = Source(lines, scale=Scale(1.0, 0.0))
-    nodes = symbolic(placed, box | {f"own {word}": Name(word) for word in words})
-    nothing = Linear()
-    forms = Forms((nothing, nothing, nothing), {})
-
-    def clean(line: Any) -> Any:
-        line = with_values(line, [forms.written(forms.form(value), exact=True) for value in values(line)])
-        return replace(line, body=tuple(map(clean, line.body))) if isinstance(line, Loop) else line
-
-    body = tuple(_published(clean(node), plain) for node, plain in zip(nodes, expanded(placed), strict=True))
-    sides = tuple((word, None) for word in BOX_IN_CELLS)
-    return replace(function, parameters=(*sides, *function.parameters), body=body)
+    measures = {inner[word]: Linear.of(word) for word in numbers if f"{name}.{word}" not in counted}
+    nodes = symbolic(placed, {inner[word]: numbers[word] for word in numbers} | measures)
+    return tuple(_published(node, numbers) for node in nodes)
 
 
 def _written(node: Node) -> Node:
@@ -115,14 +84,13 @@ def _written(node: Node) -> Node:
     return replace(node, body=tuple(map(_written, node.body))) if isinstance(node, Loop) else node
 
 
-def _published(node: Node, plain: Node) -> Node:
+def _published(node: Node, numbers: Mapping[str, float]) -> Node:
     """A statement or loop by the name that text in cells has for it, where it has one."""
-    values = plain.values
-    if isinstance(node, Loop) and isinstance(plain, Loop):
-        body = tuple(_published(inner, written) for inner, written in zip(node.body, plain.body, strict=True))
+    values: list[Any] = [value.at(numbers) if isinstance(value, Linear) else value for value in node.values]
+    if isinstance(node, Loop):
+        body = tuple(_published(inner, numbers) for inner in node.body)
         even = node.name == "rotate_about" and not any(values[2:]) and abs(values[1] * values[0] - 360) < EVEN
         return Loop("rotate", (node.values[0], 1.0), body) if even else replace(node, body=body)
-    assert isinstance(node, Draw)
     if node.name == "beam" and int(np.abs(np.subtract(values[3:6], values[:3])).argmax()) == values[8]:
         return Draw("bar", (*node.values[:8], node.values[9]), node.role)
     return Draw("back", node.values, node.role) if (node.name, node.role) == ("leaning_box", "back") else node

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
-from types import MappingProxyType
 
 import numpy as np
 
@@ -28,14 +27,12 @@ from shapeprog.language.ast import (
     assignments,
     used_names,
 )
-from shapeprog.language.convert.forms import NOTHING, Triple
 from shapeprog.language.convert.loops import Loops, with_joined_mirrors
 from shapeprog.language.evaluate import evaluated
-from shapeprog.language.expression import Linear
+from shapeprog.language.expression import Expression, Linear
 from shapeprog.language.merging import merged_lines
 from shapeprog.language.parameters import shortest, to_float32
 from shapeprog.language.placement import BOX_IN_CELLS, SIZES
-from shapeprog.language.printer import source_of
 from shapeprog.language.program import Program
 from shapeprog.language.tensors import encode
 from shapeprog.language.unit import Unit
@@ -44,19 +41,13 @@ from shapeprog.lazy_torch import torch
 from shapeprog.space import DEPTH, SIDE, UP
 
 
-def placed(
-    program: Program, functions: Mapping[str, Function] = MappingProxyType({}), *, merge: bool = True
-) -> Program:
-    """The same shape with its parts placed from the sides of the whole.
-
-    The whole is the box that the names ``width``, ``depth`` and ``height`` give, or else the bounding box.
+def placed(program: Program, *, merge: bool = True) -> Program:
+    """The same shape with its parts placed from the sides of its bounding box about the middle of the grid.
 
     Parameters
     ----------
     program
-        The program, in either notation; its names stand for plain numbers.
-    functions
-        The placed functions that it calls, by name.
+        The program, in either notation.
     merge
         Whether loops that repeat in the same way become one; otherwise lines keep their order.
 
@@ -65,24 +56,44 @@ def placed(
     ShapeProgError
         If a statement or loop has no placed form, as those that users declare, or a part has no thickness.
     """
-    source = source_of(program)
-    if source.placed:
+    if program.scale is not None:
         return program
-    numbers = source.evaluated_numbers()
-    sizes = _sizes(program, numbers)
-    converter = Loops(sizes, numbers)
-    body = with_joined_mirrors(converter.lines(_drawing(source.lines)).lines)
-    body = merged_lines(body) if merge else body
-    header = _header(source.lines, sizes, used_names(Source(body).walk()))
-    height = converter.number(sizes[2])
-    called = [line for function in functions.values() for line in (Comment(), function, Comment())]
-    return evaluated(Source((*header, *called, *body), Unit("", 1.0), Scale(1.0, -height / 2)))
+    sizes = [to_float32(float(f"{extent:.7g}")) or 1.0 for extent in _extents(program)]
+    forms = [Linear(float(shortest(size))) for size in sizes]
+    body = with_joined_mirrors(Loops((forms[0], forms[1], forms[2]), {}).lines(program.body).lines)
+    header = Assignment(tuple(zip(SIZES, sizes, strict=True)))
+    return _in_own_cells((header, *(merged_lines(body) if merge else body)))
 
 
-def placed_if_possible(program: Program, functions: Mapping[str, Function] = MappingProxyType({})) -> Program:
+def placed_again(cells: Source, functions: Iterable[Function] = ()) -> Program:
+    """The placed program of statements in cells whose values are expressions of names.
+
+    Parameters
+    ----------
+    cells
+        As :func:`~shapeprog.language.convert.named_cells` gives them; they may have calls with a box among them.
+    functions
+        The placed functions that these call.
+
+    Raises
+    ------
+    ShapeProgError
+        As for :func:`placed`.
+    """
+    numbers = cells.evaluated_numbers()
+    names = {name: Linear.of(name) for name, value in cells.numbers.items() if not isinstance(value, Expression)}
+    forms = cells.evaluated_numbers(names)
+    converter = Loops((*(forms[size] for size in SIZES),), numbers)
+    body = merged_lines(with_joined_mirrors(converter.lines(_drawing(cells.lines)).lines))
+    header = assignments(cells.lines, used_names(Source(body).walk()) | {*SIZES})
+    called = [line for function in functions for line in (Comment(), function, Comment())]
+    return _in_own_cells((*header, *called, *body))
+
+
+def placed_if_possible(program: Program) -> Program:
     """The placed program, or the same one if something in it has no placed form."""
     try:
-        return placed(program, functions)
+        return placed(program)
     except ShapeProgError:
         return program
 
@@ -114,25 +125,10 @@ def _drawing(lines: Iterable[Line]) -> Iterable[Draw | Loop | Call]:
     return (line for line in lines if isinstance(line, Draw | Loop | Call))
 
 
-def _sizes(program: Program, numbers: Mapping[str, float]) -> Triple:
-    """Width, depth and height of the whole, as names where the program has them."""
-    extents = _extents(program) if any(numbers.get(word, 0) <= NOTHING for word in SIZES) else [0.0] * 3
-    plain = [float(shortest(to_float32(float(f"{extent:.7g}")) or 1.0)) for extent in extents]
-    forms = [
-        Linear.of(word) if numbers.get(word, 0) > NOTHING else Linear(v) for word, v in zip(SIZES, plain, strict=True)
-    ]
-    return forms[0], forms[1], forms[2]
-
-
-def _header(lines: Iterable[Line], sizes: Triple, used: set[str]) -> Iterable[Assignment]:
-    """One line with the sizes of the whole, and the other names that are used."""
-    numbers = Source(tuple(lines)).numbers
-    whole = [
-        (word, numbers[word] if size.factors else to_float32(size.constant))
-        for word, size in zip(SIZES, sizes, strict=True)
-    ]
-    yield Assignment(tuple(whole))
-    yield from assignments(lines, used - {*SIZES})
+def _in_own_cells(lines: tuple[Line, ...]) -> Program:
+    """The program of placed lines with lengths in cells."""
+    source = Source(lines, Unit("", 1.0))
+    return evaluated(replace(source, scale=Scale(1.0, source.evaluated_numbers()["height"] / -2)))
 
 
 def _extents(program: Program) -> list[float]:

@@ -16,7 +16,6 @@ from shapeprog.errors import InputError, OutputError
 from shapeprog.language.ast import Call, Source
 from shapeprog.language.convert import placed
 from shapeprog.language.dimensions import in_unit
-from shapeprog.language.evaluate import evaluated
 from shapeprog.language.expression import value_at
 from shapeprog.language.named import inline, names
 from shapeprog.language.named import set as set_numbers

@@ -12,7 +12,19 @@ import numpy as np
 from shapeprog.files import write_text
 from shapeprog.formats.scripts import Script, needed, number, prelude, script
 from shapeprog.geometry.primitives.cylinder import SEGMENTS
-from shapeprog.language.ast import Argument, Assignment, Call, Comment, Function, Group, Keywords, Line, Part, Point
+from shapeprog.language.ast import (
+    Argument,
+    Assignment,
+    Call,
+    Comment,
+    Function,
+    Group,
+    Keywords,
+    Line,
+    Part,
+    Point,
+    note_of,
+)
 from shapeprog.language.expression import Expression, text_of
 from shapeprog.language.placement import BOX, ROUND, SIZES
 from shapeprog.language.program import Program
@@ -106,7 +118,7 @@ def _lines(lines: list[Line] | tuple[Line, ...], depth: int) -> Iterator[str]:
         if isinstance(line, Comment):
             yield f"{indent}// {line.text}" if line.text else ""
             continue
-        note = f" // {line.note}" if line.note else ""
+        note = f" // {text}" if (text := note_of(line)) else ""
         match line:
             case Assignment(numbers):
                 for name, value in numbers:

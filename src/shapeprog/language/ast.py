@@ -25,7 +25,7 @@ class Comment:
 
 @dataclass(frozen=True)
 class Assignment:
-    """``width, depth = 10.2, 9``: names with their values; ``note`` is the comment behind it, as in all that follow."""
+    """``width, depth = 10.2, 9``: names with their values; ``note`` is the comment behind it, as in other lines."""
 
     numbers: tuple[tuple[str, Value], ...]
     note: str = ""
@@ -35,14 +35,13 @@ class Assignment:
 class Draw:
     """A drawing statement in cells: its values in slot order, and its role if that is not its own name.
 
-    The values are numbers or expressions; in the body of a :class:`~shapeprog.language.program.Program` they are
-    numbers that float32 holds exactly.
+    The values in a :class:`~shapeprog.language.program.Program` are numbers that float32 holds exactly; symbolic
+    evaluation gives tensors or linear forms.
     """
 
     name: str
     values: tuple[Any, ...]
     role: str = ""
-    note: str = ""
 
     @property
     def word(self) -> str:
@@ -52,12 +51,11 @@ class Draw:
 
 @dataclass(frozen=True)
 class Loop:
-    """A loop in cells: its values in slot order, and the lines, statements and loops that it repeats."""
+    """A loop in cells: its values in slot order, and the statements and loops that it repeats."""
 
     name: str
     values: tuple[Any, ...]
     body: tuple[Any, ...]
-    note: str = ""
 
     @property
     def count(self) -> int:
@@ -105,8 +103,8 @@ class Group:
 class Call:
     """``leg(posts(thick=2))``: the lines of a function, with a value for each parameter that has no default.
 
-    A role around it is that of all parts in it that have none of their own.  In placed text the arguments may also be
-    keywords of the box in which the lines are drawn, and ``tilt``.
+    A role around it is that of all parts in it that have none of their own.  The arguments may also be keywords of the
+    box in which the lines are drawn, and ``tilt``.
     """
 
     name: str
@@ -117,10 +115,7 @@ class Call:
 
 @dataclass(frozen=True)
 class Function:
-    """``def legs(height, thick=2):`` with the lines of its body; ``None`` is a parameter without a default.
-
-    In cells its first parameters are the box in which its lines are drawn, which placed calls have.
-    """
+    """``def legs(height, thick=2):`` with the lines of its body; ``None`` is a parameter without a default."""
 
     name: str
     parameters: tuple[tuple[str, Value | None], ...]
@@ -223,6 +218,11 @@ class Fault(ShapeProgError):
 def body_of(line: Line) -> tuple[Line, ...]:
     """The lines inside of a line; none if it has no body."""
     return line.body if isinstance(line, Loop | Group | Function) else ()
+
+
+def note_of(line: Line) -> str:
+    """The comment behind a line."""
+    return "" if isinstance(line, Comment | Draw | Loop) else line.note
 
 
 def values(line: Line) -> tuple[Value, ...]:

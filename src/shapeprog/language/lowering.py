@@ -198,7 +198,7 @@ class Lowering(ABC):
         if line.kind == "rotate":
             point = Point(tuple((word, value) for word, value in line.keywords if word != "step"))  # type: ignore[misc]
             _, depth, side = self._point(self._place(group, "", point))
-            step = self._number(group, "step", 360 / _at_least_one(count))
+            step = self._number(group, "step", 360 / max(1, count))
             return Drawn([Loop("rotate_about", self._numbers(line, [count, step, depth, side]), tuple(nodes))], first)
         if line.kind == "translate":
             steps: Vector = tuple(self._number(group, word, 0.0) for word in ("x", "y", "z"))
@@ -211,10 +211,10 @@ class Lowering(ABC):
         outer, axis = self.box(group), ("x", "y", "z").index(line.axis)
         low, high = outer[axis]
         gap = self._number(group, "gap", 0.0)
-        size = (high - low + gap) / _at_least_one(count) - gap
+        size = (high - low + gap) / max(1, count) - gap
         if self.exact and not size > 0:
             raise Fault(line, f"{count} boxes with gaps of {gap:g} do not fit into {high - low:g}", "use fewer")
-        if not isinstance(count, Expression) and count <= 0:
+        if count <= 0:
             return Drawn([], outer)
         inner = tuple((low, low + size) if index == axis else span for index, span in enumerate(outer))
         nodes = self.lines(line.body, context._replace(scope=group.scope | sizes_of(inner), box=inner)).nodes
@@ -234,12 +234,12 @@ class Lowering(ABC):
             low, high = first[axis]
             for word, reference in ((names.low, low), (names.high, high), (names.offset, (low + high) / 2)):
                 if word in words:
-                    step[axis] = (target[axis] - reference) / _at_least_one(count - 1)
+                    step[axis] = (target[axis] - reference) / max(1, count - 1)
         return tuple(step)
 
     def _translate(self, line: Group, count: int, step: Vector, nodes: list[Any], context: Context) -> list[Any]:
         """Copies; in a function, which may be called for a row of one, a single copy is the body itself."""
-        if context.calls and not isinstance(count, Expression) and count == 1:
+        if context.calls and count == 1:
             return nodes
         by = [self._length(value) for value in (step[2], step[1], -step[0])]
         return [Loop("translate", self._numbers(line, [count, *by]), tuple(nodes))]
@@ -271,8 +271,7 @@ class Lowering(ABC):
         assert line.count is not None
         value = self.at(line, "count", line.count, scope)
         if not self.exact:
-            decided = next(self.decided)
-            return value if isinstance(value, Expression) else decided  # type: ignore[return-value]
+            return next(self.decided)
         if value > MOST_SOLIDS:
             raise Fault(line, f"a count of {value:g} is too large", f"at most {MOST_SOLIDS}", "count")
         self.decisions.append(max(0, round(value)))
@@ -388,8 +387,3 @@ def too_deep(line: Line) -> Fault:
 def sizes_of(box: Box) -> Scope:
     """Width, depth and height of a box, by name."""
     return {word: high - low for word, (low, high) in zip(SIZES, box, strict=True)}
-
-
-def _at_least_one(count: Any) -> Any:
-    """A count, or one where it is less; an expression as it is."""
-    return count if isinstance(count, Expression) else max(1, count)

@@ -28,7 +28,7 @@ def merged_lines(lines: Iterable[Line]) -> tuple[Line, ...]:
     for line in lines:
         if isinstance(line, Comment | Assignment | Function):
             indices.clear()
-        elif isinstance(line, Loop | Group) and not line.note and _merges(line):
+        elif isinstance(line, Loop | Group) and _merges(line):
             index = indices.setdefault(replace(line, body=()), len(result))
             if index < len(result):
                 before = result[index]
@@ -51,4 +51,4 @@ def separate_loops(lines: Iterable[Line]) -> Iterator[Line]:
 
 
 def _merges(line: Loop | Group) -> bool:
-    return isinstance(line, Loop) or line.kind in ("mirror", "translate", "rotate")
+    return isinstance(line, Loop) or (line.kind in ("mirror", "translate", "rotate") and not line.note)

@@ -23,9 +23,8 @@ from shapeprog.language.ast import (
     Part,
     Point,
     Source,
-    names_of,
 )
-from shapeprog.language.expression import Expression, Value, text_of
+from shapeprog.language.expression import Value, text_of
 from shapeprog.language.placement import ROUND_ROLES
 from shapeprog.language.program import DEEPEST, Draw, Node, Program
 from shapeprog.language.statement import language
@@ -64,7 +63,7 @@ def printed(source: Source) -> list[tuple[str, Line | None]]:
     for line in () if head else takewhile(lambda line: isinstance(line, Comment), source.lines):
         if isinstance(line, Comment) and re.fullmatch(rf"{HEAD}[ \t]*\S+", line.text):
             raise ShapeProgError(f"the comment {line.text!r} would be read as the unit of the text", "reword it")
-    return [*head, *_lines(source.lines, 0, 0, names_of(source) | {*source.functions})]
+    return [*head, *_lines(source.lines, 0, 0)]
 
 
 def source_of(program: Program) -> Source:
@@ -87,24 +86,24 @@ def checked_role(node: Draw) -> str:
     return node.role
 
 
-def _lines(lines: Iterable[Line], depth: int, loops: int, taken: set[str]) -> Iterator[tuple[str, Line | None]]:
-    """The lines of a block; ``taken`` are names that no variable of a loop may have."""
+def _lines(lines: Iterable[Line], depth: int, loops: int) -> Iterator[tuple[str, Line | None]]:
+    """The lines of a block."""
     indent, empty = INDENT * depth, True
     for line in lines:
         if isinstance(line, Comment):
             yield f"{indent}# {_remark(line.text)}" if line.text else "", line
             continue
         empty = False
-        note = f"  # {_remark(line.note)}" if line.note else ""
+        note = f"  # {_remark(line.note)}" if not isinstance(line, Draw | Loop) and line.note else ""
         match line:
             case Draw():
                 role, call = checked_role(line), _call(line)
-                yield f"{indent}{f'{role}({call})' if role else call}{note}", line
+                yield f"{indent}{f'{role}({call})' if role else call}", line
             case Loop():
                 if loops >= DEEPEST:
                     raise ShapeProgError(f"loops are nested more than {DEEPEST} deep", "put some of them side by side")
-                yield f"{indent}for {variable(loops, taken)} in {_call(line)}:{note}", line
-                yield from _lines(line.body, depth + 1, loops + 1, taken)
+                yield f"{indent}for {variable(loops)} in {_call(line)}:", line
+                yield from _lines(line.body, depth + 1, loops + 1)
             case Assignment():
                 names, values = zip(*line.numbers, strict=True)
                 yield f"{indent}{', '.join(names)} = {', '.join(map(text_of, values))}{note}", line
@@ -115,17 +114,17 @@ def _lines(lines: Iterable[Line], depth: int, loops: int, taken: set[str]) -> It
                 yield f"{indent}{part_text(line)}{note}", line
             case Group():
                 yield f"{indent}{group_text(line)}:{note}", line
-                yield from _lines(line.body, depth + 1, loops + 1, taken)
+                yield from _lines(line.body, depth + 1, loops + 1)
             case Function():
                 yield f"{indent}def {line.name}({', '.join(_given(line.parameters))}):{note}", line
-                yield from _lines(line.body, depth + 1, loops, taken)
+                yield from _lines(line.body, depth + 1, loops)
     if empty and depth:
         yield f"{indent}pass", None
 
 
 def lines_text(lines: Iterable[Line]) -> Iterator[str]:
     """Lines of placed text, with those inside of them, in canonical form."""
-    return (text for text, _ in _lines(lines, 0, 0, set()))
+    return (text for text, _ in _lines(lines, 0, 0))
 
 
 def part_text(line: Part) -> str:
@@ -159,7 +158,7 @@ def keywords_text(keywords: Keywords) -> Iterator[str]:
 def _call(line: Draw | Loop) -> str:
     declared = language().declaration(line.name, len(line.values))
     pairs = zip(declared.quantities, line.values, strict=True)
-    return declared.call([str(v) if isinstance(v, Expression) else quantity.written(v) for quantity, v in pairs])
+    return declared.call([quantity.written(value) for quantity, value in pairs])
 
 
 def _given(pairs: Iterable[tuple[str, Value | None]]) -> Iterator[str]:
@@ -172,7 +171,7 @@ def _remark(text: str) -> str:
     return text
 
 
-def variable(depth: int, taken: Iterable[str] = ()) -> str:
-    """The name of the variable of a loop inside ``depth`` others: i, j, k and so on, past names that are taken."""
-    letters = [letter for letter in map(chr, range(ord("i"), ord("z") + 1)) if letter not in taken]
+def variable(depth: int) -> str:
+    """The name of the variable of a loop inside ``depth`` others: i, j, k and so on."""
+    letters = [*map(chr, range(ord("i"), ord("z") + 1))]
     return letters[depth] if depth < len(letters) else f"i{depth}"

@@ -20,7 +20,7 @@ from shapeprog.language.parameters import shortest, to_float32
 
 Operator = Literal["+", "-", "*", "/"]
 
-_APPLY = {"+": operator.add, "-": operator.sub, "*": operator.mul, "/": operator.truediv}
+APPLY = {"+": operator.add, "-": operator.sub, "*": operator.mul, "/": operator.truediv}
 _LEVEL = {"+": 1, "-": 1, "*": 2, "/": 2}  # how tightly they bind; a sign binds at 3, a number or a name at 4
 
 
@@ -143,7 +143,7 @@ class Binary(Expression):
     def at(self, numbers: Mapping[str, Any]) -> Any:
         """What its operator makes of both sides."""
         try:
-            result = _APPLY[self.operator](value_at(self.left, numbers), value_at(self.right, numbers))
+            result = APPLY[self.operator](value_at(self.left, numbers), value_at(self.right, numbers))
         except ZeroDivisionError:
             cure = f"let {text_of(self.right)} be another number"
             if isinstance(self.right, Binary) and self.right.operator == "-" and isinstance(self.right.left, Name):

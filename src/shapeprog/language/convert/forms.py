@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from types import MappingProxyType
 from typing import NamedTuple, TypeAlias
 
-from shapeprog.errors import ShapeProgError
 from shapeprog.language.ast import Keywords, Point
-from shapeprog.language.expression import Binary, Expression, Linear, Name, Negative, Value, combined, value_at
+from shapeprog.language.expression import APPLY, Binary, Expression, Linear, Name, Negative, Value, combined
 from shapeprog.language.parameters import shortest, to_float32
 from shapeprog.language.placement import AXES
 
@@ -40,59 +38,42 @@ class Forms:
     ----------
     sizes
         Width, depth and height of the box around all parts.
-    scope
-        The values of names, in cells.
-    inlined
-        Linear forms of some names.
+    names
+        What names stand for in the box.
+    numbers
+        The values of these names, in cells.
     """
 
-    def __init__(
-        self, sizes: Triple, scope: Mapping[str, float], inlined: Mapping[str, Linear] = MappingProxyType({})
-    ) -> None:
-        self.sizes, self.scope, self.inlined = sizes, scope, inlined
-        self.atoms: dict[str, Expression] = {}
+    def __init__(self, sizes: Triple, names: Mapping[str, Linear], numbers: Mapping[str, float]) -> None:
+        self.sizes, self.names, self.numbers = sizes, names, numbers
 
     # ---- numbers ------------------------------------------------------------------------------------------------
 
     def form(self, value: Value) -> Linear:
-        """A number as a linear form of names, and of products and quotients of names."""
+        """A number as a linear form of names; plain numbers are the shortest decimals."""
         match value:
             case Name(name):
-                return self.inlined.get(name) or Linear.of(name)
+                return self.names[name]
             case Negative(inner):
                 return -self.form(inner)
-            case Binary("+", left, right):
-                return self.form(left) + self.form(right)
-            case Binary("-", left, right):
-                return self.form(left) - self.form(right)
-            case Binary(operator, left, right):
-                first, second = self.form(left), self.form(right)
-                try:
-                    return first * second if operator == "*" else first / second
-                except (ShapeProgError, ZeroDivisionError):
-                    atom = Binary(operator, self.written(first, exact=True), self.written(second, exact=True))
-                    self.atoms[str(atom)] = atom
-                    return Linear.of(str(atom))
-            case Expression():
-                raise TypeError(f"{value!r} is not an expression")
-        return Linear(float(shortest(value)))
+            case Binary(sign, left, right):
+                result: Linear = APPLY[sign](self.form(left), self.form(right))
+                return result
+        return Linear(float(shortest(value)))  # type: ignore[arg-type]
 
     def written(self, form: Linear, *, exact: bool = False) -> Value:
         """A linear form as a person writes it, positive terms first; without terms near zero, unless exact."""
         form = form if exact else self._clean(form)
-        terms = [(self._atom(text), factor) for text, factor in form.factors]
+        terms = [(Name(name), factor) for name, factor in form.factors]
         terms.sort(key=lambda term: term[1] < 0)
         if terms and terms[0][1] < 0 and form.constant > 0:
-            negated = combined(0.0, [(atom, -factor) for atom, factor in terms])
+            negated = combined(0.0, [(name, -factor) for name, factor in terms])
             return Binary("-", to_float32(form.constant), negated) if len(terms) == 1 else _differences(form, terms)
         return combined(form.constant, terms)
 
     def number(self, form: Linear) -> float:
         """The value of a form with the numbers in force."""
-        return form.constant + sum(factor * value_at(self._atom(text), self.scope) for text, factor in form.factors)
-
-    def _atom(self, text: str) -> Expression:
-        return self.atoms.get(text) or Name(text)
+        return form.at(self.numbers)
 
     def _clean(self, form: Linear) -> Linear:
         factors = tuple((name, factor) for name, factor in form.factors if abs(factor) > 1e-9)

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
 from shapeprog.errors import ShapeProgError
 from shapeprog.language.ast import Call, Draw, Function, Group, Keywords, Line, Loop, Part, Point, Source
 from shapeprog.language.builtin import CELL_CENTRE
-from shapeprog.language.convert.forms import NOTHING, Triple, cost
+from shapeprog.language.convert.forms import NOTHING, Span, cost
 from shapeprog.language.convert.parts import Converted, Parts, from_corner, ordered
-from shapeprog.language.expression import Binary, Linear, Value
+from shapeprog.language.expression import Binary, Expression, Linear, Value
 from shapeprog.language.merging import separate_loops
 from shapeprog.language.placement import AXES, BOX_IN_CELLS, axis_of
 from shapeprog.language.program import Node
@@ -58,13 +58,13 @@ class Loops(Parts):
         body = self.lines(line.body)
         if not body.lines:
             return body
+        if line.name == "translate":
+            return self._translate(body, line)
         v = [self.form(value) for value in line.values]
         match line.name:
             case "mirror":
                 axis = {UP: 2, DEPTH: 1, SIDE: 0}[round(self.number(v[1]))]
                 return self._mirror(line.body, axis, -v[2] if axis == 0 else v[2])
-            case "translate":
-                return self._translate(body, line, v[0], (-v[3], v[2], v[1]))
             case "tilt_about":
                 return self._tilted(body, v)
             case "rotate_about":
@@ -102,50 +102,50 @@ class Loops(Parts):
         group = Group("mirror", self._single(axis, plane), body.lines)
         return Converted((group,), body.first, middles)  # type: ignore[arg-type]
 
-    def _translate(self, body: Converted, line: Loop, count: Linear, step: Triple) -> Converted:
-        """A loop with fixed steps, a row, or a mirror, whichever is shortest."""
-        moving = [axis for axis in range(3) if not self._zero(step[axis])]
-        number = None if count.factors else max(0, round(count.constant))
+    def _translate(self, body: Converted, line: Loop) -> Converted:
+        """A loop with fixed steps, a row, or a mirror, whichever is shortest; a row where the count is a name.
+
+        The steps are then the way to the last copy, divided by the count less one.
+        """
+        count, *steps = line.values
+        number = None if isinstance(count, Expression) else max(0, round(count))
+        up, depth, side = (self.form(s.left if number is None and isinstance(s, Binary) else s) for s in steps)
+        by = (-side, depth, up)
+        moving = [axis for axis in range(3) if not self._zero(by[axis])]
         middles: list[Linear | None] = list(body.middles)
         for axis in moving:
-            middle = middles[axis]
-            determined = middle is not None and number is not None and len(moving) == 1
-            middles[axis] = middle + step[axis] * ((number - 1) / 2) if determined else None  # type: ignore[operator]
-        written, moved = self.written(count), tuple(middles)
-        by = tuple(pair for axis in moving for pair in self._extra("xyz"[axis], step[axis])) or (("x", 0.0),)
-        options = [Group("translate", by, body.lines, written)]
-        ways = [self._way(step[axis], count, number) for axis in moving]
-        if body.first and moving and all(way is not None for way in ways):
-            last: list[tuple[str, Value]] = []
-            for axis, way in zip(moving, ways, strict=True):
-                assert way is not None
-                span = body.first[axis]
-                half = self.sizes[axis] / 2.0
-                low, high = span.low + way + half, half - span.low - span.size - way
-                sides = [((AXES[axis].low, low),), ((AXES[axis].high, high),)]
-                if self.number(low) > self.number(high):
-                    sides.reverse()
-                last += self._best([*sides, ((AXES[axis].offset, span.middle + way),)])  # type: ignore[arg-type]
-            options.append(Group("row", (("last", Point(tuple(last))),), body.lines, written))
+            middle, middles[axis] = middles[axis], None
+            if middle is not None and number is not None and len(moving) == 1:
+                middles[axis] = middle + by[axis] * ((number - 1) / 2)
+        written, moved = self.written(self.form(count)), tuple(middles)
+        options: list[Group] = []
+        if number is not None:
+            keywords = tuple(pair for axis in moving for pair in self._extra("xyz"[axis], by[axis]))
+            options.append(Group("translate", keywords or (("x", 0.0),), body.lines, written))
+        if body.first and moving and (number is None or number > 1):
+            ways = {axis: by[axis] * float(1 if number is None else number - 1) for axis in moving}
+            options.append(Group("row", (("last", self._last(body.first, ways)),), body.lines, written))
         best = min(options, key=lambda group: cost(group.keywords))
         result = Converted((best,), body.first, moved)  # type: ignore[arg-type]
         if number == 2 and len(moving) == 1 and (middle := body.middles[moving[0]]) is not None:
-            mirror = self._mirror(line.body, moving[0], middle + step[moving[0]] / 2.0 - self.shift[moving[0]])
+            mirror = self._mirror(line.body, moving[0], middle + by[moving[0]] / 2.0 - self.shift[moving[0]])
             group = mirror.lines[0]
             assert isinstance(group, Group)
             if cost(group.keywords) < cost(best.keywords):
                 return mirror._replace(middles=moved)  # type: ignore[arg-type]
         return result
 
-    def _way(self, step: Linear, count: Linear, number: int | None) -> Linear | None:
-        """How far the last of some copies is from the first; none if that is no linear form, or there is one copy."""
-        if number is not None:
-            return step * float(number - 1) if number > 1 else None
-        ((text, factor), *following) = step.factors or (("", 0.0),)
-        match self.atoms.get(text):
-            case Binary("/", total, steps) if not following and not step.constant:
-                return self.form(total) * factor if self._zero(self.form(steps) - count + 1.0) else None
-        return None
+    def _last(self, first: tuple[Span, Span, Span], ways: Mapping[int, Linear]) -> Point:
+        """The best keywords for the last copy of a row, which is so far from the first along each axis."""
+        last: list[tuple[str, Value]] = []
+        for axis, way in ways.items():
+            span, half = first[axis], self.sizes[axis] / 2.0
+            low, high = span.low + way + half, half - span.low - span.size - way
+            sides = [((AXES[axis].low, low),), ((AXES[axis].high, high),)]
+            if self.number(low) > self.number(high):
+                sides.reverse()
+            last += self._best([*sides, ((AXES[axis].offset, span.middle + way),)])  # type: ignore[arg-type]
+        return Point(tuple(last))
 
     def _rotate(self, line: Loop) -> Converted:
         """A published rotation: about the axis of the whole, or about that of the statement inside."""

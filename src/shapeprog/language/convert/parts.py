@@ -12,7 +12,7 @@ from shapeprog.errors import ShapeProgError
 from shapeprog.language.ast import Argument, Draw, Keywords, Line, Part
 from shapeprog.language.builtin import ARM_HALF_WIDTH, CELL_CENTRE
 from shapeprog.language.convert.forms import Cost, Forms, Span, Triple, cost
-from shapeprog.language.expression import Linear, value_at
+from shapeprog.language.expression import Linear
 from shapeprog.language.lowering import SMALLEST
 from shapeprog.language.placement import AXES, SIZES
 from shapeprog.language.statement import language
@@ -200,7 +200,7 @@ class Parts(Forms):
         if line.name == "beam":
             axis, turn = round(self.number(numbers[2])), numbers[3]
         else:
-            ends = np.array([value_at(value, self.scope) for value in line.values[:6]], np.float32)
+            ends = np.array([self.number(self.form(value)) for value in line.values[:6]], np.float32)
             axis, turn = int(np.abs(ends[3:] - ends[:3]).argmax()), numbers[2]
         main = {UP: 2, DEPTH: 1, SIDE: 0}[axis]
         across = [

@@ -60,7 +60,7 @@ def placed(program: Program, *, merge: bool = True) -> Program:
         return program
     sizes = [to_float32(float(f"{extent:.7g}")) or 1.0 for extent in _extents(program)]
     forms = [Linear(float(shortest(size))) for size in sizes]
-    body = with_joined_mirrors(Loops((forms[0], forms[1], forms[2]), {}).lines(program.body).lines)
+    body = with_joined_mirrors(Loops((forms[0], forms[1], forms[2]), {}, {}).lines(program.body).lines)
     header = Assignment(tuple(zip(SIZES, sizes, strict=True)))
     return _in_own_cells((header, *(merged_lines(body) if merge else body)))
 
@@ -83,7 +83,7 @@ def placed_again(cells: Source, functions: Iterable[Function] = ()) -> Program:
     numbers = cells.evaluated_numbers()
     names = {name: Linear.of(name) for name, value in cells.numbers.items() if not isinstance(value, Expression)}
     forms = cells.evaluated_numbers(names)
-    converter = Loops((*(forms[size] for size in SIZES),), numbers)
+    converter = Loops((forms["width"], forms["depth"], forms["height"]), forms, numbers)
     body = merged_lines(with_joined_mirrors(converter.lines(_drawing(cells.lines)).lines))
     header = assignments(cells.lines, used_names(Source(body).walk()) | {*SIZES})
     called = [line for function in functions for line in (Comment(), function, Comment())]
@@ -115,8 +115,8 @@ def placed_function(function: Function, numbers: Mapping[str, float]) -> Functio
     """
     sizes = Linear.of("width"), Linear.of("depth"), Linear.of("height")
     low = dict(zip(BOX_IN_CELLS[:3], reversed(sizes), strict=True))
-    scope = dict(numbers) | {name: numbers[size] / -2 for name, size in zip(low, BOX_IN_CELLS[3:], strict=True)}
-    converter = Loops(sizes, scope, {name: size / -2.0 for name, size in low.items()})
+    names = {name: Linear.of(name) for name in numbers} | {name: size / -2.0 for name, size in low.items()}
+    converter = Loops(sizes, names, numbers)
     body = with_joined_mirrors(converter.lines(_drawing(function.body)).lines)
     return replace(function, parameters=function.parameters[len(BOX_IN_CELLS) :], body=body)
 

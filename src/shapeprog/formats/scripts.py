@@ -22,14 +22,13 @@ from shapeprog.language.ast import (
     Part,
     Source,
     body_of,
+    changed_values,
     names_of,
-    values,
-    with_values,
     without_double_blanks,
 )
 from shapeprog.language.convert import placed_if_possible
 from shapeprog.language.dimensions import counted_names
-from shapeprog.language.expression import Expression, Name
+from shapeprog.language.expression import Name, value_at
 from shapeprog.language.placement import LONGEST_SIDE, SIZES
 from shapeprog.language.program import Program
 from shapeprog.space import FloatArray, Frame
@@ -159,7 +158,7 @@ def _renamed(line: Line, words: dict[str, str], inner: str, boxed: bool) -> Line
     """A line with free names; ``boxed`` if it is in a box inside of the whole, whose sizes have other names."""
     scope = {name: Name(word) for name, word in words.items()}
     scope |= {size: Name(inner + size if boxed else size) for size in SIZES}
-    line = with_values(line, [v.at(scope) if isinstance(v, Expression) else v for v in values(line)])
+    line = changed_values(line, lambda value: value_at(value, scope))
     if body := body_of(line):
         below = boxed or isinstance(line, Function) or (isinstance(line, Group) and line.kind in ("inside", "divide"))
         line = replace(line, body=tuple(_renamed(inner_line, words, inner, below) for inner_line in body))  # type: ignore[arg-type]

@@ -227,37 +227,38 @@ def note_of(line: Line) -> str:
 
 def values(line: Line) -> tuple[Value, ...]:
     """The numbers and expressions on a line, in the order of its text."""
-    match line:
-        case Draw() | Loop():
-            return line.values
-        case Assignment(pairs) | Call(arguments=pairs):
-            return tuple(value for _, value in pairs)
-        case Function():
-            return tuple(default for _, default in line.parameters if default is not None)
-        case Part(keywords=keywords):
-            return tuple(_argument_values(keywords))
-        case Group(keywords=keywords, count=count):
-            return (*(() if count is None else (count,)), *_argument_values(keywords))
-        case _:
-            return ()
+    result: list[Value] = []
+
+    def noted(value: Value) -> Value:
+        result.append(value)
+        return value
+
+    changed_values(line, noted)
+    return tuple(result)
 
 
 def with_values(line: Line, new_values: Iterable[Value]) -> Line:
     """The line with other numbers and expressions, as many as :func:`values` gives."""
     new = iter(new_values)
+    return changed_values(line, lambda _: next(new))
+
+
+def changed_values(line: Line, change: Callable[[Value], Value]) -> Line:
+    """The line with a change made to each number and expression, in the order of its text."""
     match line:
         case Draw() | Loop():
-            return replace(line, values=tuple(new))
+            return replace(line, values=tuple(map(change, line.values)))
         case Assignment(pairs):
-            return replace(line, numbers=tuple((name, next(new)) for name, _ in pairs))
+            return replace(line, numbers=tuple((name, change(value)) for name, value in pairs))
         case Function(parameters=given):
-            return replace(line, parameters=tuple((name, None if v is None else next(new)) for name, v in given))
+            return replace(line, parameters=tuple((name, None if v is None else change(v)) for name, v in given))
         case Part(keywords=keywords):
-            return replace(line, keywords=_with_arguments(keywords, new))
+            return replace(line, keywords=_changed_arguments(keywords, change))
         case Call(arguments=pairs):
-            return replace(line, arguments=tuple((name, next(new)) for name, _ in pairs))
+            return replace(line, arguments=tuple((name, change(value)) for name, value in pairs))
         case Group(keywords=keywords, count=count):
-            return replace(line, count=None if count is None else next(new), keywords=_with_arguments(keywords, new))
+            count = None if count is None else change(count)
+            return replace(line, count=count, keywords=_changed_arguments(keywords, change))
         case _:
             return line
 
@@ -305,20 +306,10 @@ def without_double_blanks(lines: tuple[Line, ...]) -> tuple[Line, ...]:
     return tuple(result[:-1] if result and result[-1] == Comment() else result)
 
 
-def _argument_values(keywords: Keywords) -> Iterator[Value]:
-    for _, argument in keywords:
-        if isinstance(argument, Point):
-            yield from (value for _, value in argument.keywords)
-        elif isinstance(argument, tuple):
-            yield from argument
-        else:
-            yield argument
-
-
-def _with_arguments(keywords: Keywords, new: Iterator[Value]) -> Keywords:
+def _changed_arguments(keywords: Keywords, change: Callable[[Value], Value]) -> Keywords:
     def changed(argument: Argument) -> Argument:
         if isinstance(argument, Point):
-            return Point(tuple((word, next(new)) for word, _ in argument.keywords))
-        return (next(new), next(new)) if isinstance(argument, tuple) else next(new)
+            return Point(tuple((word, change(value)) for word, value in argument.keywords))
+        return (change(argument[0]), change(argument[1])) if isinstance(argument, tuple) else change(argument)
 
     return tuple((word, changed(argument)) for word, argument in keywords)

@@ -138,10 +138,6 @@ class Statement:
         shown = (p for p in self.parameters if not p.quantity.discrete)
         return sum(p.quantity.width for p in shown if p.unsaid is None or values[p.start] != p.unsaid)
 
-    def parameter_at(self, slot: int) -> Parameter:
-        """The parameter of a tensor slot in use."""
-        return next(p for p in self.parameters if p.start <= slot < p.start + p.quantity.width)
-
     @property
     def first(self) -> Parameter:
         """The first parameter that is written."""

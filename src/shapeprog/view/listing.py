@@ -14,8 +14,7 @@ from shapeprog.language.ast import (
     Line,
     Part,
     changed_lines,
-    values,
-    with_values,
+    changed_values,
 )
 from shapeprog.language.evaluate import provenance
 from shapeprog.language.expression import Name, Value, replaced
@@ -112,4 +111,4 @@ def _rounded(line: Line, digits: int) -> Line:
     def rounded(leaf: float | Name) -> Value:
         return leaf if isinstance(leaf, Name) else round(leaf, digits) + 0.0
 
-    return with_values(line, [replaced(value, rounded) for value in values(line)])
+    return changed_values(line, lambda value: replaced(value, rounded))

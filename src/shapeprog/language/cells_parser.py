@@ -36,7 +36,7 @@ class _Reader:
 
     def body(self, statements: Sequence[ast.stmt], depth: int = 0) -> tuple[Node, ...]:
         """The statements and loops of a block inside of ``depth`` loops."""
-        return tuple(self._node(each, depth) for each in statements if not isinstance(each, ast.Pass))
+        return tuple(self._node(node, depth) for node in statements if not isinstance(node, ast.Pass))
 
     def _node(self, node: ast.stmt, depth: int) -> Node:
         if isinstance(node, ast.For):
@@ -60,7 +60,7 @@ class _Reader:
         role = node.func.id
         if len(node.args) == 1 and isinstance(node.args[0], ast.Call) and not node.keywords:
             return role, node.args[0]
-        if role in language() and not any(isinstance(each, ast.Call) for each in node.args):
+        if role in language() and not any(isinstance(argument, ast.Call) for argument in node.args):
             return "", node
         hint = f"write {role}(box(at=(_, _, _), size=(_, _, _))), or another solid"
         raise self.text.error(node, f"{role} is a role: it takes one solid", hint)
@@ -78,19 +78,19 @@ class _Reader:
             raise self._misused(call, f"{declared.name} is a drawing statement, not a loop", declared)
         return Loop(declared.name, self._values(declared, call), self.body(node.body, depth + 1))
 
-    def _declared(self, node: ast.expr, wanted: str) -> tuple[Statement, ast.Call]:
-        """The declaration that a call names; ``wanted`` is the kind of word that fits the place."""
-        known = language()
+    def _declared(self, node: ast.expr, kind: str) -> tuple[Statement, ast.Call]:
+        """The declaration that a call names; ``kind`` is ``statement`` or ``loop``."""
+        registry = language()
         function = node.func if isinstance(node, ast.Call) else node
         if not isinstance(function, ast.Name):
-            hint = f"write the name of a {wanted} and its parameters"
-            raise self.text.error(node, f"{self.text.shown(node)} is not a {wanted}", hint)
-        if function.id not in known:
-            fitting = [declared.name for declared in known if declared.is_loop == (wanted == "loop")]
-            fitting += [] if wanted == "loop" else known.roles
+            hint = f"write the name of a {kind} and its parameters"
+            raise self.text.error(node, f"{self.text.shown(node)} is not a {kind}", hint)
+        if function.id not in registry:
+            fitting = [declared.name for declared in registry if declared.is_loop == (kind == "loop")]
+            fitting += [] if kind == "loop" else registry.roles
             hint = did_you_mean(function.id, fitting)
-            raise self.text.error(function, f"unknown {wanted} {function.id!r}", hint)
-        declared = known[function.id]
+            raise self.text.error(function, f"unknown {kind} {function.id!r}", hint)
+        declared = registry[function.id]
         if not isinstance(node, ast.Call):
             raise self._misused(node, f"{declared.name} needs parameters", declared)
         return declared, node
@@ -131,9 +131,9 @@ class _Reader:
                 hint = (axis and did_you_mean(axis, AXES)) or f"it is {parameter.quantity.range_text}"
                 raise self.text.error(node, message, hint)
             return [float(AXES.index(axis))]
-        given = [self._number(word, each) for each in (node.elts if isinstance(node, ast.Tuple) else [node])]
+        values = [self._number(word, item) for item in (node.elts if isinstance(node, ast.Tuple) else [node])]
         try:
-            return parameter.checked(declared.name, given)
+            return parameter.checked(declared.name, values)
         except ShapeProgError as mistake:
             raise self.text.error(node, mistake.message, mistake.hint) from None
 

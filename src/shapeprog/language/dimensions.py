@@ -93,9 +93,9 @@ def counted_names(source: Source) -> set[str]:
         (use, scope(use.value.name)) for use, scope in _scoped_uses(source.lines, str) if isinstance(use.value, Name)
     ]
     result: set[str] = set()
-    known = -1
-    while known < len(result):
-        known = len(result)
+    size = -1
+    while size < len(result):
+        size = len(result)
         result |= {name for use, name in names if is_count(use, result)}
     return result
 

@@ -139,10 +139,10 @@ def _ranges(program: Program, numbers: Sequence[Named]) -> dict[str, tuple[float
     Each number is changed alone, from nothing to three times its value.  The ends are values that were tried, within a
     few percent of the last good one.  A program whose parts form several groups that touch may keep as many.
     """
-    least = LEAST * (1.0 if program.unit is None else program.unit.per_cell)
+    smallest = LEAST * (1.0 if program.unit is None else program.unit.per_cell)
     searches = []
     for number in numbers:
-        size = max(abs(number.value), 1.0 if number.whole else least)
+        size = max(abs(number.value), 1.0 if number.whole else smallest)
         low = min(1.0, number.value) if number.whole else number.value - size
         ends = low, number.value + (FARTHEST - 1) * size
         searches += [_Search(number, number.value, end) for end in ends]
@@ -151,16 +151,16 @@ def _ranges(program: Program, numbers: Sequence[Named]) -> dict[str, tuple[float
         values = [[search.between(step / STEPS) for step in range(STEPS + 1)] for search in searches]
         tried = [(search.number, at) for search, row in zip(searches, values, strict=True) for at in row[1:]]
         good = iter(check(tried))
-        for place, row in enumerate(values):
+        for index, row in enumerate(values):
             results = [next(good) for _ in row[1:]]
             reached = results.index(False) if False in results else STEPS
-            searches[place] = replace(searches[place], good=row[reached], bad=row[min(reached + 1, STEPS)])
+            searches[index] = replace(searches[index], good=row[reached], bad=row[min(reached + 1, STEPS)])
         for _ in range(HALVINGS):
-            pending = [place for place, search in enumerate(searches) if search.good != search.bad]
-            tried = [(searches[place].number, searches[place].between(0.5)) for place in pending]
-            for place, (_, at), fits in zip(pending, tried, check(tried), strict=True):
-                search = searches[place]
-                searches[place] = replace(search, good=at) if fits else replace(search, bad=at)
+            pending = [index for index, search in enumerate(searches) if search.good != search.bad]
+            tried = [(searches[index].number, searches[index].between(0.5)) for index in pending]
+            for index, (_, at), fits in zip(pending, tried, check(tried), strict=True):
+                search = searches[index]
+                searches[index] = replace(search, good=at) if fits else replace(search, bad=at)
     return {low.number.name: (low.good, high.good) for low, high in zip(searches[::2], searches[1::2], strict=True)}
 
 
@@ -174,19 +174,19 @@ class _Check:
         self.groups = contact_groups(scene)[0] if program.size <= MOST else None
 
     def __call__(self, changes: Sequence[tuple[Named, float]]) -> list[bool]:
-        drawn: dict[int, Program] = {}
-        for place, (number, value) in enumerate(changes):
+        programs: dict[int, Program] = {}
+        for index, (number, value) in enumerate(changes):
             try:
                 edited = set(self.program, {number.name: value})
             except ShapeProgError:
                 continue
             if edited.size <= self.most:
-                drawn[place] = edited
+                programs[index] = edited
         results = [False] * len(changes)
-        if drawn:
-            scenes = unroll(list(drawn.values()))
-            groups = [None] * len(drawn) if self.groups is None else contact_groups(scenes)
-            for place, parts, count in zip(drawn, scenes.mask.sum(-1).tolist(), groups, strict=True):
-                whole = parts >= self.parts or changes[place][0].whole
-                results[place] = whole and (count is None or self.groups is None or count <= self.groups)
+        if programs:
+            scenes = unroll(list(programs.values()))
+            groups = [None] * len(programs) if self.groups is None else contact_groups(scenes)
+            for index, parts, count in zip(programs, scenes.mask.sum(-1).tolist(), groups, strict=True):
+                complete = parts >= self.parts or changes[index][0].whole
+                results[index] = complete and (count is None or self.groups is None or count <= self.groups)
         return results

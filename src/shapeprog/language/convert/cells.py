@@ -61,8 +61,8 @@ def call_in_cells(source: Source, name: str, numbers: Mapping[str, float]) -> tu
     """
     inner = {word: f"own {word}" for word in numbers}  # which the program does not use itself
     up, depth, side, *sizes = (Name(inner[word]) for word in BOX_IN_CELLS)
-    place = {"bottom": up, "y": depth + sizes[1] / 2.0, "x": -(side + sizes[2] / 2.0)}
-    keywords = {word: Name(inner[word]) for word in numbers if word not in BOX_IN_CELLS[:3]} | place
+    corner = {"bottom": up, "y": depth + sizes[1] / 2.0, "x": -(side + sizes[2] / 2.0)}
+    keywords = {word: Name(inner[word]) for word in numbers if word not in BOX_IN_CELLS[:3]} | corner
     header = Assignment((*((size, 1.0) for size in SIZES), *((inner[word], numbers[word]) for word in numbers)))
     call = Call(name, tuple(keywords.items()))
     placed = Source((header, *source.functions.values(), call), scale=Scale(1.0, 0.0))

@@ -167,7 +167,7 @@ def frame_of_grid(text: Frame, scale: Scale) -> Frame:
 
 def scale_of(program: Program) -> Scale:
     """How x, y, z of a text lie in the grid; statements in cells have their origin in the middle of it."""
-    return program.scale or Scale(1.0 if program.unit is None else 1 / program.unit.per_cell, 0.0)
+    return program.scale or Scale(1.0, 0.0)
 
 
 def frame_comment(frame: Frame | None, program: Program) -> str:

@@ -223,6 +223,7 @@ class _Reader(Reader):
             if word not in allowed:
                 hint = did_you_mean(word, allowed, f"possible are {', '.join(dict.fromkeys(allowed))}")
                 hint = f"write last=at({word}=...)" if kind == "row" and word in POINT else hint
+                hint = "keywords place a part, such as leg(left=0, width=2)" if word in _IN_CELLS else hint
                 raise self.error(keyword, f"unknown keyword {word!r}", hint)
             self.require(word not in result, keyword, f"{word!r} is given twice", "keep one of them")
             places[word] = keyword

@@ -25,9 +25,9 @@ Chain = tuple[Node, ...]
 class Program:
     """A shape as a list of drawing statements and loops, in the order they are written.
 
-    Where its text has named numbers, expressions or functions, ``source`` is that text and ``body`` its value:
-    see :func:`shapeprog.language.evaluate.evaluated`, which makes such programs.  Functions of shapes use the
-    body alone; a program made from another body is plain.
+    If its parts are placed, ``source`` is its text and ``body`` the value of that: see
+    :func:`shapeprog.language.evaluate.evaluated`, which makes such programs.  Functions of shapes use the body alone; a
+    program of statements in cells has no source.
     """
 
     body: tuple[Node, ...] = ()

@@ -56,8 +56,9 @@ def test_no_number_moves_far_and_no_copy_of_a_loop(seed: int, unit: Unit) -> Non
         reject()
     moved = in_readable_unit(program, unit)
     assert moved.unit == unit
-    farthest = TOLERANCES[0] + 1e-3  # six digits of an unrounded number, times the copies
-    assert (unroll(program).centre - unroll(moved).centre).abs().max() <= farthest
+    centre = unroll(program).centre
+    farthest = TOLERANCES[0] + 1e-3 + 5e-6 * float(centre.abs().max())  # numbers that stay unrounded have six digits
+    assert (centre - unroll(moved).centre).abs().max() <= farthest
 
 
 @pytest.mark.parametrize("unit", [Unit("", 0.0375), Unit("cm", 3.75), Unit("in", 1.476)])

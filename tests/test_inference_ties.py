@@ -18,6 +18,7 @@ from shapeprog.evaluation.editing import edit_scores
 from shapeprog.geometry.mesh import pieces, union_mesh
 from shapeprog.inference.fit.joints import Joints
 from shapeprog.inference.surface.evidence import evidence_of_program
+from shapeprog.inference.ties import tying
 from shapeprog.inference.ties.anchored import Anchored
 from shapeprog.inference.ties.anchors import AnchorSettings, anchors_of
 from shapeprog.inference.ties.closeness import Closeness
@@ -29,7 +30,7 @@ from shapeprog.inference.ties.model import Model
 from shapeprog.inference.ties.pricing import worthwhile
 from shapeprog.inference.ties.relations import Relation
 from shapeprog.inference.ties.tying import tie
-from shapeprog.language.ast import Assignment
+from shapeprog.language.ast import Assignment, Comment, Fault
 from shapeprog.language.convert import placed
 from shapeprog.language.evaluate import evaluated
 from shapeprog.language.free import free_numbers, free_values, multiplied, numbers
@@ -630,3 +631,18 @@ back(left=1.5, right=1.48, rear=1.5, depth=1, bottom=16, height=4)
     assert not any("2" in name for name in named)
     assert "seat_height" not in named  # of a seat that is the height of its upper side
     assert "seat_thickness" not in named or "seat(" in text
+
+
+def test_a_program_that_cannot_be_drawn_is_tied_for_less(monkeypatch):
+    program, prices = sp.parse(TABLE), list[float]()
+    tied_at = tying._Ties.tied
+
+    def tied(ties: tying._Ties, price: float) -> Program:
+        prices.append(price)
+        if len(prices) == 1:
+            raise Fault(Comment(""), "start and end are the same point", "move one of them")
+        return tied_at(ties, price)
+
+    monkeypatch.setattr(tying._Ties, "tied", tied)
+    assert tie(program, evidence_of_program(program)).free < 20
+    assert prices[1] == prices[0] / tying.CHEAPER

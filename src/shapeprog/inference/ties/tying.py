@@ -30,7 +30,7 @@ from shapeprog.inference.ties.model import Misfit, Model
 from shapeprog.inference.ties.pricing import worthwhile
 from shapeprog.inference.ties.relations import Relation, Trust, relations
 from shapeprog.inference.ties.text import written
-from shapeprog.language.ast import Part
+from shapeprog.language.ast import Fault, Part
 from shapeprog.language.convert import placed
 from shapeprog.language.evaluate import evaluated
 from shapeprog.language.free import free_numbers
@@ -108,14 +108,18 @@ def tie(
         assert source is not None
         ties = _Ties(Layout(source), evidence, seed, known=known, held=held)
         price *= KNOWN_PRICE if known else PRICE
-        tied = ties.tied(price)
-        if not known:
-            closeness = Closeness(evidence, seed)
-            before, floating = closeness.of(unroll(plain)), afloat(plain, seed, APART)
-            for attempt in range(1, ATTEMPTS):
-                if before - closeness.of(unroll(tied)) <= LOST and afloat(tied, seed, APART) <= floating:
-                    break
+        closeness = None if known else Closeness(evidence, seed)
+        before, floating = (closeness.of(unroll(plain)), afloat(plain, seed, APART)) if closeness else (0.0, 0)
+        tied = evaluated(source)
+        for attempt in range(ATTEMPTS):
+            try:
                 tied = ties.tied(price / CHEAPER**attempt)
+            except Fault:  # relations left a part without length
+                continue
+            if closeness is None:
+                break
+            if before - closeness.of(unroll(tied)) <= LOST and afloat(tied, seed, APART) <= floating:
+                break
         if progress:
             progress("tying numbers", 1.0)
     return Tied(tied, free_numbers(tied))

@@ -24,8 +24,7 @@ from scipy.spatial import cKDTree
 from shapeprog.geometry.cells import iou, rasterise, voxels
 from shapeprog.geometry.distance import each_distance, signed_distance
 from shapeprog.geometry.losses import chamfer, coverage
-from shapeprog.geometry.primitive import primitives
-from shapeprog.geometry.primitives import built_in_names
+from shapeprog.geometry.primitives import KINDS
 from shapeprog.geometry.scene import Scene
 from shapeprog.geometry.surface import sample_surface
 from shapeprog.language import Code, Draw, Loop, Program, encode, unroll
@@ -116,7 +115,7 @@ def turned(name: str, count: int, seed: int = 0, batch: int = 1) -> tuple[Scene,
     leaves.append(torch.linalg.qr(torch.randn(batch, count, 3, 3, generator=g))[0])
     leaves = [leaf.requires_grad_() for leaf in leaves]
     none = torch.zeros(batch, count, dtype=torch.long)
-    return Scene(none + primitives.kind(name), *leaves, none == 0, none, none, none), leaves
+    return Scene(none + KINDS[name], *leaves, none == 0, none, none, none), leaves
 
 
 # ---------------------------------------------------------------- rows
@@ -150,7 +149,7 @@ def _slices(scene: Scene) -> np.ndarray:
     cells = np.zeros((len(scene), 32, 32, 32), np.uint8)
     ticks = np.arange(32) - 15.5
     kind, size, centre, mask = (t.numpy() for t in (scene.kind, scene.size, scene.centre, scene.mask))
-    box, turned = primitives.kind("cuboid"), np.abs(scene.rotation.numpy())
+    box, turned = KINDS["cuboid"], np.abs(scene.rotation.numpy())
     for b, n in zip(*np.nonzero(mask), strict=True):
         half = turned[b, n] @ (size[b, n, :3] if kind[b, n] == box else size[b, n, [0, 1, 1]])
         low = np.clip(np.rint(centre[b, n] - half) + 16, 0, 32).astype(int)
@@ -253,7 +252,7 @@ def bench_primitives(batch: int) -> None:
     """What each built-in primitive costs beside the cuboid, in scenes of 20 turned ones."""
     target = torch.rand(batch, POINTS, 3, generator=torch.Generator().manual_seed(1)) * 24 - 12
     cuboid: dict[str, Time] = {}
-    for name in sorted(built_in_names(), key=lambda one: one != "cuboid"):
+    for name in sorted(KINDS, key=lambda one: one != "cuboid"):
         scene, leaves = turned(name, 20, batch=batch)
 
         def surface(scene: Scene = scene) -> torch.Tensor:

@@ -142,7 +142,7 @@ def solid_overlaps(planted: Any, found: Any) -> Any:
     import torch
 
     from shapeprog.geometry.distance import each_distance
-    from shapeprog.geometry.primitive import primitives
+    from shapeprog.geometry.primitives import primitives
 
     def volumes(scene: Any) -> Any:
         volume = torch.zeros(len(scene.mask), dtype=torch.float64)

@@ -1,23 +1,20 @@
-"""Scenes for the tests of geometry, and a primitive of a user's own."""
+"""Scenes for the tests of geometry."""
 
 import dataclasses
 import itertools
-from contextlib import contextmanager
 
 import numpy as np
-import pytest
 import torch
 
-from shapeprog.geometry.primitive import Primitive, primitives, safe_norm
-from shapeprog.geometry.primitives import BUILT_IN, built_in_names
+from shapeprog.geometry.primitives import KINDS
 from shapeprog.geometry.scene import Scene
 from shapeprog.space import HALF, Frame
 
-NAMES = tuple(primitive.name for primitive in BUILT_IN)
+NAMES = tuple(KINDS)
 
 
 def make_scene(kinds, sizes, centres, rotation=None, dtype=torch.float32, lead=()):
-    kind = torch.tensor([primitives.kind(k) if isinstance(k, str) else k for k in kinds], dtype=torch.long)
+    kind = torch.tensor([KINDS[name] for name in kinds], dtype=torch.long)
     count = len(kinds)
     size = torch.zeros(count, 4, dtype=dtype)
     for row, values in enumerate(sizes):
@@ -29,16 +26,14 @@ def make_scene(kinds, sizes, centres, rotation=None, dtype=torch.float32, lead=(
     return Scene(*(part.expand(*lead, *part.shape) for part in parts))
 
 
-def random_scene(seed, lead=(), slots=5, dtype=torch.float32, user=False, names=NAMES):
+def random_scene(seed, lead=(), slots=5, dtype=torch.float32, names=NAMES):
     """Primitives of these names, turned and upright, sheared and rounded ones among them; the last slot is padding."""
     g = torch.Generator().manual_seed(seed)
-    kinds = torch.tensor([*map(primitives.kind, names), *([ellipsoid_kind()] if user else [])])
+    kinds = torch.tensor([KINDS[name] for name in names])
     kind = kinds[torch.randint(0, len(kinds), (*lead, slots), generator=g)]
-    if user:
-        kind[..., 0] = ellipsoid_kind()
     size = torch.rand(*lead, slots, 4, generator=g, dtype=torch.float64) * 4 + 0.5
     size[..., 3] = torch.where(torch.rand(*lead, slots, generator=g) < 0.5, size[..., 3] - 2, 0)
-    lean, radius = (kind == primitives.kind(name) for name in ("cuboid", "rounded_box"))
+    lean, radius = (kind == KINDS[name] for name in ("cuboid", "rounded_box"))
     size[..., 3] = torch.where(radius, size[..., 3].abs(), size[..., 3] * lean)
     centre = torch.rand(*lead, slots, 3, generator=g, dtype=torch.float64) * 16 - 8
     rotation = torch.linalg.qr(torch.randn(*lead, slots, 3, 3, generator=g, dtype=torch.float64))[0]
@@ -60,92 +55,10 @@ def with_leaves(scene):
     return require(scene, size=leaves[0], centre=leaves[1], rotation=leaves[2]), leaves
 
 
-# ---------------------------------------------------------------- a primitive as a user would declare it
-
-
-def _ellipsoid_distance(points, size):
-    """Along the ray through the centre; exact for a ball."""
-    radii = size[..., :3].clamp(min=1e-6)
-    length = safe_norm(((points / radii) ** 2).sum(-1))
-    slope = safe_norm(((points / radii**2) ** 2).sum(-1))
-    deep = -radii.amin(-1)
-    return torch.where(length > 1e-6, length * (length - 1) / slope.clamp(min=1e-12), deep)
-
-
-def _ball_mesh(size):
-    import trimesh
-
-    ball = trimesh.creation.icosphere(subdivisions=3)
-    return np.asarray(ball.vertices) * size[:3], np.asarray(ball.faces, np.int64)
-
-
-def _on_ball(size, face, u):
-    side = 2 * u[..., 0] - 1
-    angle = 2 * torch.pi * u[..., 1]
-    ring = (1 - side**2).clamp(min=0).sqrt()
-    return torch.stack([side, ring * angle.cos(), ring * angle.sin()], -1)
-
-
-def _ball_normal(size, unit, face):
-    normal = unit / size[..., :3].clamp(min=1e-6)
-    return normal / safe_norm((normal**2).sum(-1, keepdim=True))
-
-
 def cell_centres(resolution=32):
     """Centres (R, R, R, 3) of all cells in the grid frame."""
     ticks = (torch.arange(resolution) + 0.5) * 32 / resolution - 16
     return torch.stack(torch.meshgrid(ticks, ticks, ticks, indexing="ij"), -1)
-
-
-def ellipsoid_kind():
-    """Index of the test's ellipsoid, declared on first use."""
-    name = "test_ellipsoid"
-    if name not in primitives.names:
-        primitives.register(
-            Primitive(
-                name, ("r_up", "r_depth", "r_side"), 3,
-                distance=_ellipsoid_distance,
-                bound=lambda size: size[..., :3],
-                areas=lambda size: 4 * torch.pi * (size[..., :3].prod(-1, keepdim=True).clamp(min=0)) ** (2 / 3),
-                sample=_on_ball,
-                place=lambda size, unit: size[..., :3] * unit,
-                normal=_ball_normal,
-                mesh=_ball_mesh,
-                volume=lambda size: 4 / 3 * torch.pi * size[..., :3].prod(-1),
-            )
-        )  # fmt: skip
-    return primitives.kind(name)
-
-
-@pytest.fixture(autouse=True, params=["as registered", "the other way round"])
-def any_order(request):
-    """Every law holds whatever number a primitive has; import this fixture to have it so."""
-    with primitives_restored():
-        if request.param == "as registered":
-            yield
-        else:
-            with primitives_in_another_order():
-                yield
-
-
-@contextmanager
-def primitives_restored():
-    """Forget afterwards what was declared inside, so that no other test sees it."""
-    with primitives.using(built_in_names()):
-        yield
-
-
-@contextmanager
-def primitives_in_another_order():
-    """The built-in primitives as if they had been registered the other way round."""
-    known, names = list(primitives._kinds), dict(primitives.names)
-    primitives._kinds[: len(BUILT_IN)] = reversed(BUILT_IN)
-    primitives.names.update({name: len(BUILT_IN) - 1 - names[name] for name in built_in_names()})
-    try:
-        yield
-    finally:
-        primitives._kinds[:] = known
-        primitives.names.update(names)
 
 
 def write_binvox(path, voxels, frame=None):

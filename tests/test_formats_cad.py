@@ -23,11 +23,7 @@ from shapeprog.formats.build123d import script_text
 from shapeprog.formats.cuts import cut_list
 from shapeprog.formats.frames import placement
 from shapeprog.formats.openscad import scad_text
-from shapeprog.geometry.primitive import Primitive, primitives
-from shapeprog.language import Language, statement, using
-from shapeprog.language.parameters import Extent, Position
 from shapeprog.language.parser import parse
-from shapeprog.language.shapes import solid as draw_solid
 from shapeprog.space import Frame, grid_axes
 
 FORMS = """
@@ -205,44 +201,6 @@ def test_words_of_a_script_are_no_names_of_numbers(tmp_path: Path):
     ast.parse(script)
     if shutil.which("openscad"):
         same(of_openscad(scad, tmp_path), of_meshes(program, FRAME))
-
-
-@pytest.fixture
-def own():
-    """A program with a statement of a user's own, whose primitive is not built in."""
-
-    def mesh(size):
-        sphere = trimesh.creation.icosphere(1)
-        return np.asarray(sphere.vertices) * size[:3], np.asarray(sphere.faces)
-
-    unused = {"distance": lambda points, size: points[..., 0], "areas": lambda size: size[..., :1]}
-    unused |= {"sample": lambda size, face, u: u, "place": lambda size, unit: unit}
-    unused |= {"normal": lambda size, unit, f: unit, "volume": lambda size: size[..., 0]}
-    with using(Language()):
-        ball = primitives.register(
-            Primitive("test_ball", ("a", "b", "c"), 3, bound=lambda size: size[..., :3], mesh=mesh, **unused)
-        )
-
-        @statement("puff")
-        def puff(at: Position, half: Extent):
-            """A soft cushion."""
-            return draw_solid(ball, at, *half.unbind(-1))
-
-        yield parse("puff(at=(3, 0, 0), half=(2, 5, 6))\npuff(at=(-4, 1, 5), half=(2, 1, 1))\n")
-
-
-def test_what_cannot_be_placed_is_a_mesh(own, tmp_path: Path):
-    frame = upright(own)
-    scad, script = scad_text(own, frame), script_text(own, frame)
-    assert 'painted("puff") polyhedron(' in scad
-    assert 'mesh("puff", ' in script
-    ast.parse(script)
-    wanted = of_meshes(own, frame)
-    assert min(row[2] for row in wanted) == pytest.approx(0, abs=1e-6)
-    if shutil.which("openscad"):
-        same(of_openscad(scad, tmp_path), wanted)
-    if importlib.util.find_spec("build123d"):
-        same(of_build123d(script), wanted)
 
 
 def read_3mf(path: Path):

@@ -204,9 +204,9 @@ def test_limits_are_placed_with_the_same_gradient_by_kernel_and_by_declaration(n
     scene, leaves = with_leaves(make_scene([name], [size], [[0.1, 0.2, -0.3]], dtype=torch.float64, lead=(1,)))
     areas = room.face_areas(scene)
     table = table_of(scene)
-    choice = room.visible_by_kernel(table, room.area_shares(areas.detach(), scene), 200, 5)
+    choice = room.visible(table, room.area_shares(areas.detach(), scene), 200, 5)
     weigh = cloud(200)[None]
-    fast, slow = room._Placed.apply(*leaves, areas, table, choice)[0], room.place(scene, areas, choice)[0]
+    fast, slow = room._Placed.apply(*leaves, areas, table, choice)[0], twins.place(scene, areas, choice)[0]
     torch.testing.assert_close(fast, slow)
     lengths = (torch.tensor([*size, 0.0])[:4] > 0).nonzero()[:, 0]
     got, expected = (torch.autograd.grad(each, leaves[0], weigh)[0][..., lengths] for each in (fast, slow))

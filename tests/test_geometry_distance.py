@@ -1,14 +1,11 @@
 import pytest
 import torch
-from geometry_helpers import any_order as any_order
-from geometry_helpers import ellipsoid_kind, make_scene, random_scene, require, with_leaves
+from geometry_helpers import make_scene, random_scene, require, with_leaves
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from shapeprog.geometry import distance as room
 from shapeprog.geometry.batch import Batch
 from shapeprog.geometry.distance import each_distance, nearest_primitive, projected, signed_distance
-from shapeprog.geometry.primitive import primitives
 
 
 def cloud(seed, count=200, lead=(), dtype=torch.float64, reach=12):
@@ -31,19 +28,14 @@ def test_the_union_is_the_nearest_of_all_primitives_with_the_same_gradient(seed)
         torch.testing.assert_close(got, expected, rtol=1e-7, atol=1e-9)
 
 
-@pytest.mark.parametrize("user", [False, True])
-def test_the_way_without_kernels_is_the_same(user):
-    scene = random_scene(5, lead=(2,), slots=6, user=user)
+def test_the_nearest_primitive_is_that_of_all_pairs():
+    scene = random_scene(5, lead=(2,), slots=6)
     points = cloud(0, lead=(2,), dtype=torch.float32)
     expected = each_distance(scene, points).min(-1)
     torch.testing.assert_close(signed_distance(scene, points), expected.values, rtol=1e-5, atol=1e-5)
-    torch.testing.assert_close(room.gathered_distance(scene, points), expected.values, rtol=1e-5, atol=1e-5)
     slot, value = nearest_primitive(scene, points)
     torch.testing.assert_close(value, expected.values, rtol=1e-5, atol=1e-5)
     assert (slot == expected.indices).double().mean() > 0.99
-    slot, value = room.nearest(scene, points)
-    assert (slot == expected.indices).all()
-    torch.testing.assert_close(value, expected.values)
 
 
 def test_known_distances_of_a_box_a_cylinder_and_a_sheared_board():
@@ -119,18 +111,6 @@ def test_empty_scenes_are_infinitely_far_away():
     assert signed_distance(nothing, torch.zeros(4, 3)).isinf().all()
 
 
-def test_a_user_primitive_has_gradients_on_every_path():
-    scene, leaves = with_leaves(
-        make_scene([ellipsoid_kind(), "cuboid"], [[3.0, 3, 3], [1, 1, 1]], [[0.0, 0, 0], [6, 0, 0]])
-    )
-    points = torch.tensor([[0.0, 5, 0], [9, 0, 0], [4.2, 0, 0]])
-    found = signed_distance(scene, points)
-    assert found.tolist() == pytest.approx([2, 2, 0.8])
-    size = torch.autograd.grad(found.sum(), leaves)[0]
-    torch.testing.assert_close(size[0, 1], torch.tensor(-1.0))
-    assert len(primitives) > 2
-
-
 def test_points_end_between_two_primitives_where_the_gap_is_narrow():
     scene = make_scene(["cuboid", "cuboid"], [[1, 1, 1], [1, 1, 1]], [[0, 0, 0], [0, 0, 5]], dtype=torch.float64)
     points = torch.tensor([[0.5, 0.2, -3.0], [4.0, 0, 3], [0, 0, 0.5]], dtype=torch.float64)
@@ -151,9 +131,13 @@ def test_projections_are_the_same_by_kernel_and_by_declaration(seed):
     scene, points = random_scene(seed, (40,), slots=3, dtype=torch.float64), cloud(seed, 40)
     pairs = Batch(*(part[:, :2] for part in (scene.kind, scene.size, scene.centre, scene.rotation, scene.mask)))
     moved = projected(pairs, points, 4)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(room, "by_kernel", lambda _: False)
-        torch.testing.assert_close(moved, projected(pairs, points, 4), rtol=0, atol=1e-9)
+    first, second = (Batch(*(part[:, slot : slot + 1] for part in vars(pairs).values())) for slot in range(2))
+    for batch in 4 * (second, first):
+        at = points[:, None].detach().requires_grad_()
+        value = signed_distance(batch, at)
+        (slope,) = torch.autograd.grad(value.sum(), at)
+        points = (at - value.clamp(min=0)[..., None] * slope)[:, 0].detach()
+    torch.testing.assert_close(moved, points, rtol=0, atol=1e-9)
 
 
 def pairs_of(scene, count):

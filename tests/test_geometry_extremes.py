@@ -14,7 +14,6 @@ from hypothesis import strategies as st
 from shapeprog import export, parse
 from shapeprog.errors import ShapeProgError
 from shapeprog.formats.format import suffixes
-from shapeprog.geometry import surface
 from shapeprog.geometry.cells import rasterise
 from shapeprog.geometry.distance import each_distance, nearest_primitive, signed_distance
 from shapeprog.geometry.mesh import part_meshes
@@ -88,10 +87,8 @@ def test_solids_far_apart_find_the_nearer_one(name):
     torch.testing.assert_close(distances / 1e20, torch.tensor([2.0, 1, 0.5], dtype=torch.float64))
 
 
-@pytest.mark.parametrize("by_kernel", [True, False])
 @pytest.mark.parametrize("far", [2e18, 1e30, float("inf"), float("nan")])
-def test_points_that_leave_single_precision_are_refused(monkeypatch, far, by_kernel):
-    monkeypatch.setattr(surface, "by_kernel", lambda batch: by_kernel)
+def test_points_that_leave_single_precision_are_refused(far):
     scene = make_scene(["cuboid"] * 2, [[1.0, 1, 1]] * 2, [[0.0, 0, 0], [0, far, 0]])
     with pytest.raises(ShapeProgError, match="farther than 1e\\+18 cells"):
         sample_surface(scene, 50)

@@ -1,8 +1,6 @@
 import torch
-from geometry_helpers import any_order as any_order
-from geometry_helpers import cell_centres, ellipsoid_kind, make_scene, random_scene, with_leaves
+from geometry_helpers import make_scene, random_scene, with_leaves
 
-from shapeprog.geometry.cells import voxels
 from shapeprog.geometry.distance import each_distance
 from shapeprog.geometry.losses import coverage, excess
 from shapeprog.language import Draw, Loop, Program, unroll
@@ -54,15 +52,3 @@ def test_a_loop_equals_its_copies_on_every_path():
     assert (one.voxels() == two.voxels()).all()
     g = [torch.Generator().manual_seed(1) for _ in range(2)]
     torch.testing.assert_close(one.sample(50, g[0]), two.sample(50, g[1]))
-
-
-def test_a_user_primitive_fills_the_cells_it_contains():
-    scene = make_scene([ellipsoid_kind(), "cuboid"], [[5.0, 5, 5], [1, 1, 1]], [[1.0, 2, 0], [-12, -12, -12]])
-    batch = type(scene)(**{name: t.expand(2, *t.shape) for name, t in vars(scene).items()})
-    for resolution in (20, 32):
-        inside = each_distance(scene, cell_centres(resolution).reshape(-1, 3))[:, 0] <= 0
-        cells = voxels(batch, resolution)
-        assert (cells[0] == cells[1]).all()
-        ball = cells[0].bool() & (cell_centres(resolution)[..., 0] > -8)
-        assert (ball.flatten() == inside).all()
-    assert cells[0].sum() == inside.sum() + 8

@@ -4,20 +4,14 @@ import numpy as np
 import pytest
 import torch
 import trimesh
-from geometry_helpers import ellipsoid_kind, make_scene, primitives_restored, random_scene
+from geometry_helpers import make_scene, random_scene
 
 import shapeprog as sp
 from shapeprog.data.random import random_program
 from shapeprog.errors import ShapeProgError
 from shapeprog.geometry.contacts import contact_groups
 from shapeprog.geometry.mesh import gaps, part_meshes, union_mesh
-from shapeprog.geometry.primitive import primitives
-
-
-@pytest.fixture(autouse=True)
-def restored():
-    with primitives_restored():
-        yield
+from shapeprog.geometry.primitives import primitives
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -91,11 +85,6 @@ def test_parts_without_thickness_have_no_mesh(kind, size):
 def test_a_thin_ring_has_a_mesh_though_it_fills_little_of_its_box():
     (part,) = part_meshes(make_scene(["arc"], [[1.0, 0.002, 20]], [[0.0, 0, 0]]))
     assert trimesh.Trimesh(part.vertices, part.faces).volume > 0
-
-
-def test_a_user_primitive_is_meshed():
-    scene = make_scene([ellipsoid_kind(), "cuboid"], [[3.0, 2, 1], [1, 1, 1]], [[0.0, 0, 0], [2, 0, 0]])
-    assert trimesh.Trimesh(*union_mesh(scene)).is_watertight
 
 
 def groups(scene, within):

@@ -5,7 +5,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from shapeprog.errors import ShapeProgError
-from shapeprog.geometry import nearest as room
 from shapeprog.geometry.losses import chamfer
 from shapeprog.geometry.nearest import mean_squared_distances, nearest, squared_distance
 
@@ -60,13 +59,6 @@ def test_leading_dimensions_and_directions(lead):
     torch.testing.assert_close(to_target + from_target, chamfer(one, two))
     flat = [twins.nearest_squared(a, b).mean() for a, b in zip(one.view(-1, 50, 3), two.view(-1, 40, 3), strict=True)]
     torch.testing.assert_close(to_target.reshape(-1), torch.stack(flat))
-
-
-def test_the_way_without_a_kernel_finds_the_same(monkeypatch):
-    one, two = clouds(0, 90, 80)
-    expected = nearest(one, two)
-    monkeypatch.setattr(room, "AT_ONCE", 1000)
-    assert (room.neighbours(one[None], two[None])[0] == expected).all()
 
 
 def test_weights_shift_the_mean_and_carry_gradient():

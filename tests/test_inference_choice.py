@@ -12,6 +12,8 @@ import torch
 from shapeprog.data.placement import shape_from_mesh, shape_from_points, shape_from_voxels
 from shapeprog.data.sampling import sample_surface
 from shapeprog.data.shape import Shape
+from shapeprog.geometry.batch import Batch
+from shapeprog.geometry.distance import each_distance
 from shapeprog.geometry.mesh import union_mesh
 from shapeprog.inference.choice.choice import Choice, choose, explained, value
 from shapeprog.inference.choice.coverage import (
@@ -19,14 +21,12 @@ from shapeprog.inference.choice.coverage import (
     Prices,
     covers,
     explains,
-    explains_twin,
     holds,
-    holds_twin,
     pack,
     shares,
     shares_twin,
 )  # fmt: skip
-from shapeprog.inference.choice.coverage_kernels import TURNED
+from shapeprog.inference.choice.coverage_kernels import LIFT, TURNED
 from shapeprog.inference.surface import evidence as seen
 from shapeprog.inference.surface.evidence import Evidence, evidence_of
 from shapeprog.language.parser import parse
@@ -217,9 +217,34 @@ def test_a_choice_goes_on_from_where_it_is_told_to():
 # ---------------------------------------------------------------- kernels and their twins
 
 
-@pytest.mark.parametrize("user", [False, True])
-def test_points_explained_and_held_are_those_of_the_declarations(user):
-    scene = random_scene(7, lead=(6,), user=user)
+def single(scene, element, slot):
+    """One primitive of a batch in double precision."""
+    part = scene[element : element + 1]
+    fields = (each[:, slot : slot + 1] for each in (part.kind, part.size, part.centre, part.rotation, part.mask))
+    return Batch(*(each.double() if each.is_floating_point() else each for each in fields))
+
+
+def explains_twin(scene, points, normals, tolerance, agreement):
+    """The normal of a surface is the slope of its distance."""
+    found = torch.zeros(len(scene), len(points), dtype=torch.bool)
+    unknown = normals.norm(dim=1) < 0.5
+    for element, slot in scene.mask.nonzero().tolist():
+        part, above = single(scene, element, slot), (points + LIFT * normals).requires_grad_()
+        (slope,) = torch.autograd.grad(each_distance(part, above).sum(), above)
+        fits = ((slope * normals).sum(1).abs() >= agreement) | unknown
+        found[element] |= (each_distance(part, points)[0, :, 0].abs() <= tolerance) & fits
+    return found
+
+
+def holds_twin(scene, points, depth):
+    found = torch.zeros(len(scene), len(points), dtype=torch.bool)
+    for element, slot in scene.mask.nonzero().tolist():
+        found[element] |= each_distance(single(scene, element, slot), points)[0, :, 0] < -depth
+    return found
+
+
+def test_points_explained_and_held_are_those_of_the_declarations():
+    scene = random_scene(7, lead=(6,))
     random = np.random.default_rng(0)
     points = random.uniform(-13, 13, (3000, 3))
     normals = random.normal(size=(3000, 3))

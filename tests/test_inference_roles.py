@@ -7,7 +7,7 @@ import pytest
 import torch
 
 import shapeprog as sp
-from shapeprog.geometry.primitive import primitives
+from shapeprog.geometry.primitives import primitives
 from shapeprog.inference.roles import roles
 from shapeprog.inference.roles.roles import in_order, with_roles
 from shapeprog.language.hints import Box, straight_bar, upright_box

@@ -13,8 +13,7 @@ from declared import MODULES
 from shapeprog.data.random import random_program
 from shapeprog.errors import DeclarationError, InputError, ShapeProgError
 from shapeprog.formats.plugins import load_statements
-from shapeprog.geometry import Primitive, Solids, primitives
-from shapeprog.geometry.primitives import built_in_names
+from shapeprog.geometry import Solids
 from shapeprog.language import Language, decode, encode, loop, standard, statement, unroll, using
 from shapeprog.language.parameters import Count, Extent, Length, Position, Quantity, Shift3
 from shapeprog.language.parser import parse
@@ -145,51 +144,25 @@ def test_bad_loops_are_refused(function: Callable[..., Any], words: str) -> None
         loop("still")(function)
 
 
-def test_bad_primitives_are_refused() -> None:
-    known = primitives[0]
-    with pytest.raises(DeclarationError, match="declared twice"):
-        primitives.register(known)
-    words = {field: getattr(known, field) for field in known.__dataclass_fields__}
-    with pytest.raises(DeclarationError, match="5 sizes"):
-        primitives.register(Primitive(**{**words, "name": "big", "sizes": ("a",) * 5}))
-    for field, wrong, said in [
-        ("distance", lambda points, size: points, "distance of primitive 'big' returns shape"),
-        ("areas", lambda size: size[..., 0], "areas of primitive 'big' returns shape"),
-        ("sample", lambda size, face: size, "sample of primitive 'big' fails: .*positional"),
-        ("mesh", lambda size: 1 / 0, "mesh of primitive 'big' fails: division by zero"),
-    ]:
-        with pytest.raises(DeclarationError, match=said):
-            primitives.register(Primitive(**{**words, "name": "big", field: wrong}))
-    with pytest.raises(DeclarationError, match="known: arc, cuboid, cylinder"):
-        primitives.kind("sphere")
-
-
 @pytest.mark.parametrize("module", MODULES, ids=lambda path: path.stem)
 def test_the_examples_declare_in_at_most_15_lines(module: Path) -> None:
     text = module.read_text()
     declaration = text[text.index("@statement") :]
     assert len(declaration.strip().splitlines()) <= 15
-    if "primitives.register" in text:
-        register = text[text.index("= primitives.register") : text.index("@statement")]
-        assert len(register.strip().splitlines()) <= 15
 
 
 def test_modules_load_into_any_language_once(empty: Language) -> None:
-    assert set(primitives.names) == set(built_in_names())
     for module in MODULES:
         first = load_statements(module)
         assert load_statements(str(module)) == first
         assert all(empty[declared.name] is declared for declared in first)
     assert sorted(empty.names) == ["arch", "bolster", "cone_leg", "pouf"]
-    assert primitives[primitives.kind("capsule")].name == "capsule"
-    with using(Language()), pytest.raises(DeclarationError, match="unknown primitive 'capsule'"):
-        primitives.kind("capsule")
     program = random_program(torch.Generator().manual_seed(0))
     assert parse(format_program(program)) == program
 
 
 CRATE = '''
-from shapeprog.geometry import Solids, primitives
+from shapeprog.geometry import Solids
 from shapeprog.language import statement
 from shapeprog.language.parameters import Extent, Position
 from shapeprog.language.shapes import box
@@ -200,15 +173,13 @@ def crate(at: Position, size: Extent) -> Solids:
     return box(at, size)
 '''
 
-TWIN = "\nimport dataclasses\nprimitives.register(dataclasses.replace(primitives[0], name='twin'))\n"
-
 
 @pytest.mark.parametrize(
     ("code", "words"),
     [
         ("1 / 0", r"bad.py, line 1: ZeroDivisionError: division by zero"),
-        (f"{CRATE}{TWIN}1 / 0", r"bad.py, line 14: ZeroDivisionError"),
-        (f"{CRATE}{TWIN}raise SystemExit(3)", r"line 14: SystemExit: 3"),
+        (f"{CRATE}1 / 0", r"bad.py, line 11: ZeroDivisionError"),
+        (f"{CRATE}raise SystemExit(3)", r"line 11: SystemExit: 3"),
         (f"{CRATE}{CRATE}", r"line 1[78]: statement 'crate' is declared twice"),
         ("def (", r"line 1: SyntaxError"),
         ("import no_such_module_anywhere", r"line 1: ModuleNotFoundError"),
@@ -217,12 +188,11 @@ TWIN = "\nimport dataclasses\nprimitives.register(dataclasses.replace(primitives
     ],
 )
 def test_failing_modules_leave_nothing(empty: Language, tmp_path: Path, code: str, words: str) -> None:
-    solids = dict(primitives.names)
     path = tmp_path / "bad.py"
     path.write_text(code)
     with pytest.raises(DeclarationError, match=words):
         load_statements(path)
-    assert (empty.names, primitives.names) == ([], solids)
+    assert empty.names == []
     path.write_text(CRATE)
     assert [declared.name for declared in load_statements(path)] == ["crate"]
 

@@ -10,7 +10,6 @@ import torch
 import shapeprog as sp
 from shapeprog.errors import DeclarationError, ProgramError, ShapeProgError
 from shapeprog.formats.json_form import program_to_json
-from shapeprog.geometry.primitive import primitives
 from shapeprog.language import Draw, Language, Loop, Program, decode, encode, language, using
 from shapeprog.language.hints import Box
 from shapeprog.language.parser import parse
@@ -134,16 +133,6 @@ def test_a_role_is_refused_that_is_there_or_no_word():
             with pytest.raises(DeclarationError, match=said):
                 other.add_role(name, "again")
         assert other.word(other.roles["plinth"].id) == "plinth"
-
-
-def test_what_is_not_its_own_mirror_image_is_no_primitive():
-    import dataclasses
-
-    crooked = dataclasses.replace(
-        primitives[primitives.kind("cuboid")], name="crooked", distance=lambda p, s: p[..., 2] - s[..., 0]
-    )
-    with pytest.raises(DeclarationError, match="mirror image"):
-        primitives.register(crooked)
 
 
 @pytest.mark.parametrize("declared", [each for each in language() if each.hint], ids=lambda each: each.name)

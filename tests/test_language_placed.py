@@ -12,7 +12,7 @@ from placed import placed_text
 
 import shapeprog as sp
 from shapeprog.errors import ProgramError
-from shapeprog.geometry.primitive import primitives
+from shapeprog.geometry.primitives import KINDS
 from shapeprog.language.parser import parse
 from shapeprog.language.printer import format_program
 from shapeprog.language.unroll import Plan
@@ -28,7 +28,7 @@ SEEDS = st.integers(0, 1 << 30)
 def bounds(program: sp.Program) -> torch.Tensor:
     """Bounding boxes (N, 3, 2) of the primitives along x, y and z, in the unit of the text."""
     scene, scale = sp.unroll(sp.encode(program, dtype=torch.float64)), program.source.scale
-    names = {primitives.kind(name): name for name in ("cuboid", "rounded_box", "cylinder", "frustum", "arc")}
+    names = {KINDS[name]: name for name in ("cuboid", "rounded_box", "cylinder", "frustum", "arc")}
     result = []
     for kind, size, centre, turn in zip(scene.kind, scene.size, scene.centre, scene.rotation, strict=True):
         name = names[int(kind)]

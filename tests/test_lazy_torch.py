@@ -8,8 +8,6 @@ from pathlib import Path
 
 import pytest
 
-from shapeprog.geometry import primitive
-from shapeprog.geometry.primitives import BUILT_IN
 from shapeprog.language.statement import _try, standard
 
 PROGRAM = """width, depth, height = 9, 10, 24
@@ -100,7 +98,5 @@ def test_commands_on_program_text_start_without_torch(tmp_path: Path, words: lis
 
 
 def test_declarations_that_ship_pass_the_trial_that_those_of_users_do() -> None:
-    for each in BUILT_IN:
-        primitive._try(each)
     for declared in standard:
         _try(declared)

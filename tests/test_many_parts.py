@@ -9,14 +9,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+import twins
 from geometry_helpers import make_scene, random_scene, require
 
 from shapeprog import export, parse, unroll
 from shapeprog.errors import OutputError, ShapeProgError
 from shapeprog.formats import build123d, meshes
 from shapeprog.formats.parts import crease_normals, part_normals, parts
-from shapeprog.geometry import distance, mesh, surface
+from shapeprog.geometry import mesh, surface
 from shapeprog.geometry.arrays import table_of
+from shapeprog.geometry.distance import each_distance, nearest_primitive
 from shapeprog.geometry.distance_kernels import MANY
 from shapeprog.geometry.surface_kernels import LISTED
 from shapeprog.view.viewer import viewer
@@ -40,17 +42,18 @@ def crowd(slots: int, spread: float):
 def test_points_of_many_parts_are_those_of_all_pairs(slots):
     scene = crowd(slots, 4.0)
     shares = surface.area_shares(surface.face_areas(scene), scene)
-    fast, slow = surface.visible_by_kernel(table_of(scene), shares, 40, 7), surface.visible(scene, shares, 40, 7)
+    fast, slow = surface.visible(table_of(scene), shares, 40, 7), twins.visible(scene, shares, 40, 7)
     assert (fast.chosen == slow.chosen).all()
-    torch.testing.assert_close(fast.places, slow.places)
+    np.testing.assert_allclose(fast.places, slow.places, rtol=1e-7, atol=1e-7)
 
 
 def test_distances_to_many_parts_are_those_of_all_pairs():
     scene = crowd(2 * MANY, 6.0)
     points = torch.cartesian_prod(torch.arange(-40.0, 40, 20), torch.tensor([0.0]), torch.arange(-12.0, 12)).double()
-    fast, slow = distance.nearest_by_kernel(scene, points[None], table_of(scene)), distance.nearest(scene, points[None])
-    assert (fast[0] == slow[0]).all()
-    torch.testing.assert_close(fast[1], slow[1])
+    slots, values = nearest_primitive(scene, points)
+    expected = each_distance(scene, points).min(-1)
+    assert (slots == expected.indices).all()
+    torch.testing.assert_close(values, expected.values)
 
 
 @pytest.mark.parametrize(("count", "step"), [(100_000, 3), (20_000, 0)])

@@ -1,11 +1,15 @@
 """Slow readable twins: what the fast paths must equal, written as plainly as possible."""
 
+import dataclasses
 import math
 
 import numpy as np
 import torch
 
-from shapeprog.geometry import primitives
+from shapeprog.geometry.distance import each_distance
+from shapeprog.geometry.primitives import primitives
+from shapeprog.geometry.surface import PATIENCE, SKIN, Choice
+from shapeprog.kernels.bits import FIRST, GOLDEN, SECOND
 
 SIZE, HALF = 32, 16
 
@@ -114,6 +118,69 @@ def cells(scene, resolution=SIZE):
             inside = (primitives[int(scene.kind[n])].distance(points, sizes) <= 0).numpy() & np.isfinite(size).all()
         grid[inside] = 1
     return grid
+
+
+# ---------------------------------------------------------------- points on the surface of any scene
+
+
+def uniform(seed, count):
+    """Numbers of the stream of a seed, uniform in [0, 1): SplitMix64 in whole numbers that wrap around."""
+    word = (count + 1) * (GOLDEN - 2**64) + seed
+    for shift, factor in ((30, FIRST), (27, SECOND)):
+        word = (word ^ ((word >> shift) & ((1 << (64 - shift)) - 1))) * (factor - 2**64)
+    word = word ^ ((word >> 31) & ((1 << 33) - 1))
+    return ((word >> 11) & ((1 << 53) - 1)).double() * 2.0**-53
+
+
+def of_slots(scene, slot):
+    """Kind, size, centre and rotation of chosen slots (B, n) of elements (B, N), with gradient."""
+    element = torch.arange(len(slot))[:, None]
+    return (part[element, slot] for part in (scene.kind, scene.size, scene.centre, scene.rotation))
+
+
+def turned(rotation, vectors):
+    return (rotation @ vectors[..., None])[..., 0]
+
+
+def visible(scene, shares, n, seed):
+    """Visible surface points by the declarations: the first candidates that are not hidden."""
+    scene = dataclasses.replace(
+        scene, **{name: getattr(scene, name).double() for name in ("size", "centre", "rotation")}
+    )
+    per, order = shares.shape[-1] // scene.mask.shape[-1], torch.arange(scene.mask.shape[-1])
+    count = 4 * torch.arange(PATIENCE * n) + (torch.arange(len(shares))[:, None] << 40)
+    numbers = torch.stack([uniform(seed, count + turn) for turn in range(4)], -1)
+    cell = torch.searchsorted(shares, numbers[..., 0].contiguous(), right=True)
+    slot, face = cell // per, cell % per
+    kind, size, centre, rotation = of_slots(scene, slot)
+    unit, local, normal = (torch.zeros_like(numbers[..., 1:]) for _ in range(3))
+    for item in scene.kinds:
+        chosen, declared = kind == item, primitives[item]
+        unit[chosen] = declared.sample(size[chosen], face[chosen], numbers[chosen][:, 1:])
+        local[chosen] = declared.place(size[chosen], unit[chosen])
+        normal[chosen] = declared.normal(size[chosen], unit[chosen], face[chosen])
+    places = torch.cat([unit, turned(rotation, local) + centre, turned(rotation, normal)], -1)
+    over, under = (places[..., 3:6] + side * SKIN * places[..., 6:] for side in (1, -1))
+    inside = (each_distance(scene, over) < 0) & (order != slot[..., None])
+    flush = (each_distance(scene, under) < 0) & (order < slot[..., None])
+    shown = ~(inside | flush).any(-1)
+    first = torch.argsort(~shown, dim=-1, stable=True)[:, :n]
+    element = torch.arange(len(first))[:, None]
+    chosen = torch.stack([slot, face], -1)[element, first].numpy()
+    return Choice(chosen, places[element, first].numpy(), shown.sum(-1).clamp(max=n).numpy())
+
+
+def place(scene, areas, choice):
+    """Points (B, n, 3) of a choice and their weights (B, n), with gradient."""
+    slot, face = torch.from_numpy(choice.chosen).unbind(-1)
+    kind, size, centre, rotation = of_slots(scene, slot)
+    unit = torch.from_numpy(choice.places[..., :3]).to(size)
+    local = torch.zeros_like(unit)
+    for item in scene.kinds:
+        chosen = (kind == item).nonzero(as_tuple=True)
+        local = local.index_put(chosen, primitives[item].place(size[chosen], unit[chosen]))
+    area = areas[torch.arange(len(slot))[:, None], slot, face]
+    return turned(rotation, local) + centre, area / area.detach()
 
 
 # ---------------------------------------------------------------- distances over all pairs

@@ -15,7 +15,7 @@ import torch
 
 from shapeprog.evaluation.likeness import Triangles
 from shapeprog.geometry.distance import each_distance
-from shapeprog.geometry.primitive import primitives
+from shapeprog.geometry.primitives import primitives
 from shapeprog.geometry.scene import Scene
 from shapeprog.space import Array
 

@@ -6,7 +6,7 @@ import torch
 
 from shapeprog.evaluation.likeness import Triangles
 from shapeprog.geometry.mesh import pieces
-from shapeprog.geometry.primitive import primitives
+from shapeprog.geometry.primitives import primitives
 from shapeprog.geometry.scene import Scene
 from shapeprog.space import SPAN
 

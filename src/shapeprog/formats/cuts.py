@@ -15,7 +15,7 @@ import numpy as np
 
 from shapeprog.files import write_text
 from shapeprog.geometry.mesh import solids_of
-from shapeprog.geometry.primitive import primitives
+from shapeprog.geometry.primitives import primitives
 from shapeprog.language.program import Program
 from shapeprog.language.tensors import encode
 from shapeprog.language.unit import METRES

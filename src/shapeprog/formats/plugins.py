@@ -10,7 +10,6 @@ from pathlib import Path
 from weakref import WeakKeyDictionary
 
 from shapeprog.errors import DeclarationError, InputError, ShapeProgError
-from shapeprog.geometry.primitive import primitives
 from shapeprog.language.statement import Language, Statement, language
 
 _loaded: WeakKeyDictionary[Language, dict[Path, tuple[Statement, ...]]] = WeakKeyDictionary()
@@ -36,7 +35,7 @@ def load_statements(path: str | os.PathLike[str]) -> tuple[Statement, ...]:
     if not file.is_file():
         result = "a folder" if file.is_dir() else "no file"
         raise InputError(f"{path} is {result}", "give the path of a Python file that declares statements")
-    before, roles, solids = set(language().names), set(language().roles), dict(primitives.names)
+    before, roles = set(language().names), set(language().roles)
     module_name = f"shapeprog_statements_{len(loaded)}_{file.stem}"
     try:
         _run(file, module_name)
@@ -48,8 +47,6 @@ def load_statements(path: str | os.PathLike[str]) -> tuple[Statement, ...]:
             language().forget(name)
         for name in language().roles.keys() - roles:
             del language().roles[name]
-        for name in primitives.names.keys() - solids:
-            del primitives.names[name]
         sys.modules.pop(module_name, None)
         if isinstance(cause, (Exception, SystemExit)):
             raise _in_words(path, file, cause) from cause

@@ -2,6 +2,6 @@
 
 from shapeprog.geometry.batch import Solids
 from shapeprog.geometry.primitive import Primitive
-from shapeprog.geometry.primitives import primitives  # the registry, which takes the name of that folder
+from shapeprog.geometry.primitives import primitives
 
 __all__ = ["Primitive", "Solids", "primitives"]

@@ -1,4 +1,4 @@
-"""Between tensors and kernels: the table of primitives, the choice between a kernel and its twin, and threads."""
+"""Between tensors and kernels: the table of primitives, and threads."""
 
 from __future__ import annotations
 
@@ -11,16 +11,9 @@ from functools import cache
 import numpy as np
 
 from shapeprog.geometry.batch import Batch
-from shapeprog.geometry.primitive import primitives
-from shapeprog.geometry.primitives import BUILT_IN
 from shapeprog.kernels.table import CENTRE, KIND, ROTATION, SIZE, WIDTH
 from shapeprog.lazy_torch import Tensor, torch
 from shapeprog.space import Array
-
-
-def by_kernel(of: Tensor | Batch) -> bool:
-    """Whether kernels do the work: on the CPU, for built-in primitives.  Else it is done in torch."""
-    return of.device.type == "cpu" and not (isinstance(of, Batch) and declared_kinds(of))
 
 
 def array(tensor: Tensor) -> Array:
@@ -34,19 +27,17 @@ def numbers(tensor: Tensor) -> Array:
 
 
 def cast(values: Array, like: Tensor) -> Tensor:
-    """An array as a tensor of another's type, cast by numpy: torch wakes threads that occupy the cores of kernels."""
+    """An array as a tensor of another's type and device, cast by numpy: torch wakes threads that occupy the cores."""
     with np.errstate(over="ignore"):  # beyond single precision is infinite
-        return torch.from_numpy(np.ascontiguousarray(values, array(like).dtype))
+        values = np.ascontiguousarray(values, array(like[:0]).dtype)
+    return torch.from_numpy(values).to(like.device)
 
 
 def table_of(batch: Batch) -> Array:
-    """All primitives as rows of the table (B * N, WIDTH) for kernels, see ``kernels.table``.
-
-    Its kinds are numbers among the built-in primitives, negative for padding and for declared primitives.
-    """
+    """All primitives as rows of the table (B * N, WIDTH) for kernels, see ``kernels.table``."""
     count = batch.mask.numel()
     table: Array = np.empty((count, WIDTH))
-    table[:, KIND] = np.where(array(batch.mask).reshape(count), _numbers()[array(batch.kind).reshape(count)], -1)
+    table[:, KIND] = np.where(array(batch.mask), array(batch.kind), -1).reshape(count)
     table[:, SIZE:CENTRE] = array(batch.size).reshape(count, CENTRE - SIZE)
     table[:, CENTRE:ROTATION] = array(batch.centre).reshape(count, 3)
     table[:, ROTATION:] = array(batch.rotation).reshape(count, 9)
@@ -57,20 +48,6 @@ def gradients(table: Array, like: Tensor, *shape: int) -> tuple[Tensor, Tensor, 
     """Gradient by sizes, centres and rotations of primitives (B, N) from rows of gradient by :func:`table_of`."""
     tensors = torch.from_numpy(table).to(like).reshape(*shape, WIDTH)
     return tensors[..., SIZE:CENTRE], tensors[..., CENTRE:ROTATION], tensors[..., ROTATION:].unflatten(-1, (3, 3))
-
-
-def declared_kinds(batch: Batch) -> list[int]:
-    """Kinds of primitive in use without kernels."""
-    if len(primitives) == len(BUILT_IN):
-        return []
-    kernel_numbers = _numbers()
-    return [kind for kind in batch.kinds if kernel_numbers[kind] < 0]
-
-
-def _numbers() -> Array:
-    """The number among the built-in primitives for every kind, -1 for declared ones."""
-    kernel_numbers = {id(primitive): number for number, primitive in enumerate(BUILT_IN)}
-    return np.array([kernel_numbers.get(id(primitive), -1) for primitive in primitives], np.float64)
 
 
 _kernel_threads = 0  # threads that kernels run in; 0 for as many as torch has

@@ -8,7 +8,6 @@ from typing import TypeVar
 
 from jaxtyping import Bool, Float, Int
 
-from shapeprog.geometry.primitive import SIZES
 from shapeprog.lazy_torch import Tensor, torch
 
 Some = TypeVar("Some", bound="Batch")
@@ -78,10 +77,3 @@ class Batch:
 
     def _map(self: Some, change: Callable[[Tensor], Tensor]) -> Some:
         return type(self)(*(change(getattr(self, field.name)) for field in fields(self)))
-
-    def at(self, slot: Int[Tensor, "B P"]) -> tuple[Int[Tensor, "B P"], Tensor, Tensor, Tensor]:
-        """Kind, size, centre and rotation of chosen slots of elements (B, N), with gradient to these."""
-        table = torch.cat([self.size, self.centre, self.rotation.flatten(-2)], -1)
-        rows = table.gather(1, slot[..., None].expand(*slot.shape, table.shape[-1]))
-        size, centre, rotation = rows.split([SIZES, 3, 9], -1)
-        return self.kind.gather(-1, slot), size, centre, rotation.unflatten(-1, (3, 3))

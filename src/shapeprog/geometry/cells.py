@@ -17,13 +17,11 @@ from torch import Tensor
 
 from shapeprog.errors import ShapeProgError
 from shapeprog.geometry import cell_kernels as kernels
-from shapeprog.geometry.arrays import array, declared_kinds, over_threads, table_of
+from shapeprog.geometry.arrays import array, over_threads, table_of
 from shapeprog.geometry.batch import Batch
-from shapeprog.geometry.primitive import SIZES, primitives
 from shapeprog.kernels.bits import WORD
 from shapeprog.space import RESOLUTION, Array
 
-AT_ONCE = 1 << 21  # cells that are tested together
 Cells = Int[Tensor, "*batch words R"]  # packed cells
 
 _SPREAD = np.unpackbits(np.arange(256, dtype=np.uint8), bitorder="little").view(np.uint64)
@@ -46,8 +44,6 @@ def rasterise_apart(
     words = words_of(cells.unflatten(-2, (-1, resolution)))
     data = table_of(flat), array(plane).reshape(-1), flat.mask.shape[-1], words
     over_threads(partial(kernels.fill, *data), len(flat), least=32)
-    for kind in declared_kinds(flat):
-        _fill_declared(flat, kind, plane, cells)
     return cells.reshape(*batch.batch_shape, parts, rows, resolution).to(flat.device)
 
 
@@ -124,24 +120,3 @@ def preceding(parts: Int[Tensor, "*batch K words R"]) -> Int[Tensor, "*batch K w
     for k in range(1, parts.shape[-3]):
         cells[..., k, :, :] = cells[..., k - 1, :, :] | parts[..., k - 1, :, :]
     return cells
-
-
-def _fill_declared(flat: Batch, kind: int, plane: Int[Tensor, "B N"], cells: Cells) -> None:
-    """Add the cells of a primitive without kernels to their planes: those whose centre is inside."""
-    selected, declared, resolution = flat.mask & (flat.kind == kind), primitives[kind], cells.shape[-1]
-    size, centre, rotation = (t.detach()[selected].double().cpu() for t in (flat.size, flat.centre, flat.rotation))
-    size, centre = size * (resolution / RESOLUTION), centre * (resolution / RESOLUTION) + resolution / 2
-    reach = (rotation.abs() @ declared.bound(size)[..., None])[..., 0]
-    first = (centre - reach - 0.5).floor().nan_to_num(resolution).clamp(0, resolution).long().tolist()
-    last = (centre + reach + 0.5).ceil().nan_to_num(0).clamp(0, resolution).long().tolist()
-    for number, owner in enumerate(plane[selected.cpu()].tolist()):
-        up, depth, side = (
-            torch.arange(low, max(low, high)) for low, high in zip(first[number], last[number], strict=True)
-        )
-        for layers in up.split(max(1, AT_ONCE // max(1, len(depth) * len(side)))):
-            index = torch.cartesian_prod(layers, depth, side)
-            offset = (index + 0.5 - centre[number]) @ rotation[number]
-            inside = index[declared.distance(offset, size[number].expand(len(index), SIZES)) <= 0]
-            row = inside[:, 2] // WORD * resolution + inside[:, 0]
-            bits = (1 << inside[:, 2] % WORD).to(torch.int32)  # each once, so that adding bits is joining them
-            cells[owner] |= torch.zeros_like(cells[owner]).index_put((row, inside[:, 1]), bits, accumulate=True)

@@ -14,8 +14,7 @@ from jaxtyping import Bool, Float
 
 from shapeprog.geometry.arrays import array
 from shapeprog.geometry.batch import Batch
-from shapeprog.geometry.primitive import primitives
-from shapeprog.geometry.primitives import built_in_names
+from shapeprog.geometry.primitives import KINDS, primitives
 from shapeprog.geometry.primitives.arc import PIECES
 from shapeprog.geometry.primitives.frustum import SEGMENTS
 from shapeprog.lazy_torch import torch
@@ -44,7 +43,7 @@ def contact_groups(scenes: Batch) -> list[int]:
     """The number of groups of touching primitives in each scene of a batch (B, N)."""
     kind, mask = array(scenes.kind), array(scenes.mask)
     size, centre, rotation = (array(each.double()) for each in (scenes.size, scenes.centre, scenes.rotation))
-    bound, names = np.zeros_like(centre), built_in_names()
+    bound, names = np.zeros_like(centre), KINDS
     for each in scenes.kinds:
         bound[kind == each] = array(primitives[each].bound(torch.tensor(size[kind == each])))
     reach = (np.abs(rotation) @ bound[..., None])[..., 0]
@@ -137,7 +136,7 @@ def _meet(
 def _hulls(part: FloatArray, known: dict[bytes, FloatArray]) -> Float[Array, "K V 3"]:
     """Corners of the convex solids that a part consists of: one, or several along a bent rod."""
     if (key := part[:5].tobytes()) not in known:
-        kind, size, names = int(part[0]), part[1:5], built_in_names()
+        kind, size, names = int(part[0]), part[1:5], KINDS
         if kind == names["rounded_box"]:
             corners = size[:3] * np.array([[*product((-1, 1), repeat=3)]])
         else:

@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from inspect import signature
 from typing import Any
 
-from shapeprog.geometry.primitives import BUILT_IN
+from shapeprog.geometry.primitive import Helper
+from shapeprog.geometry.primitives import primitives
 from shapeprog.kernels.compile import helper
 from shapeprog.kernels.table import KIND
 
 
-def _by_kind(question: str) -> Callable[..., Any]:
-    """The helper for one of the functions of ``Kernels``, with a branch for each primitive.
+def _by_kind(question: str) -> Helper:
+    """The helper for one of the helpers of every primitive, with a branch for each.
 
     It is written out as text: the compiler puts all of them in place, which it cannot do with a table of functions.
     """
-    answers = {primitive.name: getattr(primitive.kernels, question) for primitive in BUILT_IN}
-    arguments = ", ".join(signature(answers[BUILT_IN[0].name]).parameters)
+    answers = {primitive.name: primitive.kernels[question] for primitive in primitives}
+    arguments = ", ".join(signature(answers[primitives[0].name]).parameters)
     lines = [f"def {question}({arguments}):"]
     for number, name in enumerate(answers):
         condition = f"if table[row, {KIND}] == {number}: " if number < len(answers) - 1 else ""
@@ -29,4 +29,4 @@ def _by_kind(question: str) -> Callable[..., Any]:
 
 distance, slopes, bound, excess = map(_by_kind, ("distance", "slopes", "bound", "excess"))
 sample, place, normal, pull = map(_by_kind, ("sample", "place", "normal", "pull"))
-cells = _by_kind("cells")
+cells, convex = map(_by_kind, ("cells", "convex"))

@@ -6,7 +6,6 @@ overlap, it is only a bound: the true depth below the common surface can be grea
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -17,16 +16,15 @@ from torch import Tensor
 from torch.autograd.function import once_differentiable
 
 from shapeprog.geometry import distance_kernels as kernels
-from shapeprog.geometry.arrays import by_kernel, declared_kinds, gradients, numbers, over_threads, table_of
+from shapeprog.geometry.arrays import array, gradients, numbers, over_threads, table_of
 from shapeprog.geometry.batch import Batch
-from shapeprog.geometry.primitive import SIZES, primitives
+from shapeprog.geometry.primitive import SIZES
+from shapeprog.geometry.primitives import primitives
 from shapeprog.kernels.table import WIDTH
 from shapeprog.space import Array
 
 Nearest = tuple[Int[Tensor, "*batch P"], Float[Tensor, "*batch P"]]
 """Slot of the nearest primitive of each point, and the signed distance to it."""
-
-AT_ONCE = 1 << 22  # pairs of point and primitive that are looked at together where no kernel helps
 
 
 def each_distance(batch: Batch, points: Float[Tensor, "*shared P 3"]) -> Float[Tensor, "*batch P N"]:
@@ -46,16 +44,9 @@ def each_distance(batch: Batch, points: Float[Tensor, "*shared P 3"]) -> Float[T
 def nearest_primitive(batch: Batch, points: Float[Tensor, "*shared P 3"]) -> Nearest:
     """The slot with the smallest signed distance to each point, and that distance; without gradient."""
     flat, positions = _aligned(batch, points)
-    if by_kernel(flat.mask):
-        slot, value = nearest_by_kernel(flat, positions, table_of(flat))
-        if declared := declared_kinds(flat):
-            remaining = replace(flat, mask=flat.mask & torch.isin(flat.kind, torch.tensor(declared)))
-            slot_declared, closer = nearest(remaining, positions)
-            slot, value = torch.where(closer < value, slot_declared, slot), torch.minimum(closer, value)
-    else:
-        slot, value = nearest(flat, positions)
     shape = *batch.batch_shape, points.shape[-2]
-    return slot.reshape(shape), value.reshape(shape)
+    slots, values = _nearest(table_of(flat), positions)
+    return slots.reshape(shape), values.reshape(shape)
 
 
 def signed_distance(batch: Batch, points: Float[Tensor, "*shared P 3"]) -> Float[Tensor, "*batch P"]:
@@ -66,35 +57,18 @@ def signed_distance(batch: Batch, points: Float[Tensor, "*shared P 3"]) -> Float
     minimum over all primitives for one evaluation a point.  An empty union is infinitely far away.
     """
     flat, positions = _aligned(batch, points)
-    if by_kernel(flat):
-        data = flat, flat.size, flat.centre, flat.rotation, positions
-        result: Tensor = _UnionDistance.apply(*data)  # type: ignore[no-untyped-call]
-    else:
-        result = gathered_distance(flat, positions)
+    data = flat, flat.size, flat.centre, flat.rotation, positions
+    result: Tensor = _UnionDistance.apply(*data)  # type: ignore[no-untyped-call]
     return result.reshape(*batch.batch_shape, points.shape[-2])
 
 
-def gathered_distance(flat: Batch, positions: Float[Tensor, "B P 3"]) -> Float[Tensor, "B P"]:
-    """The same from the declarations, for any kind of primitive on any device; the twin of the kernels."""
-    result = torch.full_like(positions[..., 0], torch.inf)
-    if not flat.mask.shape[-1]:
-        return result
-    kind, size, centre, rotation = flat.at(nearest_primitive(flat, positions)[0])
-    local = ((positions - centre)[..., :, None] * rotation).sum(-2)
-    occupied = flat.mask.any(-1, keepdim=True)
-    for item in flat.kinds:
-        selected = (occupied & (kind == item)).nonzero(as_tuple=True)
-        result = result.index_put(selected, primitives[item].distance(local[selected], size[selected]))
-    return result
-
-
 class _UnionDistance(torch.autograd.Function):
-    """The kernels as one differentiable step."""
+    """The kernels as one differentiable step, on the CPU wherever the tensors are."""
 
     @staticmethod
     def forward(ctx: Any, batch: Batch, size: Tensor, centre: Tensor, rotation: Tensor, points: Tensor) -> Tensor:
         table = table_of(batch)
-        slots, values = nearest_by_kernel(batch, points, table)
+        slots, values = _nearest(table, points)
         ctx.save_for_backward(points, slots)
         ctx.table = table
         return values
@@ -106,7 +80,7 @@ class _UnionDistance(torch.autograd.Function):
         (scenes, count), per_scene = slots.shape, len(ctx.table) // max(len(slots), 1)
         to_table, to_points = np.zeros((len(ctx.table), WIDTH)), np.zeros((scenes * count, 3))
         data = (
-            ctx.table, per_scene, numbers(points).reshape(-1, 3), count, slots.numpy().reshape(-1),
+            ctx.table, per_scene, numbers(points).reshape(-1, 3), count, array(slots).reshape(-1),
             numbers(slope).reshape(-1), to_table, to_points,
         )  # fmt: skip
         over_threads(partial(kernels.pull, *data), scenes)
@@ -120,24 +94,13 @@ def _aligned(batch: Batch, points: Tensor) -> tuple[Batch, Float[Tensor, "B P 3"
     return batch.flatten(), points.expand(*batch.batch_shape, *shape).reshape(-1, *shape)
 
 
-def nearest_by_kernel(flat: Batch, points: Float[Tensor, "B P 3"], table: Array) -> Nearest:
-    """The nearest of the built-in primitives, which are rows of the table."""
+def _nearest(table: Array, points: Float[Tensor, "B P 3"]) -> Nearest:
+    """The nearest of the primitives that are rows of the table."""
     scenes, count = points.shape[:-1]
-    slots, values = np.empty(scenes * count, np.int64), np.empty(scenes * count)
-    data = table, flat.mask.shape[-1], numbers(points).reshape(-1, 3), count, slots, values
-    over_threads(partial(kernels.nearest, *data), len(slots), least=2048)
-    result = torch.from_numpy(slots), torch.from_numpy(values).to(points.dtype)
-    return result[0].reshape(scenes, count), result[1].reshape(scenes, count)
-
-
-def nearest(flat: Batch, points: Float[Tensor, "B P 3"]) -> Nearest:
-    """The same over all pairs, in pieces that fit in memory; the twin of the kernel."""
-    if not flat.mask.shape[-1]:
-        nothing = torch.full_like(points[..., 0], torch.inf)
-        return torch.zeros_like(nothing, dtype=torch.long), nothing
-    step = max(1, AT_ONCE // max(flat.mask.numel(), 1))
-    result = [each_distance(flat, piece).min(-1) for piece in points.split(step, -2)]
-    return torch.cat([item.indices for item in result], -1), torch.cat([item.values for item in result], -1)
+    slots, values = np.empty((scenes, count), np.int64), np.empty((scenes, count))
+    data = table, len(table) // max(scenes, 1), numbers(points).reshape(-1, 3), count, slots.ravel(), values.ravel()
+    over_threads(partial(kernels.nearest, *data), slots.size, least=2048)
+    return torch.from_numpy(slots).to(points.device), torch.from_numpy(values).to(points)
 
 
 def projected(pairs: Batch, points: Float[Tensor, "C 3"], rounds: int) -> Float[Tensor, "C 3"]:
@@ -146,16 +109,6 @@ def projected(pairs: Batch, points: Float[Tensor, "C 3"], rounds: int) -> Float[
     Points inside a primitive stay where they are.  Where the two overlap the points end in both of them, else where the
     gap between them is narrow (von Neumann 1933).
     """
-    if by_kernel(pairs):
-        moved = numbers(points).copy()
-        over_threads(partial(kernels.project, table_of(pairs), moved, rounds), len(moved))
-        return torch.from_numpy(moved).to(points.dtype)
-    parts = pairs.kind, pairs.size, pairs.centre, pairs.rotation, pairs.mask
-    first, second = (Batch(*(part[:, number : number + 1] for part in parts)) for number in range(2))
-    for _ in range(rounds):
-        for batch in (second, first):
-            at = points[:, None].detach().requires_grad_()
-            value = signed_distance(batch, at)
-            (slope,) = torch.autograd.grad(value.sum(), at)
-            points = (at - value.clamp(min=0)[..., None] * slope)[:, 0].detach()
-    return points
+    moved = numbers(points).copy()
+    over_threads(partial(kernels.project, table_of(pairs), moved, rounds), len(moved))
+    return torch.from_numpy(moved).to(points)

@@ -15,6 +15,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from functools import cache
+from itertools import takewhile
 from typing import Any
 
 from shapeprog.kernels.compile import helper
@@ -24,6 +25,8 @@ Number = Any  # a tensor of any shape, a :class:`Node`, or a constant
 
 Triple = tuple[Number, Number, Number]
 Four = tuple[Number, Number, Number, Number]
+
+Branch = tuple[tuple["Node", int], ...]  # nodes ``where``, the outermost first, each with one of its sides
 
 TINY = 1e-24  # squares below this have this root, and no gradient
 
@@ -145,7 +148,7 @@ def _sorted(outputs: Sequence[Number]) -> list[Node]:
 
 
 def generated(name: str, arguments: str, results: str, outputs: Sequence[Number]) -> Callable[..., Any]:
-    """A helper of kernels.
+    """A helper of kernels; what one side of a ``where`` alone needs is computed on that side.
 
     Parameters
     ----------
@@ -155,13 +158,38 @@ def generated(name: str, arguments: str, results: str, outputs: Sequence[Number]
         Its last line, a format string of the code of the outputs.
     """
     scope: dict[str, Any] = {"__name__": __name__, "math": math}
-    names: dict[Any, str] = {}
-    lines = [f"def {name}({arguments}):"]
-    for number, node in enumerate(_sorted(outputs)):
-        values = [names.get(value, repr(value)) for value in node.arguments]
-        code = _CODE.get(node.operation, f"{{}} {node.operation} {{}}").format(*values) if values else node.operation
-        names[node] = f"v{number}"
-        lines.append(f"    v{number} = {code}")
+    lines, branches = [f"def {name}({arguments}):"], _branches(outputs)
+    names: dict[Any, str] = {node: f"v{number}" for number, node in enumerate(branches)}
+
+    def write(branch: Branch) -> None:
+        indent = "    " * (len(branch) + 1)
+        for node in [node for node, needed in branches.items() if needed == branch]:
+            values = [names.get(value, repr(value)) for value in node.arguments]
+            sides = [(*branch, (node, side)) for side in (1, 2)]
+            if node.operation == "where" and any(side in branches.values() for side in sides):
+                for opening, side, value in zip((f"if {values[0]}:", "else:"), sides, values[1:], strict=True):
+                    lines.append(indent + opening)
+                    write(side)
+                    lines.append(f"{indent}    {names[node]} = {value}")
+            else:
+                code = _CODE.get(node.operation, f"{{}} {node.operation} {{}}") if values else node.operation
+                lines.append(f"{indent}{names[node]} = {code.format(*values)}")
+
+    write(())
     lines.append("    " + results.format(*(names.get(output, repr(output)) for output in outputs)))
     exec("\n".join(lines), scope)
     return helper(scope[name])
+
+
+def _branches(outputs: Sequence[Number]) -> dict[Node, Branch]:
+    """The branch in which each node is computed, the innermost that all that need it have in common."""
+    nodes = _sorted(outputs)
+    branches: dict[Node, Branch] = {output: () for output in outputs if isinstance(output, Node)}
+    for node in reversed(nodes):
+        for side, argument in enumerate(node.arguments):
+            if isinstance(argument, Node):
+                branch = branches[node] if node.operation != "where" or not side else (*branches[node], (node, side))
+                known = branches.get(argument, branch)
+                common = takewhile(lambda pair: pair[0] == pair[1], zip(known, branch, strict=False))
+                branches[argument] = tuple(pair[0] for pair in common)
+    return {node: branches[node] for node in nodes}

@@ -14,7 +14,7 @@ from shapeprog.errors import ShapeProgError
 from shapeprog.geometry.arrays import array
 from shapeprog.geometry.batch import Batch
 from shapeprog.geometry.primitive import Mesh as Triangles
-from shapeprog.geometry.primitive import primitives
+from shapeprog.geometry.primitives import primitives
 from shapeprog.geometry.primitives.cuboid import CUBOID
 from shapeprog.lazy_torch import torch
 from shapeprog.space import Array, FloatArray
@@ -91,7 +91,7 @@ def bounds(scene: Batch) -> Iterator[tuple[int, FloatArray, FloatArray]]:
     turn = np.abs(parts.rotation)
     half = (turn @ parts.half[..., None])[..., 0]
     low, high = parts.centre - half, parts.centre + half
-    exact = (turn.max(-1) > 1 - 1e-12).all(-1) | (array(scene.kind) == primitives.number(CUBOID)) & (
+    exact = (turn.max(-1) > 1 - 1e-12).all(-1) | (array(scene.kind) == primitives.index(CUBOID)) & (
         parts.size[:, 3] == 0
     )
     if (parts.solid & ~exact).any():

@@ -1,6 +1,6 @@
-"""Exact nearest neighbours between point clouds, without gradient, by the fastest method for the device.
+"""Exact nearest neighbours between point clouds: kernels search a uniform grid, by threads over the batch.
 
-On the CPU kernels search a uniform grid, by threads over the batch; elsewhere all pairs are compared in pieces.
+They run on the CPU, wherever the tensors are.
 """
 
 from __future__ import annotations
@@ -16,13 +16,11 @@ from torch.autograd.function import once_differentiable
 
 from shapeprog.errors import ShapeProgError
 from shapeprog.geometry import neighbour_kernels as kernels
-from shapeprog.geometry.arrays import by_kernel, cast, numbers, over_threads
+from shapeprog.geometry.arrays import cast, numbers, over_threads
 from shapeprog.space import Array
 
 Cloud = Float[Tensor, "*batch P 3"]
 Other = Float[Tensor, "*batch Q 3"]
-
-AT_ONCE = 1 << 26  # pairs of points that are compared together on a device without the kernel
 
 
 def nearest(queries: Cloud, points: Other) -> Int[Tensor, "*batch P"]:
@@ -31,11 +29,8 @@ def nearest(queries: Cloud, points: Other) -> Int[Tensor, "*batch P"]:
     A ``ShapeProgError`` if there are no points, or the leading dimensions differ.
     """
     source, few = _pair(queries.detach(), points.detach())
-    if by_kernel(source):
-        index = torch.from_numpy(neighbours_by_kernel(source, few)[0] - np.arange(len(few))[:, None] * few.shape[1])
-    else:
-        index = neighbours(source, few)
-    return index.reshape(queries.shape[:-1])
+    index = torch.from_numpy(_neighbours(source, few)[0] - np.arange(len(few))[:, None] * few.shape[1])
+    return index.reshape(queries.shape[:-1]).to(queries.device)
 
 
 def squared_distance(queries: Cloud, points: Other) -> Float[Tensor, "*batch P"]:
@@ -43,19 +38,14 @@ def squared_distance(queries: Cloud, points: Other) -> Float[Tensor, "*batch P"]
 
     Neighbours are found without gradient; the gradient of the distance to them is that of the minimum.
     """
-    source, few = _pair(queries, points)
-    if by_kernel(source):
-        (results,) = _Squared.apply(source, few, False)  # type: ignore[no-untyped-call]
-    else:
-        index = neighbours(source.detach(), few.detach())
-        results = ((source - few.gather(1, index[..., None].expand(-1, -1, 3))) ** 2).sum(-1)
+    (results,) = _Squared.apply(*_pair(queries, points), False)  # type: ignore[no-untyped-call]
     squared: Tensor = results.reshape(queries.shape[:-1])
     return squared
 
 
 def mean_squared_distances(cloud: Cloud, other: Other) -> tuple[Float[Tensor, "*batch"], Float[Tensor, "*batch"]]:
     """Means of the squared distances from each cloud to the nearest points of the other, with gradient to both."""
-    if not by_kernel(cloud) or not cloud.shape[-2]:
+    if not cloud.shape[-2]:
         return squared_distance(cloud, other).mean(-1), squared_distance(other, cloud).mean(-1)
     outward, back = _Squared.apply(*_pair(cloud, other), True)  # type: ignore[no-untyped-call]
     return outward.reshape(cloud.shape[:-2]), back.reshape(cloud.shape[:-2])
@@ -70,7 +60,7 @@ class _Squared(torch.autograd.Function):
     @staticmethod
     def forward(ctx: Any, cloud: Tensor, other: Tensor, means: bool) -> tuple[Tensor, ...]:
         ways = [(cloud, other), (other, cloud)] if means else [(cloud, other)]
-        results = [neighbours_by_kernel(*way) for way in ways]
+        results = [_neighbours(*way) for way in ways]
         ctx.save_for_backward(cloud, other)
         ctx.means, ctx.index = means, [index for index, _ in results]
         return tuple(cast(squared.mean(-1) if means else squared, cloud) for _, squared in results)
@@ -103,22 +93,10 @@ def _pair(queries: Cloud, points: Other) -> tuple[Float[Tensor, "B P 3"], Float[
     return source, points.to(source).reshape(count, points.shape[-2], 3).contiguous()
 
 
-def neighbours_by_kernel(queries: Tensor, points: Tensor) -> tuple[Array, Array]:
+def _neighbours(queries: Tensor, points: Tensor) -> tuple[Array, Array]:
     """Rows of the nearest points among those of all clouds, and squared distances, (B, P) each."""
     (clouds, source), count = queries.shape[:2], points.shape[1]
     index, squared = np.empty(clouds * source, np.int64), np.empty(clouds * source)
     data = numbers(queries).reshape(-1, 3), source, numbers(points).reshape(-1, 3), count, index, squared
     over_threads(partial(kernels.neighbours, *data), clouds)
     return index.reshape(clouds, source), squared.reshape(clouds, source)
-
-
-def neighbours(queries: Float[Tensor, "B P 3"], points: Float[Tensor, "B Q 3"]) -> Int[Tensor, "B P"]:
-    """The twin of the kernel.  Differences are taken before they are squared, which keeps small distances exact."""
-    step = max(1, AT_ONCE // max(1, points.shape[0] * points.shape[1]))
-    results = []
-    for piece in queries.split(step, 1):
-        squared = piece.new_zeros(())
-        for axis in range(3):
-            squared = squared + (piece[:, :, None, axis] - points[:, None, :, axis]) ** 2
-        results.append(squared.argmin(-1))
-    return torch.cat(results, 1)

@@ -12,6 +12,7 @@ and cylinder.  The line along which a part becomes hidden in another is held sti
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -22,12 +23,10 @@ from torch.autograd.function import once_differentiable
 
 from shapeprog.errors import ShapeProgError
 from shapeprog.geometry import surface_kernels as kernels
-from shapeprog.geometry.arrays import array, by_kernel, cast, gradients, numbers, over_threads, table_of
+from shapeprog.geometry.arrays import cast, gradients, numbers, over_threads, table_of
 from shapeprog.geometry.batch import Batch
-from shapeprog.geometry.distance import each_distance
 from shapeprog.geometry.distance_kernels import FARTHEST
-from shapeprog.geometry.primitive import primitives
-from shapeprog.kernels.bits import FIRST, GOLDEN, SECOND
+from shapeprog.geometry.primitives import primitives
 from shapeprog.kernels.table import WIDTH
 from shapeprog.space import Array
 
@@ -59,14 +58,9 @@ class SurfaceSample(NamedTuple):
 class Choice(NamedTuple):
     """Decisions made without gradient."""
 
-    chosen: Int[Tensor, "B n 2"]  # slot and face of each point
-    places: Float[Tensor, "B n 9"]  # its unit place, its position and its normal, three numbers each
-    found: Int[Tensor, " B"]  # how many points each element has; -1 if some are farther away than ``FARTHEST``
-
-    @property
-    def slot(self) -> Int[Tensor, "B n"]:
-        """Which primitive each point lies on."""
-        return self.chosen[..., 0]
+    chosen: Int[Array, "B n 2"]  # slot and face of each point
+    places: Float[Array, "B n 9"]  # its unit place, its position and its normal, three numbers each
+    found: Int[Array, " B"]  # how many points each element has; -1 if some are farther away than ``FARTHEST``
 
 
 def sample_surface(batch: Batch, n: int, generator: torch.Generator | None = None) -> SurfaceSample:
@@ -99,20 +93,14 @@ def sample_surface(batch: Batch, n: int, generator: torch.Generator | None = Non
     shares = area_shares(areas.detach(), batch)
     device = generator.device if generator is not None else torch.device("cpu")
     seed = int(torch.randint(0, 2**62, (), generator=generator, device=device))
-    if by_kernel(flat):
-        table = table_of(flat)
-        choice = _whole(visible_by_kernel(table, shares, n, seed), n)
-        points, weights = _Placed.apply(  # type: ignore[no-untyped-call]
-            flat.size, flat.centre, flat.rotation, areas, table, choice
-        )
-        normals = cast(choice.places[..., 6:].numpy(), flat.size)
-    else:
-        with torch.no_grad():
-            choice = _whole(visible(flat.detach(), shares, n, seed), n)
-        points, weights = place(flat, areas, choice)
-        normals = choice.places[..., 6:].to(points)
-    found = SurfaceSample(points, weights, choice.slot, normals)
-    return SurfaceSample(*(item.reshape(*batch.batch_shape, *item.shape[1:]) for item in found))
+    table = table_of(flat)
+    choice = _repeated(visible(table, shares, n, seed), n)
+    points, weights = _Placed.apply(  # type: ignore[no-untyped-call]
+        flat.size, flat.centre, flat.rotation, areas, table, choice
+    )
+    slot = torch.from_numpy(choice.chosen[..., 0]).to(flat.device)
+    sample = points, weights, slot, cast(choice.places[..., 6:], flat.size)
+    return SurfaceSample(*(item.reshape(*batch.batch_shape, *item.shape[1:]) for item in sample))
 
 
 sample = sample_surface  # its public name, shapeprog.sample
@@ -156,54 +144,16 @@ def area_shares(areas: Float[Tensor, "B N F"], batch: Batch) -> Float[Tensor, "B
     return total / total_area
 
 
-def visible_by_kernel(table: Array, shares: Float[Tensor, "B C"], n: int, seed: int) -> Choice:
+def visible(table: Array, shares: Float[Tensor, "B C"], n: int, seed: int) -> Choice:
     """Visible points, from the table of primitives."""
     count = len(shares)
-    chosen, places = np.empty((count * n, 2), np.int64), np.empty((count * n, 9))
-    found = np.zeros(count, np.int64)
+    choice = Choice(np.empty((count, n, 2), np.int64), np.empty((count, n, 9)), np.zeros(count, np.int64))
     data = (
-        table, len(table) // max(count, 1), numbers(shares), seed, SKIN, PATIENCE * n, n, chosen, places, found,
+        table, len(table) // max(count, 1), numbers(shares), seed, SKIN, PATIENCE * n, n, choice.chosen.reshape(-1, 2),
+        choice.places.reshape(-1, 9), choice.found,
     )  # fmt: skip
-    over_threads(lambda first, last: kernels.visible(*data, first, last), count)
-    return Choice(*(torch.from_numpy(item).reshape(count, *shape) for item, shape in (
-        (chosen, (n, 2)), (places, (n, 9)), (found, ())
-    )))  # fmt: skip
-
-
-def visible(flat: Batch, shares: Float[Tensor, "B C"], n: int, seed: int) -> Choice:
-    """The same from the declarations alone, for any kind of primitive on any device; the twin of the kernel."""
-    per = shares.shape[-1] // flat.mask.shape[-1]
-    pieces: list[tuple[Tensor, ...]] = []
-    tried, found = 0, torch.zeros(len(shares), dtype=torch.long, device=shares.device)
-    while tried < PATIENCE * n and bool((found < n).any()):
-        more = min(max(n, 256), PATIENCE * n - tried)
-        count = 4 * tried + torch.arange(4 * more, device=shares.device)
-        numbers = uniform(seed, (torch.arange(len(shares), device=shares.device)[:, None] << 40) + count)
-        numbers = numbers.unflatten(-1, (more, 4))
-        cell = torch.searchsorted(shares, numbers[..., 0].contiguous(), right=True)
-        slot, face = cell.div(per, rounding_mode="floor"), cell % per
-        places = _drawn(flat, slot, face, numbers[..., 1:])
-        shown = ~_hidden(flat, slot, places[..., 3:6].to(flat.size), places[..., 6:].to(flat.size))
-        pieces.append((torch.stack([slot, face], -1), places, shown))
-        found = found + shown.sum(-1)
-        tried += more
-    chosen, places, shown = (torch.cat(item, 1) for item in zip(*pieces, strict=True))
-    first = torch.argsort(~shown, dim=-1, stable=True)[:, :n]
-    places = _rows(places, first)
-    far = ~(places[..., 3:6].abs().sum(-1) < FARTHEST) & (torch.arange(n, device=found.device) < found[:, None])
-    return Choice(_rows(chosen, first), places, torch.where(far.any(-1), -1, found.clamp(max=n)))
-
-
-def place(flat: Batch, areas: Float[Tensor, "B N F"], choice: Choice) -> tuple[Tensor, Tensor]:
-    """Points (B, n, 3) of a choice and their weights (B, n), with gradient; the twin of the kernels."""
-    kind, size, centre, rotation = flat.at(choice.slot)
-    unit = choice.places[..., :3].to(size)
-    local = torch.zeros_like(unit)
-    for item in flat.kinds:
-        selected = (kind == item).nonzero(as_tuple=True)
-        local = local.index_put(selected, primitives[item].place(size[selected], unit[selected]))
-    area = areas.flatten(-2).gather(-1, choice.slot * areas.shape[-1] + choice.chosen[..., 1])
-    return _turned(rotation, local) + centre, area / area.detach()
+    over_threads(partial(kernels.visible, *data), count)
+    return choice
 
 
 class _Placed(torch.autograd.Function):
@@ -215,8 +165,8 @@ class _Placed(torch.autograd.Function):
     ) -> tuple[Tensor, Tensor]:
         ctx.save_for_backward(areas)
         ctx.table, ctx.choice = table, choice
-        points = cast(choice.places[..., 3:6].numpy(), size)
-        return points, torch.from_numpy(np.ones(points.shape[:-1], points.numpy().dtype))
+        points = cast(choice.places[..., 3:6], size)
+        return points, cast(np.ones(points.shape[:-1]), size)
 
     @staticmethod
     @once_differentiable
@@ -226,65 +176,25 @@ class _Placed(torch.autograd.Function):
         n, choice = slope.shape[1], ctx.choice
         to_table, to_faces = np.zeros((scenes * per_scene, WIDTH)), np.zeros((scenes * per_scene, faces))
         data = (
-            ctx.table, per_scene, n, array(choice.chosen).reshape(-1, 2), array(choice.places).reshape(-1, 9),
+            ctx.table, per_scene, n, choice.chosen.reshape(-1, 2), choice.places.reshape(-1, 9),
             numbers(slope).reshape(-1, 3), numbers(weigh).reshape(-1), to_table, to_faces,
         )  # fmt: skip
-        over_threads(lambda first, last: kernels.pull(*data, first, last), scenes)
+        over_threads(partial(kernels.pull, *data), scenes)
         to_areas = torch.from_numpy(to_faces).to(areas).reshape(areas.shape) / torch.where(areas > 0, areas, 1)
         return *gradients(to_table, areas, scenes, per_scene), to_areas, None, None
 
 
-def _whole(choice: Choice, n: int) -> Choice:
+def _repeated(choice: Choice, n: int) -> Choice:
     """Repeat the points of elements that are nearly hidden; refuse those that are hidden altogether, or too far."""
-    if bool((choice.found >= n).all()):
+    if (choice.found >= n).all():
         return choice
-    if bool((choice.found < 0).any()):
+    if (choice.found < 0).any():
         raise ShapeProgError(
             f"parts of the surface are farther than {FARTHEST:.0e} cells away, where distances leave single precision",
             "lower positions, sizes and shifts",
         )
-    if bool((choice.found == 0).any()):
+    if (choice.found == 0).any():
         raise ShapeProgError("no point of the surface is visible", "the primitives of the scene hide each other")
-    turn = torch.arange(n, device=choice.found.device) % choice.found[:, None]
-    return Choice(_rows(choice.chosen, turn), _rows(choice.places, turn), choice.found)
-
-
-def _rows(table: Tensor, index: Int[Tensor, "B n"]) -> Tensor:
-    """Rows (B, n, F) of tables (B, m, F)."""
-    return table.gather(1, index[..., None].expand(*index.shape, table.shape[-1]))
-
-
-def _drawn(flat: Batch, slot: Tensor, face: Tensor, numbers: Float[Tensor, "B n 3"]) -> Float[Tensor, "B n 9"]:
-    """Unit places, positions and normals from the declarations, in double precision as kernels have them."""
-    kind, size, centre, rotation = flat.at(slot)
-    size, centre, rotation = size.double(), centre.double(), rotation.double()
-    unit, local, normal = torch.zeros_like(numbers), torch.zeros_like(numbers), torch.zeros_like(numbers)
-    for item in flat.kinds:
-        selected, declared = (kind == item).nonzero(as_tuple=True), primitives[item]
-        unit[selected] = declared.sample(size[selected], face[selected], numbers[selected])
-        local[selected] = declared.place(size[selected], unit[selected])
-        normal[selected] = declared.normal(size[selected], unit[selected], face[selected])
-    return torch.cat([unit, _turned(rotation, local) + centre, _turned(rotation, normal)], -1)
-
-
-def _turned(rotation: Tensor, vectors: Tensor) -> Tensor:
-    turned: Tensor = (rotation @ vectors[..., None])[..., 0]
-    return turned
-
-
-def _hidden(flat: Batch, slot: Tensor, points: Tensor, normals: Tensor) -> Bool[Tensor, "B n"]:
-    order = torch.arange(flat.mask.shape[-1], device=slot.device)
-    over, under = points + SKIN * normals, points - SKIN * normals
-    inside = (each_distance(flat, over) < 0) & (order != slot[..., None])
-    flush = (each_distance(flat, under) < 0) & (order < slot[..., None])
-    return (inside | flush).any(-1)
-
-
-def uniform(seed: int | Int[Tensor, "*batch"], count: Int[Tensor, "*batch"]) -> Float[Tensor, "*batch"]:
-    """Numbers of the stream of a seed, uniform in [0, 1): the twin of :func:`shapeprog.kernels.bits.uniform`."""
-    word = (count + 1) * (GOLDEN - 2**64) + seed  # whole numbers that wrap around
-    for shift, factor in ((30, FIRST), (27, SECOND)):
-        word = (word ^ ((word >> shift) & ((1 << (64 - shift)) - 1))) * (factor - 2**64)
-    word = word ^ ((word >> 31) & ((1 << 33) - 1))
-    numbers: Tensor = ((word >> 11) & ((1 << 53) - 1)).double() * 2.0**-53
-    return numbers
+    turn = (np.arange(n) % choice.found[:, None])[..., None]
+    chosen, places = (np.take_along_axis(rows, turn, 1) for rows in (choice.chosen, choice.places))
+    return Choice(chosen, places, choice.found)

@@ -5,7 +5,8 @@ from __future__ import annotations
 from jaxtyping import Float, Int
 
 from shapeprog.geometry.batch import Solids
-from shapeprog.geometry.primitive import SIZES, Primitive, primitives, safe_norm
+from shapeprog.geometry.primitive import SIZES, Primitive, safe_norm
+from shapeprog.geometry.primitives import primitives
 from shapeprog.geometry.primitives.arc import ARC
 from shapeprog.geometry.primitives.cuboid import CUBOID
 from shapeprog.geometry.primitives.cylinder import CYLINDER
@@ -24,10 +25,10 @@ FLAT = 1e-6  # cells below which three points are in line
 def solid(
     primitive: Primitive, centre: Vector, *sizes: Scalar, rotation: Float[Tensor, "*batch 3 3"] | None = None
 ) -> Solids:
-    """A solid of any declared primitive from its sizes in the order it declares them."""
+    """A solid of any primitive from its sizes in the order it declares them."""
     zero = torch.zeros_like(centre[..., 0])
     padded = [*sizes, *[zero] * (SIZES - len(sizes))]
-    return Solids(primitives.number(primitive), torch.stack(padded, -1), centre, rotation)
+    return Solids(primitives.index(primitive), torch.stack(padded, -1), centre, rotation)
 
 
 def cuboid(centre: Vector, half: Vector, lean: Scalar | None = None) -> Solids:

@@ -23,8 +23,7 @@ from jaxtyping import Float
 
 from shapeprog.errors import DeclarationError, ShapeProgError
 from shapeprog.geometry.batch import Solids
-from shapeprog.geometry.primitive import SIZES, primitives, ships
-from shapeprog.geometry.primitives import built_in_names
+from shapeprog.geometry.primitive import SIZES
 from shapeprog.language.hints import Box
 from shapeprog.language.parameters import Parameter, Quantity
 from shapeprog.lazy_torch import Tensor, torch
@@ -114,7 +113,8 @@ class Statement:
     @property
     def ships(self) -> bool:
         """Whether it comes with the package: it is known to work, on NumPy arrays as on tensors."""
-        return all(ships(function) for function in (self.draw, self.move, self.pivot) if function is not None)
+        functions = (function for function in (self.draw, self.move, self.pivot) if function is not None)
+        return all(function.__module__.startswith("shapeprog.") for function in functions)
 
     @property
     def size(self) -> int:
@@ -173,13 +173,12 @@ def is_word(name: str) -> bool:
 
 
 class Language:
-    """A registry of statements and loops, found by name or by id, of roles, and the names of its primitives."""
+    """A registry of statements and loops, found by name or by id, and of roles."""
 
-    def __init__(self, solids: dict[str, int] | None = None) -> None:
+    def __init__(self) -> None:
         self._by_id: dict[int, Statement] = {}
         self._by_name: dict[str, Statement] = {}
         self.roles: dict[str, Role] = {}
-        self.primitives = built_in_names() if solids is None else solids
 
     def register(self, declared: Statement) -> Statement:
         """Add a declaration and return it; a ``DeclarationError`` if its name or id is taken or it does not fit."""
@@ -284,7 +283,7 @@ class Language:
         return [declared.name for declared in self]
 
 
-standard = Language(primitives.names)
+standard = Language()
 """The language of this process: the built-in statements and those that users register."""
 
 _active: ContextVar[Language] = ContextVar("language", default=standard)
@@ -297,11 +296,10 @@ def language() -> Language:
 
 @contextmanager
 def using(other: Language) -> Iterator[Language]:
-    """Put another language in force for a while, its names of primitives included."""
+    """Put another language in force for a while."""
     token = _active.set(other)
     try:
-        with primitives.using(other.primitives):
-            yield other
+        yield other
     finally:
         _active.reset(token)
 

@@ -14,7 +14,8 @@ from dataclasses import dataclass
 from jaxtyping import Bool, Float, Int
 
 from shapeprog.errors import ShapeProgError
-from shapeprog.geometry.primitive import SIZES, primitives
+from shapeprog.geometry.primitive import SIZES
+from shapeprog.geometry.primitives import primitives
 from shapeprog.geometry.scene import Scene
 from shapeprog.language.program import Program
 from shapeprog.language.statement import EMPTY, END, Statement, language

@@ -19,7 +19,7 @@ from jaxtyping import Float
 from torch import Tensor
 
 from shapeprog.geometry.batch import Solids
-from shapeprog.geometry.primitive import primitives
+from shapeprog.geometry.primitives import primitives
 from shapeprog.language.program import Chain, Draw, Loop, Program
 from shapeprog.language.statement import Statement, language
 from shapeprog.language.unroll import unroll

@@ -1,7 +1,4 @@
-"""The built-in primitives, one file each: declaration, functions in torch, and their twins for kernels.
-
-A file that is put here is a built-in primitive: it declares one ``PRIMITIVE`` with kernels.
-"""
+"""The primitives, one file each; a file that is put here declares one ``PRIMITIVE``."""
 
 from __future__ import annotations
 
@@ -9,14 +6,11 @@ from importlib import import_module
 from pkgutil import iter_modules
 
 from shapeprog.geometry.primitive import Primitive
-from shapeprog.geometry.primitive import primitives as primitives
 
-BUILT_IN: tuple[Primitive, ...] = tuple(
-    primitives.register(import_module(f"{__name__}.{module.name}").PRIMITIVE) for module in iter_modules(__path__)
+primitives: tuple[Primitive, ...] = tuple(
+    import_module(f"{__name__}.{module.name}").PRIMITIVE for module in iter_modules(__path__)
 )
-"""All of them; kernels number them in this order."""
+"""All of them; the kind of a primitive is its place here."""
 
-
-def built_in_names() -> dict[str, int]:
-    """Kinds of the built-in primitives by name, as every language begins with them."""
-    return {primitive.name: primitives.number(primitive) for primitive in BUILT_IN}
+KINDS: dict[str, int] = {primitive.name: kind for kind, primitive in enumerate(primitives)}
+"""Kinds by name."""

@@ -8,12 +8,8 @@ Its cells follow the rules of the published executor: at right angles to the gri
 
 from __future__ import annotations
 
-import math
-from dataclasses import replace
-
 import numpy as np
 
-from shapeprog.geometry.derived import solid
 from shapeprog.geometry.formulas import (
     TINY,
     Four,
@@ -29,7 +25,7 @@ from shapeprog.geometry.formulas import (
     root,
     where,
 )  # fmt: skip
-from shapeprog.geometry.primitive import Mesh
+from shapeprog.geometry.primitive import Mesh, Primitive
 from shapeprog.kernels.compile import helper
 from shapeprog.kernels.rows import clip, fill_box
 from shapeprog.kernels.table import CENTRE, ROTATION, SIZE
@@ -60,6 +56,14 @@ def distance(size: Four, point: Triple) -> Number:
 
     inside = (over_up < 0) & (abs(cross) < half_depth * half_up)
     return meet(root(minimum(to_cap, to_side)) * where(inside, -1.0, 1.0), abs(side) - half_side)
+
+
+def value(size: Four, point: Triple) -> Number:
+    """The same distance, cheaper where nothing is sheared, but without the slope by ``lean`` there."""
+    up, depth, side = (abs(at) - positive(half) for at, half in zip(point, size[:3], strict=True))
+    inside = maximum(maximum(up, depth), side)
+    outside = root(positive(up) ** 2 + positive(depth) ** 2 + positive(side) ** 2)
+    return where(abs(size[3]) > 0, distance(size, point), where(inside > 0, outside, inside))
 
 
 def excess(size: Four, point: Triple) -> Number:
@@ -151,27 +155,7 @@ def cells_kernel(table: Array, row: int, square: bool, planes: Array, plane: int
     return True
 
 
-_FORMULAS = solid(
-    "cuboid", ("half_up", "half_depth", "half_side", "lean"), 3,
-    distance=distance, excess=excess, bound=bound, areas=areas, sample=sample, place=place, normal=normal, mesh=mesh,
-    volume=volume, cells=cells_kernel,
+PRIMITIVE = CUBOID = Primitive(
+    "cuboid", ("half_up", "half_depth", "half_side", "lean"), 3, distance=distance, value=value, excess=excess,
+    bound=bound, areas=areas, volume=volume, sample=sample, place=place, normal=normal, mesh=mesh, cells=cells_kernel,
 )  # fmt: skip
-assert _FORMULAS.kernels is not None
-sheared_distance = _FORMULAS.kernels.distance
-
-
-@helper
-def distance_kernel(table: Array, row: int, a: float, b: float, c: float) -> float:
-    """The same distance, faster if not sheared: 40,000 points near 20 cuboids take 3.5 instead of 4.0 ms."""
-    if table[row, SIZE + 3] != 0:
-        return sheared_distance(table, row, a, b, c)
-    up, depth = abs(a) - max(table[row, SIZE], 0.0), abs(b) - max(table[row, SIZE + 1], 0.0)
-    side = abs(c) - max(table[row, SIZE + 2], 0.0)
-    inner = max(max(up, depth), side)
-    if inner <= 0:
-        return inner
-    up, depth, side = max(up, 0.0), max(depth, 0.0), max(side, 0.0)
-    return math.sqrt(up * up + depth * depth + side * side)
-
-
-PRIMITIVE = CUBOID = replace(_FORMULAS, kernels=replace(_FORMULAS.kernels, distance=distance_kernel))

@@ -9,9 +9,8 @@ import math
 
 import numpy as np
 
-from shapeprog.geometry.derived import solid
 from shapeprog.geometry.formulas import Four, Number, Triple, cos, maximum, meet, positive, root, sin, where
-from shapeprog.geometry.primitive import Mesh
+from shapeprog.geometry.primitive import Mesh, Primitive
 from shapeprog.geometry.primitives import frustum
 from shapeprog.geometry.primitives.frustum import SEGMENTS as SEGMENTS
 from shapeprog.kernels.compile import helper
@@ -91,7 +90,7 @@ def cells_kernel(table: Array, row: int, square: bool, planes: Array, plane: int
     return True
 
 
-PRIMITIVE = CYLINDER = solid(
+PRIMITIVE = CYLINDER = Primitive(
     "cylinder", ("half_height", "radius"), 2,
     distance=distance, excess=excess, bound=lambda size: frustum.bound(_frustum(size)),
     areas=lambda size: frustum.areas(_frustum(size)), sample=sample, place=place, normal=normal, mesh=mesh,

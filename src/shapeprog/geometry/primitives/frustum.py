@@ -6,7 +6,6 @@ import math
 
 import numpy as np
 
-from shapeprog.geometry.derived import solid
 from shapeprog.geometry.formulas import (
     TINY,
     Four,
@@ -23,7 +22,7 @@ from shapeprog.geometry.formulas import (
     sin,
     where,
 )  # fmt: skip
-from shapeprog.geometry.primitive import Mesh
+from shapeprog.geometry.primitive import Mesh, Primitive
 from shapeprog.space import FloatArray
 
 SEGMENTS = 48  # corners of the polygon that approximates a circle in a mesh
@@ -126,7 +125,7 @@ def volume(size: Four) -> Number:
     return 2 / 3 * math.pi * half * (bottom**2 + bottom * top + top**2)
 
 
-PRIMITIVE = FRUSTUM = solid(
+PRIMITIVE = FRUSTUM = Primitive(
     "frustum", ("half_height", "bottom", "top"), 3, distance=distance, excess=excess, bound=bound, areas=areas,
     sample=sample, place=place, normal=normal, mesh=mesh, volume=volume,
 )  # fmt: skip

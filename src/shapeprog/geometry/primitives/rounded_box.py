@@ -9,7 +9,6 @@ import math
 
 import numpy as np
 
-from shapeprog.geometry.derived import solid
 from shapeprog.geometry.formulas import (
     Four,
     Number,
@@ -23,7 +22,7 @@ from shapeprog.geometry.formulas import (
     sin,
     where,
 )  # fmt: skip
-from shapeprog.geometry.primitive import Mesh
+from shapeprog.geometry.primitive import Mesh, Primitive
 from shapeprog.geometry.primitives import cuboid
 from shapeprog.space import Array, FloatArray
 
@@ -157,7 +156,7 @@ def volume(size: Four) -> Number:
     return 8 * up * depth * side + slabs + radius**2 * math.pi * (2 * (up + depth + side) + 4 / 3 * radius)
 
 
-PRIMITIVE = ROUNDED_BOX = solid(
+PRIMITIVE = ROUNDED_BOX = Primitive(
     "rounded_box", ("half_up", "half_depth", "half_side", "radius"), 3, distance=distance, excess=excess, bound=bound,
     areas=areas, sample=sample, place=place, normal=normal, mesh=mesh, volume=volume,
 )  # fmt: skip

@@ -19,7 +19,8 @@ from jaxtyping import Float
 from torch import Tensor
 
 from shapeprog.geometry.distance import signed_distance
-from shapeprog.geometry.primitive import SIZES, primitives
+from shapeprog.geometry.primitive import SIZES
+from shapeprog.geometry.primitives import primitives
 from shapeprog.geometry.scene import Scene
 from shapeprog.geometry.surface import sample_surface
 from shapeprog.inference.candidates.fitting import BESIDE, Target, fit, improve

@@ -20,7 +20,7 @@ from shapeprog.errors import InputError
 from shapeprog.geometry.arrays import one_tensor_thread
 from shapeprog.geometry.distance import signed_distance
 from shapeprog.geometry.nearest import squared_distance
-from shapeprog.geometry.primitive import primitives
+from shapeprog.geometry.primitives import primitives
 from shapeprog.geometry.scene import Scene
 from shapeprog.geometry.surface import sample_surface
 from shapeprog.inference.budget import NEVER, Deadline, Progress

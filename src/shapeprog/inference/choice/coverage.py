@@ -12,24 +12,21 @@ A candidate is a program of one block.  All that choosing between them needs is 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 import torch
-from jaxtyping import Bool, Float
-from torch import Tensor
 
-from shapeprog.geometry.arrays import by_kernel, declared_kinds, over_threads, table_of
+from shapeprog.geometry.arrays import over_threads, table_of
 from shapeprog.geometry.batch import Batch
-from shapeprog.geometry.distance import each_distance
 from shapeprog.geometry.scene import Scene
 from shapeprog.geometry.surface import face_areas, sample_surface
 from shapeprog.inference.candidates.repeating import mirrors
-from shapeprog.inference.choice.coverage_kernels import LIFT, TURNED, charged, explain, hold
+from shapeprog.inference.choice.coverage_kernels import TURNED, charged, explain, hold
 from shapeprog.inference.surface.evidence import Evidence
 from shapeprog.language.ast import Assignment, Comment
 from shapeprog.language.free import numbers_outside
@@ -262,69 +259,27 @@ def shares_twin(samples: FloatArray, normals: FloatArray, evidence: Evidence) ->
 
 def explains(scene: Batch, points: FloatArray, normals: FloatArray, evidence: Evidence) -> Bits:
     """Which points (P, 3) each candidate (B, N) explains, as rows of bits (B, W)."""
-
-    def fill(table: FloatArray, many: int, rows: Bits) -> None:
-        places = sorted_by_cell(points, COARSE)
-        data = (
-            table, many, places.points, normals[places.order], places.order, places.starts, places.cells,
-            evidence.tolerance, evidence.agreement, rows,
-        )  # fmt: skip
-        over_threads(partial(explain, *data), len(rows))
-
-    at, facing = torch.from_numpy(points), torch.from_numpy(normals)
-    rest = partial(explains_twin, points=at, normals=facing, tolerance=evidence.tolerance, agreement=evidence.agreement)
-    return _answered(scene, len(points), fill, rest)
-
-
-def explains_twin(
-    scene: Batch, points: Float[Tensor, "P 3"], normals: Float[Tensor, "P 3"], tolerance: float, agreement: float
-) -> Bool[Tensor, "B P"]:
-    """The twin of the kernel of :func:`explains`: the normal of a surface is the slope of its distance."""
-    found = torch.zeros(len(scene), len(points), dtype=torch.bool)
-    unknown = normals.norm(dim=1) < 0.5
-    for element, slot in scene.mask.nonzero().tolist():
-        single, above = _one(scene, element, slot), (points + LIFT * normals).requires_grad_()
-        (slope,) = torch.autograd.grad(each_distance(single, above).sum(), above)
-        fits = ((slope * normals).sum(1).abs() >= agreement) | unknown
-        found[element] |= (each_distance(single, points)[0, :, 0].abs() <= tolerance) & fits
-    return found
+    places, rows = sorted_by_cell(points, COARSE), _no_bits(scene, points)
+    data = (
+        table_of(scene), scene.mask.shape[1], places.points, normals[places.order], places.order, places.starts,
+        places.cells, evidence.tolerance, evidence.agreement, rows,
+    )  # fmt: skip
+    over_threads(partial(explain, *data), len(rows))
+    return rows
 
 
 def holds(scene: Batch, points: FloatArray, depth: float) -> Bits:
     """Which points (P, 3) lie deeper than ``depth`` inside each candidate (B, N), as rows of bits (B, W)."""
-
-    def fill(table: FloatArray, many: int, rows: Bits) -> None:
-        places = sorted_by_cell(points, COARSE)
-        data = table, many, places.points, places.order, places.starts, places.cells, depth, rows
-        over_threads(partial(hold, *data), len(rows))
-
-    return _answered(scene, len(points), fill, partial(holds_twin, points=torch.from_numpy(points), depth=depth))
-
-
-def holds_twin(scene: Batch, points: Float[Tensor, "P 3"], depth: float) -> Bool[Tensor, "B P"]:
-    """The twin of the kernel of :func:`holds`."""
-    found = torch.zeros(len(scene), len(points), dtype=torch.bool)
-    for element, slot in scene.mask.nonzero().tolist():
-        found[element] |= each_distance(_one(scene, element, slot), points)[0, :, 0] < -depth
-    return found
-
-
-def _one(scene: Batch, element: int, slot: int) -> Batch:
-    fields = scene.kind, scene.size, scene.centre, scene.rotation, scene.mask
-    return Batch(*(each[element : element + 1, slot : slot + 1].double() if each.is_floating_point() else
-                   each[element : element + 1, slot : slot + 1] for each in fields))  # fmt: skip
-
-
-def _answered(
-    scene: Batch, count: int, fill: Callable[[FloatArray, int, Bits], None], twin: Callable[[Batch], Tensor]
-) -> Bits:
-    """Rows of bits by the kernel, with those of primitives that only their declaration knows by the twin."""
-    rows = np.zeros((len(scene), -(-count // WORD)), np.uint64)
-    fill(table_of(scene), scene.mask.shape[1], rows)
-    if not by_kernel(scene):
-        rest = replace(scene, mask=scene.mask & torch.isin(scene.kind, torch.tensor(declared_kinds(scene))))
-        rows |= pack(twin(rest).numpy())
+    places, rows = sorted_by_cell(points, COARSE), _no_bits(scene, points)
+    data = (
+        table_of(scene), scene.mask.shape[1], places.points, places.order, places.starts, places.cells, depth, rows
+    )  # fmt: skip
+    over_threads(partial(hold, *data), len(rows))
     return rows
+
+
+def _no_bits(scene: Batch, points: FloatArray) -> Bits:
+    return np.zeros((len(scene), -(-len(points) // WORD)), np.uint64)
 
 
 def nearby(points: FloatArray) -> npt.NDArray[np.int64]:

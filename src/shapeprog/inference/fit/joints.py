@@ -15,7 +15,7 @@ from torch import Tensor
 
 from shapeprog.geometry.batch import Batch
 from shapeprog.geometry.distance import each_distance, projected, signed_distance
-from shapeprog.geometry.primitive import primitives
+from shapeprog.geometry.primitives import primitives
 from shapeprog.geometry.scene import Scene
 from shapeprog.geometry.surface import sample_surface
 from shapeprog.inference.fit.residuals import rows_of

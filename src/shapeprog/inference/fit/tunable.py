@@ -12,7 +12,8 @@ import torch
 from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
-from shapeprog.geometry.primitive import SIZES, primitives
+from shapeprog.geometry.primitive import SIZES
+from shapeprog.geometry.primitives import primitives
 from shapeprog.geometry.scene import Scene
 from shapeprog.language.parameters import Kind, Quantity, to_float32
 from shapeprog.language.program import Draw, Loop, Node, Program

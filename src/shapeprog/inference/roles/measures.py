@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from shapeprog.geometry.primitive import primitives
+from shapeprog.geometry.primitives import primitives
 from shapeprog.geometry.primitives.arc import ARC
 from shapeprog.geometry.scene import Scene
 from shapeprog.space import DEPTH, SIDE, UP, FloatArray
@@ -119,7 +119,7 @@ class Parts:
         half, pose = half[here], np.swapaxes(turned(np.swapaxes(pose, -1, -2), turns), -1, -2)
         self.block = scene.block.numpy()[here]
         self.count = len(half)
-        self._form(half, pose, (scene.kind == primitives.number(ARC)).numpy()[here])
+        self._form(half, pose, (scene.kind == primitives.index(ARC)).numpy()[here])
         self._whole(centre, (np.abs(pose) @ half[..., None])[..., 0])
         self._places()
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from shapeprog.errors import ShapeProgError
 from shapeprog.geometry.arrays import array
-from shapeprog.geometry.primitive import primitives
+from shapeprog.geometry.primitives import primitives
 from shapeprog.language.ast import (
     Assignment,
     Call,

@@ -29,7 +29,7 @@ from shapeprog.formats.frames import frame_comment, frame_of_grid, placement, sc
 from shapeprog.formats.json_form import program_to_json, result_from_json
 from shapeprog.formats.parts import crease_normals, parts, solid
 from shapeprog.formats.shape import program_in, program_text
-from shapeprog.geometry.primitives.cylinder import mesh as cylinder_mesh
+from shapeprog.geometry.primitives.cylinder import CYLINDER
 from shapeprog.language.ast import Scale
 from shapeprog.language.evaluate import evaluated
 from shapeprog.language.parser import parse
@@ -355,7 +355,7 @@ def test_json_of_very_many_solids_has_no_list_of_them():
 
 
 def test_creases_are_sharp_and_rounds_are_smooth():
-    vertices, faces = cylinder_mesh(np.array([2.0, 3.0, 0, 0]))
+    vertices, faces = CYLINDER.mesh(np.array([2.0, 3.0, 0, 0]))
     normals = crease_normals(vertices, faces)
     np.testing.assert_allclose(np.linalg.norm(normals, axis=-1), 1, atol=1e-12)
     corners = vertices[faces]

@@ -11,7 +11,7 @@ import numpy as np
 
 from shapeprog.files import write_text
 from shapeprog.formats.scripts import Script, needed, number, prelude, script
-from shapeprog.geometry.primitives.cylinder import SEGMENTS
+from shapeprog.geometry.primitives.frustum import SEGMENTS
 from shapeprog.language.ast import (
     Argument,
     Assignment,

@@ -8,6 +8,7 @@ from typing import TypeVar
 
 from jaxtyping import Bool, Float, Int
 
+from shapeprog.geometry.primitives import primitives
 from shapeprog.lazy_torch import Tensor, torch
 
 Some = TypeVar("Some", bound="Batch")
@@ -55,6 +56,14 @@ class Batch:
         """Kinds of primitive in use."""
         kinds: list[int] = torch.unique(self.kind[self.mask]).tolist()
         return kinds
+
+    @property
+    def bounds(self) -> Float[Tensor, "*batch N 3"]:
+        """Half extents of the box around each primitive in its local frame, with gradient to sizes."""
+        half = torch.zeros_like(self.centre)
+        for kind in self.kinds:
+            half = torch.where((self.kind == kind)[..., None], primitives[kind].bound(self.size), half)
+        return half
 
     def __len__(self) -> int:
         return self.mask.shape[0]

@@ -6,23 +6,30 @@ import math
 
 import numpy as np
 
-from shapeprog.geometry.dispatch import bound, cells, convex, distance, excess
+from shapeprog.geometry.dispatch import bound, cells, excess
 from shapeprog.kernels.bits import ones
 from shapeprog.kernels.compile import helper, kernel
 from shapeprog.kernels.rows import clip, enclose, fill_row, stretch
-from shapeprog.kernels.table import CENTRE, KIND, ROTATION, SIZE, WIDTH, local
+from shapeprog.kernels.table import CENTRE, KIND, ROTATION, SIZE, WIDTH, in_axes
 
 SQUARE = 1e-6  # how far an entry of a rotation may be from 0 or 1 and still count as a right angle
+
+
+@helper
+def _excess(table, row, x, y, z):
+    """How far a place relative to the centre is outside of the primitive."""
+    a, b, c = in_axes(table, row, x, y, z)
+    return excess(table, row, a, b, c)
 
 
 @helper
 def _fill_turned(table, row, planes, plane, low, high):
     """Any primitive in any pose: cells whose centre is inside.
 
-    Those of a row are in a stretch, which is computed for the box.  If the primitive is convex, cells are taken off the
-    ends of the stretch; else steps along it are as long as the surface is away.
+    For convex primitives, the others have a rule of their own: the cells of a row are a stretch, which is computed for
+    the box and its ends are tested.
     """
-    resolution, half, rounded = planes.shape[2], bound(table, row), convex(table, row)
+    resolution, half = planes.shape[2], bound(table, row)
     reach = enclose(table, row, half, resolution, low, high)
     if not math.isfinite(reach):
         return
@@ -36,35 +43,11 @@ def _fill_turned(table, row, planes, plane, low, high):
                 continue
             first = max(clip(np.floor(start + side - 0.5), resolution), low[2])
             last = min(clip(np.ceil(stop + side + 0.5), resolution), high[2])
-            if not rounded:
-                _fill_in_steps(table, row, planes, plane, i, j, first, last)
-                continue
-            while first < last and _excess(table, row, i, j, first) > 0:
+            while first < last and _excess(table, row, x, y, first + 0.5 - side) > 0:
                 first += 1
-            while first < last and _excess(table, row, i, j, last - 1) > 0:
+            while first < last and _excess(table, row, x, y, last - 0.5 - side) > 0:
                 last -= 1
             fill_row(planes, plane, i, j, first, last)
-
-
-@helper
-def _excess(table, row, i, j, k):
-    """How far the centre of a cell is outside of the primitive."""
-    a, b, c = local(table, row, i + 0.5, j + 0.5, k + 0.5)
-    return excess(table, row, a, b, c)
-
-
-@helper
-def _fill_in_steps(table, row, planes, plane, i, j, first, last):
-    """Fill the cells of a row whose centre is inside, in steps as long as the surface is away."""
-    while first < last:
-        a, b, c = local(table, row, i + 0.5, j + 0.5, first + 0.5)
-        away = distance(table, row, a, b, c)
-        after = first + 1
-        if abs(away) > 1:  # the same is true of all cells nearer than that, but for rounding
-            after = min(first + int(np.ceil(min(abs(away), float(planes.shape[2])) - 1e-9)), last)
-        if away <= 0:
-            fill_row(planes, plane, i, j, first, after)
-        first = after
 
 
 @kernel("void(f8[:, ::1], i8[::1], i8, u4[:, :, :, ::1], i8, i8)")

@@ -10,14 +10,13 @@ from __future__ import annotations
 from itertools import product
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 
 from shapeprog.geometry.arrays import array
 from shapeprog.geometry.batch import Batch
 from shapeprog.geometry.primitives import KINDS, primitives
 from shapeprog.geometry.primitives.arc import PIECES
 from shapeprog.geometry.primitives.frustum import SEGMENTS
-from shapeprog.lazy_torch import torch
 from shapeprog.space import Array, FloatArray
 
 TOUCHING = 0.02
@@ -42,61 +41,34 @@ _TINY = 1e-12
 def contact_groups(scenes: Batch) -> list[int]:
     """The number of groups of touching primitives in each scene of a batch (B, N)."""
     kind, mask = array(scenes.kind), array(scenes.mask)
-    size, centre, rotation = (array(each.double()) for each in (scenes.size, scenes.centre, scenes.rotation))
-    bound, names = np.zeros_like(centre), KINDS
-    for each in scenes.kinds:
-        bound[kind == each] = array(primitives[each].bound(torch.tensor(size[kind == each])))
-    reach = (np.abs(rotation) @ bound[..., None])[..., 0]
+    fields = scenes.size, scenes.centre, scenes.rotation, scenes.bounds
+    size, centre, rotation, bounds = (array(field.double()) for field in fields)
+    reach = (np.abs(rotation) @ bounds[..., None])[..., 0]
     low, high = centre - reach, centre + reach + TOUCHING
-    box = (kind == names["rounded_box"]) | ((kind == names["cuboid"]) & (size[..., 3] == 0))
+    near = (low[:, :, None] <= high[:, None]).all(-1) & mask[:, :, None] & mask[:, None]
+    near &= np.triu(near.swapaxes(1, 2), 1)
+    box = (kind == KINDS["rounded_box"]) | ((kind == KINDS["cuboid"]) & (size[..., 3] == 0))
     box &= (np.abs(rotation - np.rint(rotation)) < _ALIGNED).all((-2, -1))
+    touching = near & box[:, :, None] & box[:, None]
+    scene, first, second = np.nonzero(near & ~touching)
     rows = np.concatenate([kind[..., None], size, rotation.reshape(*kind.shape, 9), centre], -1)
-    pairs: dict[bytes, FloatArray] = {}  # copies of a pair are looked at once
-    groups, undecided = [], []
-    for scene, here in enumerate(mask):
-        near = (low[scene][:, None] <= high[scene][None]).all(-1)
-        near &= near.T & here[:, None] & here
-        first, second = np.nonzero(np.triu(near, 1))
-        sure = box[scene][first] & box[scene][second]
-        group = _Groups(np.flatnonzero(here).tolist())
-        for i, j in zip(first[sure].tolist(), second[sure].tolist(), strict=True):
-            group.join(i, j)
-        open_pairs = []
-        for i, j in zip(first[~sure].tolist(), second[~sure].tolist(), strict=True):
-            if group.root(i) != group.root(j):
-                pair = rows[scene][[i, j]]
-                pair[1, -3:] = (pair[1, -3:] - pair[0, -3:]).round(6) + 0.0
-                pair[0, -3:] = 0.0
-                pairs.setdefault(key := pair.tobytes(), pair)
-                open_pairs.append((i, j, key))
-        groups.append(group)
-        undecided.append(open_pairs)
-    touching = dict(zip(pairs, _touching([*pairs.values()]), strict=True))
-    for group, open_pairs in zip(groups, undecided, strict=True):
-        for i, j, key in open_pairs:
-            if touching[key]:
-                group.join(i, j)
-    return [group.count for group in groups]
+    pairs = np.stack([rows[scene, first], rows[scene, second]], 1)
+    pairs[..., -3:] = (pairs[..., -3:] - pairs[:, :1, -3:]).round(6) + 0.0
+    different, number = np.unique(pairs, axis=0, return_inverse=True)  # copies of a pair are looked at once
+    touching[scene, first, second] = _touching(different)[number.reshape(-1)]
+    return [len(np.unique(numbers[here])) for numbers, here in zip(_connected(touching), mask, strict=True)]
 
 
-class _Groups:
-    """Disjoint sets of parts."""
-
-    def __init__(self, parts: list[int]) -> None:
-        self.parent, self.count = {part: part for part in parts}, len(parts)
-
-    def root(self, part: int) -> int:
-        while self.parent[part] != part:
-            part = self.parent[part]
-        return part
-
-    def join(self, one: int, other: int) -> None:
-        one, other = self.root(one), self.root(other)
-        self.count -= one != other
-        self.parent[one] = other
+def _connected(touching: Bool[Array, "B N N"]) -> Int[Array, "B N"]:
+    """The smallest number of a part that each part is connected with."""
+    both = touching | touching.swapaxes(1, 2)
+    before, group = None, np.broadcast_to(np.arange(touching.shape[1]), touching.shape[:2])
+    while before is None or (group != before).any():
+        before, group = group, np.where(both, group[:, None], group[..., None]).min(-1, initial=touching.shape[1])
+    return group
 
 
-def _touching(pairs: list[FloatArray]) -> list[bool]:
+def _touching(pairs: Float[Array, "P 2 17"]) -> Bool[Array, " P"]:
     """Whether the parts of pairs touch, each a row of kind, sizes, rotation and centre."""
     known: dict[bytes, FloatArray] = {}
     result = np.zeros(len(pairs), np.bool_)
@@ -108,7 +80,7 @@ def _touching(pairs: list[FloatArray]) -> list[bool]:
     for start in range(0, len(hulls), AT_ONCE):
         number, first, second, axes = (np.stack(column) for column in zip(*hulls[start : start + AT_ONCE], strict=True))
         np.logical_or.at(result, number, _meet(first, second, axes))
-    return list(map(bool, result))
+    return result
 
 
 def _meet(

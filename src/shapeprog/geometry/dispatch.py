@@ -29,4 +29,4 @@ def _by_kind(question: str) -> Helper:
 
 distance, slopes, bound, excess = map(_by_kind, ("distance", "slopes", "bound", "excess"))
 sample, place, normal, pull = map(_by_kind, ("sample", "place", "normal", "pull"))
-cells, convex = map(_by_kind, ("cells", "convex"))
+cells = _by_kind("cells")

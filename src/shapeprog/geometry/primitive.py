@@ -65,12 +65,11 @@ class Primitive:
         Formulas ``(size, unit)`` and ``(size, unit, face)``: surface point of a unit place, and its outward normal.
     mesh
         ``size (4,) -> Mesh``: watertight triangles.
-    convex
-        Whether it is.
     cells
         Helper ``(table, row, square, planes, plane, low, high) -> bool``: where cells follow a special rule, fill them
         and return true; else the sizes in the row may be changed to those by which cells are tested.  All is in cells;
         ``square`` is whether the axes are parallel to those of the grid; ``low`` and ``high`` (3,) are scratch.
+        A solid that is not convex fills all of its cells here.
     """
 
     def __init__(
@@ -88,7 +87,6 @@ class Primitive:
         place: Formula,
         normal: Formula,
         mesh: Callable[[FloatArray], Mesh],
-        convex: bool = True,
         value: Formula | None = None,
         cells: Helper = tested,
     ) -> None:
@@ -99,7 +97,6 @@ class Primitive:
         slopes = gradient([distance(_SIZES, _POINT)], [1.0], [*_POINT, *_SIZES])
         self.kernels: dict[str, Helper] = {
             "cells": cells,
-            "convex": generated("convex", "table, row", "return {}", [convex]),
             "distance": generated("distance", "table, row, a, b, c", "return {}", [away]),
             "excess": generated("excess", "table, row, a, b, c", "return {}", [excess(_SIZES, _POINT)]),
             "slopes": generated("slopes", "table, row, a, b, c, out", _assigned("out[{}] = {{}}", range(7)), slopes),

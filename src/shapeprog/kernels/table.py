@@ -9,14 +9,19 @@ KIND, SIZE, CENTRE, ROTATION, WIDTH = 0, 1, 5, 8, 17
 
 
 @helper
-def local(table, row, x, y, z):
-    """A point in the local frame of a row."""
-    x, y, z = x - table[row, CENTRE], y - table[row, CENTRE + 1], z - table[row, CENTRE + 2]
+def in_axes(table, row, x, y, z):
+    """A direction of the grid frame in the local one."""
     return (
         table[row, ROTATION] * x + table[row, ROTATION + 3] * y + table[row, ROTATION + 6] * z,
         table[row, ROTATION + 1] * x + table[row, ROTATION + 4] * y + table[row, ROTATION + 7] * z,
         table[row, ROTATION + 2] * x + table[row, ROTATION + 5] * y + table[row, ROTATION + 8] * z,
     )
+
+
+@helper
+def local(table, row, x, y, z):
+    """A point in the local frame of a row."""
+    return in_axes(table, row, x - table[row, CENTRE], y - table[row, CENTRE + 1], z - table[row, CENTRE + 2])
 
 
 @helper

@@ -29,9 +29,10 @@ from shapeprog.geometry.formulas import (
     where,
 )  # fmt: skip
 from shapeprog.geometry.primitive import Mesh, Primitive
-from shapeprog.geometry.primitives.frustum import SEGMENTS
+from shapeprog.geometry.primitives.frustum import SEGMENTS, tube
 from shapeprog.kernels.compile import helper
-from shapeprog.kernels.table import SIZE
+from shapeprog.kernels.rows import clip, enclose, fill_row, stretch
+from shapeprog.kernels.table import CENTRE, SIZE, local
 from shapeprog.lazy_torch import torch
 from shapeprog.space import Array, FloatArray
 
@@ -156,16 +157,8 @@ def mesh(size: FloatArray) -> Mesh:
     angle, way = step * (np.arange(SEGMENTS) + 0.5), np.linspace(-1, 1, PIECES + 1)
     rings = np.zeros((PIECES + 1, SEGMENTS, 3))
     rings[..., 0], rings[..., 1], rings[..., 2] = way[:, None], grown * np.cos(angle), grown * np.sin(angle)
-    unit = torch.from_numpy(np.concatenate([rings.reshape(-1, 3), [[-1.0, 0, 0], [1, 0, 0]]]))
-    half, radius, sagitta, column = torch.as_tensor(size).expand(len(unit), 4).unbind(-1)
-    along, out, side = unit.unbind(-1)
-    vertices = torch.stack(place((half, radius, sagitta, column), (along, out, side)), -1).numpy()
-    a, last = np.arange(SEGMENTS), PIECES * SEGMENTS
-    b, foot, head = (a + 1) % SEGMENTS, np.full(SEGMENTS, last + SEGMENTS), np.full(SEGMENTS, last + SEGMENTS + 1)
-    faces = [np.stack([foot, b, a], 1), np.stack([head, a + last, b + last], 1)]
-    for low in range(0, last, SEGMENTS):
-        faces += [np.stack([a, b, b + SEGMENTS], 1) + low, np.stack([a, b + SEGMENTS, a + SEGMENTS], 1) + low]
-    return vertices, np.concatenate(faces).astype(np.int64)
+    unit, faces = tube(rings, np.array([[-1.0, 0, 0], [1, 0, 0]]))
+    return PRIMITIVE.place(torch.tensor(size).expand(len(unit), 4), torch.tensor(unit)).numpy(), faces
 
 
 def volume(size: Four) -> Number:
@@ -173,13 +166,41 @@ def volume(size: Four) -> Number:
     return 2 * math.pi * _bend(size)[1] ** 2 * _length(size)[0]
 
 
-@helper
-def cells_kernel(table: Array, row: int, square: bool, planes: Array, plane: int, low: Array, high: Array) -> bool:
-    """No cells of an arc without a radius or a length."""
-    return table[row, SIZE + 1] <= 0 or (table[row, SIZE] <= 0 and table[row, SIZE + 2] <= 0)
-
-
 PRIMITIVE = ARC = Primitive(
     "arc", ("half_chord", "radius", "sagitta"), 2, distance=distance, excess=excess, bound=bound, areas=areas,
-    volume=volume, sample=sample, place=place, normal=normal, mesh=mesh, convex=False, cells=cells_kernel,
+    volume=volume, sample=sample, place=place, normal=normal, mesh=mesh,
 )  # fmt: skip
+bound_kernel, distance_kernel = ARC.kernels["bound"], ARC.kernels["distance"]
+
+
+@helper
+def cells_kernel(table: Array, row: int, square: bool, planes: Array, plane: int, low: Array, high: Array) -> bool:
+    """An arc is not convex: along a row of cells, steps are as long as the arc is away."""
+    if table[row, SIZE + 1] <= 0 or (table[row, SIZE] <= 0 and table[row, SIZE + 2] <= 0):
+        return True
+    resolution, box = planes.shape[2], bound_kernel(table, row)
+    reach = enclose(table, row, box, resolution, low, high)
+    if not math.isfinite(reach):
+        return True
+    middle = table[row, CENTRE + 2]
+    for i in range(low[0], high[0]):
+        for j in range(low[1], high[1]):
+            x, y = i + 0.5 - table[row, CENTRE], j + 0.5 - table[row, CENTRE + 1]
+            small, far = stretch(table, row, box, x, y, reach)
+            if small > far:
+                continue
+            k = max(clip(np.floor(small + middle - 0.5), resolution), low[2])
+            last = min(clip(np.ceil(far + middle + 0.5), resolution), high[2])
+            while k < last:
+                a, b, c = local(table, row, i + 0.5, j + 0.5, k + 0.5)
+                away = distance_kernel(table, row, a, b, c)
+                after = k + 1
+                if abs(away) > 1:  # the same is true of all cells nearer than that, but for rounding
+                    after = min(k + int(np.ceil(min(abs(away), float(resolution)) - 1e-9)), last)
+                if away <= 0:
+                    fill_row(planes, plane, i, j, k, after)
+                k = after
+    return True
+
+
+ARC.kernels["cells"] = cells_kernel

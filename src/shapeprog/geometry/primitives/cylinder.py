@@ -10,17 +10,12 @@ import math
 import numpy as np
 
 from shapeprog.geometry.formulas import Four, Number, Triple, cos, maximum, meet, positive, root, sin, where
-from shapeprog.geometry.primitive import Mesh, Primitive
+from shapeprog.geometry.primitive import Formula, Primitive
 from shapeprog.geometry.primitives import frustum
-from shapeprog.geometry.primitives.frustum import SEGMENTS as SEGMENTS
 from shapeprog.kernels.compile import helper
 from shapeprog.kernels.rows import CAP, REACH, clip, fill_row
 from shapeprog.kernels.table import CENTRE, ROTATION, SIZE
-from shapeprog.space import Array, FloatArray
-
-
-def _frustum(size: Four) -> Four:
-    return size[0], size[1], size[1], size[3]
+from shapeprog.space import Array
 
 
 def distance(size: Four, point: Triple) -> Number:
@@ -57,11 +52,6 @@ def normal(size: Four, unit: Triple, face: Number) -> Triple:
     return where(side, 0.0, unit[0]), where(side, unit[1], 0.0), where(side, unit[2], 0.0)
 
 
-def mesh(size: FloatArray) -> Mesh:
-    """See :func:`frustum_mesh`."""
-    return frustum.frustum_mesh(*size[[0, 1, 1]])
-
-
 @helper
 def cells_kernel(table: Array, row: int, square: bool, planes: Array, plane: int, low: Array, high: Array) -> bool:
     """Cells within ``REACH`` radii of the axis; a cylinder that stands upright is one disc, repeated in its layers."""
@@ -90,9 +80,14 @@ def cells_kernel(table: Array, row: int, square: bool, planes: Array, plane: int
     return True
 
 
+def _of_frustum(formula: Formula) -> Formula:
+    """A formula of the frustum for the sizes of a cylinder."""
+    return lambda size: formula((size[0], size[1], size[1], size[3]))
+
+
 PRIMITIVE = CYLINDER = Primitive(
-    "cylinder", ("half_height", "radius"), 2,
-    distance=distance, excess=excess, bound=lambda size: frustum.bound(_frustum(size)),
-    areas=lambda size: frustum.areas(_frustum(size)), sample=sample, place=place, normal=normal, mesh=mesh,
-    volume=lambda size: frustum.volume(_frustum(size)), cells=cells_kernel,
+    "cylinder", ("half_height", "radius"), 2, distance=distance, excess=excess, bound=_of_frustum(frustum.bound),
+    areas=_of_frustum(frustum.areas), volume=_of_frustum(frustum.volume), sample=sample,
+    place=place, normal=normal, mesh=lambda size: frustum.mesh(size[[0, 1, 1]]),
+    cells=cells_kernel,
 )  # fmt: skip

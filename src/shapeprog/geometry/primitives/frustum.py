@@ -92,31 +92,35 @@ def normal(size: Four, unit: Triple, face: Number) -> Triple:
 
 
 def mesh(size: FloatArray) -> Mesh:
-    """See :func:`frustum_mesh`."""
-    return frustum_mesh(*size[:3])
-
-
-def frustum_mesh(half_height: float, bottom: float, top: float) -> Mesh:
     """A frustum over regular polygons with the areas of the circles, so that the volume is exact.
 
     A circle without radius is one vertex.
     """
-    step = 2 * math.pi / SEGMENTS
-    angle = step * np.arange(SEGMENTS)
-    low, high = (radius * math.sqrt(step / math.sin(step)) for radius in (bottom, top))
-    ring, up = np.stack([np.zeros(SEGMENTS), np.cos(angle), np.sin(angle)], 1), np.array([half_height, 0.0, 0.0])
-    vertices = np.concatenate([low * ring - up, high * ring + up, [-up, up]])
-    a = np.arange(SEGMENTS)
-    b, foot, head = (a + 1) % SEGMENTS, np.full(SEGMENTS, 2 * SEGMENTS), np.full(SEGMENTS, 2 * SEGMENTS + 1)
-    sides = [(a, b, b + SEGMENTS), (a, b + SEGMENTS, a + SEGMENTS), (foot, b, a), (head, a + SEGMENTS, b + SEGMENTS)]
+    half, bottom, top, step = *size[:3], 2 * math.pi / SEGMENTS
+    angle, up = step * np.arange(SEGMENTS), np.array([half, 0.0, 0.0])
+    ring = math.sqrt(step / math.sin(step)) * np.stack([np.zeros(SEGMENTS), np.cos(angle), np.sin(angle)], 1)
+    vertices, faces = tube(np.stack([bottom * ring - up, top * ring + up]), np.stack([-up, up]))
     vertex = np.arange(len(vertices))
     if bottom <= 0:
-        vertex[:SEGMENTS] = foot
+        vertex[:SEGMENTS] = 2 * SEGMENTS
     if top <= 0:
-        vertex[SEGMENTS : 2 * SEGMENTS] = head
-    faces = vertex[np.concatenate([np.stack(side, 1) for side in sides])]
+        vertex[SEGMENTS : 2 * SEGMENTS] = 2 * SEGMENTS + 1
+    faces = vertex[faces]
     used, faces = np.unique(faces[(faces != np.roll(faces, 1, 1)).all(1)], return_inverse=True)
-    return vertices[used], faces.reshape(-1, 3).astype(np.int64)
+    return vertices[used], faces.reshape(-1, 3)
+
+
+def tube(rings: FloatArray, ends: FloatArray) -> Mesh:
+    """The mesh through rings of points (R, S, 3), closed by the middles (2, 3) of the first and of the last one."""
+    around = np.arange(rings.shape[1])
+    after, count = np.roll(around, -1), rings.size // 3
+    last = count - len(around)
+    faces = [np.stack(np.broadcast_arrays(count, after, around), 1)]
+    for low in range(0, last, len(around)):
+        a, b, c, d = around + low, after + low, after + low + len(around), around + low + len(around)
+        faces += [np.stack([a, b, c], 1), np.stack([a, c, d], 1)]
+    faces.append(np.stack(np.broadcast_arrays(count + 1, around + last, after + last), 1))
+    return np.concatenate([rings.reshape(-1, 3), ends]), np.concatenate(faces).astype(np.int64)
 
 
 def volume(size: Four) -> Number:

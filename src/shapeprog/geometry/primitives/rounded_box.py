@@ -6,6 +6,7 @@ It is everything within that radius of an inner box: its surface is that of a ba
 from __future__ import annotations
 
 import math
+from itertools import product
 
 import numpy as np
 
@@ -24,7 +25,7 @@ from shapeprog.geometry.formulas import (
 )  # fmt: skip
 from shapeprog.geometry.primitive import Mesh, Primitive
 from shapeprog.geometry.primitives import cuboid
-from shapeprog.space import Array, FloatArray
+from shapeprog.space import FloatArray
 
 PER_QUARTER = 8  # edges of the polygon that approximates a quarter of a circle in a mesh
 
@@ -104,49 +105,39 @@ def normal(size: Four, unit: Triple, face: Number) -> Triple:
 
 
 def mesh(size: FloatArray) -> Mesh:
-    """A ball of rings between two poles, pulled apart; its radius is a little smaller, so that the volume is exact."""
+    """The convex hull of eighths of a ball, one at each corner of the inner box.
+
+    The radius of the balls, which are polyhedra, is a little smaller, so that the volume is exact.
+    """
+    from manifold3d import Manifold
+
     half = np.maximum(size[:3], 0)
     radius = min(max(size[3], 0.0), half.min())
     if radius == 0:
         return cuboid.mesh(np.append(half, 0.0))
-    sign, ball, faces = _pulled_apart()
-    area = 2 * PER_QUARTER * math.sin(math.pi / (2 * PER_QUARTER))
-    content = np.linalg.det(ball[faces]).sum() / 6
-    # a radius takes 2 * edges * r^2 + corners * r^3 off the cuboid; the roots are sought from above, so it converges
-    edges, corners = (4 - area) * half.sum(), 6 * area - 16 - content
-    removed = 2 * (4 - math.pi) * half.sum() * radius**2 + (6 * math.pi - 16 - 4 / 3 * math.pi) * radius**3
+    tilt = math.pi / 2 * np.linspace(0, 1, PER_QUARTER + 1)
+    radius = _smaller(radius, half.sum(), tilt)
+    rim, axial, around = np.sin(tilt)[:, None], np.cos(tilt)[:, None], np.ones_like(tilt)
+    eighth = np.stack([axial * around, rim * np.cos(tilt), rim * np.sin(tilt)], -1).reshape(-1, 3)
+    signs = np.array([*product((-1, 1), repeat=3)])[:, None]
+    hull = Manifold.hull_points((signs * (half - radius + radius * eighth)).reshape(-1, 3)).to_mesh64()
+    return np.array(hull.vert_properties), np.array(hull.tri_verts, np.int64)
+
+
+def _smaller(radius: float, halves: float, tilt: FloatArray) -> float:
+    """The radius of balls over polygons at angles from the pole to the equator that takes as much off the cuboid.
+
+    A radius takes 2 * edges * r^2 + corners * r^3 off; the root is approached from above, so Newton's method converges.
+    """
+    area = 2 * PER_QUARTER * math.sin(math.pi / (2 * PER_QUARTER))  # of the polygon in a circle of radius 1
+    low, high = np.sin(tilt[:-1]), np.sin(tilt[1:])
+    ball = 2 / 3 * area * (-np.diff(np.cos(tilt)) * (low**2 + low * high + high**2)).sum()
+    edges, corners = (4 - area) * halves, 6 * area - 16 - ball
+    removed = 2 * (4 - math.pi) * halves * radius**2 + (6 * math.pi - 16 - 4 / 3 * math.pi) * radius**3
     for _ in range(6):
         off = 2 * edges * radius**2 + corners * radius**3
         radius -= (off - removed) / (4 * edges * radius + 3 * corners * radius**2)
-    return sign * (half - radius) + ball * radius, faces
-
-
-def _pulled_apart() -> tuple[FloatArray, FloatArray, Array]:
-    """Octants (V, 3) and places (V, 3) of vertices on the unit ball, and triangles; octants share no vertex."""
-    count, step = PER_QUARTER + 1, math.pi / 2 / PER_QUARTER
-    tilt = step * np.concatenate([np.arange(1, count), np.arange(PER_QUARTER, 2 * PER_QUARTER)])[:, None]
-    quarter, column = np.divmod(np.arange(4 * count), count)
-    angle = step * (PER_QUARTER * quarter + column)
-    shape = (2 * PER_QUARTER, 4 * count)
-    rim = np.sin(tilt)
-    rings = np.stack([np.broadcast_to(np.cos(tilt), shape), rim * np.cos(angle), rim * np.sin(angle)], -1)
-    around = np.stack([np.where(np.isin(quarter, (0, 3)), 1, -1), np.where(quarter < 2, 1, -1)], -1)
-    upper = np.where(np.arange(2 * PER_QUARTER) < PER_QUARTER, 1, -1)[:, None]
-    signs = np.concatenate([np.broadcast_to(upper[..., None], (*shape, 1)), np.broadcast_to(around, (*shape, 2))], -1)
-    poles = np.array([[end, 0.0, 0.0] for end in (1, -1) for _ in range(4)])
-    signs_of_poles = np.concatenate([poles[:, :1], np.tile(around[::count], (2, 1))], 1)
-    a = np.arange(4 * count)
-    b, last = (a + 1) % (4 * count), (2 * PER_QUARTER - 1) * 4 * count
-    faces = []
-    for low in range(0, last, 4 * count):
-        faces += [np.stack([a, a + 4 * count, b + 4 * count], 1) + low, np.stack([a, b + 4 * count, b], 1) + low]
-    seam, top = column == PER_QUARTER, last + 4 * count
-    for ring, pole, turn in ((0, top, 1), (last, top + 4, -1)):
-        fan = np.stack([quarter + pole, a + ring, b + ring], 1)
-        strip = np.stack([quarter + pole, b + ring, quarter[b] + pole], 1)[seam]
-        faces += [triangles[:, ::turn] for triangles in (fan, strip, np.array([[0, 1, 2], [0, 2, 3]]) + pole)]
-    vertices = np.concatenate([rings.reshape(-1, 3), poles])
-    return np.concatenate([signs.reshape(-1, 3), signs_of_poles]), vertices, np.concatenate(faces).astype(np.int64)
+    return radius
 
 
 def volume(size: Four) -> Number:

@@ -19,8 +19,6 @@ from shapeprog.formats.parts import crease_normals, part_normals, parts
 from shapeprog.geometry import mesh, surface
 from shapeprog.geometry.arrays import table_of
 from shapeprog.geometry.distance import each_distance, nearest_primitive
-from shapeprog.geometry.distance_kernels import MANY
-from shapeprog.geometry.surface_kernels import LISTED
 from shapeprog.view.viewer import viewer
 
 ROW = "for i in translate(100000, by=(0, 0, 3)):\n    leg(at=(0, 0, 0), size=(2, 2, 2))\n"
@@ -38,9 +36,8 @@ def crowd(slots: int, spread: float):
     return require(scene, centre=scene.centre * torch.tensor([spread, 1, 1], dtype=torch.float64), mask=mask).flatten()
 
 
-@pytest.mark.parametrize("slots", [LISTED, LISTED + 1])
-def test_points_of_many_parts_are_those_of_all_pairs(slots):
-    scene = crowd(slots, 4.0)
+def test_points_of_many_parts_are_those_of_all_pairs():
+    scene = crowd(500, 4.0)
     shares = surface.area_shares(surface.face_areas(scene), scene)
     fast, slow = surface.visible(table_of(scene), shares, 40, 7), twins.visible(scene, shares, 40, 7)
     assert (fast.chosen == slow.chosen).all()
@@ -48,7 +45,7 @@ def test_points_of_many_parts_are_those_of_all_pairs(slots):
 
 
 def test_distances_to_many_parts_are_those_of_all_pairs():
-    scene = crowd(2 * MANY, 6.0)
+    scene = crowd(2000, 6.0)
     points = torch.cartesian_prod(torch.arange(-40.0, 40, 20), torch.tensor([0.0]), torch.arange(-12.0, 12)).double()
     slots, values = nearest_primitive(scene, points)
     expected = each_distance(scene, points).min(-1)

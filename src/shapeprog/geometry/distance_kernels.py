@@ -11,8 +11,6 @@ from shapeprog.kernels.compile import helper, kernel
 from shapeprog.kernels.table import CENTRE, KIND, ROTATION, SIZE, local, turned
 
 ROUNDING = 2e-6  # error of a bound in single precision against the size of the coordinates, generously
-STRIDE = 2.0  # how far in cells from a point its list of possible nearest primitives is used
-LONG_STRIDE, MANY = 8.0, 1024  # the same among more primitives than this, which take longer than a longer list
 FARTHEST = 1e18  # coordinates whose squares fit into single precision, in which bounds are taken and points drawn
 
 
@@ -87,59 +85,31 @@ def _best(table, first, listed, lower, count, x, y, z):
     return best, closest
 
 
-@helper
-def _few(all_listed, all_box, lower, used, limit, listed, box):
-    """Keep the boxes whose bound is not above a limit, or no number; returns how many."""
-    number = 0
-    for n in range(used):
-        if not lower[n] > limit:
-            listed[number] = all_listed[n]
-            for entry in range(15):
-                box[entry, number] = all_box[entry, n]
-            number += 1
-    return number
-
-
 @kernel("void(f8[:, ::1], i8, f8[:, ::1], i8, i8[::1], f8[::1], i8, i8)")
 def nearest(table, per_scene, points, count, slots, values, begin, end):
     """Nearest primitive and signed distance of the union for the points ``begin`` to ``end`` of all scenes.
 
     Each scene has ``per_scene`` rows of the table and ``count`` points.  The turned box around a primitive bounds its
-    signed distance from below, inside too.  Distances change no faster than points move: a primitive whose bound at
-    one point exceeds the best there by more than twice the stride is not the nearest within a stride of it, so
-    points that come in order, such as cells, test few primitives.  Where coordinates are too large for bounds, or
-    no numbers, every primitive is looked at.
+    signed distance from below, inside too.  Where coordinates are too large for bounds, or no numbers, every primitive
+    is looked at.
     """
-    all_listed, listed = np.empty(per_scene, np.int64), np.empty(per_scene, np.int64)
-    all_box, box = np.empty((15, per_scene), np.float32), np.empty((15, per_scene), np.float32)
+    listed, box = np.empty(per_scene, np.int64), np.empty((15, per_scene), np.float32)
     up, depth, lower = np.empty(per_scene, np.float32), np.empty(per_scene, np.float32), np.empty(per_scene, np.float32)
-    scene, used, number, extent, lowest, stride = -1, 0, 0, 0.0, 0.0, STRIDE
-    px, py, pz = np.inf, np.inf, np.inf
+    scene, used, extent = -1, 0, 0.0
     for item in range(begin, end):
         if item // count != scene:
-            scene, px = item // count, np.inf
-            used, extent = _boxes(table, scene * per_scene, per_scene, all_listed, all_box)
-            stride = STRIDE if used <= MANY else LONG_STRIDE
+            scene = item // count
+            used, extent = _boxes(table, scene * per_scene, per_scene, listed, box)
         if used == 0:
             slots[item], values[item] = 0, np.inf
             continue
         x, y, z = points[item, 0], points[item, 1], points[item, 2]
-        far = not abs(x) + abs(y) + abs(z) + extent < FARTHEST
-        if not far and (x - px) * (x - px) + (y - py) * (y - py) + (z - pz) * (z - pz) < stride * stride:
-            if number == 0:
-                number = _few(all_listed, all_box, lower, used, lowest + 2 * stride + 1e-3, listed, box)
-            of, some, those = number, listed, box
+        if abs(x) + abs(y) + abs(z) + extent < FARTHEST:
+            _bounds(box, used, x, y, z, extent, up, depth, lower)
         else:
-            px, py, pz, number = x, y, z, 0
-            of, some, those = used, all_listed, all_box
-        if far:
-            lower[:of], px = -np.inf, np.inf
-        else:
-            _bounds(those, of, x, y, z, extent, up, depth, lower)
-        best, closest = _best(table, scene * per_scene, some, lower, of, x, y, z)
-        slots[item], values[item] = some[closest], best
-        if number == 0:
-            lowest = best
+            lower[:used] = -np.inf
+        best, closest = _best(table, scene * per_scene, listed, lower, used, x, y, z)
+        slots[item], values[item] = listed[closest], best
 
 
 @kernel("void(f8[:, ::1], i8, f8[:, ::1], i8, i8[::1], f8[::1], f8[:, ::1], f8[:, ::1], i8, i8)")

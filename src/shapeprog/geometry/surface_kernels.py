@@ -13,38 +13,19 @@ from shapeprog.kernels.table import CENTRE, KIND, ROTATION, local, turned
 
 GUIDE = 256  # steps of the table that shortens the search for a face
 
-LISTED = 512
-"""Most primitives of a scene of which each gets a list of those near it; in larger scenes all are looked at."""
-
 
 @helper
 def _around(table, first, per_scene, skin, box):
-    """Boxes around the primitives: centre and reach along each axis."""
+    """Boxes around the primitives: centre and reach along each axis, which is negative for padding."""
     for slot in range(per_scene):
         if table[first + slot, KIND] < 0:
+            box[slot, :3], box[slot, 3:] = 0.0, -1.0
             continue
         half = bound(table, first + slot)
         for axis in range(3):
             box[slot, axis], box[slot, 3 + axis] = table[first + slot, CENTRE + axis], skin
             for column in range(3):
                 box[slot, 3 + axis] += abs(table[first + slot, ROTATION + 3 * axis + column]) * half[column]
-
-
-@helper
-def _list_near(table, first, per_scene, box, neighbours, neighbour_counts):
-    """For each primitive the others whose box touches its own, since only they can hide it; or one list of all."""
-    for slot in range(len(neighbours)):
-        neighbour_counts[slot] = 0
-        for rival in range(per_scene):
-            separate = table[first + rival, KIND] < 0
-            if len(neighbours) == per_scene and not separate:
-                separate = rival == slot or table[first + slot, KIND] < 0
-                for axis in range(3):
-                    gap = abs(box[slot, axis] - box[rival, axis]) - box[slot, 3 + axis] - box[rival, 3 + axis]
-                    separate = separate or gap > 0
-            if not separate:
-                neighbours[slot, neighbour_counts[slot]] = rival
-                neighbour_counts[slot] += 1
 
 
 @helper
@@ -63,13 +44,9 @@ def _beyond(box, slot, x, y, z):
 
 
 @helper
-def _hidden(table, first, box, neighbours, line, count, slot, x, y, z, dx, dy, dz):
-    """Whether another part begins just outside the point, or an earlier part has the same face there.
-
-    The parts looked at are the first ``count`` in a line of ``neighbours``.
-    """
-    for turn in range(count):
-        rival = neighbours[line, turn]
+def _hidden(table, first, per_scene, box, slot, x, y, z, dx, dy, dz):
+    """Whether another part begins just outside the point, or an earlier part has the same face there."""
+    for rival in range(per_scene):
         if rival == slot or _beyond(box, rival, x, y, z):
             continue
         if _inside(table, first + rival, x + dx, y + dy, z + dz):
@@ -87,15 +64,11 @@ def visible(table, per_scene, shares, seed, skin, attempts, n, chosen, places, f
     (B * n, 9) the unit place, the grid position and the normal, and ``found`` (B,) how many of at most ``attempts``
     candidates were visible, n at most; -1 if one of them is farther away than ``FARTHEST``.
     """
-    lists = per_scene if per_scene <= LISTED else 1
-    box, neighbours = np.empty((per_scene, 6)), np.empty((lists, per_scene), np.int64)
-    neighbour_counts = np.empty(lists, np.int64)
-    guide = np.empty(GUIDE + 1, np.int64)
-    per = shares.shape[1] // max(per_scene, 1)
+    box, guide = np.empty((per_scene, 6)), np.empty(GUIDE + 1, np.int64)
+    faces = shares.shape[1] // max(per_scene, 1)
     for scene in range(begin, end):
         first, stream, base = scene * per_scene, scene << 40, scene * n
         _around(table, first, per_scene, skin, box)
-        _list_near(table, first, per_scene, box, neighbours, neighbour_counts)
         cell = 0
         for step in range(GUIDE + 1):
             while cell < shares.shape[1] and shares[scene, cell] <= step / GUIDE:
@@ -110,7 +83,7 @@ def visible(table, per_scene, shares, seed, skin, attempts, n, chosen, places, f
             cell = guide[int(number * GUIDE)]
             while shares[scene, cell] <= number:
                 cell += 1
-            slot, face = cell // per, cell % per
+            slot, face = cell // faces, cell % faces
             row = first + slot
             one, two, three = uniform(seed, count + 1), uniform(seed, count + 2), uniform(seed, count + 3)
             u, v, w = sample(table, row, face, one, two, three)
@@ -119,9 +92,7 @@ def visible(table, per_scene, shares, seed, skin, attempts, n, chosen, places, f
             x, y, z = x + table[row, CENTRE], y + table[row, CENTRE + 1], z + table[row, CENTRE + 2]
             a, b, c = normal(table, row, face, u, v, w)
             a, b, c = turned(table, row, a, b, c)
-            dx, dy, dz = skin * a, skin * b, skin * c
-            line = min(slot, lists - 1)
-            if _hidden(table, first, box, neighbours, line, neighbour_counts[line], slot, x, y, z, dx, dy, dz):
+            if _hidden(table, first, per_scene, box, slot, x, y, z, skin * a, skin * b, skin * c):
                 continue
             if not abs(x) + abs(y) + abs(z) < FARTHEST:
                 accepted = -1

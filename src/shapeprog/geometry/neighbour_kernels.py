@@ -97,37 +97,21 @@ def _search(x, y, z, ordered, starts, low, side, cells, best, closest):
     centre_i = _cell(x, low[0], inverse, cells[0])
     centre_j = _cell(y, low[1], inverse, cells[1])
     for ring in range(max(cells[0], cells[1])):
-        if ring > 0:
-            # every column of this ring is at least this far away along axis 0 or axis 1
-            close = np.inf
-            if centre_i - ring >= 0:
-                close = min(close, x - low[0] - (centre_i - ring + 1) * side)
-            if centre_i + ring < cells[0]:
-                close = min(close, low[0] + (centre_i + ring) * side - x)
-            if centre_j - ring >= 0:
-                close = min(close, y - low[1] - (centre_j - ring + 1) * side)
-            if centre_j + ring < cells[1]:
-                close = min(close, low[1] + (centre_j + ring) * side - y)
-            if close > 0 and close * close > best:
-                break
+        if ((ring - 1) * side) ** 2 > best and ring > 0:  # all columns of this ring are farther away
+            break
         for i in range(max(centre_i - ring, 0), min(centre_i + ring, cells[0] - 1) + 1):
             dx = _gap(x, low[0], side, i)
-            if dx * dx > best:
-                continue
             step = 1 if abs(i - centre_i) == ring else 2 * ring
-            j = centre_j - ring
-            while j <= centre_j + ring:
-                if 0 <= j < cells[1]:
-                    base = (i * cells[1] + j) * cells[2]
-                    if starts[base] < starts[base + cells[2]]:
-                        dy = _gap(y, low[1], side, j)
-                        remaining = best - dx * dx - dy * dy
-                        if remaining > 0:
-                            reach = math.sqrt(remaining)
-                            first = _cell(z - reach, low[2], inverse, cells[2])
-                            last = _cell(z + reach, low[2], inverse, cells[2])
-                            best, closest = _column(x, y, z, ordered, starts, base, first, last, best, closest)
-                j += max(step, 1)
+            for j in range(centre_j - ring, centre_j + ring + 1, max(step, 1)):
+                if j < 0 or j >= cells[1]:
+                    continue
+                dy = _gap(y, low[1], side, j)
+                remaining = best - dx * dx - dy * dy
+                if remaining > 0:
+                    reach, base = math.sqrt(remaining), (i * cells[1] + j) * cells[2]
+                    first = _cell(z - reach, low[2], inverse, cells[2])
+                    last = _cell(z + reach, low[2], inverse, cells[2])
+                    best, closest = _column(x, y, z, ordered, starts, base, first, last, best, closest)
     return best, closest
 
 

@@ -18,7 +18,6 @@ compiled into it: the name under which a kernel is kept therefore has a digest o
 
 from __future__ import annotations
 
-import gc
 import importlib
 import inspect
 import os
@@ -26,7 +25,7 @@ import subprocess
 import sys
 import threading
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from functools import cache, cached_property
 from hashlib import sha256
 from pathlib import Path
@@ -78,7 +77,7 @@ class Kernel:
 
     def compile(self) -> None:
         """Load it from the cache, or compile it and keep it there."""
-        with _lock, _without_collector():
+        with _lock:
             if self._compiled is None:
                 self._dispatcher.compile(self.signature)
                 self._dispatcher.disable_compile()
@@ -141,19 +140,16 @@ def prepare(modules: Sequence[str], tell: Callable[[str], None] | None = None) -
     tell
         Called with a sentence before anything is compiled, which takes seconds.
     """
-    lacking: list[Kernel] = []
+    lacking = [kernel for kernel in _of(modules) if not kernel.load()]
+    if not lacking:
+        return
+    if tell:
+        tell("compiling kernels for this machine (first run only, up to half a minute)")
+    count = min(max((os.cpu_count() or 2) - 1, 1), MOST)
     children: list[subprocess.Popen[bytes]] = []
     try:
-        for kernel in _of(modules):
-            if kernel.load():
-                continue
-            if not lacking:
-                if tell:
-                    tell("compiling kernels for this machine (first run only, up to half a minute)")
-                count = min(max((os.cpu_count() or 2) - 1, 1), MOST)
-                with suppress(OSError):  # where no other can be started, all is compiled here
-                    children += [_other(f"{number}/{count}", modules) for number in range(count)]
-            lacking.append(kernel)
+        with suppress(OSError):  # where no other can be started, all is compiled here
+            children += [_other(f"{number}/{count}", modules) for number in range(count)]
         for kernel in reversed(lacking):
             kernel.compile()
     finally:
@@ -205,18 +201,6 @@ def _compiled(function: Function) -> Any:
     template = dispatcher.get_call_template  # else each literal number is a version: 15 % slower
     dispatcher.get_call_template = lambda args, kws: template(tuple(map(numba.types.unliteral, args)), kws)
     return dispatcher
-
-
-@contextmanager
-def _without_collector() -> Iterator[None]:
-    """The compiler makes many objects and hardly any garbage: the collector would search in vain."""
-    before = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if before:
-            gc.enable()
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Kernels on packed cells: filling them, spreading their bits over bytes, counting what two grids share."""
+"""Kernels on packed cells: filling them, spreading their bits over bytes."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ import math
 import numpy as np
 
 from shapeprog.geometry.dispatch import bound, cells, excess
-from shapeprog.kernels.bits import ones
 from shapeprog.kernels.compile import helper, kernel
 from shapeprog.kernels.rows import clip, enclose, fill_row, stretch
 from shapeprog.kernels.table import CENTRE, KIND, ROTATION, SIZE, WIDTH, in_axes
@@ -82,14 +81,3 @@ def unpack(words, table, cells, begin, end):
         bits = words[k]
         for part in range(4):
             cells[k, part] = table[(bits >> np.uint32(8 * part)) & np.uint32(255)] if bits != 0 else np.uint64(0)
-
-
-@kernel("void(u4[:, ::1], u4[:, ::1], i8[:, ::1])")
-def shared(first_grid, second_grid, counts):
-    """Number of cells in both and in either of pairs of packed grids (B, words)."""
-    for pair in range(first_grid.shape[0]):
-        common, joined = 0, 0
-        for word in range(first_grid.shape[1]):
-            common += ones(np.uint64(first_grid[pair, word] & second_grid[pair, word]))
-            joined += ones(np.uint64(first_grid[pair, word] | second_grid[pair, word]))
-        counts[pair, 0], counts[pair, 1] = common, joined

@@ -99,10 +99,7 @@ def count(cells: Cells) -> Int[Tensor, "*batch"]:
 def iou(a: Int[Tensor, "*one words R"], b: Int[Tensor, "*two words R"]) -> Float[Tensor, "*batch"]:
     """Intersection over union of packed cells, with broadcasting; 1 when both are empty."""
     first, second = torch.broadcast_tensors(a, b)
-    lead = first.shape[:-2]
-    counts = np.empty((lead.numel(), 2), np.int64)
-    kernels.shared(*(words_of(item).reshape(lead.numel(), -1) for item in (first, second)), counts)
-    intersection, either = torch.from_numpy(counts).to(a.device).double().reshape(*lead, 2).unbind(-1)
+    intersection, either = count(first & second).double(), count(first | second)
     return torch.where(either > 0, intersection / either.clamp(min=1), 1.0)
 
 

@@ -12,7 +12,7 @@ from torch import Tensor
 
 from shapeprog.geometry.batch import Batch
 from shapeprog.geometry.distance import signed_distance
-from shapeprog.geometry.nearest import mean_squared_distances, squared_distance
+from shapeprog.geometry.nearest import squared_distance
 
 Cloud = Float[Tensor, "*batch P 3"]
 Weights = Float[Tensor, "*batch P"]
@@ -41,12 +41,8 @@ def chamfer(
     Tensor
         One value for each shape, in squared cells.
     """
-    if weights is None and target_weights is None:
-        there, back = mean_squared_distances(points, target)
-    else:
-        there = _mean(squared_distance(points, target), weights)
-        back = _mean(squared_distance(target, points), target_weights)
-    return there + back
+    there = _mean(squared_distance(points, target), weights)
+    return there + _mean(squared_distance(target, points), target_weights)
 
 
 def coverage(scene: Batch, target: Cloud, *, surface: bool = False) -> Values:

@@ -38,47 +38,30 @@ def squared_distance(queries: Cloud, points: Other) -> Float[Tensor, "*batch P"]
 
     Neighbours are found without gradient; the gradient of the distance to them is that of the minimum.
     """
-    (results,) = _Squared.apply(*_pair(queries, points), False)  # type: ignore[no-untyped-call]
-    squared: Tensor = results.reshape(queries.shape[:-1])
-    return squared
-
-
-def mean_squared_distances(cloud: Cloud, other: Other) -> tuple[Float[Tensor, "*batch"], Float[Tensor, "*batch"]]:
-    """Means of the squared distances from each cloud to the nearest points of the other, with gradient to both."""
-    if not cloud.shape[-2]:
-        return squared_distance(cloud, other).mean(-1), squared_distance(other, cloud).mean(-1)
-    outward, back = _Squared.apply(*_pair(cloud, other), True)  # type: ignore[no-untyped-call]
-    return outward.reshape(cloud.shape[:-2]), back.reshape(cloud.shape[:-2])
+    squared: Tensor = _Squared.apply(*_pair(queries, points))  # type: ignore[no-untyped-call]
+    return squared.reshape(queries.shape[:-1])
 
 
 class _Squared(torch.autograd.Function):
-    """The kernels as one differentiable step: squared distances one way, or the means of those both ways.
-
-    Torch would share such means among threads that then wait for more, in the way of those of the kernels.
-    """
+    """The kernels as one differentiable step."""
 
     @staticmethod
-    def forward(ctx: Any, cloud: Tensor, other: Tensor, means: bool) -> tuple[Tensor, ...]:
-        ways = [(cloud, other), (other, cloud)] if means else [(cloud, other)]
-        results = [_neighbours(*way) for way in ways]
-        ctx.save_for_backward(cloud, other)
-        ctx.means, ctx.index = means, [index for index, _ in results]
-        return tuple(cast(squared.mean(-1) if means else squared, cloud) for _, squared in results)
+    def forward(ctx: Any, queries: Tensor, points: Tensor) -> Tensor:
+        ctx.index, squared = _neighbours(queries, points)
+        ctx.save_for_backward(queries, points)
+        return cast(squared, queries)
 
     @staticmethod
     @once_differentiable
-    def backward(ctx: Any, *slopes: Tensor) -> tuple[Tensor | None, ...]:
-        clouds = [numbers(item) for item in ctx.saved_tensors]
-        results = [np.zeros(item.shape) for item in clouds]
-        for way, (index, slope) in enumerate(zip(ctx.index, slopes, strict=True)):
-            count = clouds[way].shape[1]
-            weight = numbers(slope)[:, None] / count if ctx.means else numbers(slope)
-            data = (
-                clouds[way].reshape(-1, 3), count, clouds[1 - way].reshape(-1, 3), index.reshape(-1), weight,
-                results[way].reshape(-1, 3), results[1 - way].reshape(-1, 3),
-            )  # fmt: skip
-            over_threads(partial(kernels.pull, *data), len(index), least=8)
-        return *(cast(item, cloud) for item, cloud in zip(results, ctx.saved_tensors, strict=True)), None
+    def backward(ctx: Any, slope: Tensor) -> tuple[Tensor, ...]:
+        queries, points = clouds = [numbers(cloud) for cloud in ctx.saved_tensors]
+        results = [np.zeros(cloud.shape) for cloud in clouds]
+        data = (
+            queries.reshape(-1, 3), queries.shape[1], points.reshape(-1, 3), ctx.index.reshape(-1), numbers(slope),
+            *(result.reshape(-1, 3) for result in results),
+        )  # fmt: skip
+        over_threads(partial(kernels.pull, *data), len(queries), least=8)
+        return tuple(cast(result, cloud) for result, cloud in zip(results, ctx.saved_tensors, strict=True))
 
 
 def _pair(queries: Cloud, points: Other) -> tuple[Float[Tensor, "B P 3"], Float[Tensor, "B Q 3"]]:

@@ -145,13 +145,10 @@ def neighbours(queries, query_count, points, count, index, squared, begin, end):
 
 @kernel("void(f8[:, ::1], i8, f8[:, ::1], i8[::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], i8, i8)")
 def pull(queries, query_count, points, index, slope, to_queries, to_points, begin, end):
-    """Add the gradient of squared distances to known neighbours, given the gradient of a loss by each of them.
-
-    ``slope`` (B, many), or (B, 1) when it is the same for all queries of a cloud.
-    """
+    """Add the gradient of squared distances to known neighbours, given the gradient (B, many) of a loss by each."""
     for cloud in range(begin, end):
         for turn in range(query_count):
-            query, twice = cloud * query_count + turn, 2 * slope[cloud, min(turn, slope.shape[1] - 1)]
+            query, twice = cloud * query_count + turn, 2 * slope[cloud, turn]
             for axis in range(3):
                 part = twice * (queries[query, axis] - points[index[query], axis])
                 to_queries[query, axis] += part

@@ -97,9 +97,10 @@ def mesh(size: FloatArray) -> Mesh:
     A circle without radius is one vertex.
     """
     half, bottom, top, step = *size[:3], 2 * math.pi / SEGMENTS
+    low, high = (radius * math.sqrt(step / math.sin(step)) for radius in (bottom, top))
     angle, up = step * np.arange(SEGMENTS), np.array([half, 0.0, 0.0])
-    ring = math.sqrt(step / math.sin(step)) * np.stack([np.zeros(SEGMENTS), np.cos(angle), np.sin(angle)], 1)
-    vertices, faces = tube(np.stack([bottom * ring - up, top * ring + up]), np.stack([-up, up]))
+    ring = np.stack([np.zeros(SEGMENTS), np.cos(angle), np.sin(angle)], 1)
+    vertices, faces = tube(np.stack([low * ring - up, high * ring + up]), np.stack([-up, up]))
     vertex = np.arange(len(vertices))
     if bottom <= 0:
         vertex[:SEGMENTS] = 2 * SEGMENTS

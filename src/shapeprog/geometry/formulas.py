@@ -70,6 +70,7 @@ maximum = _elementary("max", lambda x, y: torch.maximum(x, y))
 at_least = _elementary("at_least", lambda x, low: x.clamp(min=low))
 clamp = _elementary("clamp", lambda x, low, high: x.clamp(low, high))
 root = _elementary("root", lambda squared: torch.sqrt(squared.clamp(min=TINY)))
+plain_root = _elementary("plain_root", lambda squared: torch.sqrt(squared))  # exact near 0, where slopes are infinite
 sin = _elementary("sin", lambda angle: angle.sin())
 cos = _elementary("cos", lambda angle: angle.cos())
 atan2 = _elementary("atan2", lambda x, y: torch.atan2(x, y))
@@ -90,8 +91,8 @@ def meet(x: Number, y: Number) -> Number:
 _CODE: dict[str, str] = {
     "abs": "abs({})", "square": "{0} * {0}", "where": "({1} if {0} else {2})", "min": "min({}, {})",
     "max": "max({}, {})", "at_least": "max({}, {})", "clamp": "min(max({}, {}), {})",
-    "root": f"math.sqrt(max({{}}, {TINY}))", "sin": "math.sin({})", "cos": "math.cos({})",
-    "atan2": "math.atan2({}, {})", "constant": "{}",
+    "root": f"math.sqrt(max({{}}, {TINY}))", "plain_root": "math.sqrt({})", "sin": "math.sin({})",
+    "cos": "math.cos({})", "atan2": "math.atan2({}, {})", "constant": "{}",
 }  # fmt: skip
 
 _GRADIENTS: dict[str, Callable[..., tuple[Number | None, ...]]] = {

@@ -21,6 +21,7 @@ from shapeprog.geometry.formulas import (
     maximum,
     meet,
     minimum,
+    plain_root,
     positive,
     root,
     where,
@@ -62,7 +63,7 @@ def value(size: Four, point: Triple) -> Number:
     """The same distance, cheaper where nothing is sheared, but without the slope by ``lean`` there."""
     up, depth, side = (abs(at) - positive(half) for at, half in zip(point, size[:3], strict=True))
     inside = maximum(maximum(up, depth), side)
-    outside = root(positive(up) ** 2 + positive(depth) ** 2 + positive(side) ** 2)
+    outside = plain_root(positive(up) ** 2 + positive(depth) ** 2 + positive(side) ** 2)
     return where(abs(size[3]) > 0, distance(size, point), where(inside > 0, outside, inside))
 
 

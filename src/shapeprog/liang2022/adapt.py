@@ -1,9 +1,9 @@
 """Adaptation to real shapes, whose programs are not known (section 4.3 and Table 1).
 
-The generator decodes a program for each shape, the program is rendered, and the loss flows back through the rendering
-into the generator.  *Direct* adaptation renders analytically (the paper), *guided* adaptation through the neural
-executor (Tian et al. 2019), *hybrid* adaptation through both.  All weights learn.  In ten lines, after
-``import torch, shapeprog as sp`` and ``from shapeprog.liang2022 import *``:
+The loss of the rendering of each decoded program trains all weights of the generator.  *Direct* adaptation renders
+analytically (the paper), *guided* through the neural executor (Tian et al. 2019), *hybrid* through both: ``AdaptTask``.
+A sketch of direct adaptation in ten lines, without rehearsal and KL; endless: stop it yourself, then ``save_weights``;
+an error if a program has no surface.  After ``import torch, shapeprog as sp``, ``from shapeprog.liang2022 import *``:
 
     generator = load_generator("fast-wide")
     optimiser = torch.optim.Adam(generator.parameters(), lr=2e-4)

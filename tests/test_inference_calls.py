@@ -22,7 +22,7 @@ from shapeprog.inference.candidates.calls import (
 )
 from shapeprog.inference.candidates.recognition import proposed
 from shapeprog.inference.choice.connecting import connected
-from shapeprog.inference.choice.coverage import Prices
+from shapeprog.inference.choice.coverage import Coverage, Prices
 from shapeprog.inference.fit.adjustment import adjust
 from shapeprog.inference.fit.tunable import Tunable
 from shapeprog.inference.surface.evidence import evidence_of_program
@@ -223,7 +223,7 @@ def test_a_call_that_floats_is_not_taken_apart() -> None:
     call = called(PULL_OUT, DRAWER | {"bottom": -6.0, "left": -4.0, "width": 8.0})
     whole = Program((*parse(seat).body, *call.nodes))
     evidence = evidence_of_program(whole)
-    assert connected(whole, evidence, Prices(), fixed={*call.nodes}) == whole
+    assert connected(whole, Coverage(evidence), {*call.nodes}) == whole
     (one,) = parse(seat).body
     assert regrouped([one, call], whole) == [one, call]
     twice = [call.nodes[1], call, one, call]

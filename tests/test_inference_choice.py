@@ -15,17 +15,9 @@ from shapeprog.data.shape import Shape
 from shapeprog.geometry.batch import Batch
 from shapeprog.geometry.distance import each_distance
 from shapeprog.geometry.mesh import union_mesh
+from shapeprog.inference.choice.bits import explains, holds, pack
 from shapeprog.inference.choice.choice import Choice, choose, explained, value
-from shapeprog.inference.choice.coverage import (
-    Covers,
-    Prices,
-    covers,
-    explains,
-    holds,
-    pack,
-    shares,
-    shares_twin,
-)  # fmt: skip
+from shapeprog.inference.choice.coverage import Coverage, CoverageTable, Prices, shares
 from shapeprog.inference.choice.coverage_kernels import LIFT, TURNED
 from shapeprog.inference.surface import evidence as seen
 from shapeprog.inference.surface.evidence import Evidence, evidence_of
@@ -62,7 +54,7 @@ def table() -> Evidence:
 
 
 def chosen(candidates: list[Program], evidence: Evidence, blocks: int = 10) -> Choice:
-    return choose(covers(candidates, evidence, Prices()), blocks)
+    return choose(Coverage(evidence).table(candidates), blocks)
 
 
 # ---------------------------------------------------------------- choice
@@ -97,7 +89,7 @@ def test_what_lies_inside_another_costs_its_price_and_no_more():
         parse("locker(at=(-12, -8, -12), size=(24, 16, 24))"),
         parse("layer(at=(0, 0, 0), thickness=1, half=(6, 9))"),
     )
-    made = covers([body, board], evidence_of(mesh_of(body)), Prices())
+    made = Coverage(evidence_of(mesh_of(body))).table([body, board])
     assert value(made, (1,)) < -2 * made.prices[1]
     assert value(made, (0, 1)) == pytest.approx(value(made, (0,)) - made.prices[1])
 
@@ -110,7 +102,7 @@ def test_what_another_buries_explains_nothing():
     )
     vertices, faces = zip(*(union_mesh(unroll(each)) for each in (body, board)), strict=True)
     both = shape_from_mesh(np.concatenate(vertices), np.concatenate([faces[0], faces[1] + len(vertices[0])]))
-    made = covers([body, board, side], evidence_of(both), Prices())
+    made = Coverage(evidence_of(both)).table([body, board, side])
     assert explained(made, (1,)) > 0.02  # the board is in the mesh, unseen
     assert explained(made, (0, 1)) == explained(made, (1, 0)) == explained(made, (0,))
     assert value(made, (0, 1)) == pytest.approx(value(made, (0,)) - made.prices[1])
@@ -132,20 +124,20 @@ def test_what_another_buries_explains_nothing():
 )
 def test_what_is_in_the_middle_writes_a_number_less(table, block, known):
     prices, program = Prices(), parse(block)
-    (price,) = covers([program], table, prices).prices
+    (price,) = Coverage(table, prices).table([program]).prices
     assert price == pytest.approx(prices.of(program) - known * prices.number)
 
 
 def test_copies_of_a_loop_hide_each_other(table):
     crossing = "for i in translate(2, by=(0, 3, 0)):\n    locker(at=(-4, -3, -5), size=(6, 6, 10))\n"
     apart = crossing.replace("(0, 3, 0)", "(0, 6.5, 0)")
-    costs = [-value(covers([parse(text)], table, Prices(free=0)), (0,)) for text in (crossing, apart)]
+    costs = [-value(Coverage(table, Prices(free=0)).table([parse(text)]), (0,)) for text in (crossing, apart)]
     assert costs[0] < 0.85 * costs[1]
 
 
 def test_two_equal_blocks_do_not_hide_each_other(table):
     floating = parse("locker(at=(-4, -3, -5), size=(6, 6, 10))")
-    made = covers([floating, floating], table, Prices(free=0))
+    made = Coverage(table, Prices(free=0)).table([floating, floating])
     assert value(made, (0, 1)) == pytest.approx(2 * value(made, (0,)), rel=0.05)
 
 
@@ -162,11 +154,11 @@ def test_nothing_is_chosen_from_nothing(table):
 
 def test_the_same_seed_chooses_the_same():
     shape, pool = mesh_of(*TABLE), [*random_blocks(60, 1), *TABLE]
-    one, two = (choose(covers(pool, evidence_of(shape, 5), Prices(), 5), 4, seed=5) for _ in range(2))
+    one, two = (choose(Coverage(evidence_of(shape, 5), seed=5).table(pool), 4, seed=5) for _ in range(2))
     assert one == two
 
 
-def random_covers(seed: int, count: int, free: int = 1) -> Covers:
+def random_table(seed: int, count: int, free: int = 1) -> CoverageTable:
     """Bits of which each is set with a probability of a quarter, and costs of the size of gains."""
     random = np.random.default_rng(seed)
     flags = random.random((count, 64 * (2 + free + count))) < 0.25
@@ -174,12 +166,12 @@ def random_covers(seed: int, count: int, free: int = 1) -> Covers:
     buried = pack((random.random((count, 64 * 2)) < 0.1) & ~flags[:, : 64 * 2])
     rows = pack(flags)
     own = pack(random.random((count, 64)) < 0.5)[:, 0] & ~rows[np.arange(count), 2 + free + np.arange(count)]
-    return Covers(rows, weights, 2, buried, own, random.random(count) / 600, random.random(count) / 50)
+    return CoverageTable(rows, weights, 2, buried, own, random.random(count) / 600, random.random(count) / 50)
 
 
 @pytest.mark.parametrize("seed", range(8))
 def test_the_search_finds_the_best_of_all_sets(seed):
-    made = random_covers(seed, 11)
+    made = random_table(seed, 11)
     every = [c for size in range(5) for c in itertools.combinations(range(11), size)]
     found = choose(made, 4)
     assert found.best.value == pytest.approx(max(value(made, one) for one in every))
@@ -199,7 +191,7 @@ def test_a_body_does_not_stand_in_for_the_boards_around_what_it_buries():
     rows = pack(np.concatenate([outer, inner, np.zeros((boards + 1, 64 * (boards + 1)), bool)], 1))
     nothing = np.zeros(boards + 1)
     weights = np.array([0.7, 0.3]) / 64
-    made = Covers(rows, weights, words, pack(buried), nothing.astype(np.uint64), nothing, nothing + 0.01)
+    made = CoverageTable(rows, weights, words, pack(buried), nothing.astype(np.uint64), nothing, nothing + 0.01)
     assert value(made, (0,)) == pytest.approx(0.69)
     assert all(value(made, (0, *range(1, 1 + size))) < value(made, (0,)) for size in range(1, 1 + boards))
     found = choose(made, 10)
@@ -209,7 +201,7 @@ def test_a_body_does_not_stand_in_for_the_boards_around_what_it_buries():
 
 
 def test_a_choice_goes_on_from_where_it_is_told_to():
-    made = random_covers(3, 40)
+    made = random_table(3, 40)
     best = choose(made, 6, rounds=4000).best
     assert choose(made, 6, start=best.chosen, rounds=4).best.value >= best.value - 1e-12
 
@@ -259,6 +251,16 @@ def test_points_explained_and_held_are_those_of_the_declarations():
         assert np.array_equal(holds(scene, points, depth), pack(holds_twin(scene, at, depth).numpy()))
 
 
+def shares_of_pairs(samples: np.ndarray, normals: np.ndarray, known: Evidence) -> np.ndarray:
+    """The twin of :func:`shares`, over all pairs."""
+    near = np.linalg.norm(samples[:, None] - known.surface, axis=2) <= known.reach
+    unknown = np.linalg.norm(known.surface_normals, axis=1) < 0.5
+    cosine = normals @ known.surface_normals.T
+    fits = np.where(known.surface_outward, cosine, np.abs(cosine)) >= known.agreement
+    turned = (near & (cosine <= -known.agreement)).any(1)
+    return np.where((near & (fits | unknown)).any(1), 0.0, np.where(turned, TURNED, 1.0))
+
+
 def test_samples_pay_what_all_pairs_say(table):
     random = np.random.default_rng(0)
     kept = {name: getattr(table, name)[::40] for name in ("surface", "surface_normals")}
@@ -266,7 +268,7 @@ def test_samples_pay_what_all_pairs_say(table):
     samples = random.uniform(-13, 13, (500, 3))
     samples[:250] = few.surface[:250] + random.normal(0, 0.1, (250, 3))
     normals = random.choice([-1, 1], (500, 1)) * np.eye(3)[random.integers(3, size=500)]
-    wanted = shares_twin(samples, normals, few)
+    wanted = shares_of_pairs(samples, normals, few)
     assert all((wanted == share).sum() >= 10 for share in (0, TURNED, 1))
     assert np.array_equal(shares(samples, normals, few), wanted)
 
@@ -283,12 +285,27 @@ def test_the_inner_face_of_the_wall_of_a_solid_pays_for_facing_the_other_way(tab
     assert (shares(below - [1, 0, 0], facing, table) == 1).all()
 
 
+def looking_of_all(barrier: np.ndarray, starts: np.ndarray, steps: np.ndarray, wanted: int, *, through: bool):
+    """The twin of :func:`seen.looking`: all rays at once."""
+    size = len(barrier)
+    paths = starts[:, None, None] + steps[:, None] * np.arange(size + 1)[:, None]  # (N, D, steps, 3)
+    backward = starts[:, None, None] - steps[:, None] * np.arange(size + 1)[:, None]
+
+    def clear(places: np.ndarray) -> np.ndarray:
+        inside = ((places >= 0) & (places < size)).all(-1)
+        cell = np.clip(places.astype(np.int64), 0, size - 1)
+        return ~(inside & barrier[tuple(np.moveaxis(cell, -1, 0))]).any(-1)
+
+    ways = clear(paths) & clear(backward) if through else clear(paths)
+    return ways.sum(1) >= wanted
+
+
 @pytest.mark.parametrize("through", [False, True])
 def test_rays_find_the_way_out_as_their_twin_does(through):
     random = np.random.default_rng(1)
     barrier = random.random((12, 12, 12)) < 0.12
     data = barrier, random.uniform(-1, 13, (300, 3)), seen.directions(16), 3
-    wanted = seen.looking_twin(*data, through=through)
+    wanted = looking_of_all(*data, through=through)
     assert 50 < wanted.sum() < 290
     assert np.array_equal(seen.looking(*data, through=through), wanted)
 
@@ -300,12 +317,6 @@ def cell(evidence: Evidence, *place: float) -> bool:
     """Whether the space at a place is known to be free."""
     scale = len(evidence.free) / 32
     return bool(evidence.free[tuple(int((value + 16) * scale) for value in place)])
-
-
-def test_faces_that_are_doubled_count_once_in_whatever_order():
-    vertices = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [0, 0, 0], [0, 1, 0.0]])
-    faces = np.array([[0, 1, 2], [2, 1, 0], [4, 1, 5], [0, 1, 3]])
-    assert seen.single_faces(vertices, faces).tolist() == [[0, 1, 2], [0, 1, 3]]
 
 
 def test_inner_faces_count_little_and_space_within_is_not_free():

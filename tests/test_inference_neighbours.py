@@ -12,7 +12,7 @@ from shapeprog.geometry.mesh import pieces, union_mesh
 from shapeprog.inference.candidates.neighbours import neighbours
 from shapeprog.inference.choice.choice import choose
 from shapeprog.inference.choice.connecting import connected, floating
-from shapeprog.inference.choice.coverage import Prices, covers
+from shapeprog.inference.choice.coverage import Coverage
 from shapeprog.inference.fit.adjustment import adjust, tidy
 from shapeprog.inference.surface.evidence import Evidence, evidence_of
 from shapeprog.language import Draw, Loop, Program
@@ -36,7 +36,7 @@ def best(start: str, target: str) -> Program:
     """What is chosen of a program's own blocks and their neighbours."""
     program = parse(start)
     near: list[Node] = [*program.body, *neighbours(program)]
-    found = choose(covers([Program((node,)) for node in near], evidence(target), Prices()), 10)
+    found = choose(Coverage(evidence(target)).table([Program((node,)) for node in near]), 10)
     return Program(tuple(near[place] for place in found.best.chosen))
 
 
@@ -103,7 +103,7 @@ def test_neighbours_are_new_and_each_of_them_stands_once():
 def test_a_floating_leg_reaches_the_seat(height):
     program = parse(SEAT + LEGS.format(height=height))
     assert floating(program) == [1]
-    found = connected(program, evidence(TABLE), Prices())
+    found = connected(program, Coverage(evidence(TABLE)))
     assert floating(found) == []
     assert found.blocks == 2
     assert pieces(*union_mesh(unroll(found))) == 1
@@ -112,7 +112,7 @@ def test_a_floating_leg_reaches_the_seat(height):
 def test_a_leaning_leg_is_stretched_along_itself():
     leg = "for i in mirror(side):\n    bar(start=(-12, 0, 11), end=({up}, 0, {side}), section=(1, 1))\n"
     program = parse(SEAT + leg.format(up=0, side=8.43))
-    found = connected(program, evidence(SEAT + leg.format(up=2.2, side=7.96)), Prices())
+    found = connected(program, Coverage(evidence(SEAT + leg.format(up=2.2, side=7.96))))
     assert floating(found) == []
     ends = np.array(found.body[1].body[0].values)  # type: ignore[union-attr]
     assert ends[3:6] == pytest.approx([2.1, 0, 8.0], abs=0.2)
@@ -120,10 +120,10 @@ def test_a_leaning_leg_is_stretched_along_itself():
 
 def test_a_crumb_that_floats_is_left_out_and_what_says_much_is_not():
     crumb = "box(at=(-6, 0, 0), size=(0.5, 0.5, 0.5))\n"
-    found = connected(parse(TABLE + crumb), evidence(TABLE), Prices())
+    found = connected(parse(TABLE + crumb), Coverage(evidence(TABLE)))
     assert found == parse(TABLE)
     shelf = "box(at=(-8, -8, -7), size=(1, 16, 14))\n"  # as far from both legs
-    assert connected(parse(TABLE + shelf), evidence(TABLE + shelf), Prices()).blocks == 3
+    assert connected(parse(TABLE + shelf), Coverage(evidence(TABLE + shelf))).blocks == 3
 
 
 FRONT = "for i in mirror(depth):\n    box(at=(-12, {at}, -8), size=(20, {thick}, 16))\n"
@@ -134,7 +134,7 @@ CASE = "box(at=(-12, -9.5, -8), size=(20, {depth}, 16))\n"
 def test_only_a_copy_floats_and_either_side_closes_the_gap(gap):
     program = parse(CASE.format(depth=19 - gap) + FRONT.format(at=9.5, thick=0.5))
     assert floating(program) == [1]  # the rear board touches the case, its image in front does not
-    found = connected(program, evidence(CASE.format(depth=19) + FRONT.format(at=9.5, thick=0.5)), Prices())
+    found = connected(program, Coverage(evidence(CASE.format(depth=19) + FRONT.format(at=9.5, thick=0.5))))
     assert floating(found) == []
     assert found.blocks == 2
     assert pieces(*union_mesh(unroll(found))) == 1
@@ -145,14 +145,14 @@ def test_parts_of_one_run_are_joined_by_what_crosses_them():
     beam = "box(at=({low}, -9, -1), size=({height}, 18, 2))\n"
     program = parse(slats + beam.format(low=-1.02, height=1))
     assert floating(program) == [0]  # no two slats touch, and the beam is the largest part
-    found = connected(program, evidence(slats + beam.format(low=-1, height=1)), Prices())
+    found = connected(program, Coverage(evidence(slats + beam.format(low=-1, height=1))))
     assert floating(found) == []
     assert found.blocks == 2
 
 
 def test_what_is_one_piece_stays_as_it_is():
-    assert connected(parse(TABLE), evidence(TABLE), Prices()) == parse(TABLE)
-    assert connected(Program(), evidence(TABLE), Prices()) == Program()
+    assert connected(parse(TABLE), Coverage(evidence(TABLE))) == parse(TABLE)
+    assert connected(Program(), Coverage(evidence(TABLE))) == Program()
 
 
 def test_closing_a_gap_does_not_move_what_the_target_holds():

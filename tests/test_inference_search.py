@@ -9,7 +9,7 @@ from shapeprog.data.random import outside_published
 from shapeprog.geometry.cells import pack, words_of
 from shapeprog.geometry.cells import voxels as voxels_of
 from shapeprog.inference.budget import Deadline
-from shapeprog.inference.cells import editing
+from shapeprog.inference.cells import editing, ruin
 from shapeprog.inference.cells.blocks import to_program
 from shapeprog.inference.cells.chance_kernels import start
 from shapeprog.inference.cells.descent_kernels import moves, statements, valid
@@ -112,11 +112,11 @@ def test_the_search_stops_when_nothing_has_gained_for_long():
 def test_a_block_of_the_pool_is_put_in_where_it_gains():
     aim = target(cells(STAR))
     whole = search_structure(cells(STAR), Settings()).blocks
-    plan = editing.Plan(10, len(aim.table), forms=0.0, heat=0.0, recall=1.0, pool=editing.Pool.of([whole, whole], aim))
+    plan = ruin.Plan(10, len(aim.table), forms=0.0, heat=0.0, recall=1.0, pool=ruin.Pool.of([whole, whole], aim))
     assert len(plan.pool.blocks) == len(whole)
     for missing in range(len(whole)):
         start(0)
-        found = editing.recreate(np.delete(whole, missing, 0), 1, aim, plan)
+        found = ruin.recreate(np.delete(whole, missing, 0), 1, aim, plan)
         assert editing.value_of(found, aim) == pytest.approx(editing.value_of(whole, aim))
 
 
@@ -145,8 +145,8 @@ def test_descent_polish_and_rounds_never_lower_the_objective(seed):
     polished = editing.polish(blocks, aim, 1, 3)
     start = editing.value_of(blocks, aim)
     assert editing.value_of(polished, aim) >= start
-    plan = editing.Plan(most=6, families=40, forms=0.3, heat=0.004)
-    rebuilt, best = editing.rebuild(polished, aim, plan, 6, seed)
+    plan = ruin.Plan(most=6, families=40, forms=0.3, heat=0.004)
+    rebuilt, best = ruin.rebuild(polished, aim, plan, 6, seed)
     assert best == pytest.approx(editing.value_of(rebuilt, aim), abs=1e-12)
     assert best >= editing.value_of(polished, aim)
     assert len(rebuilt) <= 6

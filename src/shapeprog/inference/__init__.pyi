@@ -1,7 +1,6 @@
 from .cells.greedy import greedy_boxes
 from .cells.refine import Schedule, refine
-from .cells.snapping import snap, snapped_from
 from .cells.structure import Settings
 from .infer import Result, infer
 
-__all__ = ["Result", "Schedule", "Settings", "greedy_boxes", "infer", "refine", "snap", "snapped_from"]
+__all__ = ["Result", "Schedule", "Settings", "greedy_boxes", "infer", "refine"]

@@ -1,7 +1,8 @@
-"""Inference: a shape in, a program out, with its scores and a sentence that says why the search stopped.
+"""Inference: a shape in, a program out, with its scores and the reason why the search stopped.
 
-A program of the paper's statements is searched on cells.  Its blocks then compete with those found on the surface of
-the shape, from every statement there is; cells have a surface as well, if a coarse one.
+A mesh or a point cloud is inferred from its surface (:func:`~shapeprog.inference.assembly.assemble`), voxels and
+programs in the statements of the paper from cells (:func:`~shapeprog.inference.cells.reconstruct.reconstruct`).  Then
+numbers are tied, and parts are placed from the sides of the whole.
 """
 
 from __future__ import annotations
@@ -10,30 +11,23 @@ import importlib
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import cache, partial
+from functools import cache
 from pathlib import Path
 from typing import Literal
-
-import numpy as np
-import torch
-from jaxtyping import Float
-from torch import Tensor
 
 from shapeprog.data.shape import Shape
 from shapeprog.data.touched import occupied
 from shapeprog.geometry.arrays import one_tensor_thread
 from shapeprog.geometry.cells import iou, pack
-from shapeprog.geometry.distance import nearest_primitive
-from shapeprog.inference.assembly import TradeOff, assemble
+from shapeprog.inference.assembly import assemble
 from shapeprog.inference.budget import BUDGET, Deadline, Progress
 from shapeprog.inference.candidates.calls import recognised
-from shapeprog.inference.cells.blocks import to_program
-from shapeprog.inference.cells.refine import REACH, Schedule, refine
-from shapeprog.inference.cells.structure import Settings, search_structure
-from shapeprog.inference.choice.cell_coverage import cost_on_cells
+from shapeprog.inference.cells.reconstruct import description_length, reconstruct
+from shapeprog.inference.cells.refine import Schedule
+from shapeprog.inference.cells.structure import Settings
 from shapeprog.inference.readable import CELLS, in_readable_unit, unit_of_result
 from shapeprog.inference.roles.roles import named_anew
-from shapeprog.inference.surface.cells import points_of_cells
+from shapeprog.inference.surface.evidence import evidence_of
 from shapeprog.inference.ties.tying import tie
 from shapeprog.language.convert import placed_if_possible
 from shapeprog.language.free import numbers
@@ -44,13 +38,7 @@ from shapeprog.language.unroll import unroll
 from shapeprog.library import Library, with_library
 
 SEARCH_SHARE = 0.65
-"""Share of the time budget after which the structure search hands over to refinement."""
-
-EXPLAINED = 0.5
-"""Share of the surface that blocks must explain; else what has a surface is no furniture, and its cells are rebuilt."""
-
-DEEP = 2.5
-"""Depth in cells below the surface of the snapped program beyond which points are inner faces; chosen on val."""
+"""Share of the time budget after which the search on cells hands over to refinement."""
 
 
 @dataclass(frozen=True)
@@ -60,22 +48,19 @@ class Result:
     Parameters
     ----------
     program
-        The program with continuous parameters.
+        The program with continuous numbers.
     snapped
-        Of a program of the paper's statements, the same with whole numbers, each within one of the rounded parameter of
-        ``program``; others have no such form.
+        Of a program in the statements of the paper, the same with whole numbers, each within one of the rounded number
+        of ``program``: with ``statements="paper"``, and of voxels where that is the shorter description.
     scores
         ``blocks``, ``statements``, ``primitives``; ``numbers``, those that are free; ``explained``, the share of the
-        surface, where that was looked at; ``iou`` at 32^3 of programs found on cells, and of all for targets that are
-        cells.
+        surface, of meshes and point clouds; ``iou`` at 32^3 of voxels and of programs with a ``snapped`` form.
     reason
         Why the search stopped, where the program came from, what the time budget cut short, and what to try next.
     cut
         What the time budget cut short, and how far that had come; if nothing, the same seed gives an equal result.
     seconds
         How long it took, which counts for nothing when results are compared.
-    trade_off
-        For every number of blocks the best program that was seen: numbers written, and share of the surface explained.
     """
 
     program: Program
@@ -84,7 +69,6 @@ class Result:
     reason: str
     cut: tuple[str, ...]
     seconds: float = field(compare=False)
-    trade_off: tuple[TradeOff, ...] = ()
 
     def __str__(self) -> str:
         """A short report: the size of the program, how well it fits, and why the search stopped."""
@@ -118,11 +102,8 @@ def infer(
 ) -> Result:
     """A short program of at most ``blocks`` blocks that rebuilds a shape.
 
-    Structure is searched on the touched cells, with whole numbers; then all parameters are refined together on surface
-    points through the renderer.  These blocks and those that the surface itself suggests are candidates of one choice,
-    whose parameters are adjusted and whose parts are named.  Of a shape that is known by its cells the shorter
-    description is kept: share of cells wrong, and price of what is written.  The result is the same for the same seed
-    unless the time budget cuts in, which ``cut`` and ``reason`` tell.
+    The result is the same for the same seed unless the time budget ends a step early, which ``cut`` and ``reason``
+    report.
 
     Parameters
     ----------
@@ -134,15 +115,14 @@ def infer(
         Seconds after which neither search nor refinement starts another step: a safety net.  What they may spend in
         the common case is up to ``settings`` and ``schedule``.
     settings, schedule
-        Rounds of the search and steps of refinement, and more; the defaults were chosen on validation shapes.
+        Rounds of the search on cells and steps of refinement, and more.
     statements
         All statements in force, or those of the paper alone.
     detail
-        How much finer than usual the program may be where the surface is known: prices of what is written are divided
-        by it.
+        How much finer than usual the program may be: prices of what is written are divided by it.
     ties
         Whether numbers that hold together are tied: the program then has names for the few that are free, and
-        expressions for all others.  Of cells alone only where the description gets no longer by it.
+        expressions for all others.
     libraries
         Functions that the program is written with wherever that is shorter, unless it has the paper's statements alone.
         What they draw competes with single blocks, at the price of a call, and a call counts as one block.
@@ -166,43 +146,35 @@ def infer(
     searching, refining = (Deadline(started + share * budget) for share in (SEARCH_SHARE, 1.0))
     target = _load(shape)
     scores: dict[str, float] = {}
-    structure = search_structure(
-        target.voxels, replace(settings or Settings(), blocks=blocks), seed=seed, deadline=searching, progress=progress
-    )
-    on_cells = to_program(structure.blocks)
-    snapped: Program | None = on_cells
-    reason = f"The search ended after {structure.reason}"
-    reason += "." if searching.cut else _advice(on_cells.blocks, blocks)
-    program = refine(
-        on_cells, outer_points(target, on_cells, seed),
-        voxels=target.voxels if target.points is None else None, schedule=schedule, reach=REACH, seed=seed,
-        deadline=refining, progress=progress,
-    )  # fmt: skip
-    trade_off: tuple[TradeOff, ...] = ()
-    costs = partial(cost_on_cells, voxels=target.voxels, detail=detail)
-    if statements == "all":
+    program, reason = Program(), ""
+    snapped: Program | None = None
+    evidence = None if statements == "paper" else evidence_of(target, seed)
+    if evidence is not None and target.points is not None:
         functions = [pattern for library in libraries for pattern in library.patterns if pattern.shortens]
         found = assemble(
-            target, blocks=blocks, more=program.flat().body, functions=functions, detail=detail, seed=seed,
-            deadline=refining, progress=progress,
+            target, evidence, blocks=blocks, functions=functions, detail=detail, seed=seed, deadline=refining,
+            progress=progress,
         )  # fmt: skip
-        if target.points is not None:
-            better = found.explained >= EXPLAINED
-        else:
-            better = costs(found.program) < costs(program, snapped=snapped)
-        if better:
-            program, snapped, trade_off = found.program, None, found.trade_off
-            scores["explained"] = found.explained
-            reason = found.reason[0].upper() + found.reason[1:]
-            if ties:
-                held = {index for call in recognised(program, libraries) for index in call.places}
-                tied = tie(program, found.evidence, held=held, seed=seed, progress=progress).program
-                fits = target.points is not None or costs(tied) <= costs(program)
-                program = tied if fits else program
-        elif ties and target.points is None:
-            tied = tie(named_anew(program), found.evidence, seed=seed, progress=progress).program
-            if costs(tied) <= costs(program, snapped=snapped):
-                program, snapped = tied, None
+        program, reason = found.program, found.reason
+        scores["explained"] = found.explained
+    if not program.body:  # voxels, or no surface to speak of
+        usual = settings or Settings()
+        on_cells = reconstruct(
+            target, settings=replace(usual, blocks=blocks, price=usual.price / detail), schedule=schedule, seed=seed,
+            searching=searching, refining=refining, progress=progress,
+        )  # fmt: skip
+        program, snapped, reason = on_cells.program, on_cells.snapped, on_cells.reason
+    if evidence is not None:
+        whole, plain = snapped, program
+        if snapped is not None:
+            program, snapped = named_anew(program), None
+        if ties:
+            held = {index for call in recognised(program, libraries) for index in call.places}
+            program = tie(program, evidence, held=held, seed=seed, progress=progress).program
+        if whole is not None and description_length(plain, target.voxels, whole) < description_length(
+            program, target.voxels
+        ):
+            program, snapped = plain, whole
     if snapped is None:
         program = placed_if_possible(merged(program))
         for library in libraries:
@@ -222,7 +194,7 @@ def infer(
         "primitives": float(program.size),
         "numbers": float(numbers(program)),
     }
-    return Result(program, snapped, scores, reason, cut, time.monotonic() - started, trade_off)
+    return Result(program, snapped, scores, reason, cut, time.monotonic() - started)
 
 
 @cache
@@ -242,22 +214,3 @@ def _load(shape: Shape | str | Path) -> Shape:
     from shapeprog.data import load
 
     return load(shape)
-
-
-def outer_points(target: Shape, snapped: Program, seed: int) -> Float[Tensor, "P 3"]:
-    """Points that the surface of the program should meet.
-
-    Points deep inside the solid lie on inner faces of the mesh, such as the back of a drawer.  The surface of a union
-    cannot reach them; trying to would pull its outer faces inwards.
-    """
-    if target.points is None:
-        return torch.from_numpy(points_of_cells(target.voxels, seed=seed))
-    points = torch.from_numpy(np.asarray(target.points, np.float32))
-    outer = points[nearest_primitive(unroll(snapped), points)[1] > -DEEP] if snapped.size else points
-    return outer if len(outer) else points
-
-
-def _advice(used: int, allowed: int) -> str:
-    if used >= allowed:
-        return f"; the limit of --blocks {allowed} is reached, raise it for more."
-    return f"; {used} of {allowed} drawing statements are in use, another would improve the fit too little."

@@ -115,13 +115,12 @@ def bent(box: Box) -> Iterator[list[float]]:
 
 
 def rounded(box: Box) -> Iterator[list[float]]:
-    """Low corner, extents and radius of the edges, of a box along the axes of the grid: round all the way; and half as
+    """Low corner, extents and radius of the edges, of a box along the axes of the grid: round all the way, and half as
     much, where that differs from a sharp edge."""
     for values in upright_box(box):
-        thinnest = min(values[3:])
-        yield [*values, 0.5 * thinnest]
-        if 0.25 * thinnest >= SOFT:
-            yield [*values, 0.25 * thinnest]
+        for share in (0.5, 0.25):
+            if share * min(values[3:]) >= SOFT:
+                yield [*values, share * min(values[3:])]
 
 
 def _leaned(along: FloatArray, main: int, axis: int) -> FloatArray:

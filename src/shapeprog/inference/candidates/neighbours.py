@@ -13,8 +13,8 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 import torch
 
-from shapeprog.inference.candidates.candidates import alike, drawings, redrawn, solid_boxes
-from shapeprog.inference.candidates.repeating import mirrors, repeated
+from shapeprog.inference.candidates.drawings import drawings, hinted, redrawn, solid_boxes
+from shapeprog.inference.candidates.loops import mirrors, repeated
 from shapeprog.language.hints import STRAIGHT, Box
 from shapeprog.language.program import Chain, Draw, Loop, Node, Program, nest
 from shapeprog.language.statement import language
@@ -60,7 +60,7 @@ def neighbours(program: Program) -> list[Node]:
             found += [with_drawing(chain, other) for other in drawings(box)]
             edited = list(met(box, parts))
             edited += [middle for each in [box, *edited] for middle in centred(each)]
-            found += [with_drawing(chain, other) for each in edited for other in alike(drawing_of(chain), each)]
+            found += [with_drawing(chain, other) for each in edited for other in redrawn(drawing_of(chain), each)]
             found += _recounted(chain, box)
             found += _filled(chain)
     for (one, first), (two, second) in itertools.combinations(zip(chains, boxes, strict=True), 2):
@@ -115,7 +115,7 @@ def _recounted(chain: Chain, box: Box) -> Iterator[Node]:
             rest = chain[place + 1 :]
             yield nest((*other, *rest))
             moved = box._replace(centre=box.centre - more * (second - first))
-            for drawn in redrawn(drawing_of(chain), moved):
+            for drawn in hinted(language()[chain[-1].name], moved):
                 yield nest((*other, *rest[:-1], drawn))
 
 

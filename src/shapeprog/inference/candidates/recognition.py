@@ -15,9 +15,10 @@ import numpy as np
 
 from shapeprog.inference.budget import NEVER, Deadline
 from shapeprog.inference.candidates.calls import Called
-from shapeprog.inference.candidates.candidates import looks_of, solid_boxes
+from shapeprog.inference.candidates.drawings import solid_boxes
+from shapeprog.inference.candidates.loops import rows_and_pairs
+from shapeprog.inference.candidates.moments import moments_of
 from shapeprog.inference.candidates.neighbours import CORNERS
-from shapeprog.inference.candidates.repeating import rows_and_pairs
 from shapeprog.inference.fit.tunable import CELLS
 from shapeprog.language.hints import Box
 from shapeprog.language.parameters import to_float32
@@ -149,7 +150,7 @@ def _tidy(pattern: Pattern, found: Iterable[dict[str, float]], most: int) -> lis
 
 def _repeated(calls: Sequence[Called]) -> Iterator[Called]:
     """Runs and mirror images of calls that draw the same."""
-    seen = looks_of([call.program for call in calls]) if len(calls) > 1 else None
+    seen = moments_of([call.program for call in calls]) if len(calls) > 1 else None
     for one, loop in rows_and_pairs(seen) if seen else ():
         yield replace(calls[one], around=(loop,))
 

@@ -20,11 +20,10 @@ from shapeprog.errors import InputError
 from shapeprog.geometry.arrays import one_tensor_thread
 from shapeprog.geometry.distance import signed_distance
 from shapeprog.geometry.nearest import squared_distance
-from shapeprog.geometry.primitives import primitives
 from shapeprog.geometry.scene import Scene
 from shapeprog.geometry.surface import sample_surface
 from shapeprog.inference.budget import NEVER, Deadline, Progress
-from shapeprog.inference.fit.tunable import least
+from shapeprog.inference.fit.tunable import bounds, least
 from shapeprog.language.program import Program
 from shapeprog.language.statement import language
 from shapeprog.language.tensors import Code, decode, encode
@@ -174,19 +173,10 @@ def _slots(code: Code) -> tuple[Bool[Tensor, "K J slots"], Float[Tensor, "K J sl
     return free, low
 
 
-def _ends(scene: Scene) -> tuple[Float[Tensor, "N 3"], Float[Tensor, "N 3"]]:
-    """Low and high corners of the boxes around all primitives, for those that stand upright on the grid."""
-    bounds = torch.zeros_like(scene.centre)
-    for kind in torch.unique(scene.kind).tolist():
-        here = (scene.kind == kind)[:, None]
-        bounds = torch.where(here, primitives[kind].bound(scene.size), bounds)
-    return scene.centre - bounds, scene.centre + bounds
-
-
 def _contacts(scene: Scene) -> Int[Tensor, "C 3"]:
     """Pairs of primitives and the axis along which the first ends where the second begins: (below, above, axis)."""
     upright = scene.mask & (scene.rotation.diagonal(dim1=-2, dim2=-1) > 0.999).all(-1)
-    low, high = _ends(scene)
+    low, high = scene.centre - bounds(scene), scene.centre + bounds(scene)
     overlap = torch.minimum(high[:, None], high[None]) - torch.maximum(low[:, None], low[None])
     meets = (high[:, None] - low[None]).abs() < 1e-3
     beside = torch.stack([(overlap[..., [a for a in range(3) if a != axis]] > 0.5).all(-1) for axis in range(3)], -1)
@@ -197,7 +187,7 @@ def _gaps(scene: Scene, touching: Int[Tensor, "C 3"]) -> Float[Tensor, ""]:
     """Sum of the squared gaps, in cells, between primitives that are to touch."""
     if not len(touching):
         return scene.centre.new_zeros(())
-    low, high = _ends(scene)
+    low, high = scene.centre - bounds(scene), scene.centre + bounds(scene)
     below, above, axis = touching.unbind(-1)
     return ((low[above, axis] - high[below, axis]).clamp(min=0) ** 2).sum()
 

@@ -99,7 +99,7 @@ def search_structure(
     progress
         Called with what is being done and the share done.
     """
-    from shapeprog.inference.cells import editing
+    from shapeprog.inference.cells import editing, ruin
 
     cells = np.argwhere(voxels)
     low, high = cells.min(0), cells.max(0) + 1
@@ -120,11 +120,11 @@ def search_structure(
             break
         rounds = min(settings.chunk, settings.rounds - done)
         heat = settings.heat * (1 - done / settings.rounds)
-        pool = editing.Pool.of(earlier[-KEPT:], target)
-        plan = editing.Plan(
+        pool = ruin.Pool.of(earlier[-KEPT:], target)
+        plan = ruin.Plan(
             settings.blocks, min(settings.families, len(table)), settings.forms, heat, settings.recall, pool
         )
-        blocks, value = editing.rebuild(best, target, plan, rounds, seed + done)
+        blocks, value = ruin.rebuild(best, target, plan, rounds, seed + done)
         done += rounds
         if value > best_value:
             earlier.append(blocks)

@@ -15,8 +15,9 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from shapeprog.inference.choice.bits import Bits
 from shapeprog.inference.choice.choice_kernels import search
-from shapeprog.inference.choice.coverage import Bits, Covers
+from shapeprog.inference.choice.coverage import CoverageTable
 from shapeprog.space import Array, FloatArray
 
 ROUNDS = 1000
@@ -25,8 +26,8 @@ ROUNDS = 1000
 BLINK = 0.05
 """Probability with which a round overlooks a candidate."""
 
-BURYING = (4.0, 1.0)
-"""Prices of what is buried, in what it weighs, with which the search begins."""
+INTERIOR = (4.0, 1.0)
+"""Penalties of points in interiors, in what these weigh, with which the search begins."""
 
 
 class Option(NamedTuple):
@@ -57,23 +58,26 @@ class Choice(NamedTuple):
     options: tuple[Option, ...]
 
 
-def choose(covers: Covers, blocks: int, *, start: Sequence[int] = (), rounds: int = ROUNDS, seed: int = 0) -> Choice:
+def choose(
+    table: CoverageTable, blocks: int, *, start: Sequence[int] = (), rounds: int = ROUNDS, seed: int = 0
+) -> Choice:
     """The most valuable at most ``blocks`` of the candidates: greedily, then by ruin and recreate.
 
     A solid that holds what could be seen without it is a local optimum: greed takes it at once, and no exchange of a
-    few leaves it.  So all that is buried has a price in a first search, which falls while it goes on from the best set;
-    a second one goes on from ``start``.
+    few leaves it.  So all points in interiors have a penalty at first, which falls while the search goes on from the
+    best; a second search goes on from ``start``.
     """
-    gains = np.bitwise_count(covers.rows[:, : covers.evidence]) @ covers.weights[: covers.evidence]
-    bounds = gains - covers.prices
+    gains = np.bitwise_count(table.rows[:, : table.evidence]) @ table.weights[: table.evidence]
+    bounds = gains - table.prices
     order = np.argsort(-bounds, kind="stable")
     order = order[bounds[order] > 0]
-    words = *_words(covers.rows[:, : len(covers.weights)]), *_words(covers.buried)
-    searches = len(BURYING) + 2 if covers.buried.any() else 1
+    words = *_words(table.rows[:, : len(table.weights)]), *_words(table.interior)
+    searches = len(INTERIOR) + 2 if table.interior.any() else 1
 
-    def searched(bury: float, known: Array, found: Found) -> Found:
+    def searched(penalty: float, known: Array, found: Found) -> Found:
         search(
-            covers.rows, covers.buried, covers.weights, *words, covers.own, covers.charges, covers.prices, bury, bounds,
+            table.rows, table.interior, table.weights, *words, table.own, table.sample_price, table.prices, penalty,
+            bounds,
             order, rounds // searches, BLINK, seed, known, *found,
         )  # fmt: skip
         return found
@@ -81,12 +85,12 @@ def choose(covers: Covers, blocks: int, *, start: Sequence[int] = (), rounds: in
     best = _nothing(blocks)
     if searches > 1:
         known = best.set
-        for bury in BURYING:
-            known = searched(bury, known, _nothing(blocks)).set
+        for penalty in INTERIOR:
+            known = searched(penalty, known, _nothing(blocks)).set
         best = searched(0.0, known, best)
     best = searched(0.0, np.array(start, np.int64), best)
     found = [
-        Option(tuple(map(int, chosen[:size])), float(value), explained(covers, chosen[:size]))
+        Option(tuple(map(int, chosen[:size])), float(value), explained(table, chosen[:size]))
         for size, (value, chosen) in enumerate(zip(*best, strict=True))
         if np.isfinite(value)
     ]
@@ -103,10 +107,10 @@ def _words(rows: Bits) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
     return np.ascontiguousarray(words), np.searchsorted(row, np.arange(len(rows) + 1))
 
 
-def explained(covers: Covers, chosen: Sequence[int] | Array) -> float:
-    """Share of the target that some of the candidates explain together, and none of them buries."""
-    seen = _union(covers.rows[:, : covers.evidence], chosen) & ~_union(covers.buried, chosen)
-    return float(np.bitwise_count(seen) @ covers.weights[: covers.evidence])
+def explained(table: CoverageTable, chosen: Sequence[int] | Array) -> float:
+    """Share of the target that some of the candidates explain together, and none has in its interior."""
+    seen = _union(table.rows[:, : table.evidence], chosen) & ~_union(table.interior, chosen)
+    return float(np.bitwise_count(seen) @ table.weights[: table.evidence])
 
 
 def _union(rows: Bits, chosen: Sequence[int] | Array) -> Bits:
@@ -115,20 +119,22 @@ def _union(rows: Bits, chosen: Sequence[int] | Array) -> Bits:
     return found
 
 
-def missed(covers: Covers, chosen: tuple[int, ...]) -> Array:
+def missed(table: CoverageTable, chosen: tuple[int, ...]) -> Array:
     """The candidates that are not chosen, those first that would explain most of what is not explained."""
-    rows = covers.rows[:, : covers.evidence]
-    done = _union(rows, chosen) | _union(covers.buried, chosen)
-    more = np.bitwise_count(rows & ~done) @ covers.weights[: covers.evidence] - covers.prices
+    rows = table.rows[:, : table.evidence]
+    done = _union(rows, chosen) | _union(table.interior, chosen)
+    more = np.bitwise_count(rows & ~done) @ table.weights[: table.evidence] - table.prices
     order = np.argsort(-more, kind="stable")
     return order[~np.isin(order, chosen)]
 
 
-def value(covers: Covers, chosen: tuple[int, ...]) -> float:
+def value(table: CoverageTable, chosen: tuple[int, ...]) -> float:
     """The value of a set of candidates, by its definition: what the kernel adds up piece by piece."""
-    known, union = len(covers.weights), _union(covers.rows, chosen)
-    union[: covers.evidence] &= ~_union(covers.buried, chosen)
-    total = float(np.bitwise_count(union[:known]) @ covers.weights)
+    known, union = len(table.weights), _union(table.rows, chosen)
+    union[: table.evidence] &= ~_union(table.interior, chosen)
+    total = float(np.bitwise_count(union[:known]) @ table.weights)
     for one in chosen:
-        total -= covers.prices[one] + covers.charges[one] * int(np.bitwise_count(covers.own[one] & ~union[known + one]))
+        total -= table.prices[one] + table.sample_price[one] * int(
+            np.bitwise_count(table.own[one] & ~union[known + one])
+        )
     return total

@@ -12,42 +12,42 @@ RUIN_LEAST, RUIN_MOST = 0.1, 0.6
 
 
 @helper
-def gain(rows, weights, words, begins, own, charges, prices, cover, chosen, count, candidate):
+def gain(rows, weights, words, begins, own, sample_price, prices, cover, chosen, count, candidate):
     """What the value of the chosen grows by with one more candidate."""
     total, last = -prices[candidate], len(weights)
     for place in range(begins[candidate], begins[candidate + 1]):
         word = words[place]
         total += weights[word] * ones(rows[candidate, word] & ~cover[word])
-    total -= charges[candidate] * ones(own[candidate] & ~cover[last + candidate])
+    total -= sample_price[candidate] * ones(own[candidate] & ~cover[last + candidate])
     for place in range(count):  # what it hides of the others is no longer charged
         other = chosen[place]
-        total += charges[other] * ones(own[other] & rows[candidate, last + other] & ~cover[last + other])
+        total += sample_price[other] * ones(own[other] & rows[candidate, last + other] & ~cover[last + other])
     return total
 
 
 @helper
-def lost(buried, weights, inner, starts, bury, cover, under, candidate):
-    """What the chosen explain, and one more candidate would bury; and the price of all that it would."""
+def occlusion_loss(interior, weights, inner, starts, penalty, cover, under, candidate):
+    """What the chosen explain and one more candidate would hide in its interior; and the penalty of its interior."""
     total = 0.0
     for place in range(starts[candidate], starts[candidate + 1]):
         word = inner[place]
-        new = buried[candidate, word] & ~under[word]
-        total += weights[word] * (ones(new & cover[word]) + bury * ones(new))
+        new = interior[candidate, word] & ~under[word]
+        total += weights[word] * (ones(new & cover[word]) + penalty * ones(new))
     return total
 
 
 @helper
-def include(rows, buried, cover, under, candidate):
-    """Have one more candidate cover what it covers, and bury what it buries: nothing more is gained there."""
+def include(rows, interior, cover, under, candidate):
+    """Have one more candidate cover what it covers and hide its interior: nothing more is gained there."""
     cover |= rows[candidate]
-    cover[: len(under)] |= buried[candidate]
-    under |= buried[candidate]
+    cover[: len(under)] |= interior[candidate]
+    under |= interior[candidate]
 
 
 @helper
-def charge(own, charges, cover, last, candidate):
+def charge(own, sample_price, cover, last, candidate):
     """What is charged to a candidate: nobody can gain more by hiding it."""
-    return charges[candidate] * ones(own[candidate] & ~cover[last + candidate])
+    return sample_price[candidate] * ones(own[candidate] & ~cover[last + candidate])
 
 
 @kernel(
@@ -55,7 +55,8 @@ def charge(own, charges, cover, last, candidate):
     " i8[::1], i8, f8, i8, i8[::1], f8[::1], i8[:, ::1])"
 )
 def search(
-    rows, buried, weights, words, begins, inner, starts, own, charges, prices, bury, bounds, order, rounds, blink, seed,
+    rows, interior, weights, words, begins, inner, starts, own, sample_price, prices, penalty, bounds, order, rounds,
+    blink, seed,
     known_set, values, sets,
 ):  # fmt: skip
     """Ruin and recreate: drop some of the chosen, fill up greedily, keep what is no worse; the best set of each size.
@@ -66,14 +67,14 @@ def search(
 
     Parameters
     ----------
-    rows, buried, weights, own, charges, prices
-        See ``Covers``.
+    rows, interior, weights, own, sample_price, prices
+        See ``CoverageTable``.
     words, begins
         Which of the words with a weight hold bits of each candidate, one after another, and where those of each begin.
     inner, starts
         The same for the words of what each buries.
-    bury
-        Price of all that is buried, in what it weighs, whether others explain it or not.
+    penalty
+        Price of all that is interior, in what it weighs, whether others explain it or not.
     bounds, order
         What each candidate (C,) is worth alone, if nothing is charged to it but its price; and the falling order.
     rounds, blink, seed
@@ -85,7 +86,7 @@ def search(
         of another search, or with minus infinity and -1.
     """
     most, last = sets.shape[1], len(weights)
-    cover, under = np.empty(rows.shape[1], np.uint64), np.empty(buried.shape[1], np.uint64)
+    cover, under = np.empty(rows.shape[1], np.uint64), np.empty(interior.shape[1], np.uint64)
     kept, chosen = np.empty(most, np.int64), np.empty(most, np.int64)
     known, since = np.empty(len(rows)), np.empty(len(rows))
     size, best_value, draws = len(known_set), 0.0, 0
@@ -102,16 +103,16 @@ def search(
             if turn > 0 and (place == dropped or uniform(seed, draws) < share):
                 continue
             one = kept[place]
-            value += gain(rows, weights, words, begins, own, charges, prices, cover, chosen, count, one)
-            value -= lost(buried, weights, inner, starts, bury, cover, under, one)
-            include(rows, buried, cover, under, one)
+            value += gain(rows, weights, words, begins, own, sample_price, prices, cover, chosen, count, one)
+            value -= occlusion_loss(interior, weights, inner, starts, penalty, cover, under, one)
+            include(rows, interior, cover, under, one)
             chosen[count] = one
             count += 1
         since[:] = 0.0
         known[:] = bounds
         charged = 0.0
         for place in range(count):
-            charged += charge(own, charges, cover, last, chosen[place])
+            charged += charge(own, sample_price, cover, last, chosen[place])
         while True:
             if value > values[count]:
                 values[count] = value
@@ -133,18 +134,18 @@ def search(
                 draws += 1
                 if turn > 0 and uniform(seed, draws) < blink:
                     continue
-                more = gain(rows, weights, words, begins, own, charges, prices, cover, chosen, count, one)
+                more = gain(rows, weights, words, begins, own, sample_price, prices, cover, chosen, count, one)
                 known[one], since[one] = more, charged
-                more -= lost(buried, weights, inner, starts, bury, cover, under, one)
+                more -= occlusion_loss(interior, weights, inner, starts, penalty, cover, under, one)
                 if more > best:
                     best, found = more, one
             if found < 0:
                 break
             value += best
-            include(rows, buried, cover, under, found)
+            include(rows, interior, cover, under, found)
             chosen[count] = found
             count += 1
-            charged += charge(own, charges, cover, last, found)
+            charged += charge(own, sample_price, cover, last, found)
         if value >= best_value:
             best_value, size = value, count
             kept[:count] = chosen[:count]

@@ -9,15 +9,15 @@ from collections.abc import Collection, Iterator
 
 import numpy as np
 import torch
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
 
-from shapeprog.errors import ShapeProgError
-from shapeprog.inference.candidates.candidates import alike, solid_boxes
+from shapeprog.geometry.mesh import gaps
+from shapeprog.inference.candidates.drawings import redrawn, solid_boxes
 from shapeprog.inference.candidates.neighbours import drawing_of, met, with_drawing
 from shapeprog.inference.choice.choice import value
-from shapeprog.inference.choice.coverage import Prices, covers
-from shapeprog.inference.fit.joints import gaps
+from shapeprog.inference.choice.coverage import Coverage
 from shapeprog.inference.fit.tunable import bounds
-from shapeprog.inference.surface.evidence import Evidence
 from shapeprog.language.hints import Box
 from shapeprog.language.program import Chain, Node, Program
 from shapeprog.language.tensors import encode
@@ -36,65 +36,56 @@ FLUSH = 1e-4
 """Gap in cells up to which parts touch: faces that lie on each other do."""
 
 
-def connected(
-    program: Program, evidence: Evidence, prices: Prices, seed: int = 0, fixed: Collection[Node] = ()
-) -> Program:
+def connected(program: Program, coverage: Coverage, fixed: Collection[Node] = ()) -> Program:
     """The program with parts that float extended to others, as far as that costs little of its value; each of its nodes
     is one block, and those that are ``fixed`` stay as they are."""
-    while (better := _less_apart(program, evidence, prices, seed, fixed)) is not None:
+    while (better := _less_apart(program, coverage, fixed)) is not None:
         program = better
     return program
 
 
-def _less_apart(
-    program: Program, evidence: Evidence, prices: Prices, seed: int, fixed: Collection[Node]
-) -> Program | None:
+def _less_apart(program: Program, coverage: Coverage, fixed: Collection[Node]) -> Program | None:
     """The most valuable program with one block changed or left out and fewer parts afloat, if there is one worth it."""
-    apart = _apart(program, seed)
+    apart = _apart(program)
     many = sum(map(sum, apart))
     if not many:
         return None
     every = [program, *_options(program, apart, fixed)]
     nodes = list(dict.fromkeys(node for each in every for node in each.body))
     place = {node: number for number, node in enumerate(nodes)}
-    made = covers([Program((node,)) for node in nodes], evidence, prices, seed)
-    start, *worth = (value(made, tuple(place[node] for node in each.body)) for each in every)
+    table = coverage.table([Program((node,)) for node in nodes])
+    start, *worth = (value(table, tuple(place[node] for node in each.body)) for each in every)
     order = np.argsort(np.negative(worth), kind="stable")[:TRIED].tolist()
     likely = (every[1 + number] for number in order if worth[number] >= start - FLOATING)
-    return next((each for each in likely if sum(map(sum, _apart(each, seed))) < many), None)
+    return next((each for each in likely if sum(map(sum, _apart(each))) < many), None)
 
 
-def floating(program: Program, seed: int = 0, flush: float = FLUSH) -> list[int]:
+def floating(program: Program, flush: float = FLUSH) -> list[int]:
     """Which blocks have a part that no chain of touching parts joins to the largest such group.
 
     Parts touch across a gap of ``flush`` cells.
     """
-    return [place for place, parts in enumerate(_apart(program, seed, flush)) if any(parts)]
+    return [place for place, parts in enumerate(_apart(program, flush)) if any(parts)]
 
 
 def afloat(program: Program, seed: int = 0, flush: float = FLUSH) -> int:
-    """How many blocks are ``floating``; none where a part has no surface, which touches nothing."""
-    try:
-        return len(floating(program, seed, flush))
-    except ShapeProgError:
-        return 0
+    """How many blocks are ``floating``."""
+    return len(floating(program, flush))
 
 
-def _apart(program: Program, seed: int, flush: float = FLUSH) -> list[list[bool]]:
-    """For every part of every block, whether it is outside of the largest group."""
+def _apart(program: Program, flush: float = FLUSH) -> list[list[bool]]:
+    """For every part of every block, whether it is outside of the largest group of parts that touch."""
     found: list[list[bool]] = [[] for _ in range(program.blocks)]
     if not program.size:
         return found
     scene = unroll(encode(program, dtype=torch.float64))
-    group = list(range(len(scene.mask)))
-    near = gaps(scene, torch.Generator().manual_seed(seed))
-    for one, other in torch.stack([near.first, near.second], 1)[near.width <= flush].tolist():
-        group = [group[one] if each == group[other] else each for each in group]
+    touching = np.array(list(gaps(scene, flush)), np.int64).reshape(-1, 2)
+    links = coo_matrix((np.ones(len(touching)), touching.T), shape=(len(scene.mask),) * 2)
+    group = connected_components(links, directed=False)[1]
     half = bounds(scene)
     sizes = np.bincount(group, weights=(half * half.roll(1, -1)).sum(-1).numpy())
-    largest = int(sizes.argmax())
     for block, each in zip(scene.block.tolist(), group, strict=True):
-        found[block].append(each != largest)
+        found[block].append(bool(each != sizes.argmax()))
     return found
 
 
@@ -126,7 +117,7 @@ def _reaching(chain: Chain, own: Box, copies: list[Box], parts: list[Box]) -> It
     for copy in copies:
         for longer in met(copy, parts, LINES, longer=True):
             for box in _as_copied(own, copy, longer):
-                yield from (with_drawing(chain, drawn) for drawn in alike(drawing_of(chain), box))
+                yield from (with_drawing(chain, drawn) for drawn in redrawn(drawing_of(chain), box))
 
 
 def _as_copied(own: Box, copy: Box, longer: Box) -> Iterator[Box]:

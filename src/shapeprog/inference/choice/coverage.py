@@ -21,22 +21,21 @@ import numpy as np
 import numpy.typing as npt
 import torch
 
-from shapeprog.geometry.arrays import over_threads, table_of
+from shapeprog.geometry.arrays import over_threads
 from shapeprog.geometry.batch import Batch
 from shapeprog.geometry.scene import Scene
 from shapeprog.geometry.surface import face_areas, sample_surface
-from shapeprog.inference.candidates.repeating import mirrors
-from shapeprog.inference.choice.coverage_kernels import TURNED, charged, explain, hold
+from shapeprog.inference.candidates.loops import mirrors
+from shapeprog.inference.choice.bits import FINE, WORD, Bits, by_word, explains, holds, nearby, sorted_by_cell
+from shapeprog.inference.choice.coverage_kernels import charged
 from shapeprog.inference.surface.evidence import Evidence
 from shapeprog.language.ast import Assignment, Comment
 from shapeprog.language.free import numbers_outside
+from shapeprog.language.printer import numbers_written
 from shapeprog.language.program import Loop, Program
 from shapeprog.language.unroll import unroll
 from shapeprog.library.length import outside
 from shapeprog.space import DEPTH, HALF, RESOLUTION, SIDE, FloatArray
-
-WORD = 64
-"""Bits of a word; every candidate has one for samples of its surface."""
 
 DRAWN, LEAST, MOST = 16, 64, 256
 """Samples drawn together on one primitive; fewest and most of a candidate without loops, between them one a cell."""
@@ -52,12 +51,6 @@ FREE_POINTS = 2048
 
 CENTRED = 0.1
 """Cells within which a candidate is in the middle."""
-
-COARSE, FINE = 16, 64
-"""Cells along each side of the grids by which points are found near primitives, and near other points."""
-
-Bits = npt.NDArray[np.uint64]
-Flags = npt.NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -83,15 +76,20 @@ class Prices:
 
     def of(self, program: Program) -> float:
         """The price of a program as it is written; functions are known, and cost nothing."""
-        written = program.walk() if program.source is None else outside(program.source.lines)
-        lines = [line for line in written if not isinstance(line, Comment | Assignment)]
-        loops = [isinstance(line, Loop | Loop) for line in lines]
-        price = sum(self.loop if each else self.statement for each in loops)
-        called = program.blocks - loops.count(False)
-        return float(price + self.loop * called + self.number * numbers_outside(program))
+        if program.source is None:
+            nodes = list(program.walk())
+            loops = sum(isinstance(node, Loop) for node in nodes)
+            calls, numbers = 0, sum(map(numbers_written, nodes))
+            statements = len(nodes) - loops
+        else:
+            lines = [line for line in outside(program.source.lines) if not isinstance(line, Comment | Assignment)]
+            loops = sum(isinstance(line, Loop) for line in lines)
+            statements, numbers = len(lines) - loops, numbers_outside(program)
+            calls = program.blocks - statements
+        return float(self.statement * statements + self.loop * (loops + calls) + self.number * numbers)
 
 
-class Covers(NamedTuple):
+class CoverageTable(NamedTuple):
     """What candidates cover, as rows of bits; each has a word of its own at the end.
 
     Parameters
@@ -103,11 +101,11 @@ class Covers(NamedTuple):
         What a bit of each of the first E + F words is worth, negative for free points.
     evidence
         E, the number of words for points to be explained.
-    buried
-        Of each the points that lie deeper inside it than the tolerance (C, E): none explains what another buries.
+    interior
+        Of each the points that lie deeper inside it than the tolerance (C, E): no other candidate explains them.
     own
         Samples of its own surface that have no reason, and that it does not hide itself (C,).
-    charges
+    sample_price
         What each of them costs (C,).
     prices
         What each costs as it is written (C,).
@@ -116,50 +114,76 @@ class Covers(NamedTuple):
     rows: Bits
     weights: FloatArray
     evidence: int
-    buried: Bits
+    interior: Bits
     own: Bits
-    charges: FloatArray
+    sample_price: FloatArray
     prices: FloatArray
 
 
-class Places(NamedTuple):
-    """Points sorted by the cells of a grid, see the kernels: where each was, and where those of each cell begin."""
+class _Row(NamedTuple):
+    """What one candidate covers: bits of points and free points, samples of its surface without a reason."""
 
-    points: FloatArray
-    order: npt.NDArray[np.int64]
-    starts: npt.NDArray[np.int64]
-    cells: int
+    covered: Bits
+    interior: Bits
+    samples: FloatArray
+    drawn: int
+    sample_price: float
+    price: float
 
 
-def covers(candidates: Sequence[Program], evidence: Evidence, prices: Prices, seed: int = 0) -> Covers:
-    """What candidates cover, each a program of one block.
+class Coverage:
+    """What candidates, each a program of one block, cover of one surface; that of each is computed once.
 
-    A ``ShapeProgError`` if one draws more copies than :func:`shapeprog.language.unroll` takes.
+    Parameters
+    ----------
+    evidence, prices, seed
+        The surface, what counts against a program, and the seed of the samples of surfaces and of free space.
     """
-    scene, count = unroll(candidates).detach(), len(candidates)
-    written = np.array([prices.of(each) for each in candidates]) - prices.number * centred(scene, candidates)
-    order = np.lexsort((nearby(evidence.points), -evidence.weights))  # so the points of a word weigh nearly the same
-    explained = explains(scene, evidence.points[order], evidence.normals[order], evidence)
-    buried = holds(scene, evidence.points[order], evidence.tolerance)
-    free, volume = free_points(evidence, seed)
-    filled = holds(scene, free, evidence.tolerance)
-    places, owners, areas = unsupported(scene, evidence, seed)
-    own, charges = np.zeros(count, np.uint64), np.zeros(count)
-    samples = np.full((count, WORD, 3), AWAY)
-    for owner, mine in enumerate(np.split(np.arange(len(owners)), np.searchsorted(owners, np.arange(1, count)))):
-        if number := min(len(mine), WORD):
-            samples[owner, :number] = places[mine[np.arange(number) * len(mine) // number]]
-            own[owner] = np.uint64(2**number - 1)
-            charges[owner] = areas[mine].sum() / number
-    hidden = holds(scene, samples.reshape(-1, 3), 0.0)
-    own &= ~hidden[np.arange(count), np.arange(count)]
-    weights = np.concatenate([
-        by_word(evidence.weights[order]), by_word(np.full(len(free), -prices.free * volume / evidence.area)),
-    ])  # fmt: skip
-    return Covers(
-        np.concatenate([explained & ~buried, filled, hidden], 1), weights, explained.shape[1], buried, own,
-        prices.unsupported / evidence.area * charges, written,
-    )  # fmt: skip
+
+    def __init__(self, evidence: Evidence, prices: Prices | None = None, seed: int = 0) -> None:
+        self.evidence, self.prices, self.seed = evidence, prices or Prices(), seed
+        order = np.lexsort((nearby(evidence.points), -evidence.weights))  # points of a word weigh nearly the same
+        self._points, self._normals = evidence.points[order], evidence.normals[order]
+        self._free, volume = free_points(evidence, seed)
+        free = np.full(len(self._free), -self.prices.free * volume / max(evidence.area, 1e-9))
+        self._weights = np.concatenate([by_word(evidence.weights[order]), by_word(free)])
+        self._rows: dict[Program, _Row] = {}
+
+    def table(self, candidates: Sequence[Program]) -> CoverageTable:
+        """What the candidates cover.
+
+        A ``ShapeProgError`` if one draws more copies than :func:`shapeprog.language.unroll` takes.
+        """
+        if new := [each for each in dict.fromkeys(candidates) if each not in self._rows]:
+            self._add(new)
+        mine, count = [self._rows[each] for each in candidates], len(candidates)
+        words = -(-len(self._points) // WORD)
+        covered = np.array([each.covered for each in mine], np.uint64).reshape(count, len(self._weights))
+        interior = np.array([each.interior for each in mine], np.uint64).reshape(count, words)
+        samples = np.array([each.samples for each in mine]).reshape(-1, 3)
+        hidden = holds(unroll(candidates).detach(), samples, 0.0)
+        own = np.array([2**each.drawn - 1 for each in mine], np.uint64) & ~hidden.diagonal()
+        return CoverageTable(
+            np.concatenate([covered, hidden], 1), self._weights, words, interior, own,
+            np.array([each.sample_price for each in mine]), np.array([each.price for each in mine]),
+        )  # fmt: skip
+
+    def _add(self, candidates: Sequence[Program]) -> None:
+        evidence, prices = self.evidence, self.prices
+        scene = unroll(candidates).detach()
+        price = np.array([prices.of(each) for each in candidates]) - prices.number * centred(scene, candidates)
+        interior = holds(scene, self._points, evidence.tolerance)
+        explained = explains(scene, self._points, self._normals, evidence) & ~interior
+        covered = np.concatenate([explained, holds(scene, self._free, evidence.tolerance)], 1)
+        places, owners, areas = unsupported(scene, evidence, self.seed)
+        starts = np.searchsorted(owners, np.arange(len(candidates) + 1))
+        for k, candidate in enumerate(candidates):
+            mine = np.arange(starts[k], starts[k + 1])
+            samples, count = np.full((WORD, 3), AWAY), min(len(mine), WORD)
+            if count:
+                samples[:count] = places[mine[np.arange(count) * len(mine) // count]]
+            cost = prices.unsupported / evidence.area * areas[mine].sum() / max(count, 1)
+            self._rows[candidate] = _Row(covered[k], interior[k], samples, count, float(cost), float(price[k]))
 
 
 def centred(scene: Scene, candidates: Sequence[Program]) -> npt.NDArray[np.int64]:
@@ -174,19 +198,6 @@ def centred(scene: Scene, candidates: Sequence[Program]) -> npt.NDArray[np.int64
         around = [any(mirrors(node, axis) or node.name == "rotate" for node in each.walk()) for each in candidates]
         count += (np.abs(middle[:, axis]) < CENTRED) & ~np.array(around, np.bool_)
     return count
-
-
-def by_word(values: FloatArray) -> FloatArray:
-    """Means of the values that share a word, zero beyond the last."""
-    words = -(-len(values) // WORD)
-    counts = np.minimum(WORD, len(values) - WORD * np.arange(words))
-    return np.add.reduceat(values, WORD * np.arange(words)) / counts if words else np.zeros(0)
-
-
-def pack(flags: Flags) -> Bits:
-    """Flags (B, N) as rows of words, the first of each in its lowest bit."""
-    padded = np.pad(flags, ((0, 0), (0, -flags.shape[1] % WORD)))
-    return np.packbits(padded, axis=1, bitorder="little").view(np.uint64)
 
 
 def free_points(evidence: Evidence, seed: int) -> tuple[FloatArray, float]:
@@ -245,57 +256,3 @@ def shares(samples: FloatArray, normals: FloatArray, evidence: Evidence) -> Floa
     )  # fmt: skip
     over_threads(partial(charged, *data), len(samples), least=1024)
     return found
-
-
-def shares_twin(samples: FloatArray, normals: FloatArray, evidence: Evidence) -> FloatArray:
-    """The twin of :func:`shares`, over all pairs."""
-    near = np.linalg.norm(samples[:, None] - evidence.surface, axis=2) <= evidence.reach
-    unknown = np.linalg.norm(evidence.surface_normals, axis=1) < 0.5
-    cosine = normals @ evidence.surface_normals.T
-    fits = np.where(evidence.surface_outward, cosine, np.abs(cosine)) >= evidence.agreement
-    turned = (near & (cosine <= -evidence.agreement)).any(1)
-    return np.where((near & (fits | unknown)).any(1), 0.0, np.where(turned, TURNED, 1.0))
-
-
-def explains(scene: Batch, points: FloatArray, normals: FloatArray, evidence: Evidence) -> Bits:
-    """Which points (P, 3) each candidate (B, N) explains, as rows of bits (B, W)."""
-    places, rows = sorted_by_cell(points, COARSE), _no_bits(scene, points)
-    data = (
-        table_of(scene), scene.mask.shape[1], places.points, normals[places.order], places.order, places.starts,
-        places.cells, evidence.tolerance, evidence.agreement, rows,
-    )  # fmt: skip
-    over_threads(partial(explain, *data), len(rows))
-    return rows
-
-
-def holds(scene: Batch, points: FloatArray, depth: float) -> Bits:
-    """Which points (P, 3) lie deeper than ``depth`` inside each candidate (B, N), as rows of bits (B, W)."""
-    places, rows = sorted_by_cell(points, COARSE), _no_bits(scene, points)
-    data = (
-        table_of(scene), scene.mask.shape[1], places.points, places.order, places.starts, places.cells, depth, rows
-    )  # fmt: skip
-    over_threads(partial(hold, *data), len(rows))
-    return rows
-
-
-def _no_bits(scene: Batch, points: FloatArray) -> Bits:
-    return np.zeros((len(scene), -(-len(points) // WORD)), np.uint64)
-
-
-def nearby(points: FloatArray) -> npt.NDArray[np.int64]:
-    """Numbers (P,) that are close together for points that are: places on a curve through the cells (Morton 1966).
-
-    A word then holds points of one place, so candidates that are small have bits in few words.
-    """
-    index = np.clip(((points + HALF) * (FINE / RESOLUTION)).astype(np.int64), 0, FINE - 1)
-    places = [((index[:, axis] >> bit) & 1) << (3 * bit + axis) for bit in range(6) for axis in range(3)]
-    return np.sum(places, axis=0)
-
-
-def sorted_by_cell(points: FloatArray, cells: int) -> Places:
-    """Points (P, 3) in the order of the cells of a grid."""
-    index = np.clip(((points + HALF) * (cells / RESOLUTION)).astype(np.int64), 0, cells - 1)
-    key = (index[:, 0] * cells + index[:, 1]) * cells + index[:, 2]
-    order = np.argsort(key, kind="stable")
-    starts = np.concatenate([[0], np.bincount(key, minlength=cells**3).cumsum()])
-    return Places(np.ascontiguousarray(points[order]), order, starts, cells)

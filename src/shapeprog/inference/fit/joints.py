@@ -137,7 +137,7 @@ def needs(scene: Scene, slopes: Float[Tensor, "N 16 F"], known: Joints) -> Needs
     joined = torch.where((gap >= 0)[:, None], reach.slopes, 0.0)  # on an axis the slope of a depth is no number
     stand, feet = rows_of(scene, known.standing)
     low = _inner(scene, known.standing, _lowest(scene, known.standing))
-    height = stand.centre[:, 0, 0] + (stand.rotation[:, 0, 0] * _bound(stand) * low).sum(-1) - known.floor
+    height = stand.centre[:, 0, 0] + (stand.rotation[:, 0, 0] * bounds(stand)[:, 0] * low).sum(-1) - known.floor
     standing = _by_number(_slopes_of(height, feet), slopes[known.standing])
     return Needs(torch.cat([gap.clamp(min=0), height.detach()]), torch.cat([joined, standing]))
 
@@ -146,7 +146,7 @@ def depths(scene: Scene, slopes: Float[Tensor, "N 16 F"], known: Joints) -> Need
     """How far the place of every joint is from the second part, below zero inside it."""
     one, ours = rows_of(scene, known.first)
     two, theirs = rows_of(scene, known.second)
-    points = one.centre[:, 0] + (one.rotation[:, 0] @ (_bound(one) * known.places)[..., None])[..., 0]
+    points = one.centre[:, 0] + (one.rotation[:, 0] @ (bounds(one)[:, 0] * known.places)[..., None])[..., 0]
     far = signed_distance(two, points[:, None])[:, 0]
     found = _slopes_of(far, [*ours, *theirs])
     mine, others = found[:, :ROW], found[:, ROW:]
@@ -181,14 +181,6 @@ def _slopes_of(values: Float[Tensor, " R"], leaves: Sequence[Tensor]) -> Float[T
 
 def _by_number(rows: Float[Tensor, "R 16"], slopes: Float[Tensor, "R 16 F"]) -> Float[Tensor, "R F"]:
     found: Tensor = (rows[:, None] @ slopes)[:, 0]
-    return found
-
-
-def _bound(single: Batch) -> Float[Tensor, "R 3"]:
-    """Half extents of the boxes of a batch of single primitives, with gradient."""
-    found = torch.zeros_like(single.centre[:, 0])
-    for kind in single.kinds:
-        found = torch.where(single.kind == kind, primitives[kind].bound(single.size[:, 0]), found)
     return found
 
 

@@ -12,6 +12,7 @@ import torch
 from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
+from shapeprog.geometry.batch import Batch
 from shapeprog.geometry.primitive import SIZES
 from shapeprog.geometry.primitives import primitives
 from shapeprog.geometry.scene import Scene
@@ -162,7 +163,7 @@ def least(quantity: Quantity) -> float:
     return THINNEST / 2 if quantity.high == HALF else THINNEST
 
 
-def bounds(scene: Scene) -> Float[Tensor, "*batch N 3"]:
+def bounds(scene: Batch) -> Float[Tensor, "*batch N 3"]:
     """Half extents of the local bounding boxes of primitives, with gradient to their sizes."""
     found = torch.zeros_like(scene.centre)
     for kind in scene.kinds:

@@ -8,13 +8,14 @@ it meets, the two stretches are one limb, too.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import numpy.typing as npt
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from shapeprog.inference.pieces.strands import in_line
 from shapeprog.inference.surface.cloud import Cloud
 from shapeprog.space import FloatArray
 
@@ -41,6 +42,10 @@ BEND = 25.0
 
 LEAST = 20
 """Points of the smallest limb."""
+
+GAP, ASIDE, STRAIGHT = 6.0, 0.6, 15.0
+"""Cells between the ends of two straight limbs, cells between the lines that they lie on, and degrees between these, up
+to which they may be one."""
 
 
 def limbs(cloud: Cloud) -> list[npt.NDArray[np.int64]]:
@@ -106,3 +111,29 @@ def inner_balls(cloud: Cloud, which: npt.NDArray[np.int64]) -> tuple[FloatArray,
     half = len(which)
     better = np.where(radius[:half] <= radius[half:], 0, half) + np.arange(half)
     return points[better] - normals[better] * radius[better, None], radius[better]
+
+
+def in_line(points: FloatArray, found: Sequence[npt.NDArray[np.int64]]) -> list[npt.NDArray[np.int64]]:
+    """Stretches that continue each other, as one: a rail or a shelf may meet a leg half-way up."""
+    if len(found) < 2:
+        return []
+    lines = [_line(points[each]) for each in found]
+    middle, along = (np.stack([line[k] for line in lines]) for k in (0, 1))
+    half = np.array([line[2] for line in lines])
+    away = middle[None] - middle[:, None]
+    ahead = np.einsum("ijc,ic->ij", away, along)
+    aside = np.linalg.norm(away - ahead[..., None] * along[:, None], axis=2)
+    straight = np.abs(along @ along.T) > np.cos(np.radians(STRAIGHT))
+    one, two = np.nonzero(np.triu(straight & (np.maximum(aside, aside.T) < ASIDE), 1))
+    near = np.abs(ahead[one, two]) - half[one] - half[two] < GAP
+    edges = np.ones(near.sum(), np.bool_), (one[near], two[near])
+    _, label = connected_components(coo_matrix(edges, shape=(len(found),) * 2), directed=False)
+    many = np.flatnonzero(np.bincount(label, minlength=1) > 1)
+    return [np.concatenate([found[k] for k in np.flatnonzero(label == each).tolist()]) for each in many]
+
+
+def _line(points: FloatArray) -> tuple[FloatArray, FloatArray, float]:
+    """The middle of points, the direction in which they lie, and how far they reach."""
+    middle = points.mean(0)
+    along = np.linalg.svd(points - middle, full_matrices=False)[2][0]
+    return middle, along, float(np.abs((points - middle) @ along).max())

@@ -6,12 +6,12 @@ source    box around
 component a connected component of the mesh
 group     boxes that touch, such as the frame of a back
 rod       points on a cylinder
-limb      thin stretches of scans and of cells; of these also points whose inner balls run on in one direction
+limb      points of clean scans whose inner balls run on in one direction
 slab      the space between two planar patches that face each other
 sheet     one planar patch; how thick it is, is not known
 ========= ==========================================================================================
 
-They overlap, and most are wrong: what explains the target best is for others to choose.
+They overlap, and most are wrong: the choice among candidates decides.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ import numpy.typing as npt
 
 from shapeprog.data.sampling import sample_with_faces
 from shapeprog.data.shape import Shape
-from shapeprog.inference.cells.stacks import stacks
+from shapeprog.inference.pieces.copies import align_copies
 from shapeprog.inference.pieces.covering import Support
 from shapeprog.inference.pieces.grouping import groups
 from shapeprog.inference.pieces.limbs import limbs
@@ -33,15 +33,11 @@ from shapeprog.inference.pieces.oriented import Boxes, bounds, boxes_around, dis
 from shapeprog.inference.pieces.patches import planar_patches
 from shapeprog.inference.pieces.rods import rods
 from shapeprog.inference.pieces.slabs import sheets, slabs
-from shapeprog.inference.pieces.strands import strands
-from shapeprog.inference.surface.cells import faces_of_cells
-from shapeprog.inference.surface.cloud import Cloud, cloud_of
-from shapeprog.inference.surface.components import Components, align_copies, components
-from shapeprog.inference.surface.scans import points_of_scan
-from shapeprog.space import FloatArray
+from shapeprog.inference.surface.cloud import NOISY, Cloud, cloud_of, points_of_scan
+from shapeprog.inference.surface.components import Components, components
 
 POINTS = 20_000
-"""Points in which the surface of a mesh or of cells is seen."""
+"""Points in which the surface of a mesh is seen."""
 
 OWN = 48
 """Points that each component has at least."""
@@ -54,12 +50,6 @@ MOST = 600
 
 SAME = 0.25
 """Difference in cells in place and size below which two pieces are the same; a component's is kept as it is."""
-
-TOO_FAT = 0.5
-"""How far the surface is below the outer faces of touched cells on average, in cells."""
-
-ABOUT = 0.3
-"""Distance in cells outside a box up to which points belong to it."""
 
 LEAST = 32
 """Points below which there is no surface to speak of."""
@@ -85,45 +75,28 @@ class Pieces(NamedTuple):
         Centres, axes and half extents.
     source
         Where each comes from (N,), as values of :class:`Source`.
-    component
-        Which component of the mesh each is (N,); -1 for the others.
     cloud
         The surface as points with normals.
-    owner
-        Which component each point lies on (P,); -1 where that is not known.
     """
 
     boxes: Boxes
     source: npt.NDArray[np.int64]
-    component: npt.NDArray[np.int64]
     cloud: Cloud
-    owner: npt.NDArray[np.int64]
-
-    def points_of(self, piece: int) -> npt.NDArray[np.int64]:
-        """Indices of the points that a piece comes from: of its component, else in its box or close to it."""
-        if self.component[piece] >= 0:
-            return np.flatnonzero(self.owner == self.component[piece])
-        at = np.abs((self.cloud.points - self.boxes.centre[piece]) @ self.boxes.rotation[piece])
-        return np.flatnonzero((at <= self.boxes.half[piece] + ABOUT).all(1))
 
 
 def find_pieces(shape: Shape, seed: int = 0) -> Pieces:
-    """Pieces of a mesh, a point cloud or cells; the same for the same seed.
+    """Pieces of a mesh or a point cloud; the same for the same seed.
 
     Those that a greedy choice takes come first, then components, then the few of groups, rods and limbs, then the many
     of slabs and sheets; among these, those that explain most.
     """
-    mesh = None
-    if shape.vertices is not None and shape.faces is not None:
+    if shape.vertices is not None and shape.faces is not None and len(shape.faces):
         mesh = components(shape.vertices, shape.faces)
-    if mesh is not None and len(mesh.area):
-        return _of_mesh(mesh, seed)
-    if shape.points is not None:
-        cloud = cloud_of(points_of_scan(shape))
-        return _of_points(cloud, _told(cloud, seed, [*strands(cloud), *limbs(cloud)]))
-    cloud = cloud_of(*faces_of_cells(shape.voxels, POINTS, seed=seed))
-    found = _of_points(cloud, [(Source.LIMB, stacks(shape.voxels)), *_told(cloud, seed, limbs(cloud))])
-    return found._replace(boxes=shrunk(found.boxes, TOO_FAT))
+        if len(mesh.area):
+            return _of_mesh(mesh, seed)
+    cloud = cloud_of(points_of_scan(shape))
+    along = limbs(cloud) if cloud.noise <= NOISY else []
+    return _ranked(cloud, _of_points(cloud, seed, along), join([]))
 
 
 def _of_mesh(mesh: Components, seed: int) -> Pieces:
@@ -137,21 +110,15 @@ def _of_mesh(mesh: Components, seed: int) -> Pieces:
         first, last = mesh.face_start[each : each + 2]
         points, face = sample_with_faces(mesh.vertices, mesh.faces[first:last], OWN, seed)
         drawn.append((points, face + first))
-    points, face = np.concatenate([each[0] for each in drawn]), np.concatenate([each[1] for each in drawn])
+    points, face = (np.concatenate(each) for each in zip(*drawn, strict=True))
     corners = mesh.vertices[mesh.faces[face]]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     cloud = cloud_of(points, normals / np.linalg.norm(normals, axis=1, keepdims=True))
-    listed = [(Source.GROUP, groups(boxes)), *_told(cloud, seed, [])]
-    return _ranked(cloud, listed, boxes, mesh.component_of(face))
+    return _ranked(cloud, [(Source.GROUP, groups(boxes)), *_of_points(cloud, seed, [])], boxes)
 
 
-def _of_points(cloud: Cloud, listed: list[tuple[Source, Boxes]]) -> Pieces:
-    """Pieces of points alone."""
-    return _ranked(cloud, listed, join([]), np.full(len(cloud.points), -1))
-
-
-def _told(cloud: Cloud, seed: int, along: Sequence[npt.NDArray[np.int64]]) -> list[tuple[Source, Boxes]]:
-    """Pieces that points with normals tell of, by source, and groups of those that explain the points together.
+def _of_points(cloud: Cloud, seed: int, along: Sequence[npt.NDArray[np.int64]]) -> list[tuple[Source, Boxes]]:
+    """Pieces from points with normals, by source, and groups of those that explain the points together.
 
     ``along`` has the points of each limb.
     """
@@ -175,7 +142,7 @@ def _told(cloud: Cloud, seed: int, along: Sequence[npt.NDArray[np.int64]]) -> li
     return [*found, (Source.GROUP, groups(boxes.take(Support(cloud, boxes).cover())))]
 
 
-def _ranked(cloud: Cloud, listed: list[tuple[Source, Boxes]], whole: Boxes, owner: npt.NDArray[np.int64]) -> Pieces:
+def _ranked(cloud: Cloud, listed: list[tuple[Source, Boxes]], whole: Boxes) -> Pieces:
     """All pieces, each once, the most important first."""
     count = len(whole.half)
     listed = [(Source.COMPONENT, whole), *listed]
@@ -190,10 +157,4 @@ def _ranked(cloud: Cloud, listed: list[tuple[Source, Boxes]], whole: Boxes, owne
     first[cover] = np.arange(len(cover))
     turn = np.searchsorted([Source.COMPONENT.value, Source.LIMB.value], source)
     order = np.lexsort((-np.round(support.value, 6), turn, first))[:MOST]
-    return Pieces(boxes.take(order), source[order], np.where(order < count, order, -1), cloud, owner)
-
-
-def shrunk(boxes: Boxes, by: float) -> Boxes:
-    """Boxes whose sides are moved inwards, but not by more than half of what is there."""
-    half: FloatArray = np.maximum(boxes.half - by, boxes.half / 2)
-    return Boxes(boxes.centre, boxes.rotation, half)
+    return Pieces(boxes.take(order), source[order], cloud)

@@ -12,6 +12,7 @@ import numpy.typing as npt
 from shapeprog.geometry.primitives import primitives
 from shapeprog.geometry.primitives.arc import ARC
 from shapeprog.geometry.scene import Scene
+from shapeprog.inference.fit.tunable import bounds
 from shapeprog.space import DEPTH, SIDE, UP, FloatArray
 
 Mask = npt.NDArray[np.bool_]
@@ -111,10 +112,7 @@ class Parts:
 
     def __init__(self, scene: Scene, turns: int = 0) -> None:
         here = scene.mask.numpy()
-        half = np.zeros((len(here), 3))
-        for kind in scene.kinds:
-            of_kind = scene.mask & (scene.kind == kind)
-            half[of_kind.numpy()] = primitives[kind].bound(scene.size[of_kind].double()).numpy()
+        half = bounds(scene).double().numpy()
         centre, pose = turned(scene.centre.double().numpy()[here], turns), scene.rotation.double().numpy()[here]
         half, pose = half[here], np.swapaxes(turned(np.swapaxes(pose, -1, -2), turns), -1, -2)
         self.block = scene.block.numpy()[here]

@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from shapeprog.geometry.scene import Scene
-from shapeprog.inference.candidates.candidates import plain
+from shapeprog.inference.candidates.drawings import simplest
 from shapeprog.inference.roles.measures import Mask, Parts
 from shapeprog.language.program import Draw, Loop, Node, Program, nest
 from shapeprog.language.statement import language
@@ -160,7 +160,7 @@ def with_roles(program: Program) -> Program:
 def named_anew(program: Program) -> Program:
     """The program with each block drawn by the plainest statement, named by what it stands beside, and in order; what
     it was called before counts for nothing."""
-    return in_order(with_roles(Program(tuple(_unnamed(plain(nest(chain))) for chain in program.chains))))
+    return in_order(with_roles(Program(tuple(_unnamed(simplest(nest(chain))) for chain in program.chains))))
 
 
 def _unnamed(node: Node) -> Node:

@@ -39,20 +39,6 @@ def points_of_cells(
     return (points - HALF).astype(np.float32)
 
 
-def faces_of_cells(
-    voxels: npt.NDArray[np.bool_], count: int, *, seed: int = 0
-) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
-    """Points (count, 3), uniform on the outer faces of the touched cells, and their outward normals (count, 3)."""
-    faces = exposed_faces(voxels)
-    random = np.random.default_rng(seed)
-    chosen = faces[random.integers(len(faces), size=count)]
-    rows, axis, outwards = np.arange(count), chosen[:, 3], chosen[:, 4]
-    points, normals = chosen[:, :3] + random.random((count, 3)), np.zeros((count, 3))
-    points[rows, axis] = chosen[rows, axis] + (outwards > 0)
-    normals[rows, axis] = outwards
-    return points - HALF, normals
-
-
 def exposed_faces(voxels: npt.NDArray[np.bool_]) -> npt.NDArray[np.int64]:
     """Faces between a touched cell and one that is not: cell (3), axis, and on which side of the cell: (F, 5)."""
     padded, found = np.pad(voxels, 1), []

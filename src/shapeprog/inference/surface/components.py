@@ -9,20 +9,10 @@ import numpy.typing as npt
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from shapeprog.inference.pieces.oriented import Boxes
 from shapeprog.space import Array, FloatArray
 
 WELD = 2.0**-12
 """Vertices that round to the same multiple of this, in cells, are one: a hundred-thousandth of the longest side."""
-
-ALIKE = 0.02
-"""Distance in cells within which the vertices of copies meet."""
-
-LARGEST_COPY = 2000
-"""Vertices above which components are not compared."""
-
-KINDS = 64
-"""Different components of equal counts that are told apart."""
 
 OPEN = 0.02
 """Share of its edges at which a component may be open and yet bound a solid."""
@@ -94,40 +84,32 @@ def weld(vertices: FloatArray, faces: npt.NDArray[np.int64]) -> tuple[FloatArray
 
 def once_each(vertices: FloatArray, faces: npt.NDArray[np.int64]) -> tuple[npt.NDArray[np.int64], FloatArray]:
     """The faces that have an area, each once whichever way round it is, and their areas."""
+    ordered, count = np.sort(faces, axis=1), len(vertices)
+    _, pair = np.unique(ordered[:, 0] * count + ordered[:, 1], return_inverse=True)
+    _, first = np.unique(pair * count + ordered[:, 2], return_index=True)
+    faces = faces[np.sort(first)]
     corners = vertices[faces]
     area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
-    name = np.random.default_rng(0).integers(1 << 62, size=len(vertices), dtype=np.uint64)
-    mixed = name[faces[:, 0]] + name[faces[:, 1]] + name[faces[:, 2]]  # the same for all orders of the corners
-    order = np.argsort(mixed, kind="stable")
-    likely = np.flatnonzero(mixed[order[1:]] == mixed[order[:-1]])
-    same = (np.sort(faces[order[likely + 1]], axis=1) == np.sort(faces[order[likely]], axis=1)).all(1)
-    again = np.zeros(len(faces), np.bool_)
-    again[order[likely[same] + 1]] = True
-    keep = ~again & (area > 0)
-    return faces[keep], area[keep]
+    return faces[area > 0], area[area > 0]
 
 
-def solid_sides(vertices: FloatArray, faces: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
+def solid_sides(mesh: Components) -> npt.NDArray[np.int64]:
     """Of each face (F,) 1 if it is of a component that bounds a solid and faces outwards, -1 if inwards, else 0.
 
     At each edge of a closed surface as many faces run one way as the other, and the volume that it encloses is above
     zero where they face outwards.
     """
-    places, listed = weld(vertices, faces)
-    count, of_vertex = _joined(listed, len(places))
-    label = of_vertex[listed[:, 0]]
-    start, end = listed.reshape(-1), listed[:, [1, 2, 0]].reshape(-1)
-    name = np.minimum(start, end) * len(places) + np.maximum(start, end)
-    _, edge = np.unique(name, return_inverse=True)
+    faces, many = mesh.faces, np.diff(mesh.face_start)
+    component = np.repeat(np.arange(len(many)), many)
+    start, end = faces.reshape(-1), faces[:, [1, 2, 0]].reshape(-1)
+    _, edge = np.unique(np.minimum(start, end) * len(mesh.vertices) + np.maximum(start, end), return_inverse=True)
     uneven = np.bincount(edge, np.sign(end - start)) != 0
-    many = np.bincount(label, minlength=count)
-    gaps = np.bincount(np.repeat(label, 3), uneven[edge], minlength=count) / np.maximum(3 * many, 1)
-    corners = places[listed]
+    gaps = np.bincount(np.repeat(component, 3), uneven[edge], minlength=len(many)) / (3 * many)
+    corners = mesh.vertices[faces]
     across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    area = np.bincount(label, np.linalg.norm(across, axis=1), minlength=count) / 2
-    volume = np.bincount(label, (corners[:, 0] * across).sum(1), minlength=count) / 6
-    solid = (gaps <= OPEN) & (2 * np.abs(volume) > THICK * area)
-    found: npt.NDArray[np.int64] = np.where(solid, np.sign(volume), 0).astype(np.int64)[label]
+    volume = np.bincount(component, (corners[:, 0] * across).sum(1), minlength=len(many)) / 6
+    solid = (gaps <= OPEN) & (2 * np.abs(volume) > THICK * mesh.area)
+    found: npt.NDArray[np.int64] = np.where(solid, np.sign(volume), 0).astype(np.int64)[component]
     return found
 
 
@@ -137,45 +119,3 @@ def _joined(faces: npt.NDArray[np.int64], vertices: int) -> tuple[int, npt.NDArr
     graph = coo_matrix((np.ones(len(links), np.bool_), (links[:, 0], links[:, 1])), shape=(vertices, vertices))
     count, label = connected_components(graph, directed=False)
     return int(count), label
-
-
-def align_copies(found: Components, boxes: Boxes) -> Boxes:
-    """Boxes of components that are copies of each other, turned alike.
-
-    Copies have their vertices in the same order; the motion between them, which may be a reflection, is the best fit
-    (Kabsch 1976).  The copy whose box is turned least is the model of the others.
-    """
-    count = np.diff(found.corner_start)[: len(boxes.half)]
-    rotation, centre, half = boxes.rotation.copy(), boxes.centre.copy(), boxes.half.copy()
-    turned = np.abs(boxes.rotation).max(1).sum(1)  # 3 along the axes
-    for size in np.unique(count[(count > 2) & (count <= LARGEST_COPY)]):
-        left = np.flatnonzero(count == size)
-        at = found.corner_start[left][:, None] + np.arange(size)
-        middle = found.vertices[found.corner[at]].mean(1)
-        cloud = found.vertices[found.corner[at]] - middle[:, None]
-        for _ in range(KINDS):
-            if len(left) < 2:
-                break
-            model = 0
-            same, turn = _motions(cloud[model], cloud)
-            members = np.flatnonzero(same)
-            best = members[np.argmax(np.round(turned[left[members]], 3))]
-            for each in members:
-                motion = turn[each] @ turn[best].T
-                source, goal = left[best], left[each]
-                if each != best:
-                    rotation[goal] = motion @ boxes.rotation[source]
-                    half[goal] = boxes.half[source]
-                    centre[goal] = middle[each] + motion @ (boxes.centre[source] - middle[best])
-            keep = ~same
-            left, cloud, middle = left[keep], cloud[keep], middle[keep]
-    rotation[np.linalg.det(rotation) < 0, :, 2] *= -1
-    return Boxes(centre, rotation, half)
-
-
-def _motions(model: FloatArray, clouds: FloatArray) -> tuple[npt.NDArray[np.bool_], FloatArray]:
-    """Which centred clouds (G, V, 3) are the model (V, 3) turned or reflected, and by what (G, 3, 3)."""
-    u, _, vt = np.linalg.svd(np.einsum("gvi,vj->gij", clouds, model))
-    turn = u @ vt
-    off = np.abs(np.einsum("gij,vj->gvi", turn, model) - clouds).max((1, 2))
-    return off < ALIKE, turn

@@ -24,13 +24,12 @@ from shapeprog.data.voxelise_kernels import mark_triangles
 from shapeprog.geometry.arrays import over_threads
 from shapeprog.geometry.mesh import union_mesh
 from shapeprog.inference.surface.cells import INSET, exposed, exposed_faces
-from shapeprog.inference.surface.cloud import planes
-from shapeprog.inference.surface.components import solid_sides
+from shapeprog.inference.surface.cloud import planes, points_of_scan
+from shapeprog.inference.surface.components import Components, components, solid_sides
 from shapeprog.inference.surface.evidence_kernels import look_out
-from shapeprog.inference.surface.scans import points_of_scan
 from shapeprog.language.program import Program
 from shapeprog.language.unroll import unroll
-from shapeprog.space import HALF, RESOLUTION, SPAN, Array, FloatArray
+from shapeprog.space import HALF, RESOLUTION, SPAN, FloatArray
 
 POINTS, SURFACE = 6_000, 40_000
 """Points that are to be explained, and points of the same surface that tell whether a program has a reason."""
@@ -122,7 +121,9 @@ class Evidence:
 def evidence_of(shape: Shape, seed: int = 0) -> Evidence:
     """The evidence of a shape, from the best that it has: its mesh, its points, or its cells."""
     if shape.vertices is not None and shape.faces is not None and len(shape.faces):
-        return _of_mesh(np.asarray(shape.vertices, np.float64), np.asarray(shape.faces, np.int64), seed)
+        mesh = components(shape.vertices, shape.faces)
+        if len(mesh.area):
+            return _of_mesh(mesh, seed)
     if shape.points is not None and len(shape.points) > NEIGHBOURS:
         return _of_points(points_of_scan(shape), shape.voxels, seed)
     return _of_cells(shape.voxels)
@@ -133,24 +134,21 @@ def evidence_of_program(program: Program, seed: int = 0) -> Evidence:
 
     A ``ShapeProgError`` if nothing in it has a volume.
     """
-    vertices, faces = union_mesh(unroll(program))
-    return _of_mesh(vertices, faces, seed)
+    return _of_mesh(components(*union_mesh(unroll(program))), seed)
 
 
-def _of_mesh(vertices: FloatArray, faces: npt.NDArray[np.int64], seed: int) -> Evidence:
-    faces = single_faces(vertices, faces)
-    drawn, face = sample_with_faces(vertices, faces, SURFACE, seed)
-    surface, corners = drawn.astype(np.float64), vertices[faces]
-    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    length = np.linalg.norm(across, axis=1, keepdims=True)
-    side = solid_sides(vertices, faces)[face]
-    normals = np.where(side < 0, -1, 1)[:, None] * (across / np.where(length > 0, length, 1))[face]
+def _of_mesh(mesh: Components, seed: int) -> Evidence:
+    drawn, face = sample_with_faces(mesh.vertices, mesh.faces, SURFACE, seed)
+    surface, corners = drawn.astype(np.float64), mesh.vertices[mesh.faces]
+    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])[face]
+    side = solid_sides(mesh)[face]
+    normals = np.where(side < 0, -1, 1)[:, None] * across / np.linalg.norm(across, axis=1, keepdims=True)
     barrier = touched(corners, LOOKING)
     points = surface[:POINTS]
     front, back = (visible(points, sign * normals[:POINTS], barrier) for sign in (1, -1))
     weights = np.where(front | back, 1.0, HIDDEN)
     facing, known = outward(normals[:POINTS], front, back)
-    area = float(length.sum() / 2)
+    area = float(mesh.area.sum())
     coarse: Flags = np.any(barrier.reshape((FREE, LOOKING // FREE) * 3), (1, 3, 5))
     return Evidence(
         points, facing, weights / weights.sum(), known, TOLERANCE, AGREEMENT, surface, normals, side != 0,
@@ -199,18 +197,6 @@ def _of_cells(voxels: Flags) -> Evidence:
 def _reach(tolerance: float, area: float, count: int = SURFACE) -> float:
     """One and a half tolerances, or as far as four of so many points are found on a plane."""
     return max(1.5 * tolerance, math.sqrt(4 * area / (math.pi * max(count, 1))))
-
-
-def single_faces(vertices: FloatArray, faces: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
-    """The faces without those that join the same places as an earlier one, in whatever order."""
-    step = 2 * HALF / ((1 << 20) - 1)  # three numbers of 20 bits are one of 60
-    whole = np.clip(np.rint((vertices + HALF) / step), 0, (1 << 20) - 1).astype(np.int64)
-    _, place = np.unique(whole @ [1 << 40, 1 << 20, 1], return_inverse=True)
-    corners = np.sort(place[faces], axis=1)
-    count = int(place.max()) + 1
-    _, first = np.unique(corners[:, 0] * count + corners[:, 1], return_inverse=True)
-    _, kept = np.unique(first * count + corners[:, 2], return_index=True)
-    return faces[np.sort(kept)]
 
 
 def touched(triangles: FloatArray, resolution: int) -> Flags:
@@ -279,22 +265,6 @@ def looking(barrier: Flags, starts: FloatArray, steps: FloatArray, wanted: int, 
     data = barrier, np.ascontiguousarray(starts), np.ascontiguousarray(steps), wanted, through, seen
     over_threads(partial(look_out, *data), len(starts), least=1024)
     return seen
-
-
-def looking_twin(barrier: Flags, starts: FloatArray, steps: FloatArray, wanted: int, *, through: bool) -> Flags:
-    """The twin of :func:`looking`: all rays at once."""
-    size = len(barrier)
-    paths = starts[:, None, None] + steps[:, None] * np.arange(size + 1)[:, None]  # (N, D, steps, 3)
-    backward = starts[:, None, None] - steps[:, None] * np.arange(size + 1)[:, None]
-
-    def clear(places: Array) -> Array:
-        inside = ((places >= 0) & (places < size)).all(-1)
-        cell = np.clip(places.astype(np.int64), 0, size - 1)
-        return ~(inside & barrier[tuple(np.moveaxis(cell, -1, 0))]).any(-1)
-
-    ways = clear(paths) & clear(backward) if through else clear(paths)
-    found: Flags = ways.sum(1) >= wanted
-    return found
 
 
 def local_planes(points: FloatArray) -> tuple[FloatArray, float, float]:

@@ -1,21 +1,28 @@
 """Loops over candidates that are copies of each other: runs of equal steps, mirror images, turns, and these of these.
 
-Copies are recognised by their moments, so whatever a statement draws, one of a user's own too, is rolled up the same
-way.
+Copies are recognised by their moments, so whatever a statement draws, one of a user's own too, becomes a loop in the
+same way.  Mirror images about the middle need not be candidates: noise, holes and what meets them differ, so there the
+surface decides.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from itertools import compress
 
 import numpy as np
 import numpy.typing as npt
+import torch
+from scipy.spatial import cKDTree
 
-from shapeprog.inference.candidates.candidates import Looks, distinct, looks
-from shapeprog.inference.candidates.repeating_kernels import at_steps, copies
+from shapeprog.geometry.surface import sample_surface
+from shapeprog.inference.candidates.loop_kernels import at_steps, copies
+from shapeprog.inference.candidates.moments import Moments, distinct, moments
 from shapeprog.language.parameters import to_float32
-from shapeprog.language.program import Loop, Node
+from shapeprog.language.program import Loop, Node, Program
+from shapeprog.language.tensors import encode
+from shapeprog.language.unroll import unroll
 from shapeprog.space import DEPTH, SIDE, Array, FloatArray
 
 ALIKE = 0.08
@@ -42,6 +49,12 @@ MOST_RUNS = 160
 APART = 1.6
 """Least step, in half extents of what is repeated; two are where copies just touch."""
 
+POINTS, ON = 48, 0.4
+"""Points on each candidate whose mirror images are sought, and cells within which one is on the surface."""
+
+SUPPORTED, AS_WELL = 0.6, 0.8
+"""Share of its points that lie on the surface, at least; and how many as many of its image, at least."""
+
 TURNS = (6, 5, 4, 3)
 """Copies around the vertical axis of the grid that are looked for."""
 
@@ -59,17 +72,46 @@ def repeated(singles: Sequence[Node]) -> list[Node]:
 def _rolled(nodes: Sequence[Node]) -> list[Node]:
     if len(nodes) < 2:
         return []
-    seen = looks(nodes)
+    seen = moments(nodes)
     found: list[Node] = [replace(loop, body=(nodes[one],)) for one, loop in rows_and_pairs(seen)]
     drawn = {place for place, node in enumerate(nodes) if not isinstance(node, Loop)}  # not pairs, which would overlap
     for count in TURNS if drawn else ():
         found += [Loop("rotate", _values(count, 1), (nodes[one],)) for one in turned(seen, count) if one in drawn]
-    if not found:
+    return distinct(found)
+
+
+def images(singles: Sequence[Node], surface: FloatArray) -> list[Node]:
+    """Loops over candidates and their mirror images, left and right, in front and behind, and both, where these lie on
+    the surface (P, 3) as well and not over each other."""
+    if not singles:
         return []
-    return [found[place] for place in distinct(found, looks(found))]
+    scene = unroll(encode([Program((node,)) for node in singles], dtype=torch.float64))
+    points = sample_surface(scene, POINTS, torch.Generator().manual_seed(0)).points.numpy()
+    tree = cKDTree(surface)
+
+    def on(*axes: int) -> FloatArray:
+        """Share of its points that lie on the surface, of the image of each candidate."""
+        image = points * [-1.0 if axis in axes else 1.0 for axis in range(3)]
+        share: FloatArray = np.isfinite(tree.query(image, distance_upper_bound=ON)[0]).mean(1)
+        return share
+
+    own = on()
+    least = np.where(own >= SUPPORTED, AS_WELL * own, np.inf)
+    beside = (points.min(1) > 0) | (points.max(1) < 0)
+    side, depth = (beside[:, axis] & (on(axis) >= least) for axis in (SIDE, DEPTH))
+    both = side & depth & (on(SIDE, DEPTH) >= least)
+    return [
+        *(_mirrored(node, SIDE) for node in compress(singles, side)),
+        *(_mirrored(node, DEPTH) for node in compress(singles, depth)),
+        *(_mirrored(_mirrored(node, DEPTH), SIDE) for node in compress(singles, both)),
+    ]
 
 
-def rows_and_pairs(seen: Looks) -> Iterator[tuple[int, Loop]]:
+def _mirrored(node: Node, axis: int) -> Loop:
+    return Loop("mirror", _values(2, axis, 0), (node,))
+
+
+def rows_and_pairs(seen: Moments) -> Iterator[tuple[int, Loop]]:
     """The first of candidates that are runs or mirror images, and the loop, without a body, that repeats it."""
     for one, count, step in runs(seen):
         yield one, Loop("translate", _values(count, *step), ())
@@ -87,7 +129,7 @@ def _values(*numbers: float) -> tuple[float, ...]:
     return tuple(to_float32(number) + 0.0 for number in numbers)
 
 
-def runs(seen: Looks) -> Iterator[tuple[int, int, tuple[float, float, float]]]:
+def runs(seen: Moments) -> Iterator[tuple[int, int, tuple[float, float, float]]]:
     """The first of copies in equal steps, how many they are, and the step; the longest first.
 
     One copy may be missing if four are there: what is drawn in its place is not supported, and pays for that.
@@ -124,7 +166,7 @@ def _followed(after: Array, run: list[int]) -> list[int]:
     return run
 
 
-def mirrored(seen: Looks, axis: int) -> Iterator[tuple[int, int, float]]:
+def mirrored(seen: Moments, axis: int) -> Iterator[tuple[int, int, float]]:
     """Pairs of mirror images along an axis, the farther along first, and where the plane between them is."""
     signs = np.ones(3)
     signs[axis] = -1
@@ -144,7 +186,7 @@ def mirrored(seen: Looks, axis: int) -> Iterator[tuple[int, int, float]]:
                 return
 
 
-def turned(seen: Looks, count: int) -> Iterator[int]:
+def turned(seen: Moments, count: int) -> Iterator[int]:
     """The first of ``count`` copies spread evenly around the vertical axis of the grid."""
     angle = 2 * np.pi / count
     turn = np.array([[1, 0, 0], [0, np.cos(angle), -np.sin(angle)], [0, np.sin(angle), np.cos(angle)]])
@@ -157,18 +199,18 @@ def turned(seen: Looks, count: int) -> Iterator[int]:
         if (off < STRAY).any():
             after[one] = others[off.argmin()]
     known = np.zeros(len(middle), np.bool_)
-    opposite = _nearest(seen.middle, seen.middle * [1, 1, -1])
     for one in range(len(middle)):
         circle = [one]
         while len(circle) < count and after[circle[-1]] >= 0:
             circle.append(int(after[circle[-1]]))
-        mirrors = count == 4 and opposite[one] in circle[1:]  # four legs in a square are better said by two mirrors
+        image = np.abs(seen.middle[circle[1:]] - seen.middle[one] * [1, 1, -1]).max(1, initial=0)
+        mirrors = count == 4 and (image < STRAY).any()  # four legs in a square are better written with two mirrors
         if len(set(circle)) == count and not known[circle].all() and not mirrors:
             known[circle] = True
             yield one
 
 
-def groups(seen: Looks) -> Iterator[Array]:
+def groups(seen: Moments) -> Iterator[Array]:
     """Indices of candidates that are copies of each other by translation, each group once."""
     known: set[tuple[int, ...]] = set()
     for row in _copies(seen, seen.spread, seen.skew, seen.lean):
@@ -178,7 +220,7 @@ def groups(seen: Looks) -> Iterator[Array]:
             yield group
 
 
-def _copies(seen: Looks, spread: FloatArray, skew: FloatArray, lean: FloatArray) -> npt.NDArray[np.bool_]:
+def _copies(seen: Moments, spread: FloatArray, skew: FloatArray, lean: FloatArray) -> npt.NDArray[np.bool_]:
     """Which candidates (a column) look like each of them with these moments instead of its own (a row)."""
     count = len(seen.kind)
     kind = np.unique(np.array(seen.kind), return_inverse=True)[1]

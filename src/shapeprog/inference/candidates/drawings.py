@@ -1,0 +1,153 @@
+"""How statements draw oriented boxes, and blocks that draw the same with fewer numbers or on another side."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
+from itertools import product
+
+import numpy as np
+import torch
+
+from shapeprog.geometry.distance import signed_distance
+from shapeprog.geometry.surface import sample_surface
+from shapeprog.inference.fit.tunable import bounds
+from shapeprog.language.hints import Box
+from shapeprog.language.parameters import Parameter
+from shapeprog.language.printer import numbers_written
+from shapeprog.language.program import Draw, Loop, Node, Program, nest
+from shapeprog.language.statement import END, Statement, language
+from shapeprog.language.tensors import encode
+from shapeprog.language.unroll import unroll
+from shapeprog.space import HALF, Array, FloatArray
+
+POINTS = 64
+"""Points of a surface by which two drawings are compared."""
+
+SAME = 0.02
+"""Distance in cells below which two surfaces are the same."""
+
+
+STARTS = 192
+"""Most starts of a statement without a hint in one box."""
+
+THIN = 0.3
+"""A length may be this share of the least extent, too: the thickness of what has an inside."""
+
+COUNTS = 6
+"""Most copies that a statement with a count starts from."""
+
+
+def is_unhinted(declared: Statement) -> bool:
+    """Whether a drawing statement, but for those of the paper, does not say how it starts from a box."""
+    return declared.hint is None and not declared.is_loop and declared.id > END
+
+
+def drawings(box: Box) -> list[Draw]:
+    """How the statements that have a hint draw a box."""
+    return [drawn for declared in language() if declared.hint is not None for drawn in hinted(declared, box)]
+
+
+def hinted(declared: Statement, box: Box) -> list[Draw]:
+    """How a statement draws a box by its hint; not at all without one."""
+    values = [] if declared.hint is None else [np.array(each, np.float32) for each in declared.hint(box)]
+    return [Draw(declared.name, tuple(each.tolist())) for each in values]
+
+
+def starts(declared: Statement, box: Box) -> list[Draw]:
+    """How a statement without a hint may draw a box: combinations of what each parameter may be, evenly chosen."""
+    options = [_options(parameter, box) for parameter in declared.parameters]
+    many = math.prod(map(len, options))
+    chosen = np.unique(np.linspace(0, many - 1, min(many, STARTS)).astype(np.int64))
+    places = np.unravel_index(chosen, [len(each) for each in options])
+    rows = np.concatenate([each[place] for each, place in zip(options, places, strict=True)], 1)
+    return [Draw(declared.name, tuple(row)) for row in rows.astype(np.float32).tolist()]
+
+
+def _options(parameter: Parameter, box: Box) -> FloatArray:
+    """What a parameter may be (N, width): a place of the box, one of its extents or half of it; angles are zero."""
+    quantity, reach = parameter.quantity, np.abs(box.rotation) @ box.half
+    width, half = quantity.width, 1.0 if quantity.high == HALF else 2.0
+    if parameter.default is not None:
+        rows: Iterable[Array | Sequence[float]] = [[parameter.default]]
+    elif quantity.kind == "position" and width == len(reach):
+        along, below = box.half.max() * box.rotation[:, box.half.argmax()], reach * [1, 0, 0]
+        rows = [box.centre + away for away in (np.zeros(3), -below, below, -reach, along, -along)]
+    elif quantity.kind == "length" and width == len(reach):
+        rows = [half * reach]
+    elif quantity.kind in ("position", "length"):
+        sizes = half * np.concatenate([reach, box.half, [THIN * box.half.min()]])
+        rows = product(np.unique((box.centre if quantity.kind == "position" else sizes).round(3)), repeat=width)
+    elif quantity.discrete:
+        last = 3.0 if quantity.kind == "turn" else float(COUNTS)
+        rows = [[float(n)] * width for n in range(max(round(quantity.low), 0), round(min(quantity.high, last)) + 1)]
+    else:
+        rows = [[0.0] * width]
+    return np.unique(np.array(list(rows)).clip(quantity.low, quantity.high).round(3), axis=0)
+
+
+def redrawn(drawn: Draw, box: Box) -> list[Draw]:
+    """How the same statement draws another box by its hint; how all others do where it has none for it."""
+    return hinted(language()[drawn.name], box) or drawings(box)
+
+
+def solid_boxes(nodes: Sequence[Node]) -> list[list[Box]]:
+    """The boxes around all solids that each block draws."""
+    scene = unroll(encode([Program((node,)) for node in nodes], dtype=torch.float64))
+    centre, rotation, half = (each.numpy() for each in (scene.centre, scene.rotation, bounds(scene)))
+    return [
+        [Box(centre[row, slot], rotation[row, slot], half[row, slot]) for slot in np.flatnonzero(mask)]
+        for row, mask in enumerate(scene.mask.numpy())
+    ]
+
+
+def simplest(node: Node) -> Node:
+    """The same block drawn by the statement that writes the fewest numbers, of those with a hint that draw the same.
+
+    Nothing changes where the statement turns about an axis of its own, or draws several solids.
+    """
+    if isinstance(node, Loop):
+        return Loop(node.name, node.values, tuple(simplest(inner) for inner in node.body))
+    if language()[node.name].pivot is not None:
+        return node
+    (boxes,) = solid_boxes([node])
+    others = [replace(other, role=node.role) for other in drawings(boxes[0])] if len(boxes) == 1 else []
+    same = list(_drawing_the_same(others, node, np.ones(3)))
+    if not same or is_unhinted(language()[node.name]):  # those of the paper are written as a solid with a role
+        same.append(node)
+    return min(same, key=numbers_written)
+
+
+def canonical_side(node: Node) -> Node:
+    """The same block with what is mirrored about the middle of the shape drawn on the right, and at the rear.
+
+    Nothing changes where the statement has no drawing of the image, or other loops stand between.
+    """
+    if Program((node,)).blocks != 1:
+        return node
+    *loops, drawn = Program((node,)).chains[0]
+    assert isinstance(drawn, Draw)
+    (boxes,) = solid_boxes([drawn])
+    signs = np.ones(3)
+    for loop in loops:
+        if loop.name == "mirror" and loop.values[2] == 0 and boxes and boxes[0].centre[int(loop.values[1])] < 0:
+            signs[int(loop.values[1])] = -1
+    if (signs > 0).all() or len(boxes) != 1 or any(loop.name != "mirror" for loop in loops):
+        return node
+    turn = signs[:, None] * boxes[0].rotation * [1, 1, signs.prod()]  # a box is its own image along its last axis
+    image = Box(signs * boxes[0].centre, turn, boxes[0].half)
+    others = [replace(other, role=drawn.role) for other in hinted(language()[drawn.name], image)]
+    found = next(_drawing_the_same(others, drawn, signs), None)
+    return node if found is None else nest((*loops, found))
+
+
+def _drawing_the_same(others: Sequence[Draw], node: Node, signs: FloatArray) -> Iterator[Draw]:
+    """Those of some drawings whose surface is that of a node, or of its image by these signs of its coordinates."""
+    if not others:
+        return
+    scene = unroll(encode(Program((node,)), dtype=torch.float64))
+    points = sample_surface(scene, POINTS, torch.Generator().manual_seed(0)).points.double() * torch.from_numpy(signs)
+    drawn = unroll(encode([Program((other,)) for other in others], dtype=torch.float64))
+    off = signed_distance(drawn, points.expand(len(others), -1, -1)).abs().amax(-1).tolist()
+    yield from (other for other, far in zip(others, off, strict=True) if far < SAME)

@@ -1,0 +1,109 @@
+"""Moments of what candidates draw, by which copies among them are recognised, whatever their statements."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+import torch
+from jaxtyping import Float
+from torch import Tensor
+
+from shapeprog.geometry.primitive import SIZES
+from shapeprog.geometry.primitives import primitives
+from shapeprog.geometry.scene import Scene
+from shapeprog.language.program import Loop, Node, Program
+from shapeprog.language.tensors import encode
+from shapeprog.language.unroll import unroll
+from shapeprog.space import FloatArray
+
+SAME = 0.03
+"""Difference of places and extents, as a share of the size, below which two candidates draw the same."""
+
+
+class Moments(NamedTuple):
+    """Moments of candidates, up to the third.
+
+    Parameters
+    ----------
+    kind
+        The statements and counts that a block is made of.
+    middle, spread, skew
+        The mean (C, 3) of the centres of its solids, second moments (C, 3, 3) and third moments (C, 3) about it.
+    lean
+        How solids differ between their sides, in cells along each axis (C, 3): where a leg tapers, an arc bulges.
+    """
+
+    kind: tuple[str, ...]
+    middle: FloatArray
+    spread: FloatArray
+    skew: FloatArray
+    lean: FloatArray
+
+    @property
+    def size(self) -> FloatArray:
+        """How far a candidate reaches from its middle (C,)."""
+        return np.sqrt(np.trace(self.spread, axis1=1, axis2=2))
+
+
+def moments(nodes: Sequence[Node]) -> Moments:
+    """The moments of blocks."""
+    return moments_of([Program((node,)) for node in nodes])
+
+
+def moments_of(programs: Sequence[Program]) -> Moments:
+    """The moments of all that each program draws."""
+    scene = unroll(encode(programs, dtype=torch.float64))
+    share = scene.mask.double()
+    share = share / share.sum(-1, keepdim=True).clamp(min=1)
+    own, lean = _own_moments(scene)
+    middle = (share[..., None] * scene.centre).sum(1)
+    away = scene.centre - middle[:, None]
+    squared = (away**2).sum(-1) + own.diagonal(dim1=-2, dim2=-1).sum(-1)
+    spread = own + away[..., :, None] * away[..., None, :]
+    skew = squared[..., None] * away + 2 * (own @ away[..., None])[..., 0]
+    vectors = ((share[..., None] * each).sum(1) for each in (skew, lean))
+    found = (share[..., None, None] * spread).sum(1), *vectors
+    kinds = tuple(" ".join(map(_kind, program.body)) for program in programs)
+    return Moments(kinds, middle.numpy(), *(each.numpy() for each in found))
+
+
+def _own_moments(scene: Scene) -> tuple[Float[Tensor, "C N 3 3"], Float[Tensor, "C N 3"]]:
+    """Second moments that stand for each solid, those of its box, and how its distance differs between its sides.
+
+    They turn and mirror with the solid, and are the same for solids that are the same however their axes are named.
+    """
+    spread, leans = torch.zeros_like(scene.rotation), torch.zeros_like(scene.centre)
+    signs = torch.cartesian_prod(*[torch.tensor([-1.0, 0.0, 1.0], dtype=torch.float64)] * 3)
+    for kind in scene.kinds:
+        here = scene.mask & (scene.kind == kind)
+        size, rotation = scene.size[here], scene.rotation[here]
+        half = primitives[kind].bound(size)
+        places = signs * half[:, None]
+        level = primitives[kind].distance(places, size[:, None].expand(*places.shape[:2], SIZES))
+        lean = level @ signs / len(signs)
+        twist = torch.einsum("mp,mpi,mpj->mij", level, places, places) / len(signs) / half.amax(-1)[:, None, None]
+        twist = twist - torch.diag_embed(twist.diagonal(dim1=-2, dim2=-1))
+        own = torch.diag_embed(half**2) + twist
+        spread[here] = rotation @ own @ rotation.mT
+        leans[here] = (rotation @ lean[..., None])[..., 0]
+    return spread, leans
+
+
+def _kind(node: Node) -> str:
+    if isinstance(node, Loop):
+        return f"{node.name} {node.count} {' '.join(_kind(inner) for inner in node.body)}"
+    return node.name
+
+
+def distinct(nodes: Sequence[Node]) -> list[Node]:
+    """The first of all candidates of one kind that draw about the same, in their order."""
+    if not nodes:
+        return []
+    seen = moments(nodes)
+    kind = np.unique(seen.kind, return_inverse=True)[1]
+    order = np.round(np.log2(np.maximum(seen.size, SAME)))  # of magnitude
+    place = np.concatenate([seen.middle, seen.spread.reshape(-1, 9) / np.maximum(seen.size, SAME)[:, None]], 1)
+    key = np.column_stack([kind, order, np.round(place / (SAME * 2 ** order[:, None]))])
+    return [nodes[k] for k in np.sort(np.unique(key, axis=0, return_index=True)[1])]

@@ -1,0 +1,50 @@
+"""Candidates for what a program does not explain: boxes around clusters of points far from its surface."""
+
+from __future__ import annotations
+
+import numpy as np
+import torch
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+from shapeprog.geometry.distance import signed_distance
+from shapeprog.inference.candidates.drawings import drawings
+from shapeprog.inference.candidates.loops import images
+from shapeprog.inference.fit.tunable import THINNEST
+from shapeprog.inference.pieces.oriented import bounds, boxes_around
+from shapeprog.inference.surface.evidence import Evidence
+from shapeprog.language.hints import Box
+from shapeprog.language.program import Node, Program
+from shapeprog.language.unroll import unroll
+
+FAR = 1.5
+"""Distance from the surface of the program, in tolerances, from which a point is not explained."""
+
+NEAR = 2.0
+"""Distance between points of one cluster, in sides of the square that a point stands for."""
+
+LEAST, MOST = 8, 24
+"""Points of the smallest cluster, and most clusters."""
+
+
+def residual_candidates(program: Program, evidence: Evidence) -> list[Node]:
+    """Drawings of the boxes around clusters of visible points that a program is far from, and their mirror images."""
+    places = torch.from_numpy(evidence.points)
+    far = signed_distance(unroll(program), places).abs().numpy() > FAR * evidence.tolerance
+    points = evidence.points[far & (evidence.weights > evidence.weights.max() / 2)]
+    if len(points) < LEAST:
+        return []
+    reach = NEAR * (evidence.area / len(evidence.points)) ** 0.5
+    pairs = cKDTree(points).query_pairs(reach, output_type="ndarray")
+    links = coo_matrix((np.ones(len(pairs), np.bool_), pairs.T), shape=(len(points),) * 2)
+    _, cluster = connected_components(links, directed=False)
+    size = np.bincount(cluster)
+    largest = np.argsort(-size, kind="stable")[:MOST]
+    members = [np.flatnonzero(cluster == each) for each in largest[size[largest] >= LEAST]]
+    if not members:
+        return []
+    around = boxes_around(points[np.concatenate(members)], bounds(members))
+    half = np.maximum(around.half, THINNEST / 2)
+    nodes = [drawn for box in zip(around.centre, around.rotation, half, strict=True) for drawn in drawings(Box(*box))]
+    return [*nodes, *images(nodes, evidence.surface)]

@@ -1,0 +1,168 @@
+"""Single drawing statements as candidates, one for each piece of a target.
+
+Every statement with a hint is tried on every piece, those without one on the most important pieces in many ways.  The
+best are fitted to the points of the piece.  Of those that then fit about equally well the one with the fewest numbers
+is kept, so that copies are drawn alike, and the best one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+import torch
+from jaxtyping import Float
+from torch import Tensor
+
+from shapeprog.geometry.distance import signed_distance
+from shapeprog.inference.candidates.drawings import drawings, is_unhinted, starts
+from shapeprog.inference.fit.tunable import THINNEST, least
+from shapeprog.inference.pieces.cover_kernels import near_boxes
+from shapeprog.inference.pieces.pieces import Pieces
+from shapeprog.language.hints import Box
+from shapeprog.language.printer import numbers_written
+from shapeprog.language.program import Draw, Node, Program
+from shapeprog.language.statement import language
+from shapeprog.language.tensors import Code, encode
+from shapeprog.language.unroll import Plan, unroll
+from shapeprog.space import Array, FloatArray
+
+NEAR = 0.3
+"""Cells around a piece within which points of the surface belong to it."""
+
+POINTS, SEEN = 64, 5_000
+"""Points of a piece by which statements are compared, and points of the surface among which they are looked for."""
+
+FITTED = 48
+"""Pieces to which statements are fitted, and on which those without a hint are tried: the most important ones."""
+
+GOOD, WORTH = 0.08, 0.3
+"""Misfit up to which no fitting is needed; and how much worse than the best one a statement may be to be worth it."""
+
+STEPS, WIDTH = 8, 0.3
+"""Gauss-Newton steps of fitting, and residuals in cells that count for a quarter."""
+
+PRIOR, FARTHEST = 3e-2, 2.0
+"""Weight of a squared move by a cell from the start, for each point; and the farthest move of one number in a step."""
+
+WRONG = 0.5
+"""Distance in cells that counts as much as a normal at a right angle."""
+
+BESIDE = 0.01
+"""Cells off the surface at which the direction of a solid is taken: on a surface itself the distance has no slope."""
+
+SLACK, BETTER = 0.05, 2 / 3
+"""How much worse than the best a statement may fit if it writes fewer numbers; and the share of its misfit below which
+a good one is a candidate too."""
+
+
+class Target(NamedTuple):
+    """Points on the surface close to the faces of each of B pieces, and their normals (B, P, 3)."""
+
+    points: Float[Tensor, "B P 3"]
+    normals: Float[Tensor, "B P 3"]
+
+    def take(self, rows: Array) -> Target:
+        """Those of some of the pieces."""
+        return Target(self.points[rows], self.normals[rows])
+
+    @property
+    def beside(self) -> Float[Tensor, "B P 3"]:
+        """Just off the points: on a surface itself the distance has no slope."""
+        return self.points + BESIDE * self.normals
+
+
+def single_candidates(pieces: Pieces) -> list[Node]:
+    """The simplest drawing statement for every piece with points, in the order of the pieces, and a closer one."""
+    target, known = _target(pieces)
+    half = np.maximum(pieces.boxes.half, THINNEST / 2)
+    boxes = [Box(pieces.boxes.centre[piece], pieces.boxes.rotation[piece], half[piece]) for piece in known]
+    tried = [drawings(box) for box in boxes]
+    for declared in filter(is_unhinted, language()):
+        for box, several in zip(boxes[:FITTED], tried, strict=False):
+            several += starts(declared, box)
+    drawn = [each for several in tried for each in several]
+    owner = np.repeat(np.arange(len(boxes)), [len(each) for each in tried])
+    misfit = misfits(drawn, target.take(owner))
+    best = _least(misfit, owner, len(boxes))[owner]
+    unsure = np.flatnonzero((owner < FITTED) & (best > GOOD) & (misfit <= best + WORTH))
+    better = fitted([drawn[k] for k in unsure], target.take(owner[unsure]))
+    drawn, owner = [*drawn, *better], np.append(owner, owner[unsure])
+    misfit = np.append(misfit, misfits(better, target.take(owner[len(misfit) :])))
+    best = _least(misfit, owner, len(boxes))[owner]
+    order = np.flatnonzero(misfit <= best + SLACK).tolist()
+    order.sort(key=lambda k: (numbers_written(drawn[k]), misfit[k]), reverse=True)
+    simplest = {int(owner[k]): k for k in order}
+    closest = {int(owner[k]): k for k in order if misfit[k] == best[k]}
+    found: list[Node] = []
+    for piece, k in sorted(simplest.items()):
+        found.append(drawn[k])
+        if misfit[closest[piece]] < min(GOOD, BETTER * misfit[k]):
+            found.append(drawn[closest[piece]])
+    return found
+
+
+def _least(misfit: FloatArray, owner: Array, count: int) -> FloatArray:
+    """The least misfit for each piece; infinite where there is none."""
+    least = np.full(count, np.inf)
+    np.minimum.at(least, owner, misfit)
+    return least
+
+
+def fitted(drawn: Sequence[Draw], target: Target) -> list[Draw]:
+    """Statements brought onto their points by Gauss-Newton steps with a prior on their numbers, all at once.
+
+    Residuals are distances of the points to the surface; each has the numbers of its statement to itself, so that one
+    backward pass gives all derivatives.
+    """
+    if not drawn:
+        return []
+    declared = [language()[each.name] for each in drawn]
+    most, points = max(each.size for each in declared), target.points.shape[1]
+    values, free, low = (torch.zeros(len(drawn), most, dtype=torch.float64) for _ in range(3))
+    for row, (each, statement) in enumerate(zip(drawn, declared, strict=True)):
+        values[row, : statement.size] = torch.tensor(each.values)
+        free[row, : statement.size] = torch.tensor([not quantity.discrete for quantity in statement.quantities])
+        low[row, : statement.size] = torch.tensor([least(quantity) for quantity in statement.quantities])
+    ids = torch.tensor([each.id for each in declared])[:, None, None, None].expand(-1, points, 1, 1)
+    plan = Plan(Code(ids, values[:, None, None, None].expand(-1, points, 1, 1, -1)))
+    start, prior = values, torch.where(free > 0, PRIOR * points, 1.0)
+    beside = target.beside[:, :, None]
+    for _ in range(STEPS):
+        moving = values[:, None, None, None].expand(-1, points, 1, 1, -1).clone().requires_grad_()
+        off = signed_distance(plan.scene(moving), beside)[..., 0] - BESIDE
+        (slopes,) = torch.autograd.grad(off.sum(), moving)
+        slopes = slopes[:, :, 0, 0].nan_to_num(0) * free[:, None]
+        residual = off.detach().nan_to_num(0)
+        weighted = ((WIDTH**2 / (WIDTH**2 + residual**2)) ** 2)[..., None] * slopes
+        slope = (weighted * residual[..., None]).sum(1) + prior * (values - start)
+        move = torch.linalg.solve(weighted.mT @ slopes + torch.diag_embed(prior), slope)
+        values = torch.maximum(values - move.clamp(-FARTHEST, FARTHEST), low)
+    rows = zip(declared, values.float().tolist(), strict=True)
+    return [Draw(statement.name, tuple(row[: statement.size])) for statement, row in rows]
+
+
+def misfits(drawn: Sequence[Draw], target: Target) -> FloatArray:
+    """How far each statement (B,) is from its points: mean distance over ``WRONG`` plus 1 - the mean cosine."""
+    if not drawn:
+        return np.zeros(0)
+    beside = target.beside.requires_grad_()
+    scene = unroll(encode([Program((node,)) for node in drawn], dtype=torch.float64))
+    distance = signed_distance(scene, beside)
+    (slope,) = torch.autograd.grad(distance.sum(), beside)
+    cosine = (slope * target.normals).sum(-1).abs().mean(1)
+    off = (distance.detach().abs() / WRONG).clamp(max=1).mean(1) + 1 - cosine
+    return off.nan_to_num(np.inf).numpy()
+
+
+def _target(pieces: Pieces) -> tuple[Target, Array]:
+    """Points of the surface close to the faces of the pieces that have some, and which pieces these are (N,)."""
+    step = max(1, len(pieces.cloud.points) // SEEN)
+    points, normals = (np.ascontiguousarray(each[::step]) for each in (pieces.cloud.points, pieces.cloud.normals))
+    near = np.zeros((len(pieces.boxes.half), len(points)), np.bool_)
+    near_boxes(points, *map(np.ascontiguousarray, pieces.boxes), NEAR, near, np.zeros(len(near)))
+    known = np.flatnonzero(near.any(1))
+    inside = [np.flatnonzero(near[piece]) for piece in known]
+    chosen = np.array([each[np.arange(POINTS) * len(each) // POINTS] for each in inside], np.int64).reshape(-1, POINTS)
+    return Target(torch.from_numpy(points[chosen]), torch.from_numpy(normals[chosen])), known

@@ -1,0 +1,102 @@
+"""Programs in the statements of the paper for the cells of a shape: searched with whole numbers, then refined."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+import torch
+from jaxtyping import Float
+from torch import Tensor
+
+from shapeprog.data.shape import Shape
+from shapeprog.data.touched import occupied
+from shapeprog.geometry.cells import iou, pack
+from shapeprog.geometry.distance import nearest_primitive
+from shapeprog.inference.budget import NEVER, Deadline, Progress
+from shapeprog.inference.cells.blocks import to_program
+from shapeprog.inference.cells.refine import REACH, Schedule, refine
+from shapeprog.inference.cells.structure import Settings, search_structure
+from shapeprog.inference.choice.coverage import Prices
+from shapeprog.inference.surface.cells import points_of_cells
+from shapeprog.language.program import Program
+from shapeprog.language.unroll import unroll
+
+DEEP = 2.5
+"""Depth in cells below the surface of the snapped program beyond which points are inner faces; chosen on val."""
+
+
+@dataclass(frozen=True)
+class Reconstruction:
+    """A program in the statements of the paper.
+
+    Parameters
+    ----------
+    program
+        With continuous numbers.
+    snapped
+        The same with whole numbers, each within one of the rounded number of ``program``.
+    reason
+        Why the search stopped, as a sentence.
+    """
+
+    program: Program
+    snapped: Program
+    reason: str
+
+
+def reconstruct(
+    shape: Shape,
+    *,
+    settings: Settings,
+    schedule: Schedule | None = None,
+    seed: int = 0,
+    searching: Deadline = NEVER,
+    refining: Deadline = NEVER,
+    progress: Progress | None = None,
+) -> Reconstruction:
+    """The program of at most ``settings.blocks`` blocks whose cells are those of a shape; the same for the same seed.
+
+    Parameters
+    ----------
+    schedule
+        Steps of refinement.
+    searching, refining
+        When no further round of the search, and no further step of refinement, starts.
+    progress
+        Called with what is being done and the share of it that is done.
+    """
+    found = search_structure(shape.voxels, settings, seed=seed, deadline=searching, progress=progress)
+    snapped = to_program(found.blocks)
+    program = refine(
+        snapped, outer_points(shape, snapped, seed), voxels=shape.voxels if shape.points is None else None,
+        schedule=schedule, reach=REACH, seed=seed, deadline=refining, progress=progress,
+    )  # fmt: skip
+    reason = f"The search ended after {found.reason}"
+    if searching.cut:
+        reason += "."
+    elif snapped.blocks >= settings.blocks:
+        reason += f"; the limit of --blocks {settings.blocks} is reached, raise it for more."
+    else:
+        reason += f"; {snapped.blocks} of {settings.blocks} drawing statements are in use, another would improve the "
+        reason += "fit too little."
+    return Reconstruction(program, snapped, reason)
+
+
+def description_length(program: Program, voxels: npt.NDArray[np.bool_], snapped: Program | None = None) -> float:
+    """How long a description of cells (32, 32, 32) a program is: 1 - IoU, and the price of its text."""
+    return 1 - float(iou(occupied(program, unroll(program), snapped), pack(voxels))) + Prices().of(program)
+
+
+def outer_points(shape: Shape, snapped: Program, seed: int) -> Float[Tensor, "P 3"]:
+    """Points that the surface of the program should meet.
+
+    Points deep inside the solid lie on inner faces of the mesh, such as the back of a drawer.  The surface of a union
+    cannot reach them; trying to would pull its outer faces inwards.
+    """
+    if shape.points is None:
+        return torch.from_numpy(points_of_cells(shape.voxels, seed=seed))
+    points = torch.from_numpy(np.asarray(shape.points, np.float32))
+    outer = points[nearest_primitive(unroll(snapped), points)[1] > -DEEP] if snapped.size else points
+    return outer if len(outer) else points

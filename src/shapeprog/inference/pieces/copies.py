@@ -1,0 +1,61 @@
+"""Boxes of components that are copies of each other."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from shapeprog.inference.pieces.oriented import Boxes
+from shapeprog.inference.surface.components import Components
+from shapeprog.space import FloatArray
+
+ALIKE = 0.02
+"""Distance in cells within which the vertices of copies meet."""
+
+LARGEST_COPY = 2000
+"""Vertices above which components are not compared."""
+
+KINDS = 64
+"""Different components of equal counts that are told apart."""
+
+
+def align_copies(found: Components, boxes: Boxes) -> Boxes:
+    """Boxes of components that are copies of each other, turned alike.
+
+    Copies have their vertices in the same order; the motion between them, which may be a reflection, is the best fit
+    (Kabsch 1976).  The copy whose box is turned least is the model of the others.
+    """
+    count = np.diff(found.corner_start)[: len(boxes.half)]
+    rotation, centre, half = boxes.rotation.copy(), boxes.centre.copy(), boxes.half.copy()
+    turned = np.abs(boxes.rotation).max(1).sum(1)  # 3 along the axes
+    for size in np.unique(count[(count > 2) & (count <= LARGEST_COPY)]):
+        left = np.flatnonzero(count == size)
+        at = found.corner_start[left][:, None] + np.arange(size)
+        middle = found.vertices[found.corner[at]].mean(1)
+        cloud = found.vertices[found.corner[at]] - middle[:, None]
+        for _ in range(KINDS):
+            if len(left) < 2:
+                break
+            model = 0
+            same, turn = _motions(cloud[model], cloud)
+            members = np.flatnonzero(same)
+            best = members[np.argmax(np.round(turned[left[members]], 3))]
+            for each in members:
+                motion = turn[each] @ turn[best].T
+                source, goal = left[best], left[each]
+                if each != best:
+                    rotation[goal] = motion @ boxes.rotation[source]
+                    half[goal] = boxes.half[source]
+                    centre[goal] = middle[each] + motion @ (boxes.centre[source] - middle[best])
+            keep = ~same
+            left, cloud, middle = left[keep], cloud[keep], middle[keep]
+    rotation[np.linalg.det(rotation) < 0, :, 2] *= -1
+    return Boxes(centre, rotation, half)
+
+
+def _motions(model: FloatArray, clouds: FloatArray) -> tuple[npt.NDArray[np.bool_], FloatArray]:
+    """Which centred clouds (G, V, 3) are the model (V, 3) turned or reflected, and by what (G, 3, 3)."""
+    u, _, vt = np.linalg.svd(np.einsum("gvi,vj->gij", clouds, model))
+    turn = u @ vt
+    off = np.abs(np.einsum("gij,vj->gvi", turn, model) - clouds).max((1, 2))
+    return off < ALIKE, turn

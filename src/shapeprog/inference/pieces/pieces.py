@@ -33,7 +33,7 @@ from shapeprog.inference.pieces.oriented import Boxes, bounds, boxes_around, dis
 from shapeprog.inference.pieces.patches import planar_patches
 from shapeprog.inference.pieces.rods import rods
 from shapeprog.inference.pieces.slabs import sheets, slabs
-from shapeprog.inference.surface.cloud import NOISY, Cloud, cloud_of, points_of_scan
+from shapeprog.inference.surface.cloud import Cloud, cloud_of, is_clean, points_of_scan
 from shapeprog.inference.surface.components import Components, components
 
 POINTS = 20_000
@@ -94,9 +94,9 @@ def find_pieces(shape: Shape, seed: int = 0) -> Pieces:
         mesh = components(shape.vertices, shape.faces)
         if len(mesh.area):
             return _of_mesh(mesh, seed)
-    cloud = cloud_of(points_of_scan(shape))
-    along = limbs(cloud) if cloud.noise <= NOISY else []
-    return _ranked(cloud, _of_points(cloud, seed, along), join([]))
+    points = points_of_scan(shape)
+    cloud = cloud_of(points)
+    return _ranked(cloud, _of_points(cloud, seed, limbs(cloud) if is_clean(points) else []), join([]))
 
 
 def _of_mesh(mesh: Components, seed: int) -> Pieces:

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import torch
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from shapeprog.geometry.distance import signed_distance
@@ -13,6 +11,7 @@ from shapeprog.inference.candidates.drawings import drawings
 from shapeprog.inference.candidates.loops import images
 from shapeprog.inference.fit.tunable import THINNEST
 from shapeprog.inference.pieces.oriented import bounds, boxes_around
+from shapeprog.inference.surface.components import linked
 from shapeprog.inference.surface.evidence import Evidence
 from shapeprog.language.hints import Box
 from shapeprog.language.program import Node, Program
@@ -37,8 +36,7 @@ def residual_candidates(program: Program, evidence: Evidence) -> list[Node]:
         return []
     reach = NEAR * (evidence.area / len(evidence.points)) ** 0.5
     pairs = cKDTree(points).query_pairs(reach, output_type="ndarray")
-    links = coo_matrix((np.ones(len(pairs), np.bool_), pairs.T), shape=(len(points),) * 2)
-    _, cluster = connected_components(links, directed=False)
+    cluster = linked(pairs, len(points))
     size = np.bincount(cluster)
     largest = np.argsort(-size, kind="stable")[:MOST]
     members = [np.flatnonzero(cluster == each) for each in largest[size[largest] >= LEAST]]

@@ -9,8 +9,6 @@ from collections.abc import Collection, Iterator
 
 import numpy as np
 import torch
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
 from shapeprog.geometry.mesh import gaps
 from shapeprog.inference.candidates.drawings import redrawn, solid_boxes
@@ -18,6 +16,7 @@ from shapeprog.inference.candidates.neighbours import drawing_of, met, with_draw
 from shapeprog.inference.choice.choice import value
 from shapeprog.inference.choice.coverage import Coverage
 from shapeprog.inference.fit.tunable import bounds
+from shapeprog.inference.surface.components import linked
 from shapeprog.language.hints import Box
 from shapeprog.language.program import Chain, Node, Program
 from shapeprog.language.tensors import encode
@@ -79,9 +78,7 @@ def _apart(program: Program, flush: float = FLUSH) -> list[list[bool]]:
     if not program.size:
         return found
     scene = unroll(encode(program, dtype=torch.float64))
-    touching = np.array(list(gaps(scene, flush)), np.int64).reshape(-1, 2)
-    links = coo_matrix((np.ones(len(touching)), touching.T), shape=(len(scene.mask),) * 2)
-    group = connected_components(links, directed=False)[1]
+    group = linked(np.array(list(gaps(scene, flush)), np.int64).reshape(-1, 2), len(scene.mask))
     half = bounds(scene)
     sizes = np.bincount(group, weights=(half * half.roll(1, -1)).sum(-1).numpy())
     for block, each in zip(scene.block.tolist(), group, strict=True):

@@ -7,7 +7,6 @@ from itertools import combinations
 import numpy as np
 import numpy.typing as npt
 
-from shapeprog.inference.pieces.grouping_kernels import grow
 from shapeprog.inference.pieces.oriented import Boxes, bounds, boxes_around
 
 GAP = 0.3
@@ -44,9 +43,12 @@ def groups(boxes: Boxes) -> Boxes:
 
 def grown(beside: npt.NDArray[np.bool_], fits: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
     """For each start (a row) all that is reached from neighbour to neighbour (N, N) through what fits it (N, N)."""
-    reached = np.zeros(fits.shape, np.bool_)
-    grow(np.ascontiguousarray(beside), np.ascontiguousarray(fits), reached)
-    return reached
+    reached, links = np.eye(len(fits), dtype=np.bool_), beside.astype(np.float32)  # products of floats are faster
+    while True:
+        onwards = reached | ((reached.astype(np.float32) @ links > 0) & fits)
+        if np.array_equal(onwards, reached):
+            return reached
+        reached = onwards
 
 
 def touching(boxes: Boxes, gap: float) -> npt.NDArray[np.bool_]:

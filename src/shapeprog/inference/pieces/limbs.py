@@ -12,11 +12,10 @@ from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from shapeprog.inference.surface.cloud import Cloud
+from shapeprog.inference.surface.components import linked
 from shapeprog.space import FloatArray
 
 COUNT = 5000
@@ -60,8 +59,8 @@ def limbs(cloud: Cloud) -> list[npt.NDArray[np.int64]]:
     name, centre, radius = merged(centre, radius)
     distance, near = cKDTree(centre).query(centre, k=range(1, min(NEAREST, len(centre)) + 1), workers=2)
     reach = 2 * radius[:, None] + 2.5 * MERGED
-    linked = (distance < reach) & (np.abs(np.log(radius[near] / radius[:, None])) < 2 * STEP)
-    weight = linked.astype(np.float64)[..., None]
+    close = (distance < reach) & (np.abs(np.log(radius[near] / radius[:, None])) < 2 * STEP)
+    weight = close.astype(np.float64)[..., None]
     off = (centre[near] - (centre[near] * weight).sum(1, keepdims=True) / weight.sum(1, keepdims=True)) * weight
     spread, axes = np.linalg.eigh(off.transpose(0, 2, 1) @ off)
     spread = np.sqrt(np.maximum(spread, 0))
@@ -69,10 +68,8 @@ def limbs(cloud: Cloud) -> list[npt.NDArray[np.int64]]:
     line = spread[:, 1] < LINEAR * spread[:, 2]
     for kind, direction in ((line, axes[:, :, 2]), (~line & (spread[:, 0] < LINEAR * spread[:, 1]), axes[:, :, 0])):
         facing = np.abs(np.einsum("nki,ni->nk", direction[near], direction)) > np.cos(np.radians(BEND))
-        i, k = np.nonzero(linked & facing & kind[:, None] & kind[near])
-        graph = coo_matrix((np.ones(len(i), np.bool_), (i, near[i, k])), shape=(len(near), len(near)))
-        _, label = connected_components(graph, directed=False)
-        of_point = label[name]
+        i, k = np.nonzero(close & facing & kind[:, None] & kind[near])
+        of_point = linked(np.stack([i, near[i, k]], 1), len(near))[name]
         mine = [which[of_point == each] for each in np.flatnonzero(np.bincount(of_point) >= LEAST)]
         found += [*mine, *(in_line(cloud.points, mine) if kind is line else [])]
     return sorted(found, key=len, reverse=True)
@@ -126,8 +123,7 @@ def in_line(points: FloatArray, found: Sequence[npt.NDArray[np.int64]]) -> list[
     straight = np.abs(along @ along.T) > np.cos(np.radians(STRAIGHT))
     one, two = np.nonzero(np.triu(straight & (np.maximum(aside, aside.T) < ASIDE), 1))
     near = np.abs(ahead[one, two]) - half[one] - half[two] < GAP
-    edges = np.ones(near.sum(), np.bool_), (one[near], two[near])
-    _, label = connected_components(coo_matrix(edges, shape=(len(found),) * 2), directed=False)
+    label = linked(np.stack([one[near], two[near]], 1), len(found))
     many = np.flatnonzero(np.bincount(label, minlength=1) > 1)
     return [np.concatenate([found[k] for k in np.flatnonzero(label == each).tolist()]) for each in many]
 

@@ -44,8 +44,8 @@ def components(vertices: Array, faces: Array) -> Components:
     """The components of a triangle mesh in cells, once vertices are welded and doubled and empty faces left out."""
     places, listed = weld(np.asarray(vertices, np.float64), np.asarray(faces, np.int64))
     listed, area = once_each(places, listed)
-    count, label = _joined(listed, len(places))
-    of_face = label[listed[:, 0]]
+    label = linked(np.concatenate([listed[:, :2], listed[:, 1:]]), len(places))
+    count, of_face = int(label.max(initial=-1)) + 1, label[listed[:, 0]]
     total = np.bincount(of_face, area, minlength=count)
     used = np.flatnonzero(total > 0)
     order = used[np.argsort(-np.round(total[used], 6), kind="stable")]
@@ -113,9 +113,7 @@ def solid_sides(mesh: Components) -> npt.NDArray[np.int64]:
     return found
 
 
-def _joined(faces: npt.NDArray[np.int64], vertices: int) -> tuple[int, npt.NDArray[np.int64]]:
-    """How many components faces join so many vertices to, and which each vertex is of (V,)."""
-    links = np.concatenate([faces[:, :2], faces[:, 1:]])
-    graph = coo_matrix((np.ones(len(links), np.bool_), (links[:, 0], links[:, 1])), shape=(vertices, vertices))
-    count, label = connected_components(graph, directed=False)
-    return int(count), label
+def linked(pairs: Array, count: int) -> npt.NDArray[np.int64]:
+    """The connected component (count,) that each of so many items is of, from pairs (P, 2) that are linked."""
+    graph = coo_matrix((np.ones(len(pairs), np.bool_), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
+    return np.asarray(connected_components(graph, directed=False)[1], np.int64)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shapeprog.inference.cells.block_layout import COUNT1, ROTATE, SHIFT1, WIDTH
+from shapeprog.inference.cells.block_layout import WIDTH
 from shapeprog.inference.cells.descent_kernels import MOST_MOVES, descend, statements
 from shapeprog.inference.cells.drawing import Rows, Whole, cells_shared, draw_all, draw_each, places
 from shapeprog.inference.cells.fold_kernels import VOLUMES
@@ -138,7 +138,6 @@ def propose_form(form: int, covered: Rows, waste: float, box: FloatArray, target
     box
         The box proposed for the same place, from which some guesses start.
     """
-    price = target.price * target.cells
     gained, wasted = target.occupied & ~covered, ~target.occupied & ~covered
     cells = places(gained)
     if len(cells) < FEWEST:
@@ -149,38 +148,13 @@ def propose_form(form: int, covered: Rows, waste: float, box: FloatArray, target
         return 0.0, np.zeros(WIDTH)
     best = rough[int(_nets(rough, gained, wasted, waste).argmax())]
     block, _value = improve_block(best, target.occupied, covered, target.price, 2)
-    looped = _repeated(block, gained, wasted, waste, price)
-    if looped[COUNT1] > block[COUNT1]:
-        block, _value = improve_block(looped, target.occupied, covered, target.price, 1)
-    return float(_nets(block[None], gained, wasted, waste)[0] - price * statements(block)), block
+    return float(_nets(block[None], gained, wasted, waste)[0] - target.price * target.cells * statements(block)), block
 
 
 def _nets(blocks: FloatArray, gained: Rows, wasted: Rows, waste: float) -> FloatArray:
     """Cells of ``gained`` that each block covers, minus ``waste`` times those of ``wasted``."""
     counts = cells_shared(draw_each(blocks), gained, wasted)
     return counts[:, 0] - waste * counts[:, 1]
-
-
-def _loops() -> FloatArray:
-    """The translation loops of two to four copies along one axis: rows of a count and a shift."""
-    return np.array([
-        (count, *(step * (axis == other) for other in range(3)))
-        for axis in range(3) for step in range(-23, 24) if step for count in range(2, 5)
-        if (count - 1) * abs(step) <= 24
-    ], np.float64)  # fmt: skip
-
-
-LOOPS = _loops()
-
-
-def _repeated(block: FloatArray, gained: Rows, wasted: Rows, waste: float, price: float) -> FloatArray:
-    """The block in its best translation loop of two to four copies along one axis, if that gains."""
-    if block[COUNT1] > 1 or block[ROTATE] > 0:
-        return block
-    trials = np.repeat(block[None], 1 + len(LOOPS), 0)
-    trials[1:, COUNT1 : SHIFT1 + 3] = LOOPS
-    values = _nets(trials, gained, wasted, waste) - price * statements(trials.T)
-    return trials[int(values.argmax())]
 
 
 def best_box(covered: Rows, waste: float, picks: Whole, target: Target) -> tuple[float, FloatArray]:

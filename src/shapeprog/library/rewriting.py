@@ -23,7 +23,7 @@ from shapeprog.language.ast import (
 from shapeprog.language.convert import named_cells, placed, placed_again
 from shapeprog.language.dimensions import in_unit
 from shapeprog.language.evaluate import evaluated
-from shapeprog.language.expression import Expression
+from shapeprog.language.expression import Expression, Name, replaced
 from shapeprog.language.merging import merged_lines, separate_loops
 from shapeprog.language.printer import source_of
 from shapeprog.language.program import Program
@@ -151,7 +151,7 @@ def matchers_of(source: Source) -> Iterator[tuple[Matcher, tuple[Loop, ...]]]:
                     for some, form in zip(found, read, strict=True):
                         some.append(form)
             if isinstance(line, Loop) and len(line.body) == 1:
-                inner.setdefault(replace(line, body=()), []).append((number, line.body[0]))
+                inner.setdefault(_frame(line), []).append((number, line.body[0]))
         for some in {tuple(form.block.kind for form in some): some for some in found}.values():
             yield Matcher(some, units, free), around
         for loop, within_it in inner.items():
@@ -162,6 +162,15 @@ def matchers_of(source: Source) -> Iterator[tuple[Matcher, tuple[Loop, ...]]]:
         yield from of(list(enumerate(source.lines)))
     except ShapeProgError:  # a product of names
         return
+
+
+def _frame(loop: Loop) -> Loop:
+    """A loop without its body, and its numbers without what is left over from other units."""
+
+    def rounded(each: float | Name) -> float | Name:
+        return each if isinstance(each, Name) else round(each, 4)
+
+    return replace(loop, values=tuple(replaced(value, rounded) for value in loop.values), body=())
 
 
 def _chosen(source: Source, patterns: Sequence[Pattern]) -> list[Offer]:

@@ -19,6 +19,7 @@ from shapeprog.inference.pieces.oriented import Boxes, bounds, boxes_around
 from shapeprog.inference.pieces.pieces import Pieces, Source, find_pieces
 from shapeprog.inference.surface.cloud import cloud_of, points_of_scan, projected
 from shapeprog.inference.surface.components import components, solid_sides
+from shapeprog.inference.surface.evidence import evidence_of
 from shapeprog.space import Array, FloatArray, Frame
 
 Mesh = tuple[FloatArray, Array]
@@ -335,3 +336,9 @@ def test_all_points_of_a_clean_scan_are_looked_at_and_few_of_a_noisy_one(noise):
     assert len(shape.points) == 5_000
     assert len(points_of_scan(shape)) == (5_000 if noise > 0.1 else 20_000)
     assert len(points_of_scan(shape_from_points(points[:3_000]))) == 3_000
+
+
+@pytest.mark.parametrize("half", [(12, 5.3, 7.2), (10.1, 5.3, 12), (12, 12, 12), (5, 12, 7.7)])
+def test_the_inside_of_a_box_is_not_free_though_its_sides_lie_between_cells(half):
+    shape = shape_from_mesh(*box(np.zeros(3), np.array(half)), name="box", axes=np.eye(3))
+    assert not evidence_of(shape).free[30:34, 30:34, 30:34].any()

@@ -70,6 +70,10 @@ AGREED = 0.95
 LOOKING, FREE = 128, 64
 """Cells along each side of the grids in which points look outwards, and in which space is free."""
 
+WALL = 0.5 + 1e-6
+"""Half the side in cells of what a triangle must meet: the longest side ends where cells do, and rounding would leave
+holes in faces there, through which the whole inside is seen."""
+
 DIRECTIONS = 32
 """Directions in which they look; half of them, and their opposites, where both ways must be clear."""
 
@@ -202,7 +206,7 @@ def _reach(tolerance: float, area: float, count: int = SURFACE) -> float:
 def touched(triangles: FloatArray, resolution: int) -> Flags:
     """The cells (R, R, R) of the cube of the grid that triangles (F, 3, 3) touch."""
     cells = np.zeros((resolution,) * 3, np.bool_)
-    mark_triangles(np.ascontiguousarray((triangles + HALF) * (resolution / RESOLUTION)), 0.5, cells)
+    mark_triangles(np.ascontiguousarray((triangles + HALF) * (resolution / RESOLUTION)), WALL, cells)
     return cells
 
 

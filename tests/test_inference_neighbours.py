@@ -165,3 +165,12 @@ def test_tidy_numbers_have_two_decimals_and_angles_one():
     node = Draw("board", (2.123456, -8.0, -12.0, 1.0004, 16.0, 24.0, 12.3456))
     assert tidy(Program((node,))) == parse("board(at=(2.12, -8, -12), size=(1, 16, 24), tilt=12.3)")
     assert tidy(Program()) == Program()
+
+
+def test_parts_of_one_size_at_equal_steps_are_one_row_whatever_draws_them():
+    upper = "for i in translate(3, by=(6, 0, 0)):\n    box(at=(-9, -1, -6), size=(.6, 1, 12))\n"
+    lower = "for i in translate(3, by=(6, 0, 0)):\n    cushion(at=(-6.1, -1, -6), size=(.7, 1.1, 12), edge=.3)\n"
+    rows = [node for node in neighbours(parse(upper + lower)) if isinstance(node, Loop) and node.count == 6]
+    assert any(node.body[0].name == "box" and np.allclose(node.values[1:], (3, 0, 0), atol=0.05) for node in rows)
+    table = neighbours(parse(SEAT + LEGS.format(height=14)))
+    assert not any(node.count > 2 for node in table if isinstance(node, Loop))

@@ -16,6 +16,7 @@ import torch
 from shapeprog.inference.candidates.drawings import drawings, hinted, redrawn, solid_boxes
 from shapeprog.inference.candidates.loops import mirrors, repeated
 from shapeprog.language.hints import STRAIGHT, Box
+from shapeprog.language.parameters import to_float32
 from shapeprog.language.program import Chain, Draw, Loop, Node, Program, nest
 from shapeprog.language.statement import language
 from shapeprog.language.tensors import encode
@@ -40,6 +41,12 @@ GAP = 1.5
 OFF_LEAST, OFF_MOST = 0.02, 2.5
 """Cells by which the middle of a part is off that of the shape when it may be meant to be there."""
 
+OFF_LINE, OFF_SIZE = 0.35, 0.2
+"""Cells by which parts of one row may be off their places, and by which their extents may differ; or a quarter."""
+
+LEAST_ROW, PRESENT = 3, 0.75
+"""Fewest parts of a row, and the share of its places where there must be one."""
+
 CORNERS = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
 
 
@@ -51,7 +58,7 @@ def neighbours(program: Program) -> list[Node]:
     drawn = [drawing_of(chain) for chain in chains]
     boxes = [each[0] if len(each) == 1 else None for each in solid_boxes(drawn)]
     others = solid_boxes(program.body)
-    found: list[Node] = [*repeated([*drawn, *program.body])]
+    found: list[Node] = [*repeated([*drawn, *program.body]), *_rows(others)]
     for place, (chain, box) in enumerate(zip(chains, boxes, strict=True)):
         found += _unlooped(chain)
         found += _mirrored(chain)
@@ -68,6 +75,49 @@ def neighbours(program: Program) -> list[Node]:
             found += [with_drawing(one, other) for merged in _merged(first, second) for other in drawings(merged)]
     known = set(program.body)
     return [node for node in dict.fromkeys(found) if node not in known]
+
+
+def _rows(blocks: Sequence[Sequence[Box]]) -> Iterator[Node]:
+    """Rows along an axis of boxes of one size, which are drawn by several blocks now: rungs, slats, shelves."""
+    boxes = [box for parts in blocks for box in parts]
+    owner = np.repeat(np.arange(len(blocks)), [len(parts) for parts in blocks])
+    centre = np.array([box.centre for box in boxes])
+    half = np.array([np.abs(box.rotation) @ box.half for box in boxes])
+    known: set[tuple[int, ...]] = set()
+    for axis, first in itertools.product(range(3), range(len(boxes))):
+        limit = np.maximum(OFF_SIZE, half[first] / 4)
+        limit[axis] = max(OFF_SIZE / 2, half[first, axis] / 2)
+        alike = (np.abs(half - half[first]) <= limit).all(1)
+        alike &= (np.abs(centre - centre[first])[:, np.arange(3) != axis] <= OFF_LINE).all(1)
+        members = np.flatnonzero(alike)
+        key = (axis, *members.tolist())
+        if len(members) < LEAST_ROW or len(set(owner[members])) < 2 or key in known:
+            continue
+        known.add(key)
+        count, start, step = _evenly(centre[members, axis], 2 * float(np.median(half[members, axis])))
+        if count < LEAST_ROW:
+            continue
+        middle, size = np.median(centre[members], 0), np.median(half[members], 0)
+        middle[axis] = start
+        steps = tuple(to_float32(step) if other == axis else 0.0 for other in range(3))
+        loop = Loop("translate", (float(count), *steps), ())
+        yield from (nest((loop, drawing)) for drawing in drawings(Box(middle, np.eye(3), size)))
+
+
+def _evenly(places: FloatArray, least: float) -> tuple[int, float, float]:
+    """How many equal steps of at least ``least`` places (N,) are, the first place, and the step; 0 if they are not."""
+    places = np.unique(places.round(2))
+    steps = np.diff(places)
+    steps = steps[steps >= least]
+    if not len(steps):
+        return 0, 0.0, 0.0
+    first, length = float(places[0]), float(places[-1] - places[0])
+    count = round(length / float(np.median(steps))) + 1
+    step = length / max(count - 1, 1)
+    index = np.round((places - first) / step)
+    on = np.abs(places - first - index * step) <= min(OFF_LINE, step / 4)
+    even = on.mean() >= PRESENT and len(set(index[on])) >= PRESENT * count
+    return (count if even else 0), first, step
 
 
 def drawing_of(chain: Chain) -> Draw:

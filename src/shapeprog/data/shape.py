@@ -61,8 +61,8 @@ class Shape:
 
     @property
     def file_unit(self) -> str:
-        """Unit of its file: the one that was named, that of the format, or one assumed where the shape would be more
-        than 10 m long in metres; empty if it is not known."""
+        """The unit of its file that was named, that of the format, or one assumed where the shape would be more than
+        10 m long in metres; empty if it is not known."""
         if self.unit:
             return self.unit
         if (longest := SPAN * self.frame.scale) > MOST_METRES:

@@ -46,9 +46,9 @@ class InferOptions:
     modules: terminal.WithLibraries = None
     paper: Annotated[bool, about_program("--paper", help="Only the statements of Liang (2022), on 32^3 cells.")] = False
     seed: terminal.Seed = 0
-    rounds: Annotated[
-        int | None, about_search(metavar="N", help="Maximum number of search rounds; fewer are faster.", min=0)
-    ] = None
+    rounds: Annotated[int | None, about_search(metavar="N", help="Maximum rounds of the search on cells.", min=0)] = (
+        None
+    )
     budget: Annotated[float, about_search(metavar="SECONDS", help="Time limit per shape.", min=0.1)] = BUDGET
     baseline: Annotated[bool, about_search("--baseline", help="Greedy boxes instead of the search.")] = False
     out: Annotated[Path, typer.Option("--out", "-o", metavar="FOLDER", help="Folder for the results.")] = FOLDER

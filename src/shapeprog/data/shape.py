@@ -33,7 +33,7 @@ class Shape:
     frame
         The map from the grid to the world of the file.
     vertices, faces
-        The mesh, (V, 3) in cells and (F, 3), where there is one; for pictures.
+        The mesh, (V, 3) in cells and (F, 3), where there is one; inference reads its surface.
     source
         The file it was read from.
     kind

@@ -1,4 +1,4 @@
-"""Inference by search: propose, roll into loops, edit, refine, name; greedy boxes as the baseline."""
+"""Inference: a program from the surface of a mesh or point cloud, or from the cells of voxels."""
 
 import lazy_loader
 

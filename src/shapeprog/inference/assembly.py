@@ -1,8 +1,8 @@
 """Structure from the surface: a program of few blocks that explains what is seen of a target.
 
-Pieces of the target become candidates, and copies among them loops.  The few that explain most for the shortest text
-are chosen, then once more with their neighbours and with what is not yet explained.  Their numbers are adjusted
-together, parts that float are connected, and all get roles.  No statement is treated by name.
+Pieces of the target become single blocks, copies among them loops, and functions calls.  A first choice is fitted
+briefly, then competes with its neighbours and with boxes around unexplained points.  The result is connected, fitted,
+restored where fitting did harm, and connected again.  Then all parts get roles.  No statement is treated by name.
 """
 
 from __future__ import annotations
@@ -148,8 +148,11 @@ def _chosen(
     seed: int,
     deadline: Deadline,
 ) -> tuple[Choice, list[Part]]:
-    """What is chosen, and from which candidates: first of all; then, if that is better, of what is like the first
-    choice, or like that with a wide tolerance, as none is adjusted yet, and of what is missing in these."""
+    """The better of two choices, and its candidates.
+
+    The second is among the first choice, a choice with a wide tolerance, their adjusted forms and neighbours, boxes
+    around unexplained points, and candidates passed over.
+    """
     evidence = coverage.evidence
     table = _table(candidates, coverage)
     choice = choose(table, blocks, seed=seed)

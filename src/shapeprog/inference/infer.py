@@ -1,8 +1,10 @@
 """Inference: a shape in, a program out, with its scores and the reason why the search stopped.
 
-A mesh or a point cloud is inferred from its surface (:func:`~shapeprog.inference.assembly.assemble`), voxels and
-programs in the statements of the paper from cells (:func:`~shapeprog.inference.cells.reconstruct.reconstruct`).  Then
-numbers are tied, and parts are placed from the sides of the whole.
+A mesh or a point cloud is searched on its surface (:func:`~shapeprog.inference.assembly.assemble`).  Voxels, shapes
+with ``statements="paper"``, and shapes whose surface gives no program are searched on cells
+(:func:`~shapeprog.inference.cells.reconstruct.reconstruct`).  Unless ``statements="paper"``, parts are then placed from
+the sides of the whole, numbers are tied, and calls of library functions are written.  Lengths get a unit and are
+rounded.
 """
 
 from __future__ import annotations
@@ -56,7 +58,7 @@ class Result:
         ``blocks``, ``statements``, ``primitives``; ``numbers``, those that are free; ``explained``, the share of the
         surface, of meshes and point clouds; ``iou`` at 32^3 of voxels and of programs with a ``snapped`` form.
     reason
-        Why the search stopped, where the program came from, what the time budget cut short, and what to try next.
+        Why the search stopped, what the time budget cut short, and what to try next.
     cut
         What the time budget cut short, and how far that had come; if nothing, the same seed gives an equal result.
     seconds
@@ -112,10 +114,10 @@ def infer(
     blocks
         Most blocks of the program.
     budget
-        Seconds after which neither search nor refinement starts another step: a safety net.  What they may spend in
-        the common case is up to ``settings`` and ``schedule``.
+        Seconds after which no further step of search, fitting or refinement starts.  Choice and ties are not
+        interrupted.
     settings, schedule
-        Rounds of the search on cells and steps of refinement, and more.
+        Settings of the search on cells and of its refinement; the search on the surface does not use them.
     statements
         All statements in force, or those of the paper alone.
     detail

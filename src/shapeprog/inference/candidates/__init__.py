@@ -1,1 +1,1 @@
-"""Blocks that may be part of the program: drawing statements on pieces, and loops over copies."""
+"""Blocks that may be part of the program: statements on pieces, loops over copies, and calls of functions."""

@@ -1,1 +1,1 @@
-"""Oriented boxes that a target may consist of: ``find_pieces(shape)`` gives components, rods and slabs."""
+"""Oriented boxes that a target may consist of, ranked: components, groups, rods, limbs, slabs and sheets."""

@@ -646,3 +646,8 @@ def test_a_program_that_cannot_be_drawn_is_tied_for_less(monkeypatch):
     monkeypatch.setattr(tying._Ties, "tied", tied)
     assert tie(program, evidence_of_program(program)).free < 20
     assert prices[1] == prices[0] / tying.CHEAPER
+
+
+def test_what_lies_between_equal_clearances_is_written_with_one_number():
+    text = tied_text("box(at=(0, -8, -12), size=(1, 16, 24))\nboard(at=(1, -6, -8.5), size=(6, .5, 17), tilt=20)\n")
+    assert "width=width - 7, " in text

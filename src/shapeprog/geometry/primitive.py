@@ -7,6 +7,7 @@ sizes.  It is its own mirror image along local axis 2, so that mirroring a scene
 from __future__ import annotations
 
 from collections.abc import Callable
+from importlib import import_module
 from typing import Any
 
 import numpy.typing as npt
@@ -151,3 +152,10 @@ def _join(numbers: tuple[Number, ...], like: Tensor) -> Tensor:
 def safe_norm(squared: Scalars) -> Scalars:
     """Square root whose gradient is zero, not infinite, at zero."""
     return torch.sqrt(squared.clamp(min=1e-24))
+
+
+def __getattr__(name: str) -> Any:
+    """The tuple ``primitives`` of :mod:`shapeprog.geometry.primitives`, where release 0.1.0 had it."""
+    if name == "primitives":
+        return import_module("shapeprog.geometry.primitives").primitives
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

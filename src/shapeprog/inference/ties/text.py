@@ -167,12 +167,14 @@ def _is_zero(value: Argument) -> bool:
 
 
 def _without_zeros(value: Value) -> Value:
-    """An expression without terms that are zero."""
+    """An expression without terms that are zero, and products of plain numbers."""
     if not isinstance(value, Binary):
         return value
     left, right = _without_zeros(value.left), _without_zeros(value.right)
     if value.operator == "*" and (_is_zero(left) or _is_zero(right)):
         return 0.0
+    if value.operator == "*" and isinstance(left, float | int) and isinstance(right, float | int):
+        return to_float32(left * right)
     if value.operator in "+-" and _is_zero(right):
         return left
     return Binary(value.operator, left, right)

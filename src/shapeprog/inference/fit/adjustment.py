@@ -1,8 +1,8 @@
 """Adjustment: all continuous numbers of a program together, so that its surface lies on that of a target.
 
 A few steps of Gauss and Newton through the renderer.  Residuals are distances along normals, joints between parts are
-kept closed, and every number is drawn very gently to where it started: what the target says nothing about, such as the
-thickness behind a sheet, stays as it was.
+kept closed, and every number has a weak prior at its start: numbers that the target does not determine, such as the
+thickness behind a sheet, do not change.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from shapeprog.language.program import Program
 from shapeprog.space import FloatArray
 
 STEPS, LAST = 12, 5
-"""Steps, of which the last ones keep angles as they are written and close what is still open."""
+"""Steps, of which the last ones fix rounded angles and close the joints that are still open."""
 
 CAPTURE, EXPLAINED = 1.2, 2.0
 """Width of the weights of residuals: in cells at first, and in tolerances of the evidence at the end."""
@@ -67,7 +67,7 @@ def adjust(
     steps
         Steps of Gauss and Newton, at least ``LAST`` of them with fixed angles.
     relations
-        Rows (R, F) of factors: these sums of the numbers that move stay what they are.
+        Rows (R, F) of factors: these sums of the numbers that move stay constant.
     seed
         Of the samples that each step draws.
     deadline
@@ -83,7 +83,7 @@ def adjust(
     wide = max(CAPTURE, narrow)
     with one_tensor_thread(kernels=1):
         poses = tunable.poses(values)
-        known = find_joints(poses.scene, _floor(evidence), generator)
+        joints = find_joints(poses.scene, _floor(evidence), generator)
         for step in range(steps):
             if deadline.passed(f"the adjustment after {step} of {steps} steps"):
                 break
@@ -93,11 +93,11 @@ def adjust(
                 ways = _ways(relations, held)
                 values = torch.where(held, tunable.rounded(values * (values.abs() >= UPRIGHT)), values)
                 poses = tunable.poses(values)
-            known = moved(poses.scene, known)
+            joints = moved(poses.scene, joints)
             pairs = target.pairs(poses.scene, generator)
             systems = [
                 of_target(poses, pairs, wide ** (1 - done) * narrow**done),
-                of_joints(poses, known, closing=done == 1),
+                of_joints(poses, joints, closing=done == 1),
             ]
             onwards = torch.maximum(values + _move(systems, tunable, values, ways), tunable.low)
             values = onwards if relations is None else values + ways @ (ways.T @ (onwards - values))
@@ -120,20 +120,20 @@ System = tuple[Float[Tensor, " F"], Float[Tensor, "F F"]]
 
 
 def of_target(poses: Poses, pairs: Pairs, width: float) -> System:
-    """The part of the distances to the target, where residuals of ``width`` cells count for a quarter."""
+    """The part of the distances to the target, where residuals of ``width`` cells have a quarter of the weight."""
     asked, by = pull(poses.scene, pairs, width), poses.slopes
     slope = (by * asked.slope[..., None]).sum((0, 1))
     return slope, (by.mT @ asked.curvature @ by).sum(0)
 
 
-def of_joints(poses: Poses, known: Joints, *, closing: bool) -> System:
-    """Of gaps; one that the target insists on opens: its weight falls.  At the end all are closed that it takes to
-    keep the program in one piece, and all feet are put on the floor."""
-    gaps = needs(poses.scene, poses.slopes, known)
+def of_joints(poses: Poses, joints: Joints, *, closing: bool) -> System:
+    """Of gaps; one that the target insists on opens: its weight falls.  At the end the gaps
+    that would divide the program are closed, and all feet are put on the floor."""
+    gaps = needs(poses.scene, poses.slopes, joints)
     weight = KEPT * (NEARLY**2 / (NEARLY**2 + gaps.residual**2)) ** 2
     if closing:
-        count = len(known.first)
-        needed = joining(known.first, known.second, gaps.residual[:count], len(poses.scene.mask), WIDEST)
+        count = len(joints.first)
+        needed = joining(joints.first, joints.second, gaps.residual[:count], len(poses.scene.mask), WIDEST)
         needed = torch.cat([needed, gaps.residual[count:].abs() < OPEN])
         weight = torch.where(needed, CLOSED, weight)
     weighted = weight[:, None] * gaps.slopes
@@ -152,7 +152,7 @@ def _ways(relations: FloatArray | None, held: Bool[Tensor, " F"]) -> Float[Tenso
 def _move(
     systems: list[System], tunable: Tunable, values: Float[Tensor, " F"], ways: Float[Tensor, "F Z"]
 ) -> Float[Tensor, " F"]:
-    """The step to the least of the sum of squares, with what draws every number to its start."""
+    """The step to the minimum of the sum of squares, with the prior of every number at its start."""
     slope, curvature = (sum(parts) for parts in zip(*systems, strict=True))
     gentle = torch.tensor([GENTLE.get(kind, PLACE) for kind in tunable.kinds]).double() * tunable.scale**2
     slope = slope + gentle * (values - tunable.values)

@@ -28,7 +28,7 @@ CLOSED = 0.02
 """How far in cells a joint should reach into the other part: more than rounding takes away."""
 
 LOOKED = 64
-"""Samples of each primitive that say where it may touch others."""
+"""Samples of each primitive from which its contacts are estimated."""
 
 CANDIDATE = 2.0
 """Gap between samples up to which primitives may touch, in cells: a face may have no sample."""
@@ -38,29 +38,29 @@ FIRST, AGAIN = 24, 6
 
 
 class Joints(NamedTuple):
-    """Pairs of primitives that should touch, and primitives that should stand on the floor.
+    """Pairs of primitives that should touch, and primitives that should touch the floor.
 
     Parameters
     ----------
     first, second
         Slots (C,) of the two.
-    places
-        Of each joint the place in the box of the first (C, 3), its half extents being 1.
+    normalized
+        Point of each joint (C, 3) in the box of the first primitive, in units of its half extents.
     standing
-        Slots (S,) of the primitives that stand on the floor.
+        Slots (S,) of the primitives that should touch the floor.
     floor
         Height of the floor.
     """
 
     first: Int[Tensor, " C"]
     second: Int[Tensor, " C"]
-    places: Float[Tensor, "C 3"]
+    normalized: Float[Tensor, "C 3"]
     standing: Int[Tensor, " S"]
     floor: float
 
 
 class Needs(NamedTuple):
-    """What joints ask for: residuals (C + S,), in cells, and their derivatives (C + S, F) by the numbers."""
+    """Residuals of joints (C + S,), in cells, and their derivatives (C + S, F) by the numbers."""
 
     residual: Float[Tensor, " R"]
     slopes: Float[Tensor, "R F"]
@@ -70,16 +70,16 @@ def find_joints(scene: Scene, floor: float, generator: torch.Generator) -> Joint
     """The joints of a scene: of parts that touch, and of those that nearly touch where nothing else joins them."""
     count = len(scene.mask)
     first, second, points, gap = gaps(scene, generator)
-    chosen = (joining(first, second, gap, count, NEARLY) | (gap <= TOUCHING)).nonzero()[:, 0]
+    selected = (joining(first, second, gap, count, NEARLY) | (gap <= TOUCHING)).nonzero()[:, 0]
     lowest = _lowest(scene, torch.arange(count))[:, 0]
     standing = ((lowest - floor).abs() <= NEARLY).nonzero()[:, 0]
-    inner = _inner(scene, first[chosen], points[chosen])
-    return Joints(first[chosen], second[chosen], inner, standing, floor)
+    inner = _inner(scene, first[selected], points[selected])
+    return Joints(first[selected], second[selected], inner, standing, floor)
 
 
 class Gaps(NamedTuple):
-    """Pairs of primitives close to each other: slots (C,) of the two, the place (C, 3) where the gap is narrowest, and
-    how wide it is there (C,)."""
+    """Pairs of primitives close to each other: slots (C,) of the two, the point (C, 3) where the gap is narrowest, and
+    the width of the gap (C,)."""
 
     first: Int[Tensor, " C"]
     second: Int[Tensor, " C"]
@@ -89,12 +89,12 @@ class Gaps(NamedTuple):
 
 def gaps(scene: Scene, generator: torch.Generator) -> Gaps:
     """The gaps of a scene, those between parts that overlap below zero; the smaller part of each pair comes first."""
-    places, apart = _samples(scene, generator)
-    first, second = (torch.minimum(apart, apart.T) < CANDIDATE).triu(1).nonzero(as_tuple=True)
+    nearest, distance = _samples(scene, generator)
+    first, second = (torch.minimum(distance, distance.T) < CANDIDATE).triu(1).nonzero(as_tuple=True)
     area = bounds(scene).prod(-1)
     swap = area[first] > area[second]
     first, second = torch.where(swap, second, first), torch.where(swap, first, second)
-    points = between(scene, first, second, places[first, second], FIRST)
+    points = between(scene, first, second, nearest[first, second], FIRST)
     width = signed_distance(rows_of(scene, second)[0], points[:, None])[:, 0].detach()
     width = width + signed_distance(rows_of(scene, first)[0], points[:, None])[:, 0].detach().clamp(min=0)
     return Gaps(first, second, points, width)
@@ -107,95 +107,100 @@ def joining(
     narrowest (Kruskal 1956)."""
     needed, group = torch.zeros(len(gap), dtype=torch.bool), list(range(count))
     for pair in torch.argsort(gap, stable=True).tolist():
-        one, other = group[int(first[pair])], group[int(second[pair])]
-        if gap[pair] <= widest and one != other:
+        target, source = group[int(first[pair])], group[int(second[pair])]
+        if gap[pair] <= widest and target != source:
             needed[pair] = True
-            group = [one if each == other else each for each in group]
+            group = [target if label == source else label for label in group]
     return needed
 
 
-def moved(scene: Scene, known: Joints) -> Joints:
-    """The same joints where their parts have moved: the places that are deepest in both, or nearest to both."""
-    if not len(known.first):
-        return known
-    points = between(scene, known.first, known.second, places_of(scene, known), AGAIN)
-    inner = _inner(scene, known.first, points)
-    return known._replace(places=inner)
+def moved(scene: Scene, joints: Joints) -> Joints:
+    """The same joints after their parts have moved: the points deepest in both parts, or nearest to both."""
+    if not len(joints.first):
+        return joints
+    points = between(scene, joints.first, joints.second, positions_of(scene, joints), AGAIN)
+    inner = _inner(scene, joints.first, points)
+    return joints._replace(normalized=inner)
 
 
-def places_of(scene: Scene, known: Joints) -> Float[Tensor, "C 3"]:
-    """Where joints are while their first parts are where the scene has them."""
-    local = bounds(scene)[known.first] * known.places
-    found: Tensor = scene.centre[known.first] + (scene.rotation[known.first] @ local[..., None])[..., 0]
-    return found
+def positions_of(scene: Scene, joints: Joints) -> Float[Tensor, "C 3"]:
+    """Positions of joints when their first parts are as in the scene."""
+    local = bounds(scene)[joints.first] * joints.normalized
+    positions: Tensor = scene.centre[joints.first] + (scene.rotation[joints.first] @ local[..., None])[..., 0]
+    return positions
 
 
-def needs(scene: Scene, slopes: Float[Tensor, "N 16 F"], known: Joints) -> Needs:
-    """How far every joint is from closed, none where it is, and how high each part is that stands on the floor."""
-    reach = depths(scene, slopes, known)
+def needs(scene: Scene, slopes: Float[Tensor, "N 16 F"], joints: Joints) -> Needs:
+    """Gap of every joint, zero if it is closed, and height above the floor of every part that should touch it."""
+    reach = depths(scene, slopes, joints)
     gap = reach.residual + CLOSED
     joined = torch.where((gap >= 0)[:, None], reach.slopes, 0.0)  # on an axis the slope of a depth is no number
-    stand, feet = rows_of(scene, known.standing)
-    low = _inner(scene, known.standing, _lowest(scene, known.standing))
-    height = stand.centre[:, 0, 0] + (stand.rotation[:, 0, 0] * bounds(stand)[:, 0] * low).sum(-1) - known.floor
-    standing = _by_number(_slopes_of(height, feet), slopes[known.standing])
+    stand, feet = rows_of(scene, joints.standing)
+    low = _inner(scene, joints.standing, _lowest(scene, joints.standing))
+    height = stand.centre[:, 0, 0] + (stand.rotation[:, 0, 0] * bounds(stand)[:, 0] * low).sum(-1) - joints.floor
+    standing = _by_number(_slopes_of(height, feet), slopes[joints.standing])
     return Needs(torch.cat([gap.clamp(min=0), height.detach()]), torch.cat([joined, standing]))
 
 
-def depths(scene: Scene, slopes: Float[Tensor, "N 16 F"], known: Joints) -> Needs:
-    """How far the place of every joint is from the second part, below zero inside it."""
-    one, ours = rows_of(scene, known.first)
-    two, theirs = rows_of(scene, known.second)
-    points = one.centre[:, 0] + (one.rotation[:, 0] @ (bounds(one)[:, 0] * known.places)[..., None])[..., 0]
-    far = signed_distance(two, points[:, None])[:, 0]
-    found = _slopes_of(far, [*ours, *theirs])
-    mine, others = found[:, :ROW], found[:, ROW:]
-    return Needs(far.detach(), _by_number(mine, slopes[known.first]) + _by_number(others, slopes[known.second]))
+def depths(scene: Scene, slopes: Float[Tensor, "N 16 F"], joints: Joints) -> Needs:
+    """Signed distance from the point of every joint to the second part, negative inside it."""
+    first, first_leaves = rows_of(scene, joints.first)
+    second, second_leaves = rows_of(scene, joints.second)
+    points = first.centre[:, 0] + (first.rotation[:, 0] @ (bounds(first)[:, 0] * joints.normalized)[..., None])[..., 0]
+    far = signed_distance(second, points[:, None])[:, 0]
+    by_row = _slopes_of(far, [*first_leaves, *second_leaves])
+    by_first, by_second = by_row[:, :ROW], by_row[:, ROW:]
+    return Needs(
+        far.detach(), _by_number(by_first, slopes[joints.first]) + _by_number(by_second, slopes[joints.second])
+    )
 
 
 def between(
     scene: Scene, first: Int[Tensor, " C"], second: Int[Tensor, " C"], points: Float[Tensor, "C 3"], rounds: int
 ) -> Float[Tensor, "C 3"]:
     """Points moved between two primitives each of a scene."""
-    both = torch.stack([first, second], 1)
-    pairs = (each[both] for each in (scene.kind, scene.size, scene.centre, scene.rotation, scene.mask))
+    slots = torch.stack([first, second], 1)
+    pairs = (tensor[slots] for tensor in (scene.kind, scene.size, scene.centre, scene.rotation, scene.mask))
     return projected(Batch(*pairs), points, rounds)
 
 
 def _samples(scene: Scene, generator: torch.Generator) -> tuple[Float[Tensor, "N N 3"], Float[Tensor, "N N"]]:
-    """Of the samples of each primitive the middle of those nearest to each other one, and their distance."""
-    single = Batch(*(each[:, None] for each in (scene.kind, scene.size, scene.centre, scene.rotation, scene.mask)))
-    drawn = sample_surface(single, LOOKED, generator).points
-    away = each_distance(scene, drawn.flatten(0, 1)).unflatten(0, drawn.shape[:2])
+    """Mean of the samples of each primitive that are nearest to each other primitive, and their distance."""
+    single = Batch(*(tensor[:, None] for tensor in (scene.kind, scene.size, scene.centre, scene.rotation, scene.mask)))
+    samples = sample_surface(single, LOOKED, generator).points
+    away = each_distance(scene, samples.flatten(0, 1)).unflatten(0, samples.shape[:2])
     distance, nearest = away.topk(4, 1, largest=False)
-    places = drawn[torch.arange(len(drawn))[:, None, None], nearest].mean(1)
-    return places, distance[:, 0]
+    midpoints = samples[torch.arange(len(samples))[:, None, None], nearest].mean(1)
+    return midpoints, distance[:, 0]
 
 
 def _slopes_of(values: Float[Tensor, " R"], leaves: Sequence[Tensor]) -> Float[Tensor, "R S"]:
     """Derivatives of values by the rows of leaves, one after another."""
-    found = torch.autograd.grad(values.sum(), leaves, allow_unused=True)
-    rows = [torch.zeros_like(leaf) if each is None else each for each, leaf in zip(found, leaves, strict=True)]
-    return torch.cat([each.flatten(1) for each in rows], 1)
+    gradients = torch.autograd.grad(values.sum(), leaves, allow_unused=True)
+    rows = [
+        torch.zeros_like(leaf) if gradient is None else gradient
+        for gradient, leaf in zip(gradients, leaves, strict=True)
+    ]
+    return torch.cat([row.flatten(1) for row in rows], 1)
 
 
 def _by_number(rows: Float[Tensor, "R 16"], slopes: Float[Tensor, "R 16 F"]) -> Float[Tensor, "R F"]:
-    found: Tensor = (rows[:, None] @ slopes)[:, 0]
-    return found
+    product: Tensor = (rows[:, None] @ slopes)[:, 0]
+    return product
 
 
 def _inner(scene: Scene, slots: Int[Tensor, " C"], points: Float[Tensor, "C 3"]) -> Float[Tensor, "C 3"]:
-    """Places in the boxes of primitives."""
+    """Points in the boxes of primitives, in units of the half extents."""
     local = ((points - scene.centre[slots])[..., None] * scene.rotation[slots]).sum(-2)
     return local / bounds(scene)[slots].clamp(min=1e-6)
 
 
 def _lowest(scene: Scene, slots: Int[Tensor, " S"]) -> Float[Tensor, "S 3"]:
     """The lowest points of primitives."""
-    found = torch.zeros(len(slots), 3, dtype=scene.centre.dtype)
+    points = torch.zeros(len(slots), 3, dtype=scene.centre.dtype)
     for n, slot in enumerate(slots.tolist()):
         vertices, _ = primitives[int(scene.kind[slot])].mesh(scene.size[slot].double().numpy())
         placed = torch.from_numpy(vertices) @ scene.rotation[slot].T + scene.centre[slot]
         lowest = placed[:, 0] <= placed[:, 0].min() + 1e-6
-        found[n] = placed[lowest].mean(0)
-    return found
+        points[n] = placed[lowest].mean(0)
+    return points

@@ -1,8 +1,9 @@
-"""How far the surface of a program is from that of a target, pair by pair, and what would mend it.
+"""Distances between the surfaces of a program and of a target, pair by pair, and the step that reduces them.
 
 A point of the target and a sample of the program's surface are a pair when they are close and their normals fit.  The
 residual of a pair is the distance from the point to the surface around the sample, along its normal: sliding along a
-face costs nothing.  What no part explains has no partner nearby, and its weight vanishes (Geman & McClure 1987).
+face costs nothing.  Points that no part explains have no partner nearby, and their weight vanishes (Geman & McClure
+1987).
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ from shapeprog.inference.surface.evidence import Evidence
 from shapeprog.space import Array, FloatArray
 
 POINTS, SAMPLES = 1_500, 1_500
-"""Points of the target, and samples of the surface of the program, that one step looks at."""
+"""Points of the target, and samples of the surface of the program, that one step uses."""
 
 NEAR = 6
 """Samples among which the partner of a point is found, and points among which that of a sample is."""
@@ -39,11 +40,11 @@ NEVER = 1e9
 
 SAME, OTHER = 0.5, 0.5
 """Least cosine between normals on one face; and the share of its distance from which a sample leaves a point alone
-that the opposite side of its own part explains: a sheet is evidence for one side of a board, not for both."""
+that the opposite side of the same part explains: a sheet is evidence for one side of a board, not for both."""
 
 BACK, PLAIN = 0.5, 0.03
 """Weights, against that of the points of the target, of the samples of the program, and of plain distances of points
-to the union: these alone tell how far a part reaches along a sheet that has no edges."""
+to the union: only these determine how far a part reaches along a sheet that has no edges."""
 
 
 class Pairs(NamedTuple):
@@ -51,21 +52,21 @@ class Pairs(NamedTuple):
 
     Parameters
     ----------
-    points, places, normals, slots
+    points, samples, normals, slots
         The points, the samples and their outward normals (R, 3), and the primitives (R,) that the samples lie on.
     offset
-        What beside the distance along the normal tells against the pair (R,), squared: how far the two lie apart along
-        the surface, beyond the spacing of samples, and how much their normals differ.
+        Squared penalty of the pair (R,) besides the distance along the normal: the distance of the two along the
+        surface, beyond the spacing of samples, and the difference of their normals.
     weights
-        What each counts (R,).
+        Weights of the pairs (R,).
     either
         Whether the normals are parallel and it is not known on which side of its surface the point lies (R,).
     anywhere
-        Whether the nearest place of the primitive is meant (R,), whatever its normal.
+        Whether the pair refers to the nearest point of the primitive (R,), whatever its normal.
     """
 
     points: Float[Tensor, "R 3"]
-    places: Float[Tensor, "R 3"]
+    samples: Float[Tensor, "R 3"]
     normals: Float[Tensor, "R 3"]
     slots: Int[Tensor, " R"]
     offset: Float[Tensor, " R"]
@@ -99,86 +100,86 @@ class Target:
     def pairs(self, scene: Scene, generator: torch.Generator) -> Pairs:
         """Pairs both ways, drawn at random: from points to the program, and from its surface to points."""
         sample = sample_surface(scene, SAMPLES, generator)
-        places, facing = sample.points, sample.normals
+        samples, facing = sample.points, sample.normals
         spacing = 1.5 * math.sqrt(self.evidence.area / min(SAMPLES, len(self._points)))
-        drawn = torch.rand(POINTS, generator=generator, dtype=torch.float64).numpy() * self._shares[-1]
-        some = np.searchsorted(self._shares, drawn).clip(0, len(self._points) - 1)
-        points, normals, sides = self._points[some], self._normals[some], self._sides[some]
-        tree = cKDTree(_joint(places.numpy(), facing.numpy()))
-        near = tree.query(_joint(points.numpy(), normals.numpy()), NEAR)[1]
-        behind = near.copy()
+        thresholds = torch.rand(POINTS, generator=generator, dtype=torch.float64).numpy() * self._shares[-1]
+        selected = np.searchsorted(self._shares, thresholds).clip(0, len(self._points) - 1)
+        points, normals, sides = self._points[selected], self._normals[selected], self._sides[selected]
+        tree = cKDTree(_joint(samples.numpy(), facing.numpy()))
+        candidates = tree.query(_joint(points.numpy(), normals.numpy()), NEAR)[1]
+        behind = candidates.copy()
         unsure = ~sides.numpy()
         behind[unsure] = tree.query(_joint(points.numpy()[unsure], -normals.numpy()[unsure]), NEAR)[1]
-        near = np.concatenate([near, behind], 1)
-        offset, best = self._closest(np.broadcast_to(some[:, None], near.shape), near, sample, spacing)
-        partner = np.take_along_axis(near, best, 1)[:, 0]
-        back = self._owner[self._tree.query(_joint(places.numpy(), facing.numpy()), NEAR)[1]]
-        here = np.broadcast_to(np.arange(len(back))[:, None], back.shape)
-        other, best = self._closest(back, here, sample, spacing)
-        found = np.take_along_axis(back, best, 1)[:, 0]
+        candidates = np.concatenate([candidates, behind], 1)
+        offset, best = self._closest(np.broadcast_to(selected[:, None], candidates.shape), candidates, sample, spacing)
+        partner = np.take_along_axis(candidates, best, 1)[:, 0]
+        back = self._owner[self._tree.query(_joint(samples.numpy(), facing.numpy()), NEAR)[1]]
+        rows = np.broadcast_to(np.arange(len(back))[:, None], back.shape)
+        back_offset, best = self._closest(back, rows, sample, spacing)
+        back_partner = np.take_along_axis(back, best, 1)[:, 0]
         union = nearest_primitive(scene, points)[0]
-        along = torch.cat([(normals * facing[partner]).sum(1), (self._normals[found] * facing).sum(1)])
-        either = ~torch.cat([sides, self._sides[found]]) & (along.abs() >= SAME)
+        along = torch.cat([(normals * facing[partner]).sum(1), (self._normals[back_partner] * facing).sum(1)])
+        either = ~torch.cat([sides, self._sides[back_partner]]) & (along.abs() >= SAME)
         zeros, ones = torch.zeros(POINTS, dtype=torch.float64), torch.ones(POINTS, dtype=torch.float64)
         return Pairs(
-            torch.cat([points, self._points[found], points]),
-            torch.cat([places[partner], places, points]),
+            torch.cat([points, self._points[back_partner], points]),
+            torch.cat([samples[partner], samples, points]),
             torch.cat([facing[partner], facing, normals]),
             torch.cat([sample.slot[partner], sample.slot, union]),
-            torch.cat([offset, other, zeros]),
+            torch.cat([offset, back_offset, zeros]),
             torch.cat([ones / POINTS, torch.full((SAMPLES,), BACK / SAMPLES).double(), PLAIN * ones / POINTS]),
             torch.cat([either, torch.zeros(POINTS).bool()]),
             torch.cat([torch.zeros(POINTS + SAMPLES), ones]).bool(),
         )
 
     def _closest(
-        self, at: Array, near: Array, sample: SurfaceSample, spacing: float
+        self, at: Array, candidates: Array, sample: SurfaceSample, spacing: float
     ) -> tuple[Float[Tensor, " R"], Array]:
-        """Of several pairs (R, k) of points and samples the best (R, 1), and what beside the distance along its normal
-        tells against it, squared."""
+        """The best (R, 1) of several pairs (R, k) of points and samples, and its squared penalty besides the distance
+        along the normal."""
         offset, best = np.empty(len(at)), np.empty(len(at), np.int64)
-        points = (each.numpy() for each in (self._points, self._normals, self._sides))
-        places = (sample.points.numpy(), sample.normals.numpy())
-        at, near = np.ascontiguousarray(at), np.ascontiguousarray(near)
-        kernels.closest(*points, at, *places, near, spacing, TURNED, NEVER, offset, best)
+        points = (tensor.numpy() for tensor in (self._points, self._normals, self._sides))
+        samples = (sample.points.numpy(), sample.normals.numpy())
+        at, candidates = np.ascontiguousarray(at), np.ascontiguousarray(candidates)
+        kernels.closest(*points, at, *samples, candidates, spacing, TURNED, NEVER, offset, best)
         return torch.from_numpy(offset), best[:, None]
 
 
 def pull(scene: Scene, pairs: Pairs, width: float) -> Pull:
-    """What the pairs ask of every primitive, where residuals of ``width`` cells count for a quarter."""
+    """Slope and curvature of the misfit, where residuals of ``width`` cells have a quarter of the weight."""
     single, leaves = rows_of(scene, pairs.slots)
     at = pairs.points[:, None].clone().requires_grad_()
     level = signed_distance(single, at)[:, 0]
     slope, *by = torch.autograd.grad(level.sum(), [at, *leaves])
-    value, by_row = level.detach(), torch.cat([each.flatten(1) for each in by], 1)
+    value, by_row = level.detach(), torch.cat([gradient.flatten(1) for gradient in by], 1)
     cosine = (slope[:, 0] * pairs.normals).sum(1)
-    plane = ((pairs.points - pairs.places) * pairs.normals).sum(1)
+    plane = ((pairs.points - pairs.samples) * pairs.normals).sum(1)
     same = (cosine >= SAME) | pairs.anywhere
     residual = torch.where(same, value, plane)
-    taken = pairs.either & ~same & (value.abs() < OTHER * plane.abs())
-    if len(others := (~same).nonzero()[:, 0]):  # the nearest place is on another face: the plane at the sample is meant
-        single, leaves = rows_of(scene, pairs.slots[others])
-        at = (pairs.places + 1e-3 * pairs.normals)[others, None]
-        there = torch.autograd.grad(signed_distance(single, at).sum(), leaves)
-        by_row[others] = torch.cat([each.flatten(1) for each in there], 1)
+    explained = pairs.either & ~same & (value.abs() < OTHER * plane.abs())
+    if len(off_face := (~same).nonzero()[:, 0]):  # the nearest point is on another face: use the plane at the sample
+        single, leaves = rows_of(scene, pairs.slots[off_face])
+        at = (pairs.samples + 1e-3 * pairs.normals)[off_face, None]
+        gradients = torch.autograd.grad(signed_distance(single, at).sum(), leaves)
+        by_row[off_face] = torch.cat([gradient.flatten(1) for gradient in gradients], 1)
     robust = (width**2 / (width**2 + residual**2 + pairs.offset)) ** 2
-    weight = torch.where(taken, 0.0, pairs.weights * robust)
+    weight = torch.where(explained, 0.0, pairs.weights * robust)
     count = len(scene.mask)
-    found = Pull(by_row.new_zeros(count, ROW), by_row.new_zeros(count, ROW, ROW))
-    rows = (each.contiguous().numpy() for each in (by_row, weight, residual, pairs.slots))
-    kernels.gathered(*rows, *(each.numpy() for each in found))
-    return found
+    result = Pull(by_row.new_zeros(count, ROW), by_row.new_zeros(count, ROW, ROW))
+    rows = (tensor.contiguous().numpy() for tensor in (by_row, weight, residual, pairs.slots))
+    kernels.gathered(*rows, *(tensor.numpy() for tensor in result))
+    return result
 
 
 def rows_of(scene: Scene, slots: Int[Tensor, " R"]) -> tuple[Batch, list[Tensor]]:
     """The primitives in some slots as a batch (R, 1), and its sizes, centres and rotations to differentiate by."""
     size, centre, rotation = (
-        each[slots][:, None].clone().requires_grad_() for each in (scene.size, scene.centre, scene.rotation)
+        tensor[slots][:, None].clone().requires_grad_() for tensor in (scene.size, scene.centre, scene.rotation)
     )
     single = Batch(scene.kind[slots][:, None], size, centre, rotation, scene.mask[slots][:, None])
     return single, [size, centre, rotation]
 
 
 def _joint(points: FloatArray, normals: FloatArray) -> FloatArray:
-    """Points and normals (P, 6), in which distances are those of places and of directions together."""
+    """Points and normals (P, 6), in which distances combine those of positions and of directions."""
     return np.concatenate([points, TURNED / math.sqrt(2) * normals], 1)

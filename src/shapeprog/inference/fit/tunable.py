@@ -1,4 +1,4 @@
-"""The continuous parameters of a program as one vector, and what each of them does to every primitive."""
+"""The continuous parameters of a program as one vector, and the effect of each on every primitive."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ DEGREES, CELLS = 1, 2
 
 
 class Poses(NamedTuple):
-    """The primitives of a program and what moves them.
+    """The primitives of a program and their derivatives.
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ class Poses(NamedTuple):
 class Tunable:
     """The numbers of a program that may move, as a vector (F,), and the way from such a vector to its primitives.
 
-    Counts, turns and axes stay, and so does what is exactly zero of a shift or of the plane of a mirror: the loop along
+    Counts, turns and axes stay, and so do exact zeros of a shift or of the plane of a mirror: the loop along
     an axis keeps to it, the symmetric object stays symmetric.  A loop around several statements has its numbers once.
 
     Attributes
@@ -59,9 +59,9 @@ class Tunable:
     values, kinds
         Where the numbers are at the start (F,), and of which kind each is.
     low
-        What they must not fall below (F,): lengths a thickness of ``THINNEST``.
+        Lower bounds (F,): a thickness of ``THINNEST`` for lengths.
     nodes, moving
-        The nodes in the order of the text, and for every number (F) which of them it is of, and its slot there.
+        The nodes in the order of the text, and for every number (F) the index of its node, and its slot there.
     scale
         How many cells the surface moves for one unit of each (F,), at most: 1 for places and lengths, more for shifts
         of many copies, a lever for angles.
@@ -73,7 +73,7 @@ class Tunable:
         code = encode(program, dtype=torch.float64)
         self._start = code.parameters
         moving = [(n, slot) for n, node in enumerate(nodes) for slot in _moving(node)]
-        number = {place: f for f, place in enumerate(moving)}
+        number = {key: f for f, key in enumerate(moving)}
         index = torch.full(code.parameters.shape, -1)
         for block, chain in enumerate(_chains(program.body)):
             for step, n in enumerate(chain):
@@ -89,8 +89,8 @@ class Tunable:
         first = self._once.scene(code.parameters)
         self._row = _rank(first.block)
         self._copies = int(self._row.max()) + 1
-        many = (part.expand(self._copies * ROW, *part.shape) for part in (code.ids, code.parameters))
-        self._plan = Plan(Code(*many))
+        repeated = (part.expand(self._copies * ROW, *part.shape) for part in (code.ids, code.parameters))
+        self._plan = Plan(Code(*repeated))
         self.scale = self._scales(nodes, first)
 
     def scene(self, values: Float[Tensor, " F"]) -> Scene:
@@ -110,9 +110,9 @@ class Tunable:
         asked = rows.unflatten(0, (self._copies, ROW))
         slot, which = torch.arange(len(self._row))[:, None], torch.arange(ROW)
         (slope,) = torch.autograd.grad(asked[self._row[:, None], which, slot, which].sum(), inner)
-        found = slope.unflatten(0, (self._copies, ROW))
+        gradients = slope.unflatten(0, (self._copies, ROW))
         block = scene.block[0]
-        mine = found[self._row[:, None], which, block[:, None]].nan_to_num(0).flatten(2)  # (N, 16, J * slots)
+        mine = gradients[self._row[:, None], which, block[:, None]].nan_to_num(0).flatten(2)  # (N, 16, J * slots)
         index = self._index[block].flatten(1)
         slopes = mine.new_zeros(*mine.shape[:2], len(self.moving) + 1)
         slopes.scatter_add_(2, (index % slopes.shape[2])[:, None].expand_as(mine), mine)
@@ -121,7 +121,7 @@ class Tunable:
     def settled(self, values: Float[Tensor, " F"]) -> Program:
         """The program with these numbers, rounded."""
         tidy = self.rounded(values).tolist()
-        table = {place: to_float32(value) for place, value in zip(self.moving, tidy, strict=True)}
+        table = {key: to_float32(value) for key, value in zip(self.moving, tidy, strict=True)}
         return Program(_rebuilt(self.program.body, count(), table))
 
     def rounded(self, values: Float[Tensor, " F"]) -> Float[Tensor, " F"]:
@@ -136,7 +136,7 @@ class Tunable:
 
     def are(self, kind: str) -> Bool[Tensor, " F"]:
         """Which numbers are of a kind."""
-        return torch.tensor([each == kind for each in self.kinds], dtype=torch.bool)
+        return torch.tensor([item == kind for item in self.kinds], dtype=torch.bool)
 
     def _filled(self, values: Float[Tensor, " F"]) -> Float[Tensor, "K J slots"]:
         if not len(values):
@@ -157,7 +157,7 @@ class Tunable:
 
 
 def least(quantity: Quantity) -> float:
-    """What numbers of a quantity must not fall below: lengths a thickness of ``THINNEST``."""
+    """Lower bound of the numbers of a quantity: a thickness of ``THINNEST`` for lengths."""
     if quantity.kind != "length":
         return -math.inf
     return THINNEST / 2 if quantity.high == HALF else THINNEST
@@ -165,19 +165,19 @@ def least(quantity: Quantity) -> float:
 
 def bounds(scene: Batch) -> Float[Tensor, "*batch N 3"]:
     """Half extents of the local bounding boxes of primitives, with gradient to their sizes."""
-    found = torch.zeros_like(scene.centre)
+    extents = torch.zeros_like(scene.centre)
     for kind in scene.kinds:
-        here = scene.mask & (scene.kind == kind)
-        found = torch.where(here[..., None], primitives[kind].bound(scene.size), found)
-    return found
+        matching = scene.mask & (scene.kind == kind)
+        extents = torch.where(matching[..., None], primitives[kind].bound(scene.size), extents)
+    return extents
 
 
 def _moving(node: Node) -> Iterator[int]:
     """The slots of a node that may move."""
     declared = language()[node.name]
     for slot, quantity in enumerate(declared.quantities):
-        kept = declared.is_loop and node.values[slot] == 0
-        if not quantity.discrete and not kept:
+        fixed = declared.is_loop and node.values[slot] == 0
+        if not quantity.discrete and not fixed:
             yield slot
 
 
@@ -194,15 +194,15 @@ def _chains(body: Sequence[Node], first: int = 0, *outer: int) -> Iterator[tuple
 
 def _rebuilt(body: Sequence[Node], counter: Iterator[int], table: dict[tuple[int, int], float]) -> tuple[Node, ...]:
     """The nodes with the numbers of a table by node and slot."""
-    found: list[Node] = []
+    nodes: list[Node] = []
     for node in body:
         n = next(counter)
         values = tuple(table.get((n, slot), value) for slot, value in enumerate(node.values))
         if isinstance(node, Draw):
-            found.append(Draw(node.name, values, node.role))
+            nodes.append(Draw(node.name, values, node.role))
         else:
-            found.append(Loop(node.name, values, _rebuilt(node.body, counter, table)))
-    return tuple(found)
+            nodes.append(Loop(node.name, values, _rebuilt(node.body, counter, table)))
+    return tuple(nodes)
 
 
 def _rank(block: Int[Tensor, " N"]) -> Int[Tensor, " N"]:

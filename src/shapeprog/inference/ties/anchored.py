@@ -39,13 +39,13 @@ class Anchored:
         self.index: dict[tuple[int, str], int] = {}
         self._counter = iter(range(len(layout.lines)))
         body = self._body(layout.source.lines)
-        whole = Assignment(tuple((self.name(axis), layout.extents[axis]) for axis in range(3)))
-        others = tuple((self.name(index), slot.value) for index, slot in enumerate(self.slots))[3:]
-        self.lines: tuple[Line, ...] = (whole, *([Assignment(others)] if others else []), *body)
+        sizes = Assignment(tuple((self.name(axis), layout.extents[axis]) for axis in range(3)))
+        assigned = tuple((self.name(index), slot.value) for index, slot in enumerate(self.slots))[3:]
+        self.lines: tuple[Line, ...] = (sizes, *([Assignment(assigned)] if assigned else []), *body)
         self.source = replace(placed_source(self.lines), scale=layout.source.scale, unit=layout.source.unit)
 
     def fixed(self) -> FloatArray:
-        """Relations (M, P) that hold in any case: a round part that fills the whole is as wide as it is deep."""
+        """Relations (M, P) that always hold: the width and the depth of a round part that fills the whole are equal."""
         rows = []
         for index, line in enumerate(self.layout.lines):
             if isinstance(line, Part) and self.layout.fills(line):
@@ -75,11 +75,11 @@ class Anchored:
 
     def _part(self, index: int, line: Part) -> Part:
         keywords: list[tuple[str, Argument]] = []
-        given = dict(line.keywords)
-        if "start" in given:
-            keywords += [(word, self._point(index, word)) for word in POINTS if word in given]
-            sizes = [(word, axis) for axis, word in enumerate(SIZES) if word in given]
-            keywords += [(word, self._across(index, word, axis, float(given[word]))) for word, axis in sizes]  # type: ignore[arg-type]
+        arguments = dict(line.keywords)
+        if "start" in arguments:
+            keywords += [(word, self._point(index, word)) for word in POINTS if word in arguments]
+            sizes = [(word, axis) for axis, word in enumerate(SIZES) if word in arguments]
+            keywords += [(word, self._across(index, word, axis, float(arguments[word]))) for word, axis in sizes]  # type: ignore[arg-type]
         else:
             for axis in range(3):
                 keywords += self._placed(self.layout.elements[index, "", axis])
@@ -87,12 +87,12 @@ class Anchored:
         for word, argument in line.keywords:
             if not fills and word in ("radius", "edge", "tilt", "lean", "turn"):
                 keywords.append((word, self._plain(index, word, argument)))
-        if line.kind in ROUND and "radius" not in given and not fills:
+        if line.kind in ROUND and "radius" not in arguments and not fills:
             keywords.append(("radius", self._plain(index, "radius", self.layout.radius(line))))
         return replace(line, keywords=tuple(keywords))
 
     def _across(self, index: int, word: str, axis: int, size: float) -> Value:
-        """A size of a bar: a number, or what is left of the whole between two equal clearances."""
+        """A size of a bar: a number, or the extent of the whole less two equal clearances."""
         if self.anchors.get((index, "across", axis)) != (LOW, HIGH):
             return self._slot(index, word, "size", axis, LOW, size)
         clearance = (self.layout.extents[axis] - size) / 2
@@ -107,13 +107,13 @@ class Anchored:
         return self._slot(index, word, kind, -1, LOW, float(argument))  # type: ignore[arg-type]
 
     def _group(self, index: int, line: Group) -> Group:
-        given = dict(line.keywords)
+        arguments = dict(line.keywords)
         if line.kind == "translate":
             return replace(line, kind="row", keywords=(("last", self._point(index, "last")),))
         key = "plane" if line.kind == "mirror" else "centre"
         keywords: Keywords = self._point(index, key).keywords
-        if "step" in given:
-            keywords = (*keywords, ("step", self._plain(index, "step", given["step"])))
+        if "step" in arguments:
+            keywords = (*keywords, ("step", self._plain(index, "step", arguments["step"])))
         return replace(line, keywords=keywords)
 
     def _point(self, index: int, key: str) -> Point:

@@ -29,10 +29,10 @@ class AnchorSettings:
 
     Parameters
     ----------
-    apart
-        A pair of parts that touch and would come apart.
+    separated
+        A pair of parts that touch and would be separated.
     pressed
-        A pair that would be pressed into each other, or come apart when the whole shrinks.
+        A pair that would be pressed into each other, or be separated when the whole shrinks.
     side
         A copy of a part near a side of the whole that does not move with it.
     reaching
@@ -50,7 +50,7 @@ class AnchorSettings:
         side; and from this on they span.
     """
 
-    apart: float = 5.0
+    separated: float = 5.0
     pressed: float = 0.6
     side: float = 2.0
     reaching: float = 8.0
@@ -68,7 +68,7 @@ SHIFTS = np.array([0.0, 0.5, 1.0])
 """By how much of what the whole grows an anchor moves, seen from the low side."""
 
 TOUCH = 0.1
-"""Cells by which parts that touch may be apart."""
+"""Largest gap between parts that touch, in cells."""
 
 STEP = 0.3
 """Cells between the first and last copy of a row up to which it does not run along an axis."""
@@ -133,11 +133,11 @@ class AxisAnchors:
         base: FloatArray, contacts: Contacts, loops: dict[int, int], settings: AnchorSettings,
     ) -> None:  # fmt: skip
         self.loops = loops
-        places = {(element.line, element.key): k for k, element in enumerate(elements)}
+        index = {(element.line, element.key): k for k, element in enumerate(elements)}
         self.spans: list[tuple[int, int, float]] = []  # both ends of a rod, and the cost of different anchors
-        for (line, key), k in places.items():
-            if key in ("end", "through") and (line, "start") in places:
-                start = places[line, "start"]
+        for (line, key), k in index.items():
+            if key in ("end", "through") and (line, "start") in index:
+                start = index[line, "start"]
                 length = abs(elements[k].low - elements[start].low) / extent
                 self.spans.append((start, k, settings.resized * max(0.0, 1 - length / settings.spanning)))
         self.elements, self.axis, self.extent, self.settings = elements, axis, extent, settings
@@ -145,9 +145,9 @@ class AxisAnchors:
         self.choices: list[Sequence[Anchors]] = [self._choices(element) for element in elements]
         for start, end, _ in self.spans:  # ends at equal distances from the middle stay so
             if axis < 2 and abs(elements[start].low + elements[end].low - extent) < 2 * CENTRED * extent:
-                apart = abs(elements[start].low - elements[end].low) < settings.spanning * extent
+                wide = abs(elements[start].low - elements[end].low) < settings.spanning * extent
                 low, high = ((LOW,), (HIGH,)) if elements[start].low < elements[end].low else ((HIGH,), (LOW,))
-                self.choices[start], self.choices[end] = ([(MIDDLE,)], [(MIDDLE,)]) if apart else ([low], [high])
+                self.choices[start], self.choices[end] = ([(MIDDLE,)], [(MIDDLE,)]) if wide else ([low], [high])
         self.unary = [[self._unary(element, anchors) for anchors in choices] for element, choices in
                       zip(elements, self.choices, strict=True)]  # fmt: skip
         self.costs = np.full((len(elements), MOST), np.inf)
@@ -164,14 +164,14 @@ class AxisAnchors:
         self.reaches_low, self.reaches_high = low <= settings.reach * extent, high >= (1 - settings.reach) * extent
         self.share = np.stack([low, high]) / extent
         self.long = high - low >= settings.spanning * extent
-        one, two = contacts.first, contacts.second
+        first, second = contacts.first, contacts.second
         self.contacts, self.ends = contacts, ends
         self.overlap = self._overlaps(low, high)
         moved_by = (np.abs(slopes).max((0, 3)) > 0).astype(int)  # (N, K)
-        both = moved_by[one].T @ moved_by[two] if len(one) else np.zeros((len(elements),) * 2)
-        both = both + both.T + (moved_by.T @ moved_by)
+        shared = moved_by[first].T @ moved_by[second] if len(first) else np.zeros((len(elements),) * 2)
+        shared = shared + shared.T + (moved_by.T @ moved_by)
         self.together = [  # elements whose parts touch: they are often better changed together
-            (int(a), int(b)) for a, b in np.argwhere(np.triu(both, 1) > 0)
+            (int(a), int(b)) for a, b in np.argwhere(np.triu(shared, 1) > 0)
         ]
 
     def _choices(self, element: Element) -> Sequence[Anchors]:
@@ -211,8 +211,8 @@ class AxisAnchors:
         order = [np.argsort(unary, kind="stable") for unary in self.unary]
         starts = [[int(ranks[min(which, len(ranks) - 1)]) for ranks in order] for which in range(3)]
         for side in ((LOW, LOW), (HIGH, HIGH)):  # all faces measured from one side
-            near = [[choice[:1] + choice[-1:] == side for choice in choices] for choices in self.choices]
-            starts.append([flags.index(True) if any(flags) else 0 for flags in near])
+            matching = [[choice[:1] + choice[-1:] == side for choice in choices] for choices in self.choices]
+            starts.append([flags.index(True) if any(flags) else 0 for flags in matching])
         best = min((self._descent(np.array(start)) for start in starts), key=lambda result: round(result[0], 6))
         return [choices[k] for choices, k in zip(self.choices, best[1], strict=True)]
 
@@ -234,16 +234,16 @@ class AxisAnchors:
 
     def _overlaps(self, low: FloatArray, high: FloatArray) -> FloatArray:
         """How far pairs (..., C) of primitives that touch overlap along the axis, from their ends (..., N)."""
-        one, two = self.contacts.first, self.contacts.second
-        return np.minimum(high[..., one], high[..., two]) - np.maximum(low[..., one], low[..., two])
+        first, second = self.contacts.first, self.contacts.second
+        return np.minimum(high[..., first], high[..., second]) - np.maximum(low[..., first], low[..., second])
 
     def _costs(self, states: Array) -> FloatArray:
         """The costs (S,) of choices of anchors (S, K)."""
         s, elements = self.settings, np.arange(states.shape[1])
         shifts, cost = self.shifts[elements, states], self.costs[elements, states].sum(1)  # (S, K, 2), (S,)
-        for one, two, worth in self.spans:
-            cost += worth * (states[:, one] != states[:, two])
-        for last, first in self.loops.items():  # what a row names of its last copy is a side or the middle of it
+        for start, end, penalty in self.spans:
+            cost += penalty * (states[:, start] != states[:, end])
+        for last, first in self.loops.items():  # a row gives a side or the middle of its last copy
             shifts[:, last] -= shifts[:, last, :1] * (shifts[:, first, 1:] - shifts[:, first, :1])
         low, high = (self.base[end] + np.tensordot(shifts, self.slopes[end], ((1, 2), (1, 2))) for end in (0, 1))
         far = 0.25 * self.extent
@@ -251,17 +251,17 @@ class AxisAnchors:
         ask_low = self.at_low & (np.abs(low - np.clip(low, -0.13, np.maximum(self.share[0], 0) + 0.13)) > 1e-9)
         ask_high = self.at_high & (np.abs(high - np.clip(high, np.minimum(self.share[1], 1) - 0.13, 1.13)) > 1e-9)
         rigid = self.long & (high - low < self.share[1] - self.share[0] - 0.5)
-        each = ask_low @ np.where(self.reaches_low, s.reaching, s.side) + s.rigid * rigid.sum(1)
-        each += ask_high @ np.where(self.reaches_high, s.reaching, s.side)
+        per_copy = ask_low @ np.where(self.reaches_low, s.reaching, s.side) + s.rigid * rigid.sum(1)
+        per_copy += ask_high @ np.where(self.reaches_high, s.reaching, s.side)
         if len(self.contacts.first):
             contacts = self.contacts
             grown = self._overlaps(self.ends[0] + far * low, self.ends[1] + far * high) - self.overlap
-            apart = self.overlap + grown < np.minimum(self.overlap, 0) - TOUCH
+            separated = self.overlap + grown < np.minimum(self.overlap, 0) - TOUCH
             pressed = (grown > 1e-9) & (self.overlap < 1.5 * TOUCH)
             opened = contacts.base + np.tensordot(shifts, contacts.slopes, ((1, 2), (1, 2)))
-            apart[:, contacts.leaning] |= contacts.gaps + far * opened > np.maximum(contacts.gaps, 0) + TOUCH
-            each += s.apart * apart.sum(1) + s.pressed * pressed.sum(1)
-        return cost + each / max(1.0, low.shape[1] / len(elements))
+            separated[:, contacts.leaning] |= contacts.gaps + far * opened > np.maximum(contacts.gaps, 0) + TOUCH
+            per_copy += s.separated * separated.sum(1) + s.pressed * pressed.sum(1)
+        return cost + per_copy / max(1.0, low.shape[1] / len(elements))
 
 
 def anchors_of(model: Model, joints: Joints | None, settings: AnchorSettings) -> dict[tuple[int, str, int], Anchors]:
@@ -282,8 +282,8 @@ def anchors_of(model: Model, joints: Joints | None, settings: AnchorSettings) ->
     result: dict[tuple[int, str, int], Anchors] = {}
     for axis in range(3):
         elements = [element for element in layout.elements.values() if element.axis == axis]
-        place = {(element.line, element.key): k for k, element in enumerate(elements)}
-        loops = {k: place[layout.first(line)] for (line, key), k in place.items() if key == "last"}
+        index = {(element.line, element.key): k for k, element in enumerate(elements)}
+        loops = {k: index[layout.first(line)] for (line, key), k in index.items() if key == "last"}
         extent = layout.extents[axis]
         slopes = np.moveaxis(_by_element(model, elements, rows[:, axis]), 0, 2)
         contacts = Contacts(
@@ -297,25 +297,25 @@ def anchors_of(model: Model, joints: Joints | None, settings: AnchorSettings) ->
         for element, anchors in zip(elements, solver.solved(), strict=True):
             result[element.line, element.key, axis] = anchors
         for last, first in loops.items():
-            one, two = elements[last], elements[first]
-            if abs(one.low - two.low) < STEP:  # a row that does not run along this axis
-                result[one.line, one.key, axis] = result[two.line, two.key, axis][:1]
+            copy, original = elements[last], elements[first]
+            if abs(copy.low - original.low) < STEP:  # a row that does not run along this axis
+                result[copy.line, copy.key, axis] = result[original.line, original.key, axis][:1]
     return result
 
 
 def _by_element(model: Model, elements: list[Element], rows: FloatArray) -> FloatArray:
     """Slopes (..., P) by the numbers of a program as those by the low and high coordinates of elements (K, ..., 2)."""
     index = model.anchored.index
-    found = np.zeros((len(elements), *rows.shape[:-1], 2))
+    slopes = np.zeros((len(elements), *rows.shape[:-1], 2))
     for k, element in enumerate(elements):
         words = AXES[element.axis]
         if element.kind == "interval":
-            found[k, ..., 1] = rows[..., index[element.line, words.size]]
-            found[k, ..., 0] = -found[k, ..., 1]
+            slopes[k, ..., 1] = rows[..., index[element.line, words.size]]
+            slopes[k, ..., 0] = -slopes[k, ..., 1]
         if element.key != "across":
             low = f"{element.key}.{words.low}" if element.key else words.low
-            found[k, ..., 0] += rows[..., index[element.line, low]]
-    return found
+            slopes[k, ..., 0] += rows[..., index[element.line, low]]
+    return slopes
 
 
 def _leaning(model: Model, joints: Joints | None) -> tuple[FloatArray, FloatArray, tuple[Array, Array], Array]:

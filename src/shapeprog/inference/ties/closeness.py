@@ -1,4 +1,4 @@
-"""How much of the surface of a program lies near that of its target, and the other way round: what a change is worth.
+"""How much of the surface of a program lies near that of its target, and the other way round: the score of a change.
 
 The squared misfit assumes that points are assigned to the right parts.  For thin parts and sheets they may not be; the
 misfit can then fall while a part leaves its surface.
@@ -19,7 +19,7 @@ POINTS, SAMPLES = 4_000, 4_000
 """Points of the target, and samples of the surface of the program."""
 
 REACH = 0.01
-"""Share of the diagonal of the target's box within which surfaces are near, as they are measured by."""
+"""Share of the diagonal of the target's box within which surfaces are near, as in the evaluation."""
 
 
 class Closeness:
@@ -30,14 +30,14 @@ class Closeness:
     evidence
         The target.
     seed
-        Which of its points are looked at, and where programs are sampled: always at the same places.
+        Of the points that are compared, and of the samples of programs: always the same.
     """
 
     def __init__(self, evidence: Evidence, seed: int) -> None:
         surface = evidence.surface
         self.seed, self.reach = seed, REACH * float(np.linalg.norm(np.ptp(surface, 0)))
-        drawn = np.random.default_rng(seed).integers(0, len(surface), POINTS)
-        self._points, self._tree = torch.from_numpy(surface[drawn]), cKDTree(surface)
+        indices = np.random.default_rng(seed).integers(0, len(surface), POINTS)
+        self._points, self._tree = torch.from_numpy(surface[indices]), cKDTree(surface)
 
     def of(self, scene: Scene) -> float:
         """The F-score of the two surfaces."""

@@ -68,14 +68,14 @@ def solved(slots: list[Slot], rows: FloatArray) -> Solution:
             continue
         matrix[[row, best]] = matrix[[best, row]]
         matrix[row] /= matrix[row, column]
-        others = np.arange(len(matrix)) != row
-        matrix[others] -= np.outer(matrix[others, column], matrix[row])
+        mask = np.arange(len(matrix)) != row
+        matrix[mask] -= np.outer(matrix[mask, column], matrix[row])
         pivots.append(column)
-    rest = [column for column in range(len(columns)) if column not in set(pivots)]
-    factors = np.zeros((len(slots), len(rest)))
-    factors[[columns[c] for c in rest], np.arange(len(rest))] = 1
-    factors[[columns[c] for c in pivots]] = -matrix[: len(pivots), rest]
-    return _shortened(slots, factors, [columns[c] for c in rest])
+    free_columns = [column for column in range(len(columns)) if column not in set(pivots)]
+    factors = np.zeros((len(slots), len(free_columns)))
+    factors[[columns[c] for c in free_columns], np.arange(len(free_columns))] = 1
+    factors[[columns[c] for c in pivots]] = -matrix[: len(pivots), free_columns]
+    return _shortened(slots, factors, [columns[c] for c in free_columns])
 
 
 def _shortened(slots: list[Slot], factors: FloatArray, free: list[int]) -> Solution:
@@ -86,8 +86,8 @@ def _shortened(slots: list[Slot], factors: FloatArray, free: list[int]) -> Solut
     best = _cost(factors, sizes)
     while True:
         exchange = None
-        many = (factors != 0).sum(1) > 1
-        for p, z in zip(*np.nonzero((np.abs(np.abs(factors) - 1) < NOTHING) & many[:, None]), strict=True):
+        composite = (factors != 0).sum(1) > 1
+        for p, z in zip(*np.nonzero((np.abs(np.abs(factors) - 1) < NOTHING) & composite[:, None]), strict=True):
             if fixed[free[z]]:
                 continue
             new = factors - np.outer(factors[:, z], factors[p] / factors[p, z])
@@ -106,10 +106,10 @@ def _clean(factors: FloatArray) -> FloatArray:
 
 
 def _cost(factors: FloatArray, sizes: np.ndarray) -> float:
-    """Operators of all different sums, and what it costs to repeat them."""
+    """Number of operators of all different sums, and the cost of their repetitions."""
     used = factors != 0
     operators = np.maximum(used.sum(1) - 1, 0) + (used & (np.abs(np.abs(factors) - 1) > NOTHING)).sum(1)
     operators = operators + 0.5 * (factors < 0).sum(1) + NEGATIVE * (sizes & (factors < 0).any(1))
-    several = np.flatnonzero(operators)
-    _, first = np.unique(factors[several].round(6), axis=0, return_index=True)
-    return float(operators[several[first]].sum() + REPEATED * (len(several) - len(first)))
+    composite = np.flatnonzero(operators)
+    _, first = np.unique(factors[composite].round(6), axis=0, return_index=True)
+    return float(operators[composite[first]].sum() + REPEATED * (len(composite) - len(first)))

@@ -1,5 +1,5 @@
 """Lines of a tied program written shorter: rows of two as mirrors, neighbours that fill a box as its division, and
-parts with equal clearances inside of a box of their own."""
+parts with equal clearances inside of a new box."""
 
 from __future__ import annotations
 
@@ -51,18 +51,20 @@ def _straight(row: Group) -> Group:
         return row
     (_, last), *_ = row.keywords
     assert isinstance(last, Point)
-    given = dict(first.keywords)
-    start = given.get("start")
+    arguments = dict(first.keywords)
+    start = arguments.get("start")
     if isinstance(start, Point):
-        given = dict(start.keywords)
+        arguments = dict(start.keywords)
 
     def same(word: str, value: Value) -> bool:
         words = next(words for words in AXES if word in words)
-        full = word != words.offset and not {words.size, "radius"} & given.keys() and start is None
+        full = word != words.offset and not {words.size, "radius"} & arguments.keys() and start is None
         default = (
-            0.0 if full or word == "bottom" or (word == words.offset and not set(words[:2]) & given.keys()) else None
+            0.0
+            if full or word == "bottom" or (word == words.offset and not set(words[:2]) & arguments.keys())
+            else None
         )
-        return given.get(word, default) == value
+        return arguments.get(word, default) == value
 
     pairs = tuple((word, value) for word, value in last.keywords if not same(word, value))
     return replace(row, keywords=(("last", Point(pairs or last.keywords)),))
@@ -77,8 +79,8 @@ def _nested(line: Line) -> Line:
 
 def _mirrored(row: Group) -> Group:
     """A row of two parts with equal clearances as a mirror about the middle."""
-    (_, last), *others = row.keywords or [("", 0.0)]
-    if row.kind != "row" or others or row.count != 2 or not isinstance(last, Point) or len(last.keywords) != 1:
+    (_, last), *further = row.keywords or [("", 0.0)]
+    if row.kind != "row" or further or row.count != 2 or not isinstance(last, Point) or len(last.keywords) != 1:
         return row
     (word, value), *_ = last.keywords
     axis = axis_of(word)
@@ -134,8 +136,8 @@ def _divided(loop: Group, numbers: dict[str, float]) -> Group:
     ):
         return loop
     clearances = {word: value, first_word: keywords.get(first_word, 0.0)}
-    taken = sum(value_at(clearance, numbers) for clearance in clearances.values())  # type: ignore[arg-type]
-    gap = (numbers[SIZES[axis]] - taken - loop.count * size) / (loop.count - 1)
+    occupied = sum(value_at(clearance, numbers) for clearance in clearances.values())  # type: ignore[arg-type]
+    gap = (numbers[SIZES[axis]] - occupied - loop.count * size) / (loop.count - 1)
     if not 0 <= round(gap, 2) <= GAP * size:
         return loop
     return _division(part, axis, float(loop.count), (clearances[words.low], clearances[words.high]), round(gap, 2))
@@ -144,10 +146,10 @@ def _divided(loop: Group, numbers: dict[str, float]) -> Group:
 def _division(part: Part, axis: int, count: float, clearances: tuple[Argument, Argument], gap: float) -> Group:
     words = AXES[axis]
     mine = [(word, value) for word, value in zip(words[:2], clearances, strict=True) if value != 0]
-    others = [(word, value) for word, value in part.keywords if word in BOX and word not in words]
-    rest = tuple((word, value) for word, value in part.keywords if word not in BOX)
-    keywords: Keywords = (*([("gap", to_float32(gap))] if gap else []), *ordered((*mine, *others)))
-    return Group("divide", keywords, (replace(part, keywords=rest),), count, "xyz"[axis])
+    sides = [(word, value) for word, value in part.keywords if word in BOX and word not in words]
+    remaining = tuple((word, value) for word, value in part.keywords if word not in BOX)
+    keywords: Keywords = (*([("gap", to_float32(gap))] if gap else []), *ordered((*mine, *sides)))
+    return Group("divide", keywords, (replace(part, keywords=remaining),), count, "xyz"[axis])
 
 
 def _solids(line: Line) -> Iterator[Part]:
@@ -207,11 +209,11 @@ def _sides(line: Line) -> dict[str, str]:
     """The clearances that all parts of a line have, by keyword."""
     common: dict[str, str] | None = None
     for part in _parts(line):
-        own = {
+        clearances = {
             word: str(value) for word, value in part.keywords
             if any(word in words[:2] for words in AXES) and value != 0 and isinstance(value, Expression)
         }  # fmt: skip
-        common = own if common is None else dict(common.items() & own.items())
+        common = clearances if common is None else dict(common.items() & clearances.items())
     return common or {}
 
 
@@ -230,39 +232,41 @@ def _fits(line: Line, frame: dict[str, str]) -> bool:
                 return False
             if isinstance(inner, Group) and inner.kind not in ("divide", "mirror"):
                 return False
-            given = dict(inner.keywords) if isinstance(inner, Part | Group) else {}
+            arguments = dict(inner.keywords) if isinstance(inner, Part | Group) else {}
             if isinstance(inner, Group) and inner.kind == "mirror":
-                used = [word for word in words if word in given]
+                used = [word for word in words if word in arguments]
                 if used and not (used == [words.offset] and even):
                     return False
                 continue
-            if "start" in given or ("radius" in given and axis < 2):
+            if "start" in arguments or ("radius" in arguments and axis < 2):
                 return False
             for word in (words.low, words.high):
-                if word in frame and str(given.get(word)) != frame[word] and not _from_other(word, given, axis):
+                if word in frame and str(arguments.get(word)) != frame[word] and not _from_other(word, arguments, axis):
                     return False
-            centred = words.offset in given or (words.size in given and not {words.low, words.high} & given.keys())
-            if centred and (not even or (axis == 2 and words.offset not in given)):
+            centred = words.offset in arguments or (
+                words.size in arguments and not {words.low, words.high} & arguments.keys()
+            )
+            if centred and (not even or (axis == 2 and words.offset not in arguments)):
                 return False
     return True
 
 
-def _from_other(word: str, given: dict[str, Argument], axis: int) -> bool:
+def _from_other(word: str, arguments: dict[str, Argument], axis: int) -> bool:
     """Whether a part is measured from the side opposite to this, or from the middle, and keeps its size."""
     words = AXES[axis]
     opposite = words.high if word == words.low else words.low
-    return words.size in given and word not in given and (opposite in given or axis < 2)
+    return words.size in arguments and word not in arguments and (opposite in arguments or axis < 2)
 
 
 def _saved(line: Line, frame: dict[str, str]) -> int:
     """How many words less it has."""
     total = 0
     for part in _parts(line):
-        given = dict(part.keywords)
+        arguments = dict(part.keywords)
         for word, text in frame.items():
-            if str(given.get(word)) == text:
+            if str(arguments.get(word)) == text:
                 axis = axis_of(word)
-                sized = AXES[axis].size in given and not (axis == 2 and word == "bottom")
+                sized = AXES[axis].size in arguments and not (axis == 2 and word == "bottom")
                 total += len(text.split()) - 1 if sized else 1 + len(text.split())
     return total
 
@@ -276,12 +280,12 @@ def _inside(line: Line, frame: dict[str, str]) -> Line:
     if isinstance(line, Group) and line.kind != "divide":
         return replace(line, body=tuple(_inside(inner, frame) for inner in line.body))
     assert isinstance(line, Part | Group)
-    given, kept = dict(line.keywords), list[tuple[str, Argument]]()
+    arguments, keywords = dict(line.keywords), list[tuple[str, Argument]]()
     for word, value in line.keywords:
         if str(value) != frame.get(word):
-            kept.append((word, value))
+            keywords.append((word, value))
             continue
         axis = axis_of(word)
-        if AXES[axis].size in given and word != "bottom":
-            kept.append((word, 0.0))
-    return replace(line, keywords=tuple(kept))
+        if AXES[axis].size in arguments and word != "bottom":
+            keywords.append((word, 0.0))
+    return replace(line, keywords=tuple(keywords))

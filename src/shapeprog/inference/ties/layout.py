@@ -38,7 +38,7 @@ ALIGNED = 1e-5
 
 @dataclass(frozen=True)
 class Element:
-    """What a line says about one axis.
+    """The coordinates of a line along one axis.
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ class Slot:
     line, word
         Number of the line, and keyword; that of a point begins with ``start.`` or such.
     kind
-        What it measures.
+        The quantity that it measures.
     axis
         0, 1 or 2 along an axis, else -1.
     anchor
@@ -151,9 +151,9 @@ class Layout:
             yield from self._across(index, keywords)
             for word in POINTS:
                 if word in keywords:
-                    place = [self._coordinate(axis, keywords[word], start) for axis in range(3)]
-                    start = start or place
-                    for axis, value in enumerate(place):
+                    point = [self._coordinate(axis, keywords[word], start) for axis in range(3)]
+                    start = start or point
+                    for axis, value in enumerate(point):
                         if word == "start" or abs(value - start[axis]) > ALIGNED:
                             yield Element(index, word, axis, "coordinate", value, value)
             return
@@ -198,8 +198,8 @@ class Layout:
         """The radius of an upright round part, the larger of two."""
         keywords = dict(line.keywords)
         if "radius" in keywords:
-            given = keywords["radius"]
-            return max(map(float, given)) if isinstance(given, tuple) else float(given)  # type: ignore[arg-type]
+            argument = keywords["radius"]
+            return max(map(float, argument)) if isinstance(argument, tuple) else float(argument)  # type: ignore[arg-type]
         sizes = (self._interval(axis, keywords, None) for axis in range(2))
         return min(high - low for low, high in sizes) / 2
 
@@ -224,27 +224,27 @@ class Layout:
 
     def _interval(self, axis: int, keywords: dict[str, Argument], diameter: float | None) -> tuple[float, float]:
         words, extent = AXES[axis], self.extents[axis]
-        given: dict[str, float] = {word: float(keywords[word]) for word in words if word in keywords}  # type: ignore[arg-type]
-        size = given.get(words.size, diameter)
+        lengths: dict[str, float] = {word: float(keywords[word]) for word in words if word in keywords}  # type: ignore[arg-type]
+        size = lengths.get(words.size, diameter)
         if size is None:
-            return given.get(words.low, 0.0), extent - given.get(words.high, 0.0)
-        if words.low in given:
-            low = given[words.low]
-        elif words.high in given:
-            low = extent - given[words.high] - size
-        elif words.offset in given or axis < 2:
-            low = (extent - size) / 2 + given.get(words.offset, 0.0)
+            return lengths.get(words.low, 0.0), extent - lengths.get(words.high, 0.0)
+        if words.low in lengths:
+            low = lengths[words.low]
+        elif words.high in lengths:
+            low = extent - lengths[words.high] - size
+        elif words.offset in lengths or axis < 2:
+            low = (extent - size) / 2 + lengths.get(words.offset, 0.0)
         else:
             low = 0.0
         return low, low + size
 
     def _coordinate(self, axis: int, point: Argument, start: Sequence[float] | None) -> float:
         assert isinstance(point, Point)
-        words, extent, given = AXES[axis], self.extents[axis], dict(point.keywords)
-        if words.low in given:
-            return float(given[words.low])  # type: ignore[arg-type]
-        if words.high in given:
-            return extent - float(given[words.high])  # type: ignore[arg-type]
-        if words.offset in given:
-            return extent / 2 + float(given[words.offset])  # type: ignore[arg-type]
+        words, extent, arguments = AXES[axis], self.extents[axis], dict(point.keywords)
+        if words.low in arguments:
+            return float(arguments[words.low])  # type: ignore[arg-type]
+        if words.high in arguments:
+            return extent - float(arguments[words.high])  # type: ignore[arg-type]
+        if words.offset in arguments:
+            return extent / 2 + float(arguments[words.offset])  # type: ignore[arg-type]
         return start[axis] if start else 0.0 if axis == 2 else extent / 2

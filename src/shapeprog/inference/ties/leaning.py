@@ -37,8 +37,8 @@ def _between_ends(node: Node) -> Node:
     along, across, length, thick = (
         (upwards, backwards, high, deep) if high >= deep else (backwards, upwards, deep, high)
     )
-    start = [place + way * thick / 2 for place, way in zip((up, depth), across, strict=True)]
-    end = [place + way * length for place, way in zip(start, along, strict=True)]
+    start = [coordinate + way * thick / 2 for coordinate, way in zip((up, depth), across, strict=True)]
+    end = [coordinate + way * length for coordinate, way in zip(start, along, strict=True)]
     middle = side + wide / 2
     values = (*start, middle, *end, middle, thick, wide, 0.0)
     return Draw("bar", tuple(to_float32(value) for value in values), node.role)

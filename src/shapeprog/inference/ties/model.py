@@ -41,7 +41,7 @@ PRIOR = {
     "angle": 1e-3,
     "extent": 1e-2,
 }
-"""Weights of a squared move from the start, by kind: what nothing sees stays where it is."""
+"""Weights of a squared move from the start, by kind: numbers that nothing determines do not change."""
 
 HELD = 1e6
 """Weight of a squared move of a number that does not move."""
@@ -55,7 +55,7 @@ class Model:
     numbers
         Where they are at the start (P,).
     low
-        What they must not fall below (P,).
+        Lower bounds (P,).
     """
 
     def __init__(self, anchored: Anchored) -> None:
@@ -115,18 +115,18 @@ class Misfit:
         The target.
     seed
         Of the pairs of points that are drawn.
-    least
-        Least weight (P,) of a squared move of every number; infinite for numbers that are held.
+    minimum
+        Minimum weight (P,) of a squared move of every number; infinite for numbers that are held.
     """
 
-    def __init__(self, model: Model, evidence: Evidence, seed: int, least: FloatArray) -> None:
+    def __init__(self, model: Model, evidence: Evidence, seed: int, minimum: FloatArray) -> None:
         self.model, self.target = model, Target(evidence)
         self.width = EXPLAINED * evidence.tolerance
         self.generator = torch.Generator().manual_seed(seed)
         self.start = model.numbers
         scale = np.array([model.tunable.scale.numpy() @ np.abs(model.jacobian[:, k]) for k in range(len(model.slots))])
         self.scale = np.clip(scale, 1e-3, None)
-        prior = np.maximum([PRIOR[slot.kind] for slot in model.slots], np.minimum(least, HELD))
+        prior = np.maximum([PRIOR[slot.kind] for slot in model.slots], np.minimum(minimum, HELD))
         angles = np.array([slot.kind == "angle" for slot in model.slots])
         self.prior: FloatArray = np.where(angles, prior * self.scale**2, prior)
 
@@ -138,9 +138,9 @@ class Misfit:
         poses = self.model.poses(numbers)
         slope, curvature = np.zeros(count), np.zeros((count, count))
         for _ in range(draws):
-            one, two = of_target(poses, self.target.pairs(poses.scene, self.generator), self.width)
-            slope += one.numpy() / draws
-            curvature += two.numpy() / draws
+            part_slope, part_curvature = of_target(poses, self.target.pairs(poses.scene, self.generator), self.width)
+            slope += part_slope.numpy() / draws
+            curvature += part_curvature.numpy() / draws
         if joints is not None and len(joints.first):
             gaps = needs(poses.scene, poses.slopes, moved(poses.scene, joints))
             wide = TOGETHER * gaps.slopes
@@ -168,7 +168,7 @@ class Misfit:
 
 def ends_of(scene: Scene) -> tuple[torch.Tensor, torch.Tensor]:
     """Low and high ends of primitives along the axes (6, N), and their slopes (6, N, 16) by sizes, centre, rotation."""
-    leaves = [each.clone().requires_grad_() for each in (scene.size, scene.centre, scene.rotation)]
+    leaves = [tensor.clone().requires_grad_() for tensor in (scene.size, scene.centre, scene.rotation)]
     half = bounds(replace(scene, size=leaves[0]))
     reach = (leaves[2].abs() @ half[..., None])[..., 0]
     ends = torch.cat([leaves[1] - reach, leaves[1] + reach], -1).T

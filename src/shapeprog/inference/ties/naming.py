@@ -1,4 +1,4 @@
-"""Names for numbers that several places share."""
+"""Names for numbers that several parts share."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ FLAT = ("seat", "top", "shelf", "mattress", "cushion", "pillow")
 """Parts whose height is called thickness: the height of a seat is that of its top above the floor."""
 
 APART = 1.0
-"""Cells by which the middles of parts differ that are told apart by where they are."""
+"""Cells by which the middles of parts must differ for names by position."""
 
 WHERE = (("left", "right"), ("front", "rear"), ("lower", "upper"))
-"""Words for parts at different places along each axis."""
+"""Words for parts at different positions along each axis."""
 
 STATEMENTS = {"leaning_box": "box", "beam": "bar"}
 
@@ -41,47 +41,47 @@ class Namer:
     def __init__(self, layout: Layout, slots: Sequence[Slot]) -> None:
         self.layout, self.slots = layout, slots
         self.holders: dict[str, int] = {}
-        known = language()
+        words = language()
         roles = {line.role or line.kind for line in layout.lines if isinstance(line, Part)}
-        self.taken = {*SIZES, "diameter", *RESERVED, *known.names, *known.roles, *roles} - {"gap", "edge", "radius"}
+        self.used = {*SIZES, "diameter", *RESERVED, *words.names, *words.roles, *roles} - {"gap", "edge", "radius"}
 
     def name(self, members: Sequence[int]) -> str:
         """A new name for a number that these slots share."""
         offered = [*self._offered(members)]
         line = self._part(members)
         for base in offered:
-            if base not in self.taken:
+            if base not in self.used:
                 return self._take(base, line)
         for base in offered:
-            for word in self._apart(self.holders.get(base, line), line):
-                if (name := f"{word}_{base}") not in self.taken:
+            for word in self._distinctions(self.holders.get(base, line), line):
+                if (name := f"{word}_{base}") not in self.used:
                     return self._take(name, line)
         number = 2
-        while f"{offered[0]}_{number}" in self.taken:
+        while f"{offered[0]}_{number}" in self.used:
             number += 1
         return self._take(f"{offered[0]}_{number}", line)
 
     def _take(self, name: str, line: int) -> str:
-        self.taken.add(name)
+        self.used.add(name)
         self.holders[name] = line
         return name
 
     def _offered(self, members: Sequence[int]) -> Iterator[str]:
-        """What the number may be called, the best first."""
+        """Candidate names of a number, the best first."""
         sizes = [k for k in members if self.slots[k].kind in ("size", "radius", "edge", "angle", "length")]
-        chosen = sizes or list(members)
-        kinds = Counter(self._kind(self.slots[k]) for k in chosen)
-        roles = Counter(self._role(self.slots[k].line) for k in chosen)
+        selected = sizes or list(members)
+        kinds = Counter(self._kind(self.slots[k]) for k in selected)
+        roles = Counter(self._role(self.slots[k].line) for k in selected)
         kind = max(kinds, key=lambda word: (kinds[word], -[*kinds].index(word)))
         if len(roles) > 1 and kind in ("thickness", "radius", "inset", "setback", "edge", "tilt"):
             yield kind
         elif len(roles) > 1 and kind in SIZES:  # a number that no single part owns
-            uses = Counter(self.slots[k].line for k in chosen).most_common(1)[0]
+            uses = Counter(self.slots[k].line for k in selected).most_common(1)[0]
             yield f"{self._role(uses[0])}_width" if uses[1] > 1 else "board_width"  # that of a square section
         for role, _ in roles.most_common():
-            own = Counter(self._kind(self.slots[k]) for k in chosen if self._role(self.slots[k].line) == role)
-            yield f"{role}_{own.most_common(1)[0][0]}"
-        for k in chosen:
+            role_kinds = Counter(self._kind(self.slots[k]) for k in selected if self._role(self.slots[k].line) == role)
+            yield f"{role}_{role_kinds.most_common(1)[0][0]}"
+        for k in selected:
             slot = self.slots[k]
             if slot.axis >= 0 and slot.kind == "size":
                 yield f"{self._role(slot.line)}_{SIZES[slot.axis]}"
@@ -89,19 +89,19 @@ class Namer:
                 yield f"{self._role(slot.line)}_{slot.word.rpartition('.')[2]}"
 
     def _part(self, members: Sequence[int]) -> int:
-        return self._drawn(self.slots[min(members, key=lambda k: self.slots[k].line)].line)
+        return self._first_part(self.slots[min(members, key=lambda k: self.slots[k].line)].line)
 
-    def _drawn(self, line: int) -> int:
+    def _first_part(self, line: int) -> int:
         """The line itself if it is a part, else the first part in it."""
         return self.layout.first(line)[0] if line >= 0 else 0
 
     def _role(self, line: int) -> str:
-        part = self.layout.lines[self._drawn(line)]
+        part = self.layout.lines[self._first_part(line)]
         assert isinstance(part, Part)
         return part.role or STATEMENTS.get(part.kind, part.kind)
 
     def _kind(self, slot: Slot) -> str:
-        """What a number measures, as the end of a name."""
+        """The measured quantity of a number, as the end of a name."""
         word = slot.word.rpartition(".")[2]
         if slot.kind == "size":
             return self._size(slot)
@@ -112,12 +112,12 @@ class Namer:
         return slot.kind if slot.kind in ("radius", "edge") else slot.word.partition(".")[0]
 
     def _size(self, slot: Slot) -> str:
-        own = sorted(
-            [other.value for other in self.slots if other.line == slot.line and other.kind == "size"]
+        sizes = sorted(
+            [candidate.value for candidate in self.slots if candidate.line == slot.line and candidate.kind == "size"]
             + [self._full(slot.line, axis) for axis in range(3) if not self._is_sized(slot.line, axis)]
         )
         flat = slot.axis == 2 and self._role(slot.line) in FLAT
-        if flat or (slot.value <= own[0] and (len(own) < 2 or own[0] <= THIN * own[1])):
+        if flat or (slot.value <= sizes[0] and (len(sizes) < 2 or sizes[0] <= THIN * sizes[1])):
             return "thickness"
         return SIZES[slot.axis]
 
@@ -128,9 +128,9 @@ class Namer:
         element = self.layout.elements.get((line, "", axis))
         return element.high - element.low if element else float("inf")
 
-    def _apart(self, one: int, other: int) -> Iterator[str]:
-        """Words for the second of two parts that tell it from the first, the best first."""
-        middles = [self._middle(line) for line in (one, other)]
+    def _distinctions(self, first: int, second: int) -> Iterator[str]:
+        """Words that distinguish the second of two parts from the first, the best first."""
+        middles = [self._middle(line) for line in (first, second)]
         away = middles[1] - middles[0]
         for axis in np.argsort(-np.abs(away), kind="stable"):
             if abs(away[axis]) >= APART:

@@ -1,4 +1,4 @@
-"""Which relations are worth having: those whose price in fit is below that of the number they save.
+"""Selection of relations: those whose price in fit is below that of the number they save.
 
 Near its optimum the misfit of a program is quadratic.  With H its curvature and p the numbers, imposing c p = 0 costs
 (c p)^2 / (c H^-1 c'), so thousands of relations are priced without a refit; the cheapest is imposed, H^-1 and p follow
@@ -14,8 +14,8 @@ from shapeprog.library.independence import beside
 from shapeprog.space import FloatArray
 
 HELD = 1e-9
-"""Share of its freedom below which a relation holds already: of the freedom of numbers that nothing sees, rounding
-alone leaves more, so independence is asked of the rows themselves."""
+"""Share of its freedom below which a relation holds already: for numbers that nothing determines, rounding alone
+leaves more, so independence is tested on the rows themselves."""
 
 
 def worthwhile(
@@ -28,23 +28,23 @@ def worthwhile(
     low: FloatArray,
     far: FloatArray | float = np.inf,
 ) -> tuple[FloatArray, FloatArray]:
-    """Relations (M, V) that are worth having, those that are fixed first; and the optimum (V,) where they hold.
+    """The selected relations (M, V), those that are fixed first; and the optimum (V,) where they hold.
 
     Parameters
     ----------
     numbers, curvature
         The optimum (V,), and half the curvature (V, V) of the misfit there.
     price
-        What a number is worth, in the unit of the misfit.
+        Price of a number, in the unit of the misfit.
     fixed
         Relations (M, V) that hold in any case.
     low
-        What no number may fall below (V,) for the sake of a relation.
+        Lower bounds of the numbers (V,), which no relation may violate.
     far
-        Farthest that relations together may move a number (V,): the misfit is known near the optimum alone.
+        Farthest that relations together may move a number (V,): the quadratic model is valid near the optimum alone.
     """
-    kept, free = list(fixed), np.linalg.inv(curvature)
-    rows = np.stack([*fixed, *(each.row for each in candidates)]) if len(fixed) or candidates else fixed
+    imposed, free = list(fixed), np.linalg.inv(curvature)
+    rows = np.stack([*fixed, *(relation.row for relation in candidates)]) if len(fixed) or candidates else fixed
     if not len(rows):
         return fixed, numbers
     low, start = np.minimum(low, numbers), numbers
@@ -53,13 +53,13 @@ def worthwhile(
         if (new := beside(row, axes)) is not None:
             axes = np.vstack([axes, new])
     spread, off = np.einsum("kv,vw,kw->k", rows, free, rows, optimize=True), rows @ numbers
-    worth = price * np.array([np.inf] * len(fixed) + [each.trust for each in candidates])
-    least = HELD * spread
+    benefit = price * np.array([np.inf] * len(fixed) + [relation.trust for relation in candidates])
+    minimum = HELD * spread
     while True:
-        gain = np.where(spread > least, worth - off**2 / np.maximum(spread, least), -np.inf)
+        gain = np.where(spread > minimum, benefit - off**2 / np.maximum(spread, minimum), -np.inf)
         best = int(np.argmax(gain))
         if gain[best] <= 0:
-            return np.array(kept).reshape(-1, len(numbers)), numbers
+            return np.array(imposed).reshape(-1, len(numbers)), numbers
         along = free @ rows[best]
         moved = numbers - along * off[best] / spread[best]
         if best >= len(fixed):
@@ -67,7 +67,7 @@ def worthwhile(
             if new is None or (moved < low).any() or (np.abs(moved - start) > far).any():
                 spread[best] = 0.0
                 continue
-            kept.append(rows[best])
+            imposed.append(rows[best])
             axes = np.vstack([axes, new])
         across, numbers = rows @ along, moved
         free = free - np.outer(along, along) / spread[best]

@@ -27,10 +27,10 @@ DEGREES = 2.0
 """The same for angles, in degrees."""
 
 FLOOR = 0.02
-"""Share of the height of the whole up to which a part stands on the floor."""
+"""Share of the height of the whole up to which a part touches the floor."""
 
 ALIKE, ROUNDING = 0.25, 0.05
-"""Share of the larger by which equal sizes may differ, beside so many cells."""
+"""Tolerance of equal sizes: a share of the larger, plus so many cells."""
 
 THIN = 3.0
 """Cells below which sizes along different axes may be the two sides of one section."""
@@ -38,12 +38,12 @@ THIN = 3.0
 
 @dataclass(frozen=True)
 class Trust:
-    """What the number that a relation saves is worth, as a multiple of the usual price.
+    """Price of the number that a relation saves, as a multiple of the usual price.
 
     Parameters
     ----------
     zero
-        A clearance that is nothing.
+        A clearance of zero.
     floor
         A part that ends just above the floor.
     centred, even
@@ -54,7 +54,7 @@ class Trust:
         Faces of touching parts that lie in one plane.
     straight
         Ends of a rod at equal distances, or a row along one axis.
-    same_part, section, other
+    same_part, section, different
         Equal sizes of parts of one role; of thin sides of different roles; and others.
     aligned, opposite, across
         Equal clearances of parts that do not touch, at one side or at opposite sides; and of one part at a corner.
@@ -65,7 +65,7 @@ class Trust:
     half
         An edge that is half a thin side of its part.
     hidden
-        Contacts and centred parts off by so much that only hidden surfaces can be meant.
+        Contacts and centred parts with so large an error that only hidden surfaces can explain it.
     """
 
     zero: float = 1.0
@@ -77,7 +77,7 @@ class Trust:
     straight: float = 1.5
     same_part: float = 1.0
     section: float = 1.0
-    other: float = 0.4
+    different: float = 0.4
     aligned: float = 0.8
     opposite: float = 0.6
     across: float = 0.6
@@ -88,15 +88,15 @@ class Trust:
 
 
 class Relation(NamedTuple):
-    """That factors (P,) times the numbers of a program sum to zero, and what the number it saves is worth."""
+    """That factors (P,) times the numbers of a program sum to zero, and the price of the number it saves."""
 
     row: FloatArray
     trust: float
 
 
 class Face(NamedTuple):
-    """An end of an element: from which anchor it is measured, its row of factors (P,), its place from the low side of
-    the whole, whether it faces the low or the high side (-1 or 1; 0 for the middle), and whether it is one number."""
+    """An end of an element: its anchor, its row of factors (P,), its coordinate from the low side of the whole, whether
+    it faces the low or the high side (-1 or 1; 0 for the middle), and whether it is one number."""
 
     element: Element
     anchor: int
@@ -135,9 +135,9 @@ def faces(anchored: Anchored, numbers: FloatArray) -> list[Face]:
                 middle, half = unit(line, words.offset), unit(line, words.size) / 2
                 result += [face(MIDDLE, middle - half, -1), face(MIDDLE, middle + half, 1)]
             elif low == high:
-                near, size = unit(line, word[low]), unit(line, words.size)
+                clearance, size = unit(line, word[low]), unit(line, words.size)
                 sign = -1 if low == LOW else 1
-                result += [face(low, near, sign), face(low, near + size, -sign)]
+                result += [face(low, clearance, sign), face(low, clearance + size, -sign)]
             else:
                 result.append(face(low, unit(line, words.low), -1))
                 result.append(face(high, unit(line, words.high) * (-1 if high == MIDDLE else 1), 1))
@@ -176,7 +176,7 @@ def _image(face: Face, numbers: FloatArray) -> Face:
 
 
 def relations(anchored: Anchored, numbers: FloatArray, touching: set[tuple[int, int]], trust: Trust) -> list[Relation]:
-    """Relations that nearly hold, each once, with the highest trust that any of its readings has.
+    """Distinct relations that nearly hold, with the highest trust of any of their readings.
 
     Parameters
     ----------
@@ -185,29 +185,29 @@ def relations(anchored: Anchored, numbers: FloatArray, touching: set[tuple[int, 
     """
     best: dict[bytes, Relation] = {}
     angles = np.array([slot.kind == "angle" for slot in anchored.slots])
-    for row, worth, hidden in _candidates(anchored, numbers, touching, trust):
+    for row, weight, hidden in _candidates(anchored, numbers, touching, trust):
         used = np.flatnonzero(row)
         if not len(used):
             continue
         row = row / row[used[0]]
         off = abs(float(row @ numbers)) / float(np.abs(row).max())
         limit = DEGREES if angles[used].all() else WITHIN
-        if worth == trust.floor and len(used) == 1:
+        if weight == trust.floor and len(used) == 1:
             limit = max(limit, FLOOR * numbers[2])
         if off > limit:
             if not hidden or off > HIDDEN:
                 continue
-            worth = trust.hidden if worth < trust.centred else 1.3
+            weight = trust.hidden if weight < trust.centred else 1.3
         key = np.round(row, 6).tobytes()
-        if key not in best or best[key].trust < worth:
-            best[key] = Relation(row, worth)
+        if key not in best or best[key].trust < weight:
+            best[key] = Relation(row, weight)
     return list(best.values())
 
 
 def _candidates(
     anchored: Anchored, numbers: FloatArray, touching: set[tuple[int, int]], trust: Trust
 ) -> Iterator[tuple[FloatArray, float, bool]]:
-    """Rows that may be relations, what each is worth, and whether it may be hidden."""
+    """Rows that may be relations, their trust, and whether they may be hidden."""
     slots, count = anchored.slots, len(anchored.slots)
     eye = np.eye(count)
     upright = [abs(_angle(anchored, line)) < DEGREES for line in range(len(anchored.layout.lines))]
@@ -221,15 +221,15 @@ def _candidates(
             yield eye[k], trust.zero, False
     all_faces = faces(anchored, numbers)
     for axis in range(3):
-        here = [face for face in all_faces if face.element.axis == axis]
-        for one, two in combinations(here, 2):
-            yield from _pair(anchored, one, two, touching, trust, upright)
+        axis_faces = [face for face in all_faces if face.element.axis == axis]
+        for face, partner in combinations(axis_faces, 2):
+            yield from _pair(anchored, face, partner, touching, trust, upright)
     lengths = [k for k, slot in enumerate(slots) if slot.kind in ("size", "radius", "edge", "angle", "length")]
     for a, b in combinations(lengths, 2):
-        if worth := _equal(anchored, slots[a], slots[b], numbers[a], numbers[b], trust):
-            yield eye[a] - eye[b], worth, False
+        if weight := _equal(anchored, slots[a], slots[b], numbers[a], numbers[b], trust):
+            yield eye[a] - eye[b], weight, False
             if slots[a].kind == "angle":
-                yield eye[a] + eye[b], worth / 2, False
+                yield eye[a] + eye[b], weight / 2, False
         small, side = (a, b) if slots[b].kind == "size" else (b, a)
         kinds = slots[small].kind, slots[side].kind
         if kinds == ("edge", "size") and slots[small].line == slots[side].line and numbers[side] < THIN:
@@ -241,69 +241,69 @@ def _candidates(
 
 
 def _pair(
-    anchored: Anchored, one: Face, two: Face, touching: set[tuple[int, int]], trust: Trust, upright: list[bool]
+    anchored: Anchored, face: Face, partner: Face, touching: set[tuple[int, int]], trust: Trust, upright: list[bool]
 ) -> Iterator[tuple[FloatArray, float, bool]]:
     """Relations of two faces of one axis."""
-    first, second = one.element, two.element
+    first, second = face.element, partner.element
     axis, same = first.axis, first.line == second.line
-    if one.anchor != two.anchor:
-        if {one.anchor, two.anchor} == {LOW, HIGH} and one.single and two.single and axis < 2:
+    if face.anchor != partner.anchor:
+        if {face.anchor, partner.anchor} == {LOW, HIGH} and face.single and partner.single and axis < 2:
             if same:
-                yield one.row - two.row, trust.centred if axis == 0 else trust.even, False
+                yield face.row - partner.row, trust.centred if axis == 0 else trust.even, False
             elif first.key == "last" or second.key == "last":
-                yield one.row - two.row, trust.even, False
+                yield face.row - partner.row, trust.even, False
             else:
-                yield one.row - two.row, trust.opposite, False
+                yield face.row - partner.row, trust.opposite, False
         return
-    row = one.row - two.row
+    row = face.row - partner.row
     if same:
         if first.key and second.key:  # both ends of a rod
             yield row, trust.straight, False
-            if one.anchor == MIDDLE:
-                yield one.row + two.row, trust.centred if axis == 0 else trust.even, False
+            if face.anchor == MIDDLE:
+                yield face.row + partner.row, trust.centred if axis == 0 else trust.even, False
         return
-    if one.anchor == MIDDLE and one.facing == -two.facing and one.single and two.single:
-        yield one.row + two.row, trust.opposite, False
+    if face.anchor == MIDDLE and face.facing == -partner.facing and face.single and partner.single:
+        yield face.row + partner.row, trust.opposite, False
     if "last" in (first.key, second.key):
-        loop, other = (first, second) if first.key == "last" else (second, first)
+        loop, element = (first, second) if first.key == "last" else (second, first)
         part = anchored.layout.first(loop.line)[0]
-        if not (one.single or two.single):
+        if not (face.single or partner.single):
             return
-        if other.line == part:
-            if one.single and two.single:
+        if element.line == part:
+            if face.single and partner.single:
                 yield row, trust.straight, False
-        elif (min(part, other.line), max(part, other.line)) in touching:
+        elif (min(part, element.line), max(part, element.line)) in touching:
             yield row, trust.contact, False
-        elif one.single and two.single:
+        elif face.single and partner.single:
             yield row, trust.aligned, False
         return
     if "plane" in (first.key, second.key) or "centre" in (first.key, second.key):
-        if one.single and two.single:
+        if face.single and partner.single:
             yield row, trust.aligned, False
         return
     touches = (min(first.line, second.line), max(first.line, second.line)) in touching
     straight = axis == 0 or (upright[first.line] and upright[second.line])
-    if touches and one.facing * two.facing == -1 and straight:
+    if touches and face.facing * partner.facing == -1 and straight:
         yield row, trust.contact, True
-    elif touches and 0 in (one.facing, two.facing) and straight:
-        middle = one.facing == 0 and two.facing == 0
+    elif touches and 0 in (face.facing, partner.facing) and straight:
+        middle = face.facing == 0 and partner.facing == 0
         ends = first.kind == second.kind == "coordinate"
         if ends or not middle:
             yield row, trust.contact, True
         else:
             yield row, trust.flush, False
-    elif one.facing == two.facing and straight:
-        if one.single and two.single:
+    elif face.facing == partner.facing and straight:
+        if face.single and partner.single:
             yield row, trust.flush if touches else trust.aligned, False
         elif touches:
             yield row, trust.middle, False
     if touches and axis < 2 and (first.kind, second.kind) in (("coordinate", "interval"), ("interval", "coordinate")):
-        point, box = (one, two) if first.kind == "coordinate" else (two, one)
+        point, box = (face, partner) if first.kind == "coordinate" else (partner, face)
         if not box.single and box.facing:  # the middle of a box that it touches
-            yield point.row - (box.row + _other(anchored, box)) / 2, trust.centre, False
+            yield point.row - (box.row + _opposite_row(anchored, box)) / 2, trust.centre, False
 
 
-def _other(anchored: Anchored, face: Face) -> FloatArray:
+def _opposite_row(anchored: Anchored, face: Face) -> FloatArray:
     """The row of the near face of an interval whose far face this is."""
     element, row = face.element, np.zeros(len(anchored.slots))
     if face.anchor == MIDDLE:
@@ -316,23 +316,23 @@ def _other(anchored: Anchored, face: Face) -> FloatArray:
     return row
 
 
-def _equal(anchored: Anchored, one: Slot, two: Slot, a: float, b: float, trust: Trust) -> float:
+def _equal(anchored: Anchored, slot: Slot, partner: Slot, a: float, b: float, trust: Trust) -> float:
     """The trust in the equality of two sizes; 0 for sizes that are not compared."""
-    if one.kind != two.kind:
+    if slot.kind != partner.kind:
         return 0.0
-    if one.kind != "angle" and abs(a - b) > ALIKE * max(a, b) + ROUNDING:
+    if slot.kind != "angle" and abs(a - b) > ALIKE * max(a, b) + ROUNDING:
         return 0.0
-    roles = _role(anchored, one.line), _role(anchored, two.line)
-    if one.kind == "angle":
-        return trust.same_part if one.word == two.word else 0.0
-    if one.kind in ("radius", "edge", "length"):
-        return trust.same_part if roles[0] == roles[1] or one.line == two.line else trust.section * 0.6
+    roles = _role(anchored, slot.line), _role(anchored, partner.line)
+    if slot.kind == "angle":
+        return trust.same_part if slot.word == partner.word else 0.0
+    if slot.kind in ("radius", "edge", "length"):
+        return trust.same_part if roles[0] == roles[1] or slot.line == partner.line else trust.section * 0.6
     thin = max(a, b) < THIN
-    if one.axis != two.axis and not thin:
+    if slot.axis != partner.axis and not thin:
         return 0.0
     if roles[0] == roles[1]:
         return trust.same_part
-    return trust.section if thin else trust.other
+    return trust.section if thin else trust.different
 
 
 def _role(anchored: Anchored, line: int) -> str:

@@ -100,8 +100,8 @@ def written(anchored: Anchored, solution: Solution, numbers: FloatArray, *, grou
     if np.array_equal(factors[0], factors[1]):
         above = [Assignment((("diameter", extents[0]),))]
         extents[:2] = Name("diameter"), Name("diameter")
-    whole = Assignment(tuple(zip(SIZES, extents, strict=True)))
-    header = (*above, whole, *_assignments(named), *_assignments(sums))
+    sizes = Assignment(tuple(zip(SIZES, extents, strict=True)))
+    header = (*above, sizes, *_assignments(named), *_assignments(sums))
     body = changed_lines([line for line in anchored.lines if not isinstance(line, Assignment)], final)
     lines = (*header, *(grouped(body, Source(header).evaluated_numbers()) if group else merged_lines(body)))
     scale = anchored.source.scale
@@ -124,39 +124,39 @@ def _assignments(named: list[tuple[str, Value]]) -> Iterator[Assignment]:
 
 
 def _simplified(line: Line) -> Line:
-    """The line without keywords that say nothing."""
+    """The line without redundant keywords."""
     if not isinstance(line, Part):
         return line
-    given = dict(line.keywords)
-    kept: list[tuple[str, Argument]] = []
+    arguments = dict(line.keywords)
+    keywords: list[tuple[str, Argument]] = []
     for word, argument in line.keywords:
         if isinstance(argument, Point):
-            kept.append((word, _simplified_point(word, argument, given)))
-        elif not (_is_zero(argument) and (word in ("tilt", "lean", "turn") or _is_default(line, word, given))):
-            kept.append((word, argument))
-    radius = dict(kept).get("radius")
+            keywords.append((word, _simplified_point(word, argument, arguments)))
+        elif not (_is_zero(argument) and (word in ("tilt", "lean", "turn") or _is_default(line, word, arguments))):
+            keywords.append((word, argument))
+    radius = dict(keywords).get("radius")
     if line.kind == "taper" and isinstance(radius, tuple) and radius[0] == radius[1]:
-        return replace(line, kind="rod", keywords=tuple((w, radius[0] if w == "radius" else v) for w, v in kept))
-    return replace(line, keywords=tuple(kept))
+        return replace(line, kind="rod", keywords=tuple((w, radius[0] if w == "radius" else v) for w, v in keywords))
+    return replace(line, keywords=tuple(keywords))
 
 
-def _is_default(line: Part, word: str, given: dict[str, Argument]) -> bool:
+def _is_default(line: Part, word: str, arguments: dict[str, Argument]) -> bool:
     """Whether a keyword of an axis that is zero can be left out."""
     words = next((words for words in AXES if word in words), None)
     if words is None or word == words.size:
         return False
-    if line.kind in ROUND and words != AXES[2] and "radius" in given:
+    if line.kind in ROUND and words != AXES[2] and "radius" in arguments:
         return word == words.offset
-    if words.size in given:
+    if words.size in arguments:
         return word == words.offset if words != AXES[2] else word == words.low
     return True
 
 
-def _simplified_point(word: str, point: Point, given: dict[str, Argument]) -> Point:
+def _simplified_point(word: str, point: Point, arguments: dict[str, Argument]) -> Point:
     if word == "start":
         pairs = tuple((w, v) for w, v in point.keywords if not (_is_zero(v) and w in ("x", "y", "bottom")))
         return Point(pairs)
-    start = given["start"]
+    start = arguments["start"]
     assert isinstance(start, Point)
     before = dict(start.keywords)
     return Point(tuple((w, v) for w, v in point.keywords if before.get(w) != v))

@@ -1,8 +1,8 @@
 """Ties: the numbers of a program that hold together are written with one name.
 
 Parts are placed from the sides of the whole; every face gets an anchor.  Relations between the numbers that nearly
-hold are priced by what they cost in fit, those worth more than a number are imposed, and the numbers that stay free
-are refitted.  What several places share is then named.
+hold are priced by their cost in fit, those cheaper than a number are imposed, and the numbers that stay free are
+refitted.  Shared numbers are then named.
 """
 
 from __future__ import annotations
@@ -52,14 +52,14 @@ KNOWN = 0.1
 """Weight of a squared move of a number that somebody wrote."""
 
 LOST, CHEAPER, ATTEMPTS = 0.03, 3.0, 3
-"""How much less of the surface may be near that of the target when numbers are tied; beyond that, or where parts come
-apart, a number is worth so many times less, in so many attempts."""
+"""Largest decrease of closeness when numbers are tied; beyond that, or where parts are separated, the price of a number
+is divided by this factor, in so many attempts."""
 
 APART = 0.005
-"""Gap in cells from which parts are apart."""
+"""Gap in cells from which parts are separated."""
 
 NOWHERE = -1e6
-"""A floor that no part stands on: that parts stand is a clearance of zero."""
+"""A floor that no part touches: parts on the floor have a clearance of zero."""
 
 ROUNDS = 3
 """Most times that relations are looked for: first contacts, then all."""
@@ -89,13 +89,13 @@ def tie(
     program
         A program of statements in cells, or a placed one; only the numbers that it evaluates to are read.
     evidence
-        What it should fit: how far relations may move its parts.
+        The target, which limits how far relations may move its parts.
     price
         Price of a free number, as a multiple of ``PRICE``, or ``KNOWN_PRICE`` if the numbers are known.
     known
         Whether somebody wrote the numbers: they are then known, and not only where the surface is.
     held
-        Indices of the nodes of its body whose numbers stay what they are: calls of functions draw them.
+        Indices of the nodes of its body whose numbers stay fixed: calls of functions draw them.
     """
     plain = Program(program.body) if known or held else between_ends(Program(program.body))
     if not plain.size:

@@ -78,7 +78,7 @@ class Parts:
 
     The frame may be turned by so many quarters about up, for furniture that faces another way.
 
-    The *main* surface is what one sits on, puts things on or lies on: the highest of those that cover most of the
+    The *main* surface is the seat, the table top or the mattress: the highest of those that cover most of the
     floor, or the whole where nothing does.
 
     ======================================== =========================================================================
@@ -98,12 +98,12 @@ class Parts:
     ``main``, ``main_low``, ``main_high``    which parts are the main surface; its bounds (3,)
     ``rear``, ``aside``                      from its middle to the rear, and to either side, .5 at its edges
     ``run``, ``span``                        extents along depth and left-right, as shares of those of the main surface
-    ``grounded``, ``below``, ``beside``      on the floor; under the main surface; at its height
+    ``grounded``, ``below``, ``alongside``   on the floor; under the main surface; at its height
     ``rising``, ``above``                    it ends clearly above the main surface; it begins there
-    ``rest``                                 height of the whole above the main surface
+    ``headroom``                             height of the whole above the main surface
     ``central``, ``behind``, ``outermost``   by place along depth and left-right
     ``in_front``, ``lowest``                 at the front of the whole; the lowest plate, near the floor
-    ``walled``, ``cased``                    of the whole: it stands on its sides; it has some, or a body
+    ``walled``, ``cased``                    of the whole: its sides reach the floor; it has some, or a body
     ``on_pedestal``, ``padded``              of the whole: one column carries the main surface; something wide lies
                                              right under it
     ``size``, ``floor``, ``near``            of the whole: extents (3,), height of its lowest point, what counts as near
@@ -111,18 +111,18 @@ class Parts:
     """
 
     def __init__(self, scene: Scene, turns: int = 0) -> None:
-        here = scene.mask.numpy()
+        mask = scene.mask.numpy()
         half = bounds(scene).double().numpy()
-        centre, pose = turned(scene.centre.double().numpy()[here], turns), scene.rotation.double().numpy()[here]
-        half, pose = half[here], np.swapaxes(turned(np.swapaxes(pose, -1, -2), turns), -1, -2)
-        self.block = scene.block.numpy()[here]
+        centre, pose = turned(scene.centre.double().numpy()[mask], turns), scene.rotation.double().numpy()[mask]
+        half, pose = half[mask], np.swapaxes(turned(np.swapaxes(pose, -1, -2), turns), -1, -2)
+        self.block = scene.block.numpy()[mask]
         self.count = len(half)
-        self._form(half, pose, (scene.kind == primitives.index(ARC)).numpy()[here])
+        self._form(half, pose, (scene.kind == primitives.index(ARC)).numpy()[mask])
         self._whole(centre, (np.abs(pose) @ half[..., None])[..., 0])
         self._places()
 
     def _form(self, half: FloatArray, pose: FloatArray, bent: Mask) -> None:
-        """What the parts look like; bent rods, whose boxes are nearly empty, are sticks and no plates."""
+        """Form of the parts; bent rods, whose boxes are nearly empty, are sticks and no plates."""
         every = np.arange(len(half))
         steep = np.abs(pose[:, UP])
         up = steep.argmax(1)
@@ -163,7 +163,7 @@ class Parts:
         plate = fitting & (self.bottom <= self.floor + self.near)
         raised = fitting & ~plate
         if self.face[raised].max(initial=0) >= SMALLER * self.face[plate].max(initial=0):
-            fitting = raised  # the plate that a column stands on is no seat
+            fitting = raised  # the plate under a column is no seat
         self.main: Mask = np.zeros(self.count, bool)
         self.main_low, self.main_high = first, last
         if fitting.any():
@@ -196,11 +196,11 @@ class Parts:
         middle = (self.bottom + self.top) / 2
         self.grounded: Mask = self.bottom <= self.floor + 1.5 * self.near
         self.wide: Mask = self.lying & (self.face >= WIDE * extent[DEPTH] * extent[SIDE])
-        self.beside: Mask = (middle >= bottom) & (self.top <= top + 2 * self.near)
+        self.alongside: Mask = (middle >= bottom) & (self.top <= top + 2 * self.near)
         self.below: Mask = ~self.main & (middle < bottom)
         self.rising: Mask = (self.top >= top + 2 * self.near) | (middle >= top)
         self.above: Mask = self.bottom >= top - 2 * self.near
-        self.rest = np.full(self.count, self.floor + self.size[UP] - top)
+        self.headroom = np.full(self.count, self.floor + self.size[UP] - top)
         self.small: Mask = self.long <= SMALL * self.size.max()
         stubby = (self.depth <= STUBBY * self.size[DEPTH]) & (self.side <= STUBBY * self.size[SIDE])
         self.stubby: Mask = stubby & (self.up >= np.maximum(self.depth, self.side))

@@ -1,9 +1,9 @@
-"""What the parts of a program are for: a role for every drawing statement, by rules that look at its solids alone.
+"""Roles of the parts of a program: one for every drawing statement, by rules on its solids alone.
 
-First it is seen what the whole is: something to sit on has a main surface that something rises behind, as a bed has, or
-on either side of; unless it stands between walls as high as the whole.  All else is a table or a case.  A chair may
-face any way.  Then the first rule of its list that fits a solid gives it a role: copies of one statement have one, that
-of most of their surface, or one that says both what the one and what the other is.
+First the kind of the whole is determined.  A seat or a bed has a main surface with a part that rises behind it, a seat
+may have parts that rise on both sides instead; neither is between walls as high as the whole.  All else is a table or a
+case.  A chair may face any way.  Then the first rule of its list that fits a solid gives it a role.  Copies of one
+statement have one role: that of most of their surface, or one that covers all of theirs.
 """
 
 from __future__ import annotations
@@ -30,8 +30,8 @@ BROAD = 0.4
 """Share of the width of the main surface that a back is wide, with all its posts and rails."""
 
 ENCLOSED, CASED = 0.9, 0.6
-"""Walls at both sides that end at this share of the height, or higher, and are themselves so high, make a case: what is
-behind its main surface is no back to lean on."""
+"""Walls at both sides that end at this share of the height, or higher, and are themselves so high, make a case: parts
+behind its main surface are no back to lean on."""
 
 LOW = 0.6
 """A bed is at most this share of its depth high."""
@@ -44,7 +44,7 @@ MANY = 3
 
 
 def anything(p: Parts) -> Mask:
-    """Whatever is left."""
+    """All parts."""
     return np.ones(p.count, bool)
 
 
@@ -54,7 +54,7 @@ STANDING: tuple[Rule, ...] = (
     ("foot", lambda p: p.below & p.grounded & ~p.level & p.small),
     ("leg", lambda p: p.below & p.upright),
     ("base", lambda p: p.below & p.slender & (p.grounded | p.on_pedestal)),
-    ("apron", lambda p: (p.below | p.beside) & p.level & (p.top >= p.main_low[UP] - 1.5 * p.near)),
+    ("apron", lambda p: (p.below | p.alongside) & p.level & (p.top >= p.main_low[UP] - 1.5 * p.near)),
     ("stretcher", lambda p: p.below & p.level),
     ("leg", lambda p: p.below & p.slender & p.grounded),
     ("brace", lambda p: p.below & p.slender),
@@ -67,16 +67,16 @@ STANDING: tuple[Rule, ...] = (
 SEATING: tuple[Rule, ...] = (
     ("base", lambda p: p.below & p.grounded & (p.top < p.main_high[UP] + p.near) & (p.span > 0.3) & ~p.slender),
     ("shelf", lambda p: p.wide & p.below & (p.top < p.main_low[UP] - 1.5 * p.near)),
-    ("cushion", lambda p: p.wide & p.beside & p.padded & (p.bottom >= p.main_low[UP] - p.near)),
+    ("cushion", lambda p: p.wide & p.alongside & p.padded & (p.bottom >= p.main_low[UP] - p.near)),
     ("base", lambda p: p.main & ~p.lying & p.grounded),
-    ("seat", lambda p: p.main | (p.wide & (p.beside | p.below) & (p.top <= p.main_high[UP] + 2 * p.near))),
-    # What goes on above the seat from the ground is a leg all the same.
+    ("seat", lambda p: p.main | (p.wide & (p.alongside | p.below) & (p.top <= p.main_high[UP] + 2 * p.near))),
+    # A part from the ground to above the seat is a leg as well.
     ("leg", lambda p: p.rising & p.grounded & p.upright),
     # Behind: a back, its rails and slats, its posts.
     ("slat", lambda p: p.rising & p.behind & (p.span >= 0.5) & p.level & (p.equal >= MANY)),
-    ("rail", lambda p: p.rising & p.behind & (p.span >= 0.5) & p.level & (p.up <= 0.5 * p.rest)),
+    ("rail", lambda p: p.rising & p.behind & (p.span >= 0.5) & p.level & (p.up <= 0.5 * p.headroom)),
     ("back", lambda p: p.rising & p.behind & (p.span >= 0.5)),
-    # Beside: arm rests and what carries them.
+    # At the sides: arm rests and their posts.
     ("arm_post", lambda p: p.rising & (p.aside > 0.3) & (p.rear < 0.25) & p.upright),
     ("arm", lambda p: p.rising & (p.aside > 0.3) & ((p.rear < 0.25) | (p.run > 0.5))),
     ("arm", lambda p: (p.top >= p.main_high[UP]) & ~p.slender & (p.aside > 0.4) & (p.run > 0.5)),
@@ -133,7 +133,7 @@ CASE: tuple[Rule, ...] = (
     ("apron", lambda p: p.level & (p.top >= p.floor + 0.8 * p.size[UP])),
     ("stretcher", lambda p: p.level),
     ("brace", lambda p: p.slender),
-    # What is left.
+    # All other parts.
     ("top", lambda p: p.lying & (p.top >= p.floor + p.size[UP] - p.near) & (p.up <= 0.3 * p.size[UP])),
     ("base", lambda p: p.lying & p.flat & p.grounded),
     ("shelf", lambda p: p.lying & p.flat),
@@ -142,14 +142,14 @@ CASE: tuple[Rule, ...] = (
 )
 
 MIXED = ({"top", "base", "shelf"}, "shelf"), ({"door", "drawer", "panel", "side"}, "panel")
-"""What copies are called that lie, or stand, in places of several names, as the top and the base of one loop."""
+"""Roles of copies whose positions have different roles, as the top and the base of one loop."""
 
 MOSTLY = 0.75
 """Share of the surface of its copies from which a role is that of the block."""
 
 
 def with_roles(program: Program) -> Program:
-    """The program with a role for every plain solid; what has a role, or is a statement of one, keeps it.
+    """The program with a role for every plain solid; existing roles, and statements of a role, are kept.
 
     A box that is a leg is written as the statement ``leg``.
     """
@@ -158,8 +158,8 @@ def with_roles(program: Program) -> Program:
 
 
 def named_anew(program: Program) -> Program:
-    """The program with each block drawn by the plainest statement, named by what it stands beside, and in order; what
-    it was called before counts for nothing."""
+    """The program with each block drawn by the plainest statement, with a role by its neighbours, and in order;
+    existing roles are ignored."""
     return in_order(with_roles(Program(tuple(_unnamed(simplest(nest(chain))) for chain in program.chains))))
 
 
@@ -185,15 +185,15 @@ def in_order(program: Program) -> Program:
         level = round(float((parts.bottom[mine] - parts.floor).min(initial=parts.size[UP])) / parts.near)
         ranks.append((int(not parts.main[mine].any()), level, -float(parts.surface[mine].sum())))
     order = sorted(range(len(ranks)), key=ranks.__getitem__)
-    return Program(tuple(program.body[place] for place in order))
+    return Program(tuple(program.body[index] for index in order))
 
 
 def roles_of(parts: Parts) -> Array:
     """The role of each part (N,)."""
-    found = np.full(parts.count, "", object)
+    roles = np.full(parts.count, "", object)
     for role, fits in (("body", anything),) if parts.count == 1 else _kind(parts):
-        found[(found == "") & fits(parts)] = role
-    return found
+        roles[(roles == "") & fits(parts)] = role
+    return roles
 
 
 def roles_of_blocks(program: Program) -> list[str]:
@@ -228,11 +228,11 @@ def _named(node: Node, roles: Iterator[str]) -> Node:
 
 
 def _facing(scene: Scene) -> Parts:
-    """The parts as given, or in a frame turned by quarters so that the back, which is on one side alone, is behind."""
-    given = Parts(scene)
-    if _leaned_on(given) > 0:
-        return given
-    return max((given, *(Parts(scene, turns) for turns in (2, 1, 3))), key=_leaned_on)  # as given where all are 0
+    """The parts unchanged, or in a frame turned by quarters so that the back, which is on one side alone, is behind."""
+    parts = Parts(scene)
+    if _leaned_on(parts) > 0:
+        return parts
+    return max((parts, *(Parts(scene, turns) for turns in (2, 1, 3))), key=_leaned_on)  # unchanged where all are 0
 
 
 def _leaned_on(p: Parts) -> float:
@@ -243,7 +243,7 @@ def _leaned_on(p: Parts) -> float:
 
 
 def _kind(p: Parts) -> tuple[Rule, ...]:
-    """The rules for what the whole seems to be."""
+    """The rules for the kind of the whole."""
     walls = p.wall & p.outermost & (p.run >= 0.5) & (p.up >= CASED * p.size[UP])
     walls &= p.top >= p.floor + ENCLOSED * p.size[UP]
     open_above = not (p.main & p.flat).any() and not (p.wide & p.above).any()  # a deep seat between wings

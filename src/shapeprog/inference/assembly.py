@@ -1,4 +1,4 @@
-"""Structure from the surface: a program of few blocks that explains what is seen of a target.
+"""Structure from the surface: a program of few blocks that explains the visible surface of a target.
 
 Pieces of the target become single blocks, copies among them loops, and functions calls.  A first choice is fitted
 briefly, then competes with its neighbours and with boxes around unexplained points.  The result is connected, fitted,
@@ -52,13 +52,13 @@ ROUGH = 8
 """Steps of adjustment before the second choice."""
 
 HARM = 0.005
-"""Share of the target beyond which a block is put back to where it was before its adjustment."""
+"""Loss of coverage from which the adjustment of a block is undone, as a share of the target."""
 
 REST = 200
-"""Most of the candidates passed over that compete again: those that would add most."""
+"""Maximum number of the rejected candidates that compete again: those with the largest gain."""
 
 LEAST_GAIN = 0.0005
-"""Share of the surface from which a second choice is worth it, and another block worth a sentence."""
+"""Share of the surface from which a second choice is accepted, and another block is mentioned."""
 
 
 @dataclass(frozen=True)
@@ -96,13 +96,13 @@ def assemble(
     Parameters
     ----------
     shape, evidence
-        A mesh or a point cloud, and what is known of its surface.
+        A mesh or a point cloud, and the evidence of its surface.
     blocks
         Most blocks of the program.
     functions
         Functions whose calls compete with blocks; each call counts as one.
     detail
-        How much finer than usual the program may be: the prices of what is written are divided by it.
+        Factor by which the prices of blocks and numbers are divided: above 1 the program is finer.
     deadline, progress
         As for :func:`shapeprog.inference.infer`.
     """
@@ -121,7 +121,7 @@ def assemble(
     report(0.7)
     choice, candidates = _chosen(candidates, functions, coverage, blocks, seed, deadline)
     report(1.0)
-    start = _connected([candidates[place] for place in choice.best.chosen], coverage)
+    start = _connected([candidates[index] for index in choice.best.chosen], coverage)
     adjusted = _adjusted(start, evidence, seed=seed, deadline=deadline, progress=progress)
     parts = _connected(_unharmed(adjusted, start, coverage), coverage)
     program = tidy(Program(tuple(canonical_side(simplest(node)) for node in drawn(parts).body)))
@@ -135,9 +135,9 @@ def _candidates(shape: Shape, functions: Sequence[Pattern], seed: int, deadline:
     pieces = find_pieces(shape, seed)
     singles = distinct(single_candidates(pieces))
     loops = distinct([*repeated(singles), *images(singles, pieces.cloud.points)])
-    found = [*singles[: MOST_CANDIDATES // 2], *loops][:MOST_CANDIDATES]
-    several = [function for function in functions if function.blocks > 1]
-    return [*found, *proposed(several, found, deadline)]
+    basic = [*singles[: MOST_CANDIDATES // 2], *loops][:MOST_CANDIDATES]
+    composite = [function for function in functions if function.blocks > 1]
+    return [*basic, *proposed(composite, basic, deadline)]
 
 
 def _chosen(
@@ -156,53 +156,53 @@ def _chosen(
     evidence = coverage.evidence
     table = _table(candidates, coverage)
     choice = choose(table, blocks, seed=seed)
-    first = [candidates[place] for place in choice.best.chosen]
+    first = [candidates[index] for index in choice.best.chosen]
     if not first or deadline.passed("another choice among neighbours"):
         return choice, candidates
     wide = replace(evidence, tolerance=LOOSE * evidence.tolerance, reach=LOOSE * evidence.reach)
     loose = choose(_table(candidates, Coverage(wide, coverage.prices, seed)), blocks, seed=seed)
-    near = list(first)
-    for parts in dict.fromkeys([tuple(first), tuple(candidates[place] for place in loose.best.chosen)]):
+    pool = list(first)
+    for parts in dict.fromkeys([tuple(first), tuple(candidates[index] for index in loose.best.chosen)]):
         adjusted = _adjusted(parts, evidence, steps=ROUGH, seed=seed, deadline=deadline)
-        near += [*parts, *adjusted, *drawn(parts).body, *drawn(adjusted).body, *neighbours(drawn(adjusted))]
-        near += residual_candidates(drawn(adjusted), evidence)
-    rest = [candidates[place] for place in missed(table, choice.best.chosen)[:REST]]
-    near = list(dict.fromkeys([*near, *rest]))  # the first choice first: the search goes on from it
-    near += proposed(functions, [part for part in near if not isinstance(part, Called)], deadline)
-    again = choose(_table(near, coverage), blocks, start=range(len(first)), seed=seed)
-    return (again, near) if again.best.value > choice.best.value + LEAST_GAIN else (choice, candidates)
+        pool += [*parts, *adjusted, *drawn(parts).body, *drawn(adjusted).body, *neighbours(drawn(adjusted))]
+        pool += residual_candidates(drawn(adjusted), evidence)
+    remaining = [candidates[index] for index in missed(table, choice.best.chosen)[:REST]]
+    pool = list(dict.fromkeys([*pool, *remaining]))  # the first choice first: the search starts there
+    pool += proposed(functions, [part for part in pool if not isinstance(part, Called)], deadline)
+    again = choose(_table(pool, coverage), blocks, start=range(len(first)), seed=seed)
+    return (again, pool) if again.best.value > choice.best.value + LEAST_GAIN else (choice, candidates)
 
 
 def _adjusted(parts: Sequence[Part], evidence: Evidence, **options: Any) -> list[Part]:
-    """The parts as they fit the evidence together; what a call draws moves as its function lets it."""
+    """The parts as they fit the evidence together; calls move only as their functions allow."""
     program, calls = drawn(parts), placed(parts)
     held = relations(program, calls) if calls else None
     return moved(parts, adjust(program, evidence, relations=held, **options))
 
 
 def _connected(parts: Sequence[Part], coverage: Coverage) -> list[Part]:
-    """The parts with single blocks that float extended to others; what calls draw stays as it is."""
+    """The parts with single blocks that float extended to others; calls do not change."""
     fixed = {node for part in parts if isinstance(part, Called) for node in part.nodes}
     return regrouped(parts, connected(drawn(parts), coverage, fixed))
 
 
 def _unharmed(adjusted: Sequence[Part], start: Sequence[Part], coverage: Coverage) -> list[Part]:
-    """The adjusted parts, and those where adjustment has clearly done harm as they were at the start.
+    """The adjusted parts; those whose adjustment has clearly done harm are restored.
 
-    Calls that no longer pay are left out: what one drew may be drawn by another since all have moved.
+    Calls that no longer pay are removed: after all have moved, another may draw the same.
     """
-    count, both = len(start), [*adjusted, *start]
-    table = _table(both, coverage)
-    kept = tuple(range(count))
-    for place in range(count):
-        other = (*kept[:place], count + place, *kept[place + 1 :])
-        if value(table, other) > value(table, kept) + HARM:
-            kept = other
-    for place in [place for place in kept if isinstance(both[place], Called)]:
-        other = tuple(each for each in kept if each != place)
-        if value(table, other) > value(table, kept):
-            kept = other
-    return [both[place] for place in kept]
+    count, union = len(start), [*adjusted, *start]
+    table = _table(union, coverage)
+    selected = tuple(range(count))
+    for index in range(count):
+        trial = (*selected[:index], count + index, *selected[index + 1 :])
+        if value(table, trial) > value(table, selected) + HARM:
+            selected = trial
+    for index in [index for index in selected if isinstance(union[index], Called)]:
+        trial = tuple(member for member in selected if member != index)
+        if value(table, trial) > value(table, selected):
+            selected = trial
+    return [union[index] for index in selected]
 
 
 def _table(parts: Sequence[Part], coverage: Coverage) -> CoverageTable:
@@ -210,7 +210,7 @@ def _table(parts: Sequence[Part], coverage: Coverage) -> CoverageTable:
 
 
 def _reason(used: int, share: float, choice: Choice, candidates: Sequence[Part], allowed: int) -> str:
-    """Why there are no more than so many blocks, which explain this share."""
+    """Why the program has so many blocks, which explain this share, and not more."""
     text = f"{used} drawing statement{'s cover' if used != 1 else ' covers'} {share:.0%} of the surface"
     if used >= allowed:
         return f"{text}; this is the maximum, raise --blocks for more."
@@ -218,8 +218,8 @@ def _reason(used: int, share: float, choice: Choice, candidates: Sequence[Part],
     if more is None or more.explained - share < LEAST_GAIN:
         return f"{text}; no other candidate would cover more."
 
-    def numbers(chosen: Sequence[int]) -> int:
-        return sum(numbers_outside(program_of(candidates[place])) for place in chosen)
+    def numbers(indices: Sequence[int]) -> int:
+        return sum(numbers_outside(program_of(candidates[index])) for index in indices)
 
     gain, cost = more.explained - share, max(numbers(more.chosen) - numbers(choice.best.chosen), 0)
     return f"{text}; one more would cover another {gain:.1%} with {cost} more numbers: raise --detail to add it."

@@ -1,7 +1,7 @@
 """The time budget of inference: a safety net, far from the common path.
 
-What is found is decided by rounds, steps and the seed.  Only a shape that the budget is too short for depends on how
-fast and how busy the machine is, and then the result says so.
+Rounds, steps and the seed decide the result.  Only if the budget is too short for a shape does the result depend on
+the speed and the load of the machine, and it reports that.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 Progress = Callable[[str, float], None]
-"""Called with what is being done and the share of it that is done."""
+"""Called with the name of the current step and the share of it that is done."""
 
 BUDGET = 60.0
 """Seconds for one shape: some twenty times what the slowest of 182 validation shapes takes on one core."""
@@ -26,14 +26,14 @@ class Deadline:
     at
         Value of ``time.monotonic()``; never by default.
     cut
-        What it cut short, and after how much of it; empty as long as nothing was.
+        The step that it cut short, and the progress of that step; empty if none was.
     """
 
     at: float = float("inf")
     cut: str = ""
 
     def passed(self, work: str) -> bool:
-        """Whether it is too late for the next step; ``work`` names what is cut short then, and how far it has come."""
+        """Whether it is too late for the next step; ``work`` names that step and its progress."""
         if time.monotonic() <= self.at:
             return False
         self.cut = work

@@ -45,7 +45,7 @@ SEARCH_SHARE = 0.65
 
 @dataclass(frozen=True)
 class Result:
-    """What inference found.
+    """The result of inference.
 
     Parameters
     ----------
@@ -60,9 +60,9 @@ class Result:
     reason
         Why the search stopped, what the time budget cut short, and what to try next.
     cut
-        What the time budget cut short, and how far that had come; if nothing, the same seed gives an equal result.
+        Steps that the time budget cut short, and their progress; if none, the same seed gives an equal result.
     seconds
-        How long it took, which counts for nothing when results are compared.
+        How long it took; comparisons of results ignore it.
     """
 
     program: Program
@@ -121,18 +121,18 @@ def infer(
     statements
         All statements in force, or those of the paper alone.
     detail
-        How much finer than usual the program may be: prices of what is written are divided by it.
+        Factor by which the prices of blocks and numbers are divided: above 1 the program is finer.
     ties
         Whether numbers that hold together are tied: the program then has names for the few that are free, and
         expressions for all others.
     libraries
         Functions that the program is written with wherever that is shorter, unless it has the paper's statements alone.
-        What they draw competes with single blocks, at the price of a call, and a call counts as one block.
+        Their calls compete with single blocks, at the price of a call; a call counts as one block.
     unit
         Unit of the lengths of the program: ``mm``, ``cm``, ``m``, ``in`` or ``cells``; by default that of the file, and
         cells for voxels.  The numbers are rounded as a person would, by which nothing moves farther than .015 cells.
     progress
-        Called with what is being done and the share of it that is done.
+        Called with the name of the current step and the share of it that is done.
 
     Raises
     ------
@@ -153,12 +153,12 @@ def infer(
     evidence = None if statements == "paper" else evidence_of(target, seed)
     if evidence is not None and target.points is not None:
         functions = [pattern for library in libraries for pattern in library.patterns if pattern.shortens]
-        found = assemble(
+        assembly = assemble(
             target, evidence, blocks=blocks, functions=functions, detail=detail, seed=seed, deadline=refining,
             progress=progress,
         )  # fmt: skip
-        program, reason = found.program, found.reason
-        scores["explained"] = found.explained
+        program, reason = assembly.program, assembly.reason
+        scores["explained"] = assembly.explained
     if not program.body:  # voxels, or no surface to speak of
         usual = settings or Settings()
         on_cells = reconstruct(
@@ -167,16 +167,16 @@ def infer(
         )  # fmt: skip
         program, snapped, reason = on_cells.program, on_cells.snapped, on_cells.reason
     if evidence is not None:
-        whole, plain = snapped, program
+        integral, plain = snapped, program
         if snapped is not None:
             program, snapped = named_anew(program), None
         if ties:
             held = {index for call in recognised(program, libraries) for index in call.places}
             program = tie(program, evidence, held=held, seed=seed, progress=progress).program
-        if whole is not None and description_length(plain, target.voxels, whole) < description_length(
+        if integral is not None and description_length(plain, target.voxels, integral) < description_length(
             program, target.voxels
         ):
-            program, snapped = plain, whole
+            program, snapped = plain, integral
     if snapped is None:
         program = placed_if_possible(merged(program))
         for library in libraries:
@@ -184,7 +184,7 @@ def infer(
     program = in_readable_unit(program, unit_of_result(target, program, unit), seed)
     if target.note:
         reason += f" {target.note}"
-    cut = tuple(each.cut for each in (searching, refining) if each.cut)
+    cut = tuple(deadline.cut for deadline in (searching, refining) if deadline.cut)
     if cut:
         reason += f" The time limit of {budget:g} s ended {' and '.join(cut)}: "
         reason += "with a larger --budget the result depends on the seed alone."

@@ -1,7 +1,7 @@
 """Programs in a unit, with numbers as round as a person would write them: ``34`` for ``33.99``.
 
-The numbers are rounded one after another, each to the fewest decimals with which no face of any part is farther than a
-tolerance from where it was before all rounding.
+The numbers are rounded one after another, each to the fewest decimals with which no face of any part moves farther than
+a tolerance by all rounding.
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ def in_readable_unit(program: Program, unit: Unit | None, seed: int = 0) -> Prog
     """The program with its lengths in a unit, or in cells, rounded as a person would.
 
     No number and no face moves by more than .015 cells; where parts would come apart, by less.  A program in this
-    unit is left as it is.
+    unit is returned unchanged.
 
     Raises
     ------
@@ -77,38 +77,38 @@ def in_readable_unit(program: Program, unit: Unit | None, seed: int = 0) -> Prog
     exact = in_unit(program, unit)
     if not 0 < exact.size <= MOST:
         return exact
-    apart = afloat(program, seed)
+    floating = afloat(program, seed)
     for tolerance in TOLERANCES[unit is None :]:
         result = _rounded(exact, tolerance)
-        if afloat(result, seed) <= apart:
+        if afloat(result, seed) <= floating:
             return result
     return exact
 
 
 def _rounded(program: Program, tolerance: float) -> Program:
-    given, with_numbers = literal_lengths(program)
-    numbers, before = [*given], _faces(program)
+    lengths, with_numbers = literal_lengths(program)
+    numbers, before = [*lengths], _faces(program)
     per_cell = 1.0 if program.unit is None else program.unit.per_cell
     for step in STEPS:
-        for place, number in enumerate(given):
+        for index, number in enumerate(lengths):
             for tried in _rounder(number, min(step * tolerance * per_cell, SHARE * abs(number))):
-                if tried == numbers[place]:
+                if tried == numbers[index]:
                     break
                 try:
-                    result = with_numbers([*numbers[:place], tried, *numbers[place + 1 :]])
-                    near = float((_faces(result) - before).abs().max()) <= step * tolerance
+                    result = with_numbers([*numbers[:index], tried, *numbers[index + 1 :]])
+                    close = float((_faces(result) - before).abs().max()) <= step * tolerance
                 except ShapeProgError:  # something has no size any more
                     continue
-                if near:
-                    program, numbers[place] = result, tried
+                if close:
+                    program, numbers[index] = result, tried
                     break
     return program
 
 
 def _rounder(number: float, farthest: float) -> Iterator[float]:
     """Numbers near one, those with the fewest decimals first."""
-    fewest, most = (-math.floor(math.log10(each)) for each in (abs(number), farthest))
-    for digits in range(fewest - 1, most + FINER):
+    fewest, maximum = (-math.floor(math.log10(value)) for value in (abs(number), farthest))
+    for digits in range(fewest - 1, maximum + FINER):
         nearest, step = round(number, digits), math.copysign(10.0**-digits, number - round(number, digits))
         for tried in (to_float32(nearest), to_float32(round(nearest + step, digits))):
             if abs(tried - number) <= farthest:

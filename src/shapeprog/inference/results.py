@@ -1,4 +1,4 @@
-"""Results as files: their scores, their names, and what is in them."""
+"""Results as files: their scores, their names, and their contents."""
 
 from __future__ import annotations
 
@@ -32,9 +32,9 @@ def measured(result: Result, shape: Shape, seed: int) -> Result:
 
 def document(result: Result, shape: Shape) -> str:
     """The JSON of a result; without its seconds, so that the same seed writes the same bytes."""
-    whole = {} if result.snapped is None else {"snapped": format_program(result.snapped)}
+    extra = {} if result.snapped is None else {"snapped": format_program(result.snapped)}
     return program_to_json(
-        result.program, shape.frame, scores=result.scores, reason=result.reason, source=_source(shape), **whole
+        result.program, shape.frame, scores=result.scores, reason=result.reason, source=_source(shape), **extra
     )
 
 

@@ -46,12 +46,12 @@ class Called:
     def of(pattern: Pattern, numbers: Mapping[str, float], around: tuple[Loop, ...] = ()) -> Called | None:
         """The call with these numbers, tidy, and with defaults where they are near; none if it draws nothing."""
         tidy = [round(numbers[name], CELLS) + 0.0 for name in pattern.parameters]
-        for place, default in enumerate(pattern.defaults.values()):
-            if isinstance(default, float) and abs(tidy[place] - default) <= EXACT:
-                tidy[place] = default
-        found = Called(pattern, tuple(map(to_float32, tidy)), around)
+        for index, default in enumerate(pattern.defaults.values()):
+            if isinstance(default, float) and abs(tidy[index] - default) <= EXACT:
+                tidy[index] = default
+        call = Called(pattern, tuple(map(to_float32, tidy)), around)
         try:
-            return found if found.forms and all(map(_solid, found.program.walk())) else None
+            return call if call.forms and all(map(_solid, call.program.walk())) else None
         except ShapeProgError:  # a number that does not fit its place
             return None
 
@@ -89,9 +89,9 @@ class Called:
     def moved(self, nodes: Sequence[Node]) -> Called:
         """The call that draws what is nearest to its blocks as they are now; itself if there is none."""
         factors, constants = self._linear
-        values = np.concatenate([each.values for each in self._blocks(nodes)])
-        here = np.array([self._table[name] for name in self.pattern.measures])
-        found = here + np.linalg.pinv(factors) @ (values - constants - factors @ here)
+        values = np.concatenate([block.values for block in self._blocks(nodes)])
+        start = np.array([self._table[name] for name in self.pattern.measures])
+        solution = start + np.linalg.pinv(factors) @ (values - constants - factors @ start)
         chains = Program(tuple(nodes)).chains
         loops = [
             replace(
@@ -99,7 +99,7 @@ class Called:
             )
             for k, loop in enumerate(self.around)
         ]
-        table = self._table | dict(zip(self.pattern.measures, found.tolist(), strict=True))
+        table = self._table | dict(zip(self.pattern.measures, solution.tolist(), strict=True))
         return Called.of(self.pattern, table, tuple(loops)) or self
 
     def relations(self, nodes: Sequence[Node]) -> FloatArray:
@@ -110,21 +110,23 @@ class Called:
         factors, constants = self._linear
         across = np.linalg.svd(factors)[0].T[np.linalg.matrix_rank(factors) :]
         blocks = self._blocks(nodes)
-        unequal = across @ (constants - np.concatenate([each.rows[:, -1] for each in blocks]))
+        unequal = across @ (constants - np.concatenate([block.rows[:, -1] for block in blocks]))
         if np.abs(unequal).max(initial=0) > EXACT:
             across = np.linalg.svd(unequal[:, None])[0].T[1:] @ across
         outer = sum(len(loop.values) for loop in self.around)
-        inner = block_diag(*(np.pad(each.rows[:, :-1], ((0, 0), (outer, 0))) for each in blocks))
-        ends = np.cumsum([0, *(outer + each.rows.shape[1] - 1 for each in blocks)])
-        every = np.eye(ends[-1])
-        alike = [every[start : start + outer] - every[:outer] for start in ends[1:-1]]
-        return np.concatenate([across @ inner, *alike])
+        inner = block_diag(*(np.pad(block.rows[:, :-1], ((0, 0), (outer, 0))) for block in blocks))
+        ends = np.cumsum([0, *(outer + block.rows.shape[1] - 1 for block in blocks)])
+        identity = np.eye(ends[-1])
+        equal = [identity[start : start + outer] - identity[:outer] for start in ends[1:-1]]
+        return np.concatenate([across @ inner, *equal])
 
     def _blocks(self, nodes: Sequence[Node]) -> list[Block]:
         """The blocks within its loops in the form that its function has them in."""
         chains = [chain[len(self.around) :] for chain in Program(tuple(nodes)).chains]
         return [
-            next(each for each in forms_of(chain) if replace(each.kind, word=form.block.kind.word) == form.block.kind)
+            next(
+                block for block in forms_of(chain) if replace(block.kind, word=form.block.kind.word) == form.block.kind
+            )
             for chain, form in zip(chains, self.forms, strict=True)
         ]
 
@@ -169,7 +171,7 @@ def placed(parts: Sequence[Part]) -> list[Placed]:
 
 def recognised(program: Program, libraries: Sequence[Library]) -> list[Placed]:
     """The calls that a program of single blocks can be written with, see :func:`shapeprog.library.with_library`."""
-    found: list[Placed] = []
+    calls: list[Placed] = []
     for library in libraries:
         patterns = {pattern.function.name: pattern for pattern in library.patterns}
         for offer in offers(program, library):
@@ -178,9 +180,9 @@ def recognised(program: Program, libraries: Sequence[Library]) -> list[Placed]:
             loops = tuple(Loop(loop.name, _plain(loop.values), ()) for loop in offer.around)
             words, measures = zip(*offer.call.arguments, strict=True) if offer.call.arguments else ((), ())
             call = Called.of(pattern, usual | dict(zip(words, _plain(measures), strict=True)), loops)
-            if call and not any({*offer.lines} & {*each.places} for each in found):
-                found.append(Placed(call, offer.lines))
-    return found
+            if call and not any({*offer.lines} & {*existing.places} for existing in calls):
+                calls.append(Placed(call, offer.lines))
+    return calls
 
 
 def _plain(values: Sequence[Value]) -> tuple[float, ...]:
@@ -197,10 +199,10 @@ def relations(program: Program, calls: Sequence[Placed]) -> FloatArray:
     widths = [sum(len(node.values) for node in chain) for chain in program.chains]
     firsts = np.cumsum([0, *widths])
     rows: list[FloatArray] = []
-    for call, places in calls:
-        own = call.relations([program.body[place] for place in places])
-        rows.append(np.zeros((len(own), starts[-1])))
-        rows[-1][:, np.concatenate([firsts[place] + np.arange(widths[place]) for place in places])] = own
+    for call, indices in calls:
+        factors = call.relations([program.body[index] for index in indices])
+        rows.append(np.zeros((len(factors), starts[-1])))
+        rows[-1][:, np.concatenate([firsts[index] + np.arange(widths[index]) for index in indices])] = factors
     return _reduced(np.concatenate(rows)[:, [starts[n] + slot for n, slot in tunable.moving]])
 
 
@@ -212,8 +214,8 @@ def _reduced(rows: FloatArray) -> FloatArray:
             pivot = count + int(np.abs(rows[count:, column]).argmax())
             rows[[count, pivot]] = rows[[pivot, count]]
             rows[count] /= rows[count, column]
-            others = np.arange(len(rows)) != count
-            rows[others] -= np.outer(rows[others, column], rows[count])
+            mask = np.arange(len(rows)) != count
+            rows[mask] -= np.outer(rows[mask, column], rows[count])
             rows[np.abs(rows) < FOLLOWS] = 0
             count += 1
     return rows[:count]
@@ -230,17 +232,17 @@ def moved(parts: Sequence[Part], program: Program) -> list[Part]:
 def regrouped(parts: Sequence[Part], program: Program) -> list[Part]:
     """The parts of a program in which single blocks were changed or left out, and calls are as they were."""
     waiting = [part for part in parts if isinstance(part, Called)]
-    found: list[Part] = []
-    place = 0
-    while place < len(program.body):
-        following = program.body[place : place + len(waiting[0].nodes)] if waiting else ()
+    result: list[Part] = []
+    index = 0
+    while index < len(program.body):
+        following = program.body[index : index + len(waiting[0].nodes)] if waiting else ()
         if waiting and following == waiting[0].nodes:
-            found.append(waiting.pop(0))
-            place += len(following)
+            result.append(waiting.pop(0))
+            index += len(following)
         else:
-            found.append(program.body[place])
-            place += 1
-    return found
+            result.append(program.body[index])
+            index += 1
+    return result
 
 
 def named(parts: Sequence[Part], program: Program) -> Program:

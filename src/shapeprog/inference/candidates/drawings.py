@@ -46,22 +46,22 @@ def is_unhinted(declared: Statement) -> bool:
 
 def drawings(box: Box) -> list[Draw]:
     """How the statements that have a hint draw a box."""
-    return [drawn for declared in language() if declared.hint is not None for drawn in hinted(declared, box)]
+    return [drawing for declared in language() if declared.hint is not None for drawing in hinted(declared, box)]
 
 
 def hinted(declared: Statement, box: Box) -> list[Draw]:
     """How a statement draws a box by its hint; not at all without one."""
-    values = [] if declared.hint is None else [np.array(each, np.float32) for each in declared.hint(box)]
-    return [Draw(declared.name, tuple(each.tolist())) for each in values]
+    values = [] if declared.hint is None else [np.array(numbers, np.float32) for numbers in declared.hint(box)]
+    return [Draw(declared.name, tuple(numbers.tolist())) for numbers in values]
 
 
 def starts(declared: Statement, box: Box) -> list[Draw]:
     """How a statement without a hint may draw a box: combinations of what each parameter may be, evenly chosen."""
     options = [_options(parameter, box) for parameter in declared.parameters]
-    many = math.prod(map(len, options))
-    chosen = np.unique(np.linspace(0, many - 1, min(many, STARTS)).astype(np.int64))
-    places = np.unravel_index(chosen, [len(each) for each in options])
-    rows = np.concatenate([each[place] for each, place in zip(options, places, strict=True)], 1)
+    count = math.prod(map(len, options))
+    selected = np.unique(np.linspace(0, count - 1, min(count, STARTS)).astype(np.int64))
+    indices = np.unravel_index(selected, [len(values) for values in options])
+    rows = np.concatenate([values[index] for values, index in zip(options, indices, strict=True)], 1)
     return [Draw(declared.name, tuple(row)) for row in rows.astype(np.float32).tolist()]
 
 
@@ -87,15 +87,15 @@ def _options(parameter: Parameter, box: Box) -> FloatArray:
     return np.unique(np.array(list(rows)).clip(quantity.low, quantity.high).round(3), axis=0)
 
 
-def redrawn(drawn: Draw, box: Box) -> list[Draw]:
+def redrawn(drawing: Draw, box: Box) -> list[Draw]:
     """How the same statement draws another box by its hint; how all others do where it has none for it."""
-    return hinted(language()[drawn.name], box) or drawings(box)
+    return hinted(language()[drawing.name], box) or drawings(box)
 
 
 def solid_boxes(nodes: Sequence[Node]) -> list[list[Box]]:
     """The boxes around all solids that each block draws."""
     scene = unroll(encode([Program((node,)) for node in nodes], dtype=torch.float64))
-    centre, rotation, half = (each.numpy() for each in (scene.centre, scene.rotation, bounds(scene)))
+    centre, rotation, half = (tensor.numpy() for tensor in (scene.centre, scene.rotation, bounds(scene)))
     return [
         [Box(centre[row, slot], rotation[row, slot], half[row, slot]) for slot in np.flatnonzero(mask)]
         for row, mask in enumerate(scene.mask.numpy())
@@ -112,8 +112,8 @@ def simplest(node: Node) -> Node:
     if language()[node.name].pivot is not None:
         return node
     (boxes,) = solid_boxes([node])
-    others = [replace(other, role=node.role) for other in drawings(boxes[0])] if len(boxes) == 1 else []
-    same = list(_drawing_the_same(others, node, np.ones(3)))
+    candidates = [replace(candidate, role=node.role) for candidate in drawings(boxes[0])] if len(boxes) == 1 else []
+    same = list(_drawing_the_same(candidates, node, np.ones(3)))
     if not same or is_unhinted(language()[node.name]):  # those of the paper are written as a solid with a role
         same.append(node)
     return min(same, key=numbers_written)
@@ -126,9 +126,9 @@ def canonical_side(node: Node) -> Node:
     """
     if Program((node,)).blocks != 1:
         return node
-    *loops, drawn = Program((node,)).chains[0]
-    assert isinstance(drawn, Draw)
-    (boxes,) = solid_boxes([drawn])
+    *loops, drawing = Program((node,)).chains[0]
+    assert isinstance(drawing, Draw)
+    (boxes,) = solid_boxes([drawing])
     signs = np.ones(3)
     for loop in loops:
         if loop.name == "mirror" and loop.values[2] == 0 and boxes and boxes[0].centre[int(loop.values[1])] < 0:
@@ -137,17 +137,17 @@ def canonical_side(node: Node) -> Node:
         return node
     turn = signs[:, None] * boxes[0].rotation * [1, 1, signs.prod()]  # a box is its own image along its last axis
     image = Box(signs * boxes[0].centre, turn, boxes[0].half)
-    others = [replace(other, role=drawn.role) for other in hinted(language()[drawn.name], image)]
-    found = next(_drawing_the_same(others, drawn, signs), None)
-    return node if found is None else nest((*loops, found))
+    candidates = [replace(candidate, role=drawing.role) for candidate in hinted(language()[drawing.name], image)]
+    match = next(_drawing_the_same(candidates, drawing, signs), None)
+    return node if match is None else nest((*loops, match))
 
 
-def _drawing_the_same(others: Sequence[Draw], node: Node, signs: FloatArray) -> Iterator[Draw]:
+def _drawing_the_same(candidates: Sequence[Draw], node: Node, signs: FloatArray) -> Iterator[Draw]:
     """Those of some drawings whose surface is that of a node, or of its image by these signs of its coordinates."""
-    if not others:
+    if not candidates:
         return
     scene = unroll(encode(Program((node,)), dtype=torch.float64))
     points = sample_surface(scene, POINTS, torch.Generator().manual_seed(0)).points.double() * torch.from_numpy(signs)
-    drawn = unroll(encode([Program((other,)) for other in others], dtype=torch.float64))
-    off = signed_distance(drawn, points.expand(len(others), -1, -1)).abs().amax(-1).tolist()
-    yield from (other for other, far in zip(others, off, strict=True) if far < SAME)
+    candidate_scene = unroll(encode([Program((candidate,)) for candidate in candidates], dtype=torch.float64))
+    off = signed_distance(candidate_scene, points.expand(len(candidates), -1, -1)).abs().amax(-1).tolist()
+    yield from (candidate for candidate, far in zip(candidates, off, strict=True) if far < SAME)

@@ -6,10 +6,10 @@ from shapeprog.kernels.compile import helper, kernel
 
 
 @helper
-def far(one, other, most):
-    """Whether two arrays of numbers differ by ``most`` or more anywhere."""
-    for k in range(len(one)):  # noqa: SIM110 (numba has no any)
-        if not abs(one[k] - other[k]) < most:
+def far(first, second, limit):
+    """Whether two arrays of numbers differ by ``limit`` or more anywhere."""
+    for k in range(len(first)):  # noqa: SIM110 (numba has no any)
+        if not abs(first[k] - second[k]) < limit:
             return True
     return False
 
@@ -17,7 +17,7 @@ def far(one, other, most):
 @kernel(
     "void(i8[::1], f8[::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8, f8, b1[:, ::1])"
 )
-def copies(kind, scale, spread, skew, lean, moved_spread, moved_skew, moved_lean, alike, leaning, out):
+def copies(kind, scale, spread, skew, lean, moved_spread, moved_skew, moved_lean, tolerance, leaning, out):
     """Write which candidates (a column) look like each of them after it was moved (a row).
 
     Parameters
@@ -30,13 +30,13 @@ def copies(kind, scale, spread, skew, lean, moved_spread, moved_skew, moved_lean
         Moments (C, 9) and (C, 3), and how sides differ (C, 3), as they are.
     moved_spread, moved_skew, moved_lean
         The same after a mirror image or a turn.
-    alike, leaning
+    tolerance, leaning
         Largest relative difference of moments, and largest difference between sides.
     out
         Output (C, C).
     """
     for a in range(len(kind)):
-        second, third = alike * scale[a] ** 2, alike * scale[a] ** 3
+        second, third = tolerance * scale[a] ** 2, tolerance * scale[a] ** 3
         for b in range(len(kind)):
             out[a, b] = not (
                 kind[a] != kind[b]
@@ -47,13 +47,13 @@ def copies(kind, scale, spread, skew, lean, moved_spread, moved_skew, moved_lean
 
 
 @kernel("void(f8[:, ::1], f8, f8, i8[:, ::1])")
-def at_steps(places, times, stray, out):
+def at_steps(positions, times, stray, out):
     """Write which place is nearest to where so many steps from place a to place b lead, from a on; -1 if none.
 
     Parameters
     ----------
-    places
-        Places (M, 3).
+    positions
+        Positions (M, 3).
     times
         Steps taken from the first of two places.
     stray
@@ -61,17 +61,17 @@ def at_steps(places, times, stray, out):
     out
         Output (M, M), a row for each first place.
     """
-    count = len(places)
+    count = len(positions)
     for a in range(count):
         for b in range(count):
-            nearest, least = -1, stray
-            up = places[a, 0] + times * (places[b, 0] - places[a, 0])
-            depth = places[a, 1] + times * (places[b, 1] - places[a, 1])
-            side = places[a, 2] + times * (places[b, 2] - places[a, 2])
+            nearest, minimum = -1, stray
+            up = positions[a, 0] + times * (positions[b, 0] - positions[a, 0])
+            depth = positions[a, 1] + times * (positions[b, 1] - positions[a, 1])
+            side = positions[a, 2] + times * (positions[b, 2] - positions[a, 2])
             for c in range(count):
-                off = abs(places[c, 0] - up)
-                if off < least:
-                    off = max(off, abs(places[c, 1] - depth), abs(places[c, 2] - side))
-                    if off < least:
-                        nearest, least = c, off
+                off = abs(positions[c, 0] - up)
+                if off < minimum:
+                    off = max(off, abs(positions[c, 1] - depth), abs(positions[c, 2] - side))
+                    if off < minimum:
+                        nearest, minimum = c, off
             out[a, b] = nearest

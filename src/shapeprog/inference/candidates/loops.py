@@ -64,20 +64,22 @@ CENTRED = 0.2
 
 def repeated(singles: Sequence[Node]) -> list[Node]:
     """Runs, mirror images and turns of candidates, and runs and mirror images of these; each once."""
-    once = _rolled(singles)
-    twice = _rolled(once)
-    return [*once, *twice]
+    loops = _rolled(singles)
+    nested = _rolled(loops)
+    return [*loops, *nested]
 
 
 def _rolled(nodes: Sequence[Node]) -> list[Node]:
     if len(nodes) < 2:
         return []
-    seen = moments(nodes)
-    found: list[Node] = [replace(loop, body=(nodes[one],)) for one, loop in rows_and_pairs(seen)]
-    drawn = {place for place, node in enumerate(nodes) if not isinstance(node, Loop)}  # not pairs, which would overlap
-    for count in TURNS if drawn else ():
-        found += [Loop("rotate", _values(count, 1), (nodes[one],)) for one in turned(seen, count) if one in drawn]
-    return distinct(found)
+    stats = moments(nodes)
+    loops: list[Node] = [replace(loop, body=(nodes[index],)) for index, loop in rows_and_pairs(stats)]
+    plain = {index for index, node in enumerate(nodes) if not isinstance(node, Loop)}  # not pairs, which would overlap
+    for count in TURNS if plain else ():
+        loops += [
+            Loop("rotate", _values(count, 1), (nodes[index],)) for index in turned(stats, count) if index in plain
+        ]
+    return distinct(loops)
 
 
 def images(singles: Sequence[Node], surface: FloatArray) -> list[Node]:
@@ -95,15 +97,15 @@ def images(singles: Sequence[Node], surface: FloatArray) -> list[Node]:
         share: FloatArray = np.isfinite(tree.query(image, distance_upper_bound=ON)[0]).mean(1)
         return share
 
-    own = on()
-    least = np.where(own >= SUPPORTED, AS_WELL * own, np.inf)
-    beside = (points.min(1) > 0) | (points.max(1) < 0)
-    side, depth = (beside[:, axis] & (on(axis) >= least) for axis in (SIDE, DEPTH))
-    both = side & depth & (on(SIDE, DEPTH) >= least)
+    original = on()
+    minimum = np.where(original >= SUPPORTED, AS_WELL * original, np.inf)
+    one_sided = (points.min(1) > 0) | (points.max(1) < 0)
+    side, depth = (one_sided[:, axis] & (on(axis) >= minimum) for axis in (SIDE, DEPTH))
+    four = side & depth & (on(SIDE, DEPTH) >= minimum)
     return [
         *(_mirrored(node, SIDE) for node in compress(singles, side)),
         *(_mirrored(node, DEPTH) for node in compress(singles, depth)),
-        *(_mirrored(_mirrored(node, DEPTH), SIDE) for node in compress(singles, both)),
+        *(_mirrored(_mirrored(node, DEPTH), SIDE) for node in compress(singles, four)),
     ]
 
 
@@ -111,13 +113,13 @@ def _mirrored(node: Node, axis: int) -> Loop:
     return Loop("mirror", _values(2, axis, 0), (node,))
 
 
-def rows_and_pairs(seen: Moments) -> Iterator[tuple[int, Loop]]:
+def rows_and_pairs(stats: Moments) -> Iterator[tuple[int, Loop]]:
     """The first of candidates that are runs or mirror images, and the loop, without a body, that repeats it."""
-    for one, count, step in runs(seen):
-        yield one, Loop("translate", _values(count, *step), ())
+    for index, count, step in runs(stats):
+        yield index, Loop("translate", _values(count, *step), ())
     for axis in (SIDE, DEPTH):
-        for one, _, plane in mirrored(seen, axis):
-            yield one, Loop("mirror", _values(2, axis, plane), ())
+        for index, _, plane in mirrored(stats, axis):
+            yield index, Loop("mirror", _values(2, axis, plane), ())
 
 
 def mirrors(node: Node, axis: int) -> bool:
@@ -129,33 +131,33 @@ def _values(*numbers: float) -> tuple[float, ...]:
     return tuple(to_float32(number) + 0.0 for number in numbers)
 
 
-def runs(seen: Moments) -> Iterator[tuple[int, int, tuple[float, float, float]]]:
+def runs(stats: Moments) -> Iterator[tuple[int, int, tuple[float, float, float]]]:
     """The first of copies in equal steps, how many they are, and the step; the longest first.
 
     One copy may be missing if four are there: what is drawn in its place is not supported, and pays for that.
     """
-    found: dict[tuple[int, ...], FloatArray] = {}
-    for group in groups(seen):
-        places = seen.middle[group]
-        steps = places[None] - places[:, None]
-        onwards = (np.abs(steps).max(-1) > LEAST_STEP) & ~_backwards(steps) & ~_overlap(seen.spread[group[0]], steps)
-        first = onwards & (_at_steps(places, -1) < 0)
-        before, after, beyond = (_at_steps(places, times) for times in (-2, 2, 3))
+    step_of: dict[tuple[int, ...], FloatArray] = {}
+    for group in groups(stats):
+        positions = stats.middle[group]
+        steps = positions[None] - positions[:, None]
+        onwards = (np.abs(steps).max(-1) > LEAST_STEP) & ~_backwards(steps) & ~_overlap(stats.spread[group[0]], steps)
+        first = onwards & (_at_steps(positions, -1) < 0)
+        before, after, beyond = (_at_steps(positions, times) for times in (-2, 2, 3))
         for a, b in np.argwhere(first).tolist():
             run = _followed(after, [a, b])
-            whole = [run]
-            if (other := int(before[a, b])) >= 0 and other not in run and len(run) + 1 >= LEAST_PRESENT:
-                whole.append([other, MISSING, *run])
-            if (other := int(beyond[run[-2], run[-1]])) >= 0 and other not in run:
-                onward = int(_nearest(places, places[other] + steps[run[-2], run[-1]]))
-                rest = _followed(after, [other, onward]) if onward >= 0 and onward not in run else [other]
-                if len(run) + len(rest) >= LEAST_PRESENT:
-                    whole.append([*run, MISSING, *rest])
-            for each in whole:
-                members = tuple(int(group[one]) if one != MISSING else MISSING for one in each)
-                found.setdefault(members, (places[each[-1]] - places[each[0]]) / (len(each) - 1))
-    for members in sorted(found, key=lambda members: (-len(members), members))[:MOST_RUNS]:
-        step = np.where(np.abs(found[members]) * (len(members) - 1) < CENTRED, 0.0, found[members])
+            candidates = [run]
+            if (previous := int(before[a, b])) >= 0 and previous not in run and len(run) + 1 >= LEAST_PRESENT:
+                candidates.append([previous, MISSING, *run])
+            if (later := int(beyond[run[-2], run[-1]])) >= 0 and later not in run:
+                onward = int(_nearest(positions, positions[later] + steps[run[-2], run[-1]]))
+                tail = _followed(after, [later, onward]) if onward >= 0 and onward not in run else [later]
+                if len(run) + len(tail) >= LEAST_PRESENT:
+                    candidates.append([*run, MISSING, *tail])
+            for indices in candidates:
+                members = tuple(int(group[index]) if index != MISSING else MISSING for index in indices)
+                step_of.setdefault(members, (positions[indices[-1]] - positions[indices[0]]) / (len(indices) - 1))
+    for members in sorted(step_of, key=lambda members: (-len(members), members))[:MOST_RUNS]:
+        step = np.where(np.abs(step_of[members]) * (len(members) - 1) < CENTRED, 0.0, step_of[members])
         yield members[0], len(members), (float(step[0]), float(step[1]), float(step[2]))
 
 
@@ -166,81 +168,81 @@ def _followed(after: Array, run: list[int]) -> list[int]:
     return run
 
 
-def mirrored(seen: Moments, axis: int) -> Iterator[tuple[int, int, float]]:
+def mirrored(stats: Moments, axis: int) -> Iterator[tuple[int, int, float]]:
     """Pairs of mirror images along an axis, the farther along first, and where the plane between them is."""
     signs = np.ones(3)
     signs[axis] = -1
-    across = [other for other in range(3) if other != axis]
-    same = _copies(seen, seen.spread * signs[:, None] * signs, seen.skew * signs, seen.lean * signs)
+    across = [k for k in range(3) if k != axis]
+    same = _copies(stats, stats.spread * signs[:, None] * signs, stats.skew * signs, stats.lean * signs)
     count = 0
-    for one in np.flatnonzero(same.any(1)).tolist():
-        others = np.flatnonzero(same[one])
-        apart = seen.middle[others] - seen.middle[one]
-        opposite = (np.abs(apart[:, across]).max(1) < STRAY) & (apart[:, axis] < -LEAST_STEP)
-        opposite &= ~_overlap(seen.spread[one], apart * (1 - signs) / 2)
-        for other in others[opposite].tolist():
-            plane = float(seen.middle[one, axis] + seen.middle[other, axis]) / 2
-            yield one, other, 0.0 if abs(plane) < CENTRED else plane
+    for first in np.flatnonzero(same.any(1)).tolist():
+        candidates = np.flatnonzero(same[first])
+        offsets = stats.middle[candidates] - stats.middle[first]
+        opposite = (np.abs(offsets[:, across]).max(1) < STRAY) & (offsets[:, axis] < -LEAST_STEP)
+        opposite &= ~_overlap(stats.spread[first], offsets * (1 - signs) / 2)
+        for second in candidates[opposite].tolist():
+            plane = float(stats.middle[first, axis] + stats.middle[second, axis]) / 2
+            yield first, second, 0.0 if abs(plane) < CENTRED else plane
             count += 1
             if count == MOST_RUNS:
                 return
 
 
-def turned(seen: Moments, count: int) -> Iterator[int]:
+def turned(stats: Moments, count: int) -> Iterator[int]:
     """The first of ``count`` copies spread evenly around the vertical axis of the grid."""
     angle = 2 * np.pi / count
     turn = np.array([[1, 0, 0], [0, np.cos(angle), -np.sin(angle)], [0, np.sin(angle), np.cos(angle)]])
-    middle = seen.middle @ turn.T
-    same = _copies(seen, turn @ seen.spread @ turn.T, seen.skew @ turn.T, seen.lean @ turn.T)
+    middle = stats.middle @ turn.T
+    same = _copies(stats, turn @ stats.spread @ turn.T, stats.skew @ turn.T, stats.lean @ turn.T)
     after = np.full(len(middle), -1)
-    for one in np.flatnonzero(np.abs(middle - seen.middle).max(1, initial=0) > LEAST_STEP).tolist():
-        others = np.flatnonzero(same[one])
-        off = np.abs(seen.middle[others] - middle[one]).max(1)
+    for index in np.flatnonzero(np.abs(middle - stats.middle).max(1, initial=0) > LEAST_STEP).tolist():
+        candidates = np.flatnonzero(same[index])
+        off = np.abs(stats.middle[candidates] - middle[index]).max(1)
         if (off < STRAY).any():
-            after[one] = others[off.argmin()]
-    known = np.zeros(len(middle), np.bool_)
-    for one in range(len(middle)):
-        circle = [one]
+            after[index] = candidates[off.argmin()]
+    used = np.zeros(len(middle), np.bool_)
+    for index in range(len(middle)):
+        circle = [index]
         while len(circle) < count and after[circle[-1]] >= 0:
             circle.append(int(after[circle[-1]]))
-        image = np.abs(seen.middle[circle[1:]] - seen.middle[one] * [1, 1, -1]).max(1, initial=0)
+        image = np.abs(stats.middle[circle[1:]] - stats.middle[index] * [1, 1, -1]).max(1, initial=0)
         mirrors = count == 4 and (image < STRAY).any()  # four legs in a square are better written with two mirrors
-        if len(set(circle)) == count and not known[circle].all() and not mirrors:
-            known[circle] = True
-            yield one
+        if len(set(circle)) == count and not used[circle].all() and not mirrors:
+            used[circle] = True
+            yield index
 
 
-def groups(seen: Moments) -> Iterator[Array]:
+def groups(stats: Moments) -> Iterator[Array]:
     """Indices of candidates that are copies of each other by translation, each group once."""
-    known: set[tuple[int, ...]] = set()
-    for row in _copies(seen, seen.spread, seen.skew, seen.lean):
+    existing: set[tuple[int, ...]] = set()
+    for row in _copies(stats, stats.spread, stats.skew, stats.lean):
         group = np.flatnonzero(row)[:MOST_ALIKE]
-        if len(group) > 1 and (key := tuple(group.tolist())) not in known:
-            known.add(key)
+        if len(group) > 1 and (key := tuple(group.tolist())) not in existing:
+            existing.add(key)
             yield group
 
 
-def _copies(seen: Moments, spread: FloatArray, skew: FloatArray, lean: FloatArray) -> npt.NDArray[np.bool_]:
+def _copies(stats: Moments, spread: FloatArray, skew: FloatArray, lean: FloatArray) -> npt.NDArray[np.bool_]:
     """Which candidates (a column) look like each of them with these moments instead of its own (a row)."""
-    count = len(seen.kind)
-    kind = np.unique(np.array(seen.kind), return_inverse=True)[1]
-    now, then = (seen.spread, seen.skew, seen.lean), (spread, skew, lean)
-    rows = [np.ascontiguousarray(each).reshape(count, -1) for each in (*now, *then)]
+    count = len(stats.kind)
+    kind = np.unique(np.array(stats.kind), return_inverse=True)[1]
+    original, moved = (stats.spread, stats.skew, stats.lean), (spread, skew, lean)
+    rows = [np.ascontiguousarray(array).reshape(count, -1) for array in (*original, *moved)]
     out = np.zeros((count, count), np.bool_)
-    copies(kind, np.maximum(seen.size, 1e-3), *rows, ALIKE, LEANING, out)
+    copies(kind, np.maximum(stats.size, 1e-3), *rows, ALIKE, LEANING, out)
     return out
 
 
-def _at_steps(places: FloatArray, times: int) -> Array:
+def _at_steps(positions: FloatArray, times: int) -> Array:
     """Which place so many steps from one place (a row) to another (a column) lead to, from the first; -1 if none."""
-    out = np.zeros((len(places), len(places)), np.int64)
-    at_steps(np.ascontiguousarray(places), times, STRAY, out)
+    out = np.zeros((len(positions), len(positions)), np.int64)
+    at_steps(np.ascontiguousarray(positions), times, STRAY, out)
     return out
 
 
-def _nearest(places: FloatArray, wanted: FloatArray) -> Array:
+def _nearest(positions: FloatArray, target: FloatArray) -> Array:
     """Which place is where it is wanted (..., 3); -1 if none."""
-    off = np.abs(places - wanted[..., None, :]).max(-1)
+    off = np.abs(positions - target[..., None, :]).max(-1)
     nearest = off.argmin(-1)
     return np.where(off.min(-1) < STRAY, nearest, -1)
 
@@ -249,12 +251,12 @@ def _overlap(spread: FloatArray, steps: FloatArray) -> npt.NDArray[np.bool_]:
     """Whether copies so far apart (..., 3) lie over each other by much."""
     length = np.linalg.norm(steps, axis=-1)
     reach = np.sqrt(np.einsum("...i,ij,...j->...", steps, spread, steps)) / np.maximum(length, 1e-9)
-    found: npt.NDArray[np.bool_] = length < APART * reach
-    return found
+    overlaps: npt.NDArray[np.bool_] = length < APART * reach
+    return overlaps
 
 
 def _backwards(steps: FloatArray) -> npt.NDArray[np.bool_]:
     """Whether steps (..., 3) go down, or level and to the front, or only to the left: those runs begin at their end."""
     signs = np.sign(np.where(np.abs(steps) < CENTRED, 0, steps))
-    found: npt.NDArray[np.bool_] = signs @ np.array([9, 3, 1]) < 0
-    return found
+    backwards: npt.NDArray[np.bool_] = signs @ np.array([9, 3, 1]) < 0
+    return backwards

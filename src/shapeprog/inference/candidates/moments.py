@@ -57,19 +57,19 @@ def moments_of(programs: Sequence[Program]) -> Moments:
     scene = unroll(encode(programs, dtype=torch.float64))
     share = scene.mask.double()
     share = share / share.sum(-1, keepdim=True).clamp(min=1)
-    own, lean = _own_moments(scene)
+    inner, lean = _solid_moments(scene)
     middle = (share[..., None] * scene.centre).sum(1)
     away = scene.centre - middle[:, None]
-    squared = (away**2).sum(-1) + own.diagonal(dim1=-2, dim2=-1).sum(-1)
-    spread = own + away[..., :, None] * away[..., None, :]
-    skew = squared[..., None] * away + 2 * (own @ away[..., None])[..., 0]
-    vectors = ((share[..., None] * each).sum(1) for each in (skew, lean))
-    found = (share[..., None, None] * spread).sum(1), *vectors
+    squared = (away**2).sum(-1) + inner.diagonal(dim1=-2, dim2=-1).sum(-1)
+    spread = inner + away[..., :, None] * away[..., None, :]
+    skew = squared[..., None] * away + 2 * (inner @ away[..., None])[..., 0]
+    vectors = ((share[..., None] * array).sum(1) for array in (skew, lean))
+    arrays = (share[..., None, None] * spread).sum(1), *vectors
     kinds = tuple(" ".join(map(_kind, program.body)) for program in programs)
-    return Moments(kinds, middle.numpy(), *(each.numpy() for each in found))
+    return Moments(kinds, middle.numpy(), *(array.numpy() for array in arrays))
 
 
-def _own_moments(scene: Scene) -> tuple[Float[Tensor, "C N 3 3"], Float[Tensor, "C N 3"]]:
+def _solid_moments(scene: Scene) -> tuple[Float[Tensor, "C N 3 3"], Float[Tensor, "C N 3"]]:
     """Second moments that stand for each solid, those of its box, and how its distance differs between its sides.
 
     They turn and mirror with the solid, and are the same for solids that are the same however their axes are named.
@@ -77,17 +77,17 @@ def _own_moments(scene: Scene) -> tuple[Float[Tensor, "C N 3 3"], Float[Tensor, 
     spread, leans = torch.zeros_like(scene.rotation), torch.zeros_like(scene.centre)
     signs = torch.cartesian_prod(*[torch.tensor([-1.0, 0.0, 1.0], dtype=torch.float64)] * 3)
     for kind in scene.kinds:
-        here = scene.mask & (scene.kind == kind)
-        size, rotation = scene.size[here], scene.rotation[here]
+        mask = scene.mask & (scene.kind == kind)
+        size, rotation = scene.size[mask], scene.rotation[mask]
         half = primitives[kind].bound(size)
-        places = signs * half[:, None]
-        level = primitives[kind].distance(places, size[:, None].expand(*places.shape[:2], SIZES))
+        positions = signs * half[:, None]
+        level = primitives[kind].distance(positions, size[:, None].expand(*positions.shape[:2], SIZES))
         lean = level @ signs / len(signs)
-        twist = torch.einsum("mp,mpi,mpj->mij", level, places, places) / len(signs) / half.amax(-1)[:, None, None]
+        twist = torch.einsum("mp,mpi,mpj->mij", level, positions, positions) / len(signs) / half.amax(-1)[:, None, None]
         twist = twist - torch.diag_embed(twist.diagonal(dim1=-2, dim2=-1))
-        own = torch.diag_embed(half**2) + twist
-        spread[here] = rotation @ own @ rotation.mT
-        leans[here] = (rotation @ lean[..., None])[..., 0]
+        local = torch.diag_embed(half**2) + twist
+        spread[mask] = rotation @ local @ rotation.mT
+        leans[mask] = (rotation @ lean[..., None])[..., 0]
     return spread, leans
 
 
@@ -101,9 +101,9 @@ def distinct(nodes: Sequence[Node]) -> list[Node]:
     """The first of all candidates of one kind that draw about the same, in their order."""
     if not nodes:
         return []
-    seen = moments(nodes)
-    kind = np.unique(seen.kind, return_inverse=True)[1]
-    order = np.round(np.log2(np.maximum(seen.size, SAME)))  # of magnitude
-    place = np.concatenate([seen.middle, seen.spread.reshape(-1, 9) / np.maximum(seen.size, SAME)[:, None]], 1)
-    key = np.column_stack([kind, order, np.round(place / (SAME * 2 ** order[:, None]))])
+    stats = moments(nodes)
+    kind = np.unique(stats.kind, return_inverse=True)[1]
+    order = np.round(np.log2(np.maximum(stats.size, SAME)))  # of magnitude
+    features = np.concatenate([stats.middle, stats.spread.reshape(-1, 9) / np.maximum(stats.size, SAME)[:, None]], 1)
+    key = np.column_stack([kind, order, np.round(features / (SAME * 2 ** order[:, None]))])
     return [nodes[k] for k in np.sort(np.unique(key, axis=0, return_index=True)[1])]

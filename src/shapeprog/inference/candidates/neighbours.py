@@ -55,26 +55,36 @@ def neighbours(program: Program) -> list[Node]:
     chains = program.chains
     if not chains:
         return []
-    drawn = [drawing_of(chain) for chain in chains]
-    boxes = [each[0] if len(each) == 1 else None for each in solid_boxes(drawn)]
-    others = solid_boxes(program.body)
-    found: list[Node] = [*repeated([*drawn, *program.body]), *_rows(others)]
-    for place, (chain, box) in enumerate(zip(chains, boxes, strict=True)):
-        found += _unlooped(chain)
-        found += _mirrored(chain)
+    draws = [drawing_of(chain) for chain in chains]
+    boxes = [solids[0] if len(solids) == 1 else None for solids in solid_boxes(draws)]
+    block_boxes = solid_boxes(program.body)
+    result: list[Node] = [*repeated([*draws, *program.body]), *_rows(block_boxes)]
+    for index, (chain, box) in enumerate(zip(chains, boxes, strict=True)):
+        result += _unlooped(chain)
+        result += _mirrored(chain)
         if box is not None:
-            parts = [part for other, each in enumerate(others) if other != place for part in each]
-            found += [with_drawing(chain, other) for other in drawings(box)]
+            parts = [part for k, solids in enumerate(block_boxes) if k != index for part in solids]
+            result += [with_drawing(chain, drawing) for drawing in drawings(box)]
             edited = list(met(box, parts))
-            edited += [middle for each in [box, *edited] for middle in centred(each)]
-            found += [with_drawing(chain, other) for each in edited for other in redrawn(drawing_of(chain), each)]
-            found += _recounted(chain, box)
-            found += _filled(chain)
-    for (one, first), (two, second) in itertools.combinations(zip(chains, boxes, strict=True), 2):
-        if first is not None and second is not None and _loops(one) == _loops(two):
-            found += [with_drawing(one, other) for merged in _merged(first, second) for other in drawings(merged)]
-    known = set(program.body)
-    return [node for node in dict.fromkeys(found) if node not in known]
+            edited += [middle for candidate in [box, *edited] for middle in centred(candidate)]
+            result += [
+                with_drawing(chain, drawing)
+                for candidate in edited
+                for drawing in redrawn(drawing_of(chain), candidate)
+            ]
+            result += _recounted(chain, box)
+            result += _filled(chain)
+    for (first_chain, first_box), (second_chain, second_box) in itertools.combinations(
+        zip(chains, boxes, strict=True), 2
+    ):
+        if first_box is not None and second_box is not None and _loops(first_chain) == _loops(second_chain):
+            result += [
+                with_drawing(first_chain, drawing)
+                for merged in _merged(first_box, second_box)
+                for drawing in drawings(merged)
+            ]
+    existing = set(program.body)
+    return [node for node in dict.fromkeys(result) if node not in existing]
 
 
 def _rows(blocks: Sequence[Sequence[Box]]) -> Iterator[Node]:
@@ -83,53 +93,53 @@ def _rows(blocks: Sequence[Sequence[Box]]) -> Iterator[Node]:
     owner = np.repeat(np.arange(len(blocks)), [len(parts) for parts in blocks])
     centre = np.array([box.centre for box in boxes])
     half = np.array([np.abs(box.rotation) @ box.half for box in boxes])
-    known: set[tuple[int, ...]] = set()
+    existing: set[tuple[int, ...]] = set()
     for axis, first in itertools.product(range(3), range(len(boxes))):
         limit = np.maximum(OFF_SIZE, half[first] / 4)
         limit[axis] = max(OFF_SIZE / 2, half[first, axis] / 2)
-        alike = (np.abs(half - half[first]) <= limit).all(1)
-        alike &= (np.abs(centre - centre[first])[:, np.arange(3) != axis] <= OFF_LINE).all(1)
-        members = np.flatnonzero(alike)
+        similar = (np.abs(half - half[first]) <= limit).all(1)
+        similar &= (np.abs(centre - centre[first])[:, np.arange(3) != axis] <= OFF_LINE).all(1)
+        members = np.flatnonzero(similar)
         key = (axis, *members.tolist())
-        if len(members) < LEAST_ROW or len(set(owner[members])) < 2 or key in known:
+        if len(members) < LEAST_ROW or len(set(owner[members])) < 2 or key in existing:
             continue
-        known.add(key)
+        existing.add(key)
         count, start, step = _evenly(centre[members, axis], 2 * float(np.median(half[members, axis])))
         if count < LEAST_ROW:
             continue
         middle, size = np.median(centre[members], 0), np.median(half[members], 0)
         middle[axis] = start
-        steps = tuple(to_float32(step) if other == axis else 0.0 for other in range(3))
+        steps = tuple(to_float32(step) if k == axis else 0.0 for k in range(3))
         loop = Loop("translate", (float(count), *steps), ())
         yield from (nest((loop, drawing)) for drawing in drawings(Box(middle, np.eye(3), size)))
 
 
-def _evenly(places: FloatArray, least: float) -> tuple[int, float, float]:
-    """How many equal steps of at least ``least`` places (N,) are, the first place, and the step; 0 if they are not."""
-    places = np.unique(places.round(2))
-    steps = np.diff(places)
-    steps = steps[steps >= least]
+def _evenly(positions: FloatArray, minimum: float) -> tuple[int, float, float]:
+    """How many equal steps of at least ``minimum`` positions (N,) are, the first place, and the step; 0 if they are not."""
+    positions = np.unique(positions.round(2))
+    steps = np.diff(positions)
+    steps = steps[steps >= minimum]
     if not len(steps):
         return 0, 0.0, 0.0
-    first, length = float(places[0]), float(places[-1] - places[0])
+    first, length = float(positions[0]), float(positions[-1] - positions[0])
     count = round(length / float(np.median(steps))) + 1
     step = length / max(count - 1, 1)
-    index = np.round((places - first) / step)
-    on = np.abs(places - first - index * step) <= min(OFF_LINE, step / 4)
+    index = np.round((positions - first) / step)
+    on = np.abs(positions - first - index * step) <= min(OFF_LINE, step / 4)
     even = on.mean() >= PRESENT and len(set(index[on])) >= PRESENT * count
     return (count if even else 0), first, step
 
 
 def drawing_of(chain: Chain) -> Draw:
     """What a block draws in its loops."""
-    drawn = chain[-1]
-    assert isinstance(drawn, Draw)
-    return drawn
+    drawing = chain[-1]
+    assert isinstance(drawing, Draw)
+    return drawing
 
 
-def with_drawing(chain: Chain, drawn: Draw) -> Node:
+def with_drawing(chain: Chain, drawing: Draw) -> Node:
     """A block with another drawing in its loops."""
-    return nest((*chain[:-1], drawn))
+    return nest((*chain[:-1], drawing))
 
 
 def _loops(chain: Chain) -> tuple[tuple[str, int], ...]:
@@ -138,8 +148,8 @@ def _loops(chain: Chain) -> tuple[tuple[str, int], ...]:
 
 def _unlooped(chain: Chain) -> Iterator[Node]:
     """A block without one of its loops."""
-    for place in range(len(chain) - 1):
-        yield nest((*chain[:place], *chain[place + 1 :]))
+    for index in range(len(chain) - 1):
+        yield nest((*chain[:index], *chain[index + 1 :]))
 
 
 def _mirrored(chain: Chain) -> Iterator[Node]:
@@ -154,43 +164,43 @@ def _mirrored(chain: Chain) -> Iterator[Node]:
 
 def _recounted(chain: Chain, box: Box) -> Iterator[Node]:
     """A run with one copy more or one less, at its end or at its beginning."""
-    for place, loop in enumerate(chain[:-1]):
+    for index, loop in enumerate(chain[:-1]):
         if not (isinstance(loop, Loop) and language()[loop.name].quantities[0].written_out):
             continue
-        first, second = _places(nest((Loop(loop.name, (2.0, *loop.values[1:]), ()), chain[-1])))[:2]
+        first, second = _centres(nest((Loop(loop.name, (2.0, *loop.values[1:]), ()), chain[-1])))[:2]
         for more in (-1, 1):
             if loop.count + more < 2:
                 continue
-            other = (*chain[:place], Loop(loop.name, (loop.count + float(more), *loop.values[1:]), ()))
-            rest = chain[place + 1 :]
-            yield nest((*other, *rest))
+            outer = (*chain[:index], Loop(loop.name, (loop.count + float(more), *loop.values[1:]), ()))
+            inner = chain[index + 1 :]
+            yield nest((*outer, *inner))
             moved = box._replace(centre=box.centre - more * (second - first))
-            for drawn in hinted(language()[chain[-1].name], moved):
-                yield nest((*other, *rest[:-1], drawn))
+            for drawing in hinted(language()[chain[-1].name], moved):
+                yield nest((*outer, *inner[:-1], drawing))
 
 
-def _places(node: Node) -> FloatArray:
-    found: FloatArray = unroll(encode(Program((node,)), dtype=torch.float64)).centre.numpy()
-    return found
+def _centres(node: Node) -> FloatArray:
+    centres: FloatArray = unroll(encode(Program((node,)), dtype=torch.float64)).centre.numpy()
+    return centres
 
 
 def _filled(chain: Chain) -> Iterator[Node]:
     """A board in the place of a run."""
-    for place in range(len(chain) - 1):
-        (parts,) = solid_boxes([nest(chain[place:])])
+    for index in range(len(chain) - 1):
+        (parts,) = solid_boxes([nest(chain[index:])])
         around = _around(parts[0], parts)
-        for drawn in drawings(around):
-            yield nest((*chain[:place], drawn))
+        for drawing in drawings(around):
+            yield nest((*chain[:index], drawing))
 
 
-def _merged(one: Box, two: Box) -> Iterator[Box]:
+def _merged(first: Box, second: Box) -> Iterator[Box]:
     """The box around two that nearly touch, in the directions of the larger."""
-    if one.half.prod() < two.half.prod():
-        one, two = two, one
-    inner = np.abs((two.centre - one.centre) @ one.rotation)
-    reach = np.abs(one.rotation.T @ two.rotation) @ two.half
-    if (inner <= one.half + reach + GAP).all():
-        yield _around(one, [one, two])
+    if first.half.prod() < second.half.prod():
+        first, second = second, first
+    inner = np.abs((second.centre - first.centre) @ first.rotation)
+    reach = np.abs(first.rotation.T @ second.rotation) @ second.half
+    if (inner <= first.half + reach + GAP).all():
+        yield _around(first, [first, second])
 
 
 def _around(frame: Box, parts: Sequence[Box]) -> Box:
@@ -211,10 +221,10 @@ def met(box: Box, parts: Sequence[Box], within: Sequence[float] = (WITHIN,), *, 
         starts = (
             box.centre + np.concatenate([np.zeros((1, 3)), *(share * corners for share in within)]) @ box.rotation.T
         )
-        least = box.half[axis] if longer else -np.inf
+        minimum = box.half[axis] if longer else -np.inf
         for sign in (-1.0, 1.0):
             along = sign * box.rotation[:, axis]
-            ends = {end for part in parts for end in _crossed(starts, along, part) if end > least}
+            ends = {end for part in parts for end in _crossed(starts, along, part) if end > minimum}
             for end in sorted(ends, key=lambda end: abs(end - box.half[axis]))[:4]:
                 length = (box.half[axis] + end) / 2
                 if abs(end - box.half[axis]) <= REACH and length >= SHORTEST / 2:
@@ -241,7 +251,7 @@ def _crossed(starts: FloatArray, along: FloatArray, part: Box) -> set[float]:
     """How far along lines (L, 3) of one direction these enter a box, and a little deeper for a joint."""
     at, step = (starts - part.centre) @ part.rotation, along @ part.rotation
     step = np.where(np.abs(step) < 1e-9, 1e-9, step)
-    one, two = (-part.half - at) / step, (part.half - at) / step
-    enters, leaves = np.minimum(one, two).max(1), np.maximum(one, two).min(1)
+    first, second = (-part.half - at) / step, (part.half - at) / step
+    enters, leaves = np.minimum(first, second).max(1), np.maximum(first, second).min(1)
     through = enters < leaves
     return set(np.minimum(enters + INTO, leaves)[through].round(2).tolist())

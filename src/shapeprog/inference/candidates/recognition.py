@@ -58,10 +58,10 @@ def proposed(patterns: Sequence[Pattern], nodes: Sequence[Node], deadline: Deadl
     if not patterns or not nodes:
         return []
     pool = _Pool(nodes, patterns)
-    found = [call for pattern in patterns for call in _calls(pattern, pool, deadline)]
-    boxes = iter(solid_boxes([node for call in found for node in call.nodes]) if found else ())
-    drawn = [[box for _ in call.nodes for box in next(boxes)] for call in found]
-    return [call for call, parts in zip(found, drawn, strict=True) if not _hides(parts)]
+    calls = [call for pattern in patterns for call in _calls(pattern, pool, deadline)]
+    boxes = iter(solid_boxes([node for call in calls for node in call.nodes]) if calls else ())
+    solids = [[box for _ in call.nodes for box in next(boxes)] for call in calls]
+    return [call for call, parts in zip(calls, solids, strict=True) if not _hides(parts)]
 
 
 def _hides(parts: Sequence[Box]) -> bool:
@@ -69,9 +69,9 @@ def _hides(parts: Sequence[Box]) -> bool:
     corners = [part.centre + (CORNERS * part.half) @ part.rotation.T for part in parts]
     return any(
         bool((np.abs((corner - around.centre) @ around.rotation) <= around.half + HIDDEN).all())
-        for place, corner in enumerate(corners)
-        for other, around in enumerate(parts)
-        if place != other
+        for first, corner in enumerate(corners)
+        for second, around in enumerate(parts)
+        if first != second
     )
 
 
@@ -89,10 +89,10 @@ class _Pool:
             self._add(chain)
         hints = {name: hint for name in _pointed(patterns) if (hint := language()[name].hint) is not None}
         boxes = solid_boxes([chain[-1] for chain in chains]) if hints else []
-        for chain, own in zip(chains, boxes, strict=False):
+        for chain, solids in zip(chains, boxes, strict=False):
             for name, hint in hints.items():
-                if len(own) == 1 and name != chain[-1].name:
-                    for values in hint(own[0]):
+                if len(solids) == 1 and name != chain[-1].name:
+                    for values in hint(solids[0]):
                         self._add((*chain[:-1], Draw(name, tuple(map(to_float32, values)))))
         self.counts = {counts for _, counts in self._rows}
 
@@ -110,52 +110,52 @@ class _Pool:
 
 def _pointed(patterns: Sequence[Pattern]) -> list[str]:
     """The statements by which functions draw what is not told by the box around it."""
-    every = (form for pattern in patterns for form in pattern.forms_at(pattern.arguments))
-    return sorted({form.block.kind.shape for form in every if not form.block.kind.boxed})
+    forms = (form for pattern in patterns for form in pattern.forms_at(pattern.arguments))
+    return sorted({form.block.kind.shape for form in forms if not form.block.kind.boxed})
 
 
 def _calls(pattern: Pattern, pool: _Pool, deadline: Deadline) -> list[Called]:
     """The calls of one function that are nearest to blocks of a pool, and loops around them."""
-    found: list[tuple[float, dict[str, float]]] = []
-    for given in pattern.choices(pool.counts):
+    solutions: list[tuple[float, dict[str, float]]] = []
+    for counts in pattern.choices(pool.counts):
         if deadline.passed("the search for calls of functions"):
             break
-        usual = pattern.arguments | given
+        usual = pattern.arguments | counts
         start = np.array([usual[name] for name in pattern.measures])
-        for wanted in pattern.forms(given):
-            offered = [pool.like(form) for form in wanted]
+        for forms in pattern.forms(counts):
+            offered = [pool.like(form) for form in forms]
             if pattern.counts and any(
-                form.block.counts and not len(each) for form, each in zip(wanted, offered, strict=True)
+                form.block.counts and not len(rows) for form, rows in zip(forms, offered, strict=True)
             ):
                 continue  # only blocks that are found tell how often they are repeated
-            for cost, values in _nearest(wanted, offered, start):
-                found.append((cost, usual | dict(zip(pattern.measures, values, strict=True))))
-    found.sort(key=lambda each: each[0])
-    whole = _tidy(pattern, (numbers for cost, numbers in found if cost < MISSED), OFFERED)
-    guessed = _tidy(pattern, (numbers for cost, numbers in found if cost >= MISSED), GUESSED)
-    return [*whole, *_repeated(whole), *guessed]
+            for cost, values in _nearest(forms, offered, start):
+                solutions.append((cost, usual | dict(zip(pattern.measures, values, strict=True))))
+    solutions.sort(key=lambda solution: solution[0])
+    complete = _tidy(pattern, (numbers for cost, numbers in solutions if cost < MISSED), OFFERED)
+    guessed = _tidy(pattern, (numbers for cost, numbers in solutions if cost >= MISSED), GUESSED)
+    return [*complete, *_repeated(complete), *guessed]
 
 
-def _tidy(pattern: Pattern, found: Iterable[dict[str, float]], most: int) -> list[Called]:
+def _tidy(pattern: Pattern, solutions: Iterable[dict[str, float]], limit: int) -> list[Called]:
     """The first calls with these numbers, each once."""
     calls: list[Called] = []
-    for numbers in found:
+    for numbers in solutions:
         call = Called.of(pattern, numbers)
-        if call and not any(np.abs(np.subtract(call.numbers, each.numbers)).max() < SAME for each in calls):
+        if call and not any(np.abs(np.subtract(call.numbers, existing.numbers)).max() < SAME for existing in calls):
             calls.append(call)
-        if len(calls) == most:
+        if len(calls) == limit:
             break
     return calls
 
 
 def _repeated(calls: Sequence[Called]) -> Iterator[Called]:
     """Runs and mirror images of calls that draw the same."""
-    seen = moments_of([call.program for call in calls]) if len(calls) > 1 else None
-    for one, loop in rows_and_pairs(seen) if seen else ():
-        yield replace(calls[one], around=(loop,))
+    stats = moments_of([call.program for call in calls]) if len(calls) > 1 else None
+    for index, loop in rows_and_pairs(stats) if stats else ():
+        yield replace(calls[index], around=(loop,))
 
 
-class _Taken(NamedTuple):
+class _Assignment(NamedTuple):
     """Blocks taken for some forms of a function, in S ways: their numbers (S, M), and what each way costs (S,)."""
 
     forms: tuple[int, ...]
@@ -164,39 +164,43 @@ class _Taken(NamedTuple):
 
 
 def _nearest(
-    wanted: Sequence[Form], offered: Sequence[FloatArray], start: FloatArray
+    forms: Sequence[Form], offered: Sequence[FloatArray], start: FloatArray
 ) -> Iterator[tuple[float, list[float]]]:
     """What it costs to take some of the blocks offered for each form of a function, and the measures that they give.
 
     What they leave open of the measures is as at the ``start``.
     """
-    ways = [_Taken((), np.zeros((1, 0)), np.zeros(1))]
+    ways = [_Assignment((), np.zeros((1, 0)), np.zeros(1))]
     for k, blocks in enumerate(offered):
         longer = [way._replace(costs=way.costs + MISSED) for way in ways]
         for way in ways if len(blocks) else ():
-            forms = (*way.forms, k)
+            indices = (*way.forms, k)
             old, new = np.repeat(way.values, len(blocks), 0), np.tile(blocks, (len(way.values), 1))
             values = np.hstack([old, new])
-            _, off = _solved([wanted[each] for each in forms], values, start)
-            kept = np.flatnonzero(off <= LOOSE)
-            longer.append(_Taken(forms, values[kept], np.round(off[kept] + MISSED * (k - len(way.forms)), CELLS)))
+            _, off = _solved([forms[index] for index in indices], values, start)
+            selected = np.flatnonzero(off <= LOOSE)
+            longer.append(
+                _Assignment(indices, values[selected], np.round(off[selected] + MISSED * (k - len(way.forms)), CELLS))
+            )
         cheap = np.argsort(np.concatenate([way.costs for way in longer]), kind="stable")[:FOLLOWED]
         ends = np.cumsum([0, *(len(way.costs) for way in longer)])
         inside = [np.sort(cheap[(cheap >= low) & (cheap < high)]) - low for low, high in itertools.pairwise(ends)]
-        ways = [_Taken(way.forms, way.values[k], way.costs[k]) for way, k in zip(longer, inside, strict=True) if len(k)]
+        ways = [
+            _Assignment(way.forms, way.values[k], way.costs[k]) for way, k in zip(longer, inside, strict=True) if len(k)
+        ]
     for way in ways:
         if way.forms:
-            taken = [wanted[k] for k in way.forms]
-            found, _ = _solved(taken, way.values, start)
-            for cost, numbers in zip(way.costs.tolist(), found, strict=True):
-                yield from ((cost, guess.tolist()) for guess in (numbers, *(numbers + _unsaid(taken))))
+            assigned = [forms[k] for k in way.forms]
+            measures, _ = _solved(assigned, way.values, start)
+            for cost, numbers in zip(way.costs.tolist(), measures, strict=True):
+                yield from ((cost, guess.tolist()) for guess in (numbers, *(numbers + _undetermined(assigned))))
 
 
-def _unsaid(forms: Sequence[Form]) -> FloatArray:
+def _undetermined(forms: Sequence[Form]) -> FloatArray:
     """Changes (G, P) of measures that forms say nothing about, if that leaves one number open."""
     factors = np.concatenate([form.factors for form in forms])
-    rest = np.linalg.svd(factors)[2][np.linalg.matrix_rank(factors) :]
-    return np.outer(GUESSES, rest[0] / np.abs(rest[0]).max()) if len(rest) == 1 else np.zeros((0, factors.shape[1]))
+    free = np.linalg.svd(factors)[2][np.linalg.matrix_rank(factors) :]
+    return np.outer(GUESSES, free[0] / np.abs(free[0]).max()) if len(free) == 1 else np.zeros((0, factors.shape[1]))
 
 
 def _solved(forms: Sequence[Form], values: FloatArray, start: FloatArray) -> tuple[FloatArray, FloatArray]:

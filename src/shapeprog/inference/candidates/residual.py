@@ -29,8 +29,8 @@ LEAST, MOST = 8, 24
 
 def residual_candidates(program: Program, evidence: Evidence) -> list[Node]:
     """Drawings of the boxes around clusters of visible points that a program is far from, and their mirror images."""
-    places = torch.from_numpy(evidence.points)
-    far = signed_distance(unroll(program), places).abs().numpy() > FAR * evidence.tolerance
+    tensor = torch.from_numpy(evidence.points)
+    far = signed_distance(unroll(program), tensor).abs().numpy() > FAR * evidence.tolerance
     points = evidence.points[far & (evidence.weights > evidence.weights.max() / 2)]
     if len(points) < LEAST:
         return []
@@ -39,10 +39,12 @@ def residual_candidates(program: Program, evidence: Evidence) -> list[Node]:
     cluster = linked(pairs, len(points))
     size = np.bincount(cluster)
     largest = np.argsort(-size, kind="stable")[:MOST]
-    members = [np.flatnonzero(cluster == each) for each in largest[size[largest] >= LEAST]]
+    members = [np.flatnonzero(cluster == label) for label in largest[size[largest] >= LEAST]]
     if not members:
         return []
     around = boxes_around(points[np.concatenate(members)], bounds(members))
     half = np.maximum(around.half, THINNEST / 2)
-    nodes = [drawn for box in zip(around.centre, around.rotation, half, strict=True) for drawn in drawings(Box(*box))]
+    nodes = [
+        drawing for box in zip(around.centre, around.rotation, half, strict=True) for drawing in drawings(Box(*box))
+    ]
     return [*nodes, *images(nodes, evidence.surface)]

@@ -49,7 +49,7 @@ PRIOR, FARTHEST = 3e-2, 2.0
 WRONG = 0.5
 """Distance in cells that counts as much as a normal at a right angle."""
 
-BESIDE = 0.01
+OFFSET = 0.01
 """Cells off the surface at which the direction of a solid is taken: on a surface itself the distance has no slope."""
 
 SLACK, BETTER = 0.05, 2 / 3
@@ -68,70 +68,70 @@ class Target(NamedTuple):
         return Target(self.points[rows], self.normals[rows])
 
     @property
-    def beside(self) -> Float[Tensor, "B P 3"]:
+    def shifted(self) -> Float[Tensor, "B P 3"]:
         """Just off the points: on a surface itself the distance has no slope."""
-        return self.points + BESIDE * self.normals
+        return self.points + OFFSET * self.normals
 
 
 def single_candidates(pieces: Pieces) -> list[Node]:
     """The simplest drawing statement for every piece with points, in the order of the pieces, and a closer one."""
-    target, known = _target(pieces)
+    target, indices = _target(pieces)
     half = np.maximum(pieces.boxes.half, THINNEST / 2)
-    boxes = [Box(pieces.boxes.centre[piece], pieces.boxes.rotation[piece], half[piece]) for piece in known]
+    boxes = [Box(pieces.boxes.centre[piece], pieces.boxes.rotation[piece], half[piece]) for piece in indices]
     tried = [drawings(box) for box in boxes]
     for declared in filter(is_unhinted, language()):
-        for box, several in zip(boxes[:FITTED], tried, strict=False):
-            several += starts(declared, box)
-    drawn = [each for several in tried for each in several]
-    owner = np.repeat(np.arange(len(boxes)), [len(each) for each in tried])
-    misfit = misfits(drawn, target.take(owner))
-    best = _least(misfit, owner, len(boxes))[owner]
+        for box, options in zip(boxes[:FITTED], tried, strict=False):
+            options += starts(declared, box)
+    draws = [draw for options in tried for draw in options]
+    owner = np.repeat(np.arange(len(boxes)), [len(options) for options in tried])
+    misfit = misfits(draws, target.take(owner))
+    best = _minimum(misfit, owner, len(boxes))[owner]
     unsure = np.flatnonzero((owner < FITTED) & (best > GOOD) & (misfit <= best + WORTH))
-    better = fitted([drawn[k] for k in unsure], target.take(owner[unsure]))
-    drawn, owner = [*drawn, *better], np.append(owner, owner[unsure])
+    better = fitted([draws[k] for k in unsure], target.take(owner[unsure]))
+    draws, owner = [*draws, *better], np.append(owner, owner[unsure])
     misfit = np.append(misfit, misfits(better, target.take(owner[len(misfit) :])))
-    best = _least(misfit, owner, len(boxes))[owner]
+    best = _minimum(misfit, owner, len(boxes))[owner]
     order = np.flatnonzero(misfit <= best + SLACK).tolist()
-    order.sort(key=lambda k: (numbers_written(drawn[k]), misfit[k]), reverse=True)
+    order.sort(key=lambda k: (numbers_written(draws[k]), misfit[k]), reverse=True)
     simplest = {int(owner[k]): k for k in order}
     closest = {int(owner[k]): k for k in order if misfit[k] == best[k]}
-    found: list[Node] = []
+    result: list[Node] = []
     for piece, k in sorted(simplest.items()):
-        found.append(drawn[k])
+        result.append(draws[k])
         if misfit[closest[piece]] < min(GOOD, BETTER * misfit[k]):
-            found.append(drawn[closest[piece]])
-    return found
+            result.append(draws[closest[piece]])
+    return result
 
 
-def _least(misfit: FloatArray, owner: Array, count: int) -> FloatArray:
+def _minimum(misfit: FloatArray, owner: Array, count: int) -> FloatArray:
     """The least misfit for each piece; infinite where there is none."""
-    least = np.full(count, np.inf)
-    np.minimum.at(least, owner, misfit)
-    return least
+    minimum = np.full(count, np.inf)
+    np.minimum.at(minimum, owner, misfit)
+    return minimum
 
 
-def fitted(drawn: Sequence[Draw], target: Target) -> list[Draw]:
+def fitted(draws: Sequence[Draw], target: Target) -> list[Draw]:
     """Statements brought onto their points by Gauss-Newton steps with a prior on their numbers, all at once.
 
     Residuals are distances of the points to the surface; each has the numbers of its statement to itself, so that one
     backward pass gives all derivatives.
     """
-    if not drawn:
+    if not draws:
         return []
-    declared = [language()[each.name] for each in drawn]
-    most, points = max(each.size for each in declared), target.points.shape[1]
-    values, free, low = (torch.zeros(len(drawn), most, dtype=torch.float64) for _ in range(3))
-    for row, (each, statement) in enumerate(zip(drawn, declared, strict=True)):
-        values[row, : statement.size] = torch.tensor(each.values)
+    declared = [language()[draw.name] for draw in draws]
+    longest, points = max(statement.size for statement in declared), target.points.shape[1]
+    values, free, low = (torch.zeros(len(draws), longest, dtype=torch.float64) for _ in range(3))
+    for row, (draw, statement) in enumerate(zip(draws, declared, strict=True)):
+        values[row, : statement.size] = torch.tensor(draw.values)
         free[row, : statement.size] = torch.tensor([not quantity.discrete for quantity in statement.quantities])
         low[row, : statement.size] = torch.tensor([least(quantity) for quantity in statement.quantities])
-    ids = torch.tensor([each.id for each in declared])[:, None, None, None].expand(-1, points, 1, 1)
+    ids = torch.tensor([statement.id for statement in declared])[:, None, None, None].expand(-1, points, 1, 1)
     plan = Plan(Code(ids, values[:, None, None, None].expand(-1, points, 1, 1, -1)))
     start, prior = values, torch.where(free > 0, PRIOR * points, 1.0)
-    beside = target.beside[:, :, None]
+    shifted = target.shifted[:, :, None]
     for _ in range(STEPS):
         moving = values[:, None, None, None].expand(-1, points, 1, 1, -1).clone().requires_grad_()
-        off = signed_distance(plan.scene(moving), beside)[..., 0] - BESIDE
+        off = signed_distance(plan.scene(moving), shifted)[..., 0] - OFFSET
         (slopes,) = torch.autograd.grad(off.sum(), moving)
         slopes = slopes[:, :, 0, 0].nan_to_num(0) * free[:, None]
         residual = off.detach().nan_to_num(0)
@@ -143,14 +143,14 @@ def fitted(drawn: Sequence[Draw], target: Target) -> list[Draw]:
     return [Draw(statement.name, tuple(row[: statement.size])) for statement, row in rows]
 
 
-def misfits(drawn: Sequence[Draw], target: Target) -> FloatArray:
+def misfits(draws: Sequence[Draw], target: Target) -> FloatArray:
     """How far each statement (B,) is from its points: mean distance over ``WRONG`` plus 1 - the mean cosine."""
-    if not drawn:
+    if not draws:
         return np.zeros(0)
-    beside = target.beside.requires_grad_()
-    scene = unroll(encode([Program((node,)) for node in drawn], dtype=torch.float64))
-    distance = signed_distance(scene, beside)
-    (slope,) = torch.autograd.grad(distance.sum(), beside)
+    shifted = target.shifted.requires_grad_()
+    scene = unroll(encode([Program((node,)) for node in draws], dtype=torch.float64))
+    distance = signed_distance(scene, shifted)
+    (slope,) = torch.autograd.grad(distance.sum(), shifted)
     cosine = (slope * target.normals).sum(-1).abs().mean(1)
     off = (distance.detach().abs() / WRONG).clamp(max=1).mean(1) + 1 - cosine
     return off.nan_to_num(np.inf).numpy()
@@ -159,10 +159,12 @@ def misfits(drawn: Sequence[Draw], target: Target) -> FloatArray:
 def _target(pieces: Pieces) -> tuple[Target, Array]:
     """Points of the surface close to the faces of the pieces that have some, and which pieces these are (N,)."""
     step = max(1, len(pieces.cloud.points) // SEEN)
-    points, normals = (np.ascontiguousarray(each[::step]) for each in (pieces.cloud.points, pieces.cloud.normals))
-    near = np.zeros((len(pieces.boxes.half), len(points)), np.bool_)
-    near_boxes(points, *map(np.ascontiguousarray, pieces.boxes), NEAR, near, np.zeros(len(near)))
-    known = np.flatnonzero(near.any(1))
-    inside = [np.flatnonzero(near[piece]) for piece in known]
-    chosen = np.array([each[np.arange(POINTS) * len(each) // POINTS] for each in inside], np.int64).reshape(-1, POINTS)
-    return Target(torch.from_numpy(points[chosen]), torch.from_numpy(normals[chosen])), known
+    points, normals = (np.ascontiguousarray(array[::step]) for array in (pieces.cloud.points, pieces.cloud.normals))
+    mask = np.zeros((len(pieces.boxes.half), len(points)), np.bool_)
+    near_boxes(points, *map(np.ascontiguousarray, pieces.boxes), NEAR, mask, np.zeros(len(mask)))
+    indices = np.flatnonzero(mask.any(1))
+    inside = [np.flatnonzero(mask[piece]) for piece in indices]
+    selected = np.array([members[np.arange(POINTS) * len(members) // POINTS] for members in inside], np.int64).reshape(
+        -1, POINTS
+    )
+    return Target(torch.from_numpy(points[selected]), torch.from_numpy(normals[selected])), indices

@@ -28,11 +28,11 @@ def points_of_cells(
     exact = (high - low == SPAN)[faces[:, 3]] & (faces[np.arange(len(faces)), faces[:, 3]] == outer)
     table = np.column_stack([faces, np.where(exact, 0.0, inset)])
     random = np.random.default_rng(seed)
-    chosen = table[random.integers(len(table), size=count)]
-    points = chosen[:, :3] + random.random((count, 3))
-    along, outwards, inwards = chosen[:, 3].astype(int), chosen[:, 4], chosen[:, 5]
+    selected = table[random.integers(len(table), size=count)]
+    points = selected[:, :3] + random.random((count, 3))
+    along, outwards, inwards = selected[:, 3].astype(int), selected[:, 4], selected[:, 5]
     rows = np.arange(count)
-    points[rows, along] = chosen[rows, along] + np.where(outwards > 0, 1 - inwards, inwards)
+    points[rows, along] = selected[rows, along] + np.where(outwards > 0, 1 - inwards, inwards)
     edge_low, edge_high = low + inset, high - inset
     full = high - low == SPAN
     points = np.clip(points, np.where(full, low, edge_low), np.where(full, high, edge_high))
@@ -41,19 +41,19 @@ def points_of_cells(
 
 def exposed_faces(voxels: npt.NDArray[np.bool_]) -> npt.NDArray[np.int64]:
     """Faces between a touched cell and one that is not: cell (3), axis, and on which side of the cell: (F, 5)."""
-    padded, found = np.pad(voxels, 1), []
+    padded, faces = np.pad(voxels, 1), []
     for axis in range(3):
         for sign in (-1, 1):
             beyond = np.roll(padded, -sign, axis)[1:-1, 1:-1, 1:-1]
             cells = np.argwhere(voxels & ~beyond)
-            found.append(np.column_stack([cells, np.full(len(cells), axis), np.full(len(cells), sign)]))
-    return np.ascontiguousarray(np.concatenate(found))  # as kernels want what is made of it
+            faces.append(np.column_stack([cells, np.full(len(cells), axis), np.full(len(cells), sign)]))
+    return np.ascontiguousarray(np.concatenate(faces))  # as kernels want what is made of it
 
 
 def exposed(
     voxels: npt.NDArray[np.bool_], cells: npt.NDArray[np.int64], axis: npt.NDArray[np.int64], sign: int
 ) -> npt.NDArray[np.bool_]:
     """Which cells (C, 3) have an empty one beside them, each along an axis of its own (C,)."""
-    beside = cells + 1 + sign * np.eye(3, dtype=np.int64)[axis]
-    empty: npt.NDArray[np.bool_] = ~np.pad(voxels, 1)[tuple(beside.T)]
+    neighbours = cells + 1 + sign * np.eye(3, dtype=np.int64)[axis]
+    empty: npt.NDArray[np.bool_] = ~np.pad(voxels, 1)[tuple(neighbours.T)]
     return empty

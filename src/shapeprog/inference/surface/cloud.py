@@ -61,17 +61,17 @@ def cloud_of(points: Array, normals: Array | None = None) -> Cloud:
 
     Where no normals are given, they are those of planes through near points, on which noisy points are projected first.
     """
-    found = _cloud(points, normals)
-    return _cloud(projected(found.points), None) if normals is None and found.noise > NOISY else found
+    cloud = _cloud(points, normals)
+    return _cloud(projected(cloud.points), None) if normals is None and cloud.noise > NOISY else cloud
 
 
 def projected(points: FloatArray) -> FloatArray:
     """Points (N, 3) moved onto planes through their neighbours, near ones first (Alexa et al. 2003), some times."""
     for _ in range(PROJECTIONS):
-        distance, near = cKDTree(points).query(points, k=min(PROJECTED, len(points)))
-        normals, _ = planes(points, near)
+        distance, neighbours = cKDTree(points).query(points, k=min(PROJECTED, len(points)))
+        normals, _ = planes(points, neighbours)
         weight = np.exp(-((distance / np.maximum(distance[:, -1:] / 2, CLOSEST)) ** 2))[..., None]
-        middle = (points[near] * weight).sum(1) / weight.sum(1)
+        middle = (points[neighbours] * weight).sum(1) / weight.sum(1)
         points = points - ((points - middle) * normals).sum(1)[:, None] * normals
     return points
 
@@ -79,34 +79,34 @@ def projected(points: FloatArray) -> FloatArray:
 def _cloud(points: Array, normals: Array | None) -> Cloud:
     points = np.ascontiguousarray(points, np.float64)
     around = (AROUND if normals is None else NEAREST) + 1
-    distance, near = cKDTree(points).query(points, k=range(1, min(around, len(points)) + 1), workers=2)
-    spacing = max(float(np.median(distance[:, -1])) * (np.pi / near.shape[1]) ** 0.5, CLOSEST)
+    distance, neighbours = cKDTree(points).query(points, k=range(1, min(around, len(points)) + 1), workers=2)
+    spacing = max(float(np.median(distance[:, -1])) * (np.pi / neighbours.shape[1]) ** 0.5, CLOSEST)
     if normals is None:
-        facing, noise = plane_normals(points, near)
+        facing, noise = plane_normals(points, neighbours)
     else:
         facing = np.ascontiguousarray(normals, np.float64)
-        noise = roughness(points, facing, near)
-    return Cloud(points, facing, np.ascontiguousarray(near[:, 1 : NEAREST + 1], np.int32), spacing, noise)
+        noise = roughness(points, facing, neighbours)
+    return Cloud(points, facing, np.ascontiguousarray(neighbours[:, 1 : NEAREST + 1], np.int32), spacing, noise)
 
 
-def plane_normals(points: FloatArray, near: npt.NDArray[np.int64]) -> tuple[FloatArray, float]:
+def plane_normals(points: FloatArray, neighbours: npt.NDArray[np.int64]) -> tuple[FloatArray, float]:
     """Unit normals (N, 3) of the planes that fit near points (N, k) best, and how far these usually are from them."""
-    normals, squared = planes(points, near)
-    return normals, float(np.sqrt(np.median(squared) / near.shape[1]))
+    normals, squared = planes(points, neighbours)
+    return normals, float(np.sqrt(np.median(squared) / neighbours.shape[1]))
 
 
-def planes(points: FloatArray, near: npt.NDArray[np.int64]) -> tuple[FloatArray, FloatArray]:
+def planes(points: FloatArray, neighbours: npt.NDArray[np.int64]) -> tuple[FloatArray, FloatArray]:
     """Unit normals (N, 3) of planes that fit near points (N, k) best, and sums (N,) of their squared distances."""
-    off = points[near]
+    off = points[neighbours]
     off -= off.mean(1, keepdims=True)
     squared, axes = np.linalg.eigh(off.transpose(0, 2, 1) @ off)
     return np.ascontiguousarray(axes[:, :, 0]), np.maximum(squared[:, 0], 0)
 
 
-def roughness(points: FloatArray, normals: FloatArray, near: npt.NDArray[np.int64]) -> float:
+def roughness(points: FloatArray, normals: FloatArray, neighbours: npt.NDArray[np.int64]) -> float:
     """How far near points that face the same way usually are from the plane of a point."""
-    alike = np.abs(np.einsum("nki,ni->nk", normals[near[:, 1:]], normals)) > LIKE
-    off = np.abs(np.einsum("nki,ni->nk", points[near[:, 1:]] - points[:, None], normals))[alike]
+    parallel = np.abs(np.einsum("nki,ni->nk", normals[neighbours[:, 1:]], normals)) > LIKE
+    off = np.abs(np.einsum("nki,ni->nk", points[neighbours[:, 1:]] - points[:, None], normals))[parallel]
     return float(np.median(off)) if len(off) else 0.0
 
 
@@ -127,6 +127,6 @@ def is_clean(points: FloatArray) -> bool:
     """Whether points (P, 3) lie on planes with their nearest neighbours where the surface is flattest."""
     if len(points) <= FLAT_NEIGHBOURS:
         return False
-    near = cKDTree(points).query(points, k=FLAT_NEIGHBOURS)[1]
-    _, squared = planes(points, near)
+    neighbours = cKDTree(points).query(points, k=FLAT_NEIGHBOURS)[1]
+    _, squared = planes(points, neighbours)
     return bool(np.quantile(np.sqrt(squared / (FLAT_NEIGHBOURS - 3)), FLATTEST) < CLEAN)

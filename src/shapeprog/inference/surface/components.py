@@ -42,9 +42,9 @@ class Components(NamedTuple):
 
 def components(vertices: Array, faces: Array) -> Components:
     """The components of a triangle mesh in cells, once vertices are welded and doubled and empty faces left out."""
-    places, listed = weld(np.asarray(vertices, np.float64), np.asarray(faces, np.int64))
-    listed, area = once_each(places, listed)
-    label = linked(np.concatenate([listed[:, :2], listed[:, 1:]]), len(places))
+    welded, listed = weld(np.asarray(vertices, np.float64), np.asarray(faces, np.int64))
+    listed, area = unique_faces(welded, listed)
+    label = linked(np.concatenate([listed[:, :2], listed[:, 1:]]), len(welded))
     count, of_face = int(label.max(initial=-1)) + 1, label[listed[:, 0]]
     total = np.bincount(of_face, area, minlength=count)
     used = np.flatnonzero(total > 0)
@@ -55,7 +55,7 @@ def components(vertices: Array, faces: Array) -> Components:
     corner = np.argsort(rank[label], kind="stable")
     bounds = np.arange(len(order) + 1)
     return Components(
-        places,
+        welded,
         listed[sequence],
         np.searchsorted(rank[of_face][sequence], bounds),
         corner[: np.searchsorted(rank[label][corner], len(order))],
@@ -72,17 +72,17 @@ def weld(vertices: FloatArray, faces: npt.NDArray[np.int64]) -> tuple[FloatArray
     cell -= cell.min(0)
     size = cell.max(0) + 1
     key = (cell[:, 0] * size[1] + cell[:, 1]) * size[2] + cell[:, 2]
-    _, kept, name = np.unique(key, return_index=True, return_inverse=True)
+    _, unique, name = np.unique(key, return_index=True, return_inverse=True)
     corners = name[np.cumsum(used)[faces.reshape(-1)] - 1]
-    seen = np.empty(len(kept), np.int64)
-    seen[corners[::-1]] = np.arange(len(corners))[::-1]  # of several values the last, which is the first corner, stays
-    order = np.argsort(seen, kind="stable")
-    rank = np.empty(len(kept), np.int64)
-    rank[order] = np.arange(len(kept))
-    return vertices[used][kept][order], rank[corners].reshape(-1, 3)
+    first = np.empty(len(unique), np.int64)
+    first[corners[::-1]] = np.arange(len(corners))[::-1]  # the last value, of the first corner, stays
+    order = np.argsort(first, kind="stable")
+    rank = np.empty(len(unique), np.int64)
+    rank[order] = np.arange(len(unique))
+    return vertices[used][unique][order], rank[corners].reshape(-1, 3)
 
 
-def once_each(vertices: FloatArray, faces: npt.NDArray[np.int64]) -> tuple[npt.NDArray[np.int64], FloatArray]:
+def unique_faces(vertices: FloatArray, faces: npt.NDArray[np.int64]) -> tuple[npt.NDArray[np.int64], FloatArray]:
     """The faces that have an area, each once whichever way round it is, and their areas."""
     ordered, count = np.sort(faces, axis=1), len(vertices)
     _, pair = np.unique(ordered[:, 0] * count + ordered[:, 1], return_inverse=True)
@@ -99,18 +99,18 @@ def solid_sides(mesh: Components) -> npt.NDArray[np.int64]:
     At each edge of a closed surface as many faces run one way as the other, and the volume that it encloses is above
     zero where they face outwards.
     """
-    faces, many = mesh.faces, np.diff(mesh.face_start)
-    component = np.repeat(np.arange(len(many)), many)
+    faces, counts = mesh.faces, np.diff(mesh.face_start)
+    component = np.repeat(np.arange(len(counts)), counts)
     start, end = faces.reshape(-1), faces[:, [1, 2, 0]].reshape(-1)
     _, edge = np.unique(np.minimum(start, end) * len(mesh.vertices) + np.maximum(start, end), return_inverse=True)
     uneven = np.bincount(edge, np.sign(end - start)) != 0
-    gaps = np.bincount(np.repeat(component, 3), uneven[edge], minlength=len(many)) / (3 * many)
+    gaps = np.bincount(np.repeat(component, 3), uneven[edge], minlength=len(counts)) / (3 * counts)
     corners = mesh.vertices[faces]
     across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    volume = np.bincount(component, (corners[:, 0] * across).sum(1), minlength=len(many)) / 6
+    volume = np.bincount(component, (corners[:, 0] * across).sum(1), minlength=len(counts)) / 6
     solid = (gaps <= OPEN) & (2 * np.abs(volume) > THICK * mesh.area)
-    found: npt.NDArray[np.int64] = np.where(solid, np.sign(volume), 0).astype(np.int64)[component]
-    return found
+    sides: npt.NDArray[np.int64] = np.where(solid, np.sign(volume), 0).astype(np.int64)[component]
+    return sides
 
 
 def linked(pairs: Array, count: int) -> npt.NDArray[np.int64]:

@@ -142,8 +142,8 @@ def evidence_of_program(program: Program, seed: int = 0) -> Evidence:
 
 
 def _of_mesh(mesh: Components, seed: int) -> Evidence:
-    drawn, face = sample_with_faces(mesh.vertices, mesh.faces, SURFACE, seed)
-    surface, corners = drawn.astype(np.float64), mesh.vertices[mesh.faces]
+    samples, face = sample_with_faces(mesh.vertices, mesh.faces, SURFACE, seed)
+    surface, corners = samples.astype(np.float64), mesh.vertices[mesh.faces]
     across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])[face]
     side = solid_sides(mesh)[face]
     normals = np.where(side < 0, -1, 1)[:, None] * across / np.linalg.norm(across, axis=1, keepdims=True)
@@ -151,28 +151,28 @@ def _of_mesh(mesh: Components, seed: int) -> Evidence:
     points = surface[:POINTS]
     front, back = (visible(points, sign * normals[:POINTS], barrier) for sign in (1, -1))
     weights = np.where(front | back, 1.0, HIDDEN)
-    facing, known = outward(normals[:POINTS], front, back)
+    facing, oriented = outward(normals[:POINTS], front, back)
     area = float(mesh.area.sum())
     coarse: Flags = np.any(barrier.reshape((FREE, LOOKING // FREE) * 3), (1, 3, 5))
     return Evidence(
-        points, facing, weights / weights.sum(), known, TOLERANCE, AGREEMENT, surface, normals, side != 0,
+        points, facing, weights / weights.sum(), oriented, TOLERANCE, AGREEMENT, surface, normals, side != 0,
         _reach(TOLERANCE, area), area * float(weights.mean()), free_cells(coarse, surface, through=False),
     )  # fmt: skip
 
 
 def _of_points(surface: FloatArray, voxels: Flags, seed: int) -> Evidence:
     """Of a scan: its noise is that about the planes, and the area what the distances between its points say."""
-    normals, noise, each = local_planes(surface)
-    chosen = np.sort(np.random.default_rng(seed).permutation(len(surface))[:POINTS])
-    tolerance, area = min(max(TOLERANCE, NOISE * noise), MOST_TOLERANCE), each * len(surface)
+    normals, noise, point_area = local_planes(surface)
+    selected = np.sort(np.random.default_rng(seed).permutation(len(surface))[:POINTS])
+    tolerance, area = min(max(TOLERANCE, NOISE * noise), MOST_TOLERANCE), point_area * len(surface)
     reach = _reach(tolerance, area, len(surface))
     fine = voxels.repeat(FREE // RESOLUTION, 0).repeat(FREE // RESOLUTION, 1).repeat(FREE // RESOLUTION, 2)
     free = free_cells(fine, surface, through=True)
-    weights, points = np.full(len(chosen), 1 / len(chosen)), surface[chosen]
-    above = 1.5 * RESOLUTION / FREE * normals[chosen]
-    facing, known = outward(normals[chosen], *(_within(free, points + sign * above) for sign in (1, -1)))
+    weights, points = np.full(len(selected), 1 / len(selected)), surface[selected]
+    above = 1.5 * RESOLUTION / FREE * normals[selected]
+    facing, oriented = outward(normals[selected], *(_within(free, points + sign * above) for sign in (1, -1)))
     return Evidence(
-        points, facing, weights, known, tolerance, SCANNED, surface, normals,
+        points, facing, weights, oriented, tolerance, SCANNED, surface, normals,
         np.zeros(len(surface), np.bool_), reach, area, free,
     )  # fmt: skip
 
@@ -185,8 +185,8 @@ def _of_cells(voxels: Flags) -> Evidence:
     faces, occupied = exposed_faces(voxels), np.argwhere(voxels)
     cells, axis, sign = faces[:, :3], faces[:, 3], faces[:, 4]
     low, high = occupied.min(0)[axis], occupied.max(0)[axis] + 1
-    place = cells[np.arange(len(faces)), axis]
-    exact = (high - low == SPAN) & (place == np.where(sign < 0, low, high - 1))
+    coordinate = cells[np.arange(len(faces)), axis]
+    exact = (high - low == SPAN) & (coordinate == np.where(sign < 0, low, high - 1))
     single = exposed(voxels, cells, axis, 1) & exposed(voxels, cells, axis, -1)
     inset = np.where(exact, 0.0, np.where(single, (1 - THIN) / 2, INSET))
     normals = sign[:, None] * np.eye(3)[axis]
@@ -225,18 +225,18 @@ def outward(normals: FloatArray, front: Flags, back: Flags) -> tuple[FloatArray,
     It is where only the front or only the back of a point is free; and everywhere, thin parts included, if nearly all
     such normals agree, as those of a mesh do whose faces are all wound the same way.
     """
-    known = (front != back) & ((normals**2).sum(1) > 0.25)
-    share = float(front[known].mean()) if known.any() else 0.5
+    oriented = (front != back) & ((normals**2).sum(1) > 0.25)
+    share = float(front[oriented].mean()) if oriented.any() else 0.5
     if max(share, 1 - share) >= AGREED:
-        return normals * (1.0 if share > 0.5 else -1.0), np.ones(len(known), np.bool_)
-    return normals * np.where(known & back, -1.0, 1.0)[:, None], known
+        return normals * (1.0 if share > 0.5 else -1.0), np.ones(len(oriented), np.bool_)
+    return normals * np.where(oriented & back, -1.0, 1.0)[:, None], oriented
 
 
 def _within(cells: Flags, points: FloatArray) -> Flags:
     """Which points (P,) of the grid lie in cells that are set."""
     index = np.floor((points + HALF) * (len(cells) / RESOLUTION)).astype(np.int64).clip(0, len(cells) - 1)
-    found: Flags = cells[tuple(index.T)]
-    return found
+    inside: Flags = cells[tuple(index.T)]
+    return inside
 
 
 def free_cells(barrier: Flags, surface: FloatArray, *, through: bool) -> Flags:
@@ -249,8 +249,8 @@ def free_cells(barrier: Flags, surface: FloatArray, *, through: bool) -> Flags:
     starts = np.argwhere(np.ones_like(barrier)) + 0.5
     within = ((starts >= low) & (starts <= high)).all(1).reshape(barrier.shape)
     free: Flags = ~(barrier | within) & (not through)
-    steps, wanted = (directions(DIRECTIONS)[::2], CLEAR_THROUGH) if through else (directions(DIRECTIONS), CLEAR)
-    free[within] = looking(barrier, starts[within.reshape(-1)], steps, wanted, through=through)
+    steps, minimum = (directions(DIRECTIONS)[::2], CLEAR_THROUGH) if through else (directions(DIRECTIONS), CLEAR)
+    free[within] = looking(barrier, starts[within.reshape(-1)], steps, minimum, through=through)
     return free
 
 
@@ -263,20 +263,20 @@ def directions(count: int) -> FloatArray:
     return steps / np.abs(steps).max(1, keepdims=True)
 
 
-def looking(barrier: Flags, starts: FloatArray, steps: FloatArray, wanted: int, *, through: bool) -> Flags:
+def looking(barrier: Flags, starts: FloatArray, steps: FloatArray, minimum: int, *, through: bool) -> Flags:
     """Which starts (N,) have so many directions that lead out of the grid; see the kernel."""
-    seen = np.zeros(len(starts), np.bool_)
-    data = barrier, np.ascontiguousarray(starts), np.ascontiguousarray(steps), wanted, through, seen
+    result = np.zeros(len(starts), np.bool_)
+    data = barrier, np.ascontiguousarray(starts), np.ascontiguousarray(steps), minimum, through, result
     over_threads(partial(look_out, *data), len(starts), least=1024)
-    return seen
+    return result
 
 
 def local_planes(points: FloatArray) -> tuple[FloatArray, float, float]:
     """Normals (P, 3) of the planes through the neighbours of each point, noise about them, and area of each point."""
     from scipy.spatial import cKDTree
 
-    distance, near = cKDTree(points).query(points, k=NEIGHBOURS)
-    normals, squared = planes(points, near)
+    distance, neighbours = cKDTree(points).query(points, k=NEIGHBOURS)
+    normals, squared = planes(points, neighbours)
     noise = float(np.quantile(np.sqrt(squared / (NEIGHBOURS - 3)), FLAT))
     area = float(np.median(distance[:, -1]) ** 2 * math.pi / (NEIGHBOURS - 1))
     return normals, noise, area

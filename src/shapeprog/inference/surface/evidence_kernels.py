@@ -6,8 +6,8 @@ from shapeprog.kernels.compile import kernel
 
 
 @kernel("void(b1[:, :, ::1], f8[:, ::1], f8[:, ::1], i8, b1, b1[::1], i8, i8)")
-def look_out(barrier, starts, directions, wanted, through, seen, begin, end):
-    """Mark the starts ``begin`` to ``end`` from which ``wanted`` directions lead out of the grid; a twin is beside it.
+def look_out(barrier, starts, directions, minimum, through, out, begin, end):
+    """Mark the starts ``begin`` to ``end`` from which ``minimum`` directions lead out of the grid; a twin is beside it.
 
     Steps are one cell along the longest axis of a direction, so no ray slips through a wall of touched cells.
 
@@ -24,7 +24,7 @@ def look_out(barrier, starts, directions, wanted, through, seen, begin, end):
     """
     size = len(barrier)
     for item in range(begin, end):
-        found = 0
+        count = 0
         for turn in range(len(directions)):
             clear = True
             for sign in range(2 if through else 1):
@@ -35,7 +35,7 @@ def look_out(barrier, starts, directions, wanted, through, seen, begin, end):
                 while clear and 0 <= x < size and 0 <= y < size and 0 <= z < size:
                     clear = not barrier[int(x), int(y), int(z)]
                     x, y, z = x + dx, y + dy, z + dz
-            found += clear
-            if found >= wanted:
+            count += clear
+            if count >= minimum:
                 break
-        seen[item] = found >= wanted
+        out[item] = count >= minimum

@@ -1,7 +1,7 @@
-"""Calls of functions among the blocks of a program: what each draws competes as one, at the price of one line.
+"""Calls of functions among the blocks of a program: the blocks of a call compete as a unit, at the price of one line.
 
-What a function draws is linear in its measures once its counts are known, so the numbers of its blocks move together as
-these relations ask for, and the call that is nearest to moved blocks follows by least squares.
+For fixed counts, the numbers of the blocks that a function draws are linear in its measures.  Fitting keeps these
+relations, and least squares give the call that is nearest to moved blocks.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from shapeprog.library.store import Library
 from shapeprog.space import FloatArray
 
 FOLLOWS = 1e-6
-"""Factor of a relation below which it is none: the relation follows from others."""
+"""Factors below this are zero: such a relation follows from others."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class Called:
 
     @staticmethod
     def of(pattern: Pattern, numbers: Mapping[str, float], around: tuple[Loop, ...] = ()) -> Called | None:
-        """The call with these numbers, tidy, and with defaults where they are near; none if it draws nothing."""
+        """The call with these numbers, rounded, and set to defaults that they equal; None if it draws nothing."""
         tidy = [round(numbers[name], CELLS) + 0.0 for name in pattern.parameters]
         for index, default in enumerate(pattern.defaults.values()):
             if isinstance(default, float) and abs(tidy[index] - default) <= EXACT:
@@ -52,12 +52,12 @@ class Called:
         call = Called(pattern, tuple(map(to_float32, tidy)), around)
         try:
             return call if call.forms and all(map(_solid, call.program.walk())) else None
-        except ShapeProgError:  # a number that does not fit its place
+        except ShapeProgError:  # a number out of the range of its parameter
             return None
 
     @cached_property
     def program(self) -> Program:
-        """The program that is this call alone."""
+        """The program of this call alone."""
         pairs = zip(self.pattern.defaults.items(), self.numbers, strict=True)
         call = Call(
             self.pattern.function.name, tuple((name, value) for (name, usual), value in pairs if value != usual)
@@ -68,12 +68,12 @@ class Called:
 
     @cached_property
     def nodes(self) -> tuple[Node, ...]:
-        """What it draws, one block each."""
+        """The nodes that the call draws, one block each."""
         return self.program.flat().body
 
     @cached_property
     def forms(self) -> tuple[Form, ...]:
-        """The blocks within its loops as they follow from its measures."""
+        """The forms of the blocks within its loops, computed from its measures."""
         return self.pattern.forms_at(self._table)
 
     @property
@@ -82,12 +82,12 @@ class Called:
 
     @property
     def _linear(self) -> tuple[FloatArray, FloatArray]:
-        """Factors (M, P) and constants (M,) by which the numbers of its forms follow from its measures."""
+        """Factors (M, P) and constants (M,) of the linear map from its measures to the numbers of its forms."""
         factors, constants = zip(*((form.factors, form.constants) for form in self.forms), strict=True)
         return np.concatenate(factors), np.concatenate(constants)
 
     def moved(self, nodes: Sequence[Node]) -> Called:
-        """The call that draws what is nearest to its blocks as they are now; itself if there is none."""
+        """The call whose blocks are nearest to the given nodes in least squares; this call if there is none."""
         factors, constants = self._linear
         values = np.concatenate([block.values for block in self._blocks(nodes)])
         start = np.array([self._table[name] for name in self.pattern.measures])
@@ -103,9 +103,9 @@ class Called:
         return Called.of(self.pattern, table, tuple(loops)) or self
 
     def relations(self, nodes: Sequence[Node]) -> FloatArray:
-        """What holds between the numbers (V,) of its blocks, written one after another, as rows (R, V) of factors.
+        """Linear relations between the concatenated numbers (V,) of its blocks, as rows (R, V) of factors.
 
-        Where a function has numbers of its own, their ratios hold.
+        If a function contains constants, the relations fix their ratios.
         """
         factors, constants = self._linear
         across = np.linalg.svd(factors)[0].T[np.linalg.matrix_rank(factors) :]
@@ -121,7 +121,7 @@ class Called:
         return np.concatenate([across @ inner, *equal])
 
     def _blocks(self, nodes: Sequence[Node]) -> list[Block]:
-        """The blocks within its loops in the form that its function has them in."""
+        """The blocks within its loops, in the forms of its function."""
         chains = [chain[len(self.around) :] for chain in Program(tuple(nodes)).chains]
         return [
             next(
@@ -132,24 +132,24 @@ class Called:
 
 
 def _solid(node: Node) -> bool:
-    """Whether no part is thinner than parts may be."""
+    """Whether all numbers are at least the minimum of their quantity."""
     quantities = language()[node.name].quantities
     return all(value >= least(quantity) for value, quantity in zip(node.values, quantities, strict=True))
 
 
 Part = Node | Called
-"""What is chosen from: blocks, and calls of functions that draw several."""
+"""An element of a selection: a block, or a call of a function that draws several blocks."""
 
 
 class Placed(NamedTuple):
-    """A call, and the places of its blocks among those of a program."""
+    """A call, and the indices of its blocks among those of a program."""
 
     call: Called
     places: Sequence[int]
 
 
 def program_of(part: Part) -> Program:
-    """The program that is a part alone."""
+    """The program of a part alone."""
     return part.program if isinstance(part, Called) else Program((part,))
 
 
@@ -163,7 +163,7 @@ def _nodes(part: Part) -> tuple[Node, ...]:
 
 
 def placed(parts: Sequence[Part]) -> list[Placed]:
-    """The calls among some parts, and where their blocks are in the program of all."""
+    """The calls among some parts, with the indices of their blocks in the program of all parts."""
     starts = np.cumsum([0, *(len(_nodes(part)) for part in parts)]).tolist()
     ranges = itertools.pairwise(starts)
     return [Placed(part, range(*ends)) for part, ends in zip(parts, ranges, strict=True) if isinstance(part, Called)]
@@ -186,12 +186,12 @@ def recognised(program: Program, libraries: Sequence[Library]) -> list[Placed]:
 
 
 def _plain(values: Sequence[Value]) -> tuple[float, ...]:
-    """The numbers that stand in a program without names."""
+    """The values that are numbers; expressions are left out."""
     return tuple(value for value in values if not isinstance(value, Expression))
 
 
 def relations(program: Program, calls: Sequence[Placed]) -> FloatArray:
-    """What holds between the numbers that move of a program with calls, as independent rows (R, F) of factors."""
+    """Linear relations between the free numbers of a program with calls, as independent rows (R, F) of factors."""
     tunable = Tunable(program)
     if not calls:
         return np.zeros((0, len(tunable.moving)))
@@ -207,7 +207,7 @@ def relations(program: Program, calls: Sequence[Placed]) -> FloatArray:
 
 
 def _reduced(rows: FloatArray) -> FloatArray:
-    """Independent rows that ask for the same, as few numbers in each as elimination gives (Gauss and Jordan)."""
+    """Independent rows that span the same space, in reduced row echelon form (Gauss-Jordan elimination)."""
     rows, count = rows.copy(), 0
     for column in range(rows.shape[1]):
         if count < len(rows) and np.abs(rows[count:, column]).max() > FOLLOWS:
@@ -222,7 +222,7 @@ def _reduced(rows: FloatArray) -> FloatArray:
 
 
 def moved(parts: Sequence[Part], program: Program) -> list[Part]:
-    """The same parts where their blocks, in the same order, have other numbers."""
+    """The parts with the numbers of a program, which has the same blocks in the same order."""
     nodes = iter(program.body)
     return [
         part.moved([next(nodes) for _ in part.nodes]) if isinstance(part, Called) else next(nodes) for part in parts
@@ -230,7 +230,7 @@ def moved(parts: Sequence[Part], program: Program) -> list[Part]:
 
 
 def regrouped(parts: Sequence[Part], program: Program) -> list[Part]:
-    """The parts of a program in which single blocks were changed or left out, and calls are as they were."""
+    """The parts of a program in which single blocks were changed or removed, and the blocks of calls are unchanged."""
     waiting = [part for part in parts if isinstance(part, Called)]
     result: list[Part] = []
     index = 0
@@ -246,7 +246,7 @@ def regrouped(parts: Sequence[Part], program: Program) -> list[Part]:
 
 
 def named(parts: Sequence[Part], program: Program) -> Program:
-    """The program of some parts with roles; all that a function leaves open has the commonest one in each call."""
+    """The program of some parts with roles; blocks without a role in their function get the commonest of the call."""
     chains, roles = program.chains, with_roles(program)
     nodes = list(roles.body)
     first = 0

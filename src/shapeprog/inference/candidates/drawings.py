@@ -1,4 +1,4 @@
-"""How statements draw oriented boxes, and blocks that draw the same with fewer numbers or on another side."""
+"""Drawings of oriented boxes by statements, and equivalent blocks with fewer numbers or on another side."""
 
 from __future__ import annotations
 
@@ -33,30 +33,30 @@ STARTS = 192
 """Most starts of a statement without a hint in one box."""
 
 THIN = 0.3
-"""A length may be this share of the least extent, too: the thickness of what has an inside."""
+"""Share of the least extent that is tried as a length too: the wall thickness of hollow solids."""
 
 COUNTS = 6
-"""Most copies that a statement with a count starts from."""
+"""Largest initial value of a count."""
 
 
 def is_unhinted(declared: Statement) -> bool:
-    """Whether a drawing statement, but for those of the paper, does not say how it starts from a box."""
+    """Whether a drawing statement has no hint how it starts from a box; False for the statements of the paper."""
     return declared.hint is None and not declared.is_loop and declared.id > END
 
 
 def drawings(box: Box) -> list[Draw]:
-    """How the statements that have a hint draw a box."""
+    """The drawings of a box by all statements that have a hint."""
     return [drawing for declared in language() if declared.hint is not None for drawing in hinted(declared, box)]
 
 
 def hinted(declared: Statement, box: Box) -> list[Draw]:
-    """How a statement draws a box by its hint; not at all without one."""
+    """The drawings of a box by the hint of a statement; empty without a hint."""
     values = [] if declared.hint is None else [np.array(numbers, np.float32) for numbers in declared.hint(box)]
     return [Draw(declared.name, tuple(numbers.tolist())) for numbers in values]
 
 
 def starts(declared: Statement, box: Box) -> list[Draw]:
-    """How a statement without a hint may draw a box: combinations of what each parameter may be, evenly chosen."""
+    """Possible drawings of a box by a statement without a hint: evenly sampled combinations of parameter values."""
     options = [_options(parameter, box) for parameter in declared.parameters]
     count = math.prod(map(len, options))
     selected = np.unique(np.linspace(0, count - 1, min(count, STARTS)).astype(np.int64))
@@ -66,7 +66,7 @@ def starts(declared: Statement, box: Box) -> list[Draw]:
 
 
 def _options(parameter: Parameter, box: Box) -> FloatArray:
-    """What a parameter may be (N, width): a place of the box, one of its extents or half of it; angles are zero."""
+    """Values (N, width) of a parameter: positions on the box, its extents or half of them; angles are zero."""
     quantity, reach = parameter.quantity, np.abs(box.rotation) @ box.half
     width, half = quantity.width, 1.0 if quantity.high == HALF else 2.0
     if parameter.default is not None:
@@ -88,12 +88,12 @@ def _options(parameter: Parameter, box: Box) -> FloatArray:
 
 
 def redrawn(drawing: Draw, box: Box) -> list[Draw]:
-    """How the same statement draws another box by its hint; how all others do where it has none for it."""
+    """The drawings of another box by the same statement; by all statements if its hint gives none."""
     return hinted(language()[drawing.name], box) or drawings(box)
 
 
 def solid_boxes(nodes: Sequence[Node]) -> list[list[Box]]:
-    """The boxes around all solids that each block draws."""
+    """The boxes around all solids of each block."""
     scene = unroll(encode([Program((node,)) for node in nodes], dtype=torch.float64))
     centre, rotation, half = (tensor.numpy() for tensor in (scene.centre, scene.rotation, bounds(scene)))
     return [
@@ -103,9 +103,9 @@ def solid_boxes(nodes: Sequence[Node]) -> list[list[Box]]:
 
 
 def simplest(node: Node) -> Node:
-    """The same block drawn by the statement that writes the fewest numbers, of those with a hint that draw the same.
+    """The same block drawn by the statement with the fewest numbers, of those with a hint that draw the same solid.
 
-    Nothing changes where the statement turns about an axis of its own, or draws several solids.
+    The block is unchanged if its statement has a pivot or draws several solids.
     """
     if isinstance(node, Loop):
         return Loop(node.name, node.values, tuple(simplest(inner) for inner in node.body))
@@ -120,9 +120,9 @@ def simplest(node: Node) -> Node:
 
 
 def canonical_side(node: Node) -> Node:
-    """The same block with what is mirrored about the middle of the shape drawn on the right, and at the rear.
+    """The same block, where parts mirrored about the middle of the shape are drawn on the right and at the rear.
 
-    Nothing changes where the statement has no drawing of the image, or other loops stand between.
+    The block is unchanged if its statement cannot draw the mirror image, or if it has loops other than mirrors.
     """
     if Program((node,)).blocks != 1:
         return node
@@ -143,7 +143,7 @@ def canonical_side(node: Node) -> Node:
 
 
 def _drawing_the_same(candidates: Sequence[Draw], node: Node, signs: FloatArray) -> Iterator[Draw]:
-    """Those of some drawings whose surface is that of a node, or of its image by these signs of its coordinates."""
+    """The candidates whose surface equals that of a node, or of its mirror image by these signs of the coordinates."""
     if not candidates:
         return
     scene = unroll(encode(Program((node,)), dtype=torch.float64))

@@ -1,4 +1,4 @@
-"""Kernels that compare candidates with each other, and look for copies at equal steps."""
+"""Kernels that compare candidates with each other, and search for copies at equal steps."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ def far(first, second, limit):
     "void(i8[::1], f8[::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8, f8, b1[:, ::1])"
 )
 def copies(kind, scale, spread, skew, lean, moved_spread, moved_skew, moved_lean, tolerance, leaning, out):
-    """Write which candidates (a column) look like each of them after it was moved (a row).
+    """Write whether a candidate (column) has the same shape as a candidate (row) after a transformation.
 
     Parameters
     ----------
     kind
         Numbers (C,) that are equal for equal statements.
     scale
-        How far each reaches from its middle (C,).
+        The size (C,) of each candidate about its middle.
     spread, skew, lean
-        Moments (C, 9) and (C, 3), and how sides differ (C, 3), as they are.
+        Moments (C, 9) and (C, 3), and asymmetry between sides (C, 3), of the candidates.
     moved_spread, moved_skew, moved_lean
         The same after a mirror image or a turn.
     tolerance, leaning
@@ -48,18 +48,18 @@ def copies(kind, scale, spread, skew, lean, moved_spread, moved_skew, moved_lean
 
 @kernel("void(f8[:, ::1], f8, f8, i8[:, ::1])")
 def at_steps(positions, times, stray, out):
-    """Write which place is nearest to where so many steps from place a to place b lead, from a on; -1 if none.
+    """Write the index of the position nearest to ``times`` steps from position a towards b; -1 if none.
 
     Parameters
     ----------
     positions
         Positions (M, 3).
     times
-        Steps taken from the first of two places.
+        Number of steps from the first of two positions.
     stray
-        Distance along each axis below which a place counts as being there.
+        Distance along each axis below which a position matches.
     out
-        Output (M, M), a row for each first place.
+        Output (M, M), a row for each first position.
     """
     count = len(positions)
     for a in range(count):

@@ -1,8 +1,8 @@
-"""Loops over candidates that are copies of each other: runs of equal steps, mirror images, turns, and these of these.
+"""Loops over candidates that are copies of each other: runs of equal steps, mirror images, turns, and nested loops.
 
-Copies are recognised by their moments, so whatever a statement draws, one of a user's own too, becomes a loop in the
-same way.  Mirror images about the middle need not be candidates: noise, holes and what meets them differ, so there the
-surface decides.
+Copies are recognised by their moments, so loops are found for all statements, user-defined ones too.  Mirror images
+about the middle plane need not be candidates: noise, holes and adjacent parts make them differ, so they are compared
+with the surface.
 """
 
 from __future__ import annotations
@@ -29,34 +29,34 @@ ALIKE = 0.08
 """Relative difference of moments up to which two candidates count as copies."""
 
 LEANING = 0.1
-"""The same for how they differ between their sides, in cells."""
+"""The same for the asymmetry between their sides, in cells."""
 
 STRAY = 0.35
-"""Cells by which a copy may miss its place."""
+"""Largest deviation in cells of a copy from its expected position."""
 
 LEAST_STEP = 0.4
-"""Cells between two copies, at least."""
+"""Least distance in cells between two copies."""
 
 MISSING, LEAST_PRESENT = -1, 4
-"""What stands for a copy that is not there, and how many others must be."""
+"""Index of a missing copy, and the least number of present copies in a run with a gap."""
 
 MOST_ALIKE = 48
-"""Most copies of one group that are rolled up: those that come first."""
+"""Most copies of one group that are searched for loops: the first ones."""
 
 MOST_RUNS = 160
-"""Most runs that are made of one set of candidates, the longest."""
+"""Most runs from one set of candidates: the longest."""
 
 APART = 1.6
-"""Least step, in half extents of what is repeated; two are where copies just touch."""
+"""Least step, in half extents of the repeated block; at two, copies just touch."""
 
 POINTS, ON = 48, 0.4
-"""Points on each candidate whose mirror images are sought, and cells within which one is on the surface."""
+"""Points on each candidate whose mirror images are tested, and the largest distance in cells of one on the surface."""
 
 SUPPORTED, AS_WELL = 0.6, 0.8
-"""Share of its points that lie on the surface, at least; and how many as many of its image, at least."""
+"""Least share of its points on the surface, and least ratio of the share of its image to that."""
 
 TURNS = (6, 5, 4, 3)
-"""Copies around the vertical axis of the grid that are looked for."""
+"""Numbers of copies around the vertical axis of the grid that are searched for."""
 
 CENTRED = 0.2
 """Cells within which a mirror plane is taken as the middle plane of the shape, and a step as along an axis."""
@@ -83,8 +83,8 @@ def _rolled(nodes: Sequence[Node]) -> list[Node]:
 
 
 def images(singles: Sequence[Node], surface: FloatArray) -> list[Node]:
-    """Loops over candidates and their mirror images, left and right, in front and behind, and both, where these lie on
-    the surface (P, 3) as well and not over each other."""
+    """Loops over candidates and their mirror images from left to right, front to rear, and both, if the images lie on
+    the surface (P, 3) and do not overlap."""
     if not singles:
         return []
     scene = unroll(encode([Program((node,)) for node in singles], dtype=torch.float64))
@@ -92,7 +92,7 @@ def images(singles: Sequence[Node], surface: FloatArray) -> list[Node]:
     tree = cKDTree(surface)
 
     def on(*axes: int) -> FloatArray:
-        """Share of its points that lie on the surface, of the image of each candidate."""
+        """Share of points on the surface, for the mirror image of each candidate."""
         image = points * [-1.0 if axis in axes else 1.0 for axis in range(3)]
         share: FloatArray = np.isfinite(tree.query(image, distance_upper_bound=ON)[0]).mean(1)
         return share
@@ -114,7 +114,7 @@ def _mirrored(node: Node, axis: int) -> Loop:
 
 
 def rows_and_pairs(stats: Moments) -> Iterator[tuple[int, Loop]]:
-    """The first of candidates that are runs or mirror images, and the loop, without a body, that repeats it."""
+    """The index of the first candidate of each run or mirror pair, and the loop, without a body, that repeats it."""
     for index, count, step in runs(stats):
         yield index, Loop("translate", _values(count, *step), ())
     for axis in (SIDE, DEPTH):
@@ -132,9 +132,9 @@ def _values(*numbers: float) -> tuple[float, ...]:
 
 
 def runs(stats: Moments) -> Iterator[tuple[int, int, tuple[float, float, float]]]:
-    """The first of copies in equal steps, how many they are, and the step; the longest first.
+    """The index of the first copy of each run, the number of copies, and the step; the longest runs first.
 
-    One copy may be missing if four are there: what is drawn in its place is not supported, and pays for that.
+    One copy may be missing if four are present: the copy that fills the gap has no support, which lowers its score.
     """
     step_of: dict[tuple[int, ...], FloatArray] = {}
     for group in groups(stats):
@@ -162,14 +162,14 @@ def runs(stats: Moments) -> Iterator[tuple[int, int, tuple[float, float, float]]
 
 
 def _followed(after: Array, run: list[int]) -> list[int]:
-    """Two copies and all that follow in steps like theirs."""
+    """The run extended by all copies that follow at the same step."""
     while (third := int(after[run[-2], run[-1]])) >= 0 and third not in run:
         run = [*run, third]
     return run
 
 
 def mirrored(stats: Moments, axis: int) -> Iterator[tuple[int, int, float]]:
-    """Pairs of mirror images along an axis, the farther along first, and where the plane between them is."""
+    """Pairs of mirror images along an axis, the one with the larger coordinate first, and their plane."""
     signs = np.ones(3)
     signs[axis] = -1
     across = [k for k in range(3) if k != axis]
@@ -189,7 +189,7 @@ def mirrored(stats: Moments, axis: int) -> Iterator[tuple[int, int, float]]:
 
 
 def turned(stats: Moments, count: int) -> Iterator[int]:
-    """The first of ``count`` copies spread evenly around the vertical axis of the grid."""
+    """The index of the first of ``count`` copies at equal angles around the vertical axis of the grid."""
     angle = 2 * np.pi / count
     turn = np.array([[1, 0, 0], [0, np.cos(angle), -np.sin(angle)], [0, np.sin(angle), np.cos(angle)]])
     middle = stats.middle @ turn.T
@@ -223,7 +223,7 @@ def groups(stats: Moments) -> Iterator[Array]:
 
 
 def _copies(stats: Moments, spread: FloatArray, skew: FloatArray, lean: FloatArray) -> npt.NDArray[np.bool_]:
-    """Which candidates (a column) look like each of them with these moments instead of its own (a row)."""
+    """Whether a candidate (column) has the same shape as a candidate (row) with the given, transformed moments."""
     count = len(stats.kind)
     kind = np.unique(np.array(stats.kind), return_inverse=True)[1]
     original, moved = (stats.spread, stats.skew, stats.lean), (spread, skew, lean)
@@ -234,21 +234,21 @@ def _copies(stats: Moments, spread: FloatArray, skew: FloatArray, lean: FloatArr
 
 
 def _at_steps(positions: FloatArray, times: int) -> Array:
-    """Which place so many steps from one place (a row) to another (a column) lead to, from the first; -1 if none."""
+    """The index of the position ``times`` steps from one position (row) towards another (column); -1 if none."""
     out = np.zeros((len(positions), len(positions)), np.int64)
     at_steps(np.ascontiguousarray(positions), times, STRAY, out)
     return out
 
 
 def _nearest(positions: FloatArray, target: FloatArray) -> Array:
-    """Which place is where it is wanted (..., 3); -1 if none."""
+    """The index of the position at each target (..., 3); -1 if none."""
     off = np.abs(positions - target[..., None, :]).max(-1)
     nearest = off.argmin(-1)
     return np.where(off.min(-1) < STRAY, nearest, -1)
 
 
 def _overlap(spread: FloatArray, steps: FloatArray) -> npt.NDArray[np.bool_]:
-    """Whether copies so far apart (..., 3) lie over each other by much."""
+    """Whether copies at these steps (..., 3) overlap considerably."""
     length = np.linalg.norm(steps, axis=-1)
     reach = np.sqrt(np.einsum("...i,ij,...j->...", steps, spread, steps)) / np.maximum(length, 1e-9)
     overlaps: npt.NDArray[np.bool_] = length < APART * reach
@@ -256,7 +256,7 @@ def _overlap(spread: FloatArray, steps: FloatArray) -> npt.NDArray[np.bool_]:
 
 
 def _backwards(steps: FloatArray) -> npt.NDArray[np.bool_]:
-    """Whether steps (..., 3) go down, or level and to the front, or only to the left: those runs begin at their end."""
+    """Whether steps (..., 3) lead down, or level to the front, or only to the left: such runs are reversed."""
     signs = np.sign(np.where(np.abs(steps) < CENTRED, 0, steps))
     backwards: npt.NDArray[np.bool_] = signs @ np.array([9, 3, 1]) < 0
     return backwards

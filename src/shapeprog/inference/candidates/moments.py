@@ -1,4 +1,4 @@
-"""Moments of what candidates draw, by which copies among them are recognised, whatever their statements."""
+"""Moments of the solids of candidates, by which copies are recognised independently of their statements."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from shapeprog.language.unroll import unroll
 from shapeprog.space import FloatArray
 
 SAME = 0.03
-"""Difference of places and extents, as a share of the size, below which two candidates draw the same."""
+"""Difference of positions and extents, as a share of the size, below which two candidates are the same."""
 
 
 class Moments(NamedTuple):
@@ -28,11 +28,11 @@ class Moments(NamedTuple):
     Parameters
     ----------
     kind
-        The statements and counts that a block is made of.
+        The statements and counts of a block.
     middle, spread, skew
         The mean (C, 3) of the centres of its solids, second moments (C, 3, 3) and third moments (C, 3) about it.
     lean
-        How solids differ between their sides, in cells along each axis (C, 3): where a leg tapers, an arc bulges.
+        Asymmetry of solids between their sides, in cells along each axis (C, 3), as of tapered legs and bulging arcs.
     """
 
     kind: tuple[str, ...]
@@ -43,7 +43,7 @@ class Moments(NamedTuple):
 
     @property
     def size(self) -> FloatArray:
-        """How far a candidate reaches from its middle (C,)."""
+        """Size (C,) of a candidate: the root mean square distance from its middle."""
         return np.sqrt(np.trace(self.spread, axis1=1, axis2=2))
 
 
@@ -53,7 +53,7 @@ def moments(nodes: Sequence[Node]) -> Moments:
 
 
 def moments_of(programs: Sequence[Program]) -> Moments:
-    """The moments of all that each program draws."""
+    """The moments of all solids of each program."""
     scene = unroll(encode(programs, dtype=torch.float64))
     share = scene.mask.double()
     share = share / share.sum(-1, keepdim=True).clamp(min=1)
@@ -70,9 +70,9 @@ def moments_of(programs: Sequence[Program]) -> Moments:
 
 
 def _solid_moments(scene: Scene) -> tuple[Float[Tensor, "C N 3 3"], Float[Tensor, "C N 3"]]:
-    """Second moments that stand for each solid, those of its box, and how its distance differs between its sides.
+    """Second moments of each solid, approximated by those of its box, and the asymmetry of its distance between sides.
 
-    They turn and mirror with the solid, and are the same for solids that are the same however their axes are named.
+    Both turn and mirror with the solid, and do not depend on the order of its axes.
     """
     spread, leans = torch.zeros_like(scene.rotation), torch.zeros_like(scene.centre)
     signs = torch.cartesian_prod(*[torch.tensor([-1.0, 0.0, 1.0], dtype=torch.float64)] * 3)
@@ -98,12 +98,12 @@ def _kind(node: Node) -> str:
 
 
 def distinct(nodes: Sequence[Node]) -> list[Node]:
-    """The first of all candidates of one kind that draw about the same, in their order."""
+    """The candidates without later ones of the same kind and nearly the same moments, in their order."""
     if not nodes:
         return []
     stats = moments(nodes)
     kind = np.unique(stats.kind, return_inverse=True)[1]
-    order = np.round(np.log2(np.maximum(stats.size, SAME)))  # of magnitude
+    order = np.round(np.log2(np.maximum(stats.size, SAME)))  # order of magnitude
     features = np.concatenate([stats.middle, stats.spread.reshape(-1, 9) / np.maximum(stats.size, SAME)[:, None]], 1)
     key = np.column_stack([kind, order, np.round(features / (SAME * 2 ** order[:, None]))])
     return [nodes[k] for k in np.sort(np.unique(key, axis=0, return_index=True)[1])]

@@ -1,8 +1,8 @@
-"""Neighbours of a program: blocks a little different from its own, among which the next choice may find better ones.
+"""Neighbours of a program: variants of its blocks, which are candidates of the next selection.
 
-What was chosen first was found piece by piece.  Only when all of it is known can a block end where the next begins, two
-halves of a board become one, a mirror image be missed, or a run be one copy too short.  All of it works on boxes around
-what is drawn and on loops; how a box is drawn is for the hints of the statements to say.
+The first selection is from candidates for single pieces.  A complete program allows further changes: a block ends where
+the next begins, two halves of a board are merged, a missing mirror image is added, and a run gets one more copy.  All
+changes apply to loops and to boxes around drawings; the hints of the statements give the drawing of a changed box.
 """
 
 from __future__ import annotations
@@ -24,34 +24,34 @@ from shapeprog.language.unroll import unroll
 from shapeprog.space import DEPTH, SIDE, FloatArray
 
 REACH = 4.0
-"""Cells by which a face moves at most to meet another part."""
+"""Largest move in cells of a face to meet another part."""
 
 INTO = 0.05
-"""How far in cells a part that is extended to another reaches into it."""
+"""Depth in cells to which an extended part enters the other part."""
 
 SHORTEST = 0.2
-"""Least length in cells that is left of a part."""
+"""Least length in cells of a shortened part."""
 
 WITHIN = 0.8
 """Share of a face, along each side, within which lines across it are followed."""
 
 GAP = 1.5
-"""Cells between two parts up to which they may be one."""
+"""Largest gap in cells between two parts that may be merged."""
 
 OFF_LEAST, OFF_MOST = 0.02, 2.5
-"""Cells by which the middle of a part is off that of the shape when it may be meant to be there."""
+"""Range in cells of the distance from the middle plane of the shape within which a part may be centred."""
 
 OFF_LINE, OFF_SIZE = 0.35, 0.2
-"""Cells by which parts of one row may be off their places, and by which their extents may differ; or a quarter."""
+"""Largest deviation in cells of the positions of parts of one row, and of their extents; or a quarter, if more."""
 
 LEAST_ROW, PRESENT = 3, 0.75
-"""Fewest parts of a row, and the share of its places where there must be one."""
+"""Fewest parts of a row, and the least share of its positions at which a part is present."""
 
 CORNERS = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
 
 
 def neighbours(program: Program) -> list[Node]:
-    """Blocks close to those of a program, whose nodes are one block each; each once, none of them its own."""
+    """Variants of the blocks of a program, whose nodes are one block each, without duplicates and existing blocks."""
     chains = program.chains
     if not chains:
         return []
@@ -88,7 +88,7 @@ def neighbours(program: Program) -> list[Node]:
 
 
 def _rows(blocks: Sequence[Sequence[Box]]) -> Iterator[Node]:
-    """Rows along an axis of boxes of one size, which are drawn by several blocks now: rungs, slats, shelves."""
+    """Rows along an axis of boxes of one size that belong to several blocks, such as rungs, slats and shelves."""
     boxes = [box for parts in blocks for box in parts]
     owner = np.repeat(np.arange(len(blocks)), [len(parts) for parts in blocks])
     centre = np.array([box.centre for box in boxes])
@@ -115,7 +115,7 @@ def _rows(blocks: Sequence[Sequence[Box]]) -> Iterator[Node]:
 
 
 def _evenly(positions: FloatArray, minimum: float) -> tuple[int, float, float]:
-    """How many equal steps of at least ``minimum`` positions (N,) are, the first place, and the step; 0 if they are not."""
+    """Count, start and step of a row of positions (N,) at equal steps of at least ``minimum``; count 0 if none."""
     positions = np.unique(positions.round(2))
     steps = np.diff(positions)
     steps = steps[steps >= minimum]
@@ -131,14 +131,14 @@ def _evenly(positions: FloatArray, minimum: float) -> tuple[int, float, float]:
 
 
 def drawing_of(chain: Chain) -> Draw:
-    """What a block draws in its loops."""
+    """The drawing of a block inside its loops."""
     drawing = chain[-1]
     assert isinstance(drawing, Draw)
     return drawing
 
 
 def with_drawing(chain: Chain, drawing: Draw) -> Node:
-    """A block with another drawing in its loops."""
+    """A block with another drawing inside its loops."""
     return nest((*chain[:-1], drawing))
 
 
@@ -153,7 +153,7 @@ def _unlooped(chain: Chain) -> Iterator[Node]:
 
 
 def _mirrored(chain: Chain) -> Iterator[Node]:
-    """A block and its mirror image about the middle of the shape; and the same for what its first loop repeats."""
+    """A block mirrored about the middle planes of the shape; and the same for the body of its first loop."""
     for axis in (SIDE, DEPTH):
         if not any(mirrors(node, axis) for node in chain):
             mirror = Loop("mirror", (2.0, float(axis), 0.0), ())
@@ -185,7 +185,7 @@ def _centres(node: Node) -> FloatArray:
 
 
 def _filled(chain: Chain) -> Iterator[Node]:
-    """A board in the place of a run."""
+    """A board instead of a run."""
     for index in range(len(chain) - 1):
         (parts,) = solid_boxes([nest(chain[index:])])
         around = _around(parts[0], parts)
@@ -194,7 +194,7 @@ def _filled(chain: Chain) -> Iterator[Node]:
 
 
 def _merged(first: Box, second: Box) -> Iterator[Box]:
-    """The box around two that nearly touch, in the directions of the larger."""
+    """The box around two boxes that nearly touch, with the orientation of the larger."""
     if first.half.prod() < second.half.prod():
         first, second = second, first
     inner = np.abs((second.centre - first.centre) @ first.rotation)
@@ -204,7 +204,7 @@ def _merged(first: Box, second: Box) -> Iterator[Box]:
 
 
 def _around(frame: Box, parts: Sequence[Box]) -> Box:
-    """The smallest box in the directions of one that holds several."""
+    """The smallest box with the orientation of ``frame`` that contains all parts."""
     corners = np.concatenate([part.centre + (CORNERS * part.half) @ part.rotation.T for part in parts])
     local = corners @ frame.rotation
     low, high = local.min(0), local.max(0)
@@ -212,9 +212,10 @@ def _around(frame: Box, parts: Sequence[Box]) -> Box:
 
 
 def met(box: Box, parts: Sequence[Box], within: Sequence[float] = (WITHIN,), *, longer: bool = False) -> Iterator[Box]:
-    """A box with one face moved to where a line across the face, at its middle or near a corner, enters a part.
+    """A box with one face moved to where a line normal to the face, at its middle or near a corner, enters a part.
 
-    ``within`` says how near a corner, as shares of the face; ``longer`` that the face moves outwards only.
+    ``within`` are the distances from the middle to the lines, as shares of those to the corners.  ``longer`` restricts
+    the face to outward moves.
     """
     for axis in range(3):
         corners = CORNERS * box.half * (np.arange(3) != axis)
@@ -234,8 +235,10 @@ def met(box: Box, parts: Sequence[Box], within: Sequence[float] = (WITHIN,), *, 
 
 
 def centred(box: Box) -> Iterator[Box]:
-    """A box that is a little off the middle plane of the shape, left to right or in depth: as far on both sides as it
-    is on one of them."""
+    """Boxes centred on the middle plane of the shape, left to right or in depth, from a box that is slightly off it.
+
+    One of the two ends of the box stays.
+    """
     for axis in (SIDE, DEPTH):
         along = int(np.abs(box.rotation[axis]).argmax())
         off = abs(float(box.centre[axis]))
@@ -248,7 +251,7 @@ def centred(box: Box) -> Iterator[Box]:
 
 
 def _crossed(starts: FloatArray, along: FloatArray, part: Box) -> set[float]:
-    """How far along lines (L, 3) of one direction these enter a box, and a little deeper for a joint."""
+    """Distances at which lines (L, 3) of one direction enter a box, increased by ``INTO`` for a joint."""
     at, step = (starts - part.centre) @ part.rotation, along @ part.rotation
     step = np.where(np.abs(step) < 1e-9, 1e-9, step)
     first, second = (-part.half - at) / step, (part.half - at) / step

@@ -1,7 +1,8 @@
-"""Recognition: where blocks that were found on their own may be what one call of a function draws.
+"""Recognition of calls of functions among single blocks.
 
-What a function draws is linear in its measures once its counts are known.  So some blocks of the right kinds give them
-by least squares, and the residual tells whether these belong together; a block that nobody found follows from the rest.
+For fixed counts, the numbers of the blocks of a function are linear in its measures.  Blocks of the right kinds give
+the measures by least squares.  The residual decides whether the blocks belong to one call, and the measures give the
+missing blocks.
 """
 
 from __future__ import annotations
@@ -29,32 +30,32 @@ from shapeprog.library.matching import Form, Pattern
 from shapeprog.space import FloatArray
 
 LOOSE = 0.6
-"""How far in cells a block that was found may be from where a function draws it."""
+"""Largest difference in cells between a block and the same block drawn by a function."""
 
 MISSED = 0.3
-"""What a block that nobody found counts, in cells of such a distance."""
+"""Cost of a missing block, in cells of such a difference."""
 
 FOLLOWED = 128
-"""Most ways to take blocks for some of a function that are followed up."""
+"""Most partial assignments of blocks to a function that are continued (beam width)."""
 
 ALIKE = 400
-"""Most blocks of one kind that are looked at, the first of those found."""
+"""Most blocks of one kind that are considered: the first ones."""
 
 OFFERED, GUESSED = 48, 96
-"""Most calls of one function that compete: those all of whose blocks were found, and others."""
+"""Most calls of one function that compete: those without missing blocks, and others."""
 
 GUESSES = 2.0 * np.array([k for k in range(-12, 13) if k])
-"""Where a number that found blocks say nothing about may be, in cells from what is usual."""
+"""Values of a number that the blocks leave undetermined, in cells relative to its usual value."""
 
 HIDDEN = 0.1
-"""How far in cells a part may stand out of another part and still be hidden in it."""
+"""Largest protrusion in cells of a part that is hidden in another part."""
 
 SAME = 0.05
 """Difference of arguments in cells below which two calls are the same."""
 
 
 def proposed(patterns: Sequence[Pattern], nodes: Sequence[Node], deadline: Deadline = NEVER) -> list[Called]:
-    """Calls of functions that draw about what some blocks draw, the nearest of each function first."""
+    """Calls of functions that draw nearly the same as some blocks, the nearest of each function first."""
     if not patterns or not nodes:
         return []
     pool = _Pool(nodes, patterns)
@@ -65,7 +66,7 @@ def proposed(patterns: Sequence[Pattern], nodes: Sequence[Node], deadline: Deadl
 
 
 def _hides(parts: Sequence[Box]) -> bool:
-    """Whether one of the parts of a call lies inside another: nobody would say a solid block as a drawer in a case."""
+    """Whether one of the parts of a call lies inside another, as a drawer in a case that describes a solid block."""
     corners = [part.centre + (CORNERS * part.half) @ part.rotation.T for part in parts]
     return any(
         bool((np.abs((corner - around.centre) @ around.rotation) <= around.half + HIDDEN).all())
@@ -76,10 +77,10 @@ def _hides(parts: Sequence[Box]) -> bool:
 
 
 class _Pool:
-    """The numbers of blocks by their kind, whatever their role, and by their counts.
+    """The numbers of blocks by kind, without role, and by counts.
 
-    A function may draw a block by another statement than the one that wrote it best on its own, so those that it draws
-    by are tried on the boxes of all blocks.
+    A function may draw a block by another statement than the best one for the single block, so the statements of the
+    functions are applied to the boxes of all blocks.
     """
 
     def __init__(self, nodes: Sequence[Node], patterns: Sequence[Pattern]) -> None:
@@ -103,19 +104,19 @@ class _Pool:
                 rows.setdefault(np.round(block.values, CELLS).tobytes(), block.values)
 
     def like(self, form: Form) -> FloatArray:
-        """The numbers (N, M) of those that are of the kind of a form."""
+        """The numbers (N, M) of the blocks with the kind of a form."""
         rows = self._rows.get((replace(form.block.kind, word=""), form.block.counts), {})
         return np.array([*rows.values()]).reshape(len(rows), len(form.constants))
 
 
 def _pointed(patterns: Sequence[Pattern]) -> list[str]:
-    """The statements by which functions draw what is not told by the box around it."""
+    """The statements in functions whose drawings do not follow from their bounding box."""
     forms = (form for pattern in patterns for form in pattern.forms_at(pattern.arguments))
     return sorted({form.block.kind.shape for form in forms if not form.block.kind.boxed})
 
 
 def _calls(pattern: Pattern, pool: _Pool, deadline: Deadline) -> list[Called]:
-    """The calls of one function that are nearest to blocks of a pool, and loops around them."""
+    """The calls of one function that are nearest to blocks of a pool, and loops over them."""
     solutions: list[tuple[float, dict[str, float]]] = []
     for counts in pattern.choices(pool.counts):
         if deadline.passed("the search for calls of functions"):
@@ -127,7 +128,7 @@ def _calls(pattern: Pattern, pool: _Pool, deadline: Deadline) -> list[Called]:
             if pattern.counts and any(
                 form.block.counts and not len(rows) for form, rows in zip(forms, offered, strict=True)
             ):
-                continue  # only blocks that are found tell how often they are repeated
+                continue  # counts follow from blocks of the pool only
             for cost, values in _nearest(forms, offered, start):
                 solutions.append((cost, usual | dict(zip(pattern.measures, values, strict=True))))
     solutions.sort(key=lambda solution: solution[0])
@@ -137,7 +138,7 @@ def _calls(pattern: Pattern, pool: _Pool, deadline: Deadline) -> list[Called]:
 
 
 def _tidy(pattern: Pattern, solutions: Iterable[dict[str, float]], limit: int) -> list[Called]:
-    """The first calls with these numbers, each once."""
+    """The first calls with these numbers, without duplicates."""
     calls: list[Called] = []
     for numbers in solutions:
         call = Called.of(pattern, numbers)
@@ -149,14 +150,14 @@ def _tidy(pattern: Pattern, solutions: Iterable[dict[str, float]], limit: int) -
 
 
 def _repeated(calls: Sequence[Called]) -> Iterator[Called]:
-    """Runs and mirror images of calls that draw the same."""
+    """Loops over calls that are copies of each other: runs and mirror images."""
     stats = moments_of([call.program for call in calls]) if len(calls) > 1 else None
     for index, loop in rows_and_pairs(stats) if stats else ():
         yield replace(calls[index], around=(loop,))
 
 
 class _Assignment(NamedTuple):
-    """Blocks taken for some forms of a function, in S ways: their numbers (S, M), and what each way costs (S,)."""
+    """S assignments of blocks to some forms of a function: the numbers (S, M) of the blocks, and costs (S,)."""
 
     forms: tuple[int, ...]
     values: FloatArray
@@ -166,9 +167,9 @@ class _Assignment(NamedTuple):
 def _nearest(
     forms: Sequence[Form], offered: Sequence[FloatArray], start: FloatArray
 ) -> Iterator[tuple[float, list[float]]]:
-    """What it costs to take some of the blocks offered for each form of a function, and the measures that they give.
+    """The costs of assignments of offered blocks to the forms of a function, and the measures that follow from them.
 
-    What they leave open of the measures is as at the ``start``.
+    Measures that an assignment does not determine keep their values of ``start``.
     """
     ways = [_Assignment((), np.zeros((1, 0)), np.zeros(1))]
     for k, blocks in enumerate(offered):
@@ -197,14 +198,14 @@ def _nearest(
 
 
 def _undetermined(forms: Sequence[Form]) -> FloatArray:
-    """Changes (G, P) of measures that forms say nothing about, if that leaves one number open."""
+    """Changes (G, P) of the measures that forms do not determine, if these have one degree of freedom."""
     factors = np.concatenate([form.factors for form in forms])
     free = np.linalg.svd(factors)[2][np.linalg.matrix_rank(factors) :]
     return np.outer(GUESSES, free[0] / np.abs(free[0]).max()) if len(free) == 1 else np.zeros((0, factors.shape[1]))
 
 
 def _solved(forms: Sequence[Form], values: FloatArray, start: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """The measures (S, P) nearest to a start that make blocks of these numbers (S, M); how far off these are (S,)."""
+    """The least-squares measures (S, P), nearest to ``start``, for numbers (S, M) of blocks; largest residuals (S,)."""
     factors = np.concatenate([form.factors for form in forms])
     constants = np.concatenate([form.constants for form in forms])
     away = values - constants - factors @ start

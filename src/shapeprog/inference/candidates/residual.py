@@ -1,4 +1,4 @@
-"""Candidates for what a program does not explain: boxes around clusters of points far from its surface."""
+"""Candidates for unexplained points: boxes around clusters of points far from the surface of a program."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ FAR = 1.5
 """Distance from the surface of the program, in tolerances, from which a point is not explained."""
 
 NEAR = 2.0
-"""Distance between points of one cluster, in sides of the square that a point stands for."""
+"""Distance between points of one cluster, as a multiple of the square root of the area per point."""
 
 LEAST, MOST = 8, 24
-"""Points of the smallest cluster, and most clusters."""
+"""Points of the smallest cluster, and the largest number of clusters."""
 
 
 def residual_candidates(program: Program, evidence: Evidence) -> list[Node]:
-    """Drawings of the boxes around clusters of visible points that a program is far from, and their mirror images."""
+    """Drawings of the boxes around clusters of visible points far from a program, and their mirror images."""
     tensor = torch.from_numpy(evidence.points)
     far = signed_distance(unroll(program), tensor).abs().numpy() > FAR * evidence.tolerance
     points = evidence.points[far & (evidence.weights > evidence.weights.max() / 2)]

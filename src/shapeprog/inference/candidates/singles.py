@@ -1,8 +1,8 @@
 """Single drawing statements as candidates, one for each piece of a target.
 
-Every statement with a hint is tried on every piece, those without one on the most important pieces in many ways.  The
-best are fitted to the points of the piece.  Of those that then fit about equally well the one with the fewest numbers
-is kept, so that copies are drawn alike, and the best one.
+Every statement with a hint is tried on every piece; statements without a hint are tried on the most important pieces,
+with many starts.  The best are fitted to the points of the piece.  Of those with nearly equal misfit, the one with the
+fewest numbers is a candidate, so that copies have the same statement, and the best one.
 """
 
 from __future__ import annotations
@@ -32,29 +32,29 @@ NEAR = 0.3
 """Cells around a piece within which points of the surface belong to it."""
 
 POINTS, SEEN = 64, 5_000
-"""Points of a piece by which statements are compared, and points of the surface among which they are looked for."""
+"""Points of a piece by which statements are compared, and points of the surface from which they are sampled."""
 
 FITTED = 48
 """Pieces to which statements are fitted, and on which those without a hint are tried: the most important ones."""
 
 GOOD, WORTH = 0.08, 0.3
-"""Misfit up to which no fitting is needed; and how much worse than the best one a statement may be to be worth it."""
+"""Misfit up to which no fitting is needed, and largest excess over the best misfit of a statement that is fitted."""
 
 STEPS, WIDTH = 8, 0.3
-"""Gauss-Newton steps of fitting, and residuals in cells that count for a quarter."""
+"""Gauss-Newton steps of fitting, and the residual in cells whose weight is a quarter."""
 
 PRIOR, FARTHEST = 3e-2, 2.0
-"""Weight of a squared move by a cell from the start, for each point; and the farthest move of one number in a step."""
+"""Weight of a squared move by a cell from the start, per point; and the largest change of one number in a step."""
 
 WRONG = 0.5
-"""Distance in cells that counts as much as a normal at a right angle."""
+"""Distance in cells that has the same misfit as a normal at a right angle."""
 
 OFFSET = 0.01
-"""Cells off the surface at which the direction of a solid is taken: on a surface itself the distance has no slope."""
+"""Distance in cells from the surface at which gradients are evaluated: the distance has no gradient on the surface."""
 
 SLACK, BETTER = 0.05, 2 / 3
-"""How much worse than the best a statement may fit if it writes fewer numbers; and the share of its misfit below which
-a good one is a candidate too."""
+"""Largest excess over the best misfit of a statement with fewer numbers; and the share of its misfit below which the
+best statement is a candidate too."""
 
 
 class Target(NamedTuple):
@@ -64,12 +64,12 @@ class Target(NamedTuple):
     normals: Float[Tensor, "B P 3"]
 
     def take(self, rows: Array) -> Target:
-        """Those of some of the pieces."""
+        """The target of some of the pieces."""
         return Target(self.points[rows], self.normals[rows])
 
     @property
     def shifted(self) -> Float[Tensor, "B P 3"]:
-        """Just off the points: on a surface itself the distance has no slope."""
+        """The points shifted along their normals: the distance has no gradient on the surface."""
         return self.points + OFFSET * self.normals
 
 
@@ -111,10 +111,10 @@ def _minimum(misfit: FloatArray, owner: Array, count: int) -> FloatArray:
 
 
 def fitted(draws: Sequence[Draw], target: Target) -> list[Draw]:
-    """Statements brought onto their points by Gauss-Newton steps with a prior on their numbers, all at once.
+    """Statements fitted to their points by Gauss-Newton steps with a prior on their numbers, in one batch.
 
-    Residuals are distances of the points to the surface; each has the numbers of its statement to itself, so that one
-    backward pass gives all derivatives.
+    Residuals are distances of the points to the surface.  Each residual has a separate copy of the numbers of its
+    statement, so one backward pass gives all derivatives.
     """
     if not draws:
         return []
@@ -144,7 +144,7 @@ def fitted(draws: Sequence[Draw], target: Target) -> list[Draw]:
 
 
 def misfits(draws: Sequence[Draw], target: Target) -> FloatArray:
-    """How far each statement (B,) is from its points: mean distance over ``WRONG`` plus 1 - the mean cosine."""
+    """Misfit (B,) of each statement to its points: mean distance over ``WRONG`` plus 1 - the mean cosine."""
     if not draws:
         return np.zeros(0)
     shifted = target.shifted.requires_grad_()
@@ -157,7 +157,7 @@ def misfits(draws: Sequence[Draw], target: Target) -> FloatArray:
 
 
 def _target(pieces: Pieces) -> tuple[Target, Array]:
-    """Points of the surface close to the faces of the pieces that have some, and which pieces these are (N,)."""
+    """Points of the surface close to the faces of the pieces, and the indices (N,) of the pieces with such points."""
     step = max(1, len(pieces.cloud.points) // SEEN)
     points, normals = (np.ascontiguousarray(array[::step]) for array in (pieces.cloud.points, pieces.cloud.normals))
     mask = np.zeros((len(pieces.boxes.half), len(points)), np.bool_)

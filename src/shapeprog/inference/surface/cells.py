@@ -1,4 +1,4 @@
-"""Surface points for a shape that is known by its cells alone."""
+"""Surface points for a shape that is given as cells."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ import numpy.typing as npt
 from shapeprog.space import HALF, SPAN
 
 INSET = 0.65
-"""How far below the faces of its touched cells a surface lies on average, in cells; chosen on val.
+"""Mean depth in cells of a surface below the faces of its touched cells; tuned on val.
 
-A surface is anywhere within the cells that it touches, so the touched solid is too fat by up to a cell each side.
+A surface is anywhere within the cells that it touches, so the touched solid is too large by up to a cell on each side.
 """
 
 
 def points_of_cells(
     voxels: npt.NDArray[np.bool_], count: int = 5000, *, inset: float = INSET, seed: int = 0
 ) -> npt.NDArray[np.float32]:
-    """Points (count, 3) where the surface of a shape with these touched cells probably is, in the grid frame.
+    """Points (count, 3) on the estimated surface of a shape with these touched cells, in the grid frame.
 
     Uniform on the exposed faces of the cells, moved inwards by ``inset``; a face at the end of the longest side
     is exact, since that side is 24 cells long by definition, and stays.
@@ -40,20 +40,20 @@ def points_of_cells(
 
 
 def exposed_faces(voxels: npt.NDArray[np.bool_]) -> npt.NDArray[np.int64]:
-    """Faces between a touched cell and one that is not: cell (3), axis, and on which side of the cell: (F, 5)."""
+    """Faces (F, 5) between a touched and an untouched cell: the cell (3), the axis, and the side of the cell."""
     padded, faces = np.pad(voxels, 1), []
     for axis in range(3):
         for sign in (-1, 1):
             beyond = np.roll(padded, -sign, axis)[1:-1, 1:-1, 1:-1]
             cells = np.argwhere(voxels & ~beyond)
             faces.append(np.column_stack([cells, np.full(len(cells), axis), np.full(len(cells), sign)]))
-    return np.ascontiguousarray(np.concatenate(faces))  # as kernels want what is made of it
+    return np.ascontiguousarray(np.concatenate(faces))  # kernels need contiguous arrays
 
 
 def exposed(
     voxels: npt.NDArray[np.bool_], cells: npt.NDArray[np.int64], axis: npt.NDArray[np.int64], sign: int
 ) -> npt.NDArray[np.bool_]:
-    """Which cells (C, 3) have an empty one beside them, each along an axis of its own (C,)."""
+    """Whether the neighbour of each cell (C, 3) along its axis (C,) is empty."""
     neighbours = cells + 1 + sign * np.eye(3, dtype=np.int64)[axis]
     empty: npt.NDArray[np.bool_] = ~np.pad(voxels, 1)[tuple(neighbours.T)]
     return empty

@@ -1,8 +1,8 @@
-"""A surface as points with normals, and which points are near each other.
+"""A surface as points with normals and nearest neighbours.
 
-Points of a clean scan lie on planes with their nearest neighbours wherever the surface is flat: the more of them are
-used, the sharper are thin parts and edges.  With noise, points that are nearer to each other than it is large give no
-direction, and fewer of them show more.
+Points of a clean scan lie on planes with their nearest neighbours wherever the surface is flat; more points resolve
+thin parts and edges better.  In a noisy scan, points closer to each other than the noise give no direction, so fewer
+points are better.
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ AROUND = 20
 """Neighbours from which a normal is estimated."""
 
 NOISY = 0.05
-"""Noise in cells above which points are projected onto planes, and normals are trusted less."""
+"""Noise in cells above which points are projected onto planes, and normals are less reliable."""
 
 PROJECTED, PROJECTIONS = 24, 2
-"""Neighbours that make such a plane, and how often points are projected."""
+"""Neighbours to which such a plane is fitted, and the number of projections."""
 
 CLOSEST = 1e-3
 """Least spacing in cells: points may coincide."""
@@ -36,17 +36,17 @@ LIKE = 0.98
 
 
 FLAT_NEIGHBOURS = 8
-"""Points, one and its nearest neighbours, that lie on a plane of a clean scan."""
+"""Number of points, including neighbours, that lie on a plane of a clean scan."""
 
 FLATTEST, CLEAN = 0.1, 0.02
-"""Share of the points that may be expected to lie where the surface is flat; and noise in cells about their planes of a
-scan that is clean."""
+"""Least share of the points on flat surface that is assumed; and the largest noise in cells about their planes of a
+clean scan."""
 
 
 class Cloud(NamedTuple):
-    """Points (N, 3) on a surface with unit normals (N, 3) of either sign, near points (N, k), and how exact it all is.
+    """Points (N, 3) on a surface with unit normals (N, 3) of either sign, nearest neighbours (N, k), spacing and noise.
 
-    ``spacing`` is the side of the square that a point stands for; ``noise`` how far points are off their planes.
+    ``spacing`` is the square root of the area per point; ``noise`` the distance of points from their planes, in cells.
     """
 
     points: FloatArray
@@ -59,14 +59,15 @@ class Cloud(NamedTuple):
 def cloud_of(points: Array, normals: Array | None = None) -> Cloud:
     """The cloud of points in cells, at least one.
 
-    Where no normals are given, they are those of planes through near points, on which noisy points are projected first.
+    Without normals, they are estimated from planes through nearest neighbours; noisy points are first projected onto
+    these planes.
     """
     cloud = _cloud(points, normals)
     return _cloud(projected(cloud.points), None) if normals is None and cloud.noise > NOISY else cloud
 
 
 def projected(points: FloatArray) -> FloatArray:
-    """Points (N, 3) moved onto planes through their neighbours, near ones first (Alexa et al. 2003), some times."""
+    """Points (N, 3) projected repeatedly onto weighted planes through their neighbours (Alexa et al. 2003)."""
     for _ in range(PROJECTIONS):
         distance, neighbours = cKDTree(points).query(points, k=min(PROJECTED, len(points)))
         normals, _ = planes(points, neighbours)
@@ -90,13 +91,13 @@ def _cloud(points: Array, normals: Array | None) -> Cloud:
 
 
 def plane_normals(points: FloatArray, neighbours: npt.NDArray[np.int64]) -> tuple[FloatArray, float]:
-    """Unit normals (N, 3) of the planes that fit near points (N, k) best, and how far these usually are from them."""
+    """Unit normals (N, 3) of the best planes through neighbours (N, k), and the typical distance of these from them."""
     normals, squared = planes(points, neighbours)
     return normals, float(np.sqrt(np.median(squared) / neighbours.shape[1]))
 
 
 def planes(points: FloatArray, neighbours: npt.NDArray[np.int64]) -> tuple[FloatArray, FloatArray]:
-    """Unit normals (N, 3) of planes that fit near points (N, k) best, and sums (N,) of their squared distances."""
+    """Unit normals (N, 3) of the best planes through neighbours (N, k), and sums (N,) of squared distances."""
     off = points[neighbours]
     off -= off.mean(1, keepdims=True)
     squared, axes = np.linalg.eigh(off.transpose(0, 2, 1) @ off)
@@ -104,7 +105,7 @@ def planes(points: FloatArray, neighbours: npt.NDArray[np.int64]) -> tuple[Float
 
 
 def roughness(points: FloatArray, normals: FloatArray, neighbours: npt.NDArray[np.int64]) -> float:
-    """How far near points that face the same way usually are from the plane of a point."""
+    """Median distance of neighbours with similar normals from the plane of a point."""
     parallel = np.abs(np.einsum("nki,ni->nk", normals[neighbours[:, 1:]], normals)) > LIKE
     off = np.abs(np.einsum("nki,ni->nk", points[neighbours[:, 1:]] - points[:, None], normals))[parallel]
     return float(np.median(off)) if len(off) else 0.0
@@ -116,7 +117,7 @@ def tolerance(cloud: Cloud) -> float:
 
 
 def points_of_scan(shape: Shape) -> FloatArray:
-    """The points (P, 3) to look at of a shape that came as points: of a clean scan all, of others the usual number."""
+    """The points (P, 3) of a shape given as points: all of a clean scan, the default number of others."""
     assert shape.points is not None
     if shape.scan is not None and is_clean(np.asarray(shape.scan, np.float64)):
         return np.asarray(shape.scan, np.float64)

@@ -1,4 +1,4 @@
-"""The connected components of a mesh, whatever way its triangles were written down, and copies among them."""
+"""The connected components of a mesh, independent of the order and winding of its triangles."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ OPEN = 0.02
 """Share of its edges at which a component may be open and yet bound a solid."""
 
 THICK = 0.2
-"""Least thickness of such a solid in cells, on average: the volume of a crumpled sheet says nothing about its sides."""
+"""Least thickness of such a solid in cells, on average: the sign of the volume of a crumpled sheet is random."""
 
 
 class Components(NamedTuple):
-    """Components by falling area, and the welded mesh they are made of.
+    """Components by falling area, and the welded mesh that contains them.
 
     ``vertices`` (V, 3); ``faces`` (F, 3), each once, those of one component after another, ``face_start`` (G + 1,);
     ``corner`` (C,) the vertices of each component in the order of the file, ``corner_start`` (G + 1,); ``area`` (G,).
@@ -36,12 +36,12 @@ class Components(NamedTuple):
     area: FloatArray
 
     def component_of(self, face: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
-        """The components that some faces are of."""
+        """The indices of the components that contain some faces."""
         return np.searchsorted(self.face_start, face, side="right") - 1
 
 
 def components(vertices: Array, faces: Array) -> Components:
-    """The components of a triangle mesh in cells, once vertices are welded and doubled and empty faces left out."""
+    """The components of a triangle mesh in cells, after welding vertices and removing duplicate and empty faces."""
     welded, listed = weld(np.asarray(vertices, np.float64), np.asarray(faces, np.int64))
     listed, area = unique_faces(welded, listed)
     label = linked(np.concatenate([listed[:, :2], listed[:, 1:]]), len(welded))
@@ -65,7 +65,7 @@ def components(vertices: Array, faces: Array) -> Components:
 
 
 def weld(vertices: FloatArray, faces: npt.NDArray[np.int64]) -> tuple[FloatArray, npt.NDArray[np.int64]]:
-    """Vertices that coincide made one, in the order in which faces first use them, and the faces."""
+    """Vertices with coinciding ones merged, in the order of first use by faces, and the faces."""
     used = np.zeros(len(vertices), np.bool_)
     used[faces.reshape(-1)] = True
     cell = np.round(vertices[used] / WELD + 0.3).astype(np.int64)  # round numbers are well inside their cell
@@ -83,7 +83,7 @@ def weld(vertices: FloatArray, faces: npt.NDArray[np.int64]) -> tuple[FloatArray
 
 
 def unique_faces(vertices: FloatArray, faces: npt.NDArray[np.int64]) -> tuple[npt.NDArray[np.int64], FloatArray]:
-    """The faces that have an area, each once whichever way round it is, and their areas."""
+    """The faces with an area, without duplicates of either winding, and their areas."""
     ordered, count = np.sort(faces, axis=1), len(vertices)
     _, pair = np.unique(ordered[:, 0] * count + ordered[:, 1], return_inverse=True)
     _, first = np.unique(pair * count + ordered[:, 2], return_index=True)
@@ -94,10 +94,10 @@ def unique_faces(vertices: FloatArray, faces: npt.NDArray[np.int64]) -> tuple[np
 
 
 def solid_sides(mesh: Components) -> npt.NDArray[np.int64]:
-    """Of each face (F,) 1 if it is of a component that bounds a solid and faces outwards, -1 if inwards, else 0.
+    """For each face (F,) of a component that bounds a solid, 1 if it faces outwards and -1 if inwards; 0 for others.
 
-    At each edge of a closed surface as many faces run one way as the other, and the volume that it encloses is above
-    zero where they face outwards.
+    At each edge of a closed surface, equally many faces run in both directions, and the signed volume is positive if
+    the faces point outwards.
     """
     faces, counts = mesh.faces, np.diff(mesh.face_start)
     component = np.repeat(np.arange(len(counts)), counts)
@@ -114,6 +114,6 @@ def solid_sides(mesh: Components) -> npt.NDArray[np.int64]:
 
 
 def linked(pairs: Array, count: int) -> npt.NDArray[np.int64]:
-    """The connected component (count,) that each of so many items is of, from pairs (P, 2) that are linked."""
+    """The connected component (count,) of each of ``count`` items, from linked pairs (P, 2)."""
     graph = coo_matrix((np.ones(len(pairs), np.bool_), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
     return np.asarray(connected_components(graph, directed=False)[1], np.int64)

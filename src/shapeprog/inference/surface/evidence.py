@@ -1,10 +1,10 @@
-"""What is known of a target: points of its surface that a program should explain, and space that it should leave free.
+"""Evidence of a target: points of its surface that a program should explain, and space that it should leave free.
 
 =======  ============================================  ==========================================================
 target   points and normals                            space known to be free
 =======  ============================================  ==========================================================
-mesh     drawn by area; faces that are doubled once    what can be seen from outside
-points   as they are; normals of the planes near them  what can be seen through: a missing side shows nothing
+mesh     sampled by area; duplicate faces count once   cells that are visible from outside
+points   the points; normals of local planes           cells with clear rays in opposite directions
 cells    the exposed faces of the cells                the empty cells
 =======  ============================================  ==========================================================
 """
@@ -32,10 +32,10 @@ from shapeprog.language.unroll import unroll
 from shapeprog.space import HALF, RESOLUTION, SPAN, FloatArray
 
 POINTS, SURFACE = 6_000, 40_000
-"""Points that are to be explained, and points of the same surface that tell whether a program has a reason."""
+"""Points to be explained, and points of the same surface that support the surface of a program."""
 
 TOLERANCE = 0.008 * SPAN
-"""How far a surface may be from a clean point and explain it; .8 % of the longest side."""
+"""Largest distance between a clean point and a surface that explains it; .8 % of the longest side."""
 
 NOISE = 2.0
 """The same for scans, in standard deviations of their noise."""
@@ -44,66 +44,67 @@ CELL_TOLERANCE = 0.65
 """The same for cells: a surface is anywhere within the cells that it touches."""
 
 THIN = 0.5
-"""Thickness of what is one cell thick, on average: .50 of parts of furniture (IKEA, val)."""
+"""Mean thickness of parts that are one cell thick: .50 for parts of furniture (IKEA, val)."""
 
 AGREEMENT, SCANNED = 0.5, 0.6
-"""Least cosine between normals that fit; and of scans, of which noise could pass for a surface otherwise.
+"""Least cosine between normals that agree; and for scans, where noise could be mistaken for a surface otherwise.
 
-It only tells sides apart: near an edge of a thin part the nearest surface is often another, a slope of cells a stair.
+The bound is wide, to separate the two sides of a part only: near an edge of a thin part the nearest surface is often
+another one, and a slope in cells is a staircase.
 """
 
 HIDDEN = 0.1
 """Weight of a point that cannot be seen from outside."""
 
 MOST_TOLERANCE = 0.75
-"""Beyond this a scan says too little about where its surface is: nothing is gained by believing it more."""
+"""Largest tolerance of a scan: with more noise, the position of its surface is too uncertain for a wider tolerance."""
 
 NEIGHBOURS = 16
-"""Points of a scan that make a plane."""
+"""Points of a scan to which a plane is fitted."""
 
 FLAT = 0.25
-"""Quantile of the noise about such planes that is believed: at edges and in thin parts they do not fit anyway."""
+"""Quantile of the distances to such planes that is the noise: at edges and in thin parts the planes do not fit."""
 
 AGREED = 0.95
-"""Share of the normals known to point outwards, or inwards, that must agree before those of all are believed."""
+"""Least share of the oriented normals that agree in sign, for all normals to get that sign."""
 
 LOOKING, FREE = 128, 64
-"""Cells along each side of the grids in which points look outwards, and in which space is free."""
+"""Cells along each side of the grid for visibility, and of the grid of free space."""
 
 WALL = 0.5 + 1e-6
-"""Half the side in cells of what a triangle must meet: the longest side ends where cells do, and rounding would leave
-holes in faces there, through which the whole inside is seen."""
+"""Half the side in cells of the cube that a triangle must intersect.  The longest side ends on cell boundaries, and
+rounding would leave holes in faces there, through which the inside is visible."""
 
 DIRECTIONS = 32
-"""Directions in which they look; half of them, and their opposites, where both ways must be clear."""
+"""Directions of the rays; half of them, and their opposites, where both ways must be clear."""
 
 CLEAR, CLEAR_THROUGH = 2, 4
-"""Of these, how many must be clear for a cell to be free; and where both ways must be: scans have holes."""
+"""Least number of clear directions of a free cell; and the same where both ways must be clear: scans have holes."""
 
 Flags = npt.NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
 class Evidence:
-    """What is known of a target, in the grid frame.
+    """Evidence of a target, in the grid frame.
 
     Parameters
     ----------
     points, normals, weights
-        Points (P, 3) to be explained, their unit normals (P, 3), zero where unknown; and what each counts (P,), 1 in
-        all.
+        Points (P, 3) to be explained, their unit normals (P, 3), zero where unknown; and weights (P,) with
+        sum 1.
     outward
-        Whose normals are known to point outwards (P,); others are of either sign.
+        Whether a normal is known to point outwards (P,); others are of either sign.
     tolerance, agreement
         A surface explains a point within this distance, if the cosine between the normals is at least this.
     surface, surface_normals, reach
-        The same surface in more points (Q, 3): a program has a reason for a surface where one of them is within
-        ``reach`` and has a fitting normal.
+        The same surface as more points (Q, 3): they support the surface of a program where one of them is within
+        ``reach`` and has a matching normal.
     surface_outward
-        Which of these normals are known to point outwards (Q,), as they bound a solid: what faces the other way
-        within it has no reason there.
+        Whether a normal is known to point outwards (Q,), as it bounds a solid: a surface of a program that faces the
+        other way has no support there.
     area
-        Area in cells that all points stand for, each for its weight.
+        Area in cells of the surface that the points represent, in proportion to their weights.
     free
         Cells (R, R, R) of the cube of the grid that are known to be free; other space may be free or not.
     """
@@ -123,7 +124,7 @@ class Evidence:
 
 
 def evidence_of(shape: Shape, seed: int = 0) -> Evidence:
-    """The evidence of a shape, from the best that it has: its mesh, its points, or its cells."""
+    """The evidence of a shape, from its mesh, else from its points, else from its cells."""
     if shape.vertices is not None and shape.faces is not None and len(shape.faces):
         mesh = components(shape.vertices, shape.faces)
         if len(mesh.area):
@@ -134,9 +135,9 @@ def evidence_of(shape: Shape, seed: int = 0) -> Evidence:
 
 
 def evidence_of_program(program: Program, seed: int = 0) -> Evidence:
-    """The evidence of what a program draws, as if it had been given as a mesh.
+    """The evidence of the surface of a program, as for a mesh.
 
-    A ``ShapeProgError`` if nothing in it has a volume.
+    Raises ``ShapeProgError`` if the program has no volume.
     """
     return _of_mesh(components(*union_mesh(unroll(program))), seed)
 
@@ -161,7 +162,7 @@ def _of_mesh(mesh: Components, seed: int) -> Evidence:
 
 
 def _of_points(surface: FloatArray, voxels: Flags, seed: int) -> Evidence:
-    """Of a scan: its noise is that about the planes, and the area what the distances between its points say."""
+    """The evidence of a scan: noise is the distance from local planes; area follows from distances between points."""
     normals, noise, point_area = local_planes(surface)
     selected = np.sort(np.random.default_rng(seed).permutation(len(surface))[:POINTS])
     tolerance, area = min(max(TOLERANCE, NOISE * noise), MOST_TOLERANCE), point_area * len(surface)
@@ -178,9 +179,9 @@ def _of_points(surface: FloatArray, voxels: Flags, seed: int) -> Evidence:
 
 
 def _of_cells(voxels: Flags) -> Evidence:
-    """Of cells: one point for each exposed face, where the surface below it probably is; see ``INSET``.
+    """The evidence of cells: one point for each exposed face, at the estimated depth of the surface; see ``INSET``.
 
-    What is one cell thick has a thickness all the same: its two sides do not pass each other.
+    Parts that are one cell thick have the thickness ``THIN``, so that their two sides do not cross.
     """
     faces, occupied = exposed_faces(voxels), np.argwhere(voxels)
     cells, axis, sign = faces[:, :3], faces[:, 3], faces[:, 4]
@@ -199,7 +200,7 @@ def _of_cells(voxels: Flags) -> Evidence:
 
 
 def _reach(tolerance: float, area: float, count: int = SURFACE) -> float:
-    """One and a half tolerances, or as far as four of so many points are found on a plane."""
+    """The larger of one and a half tolerances, and the radius of a disc that contains four points on average."""
     return max(1.5 * tolerance, math.sqrt(4 * area / (math.pi * max(count, 1))))
 
 
@@ -211,8 +212,10 @@ def touched(triangles: FloatArray, resolution: int) -> Flags:
 
 
 def visible(points: FloatArray, normals: FloatArray, barrier: Flags) -> Flags:
-    """Which points (P,) of a surface can be seen from outside on the side that their normals point to; ``barrier`` are
-    the cells it touches."""
+    """Whether points (P,) of a surface are visible from outside, on the side of their normals.
+
+    ``barrier`` are the cells that the surface touches.
+    """
     scale = len(barrier) / RESOLUTION
     offset = normals / np.maximum(np.abs(normals).max(1, keepdims=True), 1e-9)
     starts = (points + HALF) * scale + 1.5 * offset  # out of the cells that the surface itself touches
@@ -220,10 +223,10 @@ def visible(points: FloatArray, normals: FloatArray, barrier: Flags) -> Flags:
 
 
 def outward(normals: FloatArray, front: Flags, back: Flags) -> tuple[FloatArray, Flags]:
-    """Normals (P, 3) turned outwards, and of which of them it is known where that is (P,).
+    """Normals (P, 3) turned outwards, and whether their orientation is known (P,).
 
-    It is where only the front or only the back of a point is free; and everywhere, thin parts included, if nearly all
-    such normals agree, as those of a mesh do whose faces are all wound the same way.
+    It is known where only the front or only the back of a point is free.  It is known everywhere, thin parts included,
+    if nearly all such normals agree, as in a mesh with consistent winding.
     """
     oriented = (front != back) & ((normals**2).sum(1) > 0.25)
     share = float(front[oriented].mean()) if oriented.any() else 0.5
@@ -233,16 +236,17 @@ def outward(normals: FloatArray, front: Flags, back: Flags) -> tuple[FloatArray,
 
 
 def _within(cells: Flags, points: FloatArray) -> Flags:
-    """Which points (P,) of the grid lie in cells that are set."""
+    """Whether points (P,) of the grid lie in cells that are set."""
     index = np.floor((points + HALF) * (len(cells) / RESOLUTION)).astype(np.int64).clip(0, len(cells) - 1)
     inside: Flags = cells[tuple(index.T)]
     return inside
 
 
 def free_cells(barrier: Flags, surface: FloatArray, *, through: bool) -> Flags:
-    """The cells (R, R, R) from which enough directions lead out of the grid; ``through``: both ways.
+    """The cells (R, R, R) from which enough directions lead out of the grid; with ``through``, both ways.
 
-    All that lies beyond the box of the surface is free; or, of a scan, not known to be: it may have been left out.
+    Cells outside the bounding box of the surface are free; with ``through``, for scans, they are not, as parts of the
+    shape may be missing from a scan.
     """
     scale = len(barrier) / RESOLUTION
     low, high = ((end + HALF) * scale for end in (surface.min(0), surface.max(0)))
@@ -264,7 +268,7 @@ def directions(count: int) -> FloatArray:
 
 
 def looking(barrier: Flags, starts: FloatArray, steps: FloatArray, minimum: int, *, through: bool) -> Flags:
-    """Which starts (N,) have so many directions that lead out of the grid; see the kernel."""
+    """Whether at least ``minimum`` directions lead out of the grid from each start (N,); see the kernel."""
     result = np.zeros(len(starts), np.bool_)
     data = barrier, np.ascontiguousarray(starts), np.ascontiguousarray(steps), minimum, through, result
     over_threads(partial(look_out, *data), len(starts), least=1024)

@@ -1,4 +1,4 @@
-"""The kernel that looks from places outwards: which directions meet nothing on their way out of the grid."""
+"""The kernel for visibility: it counts the directions that lead out of the grid without obstacles."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from shapeprog.kernels.compile import kernel
 
 @kernel("void(b1[:, :, ::1], f8[:, ::1], f8[:, ::1], i8, b1, b1[::1], i8, i8)")
 def look_out(barrier, starts, directions, minimum, through, out, begin, end):
-    """Mark the starts ``begin`` to ``end`` from which ``minimum`` directions lead out of the grid; a twin is beside it.
+    """Mark the starts ``begin`` to ``end`` from which at least ``minimum`` directions lead out of the grid.
 
     Steps are one cell along the longest axis of a direction, so no ray slips through a wall of touched cells.
 
@@ -16,7 +16,7 @@ def look_out(barrier, starts, directions, minimum, through, out, begin, end):
     barrier
         Cells (R, R, R) that stop a ray.
     starts
-        Where rays begin (N, 3), in cells from the corner of the grid; in a barrier none leads out.
+        Starts of rays (N, 3), in cells from the corner of the grid; from inside a barrier none leads out.
     directions
         Steps (D, 3), of which the largest coordinate is 1 or -1.
     through

@@ -18,14 +18,14 @@ WORD = 64
 """Bits of a word."""
 
 COARSE, FINE = 16, 64
-"""Cells along each side of the grids by which points are found near primitives, and near other points."""
+"""Cells along each side of the grids that bin points: for tests against primitives, and against other points."""
 
 Bits = npt.NDArray[np.uint64]
 Flags = npt.NDArray[np.bool_]
 
 
-class Places(NamedTuple):
-    """Points sorted by the cells of a grid, see the kernels: where each was, and where those of each cell begin."""
+class BinnedPoints(NamedTuple):
+    """Points sorted by the cells of a grid, see the kernels: original indices, and the first index of each cell."""
 
     points: FloatArray
     order: npt.NDArray[np.int64]
@@ -48,10 +48,10 @@ def pack(flags: Flags) -> Bits:
 
 def explains(scene: Batch, points: FloatArray, normals: FloatArray, evidence: Evidence) -> Bits:
     """Which points (P, 3) each candidate (B, N) explains, as rows of bits (B, W)."""
-    places, rows = sorted_by_cell(points, COARSE), _no_bits(scene, points)
+    binned, rows = sorted_by_cell(points, COARSE), _no_bits(scene, points)
     data = (
-        table_of(scene), scene.mask.shape[1], places.points, normals[places.order], places.order, places.starts,
-        places.cells, evidence.tolerance, evidence.agreement, rows,
+        table_of(scene), scene.mask.shape[1], binned.points, normals[binned.order], binned.order, binned.starts,
+        binned.cells, evidence.tolerance, evidence.agreement, rows,
     )  # fmt: skip
     over_threads(partial(explain, *data), len(rows))
     return rows
@@ -59,9 +59,9 @@ def explains(scene: Batch, points: FloatArray, normals: FloatArray, evidence: Ev
 
 def holds(scene: Batch, points: FloatArray, depth: float) -> Bits:
     """Which points (P, 3) lie deeper than ``depth`` inside each candidate (B, N), as rows of bits (B, W)."""
-    places, rows = sorted_by_cell(points, COARSE), _no_bits(scene, points)
+    binned, rows = sorted_by_cell(points, COARSE), _no_bits(scene, points)
     data = (
-        table_of(scene), scene.mask.shape[1], places.points, places.order, places.starts, places.cells, depth, rows
+        table_of(scene), scene.mask.shape[1], binned.points, binned.order, binned.starts, binned.cells, depth, rows
     )  # fmt: skip
     over_threads(partial(hold, *data), len(rows))
     return rows
@@ -72,19 +72,19 @@ def _no_bits(scene: Batch, points: FloatArray) -> Bits:
 
 
 def nearby(points: FloatArray) -> npt.NDArray[np.int64]:
-    """Numbers (P,) that are close together for points that are: places on a curve through the cells (Morton 1966).
+    """Morton codes (P,) of the cells of points: nearby points mostly have close codes (Morton 1966).
 
-    A word then holds points of one place, so candidates that are small have bits in few words.
+    In this order, the points of a word are neighbours, so a small candidate has bits in few words.
     """
     index = np.clip(((points + HALF) * (FINE / RESOLUTION)).astype(np.int64), 0, FINE - 1)
-    places = [((index[:, axis] >> bit) & 1) << (3 * bit + axis) for bit in range(6) for axis in range(3)]
-    return np.sum(places, axis=0)
+    shifted = [((index[:, axis] >> bit) & 1) << (3 * bit + axis) for bit in range(6) for axis in range(3)]
+    return np.sum(shifted, axis=0)
 
 
-def sorted_by_cell(points: FloatArray, cells: int) -> Places:
+def sorted_by_cell(points: FloatArray, cells: int) -> BinnedPoints:
     """Points (P, 3) in the order of the cells of a grid."""
     index = np.clip(((points + HALF) * (cells / RESOLUTION)).astype(np.int64), 0, cells - 1)
     key = (index[:, 0] * cells + index[:, 1]) * cells + index[:, 2]
     order = np.argsort(key, kind="stable")
     starts = np.concatenate([[0], np.bincount(key, minlength=cells**3).cumsum()])
-    return Places(np.ascontiguousarray(points[order]), order, starts, cells)
+    return BinnedPoints(np.ascontiguousarray(points[order]), order, starts, cells)

@@ -1,9 +1,9 @@
-"""Choosing few of many candidates: as much of the target explained as possible, for as little written as possible.
+"""Selection of a few candidates that explain as much of the target as possible with as little text as possible.
 
-    value = share explained - unsupported surface - free space filled - price of what is written
+    value = share explained - unsupported surface - free space filled - price of the text
 
-all in shares of the target, see :class:`~shapeprog.inference.choice.coverage.Prices`.  A candidate that explains what
-others explain gains nothing and costs its price; surface that lies inside another chosen one costs nothing, and
+all in shares of the target, see :class:`~shapeprog.inference.choice.coverage.Prices`.  A candidate that explains only
+points of others gains nothing and costs its price.  Surface inside another selected candidate costs nothing and
 explains nothing.
 """
 
@@ -27,19 +27,19 @@ BLINK = 0.05
 """Probability with which a round overlooks a candidate."""
 
 INTERIOR = (4.0, 1.0)
-"""Penalties of points in interiors, in what these weigh, with which the search begins."""
+"""Initial penalties of points in interiors, as multiples of their weights."""
 
 
 class Option(NamedTuple):
-    """The best set of one size that was found: indices of candidates, value, and share of the target explained."""
+    """The best set of one size: indices of candidates, value, and share of the target explained."""
 
     chosen: tuple[int, ...]
     value: float
     explained: float
 
 
-class Found(NamedTuple):
-    """The best value of each number of blocks (M + 1,) that was found, and its candidates (M + 1, M)."""
+class BestSets(NamedTuple):
+    """The best value for each number of blocks (M + 1,), and its candidates (M + 1, M)."""
 
     values: FloatArray
     sets: npt.NDArray[np.int64]
@@ -52,7 +52,7 @@ class Found(NamedTuple):
 
 
 class Choice(NamedTuple):
-    """The best option, and the best of each number of blocks that was found: numbers against what is explained."""
+    """The best option, and the best for each number of blocks: the trade-off between size and share explained."""
 
     best: Option
     options: tuple[Option, ...]
@@ -63,9 +63,9 @@ def choose(
 ) -> Choice:
     """The most valuable at most ``blocks`` of the candidates: greedily, then by ruin and recreate.
 
-    A solid that holds what could be seen without it is a local optimum: greed takes it at once, and no exchange of a
-    few leaves it.  So all points in interiors have a penalty at first, which falls while the search goes on from the
-    best; a second search goes on from ``start``.
+    A solid whose interior holds visible points is a local optimum: the greedy step selects it first, and an exchange
+    of a few candidates cannot leave it.  So all points in interiors have a penalty at first.  It falls while the search
+    continues from the best set.  A second search starts from ``start``.
     """
     gains = np.bitwise_count(table.rows[:, : table.evidence]) @ table.weights[: table.evidence]
     bounds = gains - table.prices
@@ -74,67 +74,67 @@ def choose(
     words = *_words(table.rows[:, : len(table.weights)]), *_words(table.interior)
     searches = len(INTERIOR) + 2 if table.interior.any() else 1
 
-    def searched(penalty: float, known: Array, found: Found) -> Found:
+    def searched(penalty: float, initial: Array, best_sets: BestSets) -> BestSets:
         search(
-            table.rows, table.interior, table.weights, *words, table.own, table.sample_price, table.prices, penalty,
+            table.rows, table.interior, table.weights, *words, table.exposed, table.sample_price, table.prices, penalty,
             bounds,
-            order, rounds // searches, BLINK, seed, known, *found,
+            order, rounds // searches, BLINK, seed, initial, *best_sets,
         )  # fmt: skip
-        return found
+        return best_sets
 
-    best = _nothing(blocks)
+    best = _no_sets(blocks)
     if searches > 1:
-        known = best.set
+        initial = best.set
         for penalty in INTERIOR:
-            known = searched(penalty, known, _nothing(blocks)).set
-        best = searched(0.0, known, best)
+            initial = searched(penalty, initial, _no_sets(blocks)).set
+        best = searched(0.0, initial, best)
     best = searched(0.0, np.array(start, np.int64), best)
-    found = [
-        Option(tuple(map(int, chosen[:size])), float(value), explained(table, chosen[:size]))
-        for size, (value, chosen) in enumerate(zip(*best, strict=True))
+    options = [
+        Option(tuple(map(int, indices[:size])), float(value), explained(table, indices[:size]))
+        for size, (value, indices) in enumerate(zip(*best, strict=True))
         if np.isfinite(value)
     ]
-    return Choice(max(found, key=lambda option: option.value), tuple(found))
+    return Choice(max(options, key=lambda option: option.value), tuple(options))
 
 
-def _nothing(blocks: int) -> Found:
-    return Found(np.full(blocks + 1, -np.inf), np.full((blocks + 1, blocks), -1, np.int64))
+def _no_sets(blocks: int) -> BestSets:
+    return BestSets(np.full(blocks + 1, -np.inf), np.full((blocks + 1, blocks), -1, np.int64))
 
 
 def _words(rows: Bits) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
-    """The words that hold bits, row after row, and where those of each row begin."""
+    """The words that hold bits, row after row, and the index of the first of each row."""
     row, words = np.nonzero(rows)
     return np.ascontiguousarray(words), np.searchsorted(row, np.arange(len(rows) + 1))
 
 
-def explained(table: CoverageTable, chosen: Sequence[int] | Array) -> float:
+def explained(table: CoverageTable, indices: Sequence[int] | Array) -> float:
     """Share of the target that some of the candidates explain together, and none has in its interior."""
-    seen = _union(table.rows[:, : table.evidence], chosen) & ~_union(table.interior, chosen)
-    return float(np.bitwise_count(seen) @ table.weights[: table.evidence])
+    visible = _union(table.rows[:, : table.evidence], indices) & ~_union(table.interior, indices)
+    return float(np.bitwise_count(visible) @ table.weights[: table.evidence])
 
 
-def _union(rows: Bits, chosen: Sequence[int] | Array) -> Bits:
-    """The bits that are set in any of the chosen rows."""
-    found: Bits = np.bitwise_or.reduce(rows[list(chosen)], axis=0, initial=0)
-    return found
+def _union(rows: Bits, indices: Sequence[int] | Array) -> Bits:
+    """The bits that are set in any of the selected rows."""
+    union: Bits = np.bitwise_or.reduce(rows[list(indices)], axis=0, initial=0)
+    return union
 
 
-def missed(table: CoverageTable, chosen: tuple[int, ...]) -> Array:
-    """The candidates that are not chosen, those first that would explain most of what is not explained."""
+def missed(table: CoverageTable, indices: tuple[int, ...]) -> Array:
+    """The candidates that are not selected, ordered by how much of the unexplained points they would explain."""
     rows = table.rows[:, : table.evidence]
-    done = _union(rows, chosen) | _union(table.interior, chosen)
-    more = np.bitwise_count(rows & ~done) @ table.weights[: table.evidence] - table.prices
-    order = np.argsort(-more, kind="stable")
-    return order[~np.isin(order, chosen)]
+    done = _union(rows, indices) | _union(table.interior, indices)
+    gains = np.bitwise_count(rows & ~done) @ table.weights[: table.evidence] - table.prices
+    order = np.argsort(-gains, kind="stable")
+    return order[~np.isin(order, indices)]
 
 
-def value(table: CoverageTable, chosen: tuple[int, ...]) -> float:
-    """The value of a set of candidates, by its definition: what the kernel adds up piece by piece."""
-    known, union = len(table.weights), _union(table.rows, chosen)
-    union[: table.evidence] &= ~_union(table.interior, chosen)
-    total = float(np.bitwise_count(union[:known]) @ table.weights)
-    for one in chosen:
-        total -= table.prices[one] + table.sample_price[one] * int(
-            np.bitwise_count(table.own[one] & ~union[known + one])
+def value(table: CoverageTable, indices: tuple[int, ...]) -> float:
+    """The value of a set of candidates, by its definition; the kernel adds it up incrementally."""
+    words, union = len(table.weights), _union(table.rows, indices)
+    union[: table.evidence] &= ~_union(table.interior, indices)
+    total = float(np.bitwise_count(union[:words]) @ table.weights)
+    for candidate in indices:
+        total -= table.prices[candidate] + table.sample_price[candidate] * int(
+            np.bitwise_count(table.exposed[candidate] & ~union[words + candidate])
         )
     return total

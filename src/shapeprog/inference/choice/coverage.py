@@ -1,13 +1,12 @@
 """Coverage of a target by candidates: the points that each explains, its cost, and the parts of others that it hides.
 
-A candidate is a program of one block.  All that choosing between them needs is put into bits once:
+A candidate is a program of one block.  All data for the selection is computed once as bits:
 
 *   points of the evidence that its surface explains (near enough, with a fitting normal);
-*   points that lie deep inside of it, where nothing that another candidate draws can be seen;
-*   points of space known to be free that it fills;
-*   samples of its own surface that the target gives no reason for, or that face the other way than the target's.  They
-    are charged by their area, unless a chosen candidate holds them, its own other copies included: nobody sees them
-    then.
+*   points deep inside it, where it hides every other candidate;
+*   points of free space that it fills;
+*   samples of its surface that the target does not support, or that face the other way than the target's.  They are
+    charged by their area unless they are hidden inside a selected candidate, including other copies of the same one.
 """
 
 from __future__ import annotations
@@ -38,13 +37,13 @@ from shapeprog.library.length import outside
 from shapeprog.space import DEPTH, HALF, RESOLUTION, SIDE, FloatArray
 
 DRAWN, LEAST, MOST = 16, 64, 256
-"""Samples drawn together on one primitive; fewest and most of a candidate without loops, between them one a cell."""
+"""Samples of one batch on a primitive; smallest and largest number for a candidate without loops, else one per cell."""
 
 SKIN = 0.5
-"""How far above the surface, in tolerances, a sample is looked at to see whether another candidate hides it."""
+"""Height above the surface, in tolerances, at which the test whether another candidate hides a sample is made."""
 
 AWAY = 4.0 * HALF
-"""A coordinate where no candidate is looked for: that of samples which a word does not have."""
+"""A coordinate outside all candidates, for unused samples of a word."""
 
 FREE_POINTS = 2048
 """Points drawn in free space."""
@@ -55,17 +54,17 @@ CENTRED = 0.1
 
 @dataclass(frozen=True)
 class Prices:
-    """What counts against a program, in shares of the target explained; chosen on val.
+    """Prices subtracted from the value of a program, in shares of the target explained; chosen on val.
 
     Parameters
     ----------
     unsupported
-        Of surface that the target gives no reason for and nobody hides, over the area of the target.
+        Of exposed surface that the target does not support, over the area of the target.
     free
         Of free space filled, in cells, over the same area.
     statement, loop, number
-        Of a drawing statement or call, of a loop, and of every continuous number written in any; what a call draws
-        beside its first block costs as much as a loop, or a box would be said as a drawer whose handle nobody sees.
+        Of a drawing statement or call, of a loop, and of every continuous number in the text.  Each further block of a
+        call costs as much as a loop; otherwise a box could be written as a drawer whose handle is hidden.
     """
 
     unsupported: float = 0.4
@@ -75,7 +74,7 @@ class Prices:
     number: float = 0.0005
 
     def of(self, program: Program) -> float:
-        """The price of a program as it is written; functions are known, and cost nothing."""
+        """The price of the text of a program; function definitions cost nothing."""
         if program.source is None:
             nodes = list(program.walk())
             loops = sum(isinstance(node, Loop) for node in nodes)
@@ -90,54 +89,54 @@ class Prices:
 
 
 class CoverageTable(NamedTuple):
-    """What candidates cover, as rows of bits; each has a word of its own at the end.
+    """Coverage of candidates, as rows of bits; each candidate has one word at the end.
 
     Parameters
     ----------
     rows
-        Of each candidate (C, E + F + C) the points explained, the free points filled, and the samples hidden of every
+        For each candidate (C, E + F + C) the points explained, the free points filled, and the hidden samples of every
         candidate.
     weights
-        What a bit of each of the first E + F words is worth, negative for free points.
+        Value of a bit of each of the first E + F words, negative for free points.
     evidence
         E, the number of words for points to be explained.
     interior
-        Of each the points that lie deeper inside it than the tolerance (C, E): no other candidate explains them.
-    own
-        Samples of its own surface that have no reason, and that it does not hide itself (C,).
+        Points deeper inside each candidate than the tolerance (C, E): no other candidate explains them.
+    exposed
+        Unsupported samples of the surface of each candidate that it does not hide itself (C,).
     sample_price
-        What each of them costs (C,).
+        Price of each of these samples (C,).
     prices
-        What each costs as it is written (C,).
+        Price of the text of each candidate (C,).
     """
 
     rows: Bits
     weights: FloatArray
     evidence: int
     interior: Bits
-    own: Bits
+    exposed: Bits
     sample_price: FloatArray
     prices: FloatArray
 
 
 class _Row(NamedTuple):
-    """What one candidate covers: bits of points and free points, samples of its surface without a reason."""
+    """Coverage of a candidate: bits of points and free points, unsupported samples of its surface."""
 
     covered: Bits
     interior: Bits
     samples: FloatArray
-    drawn: int
+    sampled: int
     sample_price: float
     price: float
 
 
 class Coverage:
-    """What candidates, each a program of one block, cover of one surface; that of each is computed once.
+    """Coverage of one surface by candidates, which are programs of one block; each is computed once.
 
     Parameters
     ----------
     evidence, prices, seed
-        The surface, what counts against a program, and the seed of the samples of surfaces and of free space.
+        The surface, the prices, and the seed of the samples of surfaces and of free space.
     """
 
     def __init__(self, evidence: Evidence, prices: Prices | None = None, seed: int = 0) -> None:
@@ -150,52 +149,54 @@ class Coverage:
         self._rows: dict[Program, _Row] = {}
 
     def table(self, candidates: Sequence[Program]) -> CoverageTable:
-        """What the candidates cover.
+        """The coverage of candidates.
 
         A ``ShapeProgError`` if one draws more copies than :func:`shapeprog.language.unroll` takes.
         """
-        if new := [each for each in dict.fromkeys(candidates) if each not in self._rows]:
+        if new := [candidate for candidate in dict.fromkeys(candidates) if candidate not in self._rows]:
             self._add(new)
-        mine, count = [self._rows[each] for each in candidates], len(candidates)
+        mine, count = [self._rows[candidate] for candidate in candidates], len(candidates)
         words = -(-len(self._points) // WORD)
-        covered = np.array([each.covered for each in mine], np.uint64).reshape(count, len(self._weights))
-        interior = np.array([each.interior for each in mine], np.uint64).reshape(count, words)
-        samples = np.array([each.samples for each in mine]).reshape(-1, 3)
+        covered = np.array([row.covered for row in mine], np.uint64).reshape(count, len(self._weights))
+        interior = np.array([row.interior for row in mine], np.uint64).reshape(count, words)
+        samples = np.array([row.samples for row in mine]).reshape(-1, 3)
         hidden = holds(unroll(candidates).detach(), samples, 0.0)
-        own = np.array([2**each.drawn - 1 for each in mine], np.uint64) & ~hidden.diagonal()
+        exposed = np.array([2**row.sampled - 1 for row in mine], np.uint64) & ~hidden.diagonal()
         return CoverageTable(
-            np.concatenate([covered, hidden], 1), self._weights, words, interior, own,
-            np.array([each.sample_price for each in mine]), np.array([each.price for each in mine]),
+            np.concatenate([covered, hidden], 1), self._weights, words, interior, exposed,
+            np.array([row.sample_price for row in mine]), np.array([row.price for row in mine]),
         )  # fmt: skip
 
     def _add(self, candidates: Sequence[Program]) -> None:
         evidence, prices = self.evidence, self.prices
         scene = unroll(candidates).detach()
-        price = np.array([prices.of(each) for each in candidates]) - prices.number * centred(scene, candidates)
+        price = np.array([prices.of(program) for program in candidates]) - prices.number * centred(scene, candidates)
         interior = holds(scene, self._points, evidence.tolerance)
         explained = explains(scene, self._points, self._normals, evidence) & ~interior
         covered = np.concatenate([explained, holds(scene, self._free, evidence.tolerance)], 1)
-        places, owners, areas = unsupported(scene, evidence, self.seed)
+        points, owners, areas = unsupported(scene, evidence, self.seed)
         starts = np.searchsorted(owners, np.arange(len(candidates) + 1))
-        for k, candidate in enumerate(candidates):
+        for k, program in enumerate(candidates):
             mine = np.arange(starts[k], starts[k + 1])
             samples, count = np.full((WORD, 3), AWAY), min(len(mine), WORD)
             if count:
-                samples[:count] = places[mine[np.arange(count) * len(mine) // count]]
+                samples[:count] = points[mine[np.arange(count) * len(mine) // count]]
             cost = prices.unsupported / evidence.area * areas[mine].sum() / max(count, 1)
-            self._rows[candidate] = _Row(covered[k], interior[k], samples, count, float(cost), float(price[k]))
+            self._rows[program] = _Row(covered[k], interior[k], samples, count, float(cost), float(price[k]))
 
 
 def centred(scene: Scene, candidates: Sequence[Program]) -> npt.NDArray[np.int64]:
-    """How many numbers (B,) of candidates are known because these are in the middle, left to right or in depth.
+    """Number of axes (B,) along which a candidate is centred, left to right or in depth; each saves one number.
 
-    Where such a part is follows from how large it is.  Of what is mirrored or turned it is no news.
+    The position of a centred part follows from its size.  Mirrored and rotated candidates save none.
     """
     share = (scene.mask / scene.mask.sum(1, keepdim=True).clamp(min=1)).numpy()
     middle = np.einsum("bn,bni->bi", share, scene.centre.numpy())
     count = np.zeros(len(candidates), np.int64)
     for axis in (SIDE, DEPTH):
-        around = [any(mirrors(node, axis) or node.name == "rotate" for node in each.walk()) for each in candidates]
+        around = [
+            any(mirrors(node, axis) or node.name == "rotate" for node in program.walk()) for program in candidates
+        ]
         count += (np.abs(middle[:, axis]) < CENTRED) & ~np.array(around, np.bool_)
     return count
 
@@ -208,51 +209,51 @@ def free_points(evidence: Evidence, seed: int) -> tuple[FloatArray, float]:
     cells = cells[((cells + 0.5 >= low) & (cells + 0.5 <= high)).all(1)]
     random = np.random.default_rng(seed)
     count = min(FREE_POINTS, len(cells))
-    chosen = cells[np.sort(random.choice(len(cells), count, replace=False))] if count else cells
-    points = (chosen + random.random((count, 3))) * side - HALF
+    selected = cells[np.sort(random.choice(len(cells), count, replace=False))] if count else cells
+    points = (selected + random.random((count, 3))) * side - HALF
     return points[np.argsort(nearby(points), kind="stable")], len(cells) * side**3 / max(count, 1)
 
 
 def unsupported(scene: Scene, evidence: Evidence, seed: int) -> tuple[FloatArray, npt.NDArray[np.int64], FloatArray]:
-    """Samples of the surfaces of candidates (B, N) that the target gives no reason for.
+    """Samples of the surfaces of candidates (B, N) that the target does not support.
 
-    Returns places (S, 3) just above the surface, whose they are (S,), and the area that each pays for (S,).
+    Returns points (S, 3) just above the surface, indices of their candidates (S,), and the area charged for each (S,).
     """
     area = np.where(scene.mask, face_areas(scene).double().sum(-1), 0.0)
-    whole = area.sum(1, keepdims=True)
-    wanted = area / np.where(whole > 0, whole, 1) * whole.clip(LEAST, MOST) / DRAWN
-    times = np.where(area > 0, np.maximum(np.rint(wanted), 1), 0).astype(np.int64).reshape(-1)
+    total = area.sum(1, keepdims=True)
+    expected = area / np.where(total > 0, total, 1) * total.clip(LEAST, MOST) / DRAWN
+    times = np.where(area > 0, np.maximum(np.rint(expected), 1), 0).astype(np.int64).reshape(-1)
     row = torch.from_numpy(np.repeat(np.arange(len(times)), times))
     single = Batch(*(
-        each.flatten(0, 1)[row][:, None] for each in (scene.kind, scene.size, scene.centre, scene.rotation, scene.mask)
+        part.flatten(0, 1)[row][:, None] for part in (scene.kind, scene.size, scene.centre, scene.rotation, scene.mask)
     ))  # fmt: skip
     if not len(row):
         return np.zeros((0, 3)), np.zeros(0, np.int64), np.zeros(0)
-    drawn = sample_surface(single, DRAWN, torch.Generator().manual_seed(seed))
-    points, normals = (each.double().reshape(-1, 3).numpy() for each in (drawn.points, drawn.normals))
+    sample = sample_surface(single, DRAWN, torch.Generator().manual_seed(seed))
+    points, normals = (part.double().reshape(-1, 3).numpy() for part in (sample.points, sample.normals))
     share = shares(points, normals, evidence)
     bare = share > 0
     source = np.repeat(row.numpy(), DRAWN)[bare]
-    places = points[bare] + SKIN * evidence.tolerance * normals[bare]
+    lifted = points[bare] + SKIN * evidence.tolerance * normals[bare]
     return (
-        places,
+        lifted,
         source // max(scene.mask.shape[1], 1),
         share[bare] * area.reshape(-1)[source] / (DRAWN * times[source]),
     )
 
 
 def shares(samples: FloatArray, normals: FloatArray, evidence: Evidence) -> FloatArray:
-    """Which share of the price of unsupported surface each sample (S, 3) of surfaces pays.
+    """Share of the price of unsupported surface that each sample (S, 3) pays.
 
-    None where a point of the target within reach has a normal that fits, ``TURNED`` where one is known to face the
-    other way, as behind the wall of a solid, and all of it elsewhere.
+    It is zero where a point of the target within reach has a normal that agrees, ``TURNED`` where an outward normal
+    faces the other way, such as behind the wall of a solid, and one elsewhere.
     """
-    places = sorted_by_cell(evidence.surface, FINE)
-    found = np.zeros(len(samples))
+    binned = sorted_by_cell(evidence.surface, FINE)
+    share = np.zeros(len(samples))
     data = (
-        samples, normals, places.points, evidence.surface_normals[places.order],
-        evidence.surface_outward[places.order], places.starts, places.cells, evidence.reach, evidence.agreement,
-        found,
+        samples, normals, binned.points, evidence.surface_normals[binned.order],
+        evidence.surface_outward[binned.order], binned.starts, binned.cells, evidence.reach, evidence.agreement,
+        share,
     )  # fmt: skip
     over_threads(partial(charged, *data), len(samples), least=1024)
-    return found
+    return share

@@ -1,7 +1,7 @@
-"""Kernels that ask which points the primitives of many candidates explain, hold, or have a reason for.
+"""Kernels that compute which points the primitives of candidates explain or hold, and which samples are supported.
 
-Points come sorted by the cells of a grid of ``cells`` along each side, row after row; ``starts`` says where in the list
-the points of each cell begin.  Candidates are rows of the table, ``many`` each; their answers are rows of bits.
+Points are sorted by the cells of a grid of ``cells`` along each side, row after row; ``starts`` has the index of the
+first point of each cell.  A candidate has ``primitives`` rows of the table; the output is one row of bits for each.
 """
 
 from __future__ import annotations
@@ -14,10 +14,10 @@ from shapeprog.kernels.table import CENTRE, KIND, ROTATION, local, turned
 from shapeprog.space import HALF, RESOLUTION
 
 LIFT = 1e-3
-"""How far in cells above a point the slope of a distance is taken: on a surface it has none."""
+"""Offset in cells above a point at which the gradient of the distance is evaluated: on a surface it is undefined."""
 
 TURNED = 0.75
-"""Share of the price that surface pays which is where the target has one, but faces the other way."""
+"""Share of the price for surface that coincides with the target's but faces the other way."""
 
 
 @helper
@@ -29,10 +29,10 @@ def cell_of(value, cells):
 @helper
 def box_of(table, row, margin, cells, ends):
     """First and last cells along each axis that the box around a primitive reaches, widened by a margin."""
-    one, two, three = bound(table, row)
+    a, b, c = bound(table, row)
     for axis in range(3):
         column = ROTATION + 3 * axis
-        reach = abs(table[row, column]) * one + abs(table[row, column + 1]) * two + abs(table[row, column + 2]) * three
+        reach = abs(table[row, column]) * a + abs(table[row, column + 1]) * b + abs(table[row, column + 2]) * c
         ends[axis] = cell_of(table[row, CENTRE + axis] - reach - margin, cells)
         ends[3 + axis] = cell_of(table[row, CENTRE + axis] + reach + margin, cells)
 
@@ -50,10 +50,10 @@ def put(rows, row, bit):
 
 
 @kernel("void(f8[:, ::1], i8, f8[:, ::1], f8[:, ::1], i8[::1], i8[::1], i8, f8, f8, u8[:, ::1], i8, i8)")
-def explain(table, many, points, normals, bits, starts, cells, tolerance, agreement, rows, begin, end):
+def explain(table, primitives, points, normals, bits, starts, cells, tolerance, agreement, rows, begin, end):
     """Set the bits of the points within a tolerance of a surface whose normal fits theirs; zero normals fit all."""
     ends, part = np.empty(6, np.int64), np.empty(7)
-    for row in range(begin * many, end * many):
+    for row in range(begin * primitives, end * primitives):
         if table[row, KIND] < 0:
             continue
         box_of(table, row, tolerance, cells, ends)
@@ -61,7 +61,7 @@ def explain(table, many, points, normals, bits, starts, cells, tolerance, agreem
             for j in range(ends[1], ends[4] + 1):
                 line = (i * cells + j) * cells
                 for item in range(starts[line + ends[2]], starts[line + ends[5] + 1]):
-                    if has(rows, row // many, bits[item]):
+                    if has(rows, row // primitives, bits[item]):
                         continue
                     a, b, c = local(table, row, points[item, 0], points[item, 1], points[item, 2])
                     if abs(distance(table, row, a, b, c)) > tolerance:
@@ -71,16 +71,16 @@ def explain(table, many, points, normals, bits, starts, cells, tolerance, agreem
                         table, row, points[item, 0] + LIFT * x, points[item, 1] + LIFT * y, points[item, 2] + LIFT * z
                     )
                     slopes(table, row, a, b, c, part)
-                    one, two, three = turned(table, row, part[0], part[1], part[2])
-                    if abs(one * x + two * y + three * z) >= agreement or x * x + y * y + z * z < 0.25:
-                        put(rows, row // many, bits[item])
+                    u, v, w = turned(table, row, part[0], part[1], part[2])
+                    if abs(u * x + v * y + w * z) >= agreement or x * x + y * y + z * z < 0.25:
+                        put(rows, row // primitives, bits[item])
 
 
 @kernel("void(f8[:, ::1], i8, f8[:, ::1], i8[::1], i8[::1], i8, f8, u8[:, ::1], i8, i8)")
-def hold(table, many, points, bits, starts, cells, depth, rows, begin, end):
+def hold(table, primitives, points, bits, starts, cells, depth, rows, begin, end):
     """Set the bits of the points that lie deeper than ``depth`` inside a primitive."""
     ends = np.empty(6, np.int64)
-    for row in range(begin * many, end * many):
+    for row in range(begin * primitives, end * primitives):
         if table[row, KIND] < 0:
             continue
         box_of(table, row, 0.0, cells, ends)
@@ -88,18 +88,18 @@ def hold(table, many, points, bits, starts, cells, depth, rows, begin, end):
             for j in range(ends[1], ends[4] + 1):
                 line = (i * cells + j) * cells
                 for item in range(starts[line + ends[2]], starts[line + ends[5] + 1]):
-                    if has(rows, row // many, bits[item]):
+                    if has(rows, row // primitives, bits[item]):
                         continue
                     a, b, c = local(table, row, points[item, 0], points[item, 1], points[item, 2])
                     if distance(table, row, a, b, c) < -depth:
-                        put(rows, row // many, bits[item])
+                        put(rows, row // primitives, bits[item])
 
 
 @kernel("void(f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], b1[::1], i8[::1], i8, f8, f8, f8[::1], i8, i8)")
 def charged(samples, sides, points, normals, outward, starts, cells, reach, agreement, share, begin, end):
-    """Say which share of its price each sample pays: none with a point within reach whose normal fits its own.
+    """Write the share of its price that each sample pays: zero with a point within reach whose normal agrees.
 
-    Zero normals fit all; where a normal is known to point outwards, what faces the other way pays ``TURNED``.
+    Zero normals agree with all.  Where a normal points outwards, a sample that faces the other way pays ``TURNED``.
     """
     low, high = np.empty(3, np.int64), np.empty(3, np.int64)
     for sample in range(begin, end):

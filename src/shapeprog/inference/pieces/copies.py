@@ -16,39 +16,39 @@ LARGEST_COPY = 2000
 """Vertices above which components are not compared."""
 
 KINDS = 64
-"""Different components of equal counts that are told apart."""
+"""Largest number of different shapes among components with equal counts of vertices."""
 
 
-def align_copies(found: Components, boxes: Boxes) -> Boxes:
-    """Boxes of components that are copies of each other, turned alike.
+def align_copies(mesh: Components, boxes: Boxes) -> Boxes:
+    """Boxes of components, with corresponding orientations for copies of each other.
 
     Copies have their vertices in the same order; the motion between them, which may be a reflection, is the best fit
-    (Kabsch 1976).  The copy whose box is turned least is the model of the others.
+    (Kabsch 1976).  The copy whose box is closest to the world's axes is the model of the others.
     """
-    count = np.diff(found.corner_start)[: len(boxes.half)]
+    count = np.diff(mesh.corner_start)[: len(boxes.half)]
     rotation, centre, half = boxes.rotation.copy(), boxes.centre.copy(), boxes.half.copy()
     turned = np.abs(boxes.rotation).max(1).sum(1)  # 3 along the axes
     for size in np.unique(count[(count > 2) & (count <= LARGEST_COPY)]):
-        left = np.flatnonzero(count == size)
-        at = found.corner_start[left][:, None] + np.arange(size)
-        middle = found.vertices[found.corner[at]].mean(1)
-        cloud = found.vertices[found.corner[at]] - middle[:, None]
+        remaining = np.flatnonzero(count == size)
+        at = mesh.corner_start[remaining][:, None] + np.arange(size)
+        middle = mesh.vertices[mesh.corner[at]].mean(1)
+        cloud = mesh.vertices[mesh.corner[at]] - middle[:, None]
         for _ in range(KINDS):
-            if len(left) < 2:
+            if len(remaining) < 2:
                 break
             model = 0
             same, turn = _motions(cloud[model], cloud)
             members = np.flatnonzero(same)
-            best = members[np.argmax(np.round(turned[left[members]], 3))]
-            for each in members:
-                motion = turn[each] @ turn[best].T
-                source, goal = left[best], left[each]
-                if each != best:
+            best = members[np.argmax(np.round(turned[remaining[members]], 3))]
+            for member in members:
+                motion = turn[member] @ turn[best].T
+                source, goal = remaining[best], remaining[member]
+                if member != best:
                     rotation[goal] = motion @ boxes.rotation[source]
                     half[goal] = boxes.half[source]
-                    centre[goal] = middle[each] + motion @ (boxes.centre[source] - middle[best])
+                    centre[goal] = middle[member] + motion @ (boxes.centre[source] - middle[best])
             keep = ~same
-            left, cloud, middle = left[keep], cloud[keep], middle[keep]
+            remaining, cloud, middle = remaining[keep], cloud[keep], middle[keep]
     rotation[np.linalg.det(rotation) < 0, :, 2] *= -1
     return Boxes(centre, rotation, half)
 

@@ -1,4 +1,4 @@
-"""Kernels that tell which points of a surface boxes explain."""
+"""Kernels that compute which points of a surface boxes explain."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from shapeprog.kernels.compile import helper, kernel
 
 
 @kernel("void(f8[:, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8, b1[:, ::1], f8[::1])")
-def near_boxes(points, centre, rotation, half, tolerance, near, fill):
+def near_boxes(points, centre, rotation, half, tolerance, explained, fill):
     """Which points are near the surface of each box, and the share of the box's surface near which points lie.
 
-    The surface is seen as squares of about two cells, at most eight along a side.
+    The surface is divided into squares of about two cells, at most eight along a side.
 
     Parameters
     ----------
@@ -20,17 +20,17 @@ def near_boxes(points, centre, rotation, half, tolerance, near, fill):
     centre, rotation, half
         Boxes (B, 3), (B, 3, 3) with axes as columns, and (B, 3).
     tolerance
-        Largest distance of a point from the surface that it speaks for.
-    near, fill
+        Largest distance of a point from the surface that explains it.
+    explained, fill
         Output (B, N) and (B,).
     """
-    seen = np.empty((6, 8, 8), np.bool_)
+    covered = np.empty((6, 8, 8), np.bool_)
     at = np.empty(3)
     for b in range(len(centre)):
-        seen[:] = False
+        covered[:] = False
         for k in range(len(points)):
             outside = False
-            near[b, k] = False
+            explained[b, k] = False
             for axis in range(3):
                 at[axis] = 0.0
                 for row in range(3):
@@ -42,23 +42,23 @@ def near_boxes(points, centre, rotation, half, tolerance, near, fill):
                 continue
             for axis in range(3):
                 if abs(abs(at[axis]) - half[b, axis]) <= tolerance:
-                    near[b, k] = True
-                    one, two = (axis + 1) % 3, (axis + 2) % 3
-                    cells1, cells2 = squares(half[b, one]), squares(half[b, two])
-                    u = int(cells1 * (at[one] / half[b, one] + 1) / 2) if half[b, one] > 0 else 0
-                    v = int(cells2 * (at[two] / half[b, two] + 1) / 2) if half[b, two] > 0 else 0
+                    explained[b, k] = True
+                    first, second = (axis + 1) % 3, (axis + 2) % 3
+                    cells1, cells2 = squares(half[b, first]), squares(half[b, second])
+                    u = int(cells1 * (at[first] / half[b, first] + 1) / 2) if half[b, first] > 0 else 0
+                    v = int(cells2 * (at[second] / half[b, second] + 1) / 2) if half[b, second] > 0 else 0
                     face = 2 * axis + (1 if at[axis] > 0 else 0)
-                    seen[face, min(max(u, 0), cells1 - 1), min(max(v, 0), cells2 - 1)] = True
+                    covered[face, min(max(u, 0), cells1 - 1), min(max(v, 0), cells2 - 1)] = True
         total, filled = 0.0, 0.0
         for face in range(6):
             axis = face // 2
-            one, two = (axis + 1) % 3, (axis + 2) % 3
-            cells1, cells2 = squares(half[b, one]), squares(half[b, two])
-            square = half[b, one] * half[b, two] / (cells1 * cells2)
+            first, second = (axis + 1) % 3, (axis + 2) % 3
+            cells1, cells2 = squares(half[b, first]), squares(half[b, second])
+            square = half[b, first] * half[b, second] / (cells1 * cells2)
             for u in range(cells1):
                 for v in range(cells2):
                     total += square
-                    filled += square if seen[face, u, v] else 0.0
+                    filled += square if covered[face, u, v] else 0.0
         fill[b] = filled / total if total > 0 else 0.0
 
 

@@ -1,9 +1,9 @@
-"""Limbs: long or flat stretches of a solid, straight or bent, found by the balls that fit in it.
+"""Limbs: long or flat parts of a solid, straight or bent, detected from the balls that fit in it.
 
 The largest ball inside a solid that touches its surface at a point (the shrinking ball of Ma, Bae and Choi 2012) has
-its centre on the middle line of a bar and on the middle sheet of a board.  Where these centres run on in one direction,
-the points that they belong to are one limb; where a leg meets a seat, the direction ends.  Where it goes on beyond what
-it meets, the two stretches are one limb, too.
+its centre on the middle line of a bar and on the middle sheet of a board.  Where these centres continue in one
+direction, their points are one limb; where a leg meets a seat, the direction ends.  Where it continues beyond the seat,
+both parts are one limb, too.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from shapeprog.inference.surface.components import linked
 from shapeprog.space import FloatArray
 
 COUNT = 5000
-"""Points whose balls are found."""
+"""Largest number of points whose balls are computed."""
 
 LARGEST = 3.0
 """Radius of the largest ball in cells."""
@@ -28,10 +28,10 @@ SHRINKS = 8
 """Rounds of shrinking a ball until no point is within it."""
 
 MERGED, STEP = 0.25, 0.25
-"""Distance in cells, and in logarithms of the radius, within which balls are made one."""
+"""Distance in cells, and in logarithms of the radius, within which balls are merged."""
 
 NEAREST = 24
-"""Centres among which the direction is found."""
+"""Neighbouring centres from which the direction is estimated."""
 
 LINEAR = 0.3
 """Standard deviation across a line of centres, as a share of that along it, at most."""
@@ -57,26 +57,26 @@ def limbs(cloud: Cloud) -> list[npt.NDArray[np.int64]]:
     if not len(which):
         return []
     name, centre, radius = merged(centre, radius)
-    distance, near = cKDTree(centre).query(centre, k=range(1, min(NEAREST, len(centre)) + 1), workers=2)
+    distance, nearest = cKDTree(centre).query(centre, k=range(1, min(NEAREST, len(centre)) + 1), workers=2)
     reach = 2 * radius[:, None] + 2.5 * MERGED
-    close = (distance < reach) & (np.abs(np.log(radius[near] / radius[:, None])) < 2 * STEP)
+    close = (distance < reach) & (np.abs(np.log(radius[nearest] / radius[:, None])) < 2 * STEP)
     weight = close.astype(np.float64)[..., None]
-    off = (centre[near] - (centre[near] * weight).sum(1, keepdims=True) / weight.sum(1, keepdims=True)) * weight
+    off = (centre[nearest] - (centre[nearest] * weight).sum(1, keepdims=True) / weight.sum(1, keepdims=True)) * weight
     spread, axes = np.linalg.eigh(off.transpose(0, 2, 1) @ off)
     spread = np.sqrt(np.maximum(spread, 0))
-    found = list[npt.NDArray[np.int64]]()
+    result = list[npt.NDArray[np.int64]]()
     line = spread[:, 1] < LINEAR * spread[:, 2]
     for kind, direction in ((line, axes[:, :, 2]), (~line & (spread[:, 0] < LINEAR * spread[:, 1]), axes[:, :, 0])):
-        facing = np.abs(np.einsum("nki,ni->nk", direction[near], direction)) > np.cos(np.radians(BEND))
-        i, k = np.nonzero(close & facing & kind[:, None] & kind[near])
-        of_point = linked(np.stack([i, near[i, k]], 1), len(near))[name]
-        mine = [which[of_point == each] for each in np.flatnonzero(np.bincount(of_point) >= LEAST)]
-        found += [*mine, *(in_line(cloud.points, mine) if kind is line else [])]
-    return sorted(found, key=len, reverse=True)
+        facing = np.abs(np.einsum("nki,ni->nk", direction[nearest], direction)) > np.cos(np.radians(BEND))
+        i, k = np.nonzero(close & facing & kind[:, None] & kind[nearest])
+        of_point = linked(np.stack([i, nearest[i, k]], 1), len(nearest))[name]
+        mine = [which[of_point == label] for label in np.flatnonzero(np.bincount(of_point) >= LEAST)]
+        result += [*mine, *(in_line(cloud.points, mine) if kind is line else [])]
+    return sorted(result, key=len, reverse=True)
 
 
 def merged(centre: FloatArray, radius: FloatArray) -> tuple[npt.NDArray[np.int64], FloatArray, FloatArray]:
-    """Balls of about the same place and size made one: the new number of each, new centres and radii."""
+    """Balls with about the same centre and radius merged: the new index of each, new centres and radii."""
     cell = np.concatenate([np.round(centre / MERGED), np.round(np.log(radius) / STEP)[:, None]], 1).astype(np.int64)
     _, name, count = np.unique(cell, axis=0, return_inverse=True, return_counts=True)
     name = name.reshape(-1)
@@ -110,22 +110,22 @@ def inner_balls(cloud: Cloud, which: npt.NDArray[np.int64]) -> tuple[FloatArray,
     return points[better] - normals[better] * radius[better, None], radius[better]
 
 
-def in_line(points: FloatArray, found: Sequence[npt.NDArray[np.int64]]) -> list[npt.NDArray[np.int64]]:
-    """Stretches that continue each other, as one: a rail or a shelf may meet a leg half-way up."""
-    if len(found) < 2:
+def in_line(points: FloatArray, stretches: Sequence[npt.NDArray[np.int64]]) -> list[npt.NDArray[np.int64]]:
+    """Unions of limbs that continue each other: a rail or a shelf may meet a leg half-way up."""
+    if len(stretches) < 2:
         return []
-    lines = [_line(points[each]) for each in found]
+    lines = [_line(points[stretch]) for stretch in stretches]
     middle, along = (np.stack([line[k] for line in lines]) for k in (0, 1))
     half = np.array([line[2] for line in lines])
     away = middle[None] - middle[:, None]
     ahead = np.einsum("ijc,ic->ij", away, along)
     aside = np.linalg.norm(away - ahead[..., None] * along[:, None], axis=2)
     straight = np.abs(along @ along.T) > np.cos(np.radians(STRAIGHT))
-    one, two = np.nonzero(np.triu(straight & (np.maximum(aside, aside.T) < ASIDE), 1))
-    near = np.abs(ahead[one, two]) - half[one] - half[two] < GAP
-    label = linked(np.stack([one[near], two[near]], 1), len(found))
-    many = np.flatnonzero(np.bincount(label, minlength=1) > 1)
-    return [np.concatenate([found[k] for k in np.flatnonzero(label == each).tolist()]) for each in many]
+    first, second = np.nonzero(np.triu(straight & (np.maximum(aside, aside.T) < ASIDE), 1))
+    close = np.abs(ahead[first, second]) - half[first] - half[second] < GAP
+    label = linked(np.stack([first[close], second[close]], 1), len(stretches))
+    groups = np.flatnonzero(np.bincount(label, minlength=1) > 1)
+    return [np.concatenate([stretches[k] for k in np.flatnonzero(label == group).tolist()]) for group in groups]
 
 
 def _line(points: FloatArray) -> tuple[FloatArray, FloatArray, float]:

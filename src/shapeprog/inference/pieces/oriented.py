@@ -13,7 +13,7 @@ from shapeprog.inference.pieces.oriented_kernels import COMPACT, FLAT, MANY, ROD
 from shapeprog.space import Array, FloatArray
 
 THIN = 0.05
-"""Side in cells below which one thickness is as good as another when directions are chosen."""
+"""Side in cells below which thickness is ignored in the selection of directions."""
 
 SLENDER, EVEN = 8.0, 0.5
 """A rod's variance along its axis is at least so many times that across it, and that across is at least so even."""
@@ -47,10 +47,10 @@ class Boxes(NamedTuple):
         return 8 * (a * b + b * c + c * a)
 
 
-def join(several: list[Boxes]) -> Boxes:
+def join(parts: list[Boxes]) -> Boxes:
     """All boxes of a list, in its order."""
     empty = Boxes(np.zeros((0, 3)), np.zeros((0, 3, 3)), np.zeros((0, 3)))
-    return Boxes(*(np.concatenate(column) for column in zip(empty, *several, strict=True)))
+    return Boxes(*(np.concatenate(column) for column in zip(empty, *parts, strict=True)))
 
 
 def boxes_around(points: Array, start: Array) -> Boxes:
@@ -66,33 +66,33 @@ def boxes_around(points: Array, start: Array) -> Boxes:
     points = np.ascontiguousarray(points, np.float64)
     start = np.ascontiguousarray(start, np.int64)
     runs = len(start) - 1
-    found = Boxes(np.zeros((runs, 3)), np.zeros((runs, 3, 3)), np.zeros((runs, 3)))
+    boxes = Boxes(np.zeros((runs, 3)), np.zeros((runs, 3, 3)), np.zeros((runs, 3)))
     if runs:
         spread, axes = principal_axes(points, start)
         rod = (spread[:, 0] > SLENDER * spread[:, 1]) & (spread[:, 2] > EVEN * spread[:, 1])
-        box_each(points, start, sphere(), axes, np.where(rod, ROD, COMPACT), THIN, *found)
-    return found
+        box_each(points, start, sphere(), axes, np.where(rod, ROD, COMPACT), THIN, *boxes)
+    return boxes
 
 
-def rectangles_around(points: FloatArray, start: Array, frames: FloatArray, least: float) -> Boxes:
+def rectangles_around(points: FloatArray, start: Array, frames: FloatArray, floor: float) -> Boxes:
     """Boxes around runs of points whose last axis is that of a frame (G, 3, 3), turned about it where that is smaller.
 
-    Sides below ``least`` count as that long.
+    Shorter sides count as ``floor``.
     """
     runs = len(start) - 1
-    found = Boxes(np.zeros((runs, 3)), np.zeros((runs, 3, 3)), np.zeros((runs, 3)))
+    boxes = Boxes(np.zeros((runs, 3)), np.zeros((runs, 3, 3)), np.zeros((runs, 3)))
     if runs:
-        box_each(points, start, sphere(), np.ascontiguousarray(frames), np.full(runs, FLAT), least, *found)
-    return found
+        box_each(points, start, sphere(), np.ascontiguousarray(frames), np.full(runs, FLAT), floor, *boxes)
+    return boxes
 
 
 def bounds(runs: Sequence[Sized]) -> npt.NDArray[np.int64]:
-    """Where runs start once they are put one after another, and where the last one ends (G + 1,)."""
+    """Start of each run in their concatenation, and the end of the last (G + 1,)."""
     return np.cumsum([0, *(len(run) for run in runs)], dtype=np.int64)
 
 
 def distinct(boxes: Boxes, step: float) -> npt.NDArray[np.int64]:
-    """Which boxes are the first of their kind: their places and sizes differ by more than about ``step``."""
+    """Which boxes are the first of their kind: their positions and sizes differ by more than about ``step``."""
     reach = boxes.rotation * boxes.half[:, None]
     extent = np.abs(np.einsum("di,nij->ndj", _LINES, reach)).sum(2)
     key = np.round(np.concatenate([boxes.centre, extent, 2 * np.sort(boxes.half, 1)], 1) / step).astype(np.int64)

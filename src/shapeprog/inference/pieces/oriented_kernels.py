@@ -7,19 +7,19 @@ import numpy as np
 from shapeprog.kernels.compile import helper, kernel
 
 WORTH = 0.93
-"""Volume, as a share of what a plainer direction needs, below which a freer direction is taken."""
+"""Largest volume relative to that of a simpler orientation at which a less restricted orientation is selected."""
 
 SLACK = 1.05
-"""How much larger than the smallest box the one along the principal axis of a rod may be and still be taken."""
+"""Largest volume relative to the smallest box at which the box along the principal axis of a rod is selected."""
 
 COMPACT, ROD, FLAT = 0, 1, 2
-"""Kinds of things that boxes are put around."""
+"""Kinds of point sets."""
 
 SWEEPS = 6
-"""Rounds of turning a box about each of its own axes in search of the smallest."""
+"""Largest number of rounds that turn a box about each of its axes to minimise its volume."""
 
 MANY = 160
-"""Points above which directions are chosen by the outermost ones alone."""
+"""Number of points above which only the outermost ones determine the directions."""
 
 
 @helper
@@ -62,10 +62,10 @@ def hull(flat, order, count, outline):
     """
     corners = 0
     for way in range(2):
-        least = corners + 1
+        minimum = corners + 1
         for step in range(count):
             k = order[step] if way == 0 else order[count - 1 - step]
-            while corners > least:
+            while corners > minimum:
                 a, b = outline[corners - 2], outline[corners - 1]
                 turn = (flat[b, 0] - flat[a, 0]) * (flat[k, 1] - flat[a, 1])
                 turn -= (flat[b, 1] - flat[a, 1]) * (flat[k, 0] - flat[a, 0])
@@ -84,16 +84,16 @@ def turn_about(points, count, frame, axis, floor, flat, order, outline):
 
     One of its sides lies on an edge of the convex hull (Freeman and Shapira 1975).
     """
-    one, two = (axis + 1) % 3, (axis + 2) % 3
+    first, second = (axis + 1) % 3, (axis + 2) % 3
     for k in range(count):
         for side in range(2):
-            at = one if side == 0 else two
+            at = first if side == 0 else second
             flat[k, side] = points[k, 0] * frame[0, at] + points[k, 1] * frame[1, at] + points[k, 2] * frame[2, at]
     sort(flat, count, order)
     corners = hull(flat, order, count, outline)
     best, cosine, sine = np.inf, 1.0, 0.0
     for k in range(corners + 1):
-        x, y = 1.0, 0.0  # as it is, for the first
+        x, y = 1.0, 0.0  # the first candidate is the frame itself
         if k > 0:
             a, b = outline[k - 1], outline[k % corners]
             x, y = flat[b, 0] - flat[a, 0], flat[b, 1] - flat[a, 1]
@@ -115,13 +115,13 @@ def turn_about(points, count, frame, axis, floor, flat, order, outline):
     if cosine < 0:
         cosine, sine = -cosine, -sine
     for row in range(3):
-        u, v = frame[row, one], frame[row, two]
-        frame[row, one], frame[row, two] = cosine * u + sine * v, cosine * v - sine * u
+        u, v = frame[row, first], frame[row, second]
+        frame[row, first], frame[row, second] = cosine * u + sine * v, cosine * v - sine * u
 
 
 @helper
 def settle(points, count, frame, floor, flat, order, outline, low, high):
-    """Turn a frame about its own axes in turn while the box becomes smaller; its volume is returned."""
+    """Turn a frame about its axes in turn while the box becomes smaller; its volume is returned."""
     best = volume(points, count, frame, floor, low, high)
     for _ in range(SWEEPS):
         before = best
@@ -134,27 +134,27 @@ def settle(points, count, frame, floor, flat, order, outline, low, high):
 
 
 @helper
-def outermost(points, first, last, directions, kept):
+def outermost(points, first, last, directions, selected):
     """Copy the points that lie farthest out along some directions, or all of a few; their number is returned."""
     if last - first <= MANY:
         for k in range(first, last):
-            kept[k - first] = points[k]
+            selected[k - first] = points[k]
         return last - first
     for d in range(directions.shape[0]):
         low, high = first, first
-        least, most = np.inf, -np.inf
+        minimum, maximum = np.inf, -np.inf
         for k in range(first, last):
             at = points[k, 0] * directions[d, 0] + points[k, 1] * directions[d, 1] + points[k, 2] * directions[d, 2]
-            if at < least:
-                least, low = at, k
-            if at > most:
-                most, high = at, k
-        kept[2 * d], kept[2 * d + 1] = points[low], points[high]
+            if at < minimum:
+                minimum, low = at, k
+            if at > maximum:
+                maximum, high = at, k
+        selected[2 * d], selected[2 * d + 1] = points[low], points[high]
     return 2 * directions.shape[0]
 
 
 @kernel("void(f8[:, ::1], i8[::1], f8[:, ::1], f8[:, :, ::1], i8[::1], f8, f8[:, ::1], f8[:, :, ::1], f8[:, ::1])")
-def box_each(points, start, directions, given, kind, floor, centre, rotation, half):
+def box_each(points, start, directions, frames, kind, floor, centre, rotation, half):
     """A small oriented box around each run of points.
 
     The world's axes where no other direction is much better, then one turned about one of them, then the smallest.
@@ -164,38 +164,37 @@ def box_each(points, start, directions, given, kind, floor, centre, rotation, ha
     points, start
         Points (P, 3); run g holds those from ``start[g]`` to ``start[g + 1] - 1``, at least one.
     directions
-        Unit vectors (D, 3), one of each opposite pair, in which the outermost points are looked for; 2 D <= MANY.
-    given, kind
-        Frames (G, 3, 3), and what they are (G,): ``COMPACT``, principal axes to start from, longest first; ``ROD``, the
-        same of a long thin thing, whose first is preferred to that of the smallest box; ``FLAT``, only to be turned
-        about its last column.
+        Unit vectors (D, 3), one of each opposite pair, that define the outermost points; 2 D <= MANY.
+    frames, kind
+        Frames (G, 3, 3) and kinds (G,): ``COMPACT``, initial principal axes, longest first; ``ROD``, the same of a long
+        thin part, whose first axis is preferred to that of the smallest box; ``FLAT``, turned only about the last axis.
     floor
-        Least side that counts: what is thinner is as good as flat.
+        Smallest side: thinner boxes count as flat.
     centre, rotation, half
         Output (G, 3), (G, 3, 3) with axes as columns, and (G, 3).
     """
-    kept, flat = np.empty((MANY, 3)), np.empty((MANY, 2))
+    selected, flat = np.empty((MANY, 3)), np.empty((MANY, 2))
     order, outline = np.empty(MANY, np.int64), np.empty(2 * MANY + 2, np.int64)
     low, high = np.empty(3), np.empty(3)
     frame, trial = np.empty((3, 3)), np.empty((3, 3))
     for g in range(len(start) - 1):
         first, last = start[g], start[g + 1]
-        count = outermost(points, first, last, directions, kept)
+        count = outermost(points, first, last, directions, selected)
         flattened = kind[g] == FLAT
         if flattened:
-            frame[:] = given[g]
+            frame[:] = frames[g]
         else:
             frame[:] = np.eye(3)
-        start_volume = volume(kept, count, frame, floor, low, high)
+        start_volume = volume(selected, count, frame, floor, low, high)
         best = WORTH * start_volume
         plain = True
         for axis in range(2 if flattened else 0, 3):
             if flattened:
-                trial[:] = given[g]
+                trial[:] = frames[g]
             else:
                 trial[:] = np.eye(3)
-            turn_about(kept, count, trial, axis, floor, flat, order, outline)
-            size = volume(kept, count, trial, floor, low, high)
+            turn_about(selected, count, trial, axis, floor, flat, order, outline)
+            size = volume(selected, count, trial, floor, low, high)
             if size < best:
                 best, plain = size, False
                 frame[:] = trial
@@ -206,17 +205,17 @@ def box_each(points, start, directions, given, kind, floor, centre, rotation, ha
                 if way == 0:
                     trial[:] = frame
                 else:
-                    trial[:] = given[g]
-                size = settle(kept, count, trial, floor, flat, order, outline, low, high)
+                    trial[:] = frames[g]
+                size = settle(selected, count, trial, floor, flat, order, outline, low, high)
                 if size < best:
                     best, free = size, True
                     rotation[g] = trial
             if free:
                 frame[:] = rotation[g]
                 if kind[g] == ROD:
-                    trial[:] = given[g]
-                    turn_about(kept, count, trial, 0, floor, flat, order, outline)
-                    if volume(kept, count, trial, floor, low, high) < SLACK * best:
+                    trial[:] = frames[g]
+                    turn_about(selected, count, trial, 0, floor, flat, order, outline)
+                    if volume(selected, count, trial, floor, low, high) < SLACK * best:
                         frame[:] = trial
         extents(points, first, last, frame, low, high)
         for row in range(3):

@@ -8,7 +8,7 @@ from shapeprog.kernels.compile import kernel
 
 
 @kernel("i8(f8[:, ::1], f8[:, ::1], i4[:, ::1], i8[::1], f8, f8, i8, i8[::1])")
-def grow_patches(points, normals, neighbours, order, cosine, tolerance, least, label):
+def grow_patches(points, normals, neighbours, order, cosine, tolerance, min_size, label):
     """Label points by the planar patch they belong to, -1 for none; the number of patches is returned.
 
     A patch grows from a seed to neighbours that lie in its plane and face its way, while the plane follows its points.
@@ -18,12 +18,12 @@ def grow_patches(points, normals, neighbours, order, cosine, tolerance, least, l
     points, normals
         Points (N, 3) and unit normals (N, 3) of either sign.
     neighbours
-        Indices (N, k) of near points.
+        Indices (N, k) of neighbouring points.
     order
         Seeds, the flattest first.
     cosine, tolerance
         How well a point's normal agrees with the plane's, and how far it may lie from it.
-    least
+    min_size
         Points of the smallest patch.
     label
         Output (N,).
@@ -42,29 +42,29 @@ def grow_patches(points, normals, neighbours, order, cosine, tolerance, least, l
         stack[0] = seed
         label[seed] = patches
         while at < size:
-            here = stack[at]
+            point = stack[at]
             at += 1
             for k in range(neighbours.shape[1]):
-                there = neighbours[here, k]
-                if label[there] >= 0:
+                neighbour = neighbours[point, k]
+                if label[neighbour] >= 0:
                     continue
                 facing, off = 0.0, 0.0
                 for axis in range(3):
-                    facing += normals[there, axis] * normal[axis]
-                    off += (points[there, axis] - mean[axis]) * normal[axis]
+                    facing += normals[neighbour, axis] * normal[axis]
+                    off += (points[neighbour, axis] - mean[axis]) * normal[axis]
                 if abs(facing) < cosine or abs(off) > tolerance:
                     continue
-                label[there] = patches
-                stack[size] = there
+                label[neighbour] = patches
+                stack[size] = neighbour
                 size += 1
                 length = 0.0
                 for axis in range(3):
-                    total[axis] += normals[there, axis] if facing > 0 else -normals[there, axis]
-                    mean[axis] += (points[there, axis] - mean[axis]) / size
+                    total[axis] += normals[neighbour, axis] if facing > 0 else -normals[neighbour, axis]
+                    mean[axis] += (points[neighbour, axis] - mean[axis]) / size
                     length += total[axis] * total[axis]
                 for axis in range(3):
                     normal[axis] = total[axis] / np.sqrt(length)
-        if size < least:
+        if size < min_size:
             for k in range(size):
                 label[stack[k]] = -2
             label[seed] = -1

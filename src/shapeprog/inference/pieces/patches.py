@@ -1,4 +1,4 @@
-"""Planar patches of a surface known by points and normals, as rectangles."""
+"""Planar patches of points with normals, as rectangles."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ SNAP = 3.0
 """Degrees within which the normal of a patch counts as one of the world's axes."""
 
 FULL = 0.8
-"""Share of a rectangle that its patch fills; below, the bars that it consists of are found too."""
+"""Share of a rectangle that its patch fills; below, its bars are detected as well."""
 
 RUNS = (0.6, 0.25, 0.1)
 """Lengths of bars, as shares of the rectangle they lie in."""
@@ -29,7 +29,7 @@ BAR = 0.7
 """Share of its rectangle that a bar fills."""
 
 MOST = 160
-"""Patches kept, the largest."""
+"""Largest number of patches."""
 
 
 class Patches(NamedTuple):
@@ -47,23 +47,23 @@ def planar_patches(cloud: Cloud) -> Patches:
     angle = np.cos(np.radians(25 if cloud.noise > NOISY else 15))
     count = grow_patches(cloud.points, cloud.normals, cloud.neighbours, order, angle, tolerance(cloud), LEAST, label)
     sizes = np.bincount(label[label >= 0], minlength=count)
-    kept = np.argsort(-sizes, kind="stable")[:MOST]
+    largest = np.argsort(-sizes, kind="stable")[:MOST]
     sequence = np.argsort(label, kind="stable")
     first = np.searchsorted(label[sequence], np.arange(count + 1))
-    members = [sequence[first[k] : first[k + 1]] for k in kept]
-    found = rectangles(cloud, members)
-    return bars(cloud, members, found)
+    members = [sequence[first[k] : first[k + 1]] for k in largest]
+    patches = rectangles(cloud, members)
+    return bars(cloud, members, patches)
 
 
 def flatness(cloud: Cloud) -> FloatArray:
-    """How much the normals around each point differ (N,)."""
+    """Mean deviation of the normals around each point (N,)."""
     facing = np.abs(np.einsum("nki,ni->nk", cloud.normals[cloud.neighbours], cloud.normals))
     return np.round(1 - facing.mean(1), 6)
 
 
 def rectangles(cloud: Cloud, members: list[npt.NDArray[np.int64]]) -> Patches:
-    """The rectangle around each planar set of points, along the world's axes where near."""
-    count = np.array([len(each) for each in members], np.int64)
+    """The rectangle around each planar set of points, along the world's axes where these are near."""
+    count = np.array([len(patch) for patch in members], np.int64)
     if not len(count):
         return Patches(np.zeros((0, 3)), np.zeros((0, 3, 3)), np.zeros((0, 2)))
     start = bounds(members)
@@ -72,8 +72,8 @@ def rectangles(cloud: Cloud, members: list[npt.NDArray[np.int64]]) -> Patches:
     off = points - np.repeat(mean, count, axis=0)
     moments = np.add.reduceat(off[:, :, None] * off[:, None], start[:-1])
     normal = np.linalg.eigh(moments)[1][:, :, 0]
-    found = rectangles_around(points, start, upright(normal), 2 * cloud.spacing)
-    return Patches(found.centre, found.rotation, found.half[:, :2] + cloud.spacing / 4)
+    boxes = rectangles_around(points, start, upright(normal), 2 * cloud.spacing)
+    return Patches(boxes.centre, boxes.rotation, boxes.half[:, :2] + cloud.spacing / 4)
 
 
 def upright(normal: FloatArray) -> FloatArray:
@@ -82,18 +82,18 @@ def upright(normal: FloatArray) -> FloatArray:
     nearest = np.eye(3)[np.abs(normal).argmax(1)]
     snapped = np.abs(normal).max(1) > np.cos(np.radians(SNAP))
     normal = np.where(snapped[:, None], nearest, normal)
-    least = np.eye(3)[np.abs(normal).argmin(1)]
-    across = least - normal * np.sum(least * normal, 1, keepdims=True)
+    axis = np.eye(3)[np.abs(normal).argmin(1)]
+    across = axis - normal * np.sum(axis * normal, 1, keepdims=True)
     across /= np.linalg.norm(across, axis=1, keepdims=True)
     return np.stack([across, np.cross(normal, across), normal], 2)
 
 
-def bars(cloud: Cloud, members: list[npt.NDArray[np.int64]], whole: Patches) -> Patches:
-    """The rectangles, and those of the bars in patches that fill their rectangle badly, such as frames."""
-    centre, frame, half = list(whole.centre), list(whole.frame), list(whole.half)
+def bars(cloud: Cloud, members: list[npt.NDArray[np.int64]], patches: Patches) -> Patches:
+    """The rectangles, and those of the bars in patches with a low fill, such as frames."""
+    centre, frame, half = list(patches.centre), list(patches.frame), list(patches.half)
     side = 1.8 * cloud.spacing
-    for each, middle, axes, reach in zip(members, *whole, strict=True):
-        flat = (cloud.points[each] - middle) @ axes[:, :2] + reach
+    for indices, middle, axes, reach in zip(members, *patches, strict=True):
+        flat = (cloud.points[indices] - middle) @ axes[:, :2] + reach
         shape = np.maximum(np.ceil(2 * reach / side).astype(int), 1)
         grid = np.zeros(shape, np.bool_)
         at = np.minimum((flat / (2 * reach) * shape).astype(int), shape - 1)
@@ -109,20 +109,20 @@ def bars(cloud: Cloud, members: list[npt.NDArray[np.int64]], whole: Patches) -> 
 
 
 def bars_of(grid: npt.NDArray[np.bool_]) -> list[tuple[Array, Array]]:
-    """Rectangles of cells, low and high corners, that long runs along either axis of a grid make up."""
-    found: dict[tuple[int, ...], None] = {}
+    """Rectangles of cells, low and high corners, formed by long runs along either axis of a grid."""
+    corners: dict[tuple[int, ...], None] = {}
     for axis in range(2):
         length = run_lengths(grid if axis else grid.T)
         length = length if axis else length.T
         for share in RUNS:
-            least = max(share * grid.shape[axis], 3)
-            regions, count = label_regions(length >= least)
+            min_length = max(share * grid.shape[axis], 3)
+            regions, count = label_regions(length >= min_length)
             for k in range(1, count + 1):
                 cells = np.argwhere(regions == k)
                 low, high = cells.min(0), cells.max(0) + 1
                 if len(cells) >= BAR * np.prod(high - low):
-                    found[(*low.tolist(), *high.tolist())] = None
-    return [(np.array(key[:2]), np.array(key[2:])) for key in found]
+                    corners[(*low.tolist(), *high.tolist())] = None
+    return [(np.array(key[:2]), np.array(key[2:])) for key in corners]
 
 
 def run_lengths(grid: npt.NDArray[np.bool_]) -> npt.NDArray[np.int64]:

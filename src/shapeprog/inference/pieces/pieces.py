@@ -1,4 +1,4 @@
-"""Proposals: oriented boxes that a target may consist of, and the points that each comes from.
+"""Proposals: oriented boxes that may be parts of a target, and the points of its surface.
 
 ========= ==========================================================================================
 source    box around
@@ -8,10 +8,10 @@ group     boxes that touch, such as the frame of a back
 rod       points on a cylinder
 limb      points of clean scans whose inner balls run on in one direction
 slab      the space between two planar patches that face each other
-sheet     one planar patch; how thick it is, is not known
+sheet     one planar patch of unknown thickness
 ========= ==========================================================================================
 
-They overlap, and most are wrong: the choice among candidates decides.
+They overlap, and most are wrong: the selection of candidates decides.
 """
 
 from __future__ import annotations
@@ -37,26 +37,26 @@ from shapeprog.inference.surface.cloud import Cloud, cloud_of, is_clean, points_
 from shapeprog.inference.surface.components import Components, components
 
 POINTS = 20_000
-"""Points in which the surface of a mesh is seen."""
+"""Points sampled on the surface of a mesh."""
 
 OWN = 48
-"""Points that each component has at least."""
+"""Smallest number of points on a component."""
 
 COMPONENTS, SLABS, SHEETS, LIMBS = 300, 600, 60, 100
-"""Most pieces of these sources."""
+"""Largest number of pieces of these sources."""
 
 MOST = 600
-"""Most pieces of one target."""
+"""Largest number of pieces of one target."""
 
 SAME = 0.25
-"""Difference in cells in place and size below which two pieces are the same; a component's is kept as it is."""
+"""Difference in cells in position and size below which two pieces are the same; components are never merged."""
 
 LEAST = 32
-"""Points below which there is no surface to speak of."""
+"""Smallest number of points from which a surface is estimated."""
 
 
 class Source(Enum):
-    """Where a piece comes from."""
+    """Source of a piece."""
 
     COMPONENT = 0
     GROUP = 1
@@ -67,14 +67,14 @@ class Source(Enum):
 
 
 class Pieces(NamedTuple):
-    """Boxes in cells, the most important first, and the points of the surface that each of them comes from.
+    """Boxes in cells, the most important first, and the points of the surface.
 
     Parameters
     ----------
     boxes
         Centres, axes and half extents.
     source
-        Where each comes from (N,), as values of :class:`Source`.
+        Source of each piece (N,), as values of :class:`Source`.
     cloud
         The surface as points with normals.
     """
@@ -87,8 +87,8 @@ class Pieces(NamedTuple):
 def find_pieces(shape: Shape, seed: int = 0) -> Pieces:
     """Pieces of a mesh or a point cloud; the same for the same seed.
 
-    Those that a greedy choice takes come first, then components, then the few of groups, rods and limbs, then the many
-    of slabs and sheets; among these, those that explain most.
+    Pieces of a greedy selection are first, then components, then groups, rods and limbs, then slabs and sheets; within
+    each class, pieces that explain more points are first.
     """
     if shape.vertices is not None and shape.faces is not None and len(shape.faces):
         mesh = components(shape.vertices, shape.faces)
@@ -100,17 +100,17 @@ def find_pieces(shape: Shape, seed: int = 0) -> Pieces:
 
 
 def _of_mesh(mesh: Components, seed: int) -> Pieces:
-    """Pieces of a mesh: of its components, and of points on it, among which each large component has some."""
+    """Pieces of a mesh: from its components, and from sampled points, with at least some on each large component."""
     count = min(len(mesh.area), COMPONENTS)
     corner = mesh.corner[: mesh.corner_start[count]]
     boxes = align_copies(mesh, boxes_around(mesh.vertices[corner], mesh.corner_start[: count + 1]))
-    drawn = [sample_with_faces(mesh.vertices, mesh.faces, POINTS, seed)]
-    own = np.bincount(mesh.component_of(drawn[0][1]), minlength=count)
-    for each in np.flatnonzero(own[:count] < OWN):
-        first, last = mesh.face_start[each : each + 2]
+    samples = [sample_with_faces(mesh.vertices, mesh.faces, POINTS, seed)]
+    counts = np.bincount(mesh.component_of(samples[0][1]), minlength=count)
+    for component in np.flatnonzero(counts[:count] < OWN):
+        first, last = mesh.face_start[component : component + 2]
         points, face = sample_with_faces(mesh.vertices, mesh.faces[first:last], OWN, seed)
-        drawn.append((points, face + first))
-    points, face = (np.concatenate(each) for each in zip(*drawn, strict=True))
+        samples.append((points, face + first))
+    points, face = (np.concatenate(column) for column in zip(*samples, strict=True))
     corners = mesh.vertices[mesh.faces[face]]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     cloud = cloud_of(points, normals / np.linalg.norm(normals, axis=1, keepdims=True))
@@ -120,7 +120,7 @@ def _of_mesh(mesh: Components, seed: int) -> Pieces:
 def _of_points(cloud: Cloud, seed: int, along: Sequence[npt.NDArray[np.int64]]) -> list[tuple[Source, Boxes]]:
     """Pieces from points with normals, by source, and groups of those that explain the points together.
 
-    ``along`` has the points of each limb.
+    ``along`` has the indices of the points of each limb.
     """
     if len(cloud.points) < LEAST:
         return [(Source.GROUP, boxes_around(cloud.points, np.array([0, len(cloud.points)])))]
@@ -128,31 +128,31 @@ def _of_points(cloud: Cloud, seed: int, along: Sequence[npt.NDArray[np.int64]]) 
     between = slabs(patches)
     between = between.take(distinct(between, SAME))
     support = Support(cloud, between)
-    kept = np.flatnonzero(support.filled)
-    kept = kept[np.argsort(-support.near[kept].sum(1), kind="stable")[:SLABS]]
+    selected = np.flatnonzero(support.filled)
+    selected = selected[np.argsort(-support.explained[selected].sum(1), kind="stable")[:SLABS]]
     along = along[:LIMBS]
     members = cloud.points[np.concatenate(along)] if along else np.zeros((0, 3))
-    found = [
+    sources = [
         (Source.ROD, rods(cloud, seed)),
         (Source.LIMB, boxes_around(members, bounds(along))),
-        (Source.SLAB, between.take(kept)),
+        (Source.SLAB, between.take(selected)),
         (Source.SHEET, sheets(patches, SHEETS)),
     ]
-    boxes = join([each for _, each in found])
-    return [*found, (Source.GROUP, groups(boxes.take(Support(cloud, boxes).cover())))]
+    boxes = join([part for _, part in sources])
+    return [*sources, (Source.GROUP, groups(boxes.take(Support(cloud, boxes).cover())))]
 
 
-def _ranked(cloud: Cloud, listed: list[tuple[Source, Boxes]], whole: Boxes) -> Pieces:
+def _ranked(cloud: Cloud, listed: list[tuple[Source, Boxes]], component_boxes: Boxes) -> Pieces:
     """All pieces, each once, the most important first."""
-    count = len(whole.half)
-    listed = [(Source.COMPONENT, whole), *listed]
+    count = len(component_boxes.half)
+    listed = [(Source.COMPONENT, component_boxes), *listed]
     boxes = join([boxes for _, boxes in listed])
     source = np.concatenate([np.full(len(boxes.half), source.value) for source, boxes in listed])
-    once = distinct(boxes, SAME)
-    once = np.concatenate([np.arange(count), once[once >= count]])
-    boxes, source = boxes.take(once), source[once]
+    unique = distinct(boxes, SAME)
+    unique = np.concatenate([np.arange(count), unique[unique >= count]])
+    boxes, source = boxes.take(unique), source[unique]
     support = Support(cloud, boxes)
-    first = np.full(len(once), len(once))
+    first = np.full(len(unique), len(unique))
     cover = support.cover()
     first[cover] = np.arange(len(cover))
     turn = np.searchsorted([Source.COMPONENT.value, Source.LIMB.value], source)

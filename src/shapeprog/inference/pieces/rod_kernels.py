@@ -7,16 +7,16 @@ import numpy as np
 from shapeprog.kernels.compile import helper, kernel
 
 BINS = 16
-"""Sectors around the axis of a rod in which its points are looked for."""
+"""Number of sectors around the axis of a rod."""
 
 EVERY = 2
-"""Of so many points one is looked at."""
+"""Stride over the points that are tested."""
 
 REACH = 0.5
 """Length in cells of the stretches along the axis of a rod; an empty one ends it."""
 
 STRETCHES = 128
-"""Such stretches along the longest rod: more than the diagonal of the grid."""
+"""Stretches along the longest rod: more than the diagonal of the grid."""
 
 
 @helper
@@ -51,29 +51,29 @@ def mark_rod(points, normals, centre, axis, radius, half, tolerance, cosine, ins
 
 @kernel("void(f8[:, ::1], f8[:, ::1], i4[:, ::1], i8[:, ::1], f8, f8, f8, f8[:, ::1])")
 def try_rods(points, normals, neighbours, draws, tolerance, cosine, largest, rods):
-    """Round rods through pairs of points, each with the number of points that speak for it.
+    """Round rods through pairs of points, each with its number of supporting points.
 
-    The axis is normal to both normals, and goes through where they meet (as in Schnabel, Wahl and Klein 2007).
+    The axis is normal to both normals, and passes through their intersection (as in Schnabel, Wahl and Klein 2007).
 
     Parameters
     ----------
     points, normals, neighbours
-        Points (N, 3) with unit normals (N, 3) of either sign, and indices (N, k) of near points.
+        Points (N, 3) with unit normals (N, 3) of either sign, and indices (N, k) of neighbouring points.
     draws
-        Drawn numbers (T, D): a first point, and the neighbours of a walk from it to the second.
+        Random numbers (T, D): a first point, and the neighbours of a walk from it to the second.
     tolerance, cosine
         How far a point may be from the cylinder, and how well its normal agrees with it.
     largest
         Largest radius.
     rods
-        Output (T, 10): points that speak for it, the point in its middle (3), axis (3), radius, half length, share
-        of sectors with points.  Those that fail have no points.
+        Output (T, 10): number of supporting points, middle (3), axis (3), radius, half length, share of sectors with
+        points.  Failed trials have no points.
     """
     count = len(points)
     axis, centre, off = np.empty(3), np.empty(3), np.empty(3)
     stretch = np.empty(STRETCHES, np.int64)
     sector = np.empty((STRETCHES, BINS), np.bool_)
-    one, two = np.empty(3), np.empty(3)
+    u, v = np.empty(3), np.empty(3)
     for trial in range(len(draws)):
         rods[trial] = 0.0
         first = draws[trial, 0] % count
@@ -104,13 +104,13 @@ def try_rods(points, normals, neighbours, draws, tolerance, cosine, largest, rod
             centre[k] = points[first, k] + s * p[k]
         side = 0 if abs(axis[0]) < 0.6 else 1
         for k in range(3):
-            one[k] = (1.0 if k == side else 0.0) - axis[side] * axis[k]
-        length = np.sqrt(dot(one, one))
+            u[k] = (1.0 if k == side else 0.0) - axis[side] * axis[k]
+        length = np.sqrt(dot(u, u))
         for k in range(3):
-            one[k] /= length
+            u[k] /= length
         for k in range(3):
             a, b = (k + 1) % 3, (k + 2) % 3
-            two[k] = axis[a] * one[b] - axis[b] * one[a]
+            v[k] = axis[a] * u[b] - axis[b] * u[a]
         stretch[:] = 0
         sector[:] = False
         middle = STRETCHES // 2
@@ -121,23 +121,23 @@ def try_rods(points, normals, neighbours, draws, tolerance, cosine, largest, rod
                 at = int(np.floor(dot(off, axis) / REACH)) + middle
                 if 0 <= at < STRETCHES:
                     stretch[at] += EVERY
-                    angle = np.arctan2(dot(off, two), dot(off, one)) / (2 * np.pi) + 0.5
+                    angle = np.arctan2(dot(off, v), dot(off, u)) / (2 * np.pi) + 0.5
                     sector[at, min(int(angle * BINS), BINS - 1)] = True
         low, high = middle, middle
         while low > 0 and stretch[low - 1] > 0:
             low -= 1
         while high < STRETCHES and stretch[high] > 0:
             high += 1
-        support, seen = 0, 0
+        support, filled = 0, 0
         for at in range(low, high):
             support += stretch[at]
         for b in range(BINS):
             for at in range(low, high):
                 if sector[at, b]:
-                    seen += 1
+                    filled += 1
                     break
         rods[trial, 0] = support
         for k in range(3):
             rods[trial, 1 + k] = centre[k] + axis[k] * REACH * ((low + high) / 2 - middle)
             rods[trial, 4 + k] = axis[k]
-        rods[trial, 7], rods[trial, 8], rods[trial, 9] = radius, REACH * (high - low) / 2, seen / BINS
+        rods[trial, 7], rods[trial, 8], rods[trial, 9] = radius, REACH * (high - low) / 2, filled / BINS

@@ -18,16 +18,16 @@ LARGEST = 5.0
 """Largest radius in cells."""
 
 ROUND = 0.6
-"""Share of the sectors around a rod in which it has points, at least."""
+"""Smallest share of the sectors around a rod with points."""
 
 DENSE = 0.5
-"""Points of a rod as a share of what its surface would have, at least."""
+"""Smallest number of points of a rod, as a share of the expected number on its surface."""
 
 LEAST = 24
 """Points of the smallest rod."""
 
 MOST = 60
-"""Rods kept."""
+"""Largest number of rods."""
 
 
 def rods(cloud: Cloud, seed: int = 0) -> Boxes:
@@ -40,14 +40,14 @@ def rods(cloud: Cloud, seed: int = 0) -> Boxes:
     expected = 2 * np.pi * radius * length * tried[:, 9] / cloud.spacing**2
     good = (support >= LEAST) & (tried[:, 9] >= ROUND) & (length > 2 * radius) & (support > DENSE * expected)
     order = np.flatnonzero(good)[np.argsort(-support[good], kind="stable")]
-    taken = np.zeros(len(cloud.points), np.bool_)
-    found: list[Boxes] = []
+    used = np.zeros(len(cloud.points), np.bool_)
+    result: list[Boxes] = []
     for row in tried[order]:
-        if len(found) == MOST:
+        if len(result) == MOST:
             break
         middle, axis, width, half = row[1:4], row[4:7], float(row[7]), float(row[8])
         inside = on_rod(cloud, middle, axis, width, half, off, facing)
-        if len(inside) < LEAST or taken[inside].mean() > 0.5:
+        if len(inside) < LEAST or used[inside].mean() > 0.5:
             continue
         for _ in range(2):
             middle, axis, width, half = fitted(cloud, inside, axis)
@@ -56,10 +56,10 @@ def rods(cloud: Cloud, seed: int = 0) -> Boxes:
                 break
         else:
             middle, axis, width, half = fitted(cloud, inside, axis)
-            taken[inside] = True
+            used[inside] = True
             frame = upright(axis[None])[0][:, [2, 0, 1]]
-            found.append(Boxes(middle[None], frame[None], np.array([[half, width, width]])))
-    return join(found)
+            result.append(Boxes(middle[None], frame[None], np.array([[half, width, width]])))
+    return join(result)
 
 
 def on_rod(
@@ -67,8 +67,8 @@ def on_rod(
 ) -> npt.NDArray[np.int64]:
     """The points on a cylinder that face across its axis."""
     inside = np.zeros(len(cloud.points), np.bool_)
-    place = np.ascontiguousarray(middle), np.ascontiguousarray(axis)
-    mark_rod(cloud.points, cloud.normals, *place, radius, half, off, facing, inside)
+    line = np.ascontiguousarray(middle), np.ascontiguousarray(axis)
+    mark_rod(cloud.points, cloud.normals, *line, radius, half, off, facing, inside)
     return np.flatnonzero(inside)
 
 

@@ -18,33 +18,33 @@ SHARED = 0.5
 """Share of the smaller patch that the larger one faces, at least."""
 
 STRETCH = 1.6
-"""Thickness of a pair as a multiple of the middle side of its box, at most: else other faces tell of it better."""
+"""Largest thickness of a pair as a multiple of the middle side of its box: above, other faces describe it better."""
 
 
 def slabs(patches: Patches) -> Boxes:
-    """Boxes between pairs of patches: what both cover, what either covers, and what each of them covers."""
+    """Boxes between pairs of patches: intersection and bounds of both rectangles, and each of them."""
     normal = patches.frame[:, :, 2]
-    apart = np.einsum("ijk,ik->ij", patches.centre[None] - patches.centre[:, None], normal)
+    distance = np.einsum("ijk,ik->ij", patches.centre[None] - patches.centre[:, None], normal)
     parallel = np.abs(normal @ normal.T) > np.cos(np.radians(PARALLEL))
     larger = patches.half.prod(1)[:, None] >= patches.half.prod(1)[None]
-    thick = np.abs(apart)
+    thick = np.abs(distance)
     i, j = np.nonzero(parallel & larger & (thick >= THICKNESS[0]) & (thick <= THICKNESS[1]))
     i, j = i[i != j], j[i != j]
     corner = corners(patches)[j] - patches.centre[i][:, None]
     flat = np.einsum("nck,nka->nca", corner, patches.frame[i][:, :, :2])
     low, high = flat.min(1), flat.max(1)
-    own = patches.half[i]
-    inner = np.maximum(low, -own), np.minimum(high, own)
+    half = patches.half[i]
+    inner = np.maximum(low, -half), np.minimum(high, half)
     shared = np.maximum(inner[1] - inner[0], 0).prod(1)
-    keep = shared >= SHARED * np.minimum(4 * own.prod(1), (high - low).prod(1))
-    i, j, low, high, own = i[keep], j[keep], low[keep], high[keep], own[keep]
+    keep = shared >= SHARED * np.minimum(4 * half.prod(1), (high - low).prod(1))
+    i, j, low, high, half = i[keep], j[keep], low[keep], high[keep], half[keep]
     spans = [
         (inner[0][keep], inner[1][keep]),
-        (np.minimum(low, -own), np.maximum(high, own)),
-        (-own, own),
+        (np.minimum(low, -half), np.maximum(high, half)),
+        (-half, half),
         (low, high),
     ]
-    return _between(patches, i, apart[i, j], spans)
+    return _between(patches, i, distance[i, j], spans)
 
 
 def sheets(patches: Patches, count: int) -> Boxes:

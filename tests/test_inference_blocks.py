@@ -27,7 +27,7 @@ from shapeprog.inference.cells.block_layout import (
 )
 from shapeprog.inference.cells.blocks import to_program
 from shapeprog.inference.cells.descent_kernels import layers
-from shapeprog.inference.cells.drawing import cells_shared, draw_all, draw_each, places
+from shapeprog.inference.cells.drawing import cells_shared, draw_all, draw_each, low_corners
 from shapeprog.language.unroll import unroll
 
 
@@ -86,7 +86,7 @@ def test_the_cells_that_blocks_cover_are_counted_and_lie_within_their_layers():
         assert not cells[:low].any()
         assert not cells[high:].any()
         assert (one, other) == ((cells & first).sum(), (cells & second).sum())
-        assert np.array_equal(places(rows), np.argwhere(cells) - 16)
+        assert np.array_equal(low_corners(rows), np.argwhere(cells) - 16)
     assert np.array_equal(draw_all(blocks), np.bitwise_or.reduce(drawn))
 
 

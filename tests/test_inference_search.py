@@ -145,7 +145,7 @@ def test_descent_polish_and_rounds_never_lower_the_objective(seed):
     polished = editing.polish(blocks, aim, 1, 3)
     start = editing.value_of(blocks, aim)
     assert editing.value_of(polished, aim) >= start
-    plan = ruin.Plan(most=6, families=40, forms=0.3, heat=0.004)
+    plan = ruin.Plan(blocks=6, families=40, forms=0.3, heat=0.004)
     rebuilt, best = ruin.rebuild(polished, aim, plan, 6, seed)
     assert best == pytest.approx(editing.value_of(rebuilt, aim), abs=1e-12)
     assert best >= editing.value_of(polished, aim)

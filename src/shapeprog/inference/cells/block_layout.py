@@ -1,4 +1,4 @@
-"""The one home of the row of numbers in which the structure search keeps a block.
+"""Layout of the row of numbers in which the structure search stores a block.
 
 A block is a row of 20 whole numbers (as float64): a form, its own numbers, and the loops around it.
 
@@ -6,7 +6,7 @@ A block is a row of 20 whole numbers (as float64): a form, its own numbers, and 
 slots      hold
 =========  ============================================================================================
 0          FORM: ``BOX``, ``DISC``, ``BACK``, ``LINE`` or ``CROSS``
-1 to 7     FIRST and on, the numbers of the form in the order of its statement, in cells, the rest unused:
+1 to 7     FIRST and on, the numbers of the form in the order of its statement, in cells, others unused:
            BOX   low corner (up, depth, side), extents (up, depth, side)
            DISC  centre of the bottom (up, depth, side), thickness, radius
            BACK  low corner, extents, tilt

@@ -125,10 +125,10 @@ def _node(block: FloatArray, name: str) -> Draw | Loop:
 
 
 def _loops(block: FloatArray) -> list[Loop]:
-    found = []
+    loops = []
     for count, shift in ((COUNT1, SHIFT1), (COUNT2, SHIFT2)):
         if block[count] > 1:
-            found.append(Loop("translate", (float(block[count]), *map(float, block[shift : shift + 3])), ()))
+            loops.append(Loop("translate", (float(block[count]), *map(float, block[shift : shift + 3])), ()))
     if block[ROTATE] > 1:
-        found.append(Loop("rotate", (float(block[ROTATE]), 1.0), ()))
-    return found
+        loops.append(Loop("rotate", (float(block[ROTATE]), 1.0), ()))
+    return loops

@@ -1,7 +1,7 @@
 """Kernels that find the box of cells with the largest sum of weights, exactly.
 
-A volume (A, B, C) is a flat array with its three sizes, so that any scratch can hold one.  Cells are named by unsigned
-numbers, which spares the compiled loops a test for indices from the end.
+A volume (A, B, C) is a flat array with its three sizes, so that any scratch can hold one.  Indices of cells are
+unsigned, so the compiled loops need no test for negative indices.
 """
 
 from __future__ import annotations
@@ -11,10 +11,10 @@ import numpy as np
 from shapeprog.kernels.compile import helper, kernel
 
 SLACK = 0.01
-"""What a bound must fall short by before it prunes: more than the rounding of a sum in single precision."""
+"""Margin below the best at which a bound prunes: more than the rounding error of a sum in single precision."""
 
 SIDE = 32
-"""Most cells along a side of a volume."""
+"""Largest number of cells along a side of a volume."""
 
 
 @helper(fastmath={"reassoc", "nsz", "nnan"})

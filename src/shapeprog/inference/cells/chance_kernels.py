@@ -35,5 +35,5 @@ def below(count):
 def shuffle(numbers):
     """Put numbers in random order (Fisher and Yates, from the last to the first)."""
     for last in range(len(numbers) - 1, 0, -1):
-        other = one_of(last + 1)
-        numbers[last], numbers[other] = numbers[other], numbers[last]
+        index = one_of(last + 1)
+        numbers[last], numbers[index] = numbers[index], numbers[last]

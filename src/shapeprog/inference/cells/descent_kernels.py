@@ -24,7 +24,7 @@ from shapeprog.kernels.compile import helper, kernel
 from shapeprog.kernels.rows import REACH
 
 MOST_MOVES = 200
-"""At least the number of neighbours that any block has."""
+"""An upper bound on the number of neighbours of a block."""
 
 LOOP = COUNT2 - COUNT1
 """Numbers of one translation loop."""
@@ -33,18 +33,18 @@ LAYER = 16
 """Words of 64 cells in one horizontal layer."""
 
 MOST_STEPS = 60
-"""Most steps of one descent."""
+"""Largest number of steps of one descent."""
 
 MOST_COPIES = 64
-"""Most copies of one block."""
+"""Largest number of copies of one block."""
 
 GAIN = 1e-9
-"""Least rise of the objective that counts, above the noise of rounding."""
+"""Smallest increase of the objective that is accepted, above rounding errors."""
 
 
 @helper
 def statements(block):
-    """Statements of a block: itself and its loops; from Python also those of the columns of many."""
+    """Statements of a block: itself and its loops; from Python also for each column of a transposed array of blocks."""
     return 1 + (block[COUNT1] > 1) + (block[COUNT2] > 1) + (block[ROTATE] > 1)
 
 
@@ -56,7 +56,7 @@ def valid(block):
         return False
     for level in range(COUNT1, ROTATE, LOOP):
         if block[level] > 1:
-            apart = False
+            separate = False
             for axis in range(3):
                 if form in (BOX, BACK):
                     extent = block[EXTENT + axis]
@@ -64,8 +64,8 @@ def valid(block):
                     extent = block[EXTENT] if axis == 0 else 2 * block[RADIUS]
                 else:
                     extent = 2.0
-                apart = apart or abs(block[level + 1 + axis]) >= extent
-            if not apart:
+                separate = separate or abs(block[level + 1 + axis]) >= extent
+            if not separate:
                 return False
     if form in (BOX, BACK):
         return block[EXTENT] >= 1 and block[EXTENT + 1] >= 1 and block[EXTENT + 2] >= 1
@@ -116,7 +116,7 @@ def put_loop(out, n, block, slot, by, shift, share):
 
 @helper
 def moves(block, out, far):
-    """Neighbours of a block: faces, places, ends, spacings and counts moved by up to ``far``; their number."""
+    """Neighbours of a block: faces, positions, ends, spacings and counts changed by up to ``far``; their number."""
     n = 0
     form = int(block[FORM])
     last = RADIUS if form == DISC else (TILT if form == LINE else TILT - 1)
@@ -124,12 +124,12 @@ def moves(block, out, far):
         delta = (which // 2 + 1.0) * (1.0 if which % 2 else -1.0)
         if form in (BOX, BACK):
             for axis in range(3):
-                place, extent = FIRST + axis, EXTENT + axis
-                n = put(out, n, block, place, delta, place, 0.0)
+                corner, extent = FIRST + axis, EXTENT + axis
+                n = put(out, n, block, corner, delta, corner, 0.0)
                 n = put(out, n, block, extent, delta, extent, 0.0)
-                n = put(out, n, block, place, delta, extent, -delta)
+                n = put(out, n, block, corner, delta, extent, -delta)
                 if which < 2:
-                    n = put(out, n, block, place, -delta, extent, 2 * delta)
+                    n = put(out, n, block, corner, -delta, extent, 2 * delta)
             if form == BACK:
                 n = put(out, n, block, TILT, delta, TILT, 0.0)
                 n = put(out, n, block, TILT, delta, FIRST + 1, -delta)
@@ -159,17 +159,17 @@ def moves(block, out, far):
 
 
 @kernel("f8(f8[::1], u8[::1], u8[::1], f8, i8, u4[:, ::1], u8[:, ::1], f8[:, ::1])")
-def descend(block, occupied, others, price, far, scratch_rows, scratch_words, around):
-    """Best-improvement descent of one block in its place; its objective.
+def descend(block, occupied, covered, price, far, scratch_rows, scratch_words, around):
+    """Best-improvement descent of one block, in place; its objective.
 
     Parameters
     ----------
     block
-        The block, which is moved.
-    occupied, others
-        The solid, and what the other blocks cover, as words (512).
+        Input and output: the block.
+    occupied, covered
+        The solid, and the cells of the other blocks, as words (512).
     price, far
-        IoU that one statement has to earn, and most cells that one move goes.
+        Price of a statement in IoU, and largest step of one move in cells.
     scratch_rows, scratch_words, around
         Scratch: the same three times 1024 words of 32 cells as 512 of 64, and room for all neighbours (M, 20).
     """
@@ -177,16 +177,16 @@ def descend(block, occupied, others, price, far, scratch_rows, scratch_words, ar
     inter = 0
     union = 0
     for i in range(len(occupied)):
-        gained[i] = occupied[i] & ~others[i]
-        wasted[i] = ~occupied[i] & ~others[i]
-        inter += ones(occupied[i] & others[i])
-        union += ones(occupied[i] | others[i])
+        gained[i] = occupied[i] & ~covered[i]
+        wasted[i] = ~occupied[i] & ~covered[i]
+        inter += ones(occupied[i] & covered[i])
+        union += ones(occupied[i] | covered[i])
     best = -np.inf
     for slot in range(len(block)):
         around[0, slot] = block[slot]
-    number = 1  # first the block alone, then with its neighbours
+    number = 1  # the block alone first, its neighbours later
     for step in range(MOST_STEPS + 1):
-        chosen = -1
+        best_index = -1
         for m in range(number):
             if step > 0 and not valid(around[m]):
                 continue
@@ -202,10 +202,10 @@ def descend(block, occupied, others, price, far, scratch_rows, scratch_words, ar
             value = good / max(bad, 1) - price * statements(around[m])
             if value > best + GAIN:
                 best = value
-                chosen = m
-        if chosen < 0:
+                best_index = m
+        if best_index < 0:
             break
         for slot in range(len(block)):
-            block[slot] = around[chosen, slot]
+            block[slot] = around[best_index, slot]
         number = moves(block, around, far)
     return best

@@ -1,4 +1,4 @@
-"""Blocks as the cells that they draw: rows of bits, one word for the 32 cells of a row."""
+"""Cells of blocks as rows of bits, one word for the 32 cells of a row."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ def draw_all(blocks: FloatArray) -> Rows:
     return rows[0]
 
 
-def cells_shared(drawn: Rows, first: Rows, second: Rows) -> Whole:
-    """How many cells each of several sets of rows (P, 1024) shares with two others: (P, 2)."""
-    counts = np.empty((len(drawn), 2), np.int64)
-    count_cells(drawn.view(np.uint64), first.view(np.uint64), second.view(np.uint64), counts)
+def cells_shared(sets: Rows, first: Rows, second: Rows) -> Whole:
+    """Number of cells that each set of rows (P, 1024) shares with two further sets: (P, 2)."""
+    counts = np.empty((len(sets), 2), np.int64)
+    count_cells(sets.view(np.uint64), first.view(np.uint64), second.view(np.uint64), counts)
     return counts
 
 
-def places(rows: Rows) -> Whole:
+def low_corners(rows: Rows) -> Whole:
     """Low corners (n, 3) of the cells of rows (1024), in the frame of the grid."""
     bits = np.unpackbits(rows.view(np.uint8), bitorder="little").view(np.bool_)
     cells = np.unravel_index(np.flatnonzero(bits), (RESOLUTION,) * 3)

@@ -1,4 +1,4 @@
-"""Editing whole programs of blocks: take some out, put better ones in, keep what pays."""
+"""Editing of programs of blocks: remove blocks, insert better ones, keep changes that raise the objective."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from shapeprog.inference.cells.block_layout import WIDTH
 from shapeprog.inference.cells.descent_kernels import MOST_MOVES, descend, statements
-from shapeprog.inference.cells.drawing import Rows, Whole, cells_shared, draw_all, draw_each, places
+from shapeprog.inference.cells.drawing import Rows, Whole, cells_shared, draw_all, draw_each, low_corners
 from shapeprog.inference.cells.fold_kernels import VOLUMES
 from shapeprog.inference.cells.form_kernels import guess
 from shapeprog.inference.cells.proposal_kernels import propose
@@ -16,15 +16,15 @@ from shapeprog.inference.cells.raster_kernels import ROWS
 from shapeprog.space import RESOLUTION, FloatArray
 
 GUESSES = 30
-"""Rough blocks of a form from which one descent starts."""
+"""Number of rough blocks of a form, the best of which starts a descent."""
 
 FEWEST = 4
-"""Uncovered cells from which a form other than a box is tried."""
+"""Smallest number of uncovered cells for a form other than a box."""
 
 
 @dataclass(frozen=True)
 class Target:
-    """What a search works towards.
+    """Target and objective of a search.
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ class Target:
     table
         The ways of repeating a box.
     price
-        IoU that one statement has to earn.
+        Price of a statement in IoU.
     cells
         Number of occupied cells.
     """
@@ -58,27 +58,27 @@ def iou(blocks: FloatArray, target: Target) -> float:
     return _iou(draw_all(blocks), target)
 
 
-def _iou(drawn: Rows, target: Target) -> float:
+def _iou(rows: Rows, target: Target) -> float:
     """IoU of rows (1024) with the target."""
-    inter, beyond = cells_shared(drawn[None], target.occupied, ~target.occupied)[0].tolist()
+    inter, beyond = cells_shared(rows[None], target.occupied, ~target.occupied)[0].tolist()
     return float(inter / (target.cells + beyond))
 
 
-def improve_block(block: FloatArray, occupied: Rows, others: Rows, price: float, far: int) -> tuple[FloatArray, float]:
-    """A block after descent on IoU minus price x statements, the other blocks fixed, and the value it comes to.
+def improve_block(block: FloatArray, occupied: Rows, covered: Rows, price: float, far: int) -> tuple[FloatArray, float]:
+    """A block after descent on IoU minus price x statements, the other blocks fixed, and the value reached.
 
     Parameters
     ----------
-    occupied, others
-        The solid, and what the other blocks cover, as rows (1024).
+    occupied, covered
+        The solid, and the cells of the other blocks, as rows (1024).
     price
-        IoU that one statement has to earn.
+        Price of a statement in IoU.
     far
-        Most cells that one move goes.
+        Largest step of one move in cells.
     """
     better, rows, around = block.copy(), np.empty((3, ROWS), np.uint32), np.empty((MOST_MOVES, WIDTH))
     words = rows.view(np.uint64)
-    value = descend(better, occupied.view(np.uint64), others.view(np.uint64), price, far, rows, words, around)
+    value = descend(better, occupied.view(np.uint64), covered.view(np.uint64), price, far, rows, words, around)
     return better, value
 
 
@@ -88,46 +88,46 @@ def polish(blocks: FloatArray, target: Target, far: int, sweeps: int) -> FloatAr
     Parameters
     ----------
     far
-        Most cells that one move goes.
+        Largest step of one move in cells.
     sweeps
         Most passes over all blocks.
     """
     blocks = blocks.copy()
-    drawn = draw_each(blocks)
+    rows = draw_each(blocks)
     settled = np.zeros(len(blocks), np.bool_)
     for _ in range(sweeps):
         changed = False
         for k in range(len(blocks)):
             if settled[k]:
                 continue
-            better, _value = improve_block(blocks[k], target.occupied, _union(drawn, k), target.price, far)
+            better, _value = improve_block(blocks[k], target.occupied, _union(rows, k), target.price, far)
             settled[k] = True
             if not np.array_equal(better, blocks[k]):
                 changed = True
                 settled[:] = False
                 settled[k] = True
                 blocks[k] = better
-                drawn[k] = draw_all(better[None])
+                rows[k] = draw_all(better[None])
         if not changed:
             break
-    k, whole = 0, _iou(_union(drawn, len(drawn)), target)
+    k, current = 0, _iou(_union(rows, len(rows)), target)
     while k < len(blocks):
-        without = _iou(_union(drawn, k), target)
-        if without >= whole - target.price * statements(blocks[k]):
-            blocks, drawn, whole = np.delete(blocks, k, 0), np.delete(drawn, k, 0), without
+        without = _iou(_union(rows, k), target)
+        if without >= current - target.price * statements(blocks[k]):
+            blocks, rows, current = np.delete(blocks, k, 0), np.delete(rows, k, 0), without
         else:
             k += 1
     return blocks
 
 
-def _union(drawn: Rows, left_out: int) -> Rows:
+def _union(rows: Rows, left_out: int) -> Rows:
     """Rows of all blocks but one."""
-    before = np.bitwise_or.reduce(drawn[:left_out], axis=0)
-    return np.asarray(before | np.bitwise_or.reduce(drawn[left_out + 1 :], axis=0))
+    before = np.bitwise_or.reduce(rows[:left_out], axis=0)
+    return np.asarray(before | np.bitwise_or.reduce(rows[left_out + 1 :], axis=0))
 
 
 def propose_form(form: int, covered: Rows, waste: float, box: FloatArray, target: Target) -> tuple[float, FloatArray]:
-    """The best of several guesses of one form on what is not covered, improved by descent: its gain and the block.
+    """The best of several guesses of one form on uncovered cells, improved by descent: its gain and the block.
 
     Parameters
     ----------
@@ -136,10 +136,10 @@ def propose_form(form: int, covered: Rows, waste: float, box: FloatArray, target
     waste
         Weight of an empty cell against an occupied one.
     box
-        The box proposed for the same place, from which some guesses start.
+        The box proposed for the same cells, from which some guesses start.
     """
     gained, wasted = target.occupied & ~covered, ~target.occupied & ~covered
-    cells = places(gained)
+    cells = low_corners(gained)
     if len(cells) < FEWEST:
         return 0.0, np.zeros(WIDTH)
     rough: FloatArray = np.empty((GUESSES, WIDTH))
@@ -158,14 +158,14 @@ def _nets(blocks: FloatArray, gained: Rows, wasted: Rows, waste: float) -> Float
 
 
 def best_box(covered: Rows, waste: float, picks: Whole, target: Target) -> tuple[float, FloatArray]:
-    """The repeated box that gains most on what is not covered, and its gain in cells; zero when none gains.
+    """The repeated box with the largest gain on uncovered cells, and its gain in cells; zero when none gains.
 
     Parameters
     ----------
     waste
         Weight of an empty cell against an occupied one.
     picks
-        Numbers of the families to try.
+        Indices of the families to try.
     """
     block, volumes = np.zeros(WIDTH), np.empty((VOLUMES, RESOLUTION**3), np.float32)
     gain = propose(

@@ -13,10 +13,10 @@ from shapeprog.inference.cells.families import MIRROR, PERIOD
 from shapeprog.kernels.compile import helper
 
 ANY = 1 << 20
-"""More cells than any side has: no limit."""
+"""A limit above the length of any side: no limit."""
 
 VOLUMES = 4
-"""Volumes that a search works on: the weights, folded once and twice, and with the axes in another order."""
+"""Volumes of a search: the weights, folded once and twice, and with the axes in another order."""
 
 
 @helper
@@ -41,18 +41,18 @@ def fold(volume, out, outer, size, inner, kind, a, b):
         for i in range(length):
             to = np.uint64((o * length + i) * inner)
             if kind == MIRROR:
-                near, far = np.uint64((o * size + left - i) * inner), np.uint64((o * size + right + i) * inner)
+                source, far = np.uint64((o * size + left - i) * inner), np.uint64((o * size + right + i) * inner)
                 for k in range(inner):
                     step = np.uint64(k)
-                    out[to + step] = volume[near + step] + volume[far + step]
+                    out[to + step] = volume[source + step] + volume[far + step]
             else:
                 for k in range(inner):
                     out[to + np.uint64(k)] = 0
                 for copy in range(a):
-                    near = np.uint64((o * size + i + copy * b) * inner)
+                    source = np.uint64((o * size + i + copy * b) * inner)
                     for k in range(inner):
                         step = np.uint64(k)
-                        out[to + step] += volume[near + step]
+                        out[to + step] += volume[source + step]
     return length
 
 
@@ -64,18 +64,18 @@ def fold_rows(volume, out, rows, size, kind, a, b):
     for r in range(rows):
         to = np.uint64(r * length)
         if kind == MIRROR:
-            near, far = np.uint64(r * size + left), np.uint64(r * size + right)
+            source, far = np.uint64(r * size + left), np.uint64(r * size + right)
             for i in range(length):
                 step = np.uint64(i)
-                out[to + step] = volume[near - step] + volume[far + step]
+                out[to + step] = volume[source - step] + volume[far + step]
         else:
             for i in range(length):
                 out[to + np.uint64(i)] = 0
             for copy in range(a):
-                near = np.uint64(r * size + copy * b)
+                source = np.uint64(r * size + copy * b)
                 for i in range(length):
                     step = np.uint64(i)
-                    out[to + step] += volume[near + step]
+                    out[to + step] += volume[source + step]
     return length
 
 
@@ -105,7 +105,7 @@ def unfold(kind, a, b, low, high):
 
 
 @helper
-def search_family(volumes, size0, size1, size2, family, floor, found):
+def search_family(volumes, size0, size1, size2, family, floor, result):
     """Best repeated box of one family: its sum, or the floor when none beats it.
 
     Parameters
@@ -114,8 +114,8 @@ def search_family(volumes, size0, size1, size2, family, floor, found):
         The weights (size0, size1, size2) in the first of ``VOLUMES`` flat volumes; the others are scratch.
     family
         A row of ``families``.
-    found
-        The box is written here: (start, extent, count1, axis1, step1, count2, axis2, step2), twelve numbers.
+    result
+        Output: the box (start, extent, count1, axis1, step1, count2, axis2, step2), twelve numbers.
     """
     sizes, limits, order = np.array([size0, size1, size2]), np.array([ANY, ANY, ANY]), np.array([0, 1, 2])
     box = np.zeros(6, np.int64)
@@ -139,27 +139,29 @@ def search_family(volumes, size0, size1, size2, family, floor, found):
     # The scan along the last axis is the fast one, so the longest goes there; it takes no limit of its length.
     last = 2
     for axis in range(3):
-        free, taken = limits[axis] == ANY, limits[last] == ANY
-        if (free and not taken) or (free == taken and sizes[axis] > sizes[last]):
+        free, last_free = limits[axis] == ANY, limits[last] == ANY
+        if (free and not last_free) or (free == last_free and sizes[axis] > sizes[last]):
             last = axis
     if last != 2:
         order[0] = 0 if last != 0 else 1
         order[1], order[2] = 3 - last - order[0], last
         turn(volumes[held], volumes[held + 1], sizes, order)
         held += 1
-    one, other = order[0], order[1]
-    best = heaviest_box(volumes[held], sizes[one], sizes[other], sizes[last], limits[one], limits[other], floor, box)
+    first, second = order[0], order[1]
+    best = heaviest_box(
+        volumes[held], sizes[first], sizes[second], sizes[last], limits[first], limits[second], floor, box
+    )
     if best <= floor:
         return floor
-    for place in range(3):
-        found[order[place]] = box[2 * place]
-        found[3 + order[place]] = box[2 * place + 1] - box[2 * place]
-    found[6], found[9] = 1, 1
-    found[7], found[10] = family[0], family[4]
+    for k in range(3):
+        result[order[k]] = box[2 * k]
+        result[3 + order[k]] = box[2 * k + 1] - box[2 * k]
+    result[6], result[9] = 1, 1
+    result[7], result[10] = family[0], family[4]
     for part in range(2):
         axis = family[4 * part]
         if axis >= 0:
             kind, a, b = family[4 * part + 1], family[4 * part + 2], family[4 * part + 3]
-            low = found[axis]
-            found[axis], found[6 + 3 * part], found[8 + 3 * part] = unfold(kind, a, b, low, low + found[3 + axis])
+            low = result[axis]
+            result[axis], result[6 + 3 * part], result[8 + 3 * part] = unfold(kind, a, b, low, low + result[3 + axis])
     return best

@@ -1,4 +1,4 @@
-"""Kernels that guess what is no upright box: discs, sheared backs, oblique bars, stars and crosses."""
+"""Kernels that guess forms other than upright boxes: discs, sheared backs, oblique bars, stars and crosses."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from shapeprog.kernels.compile import helper, kernel
 
 @kernel("i8(i8, i8[:, ::1], f8[::1], f8[:, ::1])")
 def guess(form, cells, box, out):
-    """Rough blocks of a form, each from two random cells or from a proposed box; how many descent can start from.
+    """Rough blocks of a form, each from two random cells or from a proposed box; the number of valid ones.
 
     Parameters
     ----------
@@ -37,11 +37,11 @@ def guess(form, cells, box, out):
     box
         The proposed box.
     out
-        As many blocks (G, 20) as are guessed; the first ones are written, those that descent can start from.
+        Output for G guesses (G, 20); the valid blocks come first.
     """
-    found = 0
+    count = 0
     for _ in range(len(out)):
-        block = out[found]
+        block = out[count]
         for slot in range(len(block)):
             block[slot] = 0
         block[FORM], block[COUNT1], block[COUNT2] = form, 1, 1
@@ -56,8 +56,8 @@ def guess(form, cells, box, out):
         else:
             guess_star(block, a, cells)
         if valid(block):
-            found += 1
-    return found
+            count += 1
+    return count
 
 
 @helper
@@ -119,7 +119,7 @@ def guess_disc(block, a, b, box):
 
 @helper
 def guess_star(block, a, cells):
-    """A cross, or a star of bars where the form says a bar, around the middle of the grid or of the cells."""
+    """A cross, or a star of bars where the form is a bar, around the middle of the grid or of the cells."""
     centre1, centre2 = 0.0, 0.0
     for i in range(len(cells)):
         centre1 += cells[i, 1]

@@ -14,7 +14,7 @@ from shapeprog.space import HALF, RESOLUTION
 def greedy_boxes(voxels: npt.NDArray[np.bool_], boxes: int = 10) -> Program:
     """At most ``boxes`` boxes, each with the largest count of newly covered occupied minus empty cells.
 
-    No learning, no loops, no search beyond the exact maximum-sum box: what a program must beat at equal size.
+    No learning, no loops, no search beyond the exact maximum-sum box: a baseline for programs of equal size.
     """
     from shapeprog.inference.cells.box_kernels import heaviest
 

@@ -1,4 +1,4 @@
-"""The kernel that proposes a block: the repeated box that gains most on what no block covers yet."""
+"""The kernel that proposes a block: the repeated box with the largest gain on uncovered cells."""
 
 from __future__ import annotations
 
@@ -25,48 +25,48 @@ def weigh(occupied, covered, waste, low, high, out):
 
 @kernel("f8(u4[::1], u4[::1], f8, i8[::1], i8[::1], i8[:, ::1], i8[::1], f8, f4[:, ::1], f8[::1])")
 def propose(occupied, covered, waste, low, high, table, picks, price, volumes, block):
-    """The repeated box that gains most on what is uncovered, among the families named by ``picks``.
+    """The repeated box with the largest gain on uncovered cells, among the families with indices ``picks``.
 
     Parameters
     ----------
     occupied, covered
-        The solid, and what is drawn, as rows (1024).
+        The solid, and the cells of the blocks, as rows (1024).
     waste
         Weight of an empty cell against an occupied one.
     low, high
-        Box of cells outside which nothing is proposed.
+        Box of cells that contains every proposal.
     table, picks
-        All families, and the numbers of those to try.
+        All families, and the indices of those to try.
     price
         Cells that one statement has to gain.
     volumes
         Scratch for ``VOLUMES`` volumes of 32^3 cells.
     block
-        The block (20) is written here; it comes with zeros.
+        Output (20), initially zeros.
 
     Returns
     -------
     gain
-        Zero when nothing gains.
+        Zero when no box gains.
     """
     weigh(occupied, covered, waste, low, high, volumes[0])
     size0, size1, size2 = high[0] - low[0], high[1] - low[1], high[2] - low[2]
-    found = np.zeros(12, np.int64)
+    candidate = np.zeros(12, np.int64)
     block[COUNT1], block[COUNT2] = 1, 1
     best = 0.0
     for s in picks:
         cost = price * (1 + (table[s, 0] >= 0) + (table[s, 4] >= 0))
-        value = search_family(volumes, size0, size1, size2, table[s], best + cost, found)
+        value = search_family(volumes, size0, size1, size2, table[s], best + cost, candidate)
         if value > best + cost:
             best = value - cost
             for slot in range(len(block)):
                 block[slot] = 0
             for axis in range(3):
-                block[FIRST + axis] = found[axis] + low[axis] - 16
-                block[EXTENT + axis] = found[3 + axis]
-            block[COUNT1], block[COUNT2] = found[6], found[9]
-            if found[6] > 1:
-                block[SHIFT1 + found[7]] = found[8]
-            if found[9] > 1:
-                block[SHIFT2 + found[10]] = found[11]
+                block[FIRST + axis] = candidate[axis] + low[axis] - 16
+                block[EXTENT + axis] = candidate[3 + axis]
+            block[COUNT1], block[COUNT2] = candidate[6], candidate[9]
+            if candidate[6] > 1:
+                block[SHIFT1 + candidate[7]] = candidate[8]
+            if candidate[9] > 1:
+                block[SHIFT2 + candidate[10]] = candidate[11]
     return best

@@ -28,7 +28,7 @@ ROWS = 1024
 """Rows of the grid: row 32 i + j holds the cells at height i and depth j."""
 
 ARM = 2
-"""Cells that an arm of a cross base is wide."""
+"""Width of an arm of a cross base in cells."""
 
 
 @helper
@@ -50,10 +50,10 @@ def draw_disc(rows, a, yc, zc, t, r):
         return
     limit = (REACH * r) ** 2
     for j in range(max(0, yc + 16 - r - 1), min(32, yc + 16 + r + 1)):
-        rest = limit - (j - 15.5 - yc) ** 2
-        if rest < 0:
+        square = limit - (j - 15.5 - yc) ** 2
+        if square < 0:
             continue
-        reach = np.sqrt(rest)
+        reach = np.sqrt(square)
         bits = span(int(np.ceil(zc + 15.5 - reach)), int(np.floor(zc + 15.5 + reach)) + 1)
         for i in range(max(a + 16, 0), min(a + 16 + t, 32)):
             rows[i * 32 + j] |= bits
@@ -126,8 +126,8 @@ def draw_block(rows, block):
                 else:  # one arm of a cross, in the direction of a quarter turn
                     quarter = (tc + turn) % 4
                     along = quarter % 2 == 0  # sideways, else in depth
-                    near, left = (1, tb if quarter == 0 else 0) if along else (tb if quarter == 3 else 0, 1)
-                    draw_back(rows, a, b - near, c - left, ta, ARM if along else tb, tb if along else ARM, 0)
+                    front, side = (1, tb if quarter == 0 else 0) if along else (tb if quarter == 3 else 0, 1)
+                    draw_back(rows, a, b - front, c - side, ta, ARM if along else tb, tb if along else ARM, 0)
 
 
 @kernel("void(f8[:, ::1], u4[:, ::1])")
@@ -139,11 +139,11 @@ def draw_blocks(blocks, rows):
 
 
 @kernel("void(u8[:, ::1], u8[::1], u8[::1], i8[:, ::1])")
-def count_cells(drawn, first, second, counts):
-    """Write how many cells each row of words (P, 512) shares with either of two sets of cells: (P, 2)."""
-    for k in range(len(drawn)):
-        one, other = 0, 0
-        for i in range(drawn.shape[1]):
-            one += ones(drawn[k, i] & first[i])
-            other += ones(drawn[k, i] & second[i])
-        counts[k, 0], counts[k, 1] = one, other
+def count_cells(sets, first, second, counts):
+    """Write the number of cells that each row of words (P, 512) shares with either of two sets of cells: (P, 2)."""
+    for k in range(len(sets)):
+        count1, count2 = 0, 0
+        for i in range(sets.shape[1]):
+            count1 += ones(sets[k, i] & first[i])
+            count2 += ones(sets[k, i] & second[i])
+        counts[k, 0], counts[k, 1] = count1, count2

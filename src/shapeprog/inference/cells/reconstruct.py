@@ -65,15 +65,15 @@ def reconstruct(
     searching, refining
         When no further round of the search, and no further step of refinement, starts.
     progress
-        Called with what is being done and the share of it that is done.
+        Called with the name of the current step and the completed share of it.
     """
-    found = search_structure(shape.voxels, settings, seed=seed, deadline=searching, progress=progress)
-    snapped = to_program(found.blocks)
+    structure = search_structure(shape.voxels, settings, seed=seed, deadline=searching, progress=progress)
+    snapped = to_program(structure.blocks)
     program = refine(
         snapped, outer_points(shape, snapped, seed), voxels=shape.voxels if shape.points is None else None,
         schedule=schedule, reach=REACH, seed=seed, deadline=refining, progress=progress,
     )  # fmt: skip
-    reason = f"The search ended after {found.reason}"
+    reason = f"The search ended after {structure.reason}"
     if searching.cut:
         reason += "."
     elif snapped.blocks >= settings.blocks:
@@ -85,7 +85,7 @@ def reconstruct(
 
 
 def description_length(program: Program, voxels: npt.NDArray[np.bool_], snapped: Program | None = None) -> float:
-    """How long a description of cells (32, 32, 32) a program is: 1 - IoU, and the price of its text."""
+    """Description length of cells (32, 32, 32) by a program: 1 - IoU, plus the price of its text."""
     return 1 - float(iou(occupied(program, unroll(program), snapped), pack(voxels))) + Prices().of(program)
 
 
@@ -93,7 +93,7 @@ def outer_points(shape: Shape, snapped: Program, seed: int) -> Float[Tensor, "P 
     """Points that the surface of the program should meet.
 
     Points deep inside the solid lie on inner faces of the mesh, such as the back of a drawer.  The surface of a union
-    cannot reach them; trying to would pull its outer faces inwards.
+    cannot reach them; in the loss they would pull its outer faces inwards.
     """
     if shape.points is None:
         return torch.from_numpy(points_of_cells(shape.voxels, seed=seed))

@@ -1,8 +1,8 @@
 """Refinement: all continuous parameters of a program together, by gradient through the renderer.
 
 The loss has both directions of a chamfer distance, one of them exact: target points to the surface of the union by
-signed distance, and points sampled on the visible surface to their nearest target points.  Parts that touch on the
-grid are asked to keep touching, which no point can tell: contact faces are hidden.
+signed distance, and points sampled on the visible surface to their nearest target points.  A further term keeps
+parts in contact that touch on the grid: contact faces are hidden, so no point constrains them.
 """
 
 from __future__ import annotations
@@ -34,10 +34,10 @@ DECIMALS = 2
 """Decimals of a cell that refined parameters keep: a hundredth is .04 % of the longest side."""
 
 BETAS = (0.8, 0.95)
-"""Memory of Adam for slopes and for their squares."""
+"""Decay rates of Adam for gradients and for their squares."""
 
 REACH = 1.49
-"""Farthest that refinement moves a parameter from a whole number, in cells: rounding and one step lead back."""
+"""Largest change of a parameter from a whole number, in cells: rounding and one step lead back."""
 
 
 TOUCH = 0.03
@@ -53,7 +53,7 @@ SHARPNESS = 6.0
 
 @dataclass(frozen=True)
 class Schedule:
-    """How long and how boldly to refine; chosen on val.
+    """Steps and step size of refinement; chosen on val.
 
     Parameters
     ----------
@@ -62,11 +62,11 @@ class Schedule:
     rate
         First step size of Adam in cells; it falls to a tenth by a cosine.
     points
-        Target points that one step looks at, drawn at random.
+        Random target points of one step.
     samples
         Points sampled on the surface of the program in one step.
     cells
-        Cells near the surface whose occupancy one step looks at, where the target has cells.
+        Cells near the surface whose occupancy enters one step, where the target has cells.
     """
 
     steps: int = 50
@@ -93,11 +93,11 @@ def refine(
     ----------
     voxels
         Touched cells (32, 32, 32) of the target, whose soft occupancy the program should match as well; for targets
-        that are known by their cells.
+        that are given as cells.
     schedule
         Steps, step size and numbers of points.
     reach
-        Farthest that any parameter may move from where it is, in cells; anywhere by default.
+        Largest change of any parameter in cells; unlimited by default.
     deadline
         When no further step starts.
 
@@ -133,8 +133,8 @@ def refine(
                 break
             some = points[torch.randint(len(points), (plan.points,), generator=generator)]
             sample = sample_surface(scene, plan.samples, generator)
-            there = (squared_distance(sample.points, points) * sample.weights).mean()
-            loss = (signed_distance(scene, some) ** 2).mean() + there + TOUCH * _gaps(scene, touching)
+            surface_loss = (squared_distance(sample.points, points) * sample.weights).mean()
+            loss = (signed_distance(scene, some) ** 2).mean() + surface_loss + TOUCH * _gaps(scene, touching)
             if shell is not None:
                 cells = torch.randint(len(shell), (plan.cells,), generator=generator)
                 loss = loss + OCCUPANCY * _occupancy_loss(scene, shell[cells])
@@ -156,20 +156,20 @@ def refine(
 
 
 def _slots(code: Code) -> tuple[Bool[Tensor, "K J slots"], Float[Tensor, "K J slots"]]:
-    """Which slots of a program may move, and the least value of each, so that no part vanishes.
+    """Which slots of a program may change, and the smallest value of each, so that no part vanishes.
 
-    Continuous parameters move; a shift that is exactly zero stays zero, so that a loop along an axis keeps to it.
+    Continuous parameters change; a shift that is exactly zero stays zero, so that a loop stays along its axis.
     """
     free = torch.zeros(code.parameters.shape, dtype=torch.bool)
     low = torch.full_like(code.parameters, -torch.inf)
     for declared in language():
-        here = code.ids == declared.id
-        if not bool(here.any()):
+        mask = code.ids == declared.id
+        if not bool(mask.any()):
             continue
         for slot, quantity in enumerate(declared.quantities):
             still = (code.parameters[..., slot] == 0) & (quantity.kind == "shift")
-            free[..., slot] |= here & (not quantity.discrete) & ~still
-            low[..., slot] = torch.where(here, least(quantity), low[..., slot])
+            free[..., slot] |= mask & (not quantity.discrete) & ~still
+            low[..., slot] = torch.where(mask, least(quantity), low[..., slot])
     return free, low
 
 
@@ -179,12 +179,12 @@ def _contacts(scene: Scene) -> Int[Tensor, "C 3"]:
     low, high = scene.centre - bounds(scene), scene.centre + bounds(scene)
     overlap = torch.minimum(high[:, None], high[None]) - torch.maximum(low[:, None], low[None])
     meets = (high[:, None] - low[None]).abs() < 1e-3
-    beside = torch.stack([(overlap[..., [a for a in range(3) if a != axis]] > 0.5).all(-1) for axis in range(3)], -1)
-    return (meets & beside & (upright[:, None] & upright[None])[..., None]).nonzero()
+    facing = torch.stack([(overlap[..., [a for a in range(3) if a != axis]] > 0.5).all(-1) for axis in range(3)], -1)
+    return (meets & facing & (upright[:, None] & upright[None])[..., None]).nonzero()
 
 
 def _gaps(scene: Scene, touching: Int[Tensor, "C 3"]) -> Float[Tensor, ""]:
-    """Sum of the squared gaps, in cells, between primitives that are to touch."""
+    """Sum of the squared gaps, in cells, between primitives that should touch."""
     if not len(touching):
         return scene.centre.new_zeros(())
     low, high = scene.centre - bounds(scene), scene.centre + bounds(scene)

@@ -1,7 +1,7 @@
 """Structure search: voxels to blocks of whole numbers that maximise IoU minus price x statements.
 
-Blocks are first added one by one, each the repeated box that gains most on what is still uncovered; then rounds of
-ruin and recreate take some out and put others in, discs, sheared backs, bars, stars and crosses among them.
+Blocks are first added one by one, each the repeated box with the largest gain on uncovered cells.  Then rounds of ruin
+and recreate remove some and insert others, including discs, sheared backs, bars, stars and crosses.
 """
 
 from __future__ import annotations
@@ -25,10 +25,10 @@ PLANES = 3
 """Mirror planes nearest the middle that may pair a second loop with a first."""
 
 MOST_COPIES = 8
-"""Most copies of one loop that the search proposes; descent may add more."""
+"""Largest number of copies of one loop that the search proposes; descent may add more."""
 
 KEPT = 12
-"""Programs, the latest, whose blocks the search may use again."""
+"""Number of latest programs whose blocks the search may reuse."""
 
 STARTS = (0.9, 2.0, 5.0)
 """Weights of an empty cell against an occupied one, from which greedy starts are made; the best start is kept.
@@ -38,26 +38,26 @@ A light weight finds solid bodies, a heavy one the boards of a shelf that a sing
 
 @dataclass(frozen=True)
 class Settings:
-    """What the structure search may spend and what it must gain; chosen on val.
+    """Limits and prices of the structure search; chosen on val.
 
     Parameters
     ----------
     blocks
-        Most blocks.
+        Largest number of blocks.
     price
-        IoU that one more statement has to earn.
+        Price of a statement in IoU.
     rounds
-        Most rounds of ruin and recreate.
+        Largest number of rounds of ruin and recreate.
     chunk
-        Rounds with the same heat, before the next look at the clock.
+        Rounds with the same heat, between two checks of the deadline.
     families
-        Ways of repeating a box that one round tries, drawn at random.
+        Number of random ways of repeating a box that one proposal tries.
     forms
         Share of proposals that also try a form other than a box.
     heat
         Largest loss of the objective that a first round may accept; it cools linearly.
     recall
-        Share of the blocks put in that come from earlier programs of the search, instead of being sought anew.
+        Share of proposals that use a block of earlier programs of the search, if one gains, instead of a new search.
     patience
         Rounds without a gain after which the search stops.
     """
@@ -97,7 +97,7 @@ def search_structure(
     deadline
         When no further round starts.
     progress
-        Called with what is being done and the share done.
+        Called with the name of the current step and the completed share of it.
     """
     from shapeprog.inference.cells import editing, ruin
 
@@ -106,7 +106,7 @@ def search_structure(
     table = families((high - low).tolist(), PLANES, MOST_COPIES)
     target = editing.Target(words_of(pack(voxels)).reshape(-1), low, high, table, settings.price, len(cells))
     rough = greedy_starts(target, settings.blocks)
-    starts = [editing.polish(each, target, 1, 3) for each in rough]
+    starts = [editing.polish(blocks, target, 1, 3) for blocks in rough]
     best = max(starts, key=lambda blocks: editing.value_of(blocks, target))
     best_value = editing.value_of(best, target)
     earlier = [*rough, *starts]
@@ -133,12 +133,12 @@ def search_structure(
             best, best_value = blocks, value
         if progress:
             progress("searching structure", done / settings.rounds)
-    found = editing.polish(best, target, 3, 5)
-    return Structure(found, editing.iou(found, target), reason)
+    polished = editing.polish(best, target, 3, 5)
+    return Structure(polished, editing.iou(polished, target), reason)
 
 
-def greedy_starts(target: Target, most: int) -> list[FloatArray]:
-    """For each weight of an empty cell, the repeated boxes that gain most, one after another."""
+def greedy_starts(target: Target, max_blocks: int) -> list[FloatArray]:
+    """For each weight of an empty cell, the repeated boxes with the largest gains, one after another."""
     from shapeprog.inference.cells.drawing import draw_all
     from shapeprog.inference.cells.editing import best_box
 
@@ -146,7 +146,7 @@ def greedy_starts(target: Target, most: int) -> list[FloatArray]:
     starts = []
     for waste in STARTS:
         blocks: FloatArray = np.zeros((0, WIDTH))
-        while len(blocks) < most:
+        while len(blocks) < max_blocks:
             gain, block = best_box(draw_all(blocks), float(np.float32(waste)), everything, target)
             if gain <= 0:
                 break

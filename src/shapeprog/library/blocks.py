@@ -125,30 +125,30 @@ def blocks_of(chain: Chain, rows: Sequence[int] = ()) -> Iterator[Block]:
     first = len(numbers) - 1 - len(draw.values)
     base = np.zeros((len(solid.rows), len(numbers)))
     base[:, first:] = solid.rows
-    found = _repeated(loops, base, solid, numbers, draw, rows)
-    if found is None:
+    repeated = _repeated(loops, base, solid, numbers, draw, rows)
+    if repeated is None:
         names = tuple(node.name for node in loops)
         more = [slot for node in loops for slot in _slots(language()[node.name])]
         every = np.vstack([base, np.eye(len(numbers))[:first]])
         kind = Kind(word, solid.shape, solid.boxed, others=names)
         yield Block(kind, (*solid.slots, *more), every @ numbers, every, tuple(node.count for node in loops))
         return
-    spans = [Slot("plane" if way == "mirror" else "span", "length", axis) for axis, way in found.ways]
-    slots = (*solid.slots, *spans, *(STEPS if found.steps else ()))
-    pairs = [place for place, (_, way) in enumerate(found.ways) if way == "pair"]
-    for chosen in (each for size in range(len(pairs) + 1) for each in itertools.combinations(pairs, size)):
-        repeats = tuple((axis, "row" if place in chosen else way) for place, (axis, way) in enumerate(found.ways))
-        kind = Kind(word, solid.shape, solid.boxed, repeats, found.steps)
-        yield Block(kind, slots, found.rows @ numbers, found.rows, found.counts)
+    spans = [Slot("plane" if way == "mirror" else "span", "length", axis) for axis, way in repeated.ways]
+    slots = (*solid.slots, *spans, *(STEPS if repeated.steps else ()))
+    pairs = [index for index, (_, way) in enumerate(repeated.ways) if way == "pair"]
+    for subset in (subset for size in range(len(pairs) + 1) for subset in itertools.combinations(pairs, size)):
+        repeats = tuple((axis, "row" if index in subset else way) for index, (axis, way) in enumerate(repeated.ways))
+        kind = Kind(word, solid.shape, solid.boxed, repeats, repeated.steps)
+        yield Block(kind, slots, repeated.rows @ numbers, repeated.rows, repeated.counts)
 
 
 def readings(chain: Chain) -> list[Block]:
     """The narrowest forms of a block: as it is written, then with mirror images as rows of two along some axes."""
-    found: dict[Kind, Block] = {}
+    unique: dict[Kind, Block] = {}
     for rows in ROWS:
         block = next(blocks_of(chain, rows))
-        found.setdefault(block.kind, block)
-    return list(found.values())
+        unique.setdefault(block.kind, block)
+    return list(unique.values())
 
 
 def forms_of(chain: Chain) -> list[Block]:
@@ -173,7 +173,7 @@ def _repeated(
     A solid that is not boxed is a row of two in a mirror across one of the axes ``straight`` where it is its own image.
     """
     rows = base.copy()
-    places = [
+    positions = [
         [k for k, slot in enumerate(solid.slots) if (slot.axis, slot.kind) == (axis, "position")] for axis in range(3)
     ]
     ways: dict[int, tuple[Way, FloatArray, int]] = {}
@@ -196,10 +196,10 @@ def _repeated(
         if loop.name != "mirror":
             return None
         axis, plane = int(loop.values[1]), slots[2]
-        own = solid.boxed or (axis in straight and _own_image(draw, axis))
-        if own and steps is not None and abs(steps[0][axis] @ numbers) > ZERO:
+        symmetric = solid.boxed or (axis in straight and _is_symmetric_part(draw, axis))
+        if symmetric and steps is not None and abs(steps[0][axis] @ numbers) > ZERO:
             return None  # the images step the other way
-        if not own:
+        if not symmetric:
             if axis in ways and (ways[axis][0] == "mirror" or steps is not None):
                 return None
             if axis in ways:
@@ -207,7 +207,7 @@ def _repeated(
                 steps = np.eye(3)[:, [axis]] * (reach / (count - 1)), count
             ways[axis] = "mirror", plane, 2
             continue
-        low = rows[places[axis][0]]
+        low = rows[positions[axis][0]]
         reach = 2 * plane - 2 * low - (rows[3 + axis] if solid.boxed else 0)
         if axis not in ways:
             ways[axis] = "row", reach, 2
@@ -219,32 +219,32 @@ def _repeated(
     for axis, (way, reach, _) in ways.items():
         back = way == "row" and reach @ numbers < 0
         spans[axis] = (-reach if back else reach) + (rows[3 + axis] if solid.boxed else 0)
-        rows[places[axis]] += reach if back else 0  # the first copy becomes the lowest
+        rows[positions[axis]] += reach if back else 0  # the first copy becomes the lowest
     if steps is not None:
         shift, count = steps
         if next((step for step in shift @ numbers if abs(step) > ZERO), 0) < 0:
             for axis in range(3):
-                rows[places[axis]] += (count - 1) * shift[axis]
+                rows[positions[axis]] += (count - 1) * shift[axis]
             shift = -shift
         spans |= dict(enumerate(shift, 3))
     order = sorted(ways)
     pairs = [axis for axis, (way, _, count) in ways.items() if solid.boxed and way == "row" and count == 2]
-    told = tuple((axis, "pair" if axis in pairs else ways[axis][0]) for axis in order)
+    repeats = tuple((axis, "pair" if axis in pairs else ways[axis][0]) for axis in order)
     counts = tuple(ways[axis][2] for axis in order)
-    whole = np.vstack([rows, *(spans[place] for place in sorted(spans))])
-    return _Repeated(told, steps is not None, whole, (*counts, *(steps[1:] if steps else ())))
+    stacked = np.vstack([rows, *(spans[key] for key in sorted(spans))])
+    return _Repeated(repeats, steps is not None, stacked, (*counts, *(steps[1:] if steps else ())))
 
 
 @lru_cache(1024)
-def _own_image(draw: Draw, axis: int) -> bool:
+def _is_symmetric_part(draw: Draw, axis: int) -> bool:
     """Whether a part that is told by points is its own mirror image across the plane of all of them."""
-    slots = [slot for slot, each in enumerate(_slots(language()[draw.name])) if each == (each.word, "position", axis)]
-    places = [draw.values[slot] for slot in slots]
-    if not places or np.ptp(places) > STRAIGHT:
+    indices = [k for k, slot in enumerate(_slots(language()[draw.name])) if slot == (slot.word, "position", axis)]
+    coordinates = [draw.values[k] for k in indices]
+    if not coordinates or np.ptp(coordinates) > STRAIGHT:
         return False
     points = torch.rand(64, 3, dtype=torch.float64, generator=torch.Generator().manual_seed(0)) * SPAN - HALF
     mirrored = points.clone()
-    mirrored[:, axis] = 2 * float(np.mean(places)) - points[:, axis]
+    mirrored[:, axis] = 2 * float(np.mean(coordinates)) - points[:, axis]
     scene = unroll(Program((draw,)))
     return bool((scene.distance(points) - scene.distance(mirrored)).abs().max() <= STRAIGHT)
 
@@ -257,8 +257,8 @@ def solid_of(name: str) -> Solid:
 def _slots(declared: Statement) -> Iterator[Slot]:
     for parameter in declared.parameters:
         words = parameter.quantity.each.split(", ")
-        for place in range(parameter.quantity.width):
-            axis = {"up": 0, "depth": 1, "left-right": 2}.get(words[place] if place < len(words) else "", -1)
+        for index in range(parameter.quantity.width):
+            axis = {"up": 0, "depth": 1, "left-right": 2}.get(words[index] if index < len(words) else "", -1)
             yield Slot(parameter.name, parameter.quantity.kind, axis)
 
 
@@ -266,9 +266,9 @@ def _slots(declared: Statement) -> Iterator[Slot]:
 def _solid(declared: Statement) -> Solid:
     width = declared.size
     plain = Solid(declared.name, tuple(_slots(declared)), np.hstack([np.eye(width), np.zeros((width, 1))]), False)
-    start, other = 1 + torch.rand(2, width, dtype=torch.float64, generator=torch.Generator().manual_seed(0))
-    drawn = declared.solids(start)
-    if len(drawn) != 1 or not _symmetric(drawn[0]):
+    start, check = 1 + torch.rand(2, width, dtype=torch.float64, generator=torch.Generator().manual_seed(0))
+    solids = declared.solids(start)
+    if len(solids) != 1 or not _symmetric(solids[0]):
         return plain
 
     def form(values: Float[Tensor, " S"]) -> Float[Tensor, " M"]:
@@ -278,18 +278,18 @@ def _solid(declared: Statement) -> Solid:
 
     slope = torch.autograd.functional.jacobian(form, start)
     constant = form(start) - slope @ start
-    if not torch.allclose(form(other), slope @ other + constant):
+    if not torch.allclose(form(check), slope @ check + constant):
         return plain
     rows = np.round(np.hstack([slope.numpy(), constant[:, None].numpy()]), 9) + 0.0
-    kept = list(range(6))
-    for place in range(6, len(rows)):
-        if np.linalg.matrix_rank(rows[[*kept, place]]) > np.linalg.matrix_rank(rows[kept]):
-            kept.append(place)
-    if np.linalg.matrix_rank(rows[kept, :-1]) < width:
+    selected = list(range(6))
+    for index in range(6, len(rows)):
+        if np.linalg.matrix_rank(rows[[*selected, index]]) > np.linalg.matrix_rank(rows[selected]):
+            selected.append(index)
+    if np.linalg.matrix_rank(rows[selected, :-1]) < width:
         return plain
     corner = [Slot("at", "position", axis) for axis in range(3)] + [Slot("size", "length", axis) for axis in range(3)]
-    extra = [Slot(primitives[drawn[0].kind].sizes[place - 6], "length", -1) for place in kept[6:]]
-    return Solid(primitives[drawn[0].kind].name, (*corner, *extra), rows[kept], True)
+    extra = [Slot(primitives[solids[0].kind].sizes[index - 6], "length", -1) for index in selected[6:]]
+    return Solid(primitives[solids[0].kind].name, (*corner, *extra), rows[selected], True)
 
 
 def _symmetric(solid: Solids) -> bool:

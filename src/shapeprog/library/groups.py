@@ -87,14 +87,14 @@ class Candidate:
 
 def units_of(program: Program) -> list[Unit | None]:
     """The blocks of a program that functions may draw, in the order of its text."""
-    found: list[Unit | None] = []
+    units: list[Unit | None] = []
     shared = Counter(_around(chain) for chain in program.chains)
     for chain in program.chains:
         forms = [form for form in blocks_of(chain) if not form.kind.others and not form.kind.steps]
         draw = chain[-1]
         assert isinstance(draw, Draw)
-        found.append(Unit(tuple(forms), draw, _length(chain, shared)) if forms else None)
-    return found
+        units.append(Unit(tuple(forms), draw, _length(chain, shared)) if forms else None)
+    return units
 
 
 def _around(chain: Chain) -> tuple[tuple[str, tuple[float, ...]], ...]:
@@ -116,20 +116,20 @@ def least_of(corpus: Corpus, blocks: int = 1) -> int:
 
 def candidates(corpus: Corpus) -> Iterator[Candidate]:
     """The best function for each group that is in enough programs."""
-    least = least_of(corpus)
+    minimum = least_of(corpus)
     slots: dict[Kind, tuple[Slot, ...]] = {}
     groups: dict[tuple[Kind, ...], list[Use]] = defaultdict(list)
     for number, units in enumerate(corpus):
-        for place, unit in enumerate(units):
+        for index, unit in enumerate(units):
             for form in unit.forms if unit is not None else ():
                 for kind in dict.fromkeys((form.kind, replace(form.kind, word=""))):
                     slots[kind] = form.slots
                     gain = unit.length - STATEMENT - _counted(form)  # type: ignore[union-attr]
-                    use = Use(number, (place,), form.values, gain)
+                    use = Use(number, (index,), form.values, gain)
                     groups[(kind,)].append(use)
-    level = _frequent({kinds: uses for kinds, uses in groups.items() if kinds[0].word}, least)
+    level = _frequent({kinds: uses for kinds, uses in groups.items() if kinds[0].word}, minimum)
     for _ in range(1, LARGEST):
-        level = _frequent(_larger(level, corpus), least)
+        level = _frequent(_larger(level, corpus), minimum)
         groups |= level
     for kinds, uses in groups.items():
         written = kinds[0].word or statement_of(kinds[0].shape)
@@ -145,8 +145,8 @@ def programs(uses: Iterable[Use]) -> int:
 
 def statement_of(shape: str) -> str:
     """The statement that draws a solid and gives it no role; nothing if there is none."""
-    name, known = {"cuboid": "box", "rounded_box": "cushion"}.get(shape, shape), language()
-    return name if name in known and not known.own_role(name) else ""
+    name, statements = {"cuboid": "box", "rounded_box": "cushion"}.get(shape, shape), language()
+    return name if name in statements and not statements.own_role(name) else ""
 
 
 def _counted(form: Block) -> int:
@@ -154,37 +154,37 @@ def _counted(form: Block) -> int:
     return sum(way == "row" and count != PAIR for (_, way), count in zip(form.kind.repeats, form.counts, strict=True))
 
 
-def _frequent(level: dict[tuple[Kind, ...], list[Use]], least: int) -> dict[tuple[Kind, ...], list[Use]]:
-    return {kinds: uses for kinds, uses in level.items() if programs(uses) >= least}
+def _frequent(level: dict[tuple[Kind, ...], list[Use]], minimum: int) -> dict[tuple[Kind, ...], list[Use]]:
+    return {kinds: uses for kinds, uses in level.items() if programs(uses) >= minimum}
 
 
 def _larger(level: dict[tuple[Kind, ...], list[Use]], corpus: Corpus) -> dict[tuple[Kind, ...], list[Use]]:
     """Groups with one more block each, of another role, which comes behind the others in the order of kinds."""
-    found: dict[tuple[Kind, ...], list[Use]] = defaultdict(list)
+    larger: dict[tuple[Kind, ...], list[Use]] = defaultdict(list)
     for kinds, uses in level.items():
         for use in uses:
-            for place, unit in enumerate(corpus[use.program]):
-                if unit is None or place in use.blocks:
+            for index, unit in enumerate(corpus[use.program]):
+                if unit is None or index in use.blocks:
                     continue
                 form = unit.forms[0]
                 behind = repr(form.kind) > repr(kinds[-1])
-                other = form.kind.word and form.kind.word not in [kind.word for kind in kinds]
-                if other and behind:
+                new_role = form.kind.word and form.kind.word not in [kind.word for kind in kinds]
+                if new_role and behind:
                     values = np.append(use.values, form.values)
-                    more = Use(use.program, (*use.blocks, place), values, use.gain + unit.length - _counted(form))
-                    found[(*kinds, form.kind)].append(more)
-    return found
+                    more = Use(use.program, (*use.blocks, index), values, use.gain + unit.length - _counted(form))
+                    larger[(*kinds, form.kind)].append(more)
+    return larger
 
 
-def _best(group: Group, uses: Sequence[Use], least: int) -> Iterator[Candidate]:
+def _best(group: Group, uses: Sequence[Use], minimum: int) -> Iterator[Candidate]:
     """The function for a group and each of its boxes that shortens most."""
     typical = np.median([use.values for use in uses], 0)
     for box in boxes_of(group, typical):
-        yield from _best_in(box, group, typical, uses, least)
+        yield from _best_in(box, group, typical, uses, minimum)
 
 
 def _best_in(
-    box: FloatArray, group: Group, typical: FloatArray, uses: Sequence[Use], least: int
+    box: FloatArray, group: Group, typical: FloatArray, uses: Sequence[Use], minimum: int
 ) -> Iterator[Candidate]:
     """The function that shortens programs most; relations are required one by one, the most frequent first.
 
@@ -194,11 +194,11 @@ def _best_in(
     extents = values @ box[3:].T
     uses = [use for use, sizes in zip(uses, extents, strict=True) if min(sizes) >= LEAST_EXTENT]
     values = np.array([use.values for use in uses]).reshape(-1, group.size)
-    known = list(measures(group, typical))
-    openings = [each for each in known if each.sort == "angle" and len(group.kinds) == 1]
-    offered = _offered(group, known, openings)
+    all_measures = list(measures(group, typical))
+    openings = [measure for measure in all_measures if measure.sort == "angle" and len(group.kinds) == 1]
+    offered = _offered(group, all_measures, openings)
     holds = np.abs(values @ offered.T) <= NEAR
-    owner = np.repeat(np.arange(len(group.slots)), [len(each) for each in group.slots])
+    owner = np.repeat(np.arange(len(group.slots)), [len(slots) for slots in group.slots])
     alive: npt.NDArray[np.bool_] = np.ones(len(uses), np.bool_)
     rows: FloatArray = np.zeros((0, group.size))
     joined = 0
@@ -207,14 +207,14 @@ def _best_in(
     while True:
         if joined >= len(group.kinds) - 1:
             fitting = [use for use, fits in zip(uses, alive, strict=True) if fits]
-            found = _priced(group, box, rows, openings, fitting)
-            most = PARAMETERS if len(group.kinds) == 1 else min(PARAMETERS, SHARE * group.size - len(box))
-            called = found.arguments + len(found.openings) <= most
-            if called and programs(found.uses) >= least and found.gain > (best.gain if best else 0):
-                best = found
+            candidate = _priced(group, box, rows, openings, fitting)
+            limit = PARAMETERS if len(group.kinds) == 1 else min(PARAMETERS, SHARE * group.size - len(box))
+            called = candidate.arguments + len(candidate.openings) <= limit
+            if called and programs(candidate.uses) >= minimum and candidate.gain > (best.gain if best else 0):
+                best = candidate
         support = (holds[:, untried] & alive[:, None]).sum(0)
         order = np.argsort(-support, kind="stable")
-        untried = untried[order][support[order] >= least]
+        untried = untried[order][support[order] >= minimum]
         following = next((k for k in untried if _independent(np.vstack([box, rows]), offered[k])), None)
         if following is None:
             break
@@ -225,9 +225,9 @@ def _best_in(
         yield best
 
 
-def _offered(group: Group, known: Sequence[Measure], openings: Sequence[Measure]) -> FloatArray:
+def _offered(group: Group, every: Sequence[Measure], angles: Sequence[Measure]) -> FloatArray:
     """Relations that may be asked for: not those by which an opening is zero, nor where the group is."""
-    rows = [row for row in relations(known) if all(np.linalg.matrix_rank([row, each.row]) == 2 for each in openings)]
+    rows = [row for row in relations(every) if all(np.linalg.matrix_rank([row, angle.row]) == 2 for angle in angles)]
     rows = [row for row in rows if not (moved(group) @ row).any()]
     return np.array(rows).reshape(-1, group.size)
 
@@ -236,28 +236,28 @@ def _priced(
     group: Group, box: FloatArray, rows: FloatArray, openings: Sequence[Measure], uses: Sequence[Use]
 ) -> Candidate:
     """The function of a group for which relations hold, and what it saves where it is used."""
-    chosen: FloatArray = np.zeros((0, group.size))
-    for each in openings:
-        zero = [bool(abs(use.values @ each.row) <= NEAR) for use in uses]
-        if sum(zero) < OPEN * len(uses) or not _independent(np.vstack([box, rows, chosen]), each.row):
+    optional: FloatArray = np.zeros((0, group.size))
+    for opening in openings:
+        zero = [bool(abs(use.values @ opening.row) <= NEAR) for use in uses]
+        if sum(zero) < OPEN * len(uses) or not _independent(np.vstack([box, rows, optional]), opening.row):
             continue
         if all(zero):
-            rows = np.vstack([rows, each.row])
+            rows = np.vstack([rows, opening.row])
         else:
-            chosen = np.vstack([chosen, each.row])
+            optional = np.vstack([optional, opening.row])
     values = np.array([use.values for use in uses]).reshape(-1, group.size)
-    arguments = _arguments(group, rows, chosen)
-    said = (np.abs(values @ chosen.T) > NEAR).sum(1).tolist()
-    taken: set[tuple[int, int]] = set()
-    kept: list[Use] = []
-    for use, more in zip(uses, said, strict=True):
-        own = {(use.program, place) for place in use.blocks}
-        if not own & taken:
-            taken |= own
-            kept.append(use._replace(gain=use.gain - arguments + group.counts - len(box) - more))
+    arguments = _arguments(group, rows, optional)
+    extra = (np.abs(values @ optional.T) > NEAR).sum(1).tolist()
+    used: set[tuple[int, int]] = set()
+    selected: list[Use] = []
+    for use, more in zip(uses, extra, strict=True):
+        blocks = {(use.program, index) for index in use.blocks}
+        if not blocks & used:
+            used |= blocks
+            selected.append(use._replace(gain=use.gain - arguments + group.counts - len(box) - more))
     lines = 1 + sum(1 + len(kind.repeats) for kind in group.kinds)
-    cost = STATEMENT * lines + arguments + len(chosen) + group.size
-    return Candidate(group, box, rows, chosen, tuple(kept), sum(use.gain for use in kept) - cost)
+    cost = STATEMENT * lines + arguments + len(optional) + group.size
+    return Candidate(group, box, rows, optional, tuple(selected), sum(use.gain for use in selected) - cost)
 
 
 def _arguments(group: Group, rows: FloatArray, openings: FloatArray) -> int:

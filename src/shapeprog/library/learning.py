@@ -52,18 +52,18 @@ def learn(given: Sequence[Program], most: int = MOST) -> Library:
 
     Comments tell how often each is used by the programs, and a typical call.
     """
-    found = list(_functions([in_cells(program) for program in given], most))
-    if not found:
+    results = list(_functions([in_cells(program) for program in given], most))
+    if not results:
         return Library(Source())
     given = [placed_if_possible(program) for program in given]
-    library, written, users = _used(given, _library(found))
-    if len(kept := [each for each in found if len(users[each.function.name]) >= LEAST_PROGRAMS]) < len(found):
-        if not kept:
+    library, written, users = _used(given, _library(results))
+    if len(frequent := [item for item in results if len(users[item.function.name]) >= LEAST_PROGRAMS]) < len(results):
+        if not frequent:
             return Library(Source())
-        library, written, users = _used(given, _library(kept))
+        library, written, users = _used(given, _library(frequent))
     before, after = sum(map(statements, given)), sum(map(statements, written))
-    said = f"Learned from {len(given)} programs: {before} statements, {after} with these functions"
-    lines: list[Line] = [Comment(said), *(line for line in library.source.lines if isinstance(line, Assignment))]
+    summary = f"Learned from {len(given)} programs: {before} statements, {after} with these functions"
+    lines: list[Line] = [Comment(summary), *(line for line in library.source.lines if isinstance(line, Assignment))]
     for learned in library.source.functions.values():
         where = users[learned.name]
         used = f"used {sum(where)} times, by {len(where)} programs, such as"
@@ -71,9 +71,9 @@ def learn(given: Sequence[Program], most: int = MOST) -> Library:
     return library_of(evaluated(replace(library.source, lines=tuple(lines))))
 
 
-def _used(given: Sequence[Program], library: Library) -> tuple[Library, list[Program], dict[str, list[int]]]:
+def _used(programs: Sequence[Program], library: Library) -> tuple[Library, list[Program], dict[str, list[int]]]:
     """A library, the programs written with it, and how often each of its functions is called by those that call it."""
-    written = [with_library(program, library) for program in given]
+    written = [with_library(program, library) for program in programs]
     users: dict[str, list[int]] = defaultdict(list)
     for program in written:
         for name, times in Counter(line.name for line in source_of(program).walk() if isinstance(line, Call)).items():
@@ -81,37 +81,37 @@ def _used(given: Sequence[Program], library: Library) -> tuple[Library, list[Pro
     return library, written, users
 
 
-def _library(found: Sequence[Learned]) -> Library:
+def _library(learned: Sequence[Learned]) -> Library:
     """The functions as placed text, each below its call."""
     functions = []
-    for each in found:
-        defaults = {name: value for name, value in each.function.parameters if isinstance(value, float)}
-        typical = {name: value for name, value in each.example.arguments if isinstance(value, float)}
-        functions.append(placed_function(each.function, defaults | typical))
+    for entry in learned:
+        defaults = {name: value for name, value in entry.function.parameters if isinstance(value, float)}
+        typical = {name: value for name, value in entry.example.arguments if isinstance(value, float)}
+        functions.append(placed_function(entry.function, defaults | typical))
     source = placed_source((Assignment(tuple((size, BOARD) for size in SIZES)), *functions))
     lines: list[Line] = [*source.lines[:1]]
-    for each, written in zip(found, functions, strict=True):
-        arguments = tuple(pair for pair in each.example.arguments if pair[0] not in BOX_IN_CELLS[:3])
-        call = replace(each.example, arguments=arguments)
+    for entry, written in zip(learned, functions, strict=True):
+        arguments = tuple(pair for pair in entry.example.arguments if pair[0] not in BOX_IN_CELLS[:3])
+        call = replace(entry.example, arguments=arguments)
         text = format_source(replace(source, lines=(*source.lines, call))).splitlines()[-1]
         lines += [Comment(), Comment(text), written]
     return Library(replace(source, lines=tuple(lines)))
 
 
-def _functions(given: Sequence[Program], most: int) -> Iterator[Learned]:
-    corpus: Corpus = [units_of(program) for program in given]
-    taken: set[str] = set()
-    while len(taken) < most:
-        offered = sorted(candidates(corpus), key=lambda each: -each.gain)
-        pairs = ((best, _made(best, corpus, taken)) for best in (_owned(each, corpus) for each in offered))
+def _functions(programs: Sequence[Program], limit: int) -> Iterator[Learned]:
+    corpus: Corpus = [units_of(program) for program in programs]
+    names: set[str] = set()
+    while len(names) < limit:
+        offered = sorted(candidates(corpus), key=lambda candidate: -candidate.gain)
+        pairs = ((best, _made(best, corpus, names)) for best in (_owned(candidate, corpus) for candidate in offered))
         best, made = next(((best, made) for best, made in pairs if made is not None), (None, None))
         if best is None or made is None:
             return
         yield made
-        taken.add(made.function.name)
+        names.add(made.function.name)
         for use in best.uses:
-            for place in use.blocks:
-                corpus[use.program][place] = None
+            for index in use.blocks:
+                corpus[use.program][index] = None
 
 
 def _owned(best: Candidate, corpus: Corpus) -> Candidate:
@@ -123,17 +123,17 @@ def _owned(best: Candidate, corpus: Corpus) -> Candidate:
     word, count = Counter(words).most_common(1)[0]
     if not word or count < OWN * len(words):
         return best
-    uses = tuple(use for use, own in zip(best.uses, words, strict=True) if own == word)
+    uses = tuple(use for use, role in zip(best.uses, words, strict=True) if role == word)
     return replace(best, group=Group((replace(kind, word=word),), best.group.slots), uses=uses)
 
 
-def _unit(corpus: Corpus, program: int, place: int) -> Unit:
-    found = corpus[program][place]
-    assert found is not None
-    return found
+def _unit(corpus: Corpus, program: int, index: int) -> Unit:
+    unit = corpus[program][index]
+    assert unit is not None
+    return unit
 
 
-def _made(best: Candidate, corpus: Corpus, taken: set[str]) -> Learned | None:
+def _made(best: Candidate, corpus: Corpus, names: set[str]) -> Learned | None:
     """The function of a candidate, after the use that is nearest to all; none if its sums are no simple ones."""
     values = np.array([use.values for use in best.uses])
     typical = best.uses[int(np.abs(values - np.median(values, 0)).sum(1).argmin())]
@@ -141,14 +141,16 @@ def _made(best: Candidate, corpus: Corpus, taken: set[str]) -> Learned | None:
     if made is None:
         return None
     kinds = best.group.kinds
-    units = [_unit(corpus, typical.program, place) for place in typical.blocks]
+    units = [_unit(corpus, typical.program, index) for index in typical.blocks]
     draws = [
         (unit.draw.name, unit.draw.role) if kind.word else (statement_of(kind.shape), "")
         for kind, unit in zip(kinds, units, strict=True)
     ]
-    written = function(name_of(kinds, taken), best.group, made, draws)
+    written = function(name_of(kinds, names), best.group, made, draws)
     counts = (count for kind, unit in zip(kinds, units, strict=True) for count in _counts(kind, unit))
-    numbers = {name: float(each.row @ typical.values) for name, each in zip(made.names, made.chosen, strict=True)}
+    numbers = {
+        name: float(measure.row @ typical.values) for name, measure in zip(made.names, made.parameters, strict=True)
+    }
     arguments: list[tuple[str, float]] = []
     for name, default in written.parameters:
         value = round(numbers[name], 2) + 0.0 if name in numbers else float(next(counts))

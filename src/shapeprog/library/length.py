@@ -27,18 +27,18 @@ def written(lines: Iterable[Line]) -> int:
 
 def length(lines: Iterable[Line]) -> int:
     """Statements, loops, calls and functions of some lines, and every number and name that is read in them."""
-    found = 0
+    total = 0
     for line in lines:
         match line:
             case Draw() | Loop():
-                found += STATEMENT + _written(line) + length(body_of(line))
+                total += STATEMENT + _written(line) + length(body_of(line))
             case Function():
-                found += STATEMENT + len(line.parameters) + length(line.body)
+                total += STATEMENT + len(line.parameters) + length(line.body)
             case Part() | Group() | Call():
-                found += STATEMENT + sum(map(terms, values(line))) + length(body_of(line))
+                total += STATEMENT + sum(map(terms, values(line))) + length(body_of(line))
             case Assignment():
-                found += sum(map(terms, values(line)))
-    return found
+                total += sum(map(terms, values(line)))
+    return total
 
 
 def terms(value: Value) -> int:
@@ -52,13 +52,13 @@ def terms(value: Value) -> int:
 
 
 def _written(line: Draw | Loop) -> int:
-    found = 0
+    total = 0
     for parameter in language()[line.name].parameters:
         values = line.values[parameter.slots]
         silent = parameter.unsaid is not None and values == (parameter.unsaid,)
         if parameter.quantity.written_out and not silent:
-            found += sum(terms(value) if isinstance(value, Expression) else 1 for value in values)
-    return found
+            total += sum(terms(value) if isinstance(value, Expression) else 1 for value in values)
+    return total
 
 
 def outside(lines: Iterable[Line]) -> Iterator[Line]:

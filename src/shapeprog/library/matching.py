@@ -101,17 +101,17 @@ class Pattern:
         """How many blocks it draws; none if they are not linear in its measures."""
         return len(self.forms_at(self.arguments))
 
-    def choices(self, seen: Iterable[tuple[int, ...]]) -> Iterator[dict[str, float]]:
+    def choices(self, existing: Iterable[tuple[int, ...]]) -> Iterator[dict[str, float]]:
         """What its counts may be where blocks are repeated as often as these; once only where it says so by itself.
 
         What draws one block repeats it as some block is.
         """
-        known = {tuple(sorted(counts)): Counter(counts) for counts in seen}
-        every = sorted({float(n) for counts in known for n in counts})
+        multisets = {tuple(sorted(counts)): Counter(counts) for counts in existing}
+        every = sorted({float(n) for counts in multisets for n in counts})
         options = [sorted({1.0, *every}) if self.defaults[name] == 1 else every for name in self.counts]
         for counts in itertools.product(*options):
-            several = Counter(count for count in counts if count > 1)
-            if self.blocks > 1 or any(several <= one for one in known.values()):
+            repeated = Counter(count for count in counts if count > 1)
+            if self.blocks > 1 or any(repeated <= multiset for multiset in multisets.values()):
                 yield dict(zip(self.counts, counts, strict=True))
 
     @property
@@ -122,7 +122,7 @@ class Pattern:
     @property
     def arguments(self) -> dict[str, float]:
         """A number for each parameter: that of the example, a default, or any."""
-        return self._assumed(lambda place: GENERIC / STEEP**place)
+        return self._assumed(lambda index: GENERIC / STEEP**index)
 
     def forms(self, counts: Mapping[str, float]) -> tuple[tuple[Form, ...], ...]:
         """What it draws for these counts; nothing if that is not linear in its other parameters.
@@ -130,26 +130,27 @@ class Pattern:
         Which of two copies lies below the other may depend on its arguments: where no example tells, several are tried.
         """
         key = tuple(counts.values())
-        if key not in self._known:
+        if key not in self._forms:
             last = len(self.parameters)
             assumed = [self.arguments]
             if self.example is None:
                 assumed += [
-                    self._assumed(lambda place: GENERIC / STEEP ** (last - 1 - place)),
+                    self._assumed(lambda index: GENERIC / STEEP ** (last - 1 - index)),
                     self._assumed(lambda _: GENERIC),
                 ]
-            apart = ({name: value or GENERIC for name, value in one.items()} for one in assumed)  # no copies on others
-            found = {_key(each): each for one in apart if (each := self.forms_at({**one, **counts}))}
-            self._known[key] = tuple(found.values())
-        return self._known[key]
+            # Zero would put copies on top of each other.
+            distinct = ({name: value or GENERIC for name, value in arguments.items()} for arguments in assumed)
+            unique = {_key(forms): forms for arguments in distinct if (forms := self.forms_at({**arguments, **counts}))}
+            self._forms[key] = tuple(unique.values())
+        return self._forms[key]
 
     @cached_property
-    def _known(self) -> dict[tuple[float, ...], tuple[tuple[Form, ...], ...]]:
+    def _forms(self) -> dict[tuple[float, ...], tuple[tuple[Form, ...], ...]]:
         return {}
 
     def _assumed(self, any_: Callable[[int], float]) -> dict[str, float]:
-        known = self._shown
-        return {name: 3.0 if name in self.counts else any_(n) for n, name in enumerate(self.parameters)} | known
+        shown = self._shown
+        return {name: 3.0 if name in self.counts else any_(n) for n, name in enumerate(self.parameters)} | shown
 
     @property
     def _shown(self) -> dict[str, float]:
@@ -158,7 +159,7 @@ class Pattern:
         return {name: value for name, value in shown if isinstance(value, float)}
 
     @cached_property
-    def _drawn(self) -> dict[tuple[float, ...], tuple[Node, ...]]:
+    def _nodes(self) -> dict[tuple[float, ...], tuple[Node, ...]]:
         return {}
 
     def nodes(self, numbers: Mapping[str, float]) -> tuple[Node, ...]:
@@ -168,10 +169,10 @@ class Pattern:
         """
         counts = {name: numbers[name] for name in self.counts}
         key = tuple(counts.values())
-        if key not in self._drawn:
+        if key not in self._nodes:
             usual = {name: BOX if name in BOX_IN_CELLS else 1.0 for name in self.parameters} | self._shown | counts
-            self._drawn[key] = call_in_cells(self.source, self.function.name, usual)
-        return self._drawn[key]
+            self._nodes[key] = call_in_cells(self.source, self.function.name, usual)
+        return self._nodes[key]
 
     def drawn(self, numbers: Mapping[str, float]) -> tuple[Node, ...]:
         """What it draws with these numbers; a ``ShapeProgError`` as for :meth:`nodes`."""
@@ -192,8 +193,8 @@ def _at(node: Node, numbers: Mapping[str, float]) -> Node:
     return replace(node, body=tuple(_at(inner, numbers) for inner in node.body)) if isinstance(node, Loop) else node
 
 
-def _key(found: Sequence[Form]) -> tuple[tuple[Kind, bytes, bytes], ...]:
-    return tuple((form.block.kind, form.factors.tobytes(), form.constants.tobytes()) for form in found)
+def _key(forms: Sequence[Form]) -> tuple[tuple[Kind, bytes, bytes], ...]:
+    return tuple((form.block.kind, form.factors.tobytes(), form.constants.tobytes()) for form in forms)
 
 
 class Match(NamedTuple):
@@ -212,9 +213,9 @@ def forms(
 
     Each block has several forms: with mirror images as rows of two along these axes, where both draw the same.
     """
-    given = {name: Linear.of(name) for name in names}
+    variables = {name: Linear.of(name) for name in names}
     for chain in Program(tuple(nodes)).chains:
-        rows = [[_linear(value_at(value, given)) for value in node.values] for node in chain]
+        rows = [[_linear(value_at(value, variables)) for value in node.values] for node in chain]
         values = (tuple(form.at(numbers) for form in row) for row in rows)
         plain = tuple(replace(node, values=new) for node, new in zip(chain, values, strict=True))
         every = [form for row in rows for form in row]
@@ -253,95 +254,97 @@ class Matcher:
 
     def matches(self, pattern: Pattern) -> Iterator[Match]:
         """All ways in which blocks of the program are a call of a function."""
-        found: dict[tuple[int, ...], tuple[int, Match]] = {}
-        for given in pattern.choices(form.block.counts for form in self.forms):
-            for wanted in pattern.forms(given):
-                for blocks in self._alike(wanted):
-                    solved = self._solved(pattern, given, wanted, blocks)
+        best: dict[tuple[int, ...], tuple[int, Match]] = {}
+        for counts in pattern.choices(form.block.counts for form in self.forms):
+            for targets in pattern.forms(counts):
+                for blocks in self._candidates(targets):
+                    solved = self._solved(pattern, counts, targets, blocks)
                     key = tuple(sorted(blocks))
-                    if solved is not None and (key not in found or solved[0] < found[key][0]):
-                        found[key] = solved
-        return (match for _, match in found.values())
+                    if solved is not None and (key not in best or solved[0] < best[key][0]):
+                        best[key] = solved
+        return (match for _, match in best.values())
 
-    def _alike(self, wanted: Sequence[Form]) -> Iterator[tuple[int, ...]]:
+    def _candidates(self, targets: Sequence[Form]) -> Iterator[tuple[int, ...]]:
         """Blocks of the kinds wanted, in their order, that make whole lines and share a role where one is open."""
 
-        def extended(chosen: tuple[int, ...]) -> Iterator[tuple[int, ...]]:
-            if len(chosen) == len(wanted):
-                lines = {self.units[k] for k in chosen}
-                if all(k in chosen for k, line in enumerate(self.units) if line in lines):
-                    yield chosen
+        def extended(prefix: tuple[int, ...]) -> Iterator[tuple[int, ...]]:
+            if len(prefix) == len(targets):
+                lines = {self.units[k] for k in prefix}
+                if all(k in prefix for k, line in enumerate(self.units) if line in lines):
+                    yield prefix
                 return
-            kind = wanted[len(chosen)].block.kind
+            kind = targets[len(prefix)].block.kind
             open_roles = {
                 self.forms[k].block.kind.word
-                for k, form in zip(chosen, wanted, strict=False) if not form.block.kind.word
+                for k, form in zip(prefix, targets, strict=False) if not form.block.kind.word
             }  # fmt: skip
             for k, form in enumerate(self.forms):
-                own = form.block.kind
-                alike = replace(own, word=kind.word) == kind and form.block.counts == wanted[len(chosen)].block.counts
-                role = own.word == kind.word or (not kind.word and open_roles <= {own.word})
-                if k not in chosen and alike and role:
-                    yield from extended((*chosen, k))
+                actual = form.block.kind
+                matching = (
+                    replace(actual, word=kind.word) == kind and form.block.counts == targets[len(prefix)].block.counts
+                )
+                role = actual.word == kind.word or (not kind.word and open_roles <= {actual.word})
+                if k not in prefix and matching and role:
+                    yield from extended((*prefix, k))
 
         yield from extended(())
 
     def _solved(
-        self, pattern: Pattern, counts: Mapping[str, float], wanted: Sequence[Form], blocks: tuple[int, ...]
+        self, pattern: Pattern, counts: Mapping[str, float], targets: Sequence[Form], blocks: tuple[int, ...]
     ) -> tuple[int, Match] | None:
         """The call of a function that draws some blocks, if there is one, and how many arguments are negative."""
         mine = [self.forms[k] for k in blocks]
-        factors = np.vstack([form.factors for form in wanted])
-        constants = np.concatenate([form.constants for form in wanted])
+        factors = np.vstack([form.factors for form in targets])
+        constants = np.concatenate([form.constants for form in targets])
         values = np.concatenate([form.block.values for form in mine])
         defaults = [pattern.defaults[name] for name in pattern.measures]
         free: npt.NDArray[np.bool_] = np.any(factors, 0)  # the spacing of a row of one is not
         if np.linalg.matrix_rank(factors) < free.sum() or any(
-            default is None for default, told in zip(defaults, free, strict=True) if not told
+            default is None for default, used in zip(defaults, free, strict=True) if not used
         ):
             return None
-        found = np.linalg.lstsq(factors, values - constants, rcond=None)[0]
-        if np.abs(factors @ found + constants - values).max(initial=0) > TOLERANCE:
+        solution = np.linalg.lstsq(factors, values - constants, rcond=None)[0]
+        if np.abs(factors @ solution + constants - values).max(initial=0) > TOLERANCE:
             return None
         rows = np.vstack([np.column_stack([form.factors, form.constants]) for form in mine])
         rows[:, -1] -= constants
-        told = iter(self._written(factors[:, free], rows, found[free]))
+        expressions = iter(self._written(factors[:, free], rows, solution[free]))
         written: list[Value] = [
-            next(told) if each else default or 0.0 for each, default in zip(free, defaults, strict=True)
+            next(expressions) if used else default or 0.0 for used, default in zip(free, defaults, strict=True)
         ]
-        for place, default in enumerate(defaults):
-            if free[place] and isinstance(default, float) and abs(found[place] - default) <= EXACT:
-                written[place] = default
+        for index, default in enumerate(defaults):
+            if free[index] and isinstance(default, float) and abs(solution[index] - default) <= EXACT:
+                written[index] = default
         exact = np.array([value_at(value, self.numbers) for value in written])
         error = float(np.abs(factors @ exact + constants - values).max(initial=0))
         sizes = [value for name, value in zip(pattern.measures, exact, strict=True) if name in SIZES]
         if error > TOLERANCE or min(sizes) <= 0:
             return None
         table: dict[str, Value] = {**dict(zip(pattern.measures, written, strict=True)), **counts}
-        roles = (form.block.kind.word for form, want in zip(mine, wanted, strict=True) if not want.block.kind.word)
-        said = tuple((name, table[name]) for name, default in pattern.defaults.items() if table[name] != default)
-        return int((exact < -TOLERANCE).sum()), Match(blocks, next(roles, ""), said, error)
+        roles = (form.block.kind.word for form, target in zip(mine, targets, strict=True) if not target.block.kind.word)
+        arguments = tuple((name, table[name]) for name, default in pattern.defaults.items() if table[name] != default)
+        return int((exact < -TOLERANCE).sum()), Match(blocks, next(roles, ""), arguments, error)
 
-    def _written(self, factors: FloatArray, rows: FloatArray, near: FloatArray) -> list[Value]:
+    def _written(self, factors: FloatArray, rows: FloatArray, solution: FloatArray) -> list[Value]:
         """The shortest expressions for parameters (P) whose factors (M, P) come to rows (M, N + 1) of the program.
 
         Of equally short ones that nearest to ``near`` (P) is taken.
         """
         sizes = (np.abs(rows) > 1e-9).sum(1)
         random = np.random.default_rng(0)
-        offered: list[dict[bytes, FloatArray]] = [{} for _ in near]
+        offered: list[dict[bytes, FloatArray]] = [{} for _ in solution]
         for attempt in range(TRIES):
             order = np.argsort(sizes + random.random(len(rows)) * attempt, kind="stable")
-            chosen = np.array(independent(factors, order.tolist()), np.int64)
-            for options, row in zip(offered, np.linalg.inv(factors[chosen]) @ rows[chosen], strict=True):
+            selected = np.array(independent(factors, order.tolist()), np.int64)
+            for options, row in zip(offered, np.linalg.inv(factors[selected]) @ rows[selected], strict=True):
                 options.setdefault((np.round(row, 5) + 0.0).tobytes(), row)
-        found: list[Value] = []
-        for options, wanted in zip(offered, near, strict=True):
+        result: list[Value] = []
+        for options, target in zip(offered, solution, strict=True):
             values = [self._sum(row) for row in options.values()]
-            away = [abs(float(row[:-1] @ self.values + row[-1] - wanted)) for row in options.values()]
+            away = [abs(float(row[:-1] @ self.values + row[-1] - target)) for row in options.values()]
             best = min(range(len(values)), key=lambda k: (terms(values[k]), away[k]))
-            found.append(values[best])
-        return found
+            result.append(values[best])
+        return result
 
     def _sum(self, row: FloatArray) -> Value:
         """The expression of a row (N + 1,): factors of the names, and a constant."""

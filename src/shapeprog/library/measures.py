@@ -19,7 +19,7 @@ AXIS = ("up", "depth", "side")
 THIN = 0.6
 """A solid is thin along an axis where it measures less than this share of the next longer."""
 
-CHOSEN = 2.5
+SIDE_PRICE = 2.5
 """Price up to which a place is a side of a whole block; dearer ones are of single copies, or ends of rods."""
 
 SIDES_OF = (("bottom", "top"), ("front", "rear"), ("right", "left"))
@@ -72,10 +72,10 @@ def measures(group: Group, typical: FloatArray) -> Iterator[Measure]:
     start = 0
     unit = np.eye(group.size)
     for block, (kind, slots) in enumerate(zip(group.kinds, group.slots, strict=True)):
-        own, values = unit[start : start + len(slots)], typical[start : start + len(slots)]
+        factors, values = unit[start : start + len(slots)], typical[start : start + len(slots)]
         start += len(slots)
         for word, sort, axis, row, price in (
-            _boxed(kind, slots, own, values) if kind.boxed else _pointed(kind, slots, own, values)
+            _boxed(kind, slots, factors, values) if kind.boxed else _pointed(kind, slots, factors, values)
         ):
             yield Measure(block, word, sort, axis, row, price)
 
@@ -96,12 +96,12 @@ def _box(group: Group, typical: FloatArray, leaning: bool) -> FloatArray | None:
     highs: list[list[FloatArray]] = [[], [], []]
     start, unit = 0, np.eye(group.size)
     for kind, slots in zip(group.kinds, group.slots, strict=True):
-        own, first = unit[start : start + len(slots)], len(slots) - kind.spans
+        factors, first = unit[start : start + len(slots)], len(slots) - kind.spans
         start += len(slots)
-        spans = {axis: own[place] for place, (axis, _) in enumerate(kind.repeats, first)}
+        spans = {axis: factors[index] for index, (axis, _) in enumerate(kind.repeats, first)}
         mirrored = {axis for axis, way in kind.repeats if way == "mirror"}
-        across = _across(kind, slots, own, own @ typical) if leaning else {}
-        for row, slot in zip(own[:first], slots[:first], strict=True):
+        across = _across(kind, slots, factors, factors @ typical) if leaning else {}
+        for row, slot in zip(factors[:first], slots[:first], strict=True):
             if slot.kind != "position":
                 continue
             axis = slot.axis
@@ -110,7 +110,7 @@ def _box(group: Group, typical: FloatArray, leaning: bool) -> FloatArray | None:
                 lows[axis] += ends
                 highs[axis] += ends
                 continue
-            sizes = [size for size, other in zip(own, slots, strict=True) if other == ("size", "length", axis)]
+            sizes = [size for size, item in zip(factors, slots, strict=True) if item == ("size", "length", axis)]
             ends = [row, *(row + size for size in sizes)]
             if axis in mirrored:
                 ends += [2 * spans[axis] - end for end in ends]
@@ -124,13 +124,13 @@ def _box(group: Group, typical: FloatArray, leaning: bool) -> FloatArray | None:
     return box if min(box[3:] @ typical) >= LEAST_EXTENT and np.linalg.matrix_rank(box) == 6 else None
 
 
-def _across(kind: Kind, slots: Sequence[Slot], own: FloatArray, values: FloatArray) -> dict[int, FloatArray]:
+def _across(kind: Kind, slots: Sequence[Slot], factors: FloatArray, values: FloatArray) -> dict[int, FloatArray]:
     """The thickness of a part between two points along the axes across its direction."""
     across = sorted({UP, *_leaning(slots, values)} if _leaning(slots, values) != {DEPTH, SIDE} else {DEPTH, SIDE})
-    thick = [row for slot, row in zip(slots, own, strict=True) if slot.word in ("section", "radius")]
+    thick = [row for slot, row in zip(slots, factors, strict=True) if slot.word in ("section", "radius")]
     if not thick or not _leaning(slots, values):
         return {}
-    return {axis: thick[place] if kind.shape == "bar" else 2 * thick[0] for place, axis in enumerate(across)}
+    return {axis: thick[index] if kind.shape == "bar" else 2 * thick[0] for index, axis in enumerate(across)}
 
 
 def _leaning(slots: Sequence[Slot], values: FloatArray) -> set[int]:
@@ -142,22 +142,22 @@ def _leaning(slots: Sequence[Slot], values: FloatArray) -> set[int]:
     return {DEPTH, SIDE} - {along}
 
 
-def within_box(known: Iterable[Measure], box: FloatArray) -> Iterator[Measure]:
+def within_box(all_measures: Iterable[Measure], box: FloatArray) -> Iterator[Measure]:
     """Measures with places told from the low and the high side of a box (6, M)."""
-    for each in known:
-        if each.sort not in ("place", "middle"):
-            yield each
+    for measure in all_measures:
+        if measure.sort not in ("place", "middle"):
+            yield measure
             continue
-        low, size = box[each.axis], box[3 + each.axis]
-        end = f"{each.word.partition('_at_')[0]}_" if "_at_" in each.word else ""
-        near, far = SIDES_OF[each.axis]
-        yield each._replace(word=f"{end}{near}", row=each.row - low)
-        yield each._replace(word=f"{end}{far}", row=low + size - each.row, price=each.price + 0.1)
+        low, size = box[measure.axis], box[3 + measure.axis]
+        end = f"{measure.word.partition('_at_')[0]}_" if "_at_" in measure.word else ""
+        low_side, high_side = SIDES_OF[measure.axis]
+        yield measure._replace(word=f"{end}{low_side}", row=measure.row - low)
+        yield measure._replace(word=f"{end}{high_side}", row=low + size - measure.row, price=measure.price + 0.1)
 
 
 def moved(group: Group) -> FloatArray:
     """How the numbers of a group change where it moves by one cell along each axis: (3, M)."""
-    slots = [slot for each in group.slots for slot in each]
+    slots = [slot for block_slots in group.slots for slot in block_slots]
     return np.array(
         [
             [slot.axis == axis and (slot.kind == "position" or slot.word == "plane") for slot in slots]
@@ -167,40 +167,40 @@ def moved(group: Group) -> FloatArray:
     )
 
 
-def relations(known: Sequence[Measure]) -> list[FloatArray]:
+def relations(all_measures: Sequence[Measure]) -> list[FloatArray]:
     """Relations that may hold: equal lengths, faces flush or in contact, what lies in the middle, what is straight."""
-    found = [each.row for each in known if each.opening]
-    for one, two in itertools.combinations(known, 2):
-        if one.sort == two.sort == "length":
-            found.append(one.row - two.row)
-        if one.axis != two.axis or not {one.sort, two.sort} <= {"place", "middle"}:
+    rows = [measure.row for measure in all_measures if measure.opening]
+    for first, second in itertools.combinations(all_measures, 2):
+        if first.sort == second.sort == "length":
+            rows.append(first.row - second.row)
+        if first.axis != second.axis or not {first.sort, second.sort} <= {"place", "middle"}:
             continue
-        ends = one.sort == two.sort == "place" and one.price >= CHOSEN
-        if one.block != two.block or ends:
-            found.append(one.row - two.row)
-        if one.block == two.block and ends and one.axis != UP:
-            found.append(one.row + two.row)
+        ends = first.sort == second.sort == "place" and first.price >= SIDE_PRICE
+        if first.block != second.block or ends:
+            rows.append(first.row - second.row)
+        if first.block == second.block and ends and first.axis != UP:
+            rows.append(first.row + second.row)
     unique: dict[bytes, FloatArray] = {}
-    for row in found:
+    for row in rows:
         if row.any():
             sign = np.sign(row[np.flatnonzero(row)[0]])
             unique.setdefault((np.round(row * sign, 6) + 0.0).tobytes(), row)
     return list(unique.values())
 
 
-Found = tuple[str, Sort, int, FloatArray, float]
+Values = tuple[str, Sort, int, FloatArray, float]
 
 
-def _boxed(kind: Kind, slots: Sequence[Slot], own: FloatArray, values: FloatArray) -> Iterator[Found]:
+def _boxed(kind: Kind, slots: Sequence[Slot], factors: FloatArray, values: FloatArray) -> Iterator[Values]:
     """Measures of solids that are told by low corner, extents and what else shapes them."""
     first = len(slots) - kind.spans
-    repeats = {axis: place for place, (axis, _) in enumerate(kind.repeats, first)}
+    repeats = {axis: index for index, (axis, _) in enumerate(kind.repeats, first)}
     sizes = values[3:6]
     thin = int(np.argmin(sizes))
     flat = bool(sizes[thin] < THIN * np.sort(sizes)[1])
     for axis in range(3):
-        low, size, word = own[axis], own[3 + axis], EXTENTS[axis]
-        span = own[repeats[axis]] if axis in repeats else size
+        low, size, word = factors[axis], factors[3 + axis], EXTENTS[axis]
+        span = factors[repeats[axis]] if axis in repeats else size
         if axis in repeats:
             yield word, "length", axis, span, 0.0
             word = f"each_{word}"
@@ -215,18 +215,18 @@ def _boxed(kind: Kind, slots: Sequence[Slot], own: FloatArray, values: FloatArra
         if axis in repeats:
             yield f"inner_{LOW[axis]}", "place", axis, low + size, 6.0
             yield f"outer_{LOW[axis]}", "place", axis, low + span - size, 6.0
-    for place in range(6, first):
-        yield slots[place].word, "length", -1, own[place], 1.3
+    for index in range(6, first):
+        yield slots[index].word, "length", -1, factors[index], 1.3
 
 
-def _pointed(kind: Kind, slots: Sequence[Slot], own: FloatArray, values: FloatArray) -> Iterator[Found]:
+def _pointed(kind: Kind, slots: Sequence[Slot], factors: FloatArray, values: FloatArray) -> Iterator[Values]:
     """Measures of solids that are told by points, such as the two ends of a rod."""
     first = len(slots) - kind.spans
-    planes = {axis: own[place] for place, (axis, way) in enumerate(kind.repeats, first) if way == "mirror"}
+    planes = {axis: factors[index] for index, (axis, way) in enumerate(kind.repeats, first) if way == "mirror"}
     rising = _rises(slots, values)
     heights: dict[str, FloatArray] = {}
     numbered: Counter[str] = Counter()
-    for row, slot in zip(own, slots[:first], strict=False):
+    for row, slot in zip(factors, slots[:first], strict=False):
         end = {"start": "bottom", "end": "upper"}.get(slot.word, slot.word) if rising else slot.word
         if slot.kind == "position":
             if slot.axis in planes:
@@ -241,21 +241,21 @@ def _pointed(kind: Kind, slots: Sequence[Slot], own: FloatArray, values: FloatAr
             word = {"size": EXTENTS[slot.axis]}.get(slot.word, slot.word)
             if slot.word == "section":
                 word = "thickness" if numbered[slot.word] == 1 else "breadth"
-            elif sum(each.word == slot.word for each in slots) == 2:
+            elif sum(candidate.word == slot.word for candidate in slots) == 2:
                 word = f"{'bottom' if numbered[slot.word] == 1 else 'upper'}_{slot.word}"
             yield word, "length", slot.axis, row, 1.0
         else:
             yield slot.word, "angle", -1, row, 1.0
-    ends = {(slot.word, slot.axis): row for slot, row in zip(slots, own, strict=False)}
+    ends = {(slot.word, slot.axis): row for slot, row in zip(slots, factors, strict=False)}
     for axis in _leaning(slots, values) - planes.keys():
         yield "lean" if axis == DEPTH else "shift", "angle", axis, ends["end", axis] - ends["start", axis], 1.2
     if heights.keys() >= {"start", "end"}:
         yield "height" if rising else "rise", "length", UP, heights["end"] - heights["start"], 1.5
-    for place, (axis, way) in enumerate(kind.repeats, first):
+    for index, (axis, way) in enumerate(kind.repeats, first):
         if way == "mirror":
-            yield f"middle_{AXIS[axis]}", "middle", axis, own[place], 4.0
+            yield f"middle_{AXIS[axis]}", "middle", axis, factors[index], 4.0
         else:
-            yield EXTENTS[axis], "length", axis, own[place], 0.5
+            yield EXTENTS[axis], "length", axis, factors[index], 0.5
 
 
 def _rises(slots: Sequence[Slot], values: FloatArray) -> bool:

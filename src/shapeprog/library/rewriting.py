@@ -41,42 +41,42 @@ def with_library(program: Program, library: Library) -> Program:
     statements that have no placed form does not change, nor does one whose numbers are not linear in its names.
     """
     try:
-        given = placed(program)
-        cells = _apart(named_cells(given))
+        original = placed(program)
+        cells = _separated(named_cells(original))
     except ShapeProgError:
         return program
-    chosen = _with_one_role(_offered(cells, library), library)
+    selected = _with_one_role(_offered(cells, library), library)
 
     def written_with(some: Sequence[Offer]) -> tuple[float, Program]:
         try:
-            found = placed_again(_rewritten(cells, some), _called(some, library)) if some else given
+            result = placed_again(_rewritten(cells, some), _called(some, library)) if some else original
         except ShapeProgError:
-            return np.inf, given
-        return _length(found), found
+            return np.inf, original
+        return _length(result), result
 
-    best = written_with(chosen)
-    for offer in reversed(chosen):
-        fewer = [each for each in chosen if each is not offer]
-        other = written_with(fewer)
-        if other[0] <= best[0]:
-            chosen, best = fewer, other
-    if statements(best[1]) >= statements(given):
+    best = written_with(selected)
+    for offer in reversed(selected):
+        fewer = [candidate for candidate in selected if candidate is not offer]
+        trial = written_with(fewer)
+        if trial[0] <= best[0]:
+            selected, best = fewer, trial
+    if statements(best[1]) >= statements(original):
         return program
-    own, found = source_of(given), source_of(in_unit(best[1], given.unit))
-    return evaluated(replace(found, unit=own.unit, scale=own.scale))
+    before, result = source_of(original), source_of(in_unit(best[1], original.unit))
+    return evaluated(replace(result, unit=before.unit, scale=before.scale))
 
 
 def _length(program: Program) -> int:
     return length(line for line in source_of(program).lines if not isinstance(line, Function))
 
 
-def _with_one_role(chosen: Sequence[Offer], library: Library) -> list[Offer]:
+def _with_one_role(selected: Sequence[Offer], library: Library) -> list[Offer]:
     """Offers of which those of a function with cushions, whose role is written in it, have the role of the first."""
     roles: dict[str, str] = {}
-    for offer in chosen:
+    for offer in selected:
         roles.setdefault(offer.call.name, offer.call.role)
-    soft = {name for name, each in library.source.functions.items() if any(map(_is_cushion, Source(each.body).walk()))}
-    return [offer for offer in chosen if offer.call.name not in soft or roles[offer.call.name] == offer.call.role]
+    soft = {name for name, item in library.source.functions.items() if any(map(_is_cushion, Source(item.body).walk()))}
+    return [offer for offer in selected if offer.call.name not in soft or roles[offer.call.name] == offer.call.role]
 
 
 def _as_cushion(line: Line, role: str) -> Line:
@@ -87,22 +87,22 @@ def _is_cushion(line: Line) -> bool:
     return isinstance(line, Part) and line.role == line.kind == "cushion"
 
 
-def _called(chosen: Sequence[Offer], library: Library) -> list[Function]:
+def _called(selected: Sequence[Offer], library: Library) -> list[Function]:
     """The placed functions that calls need, in the order of the library; cushions in them have the role of the call."""
-    roles = {offer.call.name: offer.call.role for offer in chosen}
-    wanted = {*roles}
+    roles = {offer.call.name: offer.call.role for offer in selected}
+    names = {*roles}
     for function in reversed(library.source.functions.values()):
-        if function.name in wanted:
-            wanted |= {line.name for line in Source(function.body).walk() if isinstance(line, Call)}
+        if function.name in names:
+            names |= {line.name for line in Source(function.body).walk() if isinstance(line, Call)}
 
     def with_role(function: Function) -> Function:
         role = roles.get(function.name) or "cushion"
         return replace(function, body=changed_lines(function.body, lambda line: _as_cushion(line, role)))
 
-    return [with_role(each) for name, each in library.source.functions.items() if name in wanted]
+    return [with_role(function) for name, function in library.source.functions.items() if name in names]
 
 
-def _apart(source: Source) -> Source:
+def _separated(source: Source) -> Source:
     """A program in cells with one statement in each nest of loops."""
     return replace(source, lines=tuple(separate_loops(source.lines)))
 
@@ -123,12 +123,12 @@ class Offer(NamedTuple):
 def offers(program: Program, library: Library) -> list[Offer]:
     """The calls of functions of a library that shorten a plain program most, none of which shares a line with
     another."""
-    return _offered(_apart(source_of(program)), library)
+    return _offered(_separated(source_of(program)), library)
 
 
 def _offered(cells: Source, library: Library) -> list[Offer]:
     names = names_of(cells)
-    return _chosen(cells, [pattern for pattern in library.patterns if pattern.function.name not in names])
+    return _selected(cells, [pattern for pattern in library.patterns if pattern.function.name not in names])
 
 
 def matchers_of(source: Source) -> Iterator[tuple[Matcher, tuple[Loop, ...]]]:
@@ -141,18 +141,18 @@ def matchers_of(source: Source) -> Iterator[tuple[Matcher, tuple[Loop, ...]]]:
     free = {name: numbers[name] for name in names}
 
     def of(lines: Sequence[tuple[int, Line]], *around: Loop) -> Iterator[tuple[Matcher, tuple[Loop, ...]]]:
-        found: list[list[Form]] = [[] for _ in ROWS]
+        readings: list[list[Form]] = [[] for _ in ROWS]
         units: list[int] = []
         inner: dict[Loop, list[tuple[int, Line]]] = {}
         for number, line in lines:
             if isinstance(line, Draw | Loop):
                 for read in forms([line], numbers, names, ROWS):
                     units.append(number)
-                    for some, form in zip(found, read, strict=True):
+                    for some, form in zip(readings, read, strict=True):
                         some.append(form)
             if isinstance(line, Loop) and len(line.body) == 1:
                 inner.setdefault(_frame(line), []).append((number, line.body[0]))
-        for some in {tuple(form.block.kind for form in some): some for some in found}.values():
+        for some in {tuple(form.block.kind for form in some): some for some in readings}.values():
             yield Matcher(some, units, free), around
         for loop, within_it in inner.items():
             if len(within_it) > 1 or isinstance(within_it[0][1], Loop):
@@ -167,13 +167,13 @@ def matchers_of(source: Source) -> Iterator[tuple[Matcher, tuple[Loop, ...]]]:
 def _frame(loop: Loop) -> Loop:
     """A loop without its body, and its numbers without what is left over from other units."""
 
-    def rounded(each: float | Name) -> float | Name:
-        return each if isinstance(each, Name) else round(each, 4)
+    def rounded(value: float | Name) -> float | Name:
+        return value if isinstance(value, Name) else round(value, 4)
 
     return replace(loop, values=tuple(replaced(value, rounded) for value in loop.values), body=())
 
 
-def _chosen(source: Source, patterns: Sequence[Pattern]) -> list[Offer]:
+def _selected(source: Source, patterns: Sequence[Pattern]) -> list[Offer]:
     """The calls that shorten a program most, one after another, none of which shares a line with another."""
     offered: list[Offer] = []
     for matcher, around in matchers_of(source):
@@ -187,13 +187,13 @@ def _chosen(source: Source, patterns: Sequence[Pattern]) -> list[Offer]:
                 gain = length(before) - length(instead) - match.error / TOLERANCE
                 if fewer > 0 and gain > 0:
                     offered.append(Offer(fewer, gain, call, lines, around))
-    taken: set[int] = set()
-    chosen = []
-    for offer in sorted(offered, key=lambda each: (-each.fewer, -each.gain)):
-        if not taken & {*offer.lines}:
-            taken |= {*offer.lines}
-            chosen.append(offer)
-    return chosen
+    used: set[int] = set()
+    selected = []
+    for offer in sorted(offered, key=lambda offer: (-offer.fewer, -offer.gain)):
+        if not used & {*offer.lines}:
+            used |= {*offer.lines}
+            selected.append(offer)
+    return selected
 
 
 def within(around: Sequence[Loop], line: Line) -> Line:
@@ -203,9 +203,9 @@ def within(around: Sequence[Loop], line: Line) -> Line:
     return line
 
 
-def _rewritten(source: Source, chosen: Sequence[Offer]) -> Source:
+def _rewritten(source: Source, selected: Sequence[Offer]) -> Source:
     """The program in cells with calls, equal loops written once."""
-    calls = {min(offer.lines): within(offer.around, offer.call) for offer in chosen}
-    gone = {number for offer in chosen for number in offer.lines} - calls.keys()
+    calls = {min(offer.lines): within(offer.around, offer.call) for offer in selected}
+    gone = {number for offer in selected for number in offer.lines} - calls.keys()
     lines = [calls.get(number, line) for number, line in enumerate(source.lines) if number not in gone]
     return replace(source, lines=merged_lines(lines))

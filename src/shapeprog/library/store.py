@@ -41,20 +41,20 @@ class Library:
     @cached_property
     def comments(self) -> dict[str, tuple[str, ...]]:
         """For each function what stands right above it."""
-        found: dict[str, tuple[str, ...]] = {}
+        result: dict[str, tuple[str, ...]] = {}
         above: tuple[str, ...] = ()
         for line in self.source.lines:
             if isinstance(line, Function):
-                found[line.name], above = above, ()
+                result[line.name], above = above, ()
             elif isinstance(line, Comment):
                 above = (*above, line.text) if line.text else ()
-        return found
+        return result
 
     @cached_property
     def examples(self) -> dict[str, Call]:
         """Calls of functions that the comment right above them shows as its last line."""
-        found = {}
-        above = replace(self.source, lines=tuple(each for each in self.source.lines if not isinstance(each, Comment)))
+        result = {}
+        above = replace(self.source, lines=tuple(line for line in self.source.lines if not isinstance(line, Comment)))
         for function in self.source.functions.values():
             text = (self.comments[function.name] or ("",))[-1]
             try:
@@ -63,18 +63,18 @@ class Library:
                 continue
             if not isinstance(shown, Call) or shown.name != function.name:
                 continue
-            given = dict(shown.arguments)
-            if not given.keys() >= {*SIZES} or not all(isinstance(given[size], float) for size in SIZES):
+            arguments = dict(shown.arguments)
+            if not arguments.keys() >= {*SIZES} or not all(isinstance(arguments[size], float) for size in SIZES):
                 continue
-            low = {"bottom": 0.0, "front": -given["depth"] / 2, "left": -given["width"] / 2}
-            pairs = {word: (low | given)[word] for word in BOX_IN_CELLS} | given
-            found[function.name] = replace(shown, arguments=tuple(pairs.items()))
-        return found
+            low = {"bottom": 0.0, "front": -arguments["depth"] / 2, "left": -arguments["width"] / 2}
+            pairs = {word: (low | arguments)[word] for word in BOX_IN_CELLS} | arguments
+            result[function.name] = replace(shown, arguments=tuple(pairs.items()))
+        return result
 
     @cached_property
     def patterns(self) -> tuple[Pattern, ...]:
         """The functions as what they draw."""
-        return tuple(Pattern(self.source, each, self.examples.get(each.name)) for each in self.functions)
+        return tuple(Pattern(self.source, function, self.examples.get(function.name)) for function in self.functions)
 
 
 def load_library(path: str | os.PathLike[str] | None = None) -> Library:
@@ -101,8 +101,8 @@ def library_of(program: Program, name: str = "<library>") -> Library:
         what = "numbers of its own" if isinstance(more, Assignment) else "statements outside of functions"
         raise InputError(f"{name} is not a library: it has {what}", "a library holds only functions")
     if source.unit is not None and source.unit.name:
-        said = f"{name} is not a library: its lengths are in {source.unit.name} of one object"
-        raise InputError(said, "leave out the line '# unit:'; programs may be in any unit")
+        message = f"{name} is not a library: its lengths are in {source.unit.name} of one object"
+        raise InputError(message, "leave out the line '# unit:'; programs may be in any unit")
     if not source.functions:
         raise InputError(f"{name} holds no functions", "write def name(parameter, ...): with what it draws below")
     return Library(source)

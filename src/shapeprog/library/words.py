@@ -28,8 +28,8 @@ PLACES = {
 """How copies lie, by the axes along which they are repeated."""
 
 WHOLES = {
-    frozenset(parts.split()): whole
-    for parts, whole in {
+    frozenset(parts.split()): name
+    for parts, name in {
         "arm back base": "sofa", "arm base cushion": "sofa", "base panel top": "case_without_sides",
         "side top base": "case",
         "side top panel": "case", "leg apron": "leg_frame", "leg stretcher": "leg_frame", "post rail": "back_frame",
@@ -41,10 +41,10 @@ WHOLES = {
 """What parts make together."""
 
 
-def name_of(kinds: Sequence[Kind], taken: Collection[str]) -> str:
+def name_of(kinds: Sequence[Kind], used: Collection[str]) -> str:
     """A name for the function of some blocks that is not taken, and is no word of the language."""
-    known = language()
-    blocked = {*taken, *known.names, *known.roles}
+    statements = language()
+    blocked = {*used, *statements.names, *statements.roles}
     options = list(_one(kinds[0]) if len(kinds) == 1 else _several(kinds))
     numbered = (f"{options[0]}_{number}" for number in range(2, len(blocked) + 3))
     return next(option for option in [*options, *numbered] if option not in blocked)
@@ -53,19 +53,19 @@ def name_of(kinds: Sequence[Kind], taken: Collection[str]) -> str:
 def _one(kind: Kind) -> Iterator[str]:
     solids = SOLIDS.get(kind.shape, plural(kind.shape))
     ways = tuple((axis, "pair" if way == "mirror" else way) for axis, way in kind.repeats)
-    place = PLACES.get(ways, "several")
+    position = PLACES.get(ways, "several")
     if kind.word:
         look = LOOKS.get(kind.shape, "")
         yield _joined(look, plural(kind.word))
-        yield _joined(place, look, plural(kind.word))
+        yield _joined(position, look, plural(kind.word))
     else:
-        yield _joined(place, solids or ("boxes" if place == "four" else ""))
+        yield _joined(position, solids or ("boxes" if position == "four" else ""))
 
 
 def _several(kinds: Sequence[Kind]) -> Iterator[str]:
-    whole = WHOLES.get(frozenset(kind.word for kind in kinds))
-    if whole:
-        yield whole
+    name = WHOLES.get(frozenset(kind.word for kind in kinds))
+    if name:
+        yield name
     yield "_with_".join(dict.fromkeys(plural(kind.word) if kind.repeats else kind.word for kind in kinds))
 
 

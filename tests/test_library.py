@@ -387,7 +387,7 @@ def test_what_steps_the_other_way_behind_a_mirror_is_no_grid() -> None:
         "for i in mirror(side):\n    for j in translate(3, by=(2, 0, 1)):\n        box(at=(-8, -2, 3), size=(1, 4, 2))"
     )
     (kind, *_) = blocks(parse(text))
-    assert kind.others == ("mirror", "translate")
+    assert kind.loops == ("mirror", "translate")
     found = with_library(parse(text), library(STEPS))
     assert statements(found) == 2, "the mirror stays around a call"
     assert away(parse(text), found) < TOLERANCE

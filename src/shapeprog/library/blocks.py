@@ -1,8 +1,8 @@
-"""Blocks in a form that does not depend on how they are written, so that what is drawn alike is found alike.
+"""Canonical forms of blocks: different texts that draw the same shape have the same form.
 
-A solid that is symmetric along the axes is its low corner and extents, whatever statement draws it; two of them side
-by side are a pair, whether a mirror or a shift makes it; copies along an axis are told by the span of all of them.
-Every number of the form is linear in those of the text once counts are known, so expressions of names carry over.
+A solid that is symmetric along the axes is its low corner and extents, whatever statement draws it.  Two copies side by
+side are a pair, whether a mirror or a shift makes them.  Copies along an axis are described by the span of all of them.
+For fixed counts every number of the form is linear in those of the text, so expressions of names carry over.
 """
 
 from __future__ import annotations
@@ -26,23 +26,23 @@ from shapeprog.language.unroll import unroll
 from shapeprog.space import DEPTH, HALF, SIDE, SPAN, UP, FloatArray
 
 ZERO = 1e-6
-"""Shifts in cells below this are none."""
+"""Shifts in cells below this are zero."""
 
 ROWS: tuple[tuple[int, ...], ...] = ((), (UP, DEPTH, SIDE), (DEPTH,), (SIDE,))
-"""Axes along which mirror images may be told as rows."""
+"""Axes along which mirror images may be read as rows."""
 
 PAIR = 2.0
-"""Copies in a row if nothing is given."""
+"""Default number of copies in a row."""
 
 STRAIGHT = 0.02
-"""How far in cells a part that is told by points may be from its own mirror image."""
+"""Largest distance in cells between a part defined by points and its own mirror image."""
 
 Way = Literal["pair", "row", "mirror"]
 """How copies lie along an axis: two, any number at equal steps, or one and its mirror image."""
 
 
 class Slot(NamedTuple):
-    """What one number of a block is: the word of its parameter, its quantity, and its axis of the grid, or -1."""
+    """The meaning of a number of a block: the word of its parameter, its quantity, and its axis of the grid, or -1."""
 
     word: str
     kind: str
@@ -54,10 +54,10 @@ STEPS = tuple(Slot("step", "length", axis) for axis in range(3))
 
 
 class Solid(NamedTuple):
-    """How the numbers of a statement make those of a block: (M, S + 1) factors of its S slots and a constant.
+    """The map from the numbers of a statement to those of a block: (M, S + 1) factors of its S slots and a constant.
 
-    The numbers of a ``boxed`` solid, its own mirror image along every axis of the grid, are its low corner, extents,
-    and what else shapes it; those of any other are as they are written.
+    A ``boxed`` solid is its own mirror image along every axis of the grid.  Its numbers are its low corner, its extents
+    and further sizes.  Those of any other solid are the numbers of its statement.
     """
 
     shape: str
@@ -68,20 +68,20 @@ class Solid(NamedTuple):
 
 @dataclass(frozen=True)
 class Kind:
-    """What blocks have to share to be alike.
+    """The discrete properties that equal blocks share.
 
     Parameters
     ----------
     word
-        The role of the part, or nothing.
+        The role of the part, or the empty string.
     shape, boxed
-        Its solid, and whether that is told by low corner and extents.
+        Its solid, and whether low corner and extents describe that.
     repeats
         The axes along which it is repeated, and how.
     steps
-        Whether all that is repeated again, shifted along several axes at once or along one of these.
-    others
-        Loops that are kept as they are written: turns, steps in steps.
+        Whether the result is repeated again, shifted along several axes at once or along one of these.
+    loops
+        Loops without such a form: turns, steps in steps.
     """
 
     word: str
@@ -89,19 +89,19 @@ class Kind:
     boxed: bool
     repeats: tuple[tuple[int, Way], ...] = ()
     steps: bool = False
-    others: tuple[str, ...] = ()
+    loops: tuple[str, ...] = ()
 
     @property
     def spans(self) -> int:
-        """How many of its numbers, the last, tell how it is repeated."""
+        """How many of its numbers describe the repetition; they come last."""
         return len(self.repeats) + 3 * self.steps
 
 
 class Block(NamedTuple):
-    """A block in its form: its numbers (M,), what they are, their factors (M, V + 1) by the V of the text, its counts.
+    """A block in its form: its numbers (M,), their slots, their factors (M, V + 1) by the V of the text, its counts.
 
-    After the numbers of the solid come, for each axis along which it is repeated, the span of all copies, or the place
-    of the mirror; then the three shifts of its steps.  The count of these comes last, too.
+    After the numbers of the solid come, for each axis along which it is repeated, the span of all copies or the
+    position of the mirror; then the three shifts of its steps.  The count of steps is the last count.
     """
 
     kind: Kind
@@ -112,9 +112,9 @@ class Block(NamedTuple):
 
 
 def blocks_of(chain: Chain, rows: Sequence[int] = ()) -> Iterator[Block]:
-    """The forms of a block: first the narrowest, then those where a pair is taken for a row of two.
+    """The forms of a block: first the narrowest, then those that read a pair as a row of two.
 
-    Parts that run straight along a mirror, such as a rail on either side, are rows of two along the axes ``rows``, too.
+    Parts that run straight along a mirror, such as a rail on either side, are also rows of two along the axes ``rows``.
     """
     *outer, draw = chain
     assert isinstance(draw, Draw)
@@ -130,7 +130,7 @@ def blocks_of(chain: Chain, rows: Sequence[int] = ()) -> Iterator[Block]:
         names = tuple(node.name for node in loops)
         more = [slot for node in loops for slot in _slots(language()[node.name])]
         every = np.vstack([base, np.eye(len(numbers))[:first]])
-        kind = Kind(word, solid.shape, solid.boxed, others=names)
+        kind = Kind(word, solid.shape, solid.boxed, loops=names)
         yield Block(kind, (*solid.slots, *more), every @ numbers, every, tuple(node.count for node in loops))
         return
     spans = [Slot("plane" if way == "mirror" else "span", "length", axis) for axis, way in repeated.ways]
@@ -143,7 +143,7 @@ def blocks_of(chain: Chain, rows: Sequence[int] = ()) -> Iterator[Block]:
 
 
 def readings(chain: Chain) -> list[Block]:
-    """The narrowest forms of a block: as it is written, then with mirror images as rows of two along some axes."""
+    """The narrowest forms of a block: with its mirrors, then with mirror images as rows of two along some axes."""
     unique: dict[Kind, Block] = {}
     for rows in ROWS:
         block = next(blocks_of(chain, rows))
@@ -152,12 +152,12 @@ def readings(chain: Chain) -> list[Block]:
 
 
 def forms_of(chain: Chain) -> list[Block]:
-    """All forms of a block: those as it is written, then where mirror images are rows of two."""
+    """All forms of a block: those with its mirrors, then those with mirror images as rows of two."""
     return [*blocks_of(chain), *readings(chain)[1:]]
 
 
 class _Repeated(NamedTuple):
-    """How a block is repeated along each axis, whether in steps, its rows with those of all of it, and its counts."""
+    """How a block is repeated along each axis, whether in steps, the factors of its numbers, and its counts."""
 
     ways: tuple[tuple[int, Way], ...]
     steps: bool
@@ -168,7 +168,7 @@ class _Repeated(NamedTuple):
 def _repeated(
     loops: Sequence[Loop], base: FloatArray, solid: Solid, numbers: FloatArray, draw: Draw, straight: Sequence[int]
 ) -> _Repeated | None:
-    """How a block is repeated, from its innermost loop outwards; none if not along the axes and in steps alone.
+    """How a block is repeated, from its innermost loop outwards; ``None`` unless along axes and in steps alone.
 
     A solid that is not boxed is a row of two in a mirror across one of the axes ``straight`` where it is its own image.
     """
@@ -181,7 +181,7 @@ def _repeated(
     starts = np.cumsum([0, *(len(loop.values) for loop in loops)])
     for loop, start in reversed([*zip(loops, starts, strict=False)]):
         slots = np.eye(len(numbers))[start : start + len(loop.values)]
-        if loop.name == "translate" and loop.count == 1:  # once, where it stands
+        if loop.name == "translate" and loop.count == 1:  # a single copy, not shifted
             continue
         if loop.name == "translate":
             shift = slots[1:4]
@@ -198,7 +198,7 @@ def _repeated(
         axis, plane = int(loop.values[1]), slots[2]
         symmetric = solid.boxed or (axis in straight and _is_symmetric_part(draw, axis))
         if symmetric and steps is not None and abs(steps[0][axis] @ numbers) > ZERO:
-            return None  # the images step the other way
+            return None  # the images would step in the opposite direction
         if not symmetric:
             if axis in ways and (ways[axis][0] == "mirror" or steps is not None):
                 return None
@@ -237,7 +237,7 @@ def _repeated(
 
 @lru_cache(1024)
 def _is_symmetric_part(draw: Draw, axis: int) -> bool:
-    """Whether a part that is told by points is its own mirror image across the plane of all of them."""
+    """Whether a part defined by points is its own mirror image across the plane through all of them."""
     indices = [k for k, slot in enumerate(_slots(language()[draw.name])) if slot == (slot.word, "position", axis)]
     coordinates = [draw.values[k] for k in indices]
     if not coordinates or np.ptp(coordinates) > STRAIGHT:
@@ -250,7 +250,7 @@ def _is_symmetric_part(draw: Draw, axis: int) -> bool:
 
 
 def solid_of(name: str) -> Solid:
-    """How the numbers of a drawing statement make those of a block."""
+    """The map from the numbers of a drawing statement to those of a block."""
     return _solid(language()[name])
 
 

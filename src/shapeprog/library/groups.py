@@ -1,4 +1,4 @@
-"""Blocks of many programs that might be calls of one function: groups, and the relations that hold in most of them."""
+"""Blocks of many programs that one function could draw: groups, and the relations that hold in most of them."""
 
 from __future__ import annotations
 
@@ -19,21 +19,21 @@ from shapeprog.library.measures import LEAST_EXTENT, Group, Measure, boxes_of, m
 from shapeprog.space import FloatArray
 
 NEAR = 0.03
-"""How far in cells a relation may be from holding."""
+"""Tolerance of a relation, in cells."""
 
 LEAST_PROGRAMS, LEAST_SHARE = 3, 0.02
-"""How many programs must use a function, and which share of all for each of its blocks."""
+"""Fewest programs that use a function, and the least share of all programs for each of its blocks."""
 
 LARGEST = 3
 """Most blocks of a function."""
 
 PARAMETERS, SHARE = 6, 0.6
-"""Most parameters of a function beside its box, which every call has, and the share of the numbers of several blocks
-that both together may be: nobody would call one with more, and whatever has a base and a top would do for one of two
-loose boxes."""
+"""Most parameters of a function without its box, and the largest share of the numbers of several blocks that parameters
+and box may be together.  Longer calls would not be used, and a function of two unrelated boxes would fit anything with
+a base and a top."""
 
 OPEN = 0.6
-"""Share of the uses from which a measure that is zero need not be said."""
+"""Least share of the uses in which a measure is zero for it to be an optional parameter."""
 
 
 class Unit(NamedTuple):
@@ -45,11 +45,11 @@ class Unit(NamedTuple):
 
 
 Corpus = list[list[Unit | None]]
-"""The blocks of each program that no function draws yet."""
+"""The blocks of each program; ``None`` for those that a function draws already."""
 
 
 class Use(NamedTuple):
-    """Blocks of one program, by their places, that are a group: their numbers (M,), and how much a call is shorter."""
+    """Blocks of one program, by index, that are a group: their numbers (M,), and how much shorter a call is."""
 
     program: int
     blocks: tuple[int, ...]
@@ -59,7 +59,7 @@ class Use(NamedTuple):
 
 @dataclass(frozen=True)
 class Candidate:
-    """A function that might be.
+    """A function that may be added to the library.
 
     Parameters
     ----------
@@ -67,7 +67,7 @@ class Candidate:
         Its blocks, the sides of its box (6, M), the relations (R, M) that hold for them, and angles (U, M) that are
         mostly zero.
     uses
-        Where it would be called; no two of them share a block.
+        The blocks that calls would replace; no two uses share a block.
     gain
         How much shorter the programs would be.
     """
@@ -81,7 +81,7 @@ class Candidate:
 
     @property
     def arguments(self) -> int:
-        """How many arguments every call says."""
+        """How many arguments every call has without its box."""
         return _arguments(self.group, self.rows, self.openings)
 
 
@@ -90,7 +90,7 @@ def units_of(program: Program) -> list[Unit | None]:
     units: list[Unit | None] = []
     shared = Counter(_around(chain) for chain in program.chains)
     for chain in program.chains:
-        forms = [form for form in blocks_of(chain) if not form.kind.others and not form.kind.steps]
+        forms = [form for form in blocks_of(chain) if not form.kind.loops and not form.kind.steps]
         draw = chain[-1]
         assert isinstance(draw, Draw)
         units.append(Unit(tuple(forms), draw, _length(chain, shared)) if forms else None)
@@ -110,7 +110,7 @@ def _length(chain: Chain, shared: Mapping[tuple[tuple[str, tuple[float, ...]], .
 
 
 def least_of(corpus: Corpus, blocks: int = 1) -> int:
-    """How many programs a function of so many blocks must serve: what is alike in a few may be so by chance."""
+    """Fewest programs that must use a function of ``blocks`` blocks: equal blocks in few programs may be chance."""
     return max(LEAST_PROGRAMS, round(LEAST_SHARE * blocks * len(corpus)))
 
 
@@ -144,13 +144,13 @@ def programs(uses: Iterable[Use]) -> int:
 
 
 def statement_of(shape: str) -> str:
-    """The statement that draws a solid and gives it no role; nothing if there is none."""
+    """The statement that draws a solid without a role; the empty string if there is none."""
     name, statements = {"cuboid": "box", "rounded_box": "cushion"}.get(shape, shape), language()
     return name if name in statements and not statements.own_role(name) else ""
 
 
 def _counted(form: Block) -> int:
-    """How many rows of a block have other than two copies, which a call need not give."""
+    """How many rows of a block do not have two copies, the default of a call."""
     return sum(way == "row" and count != PAIR for (_, way), count in zip(form.kind.repeats, form.counts, strict=True))
 
 
@@ -159,7 +159,7 @@ def _frequent(level: dict[tuple[Kind, ...], list[Use]], minimum: int) -> dict[tu
 
 
 def _larger(level: dict[tuple[Kind, ...], list[Use]], corpus: Corpus) -> dict[tuple[Kind, ...], list[Use]]:
-    """Groups with one more block each, of another role, which comes behind the others in the order of kinds."""
+    """Groups with one more block, of another role, and later in the order of kinds than the others."""
     larger: dict[tuple[Kind, ...], list[Use]] = defaultdict(list)
     for kinds, uses in level.items():
         for use in uses:
@@ -186,9 +186,9 @@ def _best(group: Group, uses: Sequence[Use], minimum: int) -> Iterator[Candidate
 def _best_in(
     box: FloatArray, group: Group, typical: FloatArray, uses: Sequence[Use], minimum: int
 ) -> Iterator[Candidate]:
-    """The function that shortens programs most; relations are required one by one, the most frequent first.
+    """The function that shortens programs most; relations are added one by one, the most frequent first.
 
-    No relation constrains its box, since every call gives another one.
+    No relation constrains its box, since every call has its own.
     """
     values = np.array([use.values for use in uses])
     extents = values @ box[3:].T
@@ -226,7 +226,7 @@ def _best_in(
 
 
 def _offered(group: Group, every: Sequence[Measure], angles: Sequence[Measure]) -> FloatArray:
-    """Relations that may be asked for: not those by which an opening is zero, nor where the group is."""
+    """Relations that may be required: none that makes an opening zero or fixes the position of the group."""
     rows = [row for row in relations(every) if all(np.linalg.matrix_rank([row, angle.row]) == 2 for angle in angles)]
     rows = [row for row in rows if not (moved(group) @ row).any()]
     return np.array(rows).reshape(-1, group.size)
@@ -235,7 +235,7 @@ def _offered(group: Group, every: Sequence[Measure], angles: Sequence[Measure]) 
 def _priced(
     group: Group, box: FloatArray, rows: FloatArray, openings: Sequence[Measure], uses: Sequence[Use]
 ) -> Candidate:
-    """The function of a group for which relations hold, and what it saves where it is used."""
+    """The function of a group for which relations hold, and how much its uses shorten programs."""
     optional: FloatArray = np.zeros((0, group.size))
     for opening in openings:
         zero = [bool(abs(use.values @ opening.row) <= NEAR) for use in uses]
@@ -261,7 +261,7 @@ def _priced(
 
 
 def _arguments(group: Group, rows: FloatArray, openings: FloatArray) -> int:
-    """How many arguments every call of a function gives beside its box."""
+    """How many arguments every call of a function has without its box."""
     return group.size - 6 - len(rows) - len(openings) + group.counts
 
 

@@ -1,4 +1,4 @@
-"""Which rows of factors are independent of each other."""
+"""Linear independence of rows of factors."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ import numpy as np
 
 from shapeprog.space import FloatArray
 
-DEPENDENT = 1e-6  # share of its length below which a row is a combination of others: rounding alone leaves that much
+DEPENDENT = 1e-6  # relative residual below which a row is a combination of others: rounding errors are of this size
 
 
 def beside(row: FloatArray, axes: FloatArray) -> FloatArray | None:
-    """The direction (V,) of what orthonormal axes (M, V) leave of a row; none if they leave nothing."""
+    """The direction (V,) of a row orthogonal to orthonormal axes (M, V); ``None`` if the row is in their span."""
     residual = row - axes.T @ (axes @ row)
     residual = residual - axes.T @ (axes @ residual)
     size = float(np.linalg.norm(residual))
@@ -20,9 +20,9 @@ def beside(row: FloatArray, axes: FloatArray) -> FloatArray | None:
 
 
 def independent(rows: FloatArray, order: Iterable[int] | None = None) -> list[int]:
-    """The places of rows (M, V) that are independent of those before them, in an order; in their own if none is given.
+    """The indices of rows (M, V) that are independent of those before them in an order, by default that of the rows.
 
-    Each that can be kept is, so as many are as the rows have dimensions.
+    The choice is greedy, so their number is the rank of the rows.
     """
     accepted: list[int] = []
     axes: FloatArray = np.zeros((0, rows.shape[1]))

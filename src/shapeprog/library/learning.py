@@ -1,8 +1,8 @@
-"""The functions that shorten many programs most, found by what their blocks have in common.
+"""Learning of the functions that shorten many programs most, from the blocks that these have in common.
 
-Blocks of one program that occur together in many are a group; the relations that hold for it in most of these leave
-few measures open, which become the parameters of a function.  Of all groups, and all sets of relations of each, the one
-that shortens the programs most becomes a function; what it draws is taken out of them, and so on.
+Blocks of one program that occur together in many are a group.  The relations that hold for it in most of these leave
+few measures open, which become the parameters of a function.  Of all groups and all their sets of relations, the one
+that shortens the programs most becomes a function.  Its blocks are removed from the programs, and the search repeats.
 """
 
 from __future__ import annotations
@@ -33,11 +33,10 @@ MOST = 12
 """Most functions of a library."""
 
 OWN = 0.9
-"""Share of the uses of a function from which parts of one role make it their own."""
-
+"""Least share of parts of one role among the uses of a function for it to get this role."""
 
 BOARD = 24.0
-"""Sides of the whole that placed text of functions declares, as any does; calls have boxes of their own."""
+"""Sides of the object in the placed text of functions, which has to declare them; calls have their own boxes."""
 
 
 class Learned(NamedTuple):
@@ -50,7 +49,7 @@ class Learned(NamedTuple):
 def learn(given: Sequence[Program], most: int = MOST) -> Library:
     """The library of the functions that shorten programs most; empty if none does.  The same for the same programs.
 
-    Comments tell how often each is used by the programs, and a typical call.
+    Comments show how often the programs use each function, and a typical call.
     """
     results = list(_functions([in_cells(program) for program in given], most))
     if not results:
@@ -82,7 +81,7 @@ def _used(programs: Sequence[Program], library: Library) -> tuple[Library, list[
 
 
 def _library(learned: Sequence[Learned]) -> Library:
-    """The functions as placed text, each below its call."""
+    """The functions as placed text, each below a typical call."""
     functions = []
     for entry in learned:
         defaults = {name: value for name, value in entry.function.parameters if isinstance(value, float)}
@@ -115,7 +114,7 @@ def _functions(programs: Sequence[Program], limit: int) -> Iterator[Learned]:
 
 
 def _owned(best: Candidate, corpus: Corpus) -> Candidate:
-    """The same for parts of one role alone where nearly all of its uses have it."""
+    """The candidate restricted to parts of one role if nearly all of its uses have that role."""
     kind = best.group.kinds[0]
     if len(best.group.kinds) > 1 or kind.word:
         return best
@@ -134,7 +133,7 @@ def _unit(corpus: Corpus, program: int, index: int) -> Unit:
 
 
 def _made(best: Candidate, corpus: Corpus, names: set[str]) -> Learned | None:
-    """The function of a candidate, after the use that is nearest to all; none if its sums are no simple ones."""
+    """The function of a candidate, with its most central use as the example; ``None`` if its sums are not simple."""
     values = np.array([use.values for use in best.uses])
     typical = best.uses[int(np.abs(values - np.median(values, 0)).sum(1).argmin())]
     made = basis(best.group, best.box, typical.values, best.rows, best.openings)

@@ -1,4 +1,4 @@
-"""How long a program is to read: its statements, and the numbers and names in them."""
+"""The description length of a program: its statements, and the numbers and names in them."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def written(lines: Iterable[Line]) -> int:
 
 
 def length(lines: Iterable[Line]) -> int:
-    """Statements, loops, calls and functions of some lines, and every number and name that is read in them."""
+    """The price of lines: statements, loops, calls and functions, and every number and name in them."""
     total = 0
     for line in lines:
         match line:
@@ -62,7 +62,7 @@ def _written(line: Draw | Loop) -> int:
 
 
 def outside(lines: Iterable[Line]) -> Iterator[Line]:
-    """Every line apart from functions and what is in them, the lines in loops and groups included."""
+    """Every line outside of functions, the lines in loops and groups included."""
     for line in lines:
         if not isinstance(line, Function):
             yield line

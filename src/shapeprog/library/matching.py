@@ -1,8 +1,8 @@
-"""Where a program draws what a function would draw, and with which arguments.
+"""Matching of functions to the blocks of a program, with the arguments of the calls.
 
-The blocks of a function are linear in its parameters once its counts are known.  So a least-squares solution tells the
-arguments for some blocks of a program, and its residual whether they fit; what the arguments are in the names of the
-program follows from as many of its numbers as there are parameters, those with the shortest expressions.
+For fixed counts the blocks of a function are linear in its parameters.  So a least-squares solution gives the arguments
+for some blocks of a program, and its residual whether they fit.  Expressions of the arguments in the names of the
+program follow from as many of its numbers as there are parameters, those with the shortest expressions.
 """
 
 from __future__ import annotations
@@ -31,22 +31,22 @@ from shapeprog.library.length import terms, written
 from shapeprog.space import FloatArray
 
 TOLERANCE = 0.05
-"""How far in cells a number may be from what a function makes of its arguments."""
+"""Largest difference in cells between a number of a program and that of a call that replaces it."""
 
 BOX = 12.0
-"""Sides of the box of a parameter without an example, where that decides what lies above or beside what."""
+"""Sides of the box of a call without an example; they decide the order of parts along each axis."""
 
 GENERIC = 7.0
-"""What a parameter without an example is tried with."""
+"""Value of a parameter without an example."""
 
 STEEP = 8.0
-"""How much smaller than another such parameter the next is: thin parts are."""
+"""Ratio of the values of successive parameters without an example: parts may be thin."""
 
 EXACT = 0.01
 """Largest difference in cells between the default of a parameter and a number that it replaces."""
 
 TRIES = 12
-"""Ways in which arguments are expressed, of which the shortest is kept."""
+"""Sets of numbers tried to express the arguments; the shortest expressions win."""
 
 
 class Form(NamedTuple):
@@ -59,7 +59,7 @@ class Form(NamedTuple):
 
 @dataclass(frozen=True)
 class Pattern:
-    """A function as what it draws.
+    """A function as the blocks that it draws.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ class Pattern:
     function
         The function.
     example
-        A typical call, if one is known.
+        A typical call, if there is one.
     """
 
     source: Source
@@ -87,7 +87,7 @@ class Pattern:
 
     @cached_property
     def counts(self) -> tuple[str, ...]:
-        """Parameters that say how often something is repeated."""
+        """Parameters that are counts of repetitions."""
         counted = counted_names(self.source)
         return tuple(name for name in self.parameters if f"{self.function.name}.{name}" in counted)
 
@@ -98,13 +98,13 @@ class Pattern:
 
     @cached_property
     def blocks(self) -> int:
-        """How many blocks it draws; none if they are not linear in its measures."""
+        """How many blocks it draws; zero if they are not linear in its measures."""
         return len(self.forms_at(self.arguments))
 
     def choices(self, existing: Iterable[tuple[int, ...]]) -> Iterator[dict[str, float]]:
-        """What its counts may be where blocks are repeated as often as these; once only where it says so by itself.
+        """Possible values of its counts, given those of the blocks; 1 is added for those with that default.
 
-        What draws one block repeats it as some block is.
+        Counts above 1 of a function that draws one block occur together in one of the blocks.
         """
         multisets = {tuple(sorted(counts)): Counter(counts) for counts in existing}
         every = sorted({float(n) for counts in multisets for n in counts})
@@ -116,18 +116,18 @@ class Pattern:
 
     @property
     def shortens(self) -> bool:
-        """Whether a call is less to write than what it draws."""
+        """Whether a call has fewer statements than the body."""
         return written(self.function.body) > 1
 
     @property
     def arguments(self) -> dict[str, float]:
-        """A number for each parameter: that of the example, a default, or any."""
+        """A number for each parameter: that of the example, its default, or a generic one."""
         return self._assumed(lambda index: GENERIC / STEEP**index)
 
     def forms(self, counts: Mapping[str, float]) -> tuple[tuple[Form, ...], ...]:
-        """What it draws for these counts; nothing if that is not linear in its other parameters.
+        """The forms of its blocks for these counts; empty if those are not linear in its other parameters.
 
-        Which of two copies lies below the other may depend on its arguments: where no example tells, several are tried.
+        Which of two copies is the lower may depend on the arguments: without an example, several sets are tried.
         """
         key = tuple(counts.values())
         if key not in self._forms:
@@ -163,9 +163,9 @@ class Pattern:
         return {}
 
     def nodes(self, numbers: Mapping[str, float]) -> tuple[Node, ...]:
-        """What it draws for the counts among these numbers, with linear forms of its measures.
+        """Its statements for the counts among these numbers, with linear forms of its measures.
 
-        A ``ShapeProgError`` if it is not linear in them.
+        Raises a ``ShapeProgError`` if they are not linear in the measures.
         """
         counts = {name: numbers[name] for name in self.counts}
         key = tuple(counts.values())
@@ -175,11 +175,11 @@ class Pattern:
         return self._nodes[key]
 
     def drawn(self, numbers: Mapping[str, float]) -> tuple[Node, ...]:
-        """What it draws with these numbers; a ``ShapeProgError`` as for :meth:`nodes`."""
+        """Its statements with these numbers; raises a ``ShapeProgError`` as :meth:`nodes` does."""
         return tuple(_at(node, numbers) for node in self.nodes(numbers))
 
     def forms_at(self, numbers: Mapping[str, float]) -> tuple[Form, ...]:
-        """What it draws about these numbers, one for each parameter; nothing if that is not linear in its measures."""
+        """The forms of its blocks at these numbers, one for each parameter; empty if not linear in its measures."""
         try:
             return tuple(form for (form,) in forms(self.nodes(numbers), numbers, self.measures))
         except (ShapeProgError, ZeroDivisionError):
@@ -198,7 +198,7 @@ def _key(forms: Sequence[Form]) -> tuple[tuple[Kind, bytes, bytes], ...]:
 
 
 class Match(NamedTuple):
-    """Blocks of a program, by their places, that are a call of a function with these arguments."""
+    """Blocks of a program, by index, that a call of a function with these arguments can replace."""
 
     blocks: tuple[int, ...]
     role: str
@@ -209,9 +209,9 @@ class Match(NamedTuple):
 def forms(
     nodes: Iterable[Node], numbers: Mapping[str, float], names: Sequence[str], ways: Sequence[Sequence[int]] = ((),)
 ) -> Iterator[tuple[Form, ...]]:
-    """The blocks of statements and loops, linear in ``names``, as they are with these numbers.
+    """The blocks of statements and loops at these numbers, linear in ``names``.
 
-    Each block has several forms: with mirror images as rows of two along these axes, where both draw the same.
+    A block has one form for each of ``ways``: the axes along which equal mirror images are read as rows of two.
     """
     variables = {name: Linear.of(name) for name in names}
     for chain in Program(tuple(nodes)).chains:
@@ -236,16 +236,16 @@ def _linear(value: Any) -> Linear:
 
 
 class Matcher:
-    """The blocks of one program, and where functions fit them.
+    """The blocks of one program, and the calls of functions that fit them.
 
     Parameters
     ----------
     forms
         Its blocks, linear in its free names.
     units
-        For each block the line that it is of: a call takes all blocks of a line or none.
+        For each block the index of its line: a call replaces all blocks of a line or none.
     numbers
-        Its names, and the N numbers that they stand for.
+        Its names, and their N numbers.
     """
 
     def __init__(self, forms: Sequence[Form], units: Sequence[int], numbers: Mapping[str, float]) -> None:
@@ -253,7 +253,7 @@ class Matcher:
         self.values = np.array([*numbers.values()])
 
     def matches(self, pattern: Pattern) -> Iterator[Match]:
-        """All ways in which blocks of the program are a call of a function."""
+        """All sets of blocks of the program that a call of a function can replace."""
         best: dict[tuple[int, ...], tuple[int, Match]] = {}
         for counts in pattern.choices(form.block.counts for form in self.forms):
             for targets in pattern.forms(counts):
@@ -265,7 +265,7 @@ class Matcher:
         return (match for _, match in best.values())
 
     def _candidates(self, targets: Sequence[Form]) -> Iterator[tuple[int, ...]]:
-        """Blocks of the kinds wanted, in their order, that make whole lines and share a role where one is open."""
+        """Blocks of the kinds of ``targets``, in order, that fill lines completely and share a role if one is open."""
 
         def extended(prefix: tuple[int, ...]) -> Iterator[tuple[int, ...]]:
             if len(prefix) == len(targets):
@@ -298,7 +298,7 @@ class Matcher:
         constants = np.concatenate([form.constants for form in targets])
         values = np.concatenate([form.block.values for form in mine])
         defaults = [pattern.defaults[name] for name in pattern.measures]
-        free: npt.NDArray[np.bool_] = np.any(factors, 0)  # the spacing of a row of one is not
+        free: npt.NDArray[np.bool_] = np.any(factors, 0)  # the spacing of a row of one copy has no effect
         if np.linalg.matrix_rank(factors) < free.sum() or any(
             default is None for default, used in zip(defaults, free, strict=True) if not used
         ):
@@ -326,9 +326,9 @@ class Matcher:
         return int((exact < -TOLERANCE).sum()), Match(blocks, next(roles, ""), arguments, error)
 
     def _written(self, factors: FloatArray, rows: FloatArray, solution: FloatArray) -> list[Value]:
-        """The shortest expressions for parameters (P) whose factors (M, P) come to rows (M, N + 1) of the program.
+        """The shortest expressions for parameters (P) whose factors (M, P) give rows (M, N + 1) of the program.
 
-        Of equally short ones that nearest to ``near`` (P) is taken.
+        Of equally short expressions, the one closest to ``solution`` (P) is used.
         """
         sizes = (np.abs(rows) > 1e-9).sum(1)
         random = np.random.default_rng(0)

@@ -1,4 +1,4 @@
-"""What can be measured of some blocks together, the relations between it, and words for it."""
+"""Measures of groups of blocks, the relations between them, and their names."""
 
 from __future__ import annotations
 
@@ -20,19 +20,19 @@ THIN = 0.6
 """A solid is thin along an axis where it measures less than this share of the next longer."""
 
 SIDE_PRICE = 2.5
-"""Price up to which a place is a side of a whole block; dearer ones are of single copies, or ends of rods."""
+"""Largest price of a side of a complete block; higher prices are sides of single copies, or ends of rods."""
 
 SIDES_OF = (("bottom", "top"), ("front", "rear"), ("right", "left"))
 """The low and the high side of a box along each axis of the grid."""
 
 LEAST_EXTENT = 0.1
-"""Cells that the box of a group measures along each axis, at least."""
+"""Least extent of the box of a group along an axis, in cells."""
 
 Sort = Literal["length", "place", "middle", "angle"]
 
 
 class Group(NamedTuple):
-    """Blocks that may be a function: their kinds and the slots of each, one block after another."""
+    """Blocks that a function may draw: the kind and the slots of each block."""
 
     kinds: tuple[Kind, ...]
     slots: tuple[tuple[Slot, ...], ...]
@@ -44,14 +44,14 @@ class Group(NamedTuple):
 
     @property
     def counts(self) -> int:
-        """How many of their repetitions have a count that is open."""
+        """How many of their repetitions have a variable count."""
         return sum(way == "row" for kind in self.kinds for _, way in kind.repeats)
 
 
 class Measure(NamedTuple):
     """A measure of a group: its block, its row of factors, and its price as an argument of a call.
 
-    An ``opening`` is zero in most programs: a part centred in the whole, or an upright angle.
+    An ``opening`` is zero in most programs: a part centred in the object, or an upright angle.
     """
 
     block: int
@@ -68,7 +68,7 @@ class Measure(NamedTuple):
 
 
 def measures(group: Group, typical: FloatArray) -> Iterator[Measure]:
-    """All measures of a group; ``typical`` are its numbers (M,) in one program, by which thin parts are recognised."""
+    """All measures of a group; ``typical`` are its numbers (M,) in one program, which show thin parts."""
     start = 0
     unit = np.eye(group.size)
     for block, (kind, slots) in enumerate(zip(group.kinds, group.slots, strict=True)):
@@ -81,11 +81,11 @@ def measures(group: Group, typical: FloatArray) -> Iterator[Measure]:
 
 
 def boxes_of(group: Group, typical: FloatArray) -> Iterator[FloatArray]:
-    """The boxes of a group as rows (6, M): their low corner, then their extents, if these are more than nothing.
+    """The boxes of a group as rows (6, M): their low corner, then their extents, which are positive.
 
-    Which sides of which blocks are the sides of a box follows from ``typical`` (M,), the numbers in one program.  Parts
-    between points count by these points along their direction and where they are mirrored; elsewhere by their thickness
-    at the start, so that they may lean either way, or by their points as well.
+    The blocks whose sides bound a box follow from ``typical`` (M,), the numbers in one program.  The points of a part
+    between points bound it along its direction and along mirrored axes.  Along the other axes its thickness at the
+    start does in one box, so that it may lean either way, and its points do in the other.
     """
     unique = {box.tobytes(): box for leaning in (True, False) if (box := _box(group, typical, leaning)) is not None}
     yield from unique.values()
@@ -134,7 +134,7 @@ def _across(kind: Kind, slots: Sequence[Slot], factors: FloatArray, values: Floa
 
 
 def _leaning(slots: Sequence[Slot], values: FloatArray) -> set[int]:
-    """The horizontal axes across the direction of a part between two points; none of other parts."""
+    """The horizontal axes across the direction of a part between two points; empty for other parts."""
     ends = {(slot.word, slot.axis): value for slot, value in zip(slots, values, strict=False)}
     if ("end", UP) not in ends or ("through", UP) in ends:
         return set()
@@ -143,7 +143,7 @@ def _leaning(slots: Sequence[Slot], values: FloatArray) -> set[int]:
 
 
 def within_box(all_measures: Iterable[Measure], box: FloatArray) -> Iterator[Measure]:
-    """Measures with places told from the low and the high side of a box (6, M)."""
+    """Measures with positions relative to the low and the high side of a box (6, M)."""
     for measure in all_measures:
         if measure.sort not in ("place", "middle"):
             yield measure
@@ -156,7 +156,7 @@ def within_box(all_measures: Iterable[Measure], box: FloatArray) -> Iterator[Mea
 
 
 def moved(group: Group) -> FloatArray:
-    """How the numbers of a group change where it moves by one cell along each axis: (3, M)."""
+    """The change of the numbers of a group when it moves by one cell along each axis: (3, M)."""
     slots = [slot for block_slots in group.slots for slot in block_slots]
     return np.array(
         [
@@ -168,7 +168,7 @@ def moved(group: Group) -> FloatArray:
 
 
 def relations(all_measures: Sequence[Measure]) -> list[FloatArray]:
-    """Relations that may hold: equal lengths, faces flush or in contact, what lies in the middle, what is straight."""
+    """Relations that may hold: equal lengths, faces flush or in contact, centred parts, zero angles."""
     rows = [measure.row for measure in all_measures if measure.opening]
     for first, second in itertools.combinations(all_measures, 2):
         if first.sort == second.sort == "length":
@@ -188,11 +188,11 @@ def relations(all_measures: Sequence[Measure]) -> list[FloatArray]:
     return list(unique.values())
 
 
-Values = tuple[str, Sort, int, FloatArray, float]
+Fields = tuple[str, Sort, int, FloatArray, float]
 
 
-def _boxed(kind: Kind, slots: Sequence[Slot], factors: FloatArray, values: FloatArray) -> Iterator[Values]:
-    """Measures of solids that are told by low corner, extents and what else shapes them."""
+def _boxed(kind: Kind, slots: Sequence[Slot], factors: FloatArray, values: FloatArray) -> Iterator[Fields]:
+    """Measures of solids described by low corner, extents and further sizes."""
     first = len(slots) - kind.spans
     repeats = {axis: index for index, (axis, _) in enumerate(kind.repeats, first)}
     sizes = values[3:6]
@@ -219,8 +219,8 @@ def _boxed(kind: Kind, slots: Sequence[Slot], factors: FloatArray, values: Float
         yield slots[index].word, "length", -1, factors[index], 1.3
 
 
-def _pointed(kind: Kind, slots: Sequence[Slot], factors: FloatArray, values: FloatArray) -> Iterator[Values]:
-    """Measures of solids that are told by points, such as the two ends of a rod."""
+def _pointed(kind: Kind, slots: Sequence[Slot], factors: FloatArray, values: FloatArray) -> Iterator[Fields]:
+    """Measures of solids described by points, such as the two ends of a rod."""
     first = len(slots) - kind.spans
     planes = {axis: factors[index] for index, (axis, way) in enumerate(kind.repeats, first) if way == "mirror"}
     rising = _rises(slots, values)
@@ -259,7 +259,7 @@ def _pointed(kind: Kind, slots: Sequence[Slot], factors: FloatArray, values: Flo
 
 
 def _rises(slots: Sequence[Slot], values: FloatArray) -> bool:
-    """Whether what runs from a start to an end runs upwards more than along the floor."""
+    """Whether a part from a start to an end rises more than it runs along the floor."""
     ends = {(slot.word, slot.axis): value for slot, value in zip(slots, values, strict=False)}
     if ("start", UP) not in ends or ("end", UP) not in ends:
         return False

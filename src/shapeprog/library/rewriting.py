@@ -1,4 +1,4 @@
-"""Programs written with the functions of a library."""
+"""Rewriting of programs with the functions of a library."""
 
 from __future__ import annotations
 
@@ -34,11 +34,11 @@ from shapeprog.library.store import Library
 
 
 def with_library(program: Program, library: Library) -> Program:
-    """The same program with calls of functions of a library wherever that is shorter; itself if that is nowhere.
+    """The same program with calls of functions of a library where these are shorter; unchanged if none is.
 
-    It draws the same within ``TOLERANCE`` cells.  The functions that it calls stand in it, below the numbers that it
-    names; ties are kept, as arguments are expressions of its names.  Its lengths stay in their unit.  A program with
-    statements that have no placed form does not change, nor does one whose numbers are not linear in its names.
+    It draws the same within ``TOLERANCE`` cells.  The result contains the functions that it calls, below its
+    assignments.  Arguments are expressions of its names, which keeps ties.  Its lengths stay in their unit.  A program
+    with statements that have no placed form does not change, nor does one whose numbers are not linear in its names.
     """
     try:
         original = placed(program)
@@ -71,7 +71,7 @@ def _length(program: Program) -> int:
 
 
 def _with_one_role(selected: Sequence[Offer], library: Library) -> list[Offer]:
-    """Offers of which those of a function with cushions, whose role is written in it, have the role of the first."""
+    """Offers; those of a function with cushions all have the role of its first, which its body contains."""
     roles: dict[str, str] = {}
     for offer in selected:
         roles.setdefault(offer.call.name, offer.call.role)
@@ -121,8 +121,7 @@ class Offer(NamedTuple):
 
 
 def offers(program: Program, library: Library) -> list[Offer]:
-    """The calls of functions of a library that shorten a plain program most, none of which shares a line with
-    another."""
+    """The calls of functions of a library that shorten a plain program most; no two of them share a line."""
     return _offered(_separated(source_of(program)), library)
 
 
@@ -132,9 +131,9 @@ def _offered(cells: Source, library: Library) -> list[Offer]:
 
 
 def matchers_of(source: Source) -> Iterator[tuple[Matcher, tuple[Loop, ...]]]:
-    """The blocks of a program that calls may replace: of all its lines, then of what equal loops have inside of them.
+    """The blocks of a program that calls may replace: of all its lines, then of the bodies of equal loops.
 
-    With each come the loops that stay around, without bodies.  None if its numbers are not linear in its names.
+    With each matcher come the loops around its lines, without bodies.  Stops if a number is not linear in the names.
     """
     numbers = source.evaluated_numbers()
     names = [name for name, value in source.numbers.items() if not isinstance(value, Expression)]
@@ -165,7 +164,7 @@ def matchers_of(source: Source) -> Iterator[tuple[Matcher, tuple[Loop, ...]]]:
 
 
 def _frame(loop: Loop) -> Loop:
-    """A loop without its body, and its numbers without what is left over from other units."""
+    """A loop without its body, and its numbers without rounding errors of unit conversion."""
 
     def rounded(value: float | Name) -> float | Name:
         return value if isinstance(value, Name) else round(value, 4)
@@ -174,7 +173,7 @@ def _frame(loop: Loop) -> Loop:
 
 
 def _selected(source: Source, patterns: Sequence[Pattern]) -> list[Offer]:
-    """The calls that shorten a program most, one after another, none of which shares a line with another."""
+    """The calls that shorten a program most, in greedy order; no two of them share a line."""
     offered: list[Offer] = []
     for matcher, around in matchers_of(source):
         for pattern in patterns:

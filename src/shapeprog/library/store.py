@@ -1,4 +1,4 @@
-"""Libraries as they are kept: program text of functions alone, with comments that show a typical call of each."""
+"""Files of libraries: program text of functions alone, with comments that show a typical call of each."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class Library:
 
     @cached_property
     def comments(self) -> dict[str, tuple[str, ...]]:
-        """For each function what stands right above it."""
+        """For each function the comment lines directly above it."""
         result: dict[str, tuple[str, ...]] = {}
         above: tuple[str, ...] = ()
         for line in self.source.lines:
@@ -52,7 +52,7 @@ class Library:
 
     @cached_property
     def examples(self) -> dict[str, Call]:
-        """Calls of functions that the comment right above them shows as its last line."""
+        """For each function the call in the last comment line directly above it, if there is one."""
         result = {}
         above = replace(self.source, lines=tuple(line for line in self.source.lines if not isinstance(line, Comment)))
         for function in self.source.functions.values():
@@ -73,7 +73,7 @@ class Library:
 
     @cached_property
     def patterns(self) -> tuple[Pattern, ...]:
-        """The functions as what they draw."""
+        """The functions as patterns of blocks."""
         return tuple(Pattern(self.source, function, self.examples.get(function.name)) for function in self.functions)
 
 
@@ -92,7 +92,7 @@ def load_library(path: str | os.PathLike[str] | None = None) -> Library:
 
 
 def library_of(program: Program, name: str = "<library>") -> Library:
-    """The library that is a program of functions alone; an ``InputError`` if it is none."""
+    """The library in a program of functions alone; an ``InputError`` for other programs."""
     source = source_of(program)
     more = next((line for line in source.lines if not isinstance(line, Comment | Function)), None)
     if isinstance(more, Assignment) and {*SIZES} == source.numbers.keys():

@@ -1,4 +1,4 @@
-"""What functions of a library are called: by their parts and what these look like, or by how they lie."""
+"""Names of the functions of a library: by their parts and the look of these, or by their arrangement."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ LOOKS = {
     "cylinder": "round", "rod": "round", "taper": "tapered", "bent_rod": "bent", "rounded_box": "soft",
     "board": "leaning", "bar": "slanting",
 }  # fmt: skip
-"""Adjectives for solids; a box goes without."""
+"""Adjectives for solids; a box has none."""
 
 SOLIDS = {
     "cuboid": "", "cylinder": "cylinders", "rod": "rods", "taper": "tapers", "bent_rod": "bent_rods",
@@ -25,7 +25,7 @@ PLACES = {
     ((0, "row"), (2, "row")): "lattice", ((0, "row"), (1, "pair"), (2, "pair")): "stacked_fours",
     ((1, "row"), (2, "pair")): "pairs_to_rear", ((1, "pair"), (2, "row")): "pairs_to_left",
 }  # fmt: skip
-"""How copies lie, by the axes along which they are repeated."""
+"""Names of arrangements, by the axes along which copies are repeated."""
 
 WHOLES = {
     frozenset(parts.split()): name
@@ -38,11 +38,11 @@ WHOLES = {
         "base pedestal": "column", "back seat": "seat_with_back",
     }.items()
 }  # fmt: skip
-"""What parts make together."""
+"""Names of sets of parts."""
 
 
 def name_of(kinds: Sequence[Kind], used: Collection[str]) -> str:
-    """A name for the function of some blocks that is not taken, and is no word of the language."""
+    """A name for the function of some blocks that is not in use, and is no word of the language."""
     statements = language()
     blocked = {*used, *statements.names, *statements.roles}
     options = list(_one(kinds[0]) if len(kinds) == 1 else _several(kinds))

@@ -20,9 +20,9 @@ SAME = 1e-6
 
 
 class Basis(NamedTuple):
-    """Measures that are parameters, their names, the numbers of the group by them (M, P), and how many are openings.
+    """Measures that are parameters, their names, the factors (M, P) of the numbers of the group, the count of openings.
 
-    These come last, and are zero by default.
+    Openings come last, and are zero by default.
     """
 
     parameters: tuple[Measure, ...]
@@ -32,7 +32,7 @@ class Basis(NamedTuple):
 
 
 def basis(group: Group, box: FloatArray, typical: FloatArray, rows: FloatArray, openings: FloatArray) -> Basis | None:
-    """The cheapest measures that tell a group for which relations (R, M) hold; none if sums of them are no simple ones.
+    """The cheapest measures that determine a group with relations (R, M); ``None`` if their sums are not simple.
 
     The sides of its ``box`` (6, M) come first, ``openings`` (U, M) last.
     """
@@ -80,11 +80,11 @@ def function(name: str, group: Group, made: Basis, draws: Sequence[tuple[str, st
 def _block(
     kind: Kind, factors: FloatArray, names: Sequence[str], counts: Iterator[str], statement: str, role: str
 ) -> Draw | Loop:
-    """The lines of one block whose numbers follow from the parameters by ``own`` (M, P)."""
+    """The lines of one block whose numbers are the product of ``factors`` (M, P) and the parameters."""
     solid = solid_of(statement)
     first = len(factors) - kind.spans
     base = factors[:first].copy()
-    inverse = np.round(np.linalg.pinv(solid.rows[:, :-1]), 9)  # which leaves traces where it has zeros
+    inverse = np.round(np.linalg.pinv(solid.rows[:, :-1]), 9)  # the pseudoinverse has rounding errors instead of zeros
     mirrors: list[tuple[str, tuple[Value, ...]]] = []
     loops: list[tuple[str, tuple[Value, ...]]] = []
 
@@ -111,12 +111,12 @@ def _block(
 
 
 def _names(group: Group, selected: Sequence[Measure]) -> tuple[str, ...]:
-    """A name for each parameter, which begins with its part where several parts have the like."""
+    """A name for each parameter; it begins with its part if several parts have the same measure."""
     words = [measure.word.removesuffix("_end") for measure in selected]
     for index, word in enumerate(words):
         stem = word.removeprefix("bottom_")
         if stem != word and f"upper_{stem}" not in words and stem not in words and stem not in RESERVED:
-            words[index] = stem  # it is the same above
+            words[index] = stem  # it is the same at both ends
     statements = language()
     names = [*BOX_IN_CELLS]
     used = {*statements.names, *statements.roles, *RESERVED, "tilt"}

@@ -1,6 +1,6 @@
 """The same edits of programs with named numbers and of the same programs with plain numbers, side by side.
 
-    python -m benchmarks.edits docs/edits.png examples/chair_kenney.obj leg_height=62 \\
+    python -m benchmarks.edits docs/edits.png examples/chair_kenney.obj seat_bottom=12.5 \\
         examples/bookcase_kenney_open.obj 'height*=0.7' examples/table_polyhaven_wooden.obj 'width*=1.5'
 
 Above, each change is made to the name.  Below, it is made to the plain number that is nearest to the named one, the
@@ -64,7 +64,7 @@ def columns_of(mesh: str, changes: tuple[str, ...]) -> list[Column]:
     from shapeprog.view.model import of_parts
     from shapeprog.view.render import camera_for
 
-    named = infer(load(mesh), unit="cm").program
+    named = infer(load(mesh), unit="cells").program
     plain = inline(named)
     rows: list[tuple[tuple[str, str], tuple[Any, Any]]] = [(("named numbers", "plain numbers"), (named, plain))]
     before = {each.name: each for each in names(named)}

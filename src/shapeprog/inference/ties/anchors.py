@@ -121,7 +121,7 @@ class AxisAnchors:
     base
         How they move with the high side of the whole while all coordinates stay (2, N): mirror images do.
     contacts
-        Pairs of primitives that touch (C, 2).
+        Pairs of primitives that touch.
     loops
         For every element that is the last copy of a row, the element of its first.
     settings
@@ -148,12 +148,10 @@ class AxisAnchors:
                 wide = abs(elements[start].low - elements[end].low) < settings.spanning * extent
                 low, high = ((LOW,), (HIGH,)) if elements[start].low < elements[end].low else ((HIGH,), (LOW,))
                 self.choices[start], self.choices[end] = ([(MIDDLE,)], [(MIDDLE,)]) if wide else ([low], [high])
-        self.unary = [[self._unary(element, anchors) for anchors in choices] for element, choices in
-                      zip(elements, self.choices, strict=True)]  # fmt: skip
         self.costs = np.full((len(elements), MOST), np.inf)
         self.shifts = np.zeros((len(elements), MOST, 2))  # how low and high coordinates move with each choice
-        for k, (costs, choices) in enumerate(zip(self.unary, self.choices, strict=True)):
-            self.costs[k, : len(costs)] = costs
+        for k, (element, choices) in enumerate(zip(elements, self.choices, strict=True)):
+            self.costs[k, : len(choices)] = [self._unary(element, anchors) for anchors in choices]
             self.shifts[k, : len(choices)] = [(SHIFTS[ends[0]], SHIFTS[ends[-1]]) for ends in choices]
         low, high = ends
         half = extent / 2
@@ -194,9 +192,7 @@ class AxisAnchors:
                 cost += s.middle * (abs(end - extent / 2) > CENTRED * extent or len(set(anchors)) > 1)
             else:
                 distance = end if anchor == LOW else extent - end
-                if (
-                    self.axis == 2 and element.key != "last"
-                ):  # heights are measured from the floor, but for what hangs from the top
+                if self.axis == 2 and element.key != "last":  # heights are measured from the floor
                     cost += s.hanging * (anchor == HIGH) * max(0.0, distance / extent - 0.1)
                 else:
                     cost += s.farther * max(0.0, 2 * distance / extent - 1)
@@ -208,12 +204,13 @@ class AxisAnchors:
 
     def solved(self) -> list[Anchors]:
         """The anchors of every element."""
-        order = [np.argsort(unary, kind="stable") for unary in self.unary]
-        starts = [[int(ranks[min(which, len(ranks) - 1)]) for ranks in order] for which in range(3)]
-        for side in ((LOW, LOW), (HIGH, HIGH)):  # all faces measured from one side
-            matching = [[choice[:1] + choice[-1:] == side for choice in choices] for choices in self.choices]
-            starts.append([flags.index(True) if any(flags) else 0 for flags in matching])
-        best = min((self._descent(np.array(start)) for start in starts), key=lambda result: round(result[0], 6))
+        order = np.argsort(self.costs, axis=1, kind="stable")
+        last = np.array([len(choices) - 1 for choices in self.choices], np.int64)
+        starts = [order[np.arange(len(order)), np.minimum(rank, last)] for rank in range(3)]
+        for side in (LOW, HIGH):  # all faces measured from one side
+            one_sided = ([set(choice) == {side} for choice in choices] for choices in self.choices)
+            starts.append(np.array([flags.index(True) if any(flags) else 0 for flags in one_sided], np.int64))
+        best = min((self._descent(start) for start in starts), key=lambda result: round(result[0], 6))
         return [choices[k] for choices, k in zip(self.choices, best[1], strict=True)]
 
     def _descent(self, state: Array) -> tuple[float, Array]:

@@ -86,12 +86,35 @@ class Trust:
     half: float = 0.5
     hidden: float = 0.6
 
+    def symmetric(self, axis: int) -> float:
+        """That of equal clearances on both sides along a horizontal axis."""
+        return self.centred if axis == 0 else self.even
+
 
 class Relation(NamedTuple):
     """That factors (P,) times the numbers of a program sum to zero, and the price of the number it saves."""
 
     row: FloatArray
     trust: float
+
+
+class Reading(NamedTuple):
+    """A relation that the text may have, and how well it must hold already.
+
+    Parameters
+    ----------
+    row, trust
+        As of :class:`Relation`.
+    limit
+        Largest deviation, in cells or degrees.
+    hidden
+        Whether it may be off by up to ``HIDDEN`` with less trust, since only hidden surfaces would move.
+    """
+
+    row: FloatArray
+    trust: float
+    limit: float = WITHIN
+    hidden: bool = False
 
 
 class Face(NamedTuple):
@@ -184,16 +207,12 @@ def relations(anchored: Anchored, numbers: FloatArray, touching: set[tuple[int, 
         Pairs of lines, the smaller first, whose parts touch.
     """
     best: dict[bytes, Relation] = {}
-    angles = np.array([slot.kind == "angle" for slot in anchored.slots])
-    for row, weight, hidden in _candidates(anchored, numbers, touching, trust):
+    for row, weight, limit, hidden in _readings(anchored, numbers, touching, trust):
         used = np.flatnonzero(row)
         if not len(used):
             continue
         row = row / row[used[0]]
         off = abs(float(row @ numbers)) / float(np.abs(row).max())
-        limit = DEGREES if angles[used].all() else WITHIN
-        if weight == trust.floor and len(used) == 1:
-            limit = max(limit, FLOOR * numbers[2])
         if off > limit:
             if not hidden or off > HIDDEN:
                 continue
@@ -204,21 +223,22 @@ def relations(anchored: Anchored, numbers: FloatArray, touching: set[tuple[int, 
     return list(best.values())
 
 
-def _candidates(
+def _readings(
     anchored: Anchored, numbers: FloatArray, touching: set[tuple[int, int]], trust: Trust
-) -> Iterator[tuple[FloatArray, float, bool]]:
-    """Rows that may be relations, their trust, and whether they may be hidden."""
+) -> Iterator[Reading]:
+    """Relations that the slots and faces of a program may have."""
     slots, count = anchored.slots, len(anchored.slots)
     eye = np.eye(count)
     upright = [abs(_angle(anchored, line)) < DEGREES for line in range(len(anchored.layout.lines))]
     for k, slot in enumerate(slots):
         if slot.kind == "clearance":
-            stands = slot.axis == 2 and slot.anchor == LOW and numbers[k] < FLOOR * numbers[2]
-            yield eye[k], trust.floor if stands else trust.zero, False
+            floor = FLOOR * numbers[2]
+            stands = slot.axis == 2 and slot.anchor == LOW and numbers[k] < floor
+            yield Reading(eye[k], trust.floor, max(WITHIN, floor)) if stands else Reading(eye[k], trust.zero)
         elif slot.kind == "offset":
-            yield eye[k], trust.centred if slot.axis == 0 else trust.even, slot.axis == 0
+            yield Reading(eye[k], trust.symmetric(slot.axis), hidden=slot.axis == 0)
         elif slot.kind == "angle" and not slot.word.startswith("step"):
-            yield eye[k], trust.zero, False
+            yield Reading(eye[k], trust.zero, DEGREES)
     all_faces = faces(anchored, numbers)
     for axis in range(3):
         axis_faces = [face for face in all_faces if face.element.axis == axis]
@@ -227,43 +247,45 @@ def _candidates(
     lengths = [k for k, slot in enumerate(slots) if slot.kind in ("size", "radius", "edge", "angle", "length")]
     for a, b in combinations(lengths, 2):
         if weight := _equal(anchored, slots[a], slots[b], numbers[a], numbers[b], trust):
-            yield eye[a] - eye[b], weight, False
             if slots[a].kind == "angle":
-                yield eye[a] + eye[b], weight / 2, False
+                yield Reading(eye[a] - eye[b], weight, DEGREES)
+                yield Reading(eye[a] + eye[b], weight / 2, DEGREES)
+            else:
+                yield Reading(eye[a] - eye[b], weight)
         small, side = (a, b) if slots[b].kind == "size" else (b, a)
         kinds = slots[small].kind, slots[side].kind
         if kinds == ("edge", "size") and slots[small].line == slots[side].line and numbers[side] < THIN:
-            yield eye[small] - eye[side] / 2, trust.half, False
+            yield Reading(eye[small] - eye[side] / 2, trust.half)
     across = [k for k, slot in enumerate(slots) if slot.kind == "clearance" and slot.axis < 2 and numbers[k] > WITHIN]
     for a, b in combinations(across, 2):
         if slots[a].axis != slots[b].axis and slots[a].line == slots[b].line and max(numbers[a], numbers[b]) < THIN:
-            yield eye[a] - eye[b], trust.across, False
+            yield Reading(eye[a] - eye[b], trust.across)
 
 
 def _pair(
     anchored: Anchored, face: Face, partner: Face, touching: set[tuple[int, int]], trust: Trust, upright: list[bool]
-) -> Iterator[tuple[FloatArray, float, bool]]:
+) -> Iterator[Reading]:
     """Relations of two faces of one axis."""
     first, second = face.element, partner.element
     axis, same = first.axis, first.line == second.line
     if face.anchor != partner.anchor:
         if {face.anchor, partner.anchor} == {LOW, HIGH} and face.single and partner.single and axis < 2:
             if same:
-                yield face.row - partner.row, trust.centred if axis == 0 else trust.even, False
+                yield Reading(face.row - partner.row, trust.symmetric(axis))
             elif first.key == "last" or second.key == "last":
-                yield face.row - partner.row, trust.even, False
+                yield Reading(face.row - partner.row, trust.even)
             else:
-                yield face.row - partner.row, trust.opposite, False
+                yield Reading(face.row - partner.row, trust.opposite)
         return
     row = face.row - partner.row
     if same:
         if first.key and second.key:  # both ends of a rod
-            yield row, trust.straight, False
+            yield Reading(row, trust.straight)
             if face.anchor == MIDDLE:
-                yield face.row + partner.row, trust.centred if axis == 0 else trust.even, False
+                yield Reading(face.row + partner.row, trust.symmetric(axis))
         return
     if face.anchor == MIDDLE and face.facing == -partner.facing and face.single and partner.single:
-        yield face.row + partner.row, trust.opposite, False
+        yield Reading(face.row + partner.row, trust.opposite)
     if "last" in (first.key, second.key):
         loop, element = (first, second) if first.key == "last" else (second, first)
         part = anchored.layout.first(loop.line)[0]
@@ -271,36 +293,36 @@ def _pair(
             return
         if element.line == part:
             if face.single and partner.single:
-                yield row, trust.straight, False
+                yield Reading(row, trust.straight)
         elif (min(part, element.line), max(part, element.line)) in touching:
-            yield row, trust.contact, False
+            yield Reading(row, trust.contact)
         elif face.single and partner.single:
-            yield row, trust.aligned, False
+            yield Reading(row, trust.aligned)
         return
     if "plane" in (first.key, second.key) or "centre" in (first.key, second.key):
         if face.single and partner.single:
-            yield row, trust.aligned, False
+            yield Reading(row, trust.aligned)
         return
     touches = (min(first.line, second.line), max(first.line, second.line)) in touching
     straight = axis == 0 or (upright[first.line] and upright[second.line])
     if touches and face.facing * partner.facing == -1 and straight:
-        yield row, trust.contact, True
+        yield Reading(row, trust.contact, hidden=True)
     elif touches and 0 in (face.facing, partner.facing) and straight:
         middle = face.facing == 0 and partner.facing == 0
         ends = first.kind == second.kind == "coordinate"
         if ends or not middle:
-            yield row, trust.contact, True
+            yield Reading(row, trust.contact, hidden=True)
         else:
-            yield row, trust.flush, False
+            yield Reading(row, trust.flush)
     elif face.facing == partner.facing and straight:
         if face.single and partner.single:
-            yield row, trust.flush if touches else trust.aligned, False
+            yield Reading(row, trust.flush if touches else trust.aligned)
         elif touches:
-            yield row, trust.middle, False
+            yield Reading(row, trust.middle)
     if touches and axis < 2 and (first.kind, second.kind) in (("coordinate", "interval"), ("interval", "coordinate")):
         point, box = (face, partner) if first.kind == "coordinate" else (partner, face)
         if not box.single and box.facing:  # the middle of a box that it touches
-            yield point.row - (box.row + _opposite_row(anchored, box)) / 2, trust.centre, False
+            yield Reading(point.row - (box.row + _opposite_row(anchored, box)) / 2, trust.centre)
 
 
 def _opposite_row(anchored: Anchored, face: Face) -> FloatArray:

@@ -182,10 +182,9 @@ def with_noise(program: Any, random: np.random.Generator) -> Any:
 def sides(scene: Any) -> tuple[Any, Any]:
     """Of every primitive of a scene the low and high sides and the two least half sizes, and the same with the ends of
     its axis for sides (N, 2, 8); its kind and block, and whether it is a slender one that runs aslant (N, 3)."""
-    from shapeprog.inference.fit.tunable import bounds
 
     drawn = scene.mask.numpy()
-    local, turned, centre = (each.numpy()[drawn] for each in (bounds(scene), scene.rotation, scene.centre))
+    local, turned, centre = (each.numpy()[drawn] for each in (scene.bounds, scene.rotation, scene.centre))
     every, longest = np.arange(len(local)), local.argmax(1)
     axis, sizes = np.abs(turned[every, :, longest]), np.sort(local, 1)
     rows = [
@@ -474,7 +473,6 @@ def boxes_of(pack: Path, number: int) -> tuple[list[Any], Any]:
 def shaken(program: Any) -> tuple[int, Any]:
     """The number of free numbers; and the sizes of the boxes of all primitives (K, N, 3), smallest first, as they are
     and where all free numbers are others."""
-    from shapeprog.inference.fit.tunable import bounds
     from shapeprog.language.free import free_numbers, multiplied
     from shapeprog.language.unroll import unroll
 
@@ -483,7 +481,7 @@ def shaken(program: Any) -> tuple[int, Any]:
     for place, factor in enumerate(np.random.default_rng(0).uniform(1 - SHAKEN, 1 + SHAKEN, free)):
         changed = multiplied(changed, place, factor)
     scenes = [unroll(each) for each in (program, changed)]
-    return free, np.array([np.sort(bounds(scene)[scene.mask].numpy(), 1) for scene in scenes])
+    return free, np.array([np.sort(scene.bounds[scene.mask].numpy(), 1) for scene in scenes])
 
 
 def tasks(args: argparse.Namespace) -> Iterator[Task]:

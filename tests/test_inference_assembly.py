@@ -21,7 +21,6 @@ from shapeprog.inference.assembly import Assembly, assemble
 from shapeprog.inference.candidates.drawings import canonical_side, simplest
 from shapeprog.inference.candidates.loops import images, repeated
 from shapeprog.inference.candidates.moments import distinct, moments
-from shapeprog.inference.fit.tunable import bounds
 from shapeprog.inference.surface.evidence import evidence_of, evidence_of_program
 from shapeprog.language import Draw, Language, Loop, Program, language, standard, statement, using
 from shapeprog.language.hints import Box
@@ -229,7 +228,7 @@ def test_looks_do_not_depend_on_how_a_solid_is_written():
 def test_solids_with_others_inside_are_not_drawn_as_hollow():
     found = assembled(load(EXAMPLES / "armchair_kaykit.obj")).program
     assert found.blocks <= 6
-    assert bounds(unroll(found)).amin() > 0.5  # half of the thinnest part: walls of the arms would be of .1 cells
+    assert unroll(found).bounds.amin() > 0.5  # half of the thinnest part: walls of the arms would be of .1 cells
 
 
 def test_a_thick_seat_with_bevelled_edges_is_a_cushion():

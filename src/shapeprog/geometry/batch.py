@@ -62,8 +62,14 @@ class Batch:
         """Half extents of the box around each primitive in its local frame, with gradient to sizes."""
         half = torch.zeros_like(self.centre)
         for kind in self.kinds:
-            half = torch.where((self.kind == kind)[..., None], primitives[kind].bound(self.size), half)
+            of_kind = self.mask & (self.kind == kind)
+            half = torch.where(of_kind[..., None], primitives[kind].bound(self.size), half)
         return half
+
+    @property
+    def reach(self) -> Float[Tensor, "*batch N 3"]:
+        """Half extents of the box around each primitive along the axes of the grid, with gradient."""
+        return (self.rotation.abs() @ self.bounds[..., None])[..., 0]
 
     def __len__(self) -> int:
         return self.mask.shape[0]

@@ -16,7 +16,6 @@ from torch import Tensor
 from shapeprog.data.shape import Shape
 from shapeprog.errors import ShapeProgError
 from shapeprog.inference.choice.connecting import afloat
-from shapeprog.inference.fit.tunable import bounds
 from shapeprog.language.dimensions import in_unit, literal_lengths
 from shapeprog.language.parameters import to_float32
 from shapeprog.language.program import Program
@@ -118,5 +117,4 @@ def _rounder(number: float, farthest: float) -> Iterator[float]:
 def _faces(program: Program) -> Float[Tensor, "N 2 3"]:
     """The lowest and highest corners of the boxes around the primitives of a program, along the axes of the grid."""
     scene = unroll(encode(program, dtype=torch.float64))
-    reach = (scene.rotation.abs() @ bounds(scene)[..., None])[..., 0]
-    return torch.stack([scene.centre - reach, scene.centre + reach], 1)
+    return torch.stack([scene.centre - scene.reach, scene.centre + scene.reach], 1)

@@ -12,7 +12,6 @@ import torch
 
 from shapeprog.geometry.distance import signed_distance
 from shapeprog.geometry.surface import sample_surface
-from shapeprog.inference.fit.tunable import bounds
 from shapeprog.language.hints import Box
 from shapeprog.language.parameters import Parameter
 from shapeprog.language.printer import numbers_written
@@ -95,7 +94,7 @@ def redrawn(drawing: Draw, box: Box) -> list[Draw]:
 def solid_boxes(nodes: Sequence[Node]) -> list[list[Box]]:
     """The boxes around all solids of each block."""
     scene = unroll(encode([Program((node,)) for node in nodes], dtype=torch.float64))
-    centre, rotation, half = (tensor.numpy() for tensor in (scene.centre, scene.rotation, bounds(scene)))
+    centre, rotation, half = (tensor.numpy() for tensor in (scene.centre, scene.rotation, scene.bounds))
     return [
         [Box(centre[row, slot], rotation[row, slot], half[row, slot]) for slot in np.flatnonzero(mask)]
         for row, mask in enumerate(scene.mask.numpy())

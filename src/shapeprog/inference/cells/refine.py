@@ -23,7 +23,7 @@ from shapeprog.geometry.nearest import squared_distance
 from shapeprog.geometry.scene import Scene
 from shapeprog.geometry.surface import sample_surface
 from shapeprog.inference.budget import NEVER, Deadline, Progress
-from shapeprog.inference.fit.tunable import bounds, least
+from shapeprog.inference.fit.tunable import least
 from shapeprog.language.program import Program
 from shapeprog.language.statement import language
 from shapeprog.language.tensors import Code, decode, encode
@@ -176,7 +176,7 @@ def _slots(code: Code) -> tuple[Bool[Tensor, "K J slots"], Float[Tensor, "K J sl
 def _contacts(scene: Scene) -> Int[Tensor, "C 3"]:
     """Pairs of primitives and the axis along which the first ends where the second begins: (below, above, axis)."""
     upright = scene.mask & (scene.rotation.diagonal(dim1=-2, dim2=-1) > 0.999).all(-1)
-    low, high = scene.centre - bounds(scene), scene.centre + bounds(scene)
+    low, high = scene.centre - scene.bounds, scene.centre + scene.bounds
     overlap = torch.minimum(high[:, None], high[None]) - torch.maximum(low[:, None], low[None])
     meets = (high[:, None] - low[None]).abs() < 1e-3
     facing = torch.stack([(overlap[..., [a for a in range(3) if a != axis]] > 0.5).all(-1) for axis in range(3)], -1)
@@ -187,7 +187,7 @@ def _gaps(scene: Scene, touching: Int[Tensor, "C 3"]) -> Float[Tensor, ""]:
     """Sum of the squared gaps, in cells, between primitives that should touch."""
     if not len(touching):
         return scene.centre.new_zeros(())
-    low, high = scene.centre - bounds(scene), scene.centre + bounds(scene)
+    low, high = scene.centre - scene.bounds, scene.centre + scene.bounds
     below, above, axis = touching.unbind(-1)
     return ((low[above, axis] - high[below, axis]).clamp(min=0) ** 2).sum()
 

@@ -15,7 +15,6 @@ from shapeprog.inference.candidates.drawings import redrawn, solid_boxes
 from shapeprog.inference.candidates.neighbours import drawing_of, met, with_drawing
 from shapeprog.inference.choice.choice import value
 from shapeprog.inference.choice.coverage import Coverage
-from shapeprog.inference.fit.tunable import bounds
 from shapeprog.inference.surface.components import linked
 from shapeprog.language.hints import Box
 from shapeprog.language.program import Chain, Node, Program
@@ -79,7 +78,7 @@ def _loose_parts(program: Program, flush: float = FLUSH) -> list[list[bool]]:
         return loose
     scene = unroll(encode(program, dtype=torch.float64))
     group = linked(np.array(list(gaps(scene, flush)), np.int64).reshape(-1, 2), len(scene.mask))
-    half = bounds(scene)
+    half = scene.bounds
     sizes = np.bincount(group, weights=(half * half.roll(1, -1)).sum(-1).numpy())
     for block, label in zip(scene.block.tolist(), group, strict=True):
         loose[block].append(bool(label != sizes.argmax()))

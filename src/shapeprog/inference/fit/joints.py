@@ -19,7 +19,7 @@ from shapeprog.geometry.primitives import primitives
 from shapeprog.geometry.scene import Scene
 from shapeprog.geometry.surface import sample_surface
 from shapeprog.inference.fit.residuals import rows_of
-from shapeprog.inference.fit.tunable import ROW, bounds
+from shapeprog.inference.fit.tunable import ROW
 
 NEARLY, TOUCHING = 0.3, 0.05
 """Gaps in cells up to which parts nearly touch, and touch."""
@@ -91,7 +91,7 @@ def gaps(scene: Scene, generator: torch.Generator) -> Gaps:
     """The gaps of a scene, those between parts that overlap below zero; the smaller part of each pair comes first."""
     nearest, distance = _samples(scene, generator)
     first, second = (torch.minimum(distance, distance.T) < CANDIDATE).triu(1).nonzero(as_tuple=True)
-    area = bounds(scene).prod(-1)
+    area = scene.bounds.prod(-1)
     swap = area[first] > area[second]
     first, second = torch.where(swap, second, first), torch.where(swap, first, second)
     points = between(scene, first, second, nearest[first, second], FIRST)
@@ -125,7 +125,7 @@ def moved(scene: Scene, joints: Joints) -> Joints:
 
 def positions_of(scene: Scene, joints: Joints) -> Float[Tensor, "C 3"]:
     """Positions of joints when their first parts are as in the scene."""
-    local = bounds(scene)[joints.first] * joints.normalized
+    local = scene.bounds[joints.first] * joints.normalized
     positions: Tensor = scene.centre[joints.first] + (scene.rotation[joints.first] @ local[..., None])[..., 0]
     return positions
 
@@ -137,7 +137,7 @@ def needs(scene: Scene, slopes: Float[Tensor, "N 16 F"], joints: Joints) -> Need
     joined = torch.where((gap >= 0)[:, None], reach.slopes, 0.0)  # on an axis the slope of a depth is no number
     stand, feet = rows_of(scene, joints.standing)
     low = _inner(scene, joints.standing, _lowest(scene, joints.standing))
-    height = stand.centre[:, 0, 0] + (stand.rotation[:, 0, 0] * bounds(stand)[:, 0] * low).sum(-1) - joints.floor
+    height = stand.centre[:, 0, 0] + (stand.rotation[:, 0, 0] * stand.bounds[:, 0] * low).sum(-1) - joints.floor
     standing = _by_number(_slopes_of(height, feet), slopes[joints.standing])
     return Needs(torch.cat([gap.clamp(min=0), height.detach()]), torch.cat([joined, standing]))
 
@@ -146,7 +146,7 @@ def depths(scene: Scene, slopes: Float[Tensor, "N 16 F"], joints: Joints) -> Nee
     """Signed distance from the point of every joint to the second part, negative inside it."""
     first, first_leaves = rows_of(scene, joints.first)
     second, second_leaves = rows_of(scene, joints.second)
-    points = first.centre[:, 0] + (first.rotation[:, 0] @ (bounds(first)[:, 0] * joints.normalized)[..., None])[..., 0]
+    points = first.centre[:, 0] + (first.rotation[:, 0] @ (first.bounds[:, 0] * joints.normalized)[..., None])[..., 0]
     far = signed_distance(second, points[:, None])[:, 0]
     by_row = _slopes_of(far, [*first_leaves, *second_leaves])
     by_first, by_second = by_row[:, :ROW], by_row[:, ROW:]
@@ -192,7 +192,7 @@ def _by_number(rows: Float[Tensor, "R 16"], slopes: Float[Tensor, "R 16 F"]) -> 
 def _inner(scene: Scene, slots: Int[Tensor, " C"], points: Float[Tensor, "C 3"]) -> Float[Tensor, "C 3"]:
     """Points in the boxes of primitives, in units of the half extents."""
     local = ((points - scene.centre[slots])[..., None] * scene.rotation[slots]).sum(-2)
-    return local / bounds(scene)[slots].clamp(min=1e-6)
+    return local / scene.bounds[slots].clamp(min=1e-6)
 
 
 def _lowest(scene: Scene, slots: Int[Tensor, " S"]) -> Float[Tensor, "S 3"]:

@@ -12,9 +12,7 @@ import torch
 from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
-from shapeprog.geometry.batch import Batch
 from shapeprog.geometry.primitive import SIZES
-from shapeprog.geometry.primitives import primitives
 from shapeprog.geometry.scene import Scene
 from shapeprog.language.parameters import Kind, Quantity, to_float32
 from shapeprog.language.program import Draw, Loop, Node, Program
@@ -144,7 +142,7 @@ class Tunable:
         return torch.where(self._index >= 0, values[self._index.clamp(min=0)], self._start)
 
     def _scales(self, nodes: Sequence[Node], scene: Scene) -> Float[Tensor, " F"]:
-        reach = bounds(scene).norm(dim=-1)
+        reach = scene.bounds.norm(dim=-1)
         scale = torch.ones(len(self.moving), dtype=torch.float64)
         for f, (n, _) in enumerate(self.moving):
             node = nodes[n]
@@ -161,15 +159,6 @@ def least(quantity: Quantity) -> float:
     if quantity.kind != "length":
         return -math.inf
     return THINNEST / 2 if quantity.high == HALF else THINNEST
-
-
-def bounds(scene: Batch) -> Float[Tensor, "*batch N 3"]:
-    """Half extents of the local bounding boxes of primitives, with gradient to their sizes."""
-    extents = torch.zeros_like(scene.centre)
-    for kind in scene.kinds:
-        matching = scene.mask & (scene.kind == kind)
-        extents = torch.where(matching[..., None], primitives[kind].bound(scene.size), extents)
-    return extents
 
 
 def _moving(node: Node) -> Iterator[int]:

@@ -12,7 +12,6 @@ import numpy.typing as npt
 from shapeprog.geometry.primitives import primitives
 from shapeprog.geometry.primitives.arc import ARC
 from shapeprog.geometry.scene import Scene
-from shapeprog.inference.fit.tunable import bounds
 from shapeprog.space import DEPTH, SIDE, UP, FloatArray
 
 Mask = npt.NDArray[np.bool_]
@@ -112,7 +111,7 @@ class Parts:
 
     def __init__(self, scene: Scene, turns: int = 0) -> None:
         mask = scene.mask.numpy()
-        half = bounds(scene).double().numpy()
+        half = scene.bounds.double().numpy()
         centre, pose = turned(scene.centre.double().numpy()[mask], turns), scene.rotation.double().numpy()[mask]
         half, pose = half[mask], np.swapaxes(turned(np.swapaxes(pose, -1, -2), turns), -1, -2)
         self.block = scene.block.numpy()[mask]

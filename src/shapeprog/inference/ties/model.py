@@ -11,7 +11,7 @@ from shapeprog.geometry.scene import Scene
 from shapeprog.inference.fit.adjustment import EXPLAINED, of_target
 from shapeprog.inference.fit.joints import Joints, moved, needs
 from shapeprog.inference.fit.residuals import Target
-from shapeprog.inference.fit.tunable import THINNEST, Poses, Tunable, bounds
+from shapeprog.inference.fit.tunable import THINNEST, Poses, Tunable
 from shapeprog.inference.surface.evidence import Evidence
 from shapeprog.inference.ties.anchored import Anchored
 from shapeprog.language.evaluate import expanded, symbolic
@@ -169,8 +169,7 @@ class Misfit:
 def ends_of(scene: Scene) -> tuple[torch.Tensor, torch.Tensor]:
     """Low and high ends of primitives along the axes (6, N), and their slopes (6, N, 16) by sizes, centre, rotation."""
     leaves = [tensor.clone().requires_grad_() for tensor in (scene.size, scene.centre, scene.rotation)]
-    half = bounds(replace(scene, size=leaves[0]))
-    reach = (leaves[2].abs() @ half[..., None])[..., 0]
+    reach = replace(scene, size=leaves[0], rotation=leaves[2]).reach
     ends = torch.cat([leaves[1] - reach, leaves[1] + reach], -1).T
     slopes = []
     for end in ends:

@@ -9,11 +9,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
-import numpy as np
-
 from shapeprog.errors import ShapeProgError
 from shapeprog.geometry.arrays import array
-from shapeprog.geometry.primitives import primitives
 from shapeprog.language.ast import (
     Assignment,
     Call,
@@ -133,12 +130,7 @@ def _in_own_cells(lines: tuple[Line, ...]) -> Program:
 
 def _extents(program: Program) -> list[float]:
     """Width, depth and height in cells of the smallest box about the middle of the grid that holds a program."""
-    reach = np.zeros(3)
     with on_numpy_if_shipped(program):
         scene = unroll(encode(program, dtype=torch.float64))
-        for kind in scene.kinds:
-            selected = scene.mask & (scene.kind == kind)
-            half = primitives[kind].bound(scene.size[selected])
-            corners = (scene.rotation[selected].abs() @ half[..., None])[..., 0] + scene.centre[selected].abs()
-            reach = np.maximum(reach, array(corners).max(0))
+        reach = array(scene.reach + scene.centre.abs())[array(scene.mask)].max(0, initial=0.0)
     return [float(2 * reach[axis]) for axis in (SIDE, DEPTH, UP)]

@@ -1,8 +1,8 @@
 """Groups of parts that touch, for many scenes at once.
 
 Boxes along the axes of the grid are compared exactly.  Other solids touch if no plane is found between them: those
-along the faces and edges of the boxes around them are tried, then those that Gilbert (1966) finds.  Cushions count as
-boxes, bent rods as several straight ones, and solids that users declare as their convex hulls.
+along the faces and edges of the boxes around them are tried, then those that Gilbert (1966) finds.  Cushions are
+compared as boxes, and bent rods as several straight ones.
 """
 
 from __future__ import annotations

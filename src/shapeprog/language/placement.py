@@ -1,7 +1,7 @@
 """The keywords by which placed parts lie in a box, and the tables of placed solids, loops and groups.
 
-x points right, y to the rear, z up, as seen by a person who looks at the front.  The whole stands on z = 0 and is
-centred at x = 0, y = 0.  The grid has the axes up, depth and *left*: ``up = z + floor``, ``depth = y``, ``side = -x``.
+Seen from the front, x points right, y to the rear and z up.  The whole stands on z = 0, centred at x = 0, y = 0.
+The grid has the axes up, depth and *left*: ``up = z + floor``, ``depth = y``, ``side = -x``.
 """
 
 from __future__ import annotations

@@ -77,7 +77,7 @@ def _rolled(nodes: Sequence[Node]) -> list[Node]:
     plain = {index for index, node in enumerate(nodes) if not isinstance(node, Loop)}  # not pairs, which would overlap
     for count in TURNS if plain else ():
         loops += [
-            Loop("rotate", _values(count, 1), (nodes[index],)) for index in turned(stats, count) if index in plain
+            Loop("rotate", loop_values(count, 1), (nodes[index],)) for index in turned(stats, count) if index in plain
         ]
     return distinct(loops)
 
@@ -110,16 +110,16 @@ def images(singles: Sequence[Node], surface: FloatArray) -> list[Node]:
 
 
 def _mirrored(node: Node, axis: int) -> Loop:
-    return Loop("mirror", _values(2, axis, 0), (node,))
+    return Loop("mirror", loop_values(2, axis, 0), (node,))
 
 
 def rows_and_pairs(stats: Moments) -> Iterator[tuple[int, Loop]]:
     """The index of the first candidate of each run or mirror pair, and the loop, without a body, that repeats it."""
     for index, count, step in runs(stats):
-        yield index, Loop("translate", _values(count, *step), ())
+        yield index, Loop("translate", loop_values(count, *step), ())
     for axis in (SIDE, DEPTH):
         for index, _, plane in mirrored(stats, axis):
-            yield index, Loop("mirror", _values(2, axis, plane), ())
+            yield index, Loop("mirror", loop_values(2, axis, plane), ())
 
 
 def mirrors(node: Node, axis: int) -> bool:
@@ -127,7 +127,8 @@ def mirrors(node: Node, axis: int) -> bool:
     return isinstance(node, Loop) and node.name == "mirror" and node.values[1] == axis
 
 
-def _values(*numbers: float) -> tuple[float, ...]:
+def loop_values(*numbers: float) -> tuple[float, ...]:
+    """Numbers of a loop as float32 holds them."""
     return tuple(to_float32(number) + 0.0 for number in numbers)
 
 

@@ -14,9 +14,8 @@ import numpy as np
 import torch
 
 from shapeprog.inference.candidates.drawings import drawings, hinted, redrawn, solid_boxes
-from shapeprog.inference.candidates.loops import mirrors, repeated
+from shapeprog.inference.candidates.loops import loop_values, mirrors, repeated
 from shapeprog.language.hints import STRAIGHT, Box
-from shapeprog.language.parameters import to_float32
 from shapeprog.language.program import Chain, Draw, Loop, Node, Program, nest
 from shapeprog.language.statement import language
 from shapeprog.language.tensors import encode
@@ -109,8 +108,7 @@ def _rows(blocks: Sequence[Sequence[Box]]) -> Iterator[Node]:
             continue
         middle, size = np.median(centre[members], 0), np.median(half[members], 0)
         middle[axis] = start
-        steps = tuple(to_float32(step) if k == axis else 0.0 for k in range(3))
-        loop = Loop("translate", (float(count), *steps), ())
+        loop = Loop("translate", loop_values(count, *(step if k == axis else 0 for k in range(3))), ())
         yield from (nest((loop, drawing)) for drawing in drawings(Box(middle, np.eye(3), size)))
 
 

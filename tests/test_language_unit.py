@@ -112,21 +112,6 @@ def test_gradients_reach_names_in_their_unit(text: str) -> None:
     torch.testing.assert_close(found[1] * by, found[0])
 
 
-def test_lengths_are_rounded_to_decimals_and_thin_ones_to_two_digits() -> None:
-    text = (
-        "width, depth, height = 24, 24, 24\n"
-        "box(width=24.001, front=-0.0121, depth=2.9, bottom=12.05, height=0.0123)\nbox(tilt=12.345)\n"
-    )
-    for unit, digits, numbers in (
-        (Unit("cm", 3.75), 1, "width=90, front=-0.045, depth=10.9, bottom=45.2, height=0.046"),
-        (Unit("mm", 37.5), 0, "width=900, front=-0.45, depth=109, bottom=452, height=0.46"),
-        (Unit("m", 0.0375), 3, "width=0.9, front=-0.00045, depth=0.109, bottom=0.452, height=0.00046"),
-    ):
-        found = in_unit(parse(text), unit, digits=digits)
-        assert format_program(found).splitlines()[2] == f"box({numbers})"
-        assert format_program(found).endswith("tilt=12.345)\n")
-
-
 @pytest.mark.parametrize(
     "text",
     [

@@ -6,7 +6,6 @@ in products, powers of length add up.  Lengths are rescaled when a program is wr
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from dataclasses import replace
 from typing import Literal, NamedTuple, TypeAlias
@@ -38,7 +37,6 @@ from shapeprog.language.statement import language
 from shapeprog.language.unit import Unit
 
 DIGITS = 6  # digits of a length that is converted: float32 has two more, which would show that it was
-FEWEST = 2  # digits that lengths have at least where they are rounded, so that thin parts keep their thickness
 
 _NOTHING = 1e-9
 _PLAIN = ("tilt", "turn", "step")
@@ -113,13 +111,10 @@ def _scoped_uses(lines: Iterable[Line], scope: Scope) -> Iterator[tuple[Use, Sco
         yield from _scoped_uses(body_of(line), _inside(line, scope))
 
 
-def in_unit(program: Program, unit: Unit | None, *, digits: int | None = None) -> Program:
+def in_unit(program: Program, unit: Unit | None) -> Program:
     """The same placed program with its lengths in a unit, or in cells; unchanged if it is in this unit.
 
-    Parameters
-    ----------
-    digits
-        Decimals to which lengths are rounded; else they keep six digits.
+    Lengths keep six digits.
 
     Raises
     ------
@@ -136,10 +131,7 @@ def in_unit(program: Program, unit: Unit | None, *, digits: int | None = None) -
     def change(number: float, power: float) -> float:
         if not power or not number:
             return number
-        new = number * factor**power
-        if digits is None or power != 1:
-            return to_float32(float(f"{new:.{DIGITS}g}"))
-        return to_float32(round(new, max(digits, FEWEST - 1 - math.floor(math.log10(abs(new))))))
+        return to_float32(float(f"{number * factor**power:.{DIGITS}g}"))
 
     return _scaled(Source(_Powers(source).changed(source.lines, change), unit, source.scale))
 

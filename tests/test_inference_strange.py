@@ -12,6 +12,7 @@ import shapeprog as sp
 from shapeprog.data.placement import shape_from_mesh, shape_from_points, shape_from_voxels
 from shapeprog.data.shape import Shape
 from shapeprog.errors import ShapeProgError
+from shapeprog.inference.surface.evidence import doubt_of_furniture, evidence_of
 
 RANDOM = np.random.default_rng(0)
 START = RANDOM.bit_generator.state
@@ -148,3 +149,16 @@ def test_a_strange_shape_gives_a_program_of_finite_numbers_or_a_refusal(name: st
     assert found.reason
     assert not found.cut
     assert all(np.isfinite(node.values).all() for node in found.program.walk())
+
+
+def test_what_does_not_look_like_furniture_is_reported() -> None:
+    def doubt(mesh: Mesh) -> str:
+        return doubt_of_furniture(evidence_of(shape_from_mesh(*mesh, name="a shape", axes=np.eye(3))))
+
+    turned, across = np.meshgrid(np.linspace(0, 2 * np.pi, 40), np.linspace(0, 2 * np.pi, 20), indexing="ij")
+    reach = 3 + np.cos(across)
+    torus = np.stack([reach * np.cos(turned), np.sin(across), reach * np.sin(turned)], -1).reshape(-1, 3)
+    corner = (np.arange(39)[:, None] * 20 + np.arange(19)).reshape(-1)
+    faces = np.concatenate([np.stack([corner, corner + 20, corner + step], -1) for step in (1, 21)])
+    assert "does not look like furniture" in doubt((torus, faces))
+    assert not doubt(moved(CUBE, [5.0, 1, 1]))

@@ -222,4 +222,5 @@ def _reason(used: int, share: float, choice: Choice, candidates: Sequence[Part],
         return sum(numbers_outside(program_of(candidates[index])) for index in indices)
 
     gain, cost = more.explained - share, max(numbers(more.chosen) - numbers(choice.best.chosen), 0)
-    return f"{text}; one more would cover another {gain:.1%} with {cost} more numbers: raise --detail to add it."
+    price = f"with {cost} more numbers" if cost else "without more numbers"
+    return f"{text}; one more would cover another {gain:.1%} {price}: raise --detail to add it."

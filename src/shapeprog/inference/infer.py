@@ -29,7 +29,7 @@ from shapeprog.inference.cells.refine import Schedule
 from shapeprog.inference.cells.structure import Settings
 from shapeprog.inference.readable import CELLS, in_readable_unit, unit_of_result
 from shapeprog.inference.roles.roles import named_anew
-from shapeprog.inference.surface.evidence import evidence_of
+from shapeprog.inference.surface.evidence import doubt_of_furniture, evidence_of
 from shapeprog.inference.ties.tying import tie
 from shapeprog.language.convert import placed_if_possible
 from shapeprog.language.free import numbers
@@ -182,8 +182,8 @@ def infer(
         for library in libraries:
             program = with_library(program, library)
     program = in_readable_unit(program, unit_of_result(target, program, unit), seed)
-    if target.note:
-        reason += f" {target.note}"
+    doubt = "" if evidence is None else doubt_of_furniture(evidence)
+    reason = " ".join(sentence for sentence in (reason, doubt, target.note) if sentence)
     cut = tuple(deadline.cut for deadline in (searching, refining) if deadline.cut)
     if cut:
         reason += f" The time limit of {budget:g} s ended {' and '.join(cut)}: "

@@ -17,7 +17,9 @@ from shapeprog.formats.json_form import program_to_json, read_result
 from shapeprog.inference.infer import Result
 from shapeprog.language.printer import format_program
 
-MEASURES = ("iou", "cd", "noise_floor", "f1", "blocks", "statements", "primitives")  # scores of every result
+MEASURES = (
+    "iou", "cd", "noise_floor", "f1_half_percent", "f1_percent", "silhouette", "blocks", "statements", "primitives",
+)  # fmt: skip  # scores of every result
 
 _SUFFIXES = (".json", ".shape", ".glb", ".png")
 _LONGEST = 120  # letters of the name of a file
@@ -25,7 +27,7 @@ _LONGEST = 120  # letters of the name of a file
 
 def measured(result: Result, shape: Shape, seed: int) -> Result:
     """The result with the distance to the input and the size of the program among its scores."""
-    row = evaluate_program(result.program, shape, result.snapped, seed=seed, iou=result.scores.get("iou"))
+    row = evaluate_program(result.program, shape, result.snapped, seed=seed, iou=result.scores.get("iou"), looks=True)
     scores = {**result.scores, **{name: getattr(row, name) for name in MEASURES}}
     return replace(result, scores={name: value for name, value in scores.items() if math.isfinite(value)})
 

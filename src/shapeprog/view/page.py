@@ -190,7 +190,10 @@ def scores_text(scores: Mapping[str, float] | None, program: Program) -> list[st
     size = f"{parts} part{'s' * (parts != 1)} · {blocks} drawing statement{'s' * (blocks != 1)}"
     if not scores:
         return [size]
-    labels = {"iou": "IoU", "cd": "CD", "f1": "F1", "seconds": "time"}
+    labels = {
+        "iou": "IoU", "cd": "CD", "f1_half_percent": "F1@.5%", "f1_percent": "F1@1%", "silhouette": "silhouette",
+        "seconds": "time",
+    }  # fmt: skip
     words = []
     for key, label in labels.items():
         if key in scores and np.isfinite(scores[key]):

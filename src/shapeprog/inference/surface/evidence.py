@@ -29,7 +29,7 @@ from shapeprog.inference.surface.components import Components, components, solid
 from shapeprog.inference.surface.evidence_kernels import look_out
 from shapeprog.language.program import Program
 from shapeprog.language.unroll import unroll
-from shapeprog.space import HALF, RESOLUTION, SPAN, FloatArray
+from shapeprog.space import HALF, RESOLUTION, SPAN, UP, FloatArray
 
 POINTS, SURFACE = 6_000, 40_000
 """Points to be explained, and points of the same surface that support the surface of a program."""
@@ -80,6 +80,14 @@ DIRECTIONS = 32
 
 CLEAR, CLEAR_THROUGH = 2, 4
 """Least number of clear directions of a free cell; and the same where both ways must be clear: scans have holes."""
+
+LEAST_LEVEL, LEAST_ALONG = 0.35, 0.45
+"""Shares of the plan that level surfaces cover, and of the surface that faces along an axis; below both, a target does
+not look like furniture.  That holds for mugs, bottles, cars and figures, and for 2 % of furniture (val), all of it wire
+or shells."""
+
+LEVEL, ALONG = math.cos(math.radians(15)), math.cos(math.radians(10))
+"""Cosines from which a surface is level, or faces along an axis."""
 
 Flags = npt.NDArray[np.bool_]
 
@@ -284,3 +292,23 @@ def local_planes(points: FloatArray) -> tuple[FloatArray, float, float]:
     noise = float(np.quantile(np.sqrt(squared / (NEIGHBOURS - 3)), FLAT))
     area = float(np.median(distance[:, -1]) ** 2 * math.pi / (NEIGHBOURS - 1))
     return normals, noise, area
+
+
+def doubt_of_furniture(evidence: Evidence) -> str:
+    """Why a target does not look like furniture, as a sentence; empty if it does.
+
+    Furniture carries something on level surfaces above the floor, and most of its surfaces face along an axis.
+    """
+    points, normals = evidence.surface, np.abs(evidence.surface_normals)
+    low, extents = points.min(0), np.maximum(np.ptp(points, axis=0), 1e-9)
+    place = (points - low) / extents
+    plan = np.minimum((place[:, 1:] * RESOLUTION).astype(int), RESOLUTION - 1) @ [RESOLUTION, 1]
+    level = (normals[:, UP] > LEVEL) & (place[:, UP] > 0.1)
+    covered = len(np.unique(plan[level])) / len(np.unique(plan))
+    along = float((normals.max(1) > ALONG).mean())
+    if covered >= LEAST_LEVEL or along >= LEAST_ALONG:
+        return ""
+    return (
+        f"This does not look like furniture: {along:.0%} of its surface faces along an axis, and level surfaces cover "
+        f"{covered:.0%} of its plan."
+    )

@@ -32,7 +32,7 @@ from shapeprog.view import raster_kernels as kernels
 from shapeprog.view.listing import listing, parted, wrapped
 from shapeprog.view.model import of_cells, of_mesh, of_parts, of_points, of_shape
 from shapeprog.view.render import camera_for, render
-from shapeprog.view.sliders import corners_of, pieces, sliders
+from shapeprog.view.viewer import PAGE, corners_of, sliders
 
 TEXT = """
 top_rectangle(at=(4, 0, 0), thickness=2, half=(9, 11))
@@ -283,33 +283,31 @@ for _ in translate(count, x=width / 4):
 
 def test_corners_go_where_the_program_with_another_number_has_them():
     program = parse(DRAGGED)
-    drawn = parts(program)
+    drawn = parts(program, PAGE)
     start, found = corners_of(drawn), {slider.name: slider for slider in sliders(program, drawn)}
     assert list(found) == ["width", "depth", "height", "lean"], "a count changes how many parts there are"
-    assert len(found["lean"].places) > 1, "corners go round a hinge"
     for name, slider in found.items():
-        for at, places in slider.places.items():
-            expected = corners_of(parts(set_names(program, {name: at})))
+        for at, places in slider.ends.items():
+            expected = corners_of(parts(set_names(program, {name: at}), PAGE))
             for before, there, wanted in zip(start, places, expected, strict=True):
                 np.testing.assert_allclose(before if there is None else there, wanted, atol=1e-3)
-    (far,) = found["height"].places
-    half = corners_of(parts(set_names(program, height=(8 + far) / 2)))
-    for before, there, wanted in zip(start, found["height"].places[far], half, strict=True):
+    far = max(found["height"].ends)
+    half = corners_of(parts(set_names(program, height=(8 + far) / 2), PAGE))
+    for before, there, wanted in zip(start, found["height"].ends[far], half, strict=True):
         np.testing.assert_allclose(before if there is None else (before + there) / 2, wanted, atol=1e-3)
 
 
 def test_numbers_of_a_program_in_a_unit_are_dragged_in_it(tmp_path: Path):
     program = in_unit(parse(DRAGGED), Unit("m", 0.04))
     cells = parse(DRAGGED)
-    drawn = parts(program)
-    found = {slider.name: slider for slider in sliders(program, drawn)}
-    plain = {slider.name: slider for slider in sliders(cells, parts(cells))}
+    found = {slider.name: slider for slider in sliders(program, parts(program, PAGE))}
+    plain = {slider.name: slider for slider in sliders(cells, parts(cells, PAGE))}
     assert {name: slider.unit for name, slider in found.items()} == {
         "width": "m", "depth": "m", "height": "m", "lean": "",
     }  # fmt: skip
     for name, slider in found.items():
         by = 0.04 * 24 / 10 if slider.unit else 1.0
-        np.testing.assert_allclose([slider.low, slider.high], [plain[name].low * by, plain[name].high * by], rtol=1e-5)
+        np.testing.assert_allclose(list(slider.ends), [end * by for end in plain[name].ends], rtol=1e-5)
     page = viewer(program, tmp_path / "page.html").read_text()
     content = json.loads(re.search(r'id="data">(.*?)</script>', page)[1])
     assert [slider["unit"] for slider in content["sliders"]] == ["m", "m", "m", ""]
@@ -322,10 +320,10 @@ def test_sliders_end_where_parts_come_apart():
         "width, depth, height = 20, 10, 24\nleg_height, thickness = 22, 4\n"
         "top(top=0, height=thickness)\nleg(left=0, width=2, height=leg_height)\n"
     )
-    found = {slider.name: slider for slider in sliders(program, parts(program))}
-    assert (found["leg_height"].low, found["leg_height"].high) == pytest.approx((20, 33), abs=0.5)
-    assert (found["thickness"].low, found["thickness"].high) == pytest.approx((2, 6), abs=0.1)
-    assert (found["width"].low, found["width"].high) == pytest.approx((10, 30))
+    found = {slider.name: slider for slider in sliders(program, parts(program, PAGE))}
+    assert list(found["leg_height"].ends) == pytest.approx([20, 33], abs=0.5)
+    assert list(found["thickness"].ends) == pytest.approx([2, 6], abs=0.1)
+    assert list(found["width"].ends) == pytest.approx([10, 30])
 
 
 def test_listing_shows_the_unit_and_as_many_decimals_as_it_needs():
@@ -346,20 +344,13 @@ def test_plain_programs_and_programs_of_very_many_parts_have_nothing_to_drag():
     assert sliders(many, parts(many)) == []
 
 
-def test_lines_tell_where_the_numbers_of_names_are_written():
-    names = ["width", "tall", "low"]
-    assert pieces("width, floor, tall = 10.5, -tall / 2, 24  # all", names) == [
-        ("width, floor, tall = ", ""), ("10.5", "width"), (", -tall / 2, ", ""), ("24", "tall"), ("  # all", ""),
+def test_lines_that_assign_numbers_know_their_names_and_values():
+    rows = listing(
+        parse("width, depth, height = 10.5, 8, 24  # all\ntall = -0.5\nfloor = -tall / 2\nbox(height=floor)")
+    )
+    assert [row.numbers for row in rows] == [
+        (("width", "10.5"), ("depth", "8"), ("height", "24")), (("tall", "-0.5"),), (("floor", "-tall / 2"),), (),
     ]  # fmt: skip
-    assert pieces("    low = -0.5", names) == [("    low = ", ""), ("-0.5", "low"), ("", "")]
-    for line in (
-        "floor = -tall / 2",
-        "for i in mirror(side):",
-        "leg(at=(0, 0, width))",
-        "# width = 2",
-        "def low(width=3):",
-    ):
-        assert pieces(line, names) is None
 
 
 def test_listing_shows_programs_as_they_are_written():

@@ -123,11 +123,7 @@ def crease_normals(vertices: Vertices, faces: Faces, angle: float = 40.0) -> Ver
     from scipy.sparse.csgraph import connected_components
 
     area, flat = triangle_normals(vertices, faces)
-    ends = np.sort(np.stack([faces, np.roll(faces, -1, 1)], -1), -1).reshape(-1, 2)
-    edge = ends[:, 0] * len(vertices) + ends[:, 1]
-    order = np.argsort(edge, kind="stable")
-    shared = edge[order[1:]] == edge[order[:-1]]
-    pairs = np.stack([order[:-1][shared], order[1:][shared]]) // 3
+    pairs = _shared_edges(faces) // 3
     pairs = pairs[:, (flat[pairs[0]] * flat[pairs[1]]).sum(1) > np.cos(np.radians(angle))]
     links = coo_array((np.ones(pairs.shape[1]), pairs), (len(faces), len(faces)))
     _, surface = connected_components(links, directed=False)
@@ -137,6 +133,28 @@ def crease_normals(vertices: Vertices, faces: Faces, angle: float = 40.0) -> Ver
     size = np.linalg.norm(total, axis=1, keepdims=True)
     normals: Vertices = np.where(size > 1e-30, total / np.where(size > 1e-30, size, 1), np.repeat(flat, 3, 0))
     return normals.reshape(-1, 3, 3)
+
+
+def crease_edges(faces: Faces, normals: Vertices) -> Faces:
+    """The edges of triangles (F, 3) across which the normals (F, 3, 3) of their corners jump, and those at borders.
+
+    An edge (E, 2) is given by its ends as indices of corners, 3 for each triangle.
+    """
+    across = (normals + np.roll(normals, -1, 1)).reshape(-1, 3)
+    across /= np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-12)
+    one, other = _shared_edges(faces)
+    smooth = (across[one] * across[other]).sum(1) > 0.77  # 40 degrees
+    start = np.delete(np.arange(faces.size), np.concatenate([one[smooth], other]))
+    return np.stack([start, start - start % 3 + (start + 1) % 3], 1)
+
+
+def _shared_edges(faces: Faces) -> Faces:
+    """Pairs (2, P) of edges with the same ends; edge 3 f + k goes from corner k of triangle f to the next."""
+    ends = np.sort(np.stack([faces, np.roll(faces, -1, 1)], -1), -1).reshape(-1, 2)
+    edge = ends[:, 0] * (faces.max(initial=0) + 1) + ends[:, 1]
+    order = np.argsort(edge, kind="stable")
+    shared = edge[order[1:]] == edge[order[:-1]]
+    return np.stack([order[:-1][shared], order[1:][shared]])
 
 
 def triangle_normals(vertices: Vertices, faces: Faces) -> tuple[Vertices, Vertices]:

@@ -17,7 +17,7 @@ from shapeprog.language.ast import (
     changed_values,
 )
 from shapeprog.language.evaluate import provenance
-from shapeprog.language.expression import Name, Value, replaced
+from shapeprog.language.expression import Name, Value, replaced, text_of
 from shapeprog.language.printer import printed, source_of
 from shapeprog.language.program import Program
 from shapeprog.language.unit import Unit
@@ -39,12 +39,15 @@ class Row:
         The role or statement in whose colour it is shown, if it draws, else empty.
     blocks
         Indices, from 0, of the drawing statements of the expanded program that it draws or repeats.
+    numbers
+        The names that it assigns, each with its value as printed, in this order.
     """
 
     text: str
     word: str = ""
     role: str = ""
     blocks: tuple[int, ...] = ()
+    numbers: tuple[tuple[str, str], ...] = ()
 
 
 def listing(program: Program, digits: int | None = DIGITS) -> list[Row]:
@@ -57,7 +60,8 @@ def listing(program: Program, digits: int | None = DIGITS) -> list[Row]:
     rows = []
     for (text, _), (_, line) in zip(printed(shown), printed(source), strict=True):
         if line is None or isinstance(line, Comment | Assignment):
-            rows.append(Row(text))
+            numbers = line.numbers if isinstance(line, Assignment) else ()
+            rows.append(Row(text, numbers=tuple((name, text_of(value)) for name, value in numbers)))
             continue
         block_numbers = tuple(blocks.get(id(line), ()))
         word, role = _word(line), ""

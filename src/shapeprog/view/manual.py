@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 
 from shapeprog.errors import ShapeProgError, did_you_mean
 from shapeprog.language.parameters import Parameter
@@ -17,54 +18,9 @@ UNITS = {
 }  # fmt: skip
 """Unit of each kind of parameter, as it follows the kind."""
 
-
-_PROGRAM = """\
-A program: parts that are placed from the sides of a box
-  # unit: cm                                mm, cm, m or in; may be left out
-  width, depth, height = 140, 60, 74        size of the whole, on one line; only names stand above it
-  thickness = 2.5                           a number for others: names, + - * / and parentheses
-  top(top=0, height=thickness)              a role alone is a box
-  leg(cylinder(left=4, front=4, radius=3))  a role around another solid
-  def shelf_pair(gap=2):                    a function draws in the box of its call
-      shelf(bottom=gap, height=2)
-  shelf_pair(gap=5, right=0, width=40)
-
-Keywords of a box: x points right, y to the rear, z up; left and right as seen from the front
-  left right width x    front rear depth y    bottom top height z
-  left=3, width=20      from a side; sides are distances inwards
-  left=3, right=3       between two sides
-  x=5, width=20         x, y and z are offsets of the middle from that of the box around
-  width=20              in the middle; height=20 is at the bottom
-  (none)                the full extent of the box around
-  at(left=3, top=0)     a point, of at most one side or offset for each axis"""
-
-_DOCS = {
-    "box": "a box",
-    "cushion": "a box with rounded edges",
-    "cylinder": "an upright cylinder, of its radius or of the width or depth of its box",
-    "rod": "a round rod between two points, or upright in a box",
-    "taper": "a round rod with another radius at each end, between two points or upright in a box",
-    "bar": "a bar between two points; two of width, depth and height are its sizes across",
-    "bent_rod": "a round rod along the circle from start through a second point to end",
-    "inside": "a box in which the lines below are placed",
-    "divide": "the lines below in that many equal boxes, along x, y or z",
-    "mirror": "the lines below and their mirror image, about a plane through the point; two axes give four copies",
-    "rotate": "copies about the vertical axis through a point, by default the middle",
-    "translate": "copies, each moved by x, y and z from the one before",
-    "row": "evenly spaced copies; last= places the first part of the last copy",
-    "edge": "radius of the edges",
-    "radius": "one radius, or (first, second) for the two ends of a taper",
-    "tilt": "degrees by which it leans to the rear, about the bottom front edge of its box",
-    "lean": "length by which its top is shifted to the rear",
-    "turn": "degrees about its own axis",
-    "gap": "distance between the boxes",
-    "step": "degrees from copy to copy, by default the full circle divided by their number",
-    "last": "keywords of a point, as in last=at(top=2)",
-    "start": "a point, as in start=at(left=3, top=0)",
-    "through": "a point",
-    "end": "a point; axes without a keyword are those of start",
-}
-"""The words of placed text."""
+_PROGRAM, _WORDS = Path(__file__).with_suffix(".txt").read_text(encoding="utf-8").split("\n---\n")
+_DOCS = dict(line.split(": ", 1) for line in _WORDS.splitlines())
+"""The words of placed text, each with its meaning."""
 
 
 def manual(name: str | None = None) -> str:

@@ -74,7 +74,8 @@ def of_mesh(vertices: Array, faces: Array) -> Model:
     extent = max(float(np.ptp(vertices, axis=0).max(initial=0)), 1e-30)
     unique_rows: Any = trimesh.grouping.unique_rows
     first, place = unique_rows((vertices - vertices.min(0, initial=np.inf)) / extent, digits=6)
-    return _plain(vertices, faces, crease_normals(vertices[first], place[faces]))
+    vertices, faces = vertices[first], place[faces]
+    return _plain(vertices, faces, crease_normals(vertices, faces))
 
 
 def of_cells(cells: Array) -> Model:
@@ -92,10 +93,9 @@ def of_cells(cells: Array) -> Model:
             quad = np.stack([corner, corner + first_edge, corner + first_edge + second_edge, corner + second_edge], 1)
             corners.append(quad if sign > 0 else quad[:, ::-1])
             normals.append(np.tile(sign * np.eye(3)[axis], (2 * len(corner), 3, 1)))
-    vertices = np.concatenate(corners).reshape(-1, 3) * size - RESOLUTION / 2
-    first = 4 * np.arange(len(vertices) // 4)[:, None]
-    faces = (first + np.array([0, 1, 2, 0, 2, 3])).reshape(-1, 3)
-    return _plain(vertices, faces, np.concatenate(normals))
+    vertices, index = np.unique(np.concatenate(corners).reshape(-1, 3), axis=0, return_inverse=True)
+    faces = index.reshape(-1, 4)[:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3)
+    return _plain(vertices * size - RESOLUTION / 2, faces, np.concatenate(normals))
 
 
 def of_points(points: Array) -> Model:

@@ -1,31 +1,66 @@
 """An interactive view as one self-contained HTML file: turn the shape, relate lines to parts, and drag the
-numbers of a program."""
+numbers of a program.
+
+The page cannot draw statements, which may be a user's own.  It has the meshes for the smallest and the largest value of
+each number and interpolates linearly between them and the written one, which is exact wherever corners depend linearly
+on a number.
+"""
 
 from __future__ import annotations
 
 import base64
 import json
 import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from shapeprog.data.shape import Shape
-from shapeprog.errors import OutputError
+from shapeprog.errors import OutputError, ShapeProgError
 from shapeprog.files import write_text
 from shapeprog.formats.colours import colour
 from shapeprog.formats.frames import frame_comment
-from shapeprog.formats.parts import parts
+from shapeprog.formats.parts import Part, crease_edges, part_normals, parts
+from shapeprog.language.dimensions import lengths
+from shapeprog.language.named import Named, names, set
 from shapeprog.language.program import Program
+from shapeprog.language.unit import Unit
 from shapeprog.space import Array, Frame
-from shapeprog.view.listing import digits_in, listing, parted
+from shapeprog.view.listing import Row, digits_in, listing, parted
 from shapeprog.view.model import FINE, of_cells, of_shape
 from shapeprog.view.page import readable, scores_text
-from shapeprog.view.sliders import Slider, corners_of, pieces, sliders
 
-_TO_PAGE = np.array([[0.0, 0.0, -1.0], [1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
+PAGE = Frame(axes=((0.0, 0.0, -1.0), (1.0, 0.0, 0.0), (0.0, -1.0, 0.0)))
 """From grid axes (up, depth, left-right) to page axes (right, up, towards the viewer)."""
+
+REACH = 0.5  # farthest from a number that its slider goes, as a share of it, within the range of the name
+LEAST = 1.0  # magnitude assumed for smaller numbers, so that a zero can be dragged; for lengths in cells
+STILL = 1e-4  # movement in cells below which a part counts as fixed
+MOST = 400_000  # most triangle corners of all meshes of a page; with more it has no sliders
+
+
+@dataclass(frozen=True)
+class Slider:
+    """A number to drag.
+
+    Parameters
+    ----------
+    name, value
+        Its name and value.
+    unit
+        Unit of a length that is not in cells, else empty.
+    ends
+        For its smallest and its largest value the corners (F, 3, 6) of the triangles of each part, positions and
+        normals; ``None`` for parts that do not move.
+    """
+
+    name: str
+    value: float
+    unit: str
+    ends: dict[float, list[Array | None]]
 
 
 def viewer(
@@ -34,7 +69,7 @@ def viewer(
     *,
     shape: Shape | None = None,
     title: str = "",
-    scores: Any = None,
+    scores: Mapping[str, float] | None = None,
     frame: Frame | None = None,
 ) -> Path:
     """Write the page: the program next to its parts, and the input if there is one.
@@ -59,91 +94,116 @@ def viewer(
     OutputError
         If the file cannot be written, or the program has more than ``FINE`` triangles.
     """
-    shown_parts = parts(program)
-    if (triangles := sum(len(part.faces) for part in shown_parts)) > FINE:
+    drawn = parts(program, PAGE)
+    if (triangles := sum(len(part.faces) for part in drawn)) > FINE:
         raise OutputError(
-            f"the {len(shown_parts)} parts of this program have {triangles} triangles: a page holds at most {FINE}",
+            f"the {len(drawn)} parts of this program have {triangles} triangles: a page holds at most {FINE}",
             "lower the counts, or draw a picture",
         )
-    # No browser opens a page of hundreds of megabytes, so such a mesh is shown as cells.
-    large = shape is not None and shape.faces is not None and len(shape.faces) > FINE
-    model = None if shape is None else of_cells(shape.voxels) if large else of_shape(shape)
-    vertices = [part.vertices for part in shown_parts] + ([] if model is None else [model.vertices])
-    points = np.concatenate([*vertices, np.zeros((0, 3))])
-    points = points if len(points) else np.zeros((1, 3))
+    given = None if shape is None else _input(shape)
+    points = np.concatenate([part.vertices for part in drawn] + [np.zeros((1, 3)) if given is None else given[0]])
     low, high = points.min(0), points.max(0)
-    movable = sliders(program, shown_parts)
+    target = Path(path)
     content = {
         "frame": frame_comment(frame, program),
-        "title": title or (shape.name if shape is not None else Path(path).stem),
+        "title": title or (shape.name if shape is not None else target.stem),
         "facts": " · ".join(scores_text(scores, program)),
-        "middle": (_TO_PAGE @ ((low + high) / 2)).tolist(),
+        "middle": ((low + high) / 2).tolist(),
         "radius": max(1.0, float(np.linalg.norm(high - low)) / 2),
-        "lines": [_line(line, [slider.name for slider in movable]) for line in listing(program, None)],
+        "lines": [_line(row) for row in listing(program, None)],
         "parts": [
             {"name": part.name, "block": part.block, "colour": [channel / 255 for channel in colour(part.word)]}
-            | _buffers(corners)
-            for part, corners in zip(shown_parts, corners_of(shown_parts), strict=True)
+            | _buffers(part.vertices, part.faces, normals)
+            for part, normals in zip(drawn, part_normals(drawn), strict=True)
         ],
-        "sliders": [_slider(slider) for slider in movable],
+        "sliders": [_slider_content(slider) for slider in sliders(program, drawn)],
         "digits": digits_in(program.unit),
-        "input": None if model is None else _buffers(np.concatenate([model.vertices[model.faces], model.normals], -1)),
+        "input": None if given is None else _buffers(*given),
     }
     text = json.dumps(content, separators=(",", ":")).replace("<", "\\u003c")
-    target = Path(path)
     write_text(target, Path(__file__).with_suffix(".html").read_text(encoding="utf-8").replace("@DATA@", text))
     return target
 
 
-def _line(line: Any, movable: list[str]) -> dict[str, Any]:
-    before, word, after = parted(line)
-    record = {"before": before, "word": word, "after": after, "blocks": list(line.blocks), "colour": None, "ink": None}
-    if line.role:
-        record["colour"] = "rgb({}, {}, {})".format(*colour(line.role))
-        record["ink"] = "rgb({}, {}, {})".format(*readable(line.role))
-    return record | {"pieces": pieces(line.text, movable)}
+def sliders(program: Program, drawn: Sequence[Part]) -> list[Slider]:
+    """The free numbers of a program, except for those that change how many parts there are or how they are divided.
+
+    Parameters
+    ----------
+    drawn
+        The parts of the unchanged program on the page.
+    """
+    free = [named for named in names(program) if named.free]
+    if len(free) * 2 * sum(3 * len(part.faces) for part in drawn) > MOST:
+        return []
+    unit, measured, start = program.unit, lengths(program), corners_of(drawn)
+    result = []
+    for named in free:
+        own_unit = unit if named.name in measured else None
+        tried = {end: _moved(program, start, {named.name: end}) for end in _range(named, own_unit)}
+        ends = {end: corners for end, corners in tried.items() if corners is not None}
+        if any(part is not None for corners in ends.values() for part in corners):
+            result.append(Slider(named.name, named.value, own_unit.name if own_unit else "", ends))
+    return result
 
 
-def _slider(slider: Slider) -> dict[str, Any]:
-    steps = [
-        {"at": at, "parts": [None if part is None else _packed(_turned(part)) for part in meshes]}
-        for at, meshes in sorted(slider.places.items())
+def corners_of(drawn: Sequence[Part]) -> list[Array]:
+    """The corners of the triangles of parts (F, 3, 6): positions and normals."""
+    return [
+        np.concatenate([part.vertices[part.faces], normals], -1)
+        for part, normals in zip(drawn, part_normals(drawn), strict=True)
     ]
-    ends = {"low": slider.low, "high": slider.high, "unit": slider.unit}
-    return {"name": slider.name, "value": slider.value, **ends, "places": steps}
 
 
-def _buffers(corners: Array) -> dict[str, str]:
-    """Triangles (F, 3, 6) as positions and normals in the axes of the page, and creases as pairs of their corners."""
-    return {
-        "triangles": _packed(_turned(corners)),
-        "creases": _packed(_creases(corners[..., :3], corners[..., 3:]), "<u4"),
-    }
+def _range(named: Named, unit: Unit | None) -> list[float]:
+    """The ends of the slider of a number that differ from it."""
+    size = REACH * max(abs(named.value), LEAST if unit is None else LEAST * unit.per_cell)
+    low, high = named.range or (named.value, named.value)
+    ends = max(low, named.value - size), min(high, named.value + size)
+    return [end for end in ends if end != named.value]
 
 
-def _turned(corners: Array) -> Array:
-    """Positions and normals in the axes of the page."""
-    return np.concatenate([corners[..., :3] @ _TO_PAGE.T, corners[..., 3:] @ _TO_PAGE.T], -1)
+def _moved(program: Program, start: Sequence[Array], changes: Mapping[str, float]) -> list[Array | None] | None:
+    """The corners of moving parts of a changed program; none at all if it has other parts."""
+    try:
+        corners = corners_of(parts(set(program, changes), PAGE))
+    except ShapeProgError:
+        return None
+    if [part.shape for part in corners] != [part.shape for part in start]:
+        return None
+    pairs = zip(start, corners, strict=True)
+    return [None if np.abs(after - before).max(initial=0) < STILL else after for before, after in pairs]
 
 
-def _creases(corners: Array, normals: Array) -> Array:
-    """Indices (E, 2) of the corners, over all triangles, at the ends of creases."""
-    starts, ends = corners.reshape(-1, 3), np.roll(corners, -1, 1).reshape(-1, 3)
-    tilt = np.asarray(normals).reshape(-1, 3) + np.roll(normals, -1, 1).reshape(-1, 3)
-    extent = float(np.ptp(corners.reshape(-1, 3), axis=0).max()) if len(corners) else 1.0
-    inside = np.stack([starts, ends], 1) - corners.reshape(-1, 3).min(0, initial=np.inf)
-    keys = np.rint(inside / max(extent, 1e-30) * 1e5).astype(np.int64)
-    swap = [tuple(start) > tuple(end) for start, end in keys.tolist()]
-    keys[swap] = keys[swap][:, ::-1]
-    _, first, edge, count = np.unique(
-        keys.reshape(-1, 6), axis=0, return_index=True, return_inverse=True, return_counts=True
-    )
-    total = np.zeros((len(first), 3))
-    np.add.at(total, edge.reshape(-1), tilt / np.maximum(np.linalg.norm(tilt, axis=1, keepdims=True), 1e-12))
-    sharp = (count == 1) | (np.linalg.norm(total, axis=1) < 0.94 * count)
-    sharp &= (keys[first, 0] != keys[first, 1]).any(1)
-    corner = first[sharp]
-    return np.stack([corner, corner - corner % 3 + (corner % 3 + 1) % 3], 1)
+def _input(shape: Shape) -> tuple[Array, Array, Array]:
+    """The vertices, faces and normals of an input on the page."""
+    # No browser opens a page of hundreds of megabytes, so such a mesh is shown as cells.
+    large = shape.faces is not None and len(shape.faces) > FINE
+    model = of_cells(shape.voxels) if large else of_shape(shape)
+    return PAGE.to_world(model.vertices), model.faces, PAGE.to_world(model.normals)
+
+
+def _line(row: Row) -> dict[str, Any]:
+    before, word, after = parted(row)
+    record = {"before": before, "word": word, "after": after, "blocks": row.blocks, "numbers": row.numbers}
+    shades = {"colour": colour(row.role), "ink": readable(row.role)} if row.role else {}
+    return record | {key: "rgb({}, {}, {})".format(*shade) for key, shade in shades.items()}
+
+
+def _slider_content(slider: Slider) -> dict[str, Any]:
+    places = [
+        {"at": at, "parts": [None if part is None else _packed(part) for part in corners]}
+        for at, corners in slider.ends.items()
+    ]
+    values = [slider.value, *slider.ends]
+    ends = {"low": min(values), "high": max(values), "unit": slider.unit}
+    return {"name": slider.name, "value": slider.value, **ends, "places": places}
+
+
+def _buffers(vertices: Array, faces: Array, normals: Array) -> dict[str, str]:
+    """Triangles as positions and normals of corners, and creases as pairs of corners."""
+    corners = np.concatenate([vertices[faces], normals], -1)
+    return {"triangles": _packed(corners), "creases": _packed(crease_edges(faces, normals), "<u4")}
 
 
 def _packed(values: Array, kind: str = "<f4") -> str:

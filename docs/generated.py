@@ -9,7 +9,6 @@ from typing import Any
 import typer
 
 from shapeprog.cli.app import app
-from shapeprog.cli.help import help_record
 from shapeprog.language import Statement, language
 from shapeprog.language.parameters import Parameter
 from shapeprog.language.statement import END
@@ -66,8 +65,8 @@ def _command(command: Any, context: Any) -> Iterator[str]:
             yield f"```text{paragraph[1:]}\n```\n"
         else:
             yield f"{_plain(paragraph)}\n"
-    records = [help_record(option, context) for option in command.get_params(context) if option.name != "help"]
-    rows = [(f"`{names}`", _plain(text)) for names, text in records]
+    records = [each.get_help_record(context) for each in command.get_params(context) if each.name != "help"]
+    rows = [(f"`{re.sub(r' <.*>$', '', names)}`", _plain(text)) for names, text in records]  # without Python types
     yield from _table("argument or option", "meaning", rows=rows) if rows else ()
     for name in command.list_commands(context) if hasattr(command, "list_commands") else ():
         inner = command.get_command(context, name)

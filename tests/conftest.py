@@ -85,3 +85,17 @@ def run(capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.
         return Ended(code if isinstance(code, int) else 0, told.out, told.err)
 
     return call
+
+
+@pytest.fixture
+def quick(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Inference that always finds the same table, at once."""
+    from commands import PROGRAM
+
+    from shapeprog import inference
+
+    def infer(shape, *, progress, **_):
+        progress("searching", 0.5)
+        return inference.Result(PROGRAM, PROGRAM.snap(), {"odd": float("nan")}, "Stopped at once.", (), seconds=0.1)
+
+    monkeypatch.setattr(inference, "infer", infer)

@@ -28,6 +28,7 @@ def names(ended: Ended, *bad: str) -> None:
     assert not PYTHON.search(told), told
 
 
+@pytest.mark.usefixtures("quick")
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_bad_file_between_two_good_ones_is_told_at_the_end_by_every_command(run: Run, tmp_path: Path, kind: str):
     if "h5" in kind or kind.startswith("hdf5"):
@@ -37,7 +38,7 @@ def test_a_bad_file_between_two_good_ones_is_told_at_the_end_by_every_command(ru
     first, last = (table(folder / f"{name}.obj") for name in ("a_good", "z_good"))
     bad = BAD[kind](folder)
     within = bad in files_below(folder, readable_suffixes(), [])  # else it is only there for who names it
-    ended = run("infer", first, bad, last, "--out", "res", "--no-picture", "--baseline")
+    ended = run("infer", first, bad, last, "--out", "res", "--no-picture")
     names(ended, bad.name)
     assert sorted(path.name for path in (tmp_path / "res").glob("*.json")) == ["a_good.json", "z_good.json"]
     ended = run("prepare", "in", "packs")
@@ -50,11 +51,12 @@ def test_a_bad_file_between_two_good_ones_is_told_at_the_end_by_every_command(ru
         assert [row["name"] for row in json.loads(ended.out)["rows"]] == ["a_good", "z_good"]
 
 
+@pytest.mark.usefixtures("quick")
 @pytest.mark.wrong_types  # a pack is a sequence, which the checker looks into
 def test_bad_shapes_of_a_pack_between_two_good_ones_are_told_and_the_others_inferred(run: Run, tmp_path: Path):
     sides = {"first": 1.0, "hollow": 1.0, "tiny": 5e-324, "vast": 1.7e308, "unknown": np.nan, "last": 1.0}
     voxels = np.stack([np.packbits(CELLS & (name != "hollow")) for name in sides])
     written(tmp_path / "few.npz", npz(ids=np.array([*sides]), voxels=voxels, longest_side=np.array([*sides.values()])))
-    ended = run("infer", "few.npz", "--out", "res", "--no-picture", "--baseline")
+    ended = run("infer", "few.npz", "--out", "res", "--no-picture")
     names(ended, "hollow", "tiny", "vast", "unknown")
     assert sorted(path.stem for path in (tmp_path / "res").glob("*.json")) == ["first", "last"]

@@ -96,15 +96,7 @@ def test_meshes_are_exported_in_the_unit_that_is_asked_for(run: Run, tmp_path: P
         found = wide(tmp_path / name)[[0, 2, 1] if name.endswith(".stl") else [0, 1, 2]]  # makers have z up
         np.testing.assert_allclose(found, factor * in_metres, atol=4e-2 * factor * FRAME.scale)
     ended = run("export", "table.shape", "a.npy", "--unit", "mm")
-    assert (ended.code, "--unit has no effect on a.npy" in ended.err) == (2, True), ended.err
-
-
-def test_baselines_are_in_the_unit_too(run: Run, tmp_path: Path) -> None:
-    ended = run("infer", table(tmp_path / "table.obj"), "--baseline", "--unit", "in", "--no-picture", "--out", "res")
-    assert ended.code == 0, ended.err
-    unit = load(tmp_path / "res" / "table.shape").unit
-    assert unit is not None
-    assert unit.name == "in"
+    assert (ended.code, "--unit has no effect on .npy" in ended.err) == (2, True), ended.err
 
 
 def test_export_writes_programs_in_another_unit(run: Run, tmp_path: Path) -> None:

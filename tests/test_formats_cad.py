@@ -281,17 +281,17 @@ rail(bent_rod(start=at(left=0), through=at(x=0, bottom=40), end=at(right=0), rad
 def test_a_cut_list_has_each_distinct_part_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
     program = parse(CABINET)
     found = cut_list(program, upright(program, "a.csv"), "cm")
-    rows = {(count, cut.role, cut.size, cut.shape) for cut, count in found.cuts}
+    rows = {(count, *cut) for cut, count in found.cuts}
     arc = 2 * 40 * math.atan2(40, 40) * 2
     assert rows == {
-        (2, "side", "60 x 40 x 1.8", "board"),
-        (1, "panel", "76 x 60 x 0.8", "board"),
-        (1, "shelf", "76.4 x 40 x 1.8", "board"),
-        (4, "foot", "⌀ 4 x 10", "round"),
-        (4, "foot", "⌀ 4 x 8", "tapered from 2 to 4"),
-        (1, "seat", "80 x 40 x 6", "rounded edges 2"),
-        (1, "back", "80 x 60 x 2", "leaning by 5"),
-        (1, "rail", f"⌀ 2 x {round(arc, 2):g}", "bent"),
+        (2, "side", "board", 60, 40, 1.8, 0),
+        (1, "panel", "board", 76, 60, 0.8, 0),
+        (1, "shelf", "board", 76.4, 40, 1.8, 0),
+        (4, "foot", "round", 10, 0, 0, 4),
+        (4, "foot", "tapered from 2 to 4", 8, 0, 0, 4),
+        (1, "seat", "rounded edges 2", 80, 40, 6, 0),
+        (1, "back", "leaning by 5", 80, 60, 2, 0),
+        (1, "rail", "bent", round(arc, 2), 0, 0, 2),
     }
     assert found.coinciding == 1
     assert found.area == "1.24 m²"  # two sides, a panel, a shelf

@@ -44,7 +44,7 @@ def test_whole_numbers_of_any_length_are_refused_in_words(digits: int) -> None:
         program_from_json(program_to_json(PROGRAM).replace("(1, ", f"({number}, "))
     with pytest.raises(ShapeProgError, match=words):
         parse(LEG.replace("1", number))
-    with pytest.raises(ProgramError, match="not a positive number"):
+    with pytest.raises(ProgramError, match="no frame of a text"):
         program_in(f"# placed: up y, front z, origin 0 0 0, 1 unit = {number + '0' * 300}\n{LEG}", "x")
 
 
@@ -155,7 +155,7 @@ def test_the_input_is_opened_only_beside_its_program_or_where_the_user_says(
     path.write_text(program_to_json(PROGRAM, source=source.format(places)))
     opened: list[str] = []
     monkeypatch.setattr(data, "load", lambda place: opened.append(str(place)) or PLATE)
-    found = writing._input_of(read_result(path), None if named is None else places / named)
+    found, _ = writing._input_and_scores(path, None if named is None else places / named)
     assert (len(opened), found is not None) == ((1, True) if shown else (0, False))
 
 

@@ -38,6 +38,7 @@ def _shape_file(path: Path) -> Iterator[Use]:
 def _program_file(path: Path, out: Path) -> Iterator[Use]:
     """Read, unroll, draw, export and show a program; nothing follows where it cannot be read."""
     import shapeprog as sp
+    from shapeprog.cli import terminal
     from shapeprog.cli.writing import show_command
     from shapeprog.formats.format import suffixes
     from shapeprog.geometry.mesh import part_meshes, union_mesh
@@ -56,7 +57,8 @@ def _program_file(path: Path, out: Path) -> Iterator[Use]:
     for suffix in suffixes():
         if suffix not in (".step", ".stp"):  # through build123d, a second for each part
             yield f"export {suffix}", lambda: sp.export(program, out / f"program{suffix}", frame)  # noqa: B023
-    yield "show", lambda: show_command(path, out / "page.html", quiet=True)
+    terminal.quiet = True
+    yield "show", lambda: show_command(path, out / "page.html")
 
 
 def _raised(found: Iterable[Any]) -> None:

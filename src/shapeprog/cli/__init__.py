@@ -22,8 +22,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     words = sys.argv[1:] if arguments is None else arguments
     terminal.write_anything()
     terminal.debugging = "--debug" in words  # wherever it stands
+    terminal.quiet = "--quiet" in words or "-q" in words
     try:
-        app(args=[word for word in words if word != "--debug"], prog_name="shapeprog")
+        app(args=[word for word in words if word not in ("--debug", "--quiet", "-q")], prog_name="shapeprog")
     except SystemExit as stop:
         if arguments is None and isinstance(stop.code, int | None):
             _leave(stop.code or 0, stop.code == terminal.INTERRUPTED)

@@ -11,7 +11,6 @@ from typing import Annotated
 import typer
 
 from shapeprog.cli import changes, inferring, libraries, measuring, sampling, terminal, tidying, writing
-from shapeprog.cli.help import GroupedCommand, GroupedCommands
 from shapeprog.liang2022.cli import app as paper
 
 # Before torch is loaded: its idle workers would spin on the cores that the kernels of other threads want.
@@ -22,8 +21,7 @@ app = typer.Typer(
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
-    rich_markup_mode=None,
-    cls=GroupedCommands,
+    rich_markup_mode="rich",
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
 )
 
@@ -31,7 +29,7 @@ PROGRAMS, OUTPUT, RESEARCH = "From shapes to programs", "View and export program
 """Headings of the list of commands."""
 
 for name, command, panel in (
-    ("infer", terminal.with_options(inferring.infer_command, inferring.InferOptions), PROGRAMS),
+    ("infer", inferring.infer_command, PROGRAMS),
     ("tidy", tidying.tidy_command, PROGRAMS),
     ("statements", writing.statements_command, PROGRAMS),
     ("export", writing.export_command, OUTPUT),
@@ -44,9 +42,9 @@ for name, command, panel in (
 ):
     app.command(name, cls=changes.ChangingCommand, rich_help_panel=panel)(terminal.guarded(command))
 
-library = typer.Typer(no_args_is_help=True, cls=GroupedCommands, rich_markup_mode=None)
-library.command("learn", cls=GroupedCommand)(terminal.guarded(libraries.learn_command))
-library.command("show", cls=GroupedCommand)(terminal.guarded(libraries.show_command))
+library = typer.Typer(no_args_is_help=True, rich_markup_mode="rich")
+library.command("learn")(terminal.guarded(libraries.learn_command))
+library.command("show")(terminal.guarded(libraries.show_command))
 app.add_typer(library, name="library", help="Learn functions from programs, or list them.", rich_help_panel=PROGRAMS)
 app.add_typer(
     paper, name="paper", help="Liang (2022): networks, training, adaptation and Table 1.", rich_help_panel=RESEARCH
@@ -66,7 +64,8 @@ def _options(
     version: Annotated[
         bool | None, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")
     ] = False,
-    debug: Annotated[bool, typer.Option("--debug", help="Print the traceback of an error.")] = False,
+    debug: Annotated[bool, typer.Option("--debug", help="Print the traceback of an error; of every command.")] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only; of every command.")] = False,
 ) -> None:
     """Infer short, editable programs from furniture given as meshes, point clouds or voxels.
 

@@ -7,31 +7,25 @@ import re
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-import typer
+from typer.core import TyperCommand
 
-from shapeprog.cli.help import GroupedCommand
 from shapeprog.errors import InputError
 
 if TYPE_CHECKING:
     from shapeprog.language.program import Program
 
 _CHANGE = re.compile(r"([^\W\d]\w*)\s*([-+*/]?)=\s*(.*)", re.DOTALL)
-_SPACED = re.compile(r"([^\W\d]\w*)\b ?(?:([-+*/]?)= ?)?(-?[\d.]+)(?: .*)?", re.DOTALL)
-_APPLY = {"+": operator.add, "-": operator.sub, "*": operator.mul, "/": operator.truediv}
+_APPLY = {"": lambda _, number: number, "+": operator.add, "-": operator.sub, "*": operator.mul, "/": operator.truediv}
 
 
-class ChangingCommand(GroupedCommand):
+class ChangingCommand(TyperCommand):
     """A command whose option ``--set`` takes all the changes that follow it."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Read the words of the command line, with the option before each change."""
         words: list[str] = []
-        for index, word in enumerate(args):
-            spaced = _SPACED.fullmatch(" ".join(args[index + 1 : index + 4]))
-            if word == "--set" and spaced and not re.search("=.", args[index + 1]):
-                name, sign, number = spaced.groups(default="")
-                raise typer.BadParameter(f"--set {name} lacks its number; write --set {name}{sign}={number}", ctx)
-            following = len(words) > 1 and words[-2] == "--set" and _CHANGE.fullmatch(word)
+        for word in args:
+            following = "--set" in words[-2:-1] and _CHANGE.fullmatch(word)
             words += ["--set", word] if following else [word]
         return super().parse_args(ctx, words)
 
@@ -60,8 +54,7 @@ def changed(program: Program, changes: Sequence[str]) -> Program:
         name, sign, text = match.groups()
         try:
             number = float(text)
-            before = wanted.get(name, values.get(name, number))
-            wanted[name] = _APPLY[sign](before, number) if sign else number
+            wanted[name] = _APPLY[sign](wanted.get(name, values.get(name, number)), number)
         except ValueError:
             raise InputError(f"{change!r}: {text!r} is not a number", "write a number such as 11 or 1.2") from None
         except ZeroDivisionError:

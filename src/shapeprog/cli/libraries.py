@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -13,7 +12,6 @@ from shapeprog.errors import InputError, ShapeProgError
 
 if TYPE_CHECKING:
     from shapeprog.library import Library
-    from shapeprog.view import Item
 
 Sheet = Annotated[Path | None, typer.Option(metavar="FILE", help="Picture of the functions, such as library.png.")]
 
@@ -24,7 +22,6 @@ def learn_command(
     most: Annotated[int, typer.Option(metavar="N", help="Maximum number of functions.", min=1, max=100)] = 12,
     sheet: Sheet = None,
     modules: terminal.With = None,
-    quiet: terminal.Quiet = False,
 ) -> None:
     """Learn the functions that shorten a collection of programs most.
 
@@ -35,11 +32,12 @@ def learn_command(
     """
     from dataclasses import replace
 
+    from shapeprog.formats.files import program_files
     from shapeprog.language.ast import Comment
     from shapeprog.library import learn, save_library
 
     terminal.load_modules(modules)
-    paths = [path for folder in folders for path in _files(folder)]
+    paths = [path for folder in folders for path in ([folder] if folder.is_file() else program_files(folder))]
     programs = [terminal.read_program_file(path)[0] for path in paths]
     library = learn(programs, most)
     if not library.functions:
@@ -48,10 +46,9 @@ def learn_command(
     command = f"shapeprog library learn {' '.join(map(str, folders))} --out {out}"
     library = replace(library, source=replace(library.source, lines=(Comment(command), *library.source.lines)))
     save_library(library, out)
-    _draw(library, sheet)
-    if not quiet:
-        for path in (out, *([sheet] if sheet else [])):
-            terminal.output().print(f"wrote {path}: {len(library.functions)} functions from {len(programs)} programs")
+    terminal.say(f"wrote {out}: {len(library.functions)} functions from {len(programs)} programs")
+    if sheet is not None:
+        _draw(library, sheet)
 
 
 def show_command(
@@ -70,31 +67,18 @@ def show_command(
 
     terminal.load_modules(modules)
     library = load_library(file)
-    _draw(library, sheet)
-    if sheet:
-        terminal.output().print(f"wrote {sheet}: {len(library.functions)} functions")
+    if sheet is not None:
+        _draw(library, sheet)
     else:
         terminal.output().print(format_source(library.source).rstrip("\n"))
 
 
-def _files(folder: Path) -> list[Path]:
-    from shapeprog.formats.files import program_files
-
-    return [folder] if folder.is_file() else program_files(folder)
-
-
-def _draw(library: Library, sheet: Path | None) -> None:
-    from shapeprog.view import contact_sheet
-
-    if sheet is not None:
-        contact_sheet(list(_items(library)), sheet)
-
-
-def _items(library: Library) -> Iterator[Item]:
-    """Each function as its typical call draws it."""
+def _draw(library: Library, sheet: Path) -> None:
+    """Draw a sheet of all functions, each as its typical call draws it."""
     from shapeprog.language.program import Program
-    from shapeprog.view import Item
+    from shapeprog.view import Item, contact_sheet
 
+    items = []
     for pattern in library.patterns:
         name = pattern.function.name
         try:
@@ -103,4 +87,6 @@ def _items(library: Library) -> Iterator[Item]:
             message = f"{name} cannot be drawn: {fault.message}"
             raise InputError(message, "show a typical call in a comment above it") from None
         used = next((line for line in library.comments[name] if line.startswith("used ")), "")
-        yield Item(name, None, program, used.removesuffix(", such as"))
+        items.append(Item(name, None, program, used.removesuffix(", such as")))
+    contact_sheet(items, sheet)
+    terminal.say(f"wrote {sheet}: {len(items)} functions")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -16,17 +17,14 @@ if TYPE_CHECKING:
     from shapeprog.evaluation.metrics import Metrics, Summary
 
 _LABELS = {
-    "f1_half_percent": "F1@.5%", "f1_half_percent_floor": "F1@.5% floor", "f1_percent": "F1@1%",
-    "f1_percent_floor": "F1@1% floor", "normals": "normals", "normals_floor": "normals floor",
-    "silhouette": "silhouette", "one_piece": "one piece", "slivers": "slivers",
-    "part_recall": "part recall", "part_precision": "part precision",
-    "iou": "IoU@32", "cd": "CD", "noise_floor": "CD noise floor", "f1": "F1@1cell",
-    "blocks": "drawing statements", "statements": "statements", "primitives": "parts", "numbers": "free numbers",
+    "f1_percent": "F1@1%", "f1_percent_floor": "F1@1% floor", "silhouette": "silhouette", "one_piece": "one piece",
+    "part_recall": "part recall", "part_precision": "part precision", "cd": "CD", "noise_floor": "CD noise floor",
+    "numbers": "free numbers",
+    "f1_half_percent": "F1@.5%", "f1_half_percent_floor": "F1@.5% floor", "normals": "normals",
+    "normals_floor": "normals floor", "slivers": "slivers", "iou": "IoU@32", "f1": "F1@1cell",
+    "blocks": "drawing statements", "statements": "statements", "primitives": "parts",
 }  # fmt: skip
-_MAIN = (
-    "f1_percent", "f1_percent_floor", "silhouette", "one_piece", "part_recall", "part_precision", "cd", "noise_floor",
-    "numbers",
-)  # fmt: skip
+_MAIN = tuple(_LABELS)[:9]
 _FEW = 5
 _SIZES = ("blocks", "statements", "primitives", "numbers")
 
@@ -40,7 +38,6 @@ def prepare_command(
     seed: terminal.Seed = 0,
     up: terminal.Up = None,
     front: terminal.Front = None,
-    quiet: terminal.Quiet = False,
 ) -> None:
     """Convert a folder of models to data sets (packs) CATEGORY_SPLIT.npz of voxels and points.
 
@@ -52,7 +49,7 @@ def prepare_command(
 
     terminal.check_axes(up, front)
     last = None
-    with terminal.progress(not quiet) as begin:
+    with terminal.progress() as begin:
         report = begin("preparing")
         try:
             for last in prepare(directory, output, points=points, seed=seed, up=up, front=front):
@@ -60,16 +57,11 @@ def prepare_command(
         except KeyboardInterrupt:
             raise terminal.Interrupted(f"finished categories are kept in {output}") from None
     assert last is not None
-    for path, error in last.failures:
-        terminal.complain(terminal.at(path, error))
-    if not quiet:
-        for path, count in last.packs:
-            terminal.output().print(f"wrote {path}: {count} shapes")
-        small = ", ".join(path.name for path, count in last.packs if count < _FEW)
-        if small:
-            terminal.errors().print(f"Few shapes, so scores on them say little: {small}", style="yellow", markup=False)
-    if last.failures:
-        raise typer.Exit(1)
+    for path, count in last.packs:
+        terminal.say(f"wrote {path}: {count} shapes")
+    if small := ", ".join(path.name for path, count in last.packs if count < _FEW):
+        terminal.note(f"Few shapes, so scores on them say little: {small}", "yellow")
+    terminal.finish([terminal.at(path, error) for path, error in last.failures])
 
 
 def evaluate_command(
@@ -87,7 +79,6 @@ def evaluate_command(
     every: Annotated[bool, typer.Option("--all", help="Print all measures, not only the main ones.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print rows and summary as JSON.")] = False,
     modules: terminal.With = None,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Show no progress bar.")] = False,
 ) -> None:
     """Score predictions against targets of the same name.
 
@@ -124,8 +115,8 @@ def evaluate_command(
     shapes, failures = scoring.read_targets(targets, up, front, points, seed)
     listed = list(scoring.predictions(predictions))
     rows: list[Metrics] = []
-    silent = quiet or as_json
-    for path, name, prediction in track(listed, "measuring", console=terminal.errors(), transient=True, disable=silent):
+    hidden = terminal.quiet or as_json
+    for path, name, prediction in track(listed, "measuring", console=terminal.errors(), transient=True, disable=hidden):
         target = next(iter(shapes.values())) if len(shapes) == len(listed) == 1 else shapes.get(name)
         if isinstance(prediction, tuple):
             terminal.warn(path, prediction[0])
@@ -146,17 +137,15 @@ def evaluate_command(
     if not any(row.blocks for row in rows):
         summary = {name: value for name, value in summary.items() if name not in _SIZES}
     if as_json:
-        totals = {name: terminal.plain(asdict(value)) for name, value in summary.items()}
-        shown = [terminal.plain(asdict(row)) for row in rows]
-        terminal.print_json({"seed": seed, "rows": shown, "summary": totals, "missing": missing_names})
+        totals = {name: _finite(value) for name, value in summary.items()}
+        content = {"rows": [_finite(row) for row in rows], "summary": totals, "missing": missing_names}
+        terminal.print_json({"seed": seed, **content})
     else:
         _table(rows, summary if every else {name: summary[name] for name in _MAIN if name in summary}, per_shape, seed)
     if missing_names:
         names = ", ".join(missing_names[:_FEW]) + (", ..." if len(missing_names) > _FEW else "")
-        terminal.errors().print(
-            f"{len(missing_names)} of {len(shapes)} targets have no prediction and are not counted: {names}",
-            markup=False,
-        )
+        without = f"{len(missing_names)} of {len(shapes)} targets"
+        terminal.note(f"{without} have no prediction and are not counted: {names}", "none")
     terminal.finish(failures)
 
 
@@ -167,9 +156,8 @@ def _table(rows: Sequence[Metrics], summary: dict[str, Summary], per_shape: bool
     console = terminal.output()
     names = [name for name in _LABELS if name in summary and summary[name].count]
     if per_shape:
-        table = Table(box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0))
-        table.add_column("shape", min_width=12, overflow="fold")
         shown = [name for name in names if not name.endswith("floor")]
+        table = Table("shape", box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0))
         for name in shown:
             table.add_column(_LABELS[name], justify="right", min_width=7, overflow="fold")
         for row in rows:
@@ -182,6 +170,12 @@ def _table(rows: Sequence[Metrics], summary: dict[str, Summary], per_shape: bool
         value = summary[name]
         table.add_row(_LABELS[name], *(_number(name, number) for number in (value.mean, value.error, value.median)))
     console.print(table)
+
+
+def _finite(record: Metrics | Summary) -> dict[str, Any]:
+    """The fields of a record that JSON can hold."""
+    fields = asdict(record).items()
+    return {name: value for name, value in fields if not isinstance(value, float) or math.isfinite(value)}
 
 
 def _number(name: str, value: Any) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -12,27 +12,16 @@ from shapeprog.cli import terminal
 if TYPE_CHECKING:
     from shapeprog.language.program import Program
 
-SHEET = 24  # shapes drawn where no number is given
-
-
-Count = Annotated[int, typer.Option(metavar="N", help="Number of shapes.", min=1)]
-Out = Annotated[Path | None, typer.Option(metavar="FILE", help="Contact sheet to write, such as sheet.png.")]
-Folder = Annotated[Path | None, typer.Option(metavar="FOLDER", help="Folder for a .shape file of each.")]
-Pack = Annotated[Path | None, typer.Option(metavar="FILE", help="Data set to write: voxels and points, .npz.")]
-Points = Annotated[int, typer.Option(metavar="N", help="Surface points per shape in the data set.", min=0)]
-Columns = Annotated[int, typer.Option(metavar="N", help="Shapes per row of the contact sheet.", min=1)]
-
 
 def sample_command(
-    prior: Annotated[str, typer.Argument(metavar="PRIOR", help="Distribution to draw from: furniture.")] = "furniture",
-    count: Count = SHEET,
+    count: Annotated[int, typer.Option(metavar="N", help="Number of shapes.", min=1)] = 24,
     seed: terminal.Seed = 0,
-    out: Out = None,
-    folder: Folder = None,
-    pack: Pack = None,
-    points: Points = 0,
-    columns: Columns = 6,
-    quiet: terminal.Quiet = False,
+    out: Annotated[Path | None, typer.Option(metavar="FILE", help="Contact sheet to write, such as sheet.png.")] = None,
+    folder: Annotated[Path | None, typer.Option(metavar="FOLDER", help="Folder for a .shape file of each.")] = None,
+    pack: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Data set to write: voxels and points, .npz.")
+    ] = None,
+    points: Annotated[int, typer.Option(metavar="N", help="Surface points per shape in the data set.", min=0)] = 0,
 ) -> None:
     """Generate synthetic furniture as a contact sheet, as programs, or as a data set.
 
@@ -41,13 +30,9 @@ def sample_command(
     Without --out, --folder and --pack the programs are printed.
     """
     from shapeprog.data.synthetic import FURNITURE, furniture
-    from shapeprog.errors import InputError, did_you_mean
 
-    if prior != FURNITURE:
-        raise InputError(f"unknown prior {prior!r}", did_you_mean(prior, [FURNITURE], quoted=True))
     programs = [furniture(number, seed) for number in range(count)]
-    files: dict[str, Any] = {"out": out, "folder": folder, "pack": pack}
-    write_samples(prior, programs, seed, **files, points=points, columns=columns, quiet=quiet)
+    write_samples(FURNITURE, programs, seed, out=out, folder=folder, pack=pack, points=points)
 
 
 def write_samples(
@@ -59,8 +44,6 @@ def write_samples(
     folder: Path | None = None,
     pack: Path | None = None,
     points: int = 0,
-    columns: int = 6,
-    quiet: bool = False,
 ) -> None:
     """Write programs of a prior as a sheet, a folder and a pack, as far as asked for; otherwise print them."""
     from shapeprog.data import write_pack
@@ -73,16 +56,15 @@ def write_samples(
     if out is not None:
         sizes = [f"{program.size} parts, {program.blocks} drawing statements" for program in programs]
         items = [Item(name, None, named[name], size) for name, size in zip(named, sizes, strict=True)]
-        contact_sheet(items, out, columns=columns, title=f"{prior}, seed {seed}")
+        contact_sheet(items, out, columns=6, title=f"{prior}, seed {seed}")
     if folder is not None:
         for name, program in named.items():
             save(program, make_folder(folder) / f"{name}.shape")
     if pack is not None:
         write_pack(pack, shapes_of(named, points, seed))
-    if not (out or folder or pack):
-        for name, program in named.items():
-            terminal.output().print(f"# {name}")
-            terminal.print_program(terminal.output(), program)
-    for path in () if quiet else (out, folder, pack):
-        if path is not None:
-            terminal.output().print(f"wrote {path}: {len(programs)} shapes")
+    files = [path for path in (out, folder, pack) if path is not None]
+    for path in files:
+        terminal.say(f"wrote {path}: {len(programs)} shapes")
+    for name, program in named.items() if not files else ():
+        terminal.output().print(f"# {name}")
+        terminal.print_program(program)

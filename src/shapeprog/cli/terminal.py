@@ -1,18 +1,16 @@
-"""Output of the commands: results on the standard output, progress and messages on the standard error."""
+"""Options that commands share, and their output: results on the standard output, messages on the standard error."""
 
 from __future__ import annotations
 
 import functools
-import inspect
 import io
 import json
 import os
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import MISSING, fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, TypeVar, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 
@@ -26,6 +24,7 @@ if TYPE_CHECKING:
     from shapeprog.library import Library
 
 debugging = False  # whether errors show their traceback
+quiet = False  # whether errors alone are printed
 WIDTH = 120  # columns of a table where the output is no terminal
 FAILED, MISTAKE, INTERRUPTED = 1, 2, 130  # exit codes
 
@@ -65,7 +64,6 @@ Up = Annotated[
 ]
 Front = Annotated[str | None, about_input(metavar="AXIS", help="Axis that the front faces, such as -z.")]
 Seed = Annotated[int, typer.Option(metavar="N", help="Seed of all random numbers.", min=0, callback=_checked_seed)]
-Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")]
 
 
 class Interrupted(KeyboardInterrupt):
@@ -82,7 +80,7 @@ def guarded(command: Command) -> Command:
             sys.stdout.flush()
         except KeyboardInterrupt as stop:
             note = str(stop) if isinstance(stop, Interrupted) else "no file is incomplete"
-            errors().print(f"Interrupted; {note}.", style="yellow", markup=False, highlight=False)
+            errors().print(f"Interrupted; {note}.", style="yellow")
             raise typer.Exit(INTERRUPTED) from None
         except BrokenPipeError:
             # The reader of a pipe has gone; keep Python from complaining about it at exit.
@@ -109,21 +107,6 @@ def _explained(error: Exception) -> ShapeProgError:
     return InputError(f"this needs the package {name}, which is not installed", f"pip install {name}")
 
 
-def with_options(run: Callable[[Any], None], kind: type[Any]) -> Callable[..., None]:
-    """The command that calls ``run`` with an instance of a dataclass, with an argument or option for each field."""
-
-    @functools.wraps(run)
-    def command(**values: Any) -> None:
-        run(kind(**values))
-
-    hints, keyword = get_type_hints(kind, include_extras=True), inspect.Parameter.KEYWORD_ONLY
-    defaults = [(f.name, inspect.Parameter.empty if f.default is MISSING else f.default) for f in fields(kind)]
-    options = [inspect.Parameter(n, keyword, default=default, annotation=hints[n]) for n, default in defaults]
-    command.__signature__ = inspect.Signature(options)  # type: ignore[attr-defined]
-    command.__annotations__ = {option.name: option.annotation for option in options}
-    return command
-
-
 def write_anything() -> None:
     """Let both outputs print letters that the terminal cannot encode as escapes, such as ``\\xb7``, not as an error."""
     for stream in (sys.stdout, sys.stderr):
@@ -142,17 +125,29 @@ def errors() -> Console:
     """The standard error, for progress and complaints."""
     from rich.console import Console
 
-    return Console(stderr=True, highlight=False, soft_wrap=True)
+    return Console(stderr=True, highlight=False, markup=False, soft_wrap=True)
+
+
+def say(text: str) -> None:
+    """Print a line about a result, unless ``--quiet`` is given."""
+    if not quiet:
+        output().print(text)
+
+
+def note(text: str, style: str = "dim") -> None:
+    """Print a remark on the standard error, unless ``--quiet`` is given."""
+    if not quiet:
+        errors().print(text, style=style)
 
 
 @contextmanager
-def progress(shown: bool) -> Iterator[Callable[[str], Callable[[str, float], None]]]:
+def progress(shown: bool = True) -> Iterator[Callable[[str], Callable[[str, float], None]]]:
     """A bar for one thing after another: a function of a name, which returns one of the stage and the share done."""
     from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
     text = TextColumn("{task.description}", markup=False)
     columns = SpinnerColumn("line"), text, BarColumn(24), TimeElapsedColumn()
-    with Progress(*columns, console=errors(), transient=True, disable=not shown) as bar:
+    with Progress(*columns, console=errors(), transient=True, disable=quiet or not shown) as bar:
         task = bar.add_task("reading", total=1.0)
 
         def begin(name: str) -> Callable[[str, float], None]:
@@ -164,14 +159,11 @@ def progress(shown: bool) -> Iterator[Callable[[str], Callable[[str, float], Non
 
 def complain(error: ShapeProgError) -> None:
     """Print an error: the cause in red, the cure below it."""
-    text = str(error)
-    if error.hint:
-        text = text.removesuffix(f"\n  hint: {error.hint}")
     console = errors()
     console.print("error: ", style="bold red", end="")
-    console.print(text, style="red", markup=False)
+    console.print(str(error).removesuffix(f"\n  hint: {error.hint}"), style="red")
     if error.hint:
-        console.print(f"hint: {error.hint}", markup=False)
+        console.print(f"hint: {error.hint}")
 
 
 def finish(failures: Sequence[ShapeProgError]) -> None:
@@ -189,13 +181,7 @@ def at(path: Path, error: ShapeProgError) -> ShapeProgError:
 
 
 def fault(what: str, error: Exception) -> ShapeProgError:
-    """The message for an internal error, so that a command continues with the next file; --debug stops at it.
-
-    Raises
-    ------
-    Exception
-        ``error`` itself, where errors are to show their traceback.
-    """
+    """The message for an internal error, so that a command continues with the next file; raises it with --debug."""
     if debugging:
         raise error
     return ShapeProgError(f"{what}: internal error", "run again with --debug and report the traceback")
@@ -209,70 +195,52 @@ def check_axes(up: str | None, front: str | None) -> None:
     axes_of(Path("--up and --front"), up, front)
 
 
-def load_modules(modules: list[Path] | None) -> None:
+def load_modules(modules: Sequence[Path] | None) -> None:
     """Declare the statements of a user's modules."""
-    if not modules:
-        return
-    from shapeprog.formats.plugins import load_statements
+    if modules:
+        from shapeprog.formats.plugins import load_statements
 
-    for module in modules:
-        load_statements(module)
+        for module in modules:
+            load_statements(module)
 
 
-def load_libraries(files: list[Path] | None, shipped: bool) -> list[Library]:
+def load_libraries(files: Sequence[Path] | None, shipped: bool) -> list[Library]:
     """The libraries given with ``--with``, then the built-in one if ``shipped``; modules are loaded as well."""
     from shapeprog.library import load_library
 
-    paths = files or []
-    load_modules([file for file in paths if file.suffix.lower() != ".shape"])
-    return [*(load_library(f) for f in paths if f.suffix.lower() == ".shape"), *([load_library()] if shipped else [])]
+    libraries = [file for file in files or () if file.suffix.lower() == ".shape"]
+    load_modules([file for file in files or () if file not in libraries])
+    return [*map(load_library, libraries), *([load_library()] if shipped else [])]
 
 
 def read_program_file(path: Path, changes: Sequence[str] | None = None) -> tuple[Program, Any]:
-    """The program and frame of a file, with other numbers for its names as ``--set`` has them; prints its warnings.
-
-    Raises
-    ------
-    InputError
-        Where the file holds a shape instead, with the command that makes a program of it.
-    """
+    """The program and frame of a file, with other numbers for its names as ``--set`` has them; prints its warnings."""
     from shapeprog.cli.changes import changed
-    from shapeprog.formats import load_with_frame, program_suffixes
+    from shapeprog.formats import load_with_frame
 
-    try:
-        program, frame = load_with_frame(path)
-        warn(path, program)
-        return changed(program, changes or ()), frame
-    except InputError as error:
-        if path.is_file() and path.suffix.lower() not in program_suffixes():
-            raise InputError(error.message, f"infer a program first: shapeprog infer {path}") from None
-        raise
+    program, frame = load_with_frame(path)
+    warn(path, program)
+    return changed(program, changes or ()), frame
 
 
 def warn(path: Path, program: Program) -> None:
     """Print what is legal in the program of a file and probably a mistake."""
     for warning in program.source.warnings if program.source else ():
-        errors().print(f"warning: {path}, {warning}", style="yellow", markup=False)
+        errors().print(f"warning: {path}, {warning}", style="yellow")
 
 
-def print_program(console: Console, program: Program) -> None:
+def print_program(program: Program) -> None:
     """Print a program with each statement in its colour, numbers rounded for reading."""
     from rich.text import Text
 
     from shapeprog.formats.colours import hexadecimal
     from shapeprog.view.listing import listing, parted
 
+    console = output()
     for line in listing(program):
         before, word, after = parted(line)
         style = f"bold {hexadecimal(line.role)}" if line.role else "dim"
         console.print(Text.assemble((before, "dim"), (word, style), after))
-
-
-def plain(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Numbers fit for JSON: those that are not finite are left out."""
-    import math
-
-    return {key: value for key, value in values.items() if not isinstance(value, float) or math.isfinite(value)}
 
 
 def print_json(content: Any) -> None:

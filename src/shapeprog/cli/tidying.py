@@ -41,7 +41,7 @@ def tidy_command(
     from shapeprog.language.free import numbers
     from shapeprog.library import with_library
 
-    check_units(unit, file_unit)
+    check_units(unit, file_unit, needed=True)
     libraries = terminal.load_libraries(modules, library)
     given, frame = terminal.read_program_file(program)
     if not given.size:
@@ -57,6 +57,5 @@ def tidy_command(
     result = in_readable_unit(result, wanted, seed)
     if out is not None:
         save(result, out, frame)
-    terminal.print_program(terminal.output(), result)
-    before = numbers(given)
-    terminal.errors().print(f"Free numbers: {before} before, {numbers(result)} now.", style="dim", markup=False)
+    terminal.print_program(result)
+    terminal.note(f"Free numbers: {numbers(given)} before, {numbers(result)} now.")

@@ -7,12 +7,11 @@ from typing import TYPE_CHECKING, Annotated
 
 from shapeprog.cli.terminal import about_input, about_program
 from shapeprog.errors import InputError, ShapeProgError
+from shapeprog.formats.format import CELLS
 
 if TYPE_CHECKING:
     from shapeprog.language.unit import Unit
     from shapeprog.space import Frame
-
-CELLS = "cells"
 
 AsUnit = Annotated[
     str | None,
@@ -26,7 +25,7 @@ FileUnit = Annotated[
 ]
 
 
-def check_units(unit: str | None, file_unit: str | None, needed: bool = True) -> None:
+def check_units(unit: str | None, file_unit: str | None, needed: bool = False) -> None:
     """Refuse units that are none before the first file is read; ``needed`` if --file-unit needs --unit."""
     from shapeprog.language.unit import metres
 

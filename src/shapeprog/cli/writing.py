@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -11,19 +12,14 @@ import typer
 from shapeprog.cli import terminal
 from shapeprog.cli.terminal import about_input
 from shapeprog.cli.units import AsUnit, FileUnit, asked_unit, assumed, check_units
-from shapeprog.errors import InputError, OutputError, ShapeProgError
+from shapeprog.errors import OutputError, ShapeProgError
 from shapeprog.formats.format import format_of, program_suffixes, suffixes
 
 if TYPE_CHECKING:
     from shapeprog.data.shape import Shape
-    from shapeprog.formats.json_form import Result
-    from shapeprog.language.program import Program
     from shapeprog.space import Frame
 
 _SAMPLES = " ".join(suffixes("sample"))
-
-WRITTEN, WITHOUT_UNIT = (".shape", ".json"), (".npy",)
-"""Files whose numbers are written in the unit that is asked for, and files whose lengths are in cells always."""
 
 ProgramFile = Annotated[Path, typer.Argument(metavar="PROGRAM", help=f"Program file: {' '.join(program_suffixes())}")]
 Outputs = Annotated[
@@ -53,7 +49,6 @@ def export_command(
         terminal.about_input("--on-input/--upright", help="Lie on the input. Default: .glb .obj .ply and samples."),
     ] = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace existing program files.")] = False,
-    quiet: terminal.Quiet = False,
 ) -> None:
     """Export a program as a mesh, CAD file, voxels, points, or in another program format.
 
@@ -64,53 +59,39 @@ def export_command(
     --upright change that. A .csv is a cut list, which is printed too. --set uses the unit of the program file.
     """
     from shapeprog.formats import export
+    from shapeprog.formats.cuts import cut_table
     from shapeprog.language.unit import MOST_METRES
     from shapeprog.space import SPAN
 
-    check_units(unit, file_unit, needed=False)
-    for path in outputs:
-        if unit is not None and path.suffix.lower() in WITHOUT_UNIT:
-            raise InputError(f"--unit has no effect on {path.name}", "its lengths are in cells")
+    check_units(unit, file_unit)
     terminal.load_modules(modules)
     if not overwrite:
         _refuse_programs(program, outputs)
     loaded, frame = terminal.read_program_file(program, changes)
-    unknown = loaded.unit is None or not loaded.unit.name
     makers = any(chosen.maker for path in outputs if (chosen := format_of(path)) is not None)
-    if frame is not None and unknown and makers and not (file_unit or quiet) and SPAN * frame.scale > MOST_METRES:
-        terminal.errors().print(assumed(frame), style="dim", markup=False)
+    known = file_unit is not None or (loaded.unit is not None and loaded.unit.name)
+    if frame is not None and makers and not known and SPAN * frame.scale > MOST_METRES:
+        terminal.note(assumed(frame))
+    asked: dict[str, Any] = {"unit": unit or "", "file_unit": file_unit or "", "up": up, "on_input": on_input}
     failures: list[ShapeProgError] = []
     for path in outputs:
-        written = loaded
-        if unit is not None and path.suffix.lower() in WRITTEN:
-            from shapeprog.inference.readable import in_readable_unit
-
-            written = in_readable_unit(loaded, asked_unit(loaded.unit, frame, program, unit, file_unit))
-        asked: dict[str, Any] = {"unit": unit or "", "file_unit": file_unit or "", "up": up, "on_input": on_input}
         try:
+            written = loaded
+            if unit is not None and path.suffix.lower() in suffixes("program"):
+                from shapeprog.inference.readable import in_readable_unit
+
+                written = in_readable_unit(loaded, asked_unit(loaded.unit, frame, program, unit, file_unit))
             export(written, path, frame, **asked)
         except ShapeProgError as error:  # the other files do not depend on this one
             failures.append(error)
             continue
-        if not quiet:
-            terminal.output().print(f"wrote {path}")
-            if path.suffix.lower() == ".csv":
-                terminal.output().print(_cut_table(loaded, path, frame, asked), markup=False, highlight=False)
+        terminal.say(f"wrote {path}")
+        if path.suffix.lower() == ".csv":
+            terminal.say(cut_table(loaded, frame, **asked))
     for failure in failures[:-1]:
         terminal.complain(failure)
     if failures:
         raise failures[-1]
-
-
-def _cut_table(program: Program, path: Path, frame: Frame | None, asked: Mapping[str, Any]) -> str:
-    from shapeprog.formats.cuts import cut_list
-    from shapeprog.formats.frames import placement
-
-    chosen = format_of(path)
-    assert chosen is not None
-    lies = placement(chosen, program, frame, **asked)
-    assert lies.frame is not None
-    return cut_list(program, lies.frame, lies.unit).table
 
 
 def _refuse_programs(program: Path, outputs: Sequence[Path]) -> None:
@@ -136,7 +117,6 @@ def render_command(
     seed: terminal.Seed = 0,
     changes: terminal.Changes = None,
     modules: terminal.With = None,
-    quiet: terminal.Quiet = False,
 ) -> None:
     """Render a program as a picture, as voxels, or as points on its surface.
 
@@ -152,7 +132,7 @@ def render_command(
     loaded, frame = terminal.read_program_file(program, changes)
     suffix, chosen = output.suffix.lower(), format_of(output)
     if suffix in SUFFIXES:
-        beside, scores = _input_and_scores(program, changes, shape, quiet)
+        beside, scores = _input_and_scores(program, shape, changes)
         picture(beside, loaded, output, title=program.stem, scores=scores)
     elif chosen is not None and chosen.kind == "sample":
         given: dict[str, Any] = {"resolution": resolution, "points": points, "seed": seed}
@@ -160,8 +140,7 @@ def render_command(
     else:
         known = " ".join((*SUFFIXES, *suffixes("sample")))
         raise OutputError(f"cannot render to {suffix or 'a file without a suffix'}", f"known suffixes: {known}")
-    if not quiet:
-        terminal.output().print(f"wrote {output}")
+    terminal.say(f"wrote {output}")
 
 
 def show_command(
@@ -173,7 +152,6 @@ def show_command(
     browse: Annotated[bool, typer.Option("--open", help="Open the page in a browser.")] = False,
     changes: terminal.Changes = None,
     modules: terminal.With = None,
-    quiet: terminal.Quiet = False,
 ) -> None:
     """Write an HTML page: turn the shape, see which line draws which part, drag its numbers.
 
@@ -188,10 +166,9 @@ def show_command(
     page = output or Path(f"{program.stem}.html")
     if page.suffix.lower() not in (".html", ".htm"):
         raise OutputError(f"{page} is not an HTML file", "pages end in .html; for pictures use 'shapeprog render'")
-    beside, scores = _input_and_scores(program, changes, shape, quiet)
+    beside, scores = _input_and_scores(program, shape, changes)
     viewer(loaded, page, shape=beside, title=program.stem, scores=scores, frame=frame)
-    if not quiet:
-        terminal.output().print(f"wrote {page}")
+    terminal.say(f"wrote {page}")
     if browse:
         import webbrowser
 
@@ -209,7 +186,6 @@ def sheet_command(
         about_input("--shape", metavar="FOLDER", help="Folder of the inputs. Default: that of the programs."),
     ] = None,
     modules: terminal.With = None,
-    quiet: terminal.Quiet = False,
 ) -> None:
     """Draw a contact sheet of a folder of programs, each beside its input.
 
@@ -232,11 +208,10 @@ def sheet_command(
         except ShapeProgError as error:
             failures.append(error)
             continue
-        beside, scores = _input_and_scores(path, None, shape, quiet=True)
+        beside, scores = _input_and_scores(path, shape, noted=False)
         items.append(Item(path.stem, beside, loaded, scores_text(scores, loaded)[0]))
     contact_sheet(items, output, columns=columns, title=title)
-    if not quiet:
-        terminal.output().print(f"wrote {output}: {len(items)} programs")
+    terminal.say(f"wrote {output}: {len(items)} programs")
     terminal.finish(failures)
 
 
@@ -258,45 +233,36 @@ def statements_command(
 
 
 def _input_and_scores(
-    path: Path, changes: Sequence[str] | None, named: Path | None, quiet: bool
+    program: Path, named: Path | None, changes: Sequence[str] | None = None, noted: bool = True
 ) -> tuple[Shape | None, Mapping[str, float]]:
-    """The input of a program, see :func:`_input_of`, and the scores in its .json file, unless ``--set`` changes it."""
+    """The input of a program and the scores in its .json file, unless ``--set`` changes it.
+
+    The input is the file that the user names, or the one that the .json file names.  The latter is opened only beside
+    the program, or in the folder that the user names and deeper: a program from elsewhere may name any file.  Where
+    there is none, a remark is printed if ``noted``: a picture without the input is better than none.
+    """
+    from shapeprog.data import load
     from shapeprog.formats.json_form import Result, read_result
     from shapeprog.language.program import Program
 
-    is_empty = changes or path.suffix.lower() != ".json"
-    result = Result(str(path), Program()) if is_empty else read_result(path)
-    shape = _input_of(result, named)
-    if result.source and shape is None and not quiet:
-        message = "The input is not shown: it was not found, or cannot be read. Give it with --shape."
-        terminal.errors().print(message, style="dim", markup=False)
-    return shape, result.scores
-
-
-def _input_of(result: Result, named: Path | None) -> Shape | None:
-    """The shape that a program was inferred from: the file that the user names, or the one that its own file names.
-
-    The latter is opened only beside the program, or in the folder that the user names and deeper: a program from
-    elsewhere may name any file.
-    """
-    from dataclasses import replace
-
-    from shapeprog.data import load
-
+    kept = not changes and program.suffix.lower() == ".json"
+    result = read_result(program) if kept else Result(str(program), Program())
     if named is not None and not named.is_dir():
-        return load(named)
+        return load(named), result.scores
     place, mark, member = (result.source or "").partition("#")
-    wanted = Path(place).name
-    files = Path(result.name).parent.iterdir() if named is None else named.rglob("*")
-    found = sorted(file for file in files if file.name == wanted and file.is_file() and not file.is_symlink())
-    if not found:
-        return None
+    files = program.parent.iterdir() if named is None else named.rglob("*")
+    same = sorted(file for file in files if file.name == Path(place).name and file.is_file() and not file.is_symlink())
     try:
-        shape = load(f"{found[0]}{mark}{member}")
-    except ShapeProgError:
-        return None  # a picture without the input is better than none
-    if result.frame is None or shape.vertices is None or result.frame.axes == shape.frame.axes:
+        return _as_inferred(load(f"{same[0]}{mark}{member}"), result.frame), result.scores
+    except (IndexError, ShapeProgError):
+        if noted and result.source:
+            terminal.note("The input is not shown: it was not found, or cannot be read. Give it with --shape.")
+        return None, result.scores
+
+
+def _as_inferred(shape: Shape, frame: Frame | None) -> Shape:
+    """A shape as it was seen when it was inferred, perhaps with --up or --front."""
+    if frame is None or shape.vertices is None or frame.axes == shape.frame.axes:
         return shape
-    # It was inferred with --up or --front: show it as it was seen then.
-    seen = result.frame.to_grid(shape.frame.to_world(shape.vertices))
+    seen = frame.to_grid(shape.frame.to_world(shape.vertices))
     return replace(shape, vertices=seen.astype(shape.vertices.dtype))

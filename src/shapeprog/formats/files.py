@@ -43,7 +43,8 @@ def load_with_frame(path: str | os.PathLike[str]) -> tuple[Program, Frame | None
             cure = f"name one of its programs, such as {file / held[0]}" if held else f"programs are {endings} files"
             raise InputError(f"{file} is a folder", cure)
         ending = f"its name ends in {file.suffix!r}" if file.suffix else "its name has no suffix"
-        raise InputError(f"{file} holds no program: {ending}", f"programs are {endings} files")
+        cure = f"programs are {endings} files; infer one from a shape: shapeprog infer {file}"
+        raise InputError(f"{file} holds no program: {ending}", cure)
     return file_format.read(file)
 
 
@@ -133,11 +134,11 @@ def export(
     if file_format is None or not file_format.writer:
         wrong = f"no export ends in {suffix!r}" if suffix else f"{target} has no suffix, so its format is unknown"
         raise OutputError(wrong, did_you_mean(suffix, suffixes()))
-    for name in options:
-        if name not in file_format.options:
-            raise OutputError(f"{suffix} takes no {name}", f"it takes {', '.join(file_format.options) or 'no options'}")
     lies = placement(file_format, program, frame, unit=unit, file_unit=file_unit, up=up, on_input=on_input)
-    named = {"unit": lies.unit} if file_format.takes_unit else {}
+    takes = file_format.options
+    for name in options.keys() - takes:
+        raise OutputError(f"{suffix} takes no {name}", f"it takes {', '.join({*takes} - {'unit'}) or 'no options'}")
+    named = {"unit": lies.unit} if "unit" in takes else {}
     try:
         file_format.write(program, target, lies.frame, **options, **named)
     except OSError as error:

@@ -6,6 +6,7 @@ formats from here.  Readers and writers are imported when they are first used.
 
 from __future__ import annotations
 
+import inspect
 import os
 import pkgutil
 from dataclasses import dataclass
@@ -17,6 +18,8 @@ if TYPE_CHECKING:
     from shapeprog.space import Frame
 
 Kind = Literal["program", "solid", "list", "sample", "shape"]
+
+CELLS = "cells"  # the word for lengths in cells
 
 Axes = tuple[str, str]  # world axes that point up and that the front faces, such as ``("+y", "+z")``
 Y_UP: Axes = ("+y", "+z")  # axes of glTF, and of most mesh files
@@ -45,16 +48,12 @@ class Format:
     doc
         Contents of such a file, in one line.
     reader, writer
-        ``module:function`` of this package or in full: ``(path) -> (program, frame or None)`` and ``(program, path,
-        frame)``.
-    options
-        Further arguments of the writer.
+        ``module:function`` of this package: ``(path) -> (program, frame or None)`` and ``(program, path, frame)``,
+        perhaps with the name of the ``unit`` and further options.
     unit
         Unit of the coordinates of a file unless another is asked for; ``text`` for that of the program, empty for that
-        of the input, or of the program if no input is known.  Files in millimetres are for makers: the shape stands
-        upright on the origin, whatever its input.
-    takes_unit
-        Whether the writer takes the name of the unit.
+        of the input, or of the program if no input is known, ``cells`` for cells always.  Files in millimetres are for
+        makers: the shape stands upright on the origin, whatever its input.
     """
 
     name: str
@@ -64,14 +63,17 @@ class Format:
     doc: str
     reader: str = ""
     writer: str = ""
-    options: tuple[str, ...] = ()
     unit: str = ""
-    takes_unit: bool = False
 
     @property
     def maker(self) -> bool:
         """Whether the shape stands upright on the origin."""
         return self.unit == "mm"
+
+    @property
+    def options(self) -> tuple[str, ...]:
+        """Further arguments of the writer."""
+        return tuple(inspect.signature(_function(self.writer)).parameters)[3:]
 
     def read(self, path: Path) -> tuple[Program, Frame | None]:
         """The program in a file of this format, and its frame if the file has one."""
@@ -98,21 +100,21 @@ FORMATS = (
     Format("STL", "solid", (".stl",), Z_UP, "the union of all parts: one watertight solid",
         writer="meshes:write_stl", unit="mm"),
     Format("3MF", "solid", (".3mf",), Z_UP, "one named, coloured object per part, for 3D printing",
-        writer="meshes:write_3mf", unit="mm", takes_unit=True),
+        writer="meshes:write_3mf", unit="mm"),
     Format("OpenSCAD", "solid", (".scad",), Z_UP,
         "the program as a script: groups, functions, loops; its named numbers for the customizer",
-        writer="openscad:write_scad", unit="mm", takes_unit=True),
+        writer="openscad:write_scad", unit="mm"),
     Format("build123d", "solid", (".py",), Z_UP, "the same as a Python script, which writes a STEP file when run",
-        writer="build123d:write_script", unit="mm", takes_unit=True),
+        writer="build123d:write_script", unit="mm"),
     Format("STEP", "solid", (".step", ".stp"), Z_UP,
         "named, coloured solids, through build123d (pip install build123d)",
-        writer="build123d:write_step", unit="mm", takes_unit=True),
+        writer="build123d:write_step", unit="mm"),
     Format("cut list", "list", (".csv",), Z_UP, "count, role and size of each distinct part",
-        writer="cuts:write_cuts", unit="text", takes_unit=True),
+        writer="cuts:write_cuts", unit="text"),
     Format("NPY", "sample", (".npy",), GRID, "the 32^3 cells; others with render --resolution",
-        writer="samples:write_grid", options=("resolution",)),
+        writer="samples:write_grid", unit=CELLS),
     Format("XYZ", "sample", (".xyz",), Z_UP, "points on the surface, one line 'x y z nx ny nz' each",
-        writer="samples:write_points", options=("points", "seed")),
+        writer="samples:write_points"),
     Format("binvox", "shape", (".binvox",), Y_UP, "cells"),
     Format("NPZ", "shape", (".npz",), GRID, "cells or points, of one shape or many"),
     Format("OFF", "shape", (".off",), Y_UP, "a mesh"),

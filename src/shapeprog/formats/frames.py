@@ -18,13 +18,12 @@ from __future__ import annotations
 
 import math
 import re
-from reprlib import repr as shortened
 from typing import NamedTuple
 
 import numpy as np
 
 from shapeprog.errors import InputError
-from shapeprog.formats.format import GRID, Y_UP, Z_UP, Format
+from shapeprog.formats.format import CELLS, GRID, Y_UP, Z_UP, Format
 from shapeprog.language.ast import Scale
 from shapeprog.language.placement import LONGEST_SIDE
 from shapeprog.language.program import Program
@@ -32,22 +31,20 @@ from shapeprog.language.text import Text
 from shapeprog.language.unit import METRES, assumed_unit, metres
 from shapeprog.space import SPAN, Array, FloatArray, Frame, grid_axes
 
-CELLS = "cells"  # the word for lengths in cells
-
-_LINE = re.compile(r"([^\r\n]*)(?:\r\n|\r|\n)")
-_PLACED = re.compile(r"#[ \t]*placed:[ \t]*([^\r\n]*)")
-_DIRECTION = r"([+-]?[xyz]|\S+ +\S+ +\S+)"
+_LINE_END = r"(?:\r?\n|\r(?!\n))"
+_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+_DIRECTION = rf"([-+]?[xyz]|{_NUMBER} +{_NUMBER} +{_NUMBER})"
+_PLACED = re.compile(rf"((?:(?:#[^\r\n]*|[ \t]*){_LINE_END})*?)#[ \t]*placed:[ \t]*([^\r\n]*)")
 _ENTRIES = re.compile(
-    rf"up +{_DIRECTION} *, *front +{_DIRECTION} *, *origin +(\S+) +(\S+) +(\S+) *, *1 unit *= *(\S+)(?: +[a-z]+)?\s*"
+    rf"up +{_DIRECTION} *, *front +{_DIRECTION} *, *origin +({_NUMBER}) +({_NUMBER}) +({_NUMBER}) *, *"
+    rf"1 unit *= *({_NUMBER})(?: +[a-z]+)?\s*"
 )
-_PLACED_CURE = "write it as # placed: up y, front z, origin 0 0.5 0, 1 unit = 1, or remove it"
 
 _ALIGNED = 1e-9  # largest difference of a direction from the axis as which it is written
 _ROUNDED = 1e-7  # share of the longest side by which the origin of a text is rounded
 
 _GRID = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
 """Directions x, y, z of a text in the axes of the grid, as columns."""
-
 
 UP = {"x": GRID, "y": Y_UP, "z": Z_UP}  # up and front axes of a file by the axis that points up
 
@@ -92,20 +89,24 @@ def placement(
     Raises
     ------
     InputError
-        If the input, the axis or the size of the object is not known.
+        If the input, the axis or the size of the object is not known, or the file is in cells always.
     """
     if chosen.axes is None:
         return Placement(frame)
+    if chosen.unit == CELLS:
+        if unit:
+            raise InputError(f"--unit has no effect on {chosen.suffixes[0]}", "its lengths are in cells")
+        return Placement(Frame())
     if up and up.removeprefix("+") not in UP:
         raise InputError(f"{up!r} is no axis that points up", "use x, y or z")
     if on_input and frame is None:
         raise InputError("the program does not say how its input lies", "export a program that infer has written")
-    lies = frame is not None and not up and (not chosen.maker if on_input is None else on_input)
-    if lies and not unit and chosen.unit != "text":
-        return Placement(frame)
+    if on_input is None:
+        on_input = not chosen.maker
     per_cell, name = _cell_size(chosen, program, frame, unit, file_unit)
-    if lies:
-        assert frame is not None
+    if frame is not None and on_input and not up:
+        if not unit and chosen.unit != "text":
+            return Placement(frame)
         return Placement(_frame(per_cell, per_cell / frame.scale * np.array(frame.centre), np.array(frame.axes)), name)
     matrix = grid_axes(*(UP[up.removeprefix("+")] if up else chosen.axes))
     centre = -per_cell * (matrix @ _ground(program)) + 0.0 if chosen.maker else np.zeros(3)
@@ -120,15 +121,13 @@ def _cell_size(chosen: Format, program: Program, frame: Frame | None, unit: str,
     per_cell = 1.0 if own is None else own.per_cell
     if program.scale is not None:
         per_cell = 1 / program.scale.cells_per_unit  # not rounded
-    wanted = unit or (known if chosen.unit == "text" else chosen.unit)
-    if not wanted and chosen.unit == "text" and frame is not None:
-        wanted = "mm"
-    if not wanted and frame is not None:
-        return frame.scale, ""
+    wanted = unit or chosen.unit
+    if wanted == "text":
+        wanted = known or ("" if frame is None else "mm")
     if not wanted:
-        return per_cell, known
+        return (per_cell, known) if frame is None else (frame.scale, "")
     if frame is not None and (file_unit or not known):
-        return frame.scale * metres(file_unit or assumed_unit(SPAN * frame.scale)) / metres(wanted), wanted
+        per_cell, known = frame.scale, file_unit or assumed_unit(SPAN * frame.scale)
     if known:
         return per_cell * (metres(known) / metres(wanted)), wanted
     if unit:
@@ -175,79 +174,48 @@ def frame_comment(frame: Frame | None, program: Program) -> str:
     if frame is None:
         return ""
     scale = scale_of(program)
-    text, own = frame_of_text(frame, scale), "" if program.unit is None else program.unit.name
-    size = f"{text.scale:.8g}"
-    factors = {name: METRES[own] / length for name, length in METRES.items()} if own else {"": 1.0}
-    for name, factor in factors.items():
-        if math.isclose(factor, text.scale, rel_tol=2e-7):
-            size = f"{factor:.8g} {name}".rstrip()
+    text, size = frame_of_text(frame, scale), ""
+    own = "" if program.unit is None else program.unit.name
+    for name, length in METRES.items() if own else ():
+        if math.isclose(METRES[own] / length, text.scale, rel_tol=2e-7):
+            size = f"{METRES[own] / length:.8g} {name}"
     step = _ROUNDED * text.scale * LONGEST_SIDE / scale.cells_per_unit
     digits = -math.ceil(math.log10(max(step, 1e-300)))
     origin = " ".join(f"{round(value, digits) + 0.0:.15g}" for value in text.centre)
     axes = np.asarray(text.axes)
     up, front = _direction_text(axes[:, 2]), _direction_text(-axes[:, 1])
-    return f"# placed: up {up}, front {front}, origin {origin}, 1 unit = {size}\n"
+    return f"# placed: up {up}, front {front}, origin {origin}, 1 unit = {size or f'{text.scale:.8g}'}\n"
 
 
-def without_frame(text: str) -> str:
-    """Program text without the comment that stores its frame; line numbers do not change."""
-    _, placed = _placed_comment(text)
-    return text if placed is None else text[: placed.start()] + text[placed.end() :]
-
-
-def frame_in(text: str, name: str, program: Program) -> Frame | None:
-    """The frame stored in the text of a program, or None.
+def split_frame(text: str, name: str) -> tuple[str, Frame | None]:
+    """The text of a program without the comment that stores its frame, and the map from x, y, z of the text to the
+    world if it has one.  Line numbers do not change.
 
     Parameters
     ----------
     text, name
         The text, and its name in errors.
-    program
-        The program of the text.
 
     Raises
     ------
     ProgramError
         If the comment cannot be read.
     """
-    row, placed = _placed_comment(text)
-    if placed is None:
-        return None
-    return frame_of_grid(_placed_frame(placed, Text(text, name), row), scale_of(program))
-
-
-def _placed_comment(text: str) -> tuple[int, re.Match[str] | None]:
-    """The comment above the first statement that places a text, and its row, from 1."""
-    for row, line in enumerate(_LINE.finditer(text), 1):
-        if match := _PLACED.match(text, line.start()):
-            return row, match
-        if line[1].strip() and not line[1].startswith("#"):
-            break
-    return 0, None
-
-
-def _placed_frame(comment: re.Match[str], text: Text, row: int) -> Frame:
-    """The map from x, y, z of a text to the world, as its comment on a row says."""
-    start = comment.start(1) - comment.start()
-    entries = _ENTRIES.fullmatch(comment[1])
-    if entries is None:
-        raise text.at(row, start + 1, "this is no frame of a text", _PLACED_CURE)
-    up, rear = _direction(entries[1]), -_direction(entries[2])
-    rotation = np.stack([up, rear, np.cross(up, rear)], 1)
-    if not np.allclose(rotation.T @ rotation, np.eye(3), atol=1e-6):
-        raise text.at(row, start + 1, "up and front are not perpendicular unit directions", _PLACED_CURE)
-    numbers = []
-    for group in (3, 4, 5, 6):
-        try:
-            numbers.append(float(entries[group]))
-        except ValueError:
-            numbers.append(math.nan)
-        if not math.isfinite(numbers[-1]) or (group == 6 and not numbers[-1] > 0):
-            what = "a number" if group < 6 else "a positive number"
-            raise text.at(
-                row, start + entries.start(group) + 1, f"{shortened(entries[group])} is not {what}", _PLACED_CURE
-            )
-    return _frame(numbers[3], np.array(numbers[:3]), rotation @ _GRID)
+    comment = _PLACED.match(text)
+    if comment is None:
+        return text, None
+    wrong, entries = "this is no frame of a text", _ENTRIES.fullmatch(comment[2])
+    if entries is not None:
+        *origin, size = (float(number) for number in entries.groups()[2:])
+        up, rear = _direction(entries[1]), -_direction(entries[2])
+        rotation = np.stack([up, rear, np.cross(up, rear)], 1)
+        if not np.allclose(rotation.T @ rotation, np.eye(3), atol=1e-6):
+            wrong = "up and front are not perpendicular unit directions"
+        elif np.isfinite([*origin, size]).all() and size > 0:
+            return text[: comment.end(1)] + text[comment.end() :], _frame(size, np.array(origin), rotation @ _GRID)
+    row, column = len(re.findall(_LINE_END, comment[1])) + 1, comment.start(2) - comment.end(1) + 1
+    cure = "write it as # placed: up y, front z, origin 0 0.5 0, 1 unit = 1, or remove it"
+    raise Text(text, name).at(row, column, wrong, cure)
 
 
 def _frame(scale: float, centre: Array, axes: Array) -> Frame:
@@ -256,15 +224,10 @@ def _frame(scale: float, centre: Array, axes: Array) -> Frame:
 
 
 def _direction(text: str) -> FloatArray:
-    """A signed axis, or a direction of three numbers; 0 if one of them is no number or not in -2 to 2."""
-    words = text.split()
-    if len(words) == 1:
+    """A signed axis, or a direction of three numbers, each at most 2."""
+    if text[-1] in "xyz":
         return (-1.0 if text.startswith("-") else 1.0) * np.eye(3)["xyz".index(text[-1])]
-    try:
-        direction = np.array([float(word) for word in words])
-    except ValueError:
-        return np.zeros(3)
-    return direction if (np.abs(direction) <= 2).all() else np.zeros(3)
+    return np.clip([float(word) for word in text.split()], -2, 2)
 
 
 def _direction_text(direction: FloatArray) -> str:

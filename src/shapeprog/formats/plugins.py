@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import importlib.util
 import os
-import sys
+import runpy
 import traceback
 from pathlib import Path
 from weakref import WeakKeyDictionary
@@ -35,33 +34,21 @@ def load_statements(path: str | os.PathLike[str]) -> tuple[Statement, ...]:
     if not file.is_file():
         result = "a folder" if file.is_dir() else "no file"
         raise InputError(f"{path} is {result}", "give the path of a Python file that declares statements")
-    before, roles = set(language().names), set(language().roles)
-    module_name = f"shapeprog_statements_{len(loaded)}_{file.stem}"
+    registry = vars(language())
+    before = {table: dict(entries) for table, entries in registry.items()}
+    known, roles = set(language().names), len(language().roles)
     try:
-        _run(file, module_name)
-        declared = tuple(declaration for declaration in language() if declaration.name not in before)
-        if not declared and not language().roles.keys() - roles:
+        runpy.run_path(str(file), run_name=f"shapeprog_statements_{len(loaded)}_{file.stem}")
+        declared = tuple(declaration for declaration in language() if declaration.name not in known)
+        if not declared and len(language().roles) == roles:
             raise DeclarationError(f"{path} declares no statement", "decorate a function with @statement or @loop")
     except BaseException as cause:
-        for name in set(language().names) - before:
-            language().forget(name)
-        for name in language().roles.keys() - roles:
-            del language().roles[name]
-        sys.modules.pop(module_name, None)
+        registry.update(before)
         if isinstance(cause, (Exception, SystemExit)):
             raise _in_words(path, file, cause) from cause
         raise
     loaded[file] = declared
     return declared
-
-
-def _run(file: Path, module_name: str) -> None:
-    spec = importlib.util.spec_from_loader(module_name, loader=None, origin=str(file))
-    assert spec is not None
-    module = importlib.util.module_from_spec(spec)
-    module.__file__ = str(file)
-    sys.modules[module_name] = module
-    exec(compile(file.read_bytes(), str(file), "exec"), module.__dict__)
 
 
 def _in_words(path: str | os.PathLike[str], file: Path, cause: BaseException) -> DeclarationError:

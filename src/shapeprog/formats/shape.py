@@ -9,7 +9,7 @@ from pathlib import Path
 
 from shapeprog.errors import InputError
 from shapeprog.files import write_text
-from shapeprog.formats.frames import frame_comment, frame_in, without_frame
+from shapeprog.formats.frames import frame_comment, frame_of_grid, scale_of, split_frame
 from shapeprog.language.parser import parse
 from shapeprog.language.printer import format_program
 from shapeprog.language.program import Program
@@ -25,8 +25,9 @@ def read_shape(path: Path) -> tuple[Program, Frame | None]:
 
 def program_in(text: str, name: str) -> tuple[Program, Frame | None]:
     """The program of a text, and its frame if a comment stores one."""
-    program = parse(without_frame(text), name)
-    return program, frame_in(text, name, program)
+    text, frame = split_frame(text, name)
+    program = parse(text, name)
+    return program, None if frame is None else frame_of_grid(frame, scale_of(program))
 
 
 def write_shape(program: Program, path: Path, frame: Frame | None) -> None:

@@ -59,7 +59,7 @@ def infer_command(
         decoded = decode(generator, cells, decoder=decoder, blocks=blocks)  # type: ignore[arg-type]
         (program,) = decoded.programs()
         terminal.output().print(f"# {shape.name}: canvas IoU {float(decoded.iou()):.3f}")
-        terminal.print_program(terminal.output(), program)
+        terminal.print_program(program)
         if out is not None:
             save(program, make_folder(out) / f"{shape.name}.shape")
     if failed:
@@ -152,7 +152,6 @@ def _add_training(name: str, kind: type[Any], task: str, doc: str) -> None:
         folder: Annotated[Path, typer.Argument(help="Folder of the run; a run in it is resumed.")],
         device: Annotated[str, typer.Option(help="auto, cpu or cuda.")] = "auto",
         restart: Annotated[bool, typer.Option("--restart", help="Start over if the folder holds a run.")] = False,
-        quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
         files: Annotated[list[Path] | None, typer.Option("--with", help="Python files that declare losses.")] = None,
         **options: Any,
     ) -> None:
@@ -169,19 +168,18 @@ def _add_training(name: str, kind: type[Any], task: str, doc: str) -> None:
             except Exception as error:
                 raise InputError(f"{file} raised {type(error).__name__}: {error}", "correct it") from error
         last = {"samples_seen": 0.0}
-        with _stop_event() as stop, terminal.progress(not quiet) as begin:
+        with _stop_event() as stop, terminal.progress() as begin:
             update, made = begin("training"), pkgutil.resolve_name(f"shapeprog.liang2022.{task}")(settings)
             steps = train(made, settings, folder, device=device, restart=restart, stop=stop, command=COMMAND_LINE)
             for last in steps:
                 update(f"loss {last['loss']:.3f}", last["samples_seen"] / settings.num_shapes)
                 scores = [f"{key[4:]} {value:.4g}" for key, value in last.items() if key.startswith("val_")]
-                if scores and not quiet:
-                    terminal.errors().print(f"{last['samples_seen']:.0f} shapes: {', '.join(scores)}", markup=False)
+                if scores:
+                    terminal.note(f"{last['samples_seen']:.0f} shapes: {', '.join(scores)}", "none")
         if stop.is_set() and last["samples_seen"] < settings.num_shapes:
             raise terminal.Interrupted(f"{folder} holds the run; the same command resumes it")
-        if not quiet:
-            best = f"; the best on validation: {folder / BEST}" if (folder / BEST).exists() else ""
-            terminal.output().print(f"the weights are {folder / WEIGHTS}{best}")
+        best = f"; the best on validation: {folder / BEST}" if (folder / BEST).exists() else ""
+        terminal.say(f"the weights are {folder / WEIGHTS}{best}")
 
     signature = [each for each in inspect.signature(run, eval_str=True).parameters.values() if each.name != "options"]
     hints, bases = get_type_hints(kind), [base for base in reversed(kind.__mro__) if is_dataclass(base)]

@@ -15,20 +15,8 @@ BACKGROUND = -1  # face index of a pixel that shows the ground
 
 
 @helper
-def first_pixel(a, b, c):
-    """First pixel whose middle three coordinates may enclose."""
-    return max(0, math.ceil(min(min(a, b), c) - 0.5))
-
-
-@helper
-def last_pixel(a, b, c, size):
-    """Last of ``size`` pixels whose middle three coordinates may enclose."""
-    return min(size - 1, math.floor(max(max(a, b), c) - 0.5))
-
-
-@helper
 def narrow(low, high, weight, step):
-    """The stretch of a row where a weight, given at pixel 0, is not negative as well."""
+    """The part of an interval of a row where a weight, given at pixel 0, is not negative."""
     weight += 1e-9
     if step > 1e-15:
         low = max(low, -weight / step)
@@ -37,15 +25,6 @@ def narrow(low, high, weight, step):
     elif weight < 0:
         high = -1.0  # nowhere
     return low, high
-
-
-@helper
-def covered(wb, wc, step_b, step_c, first, last):
-    """The pixels of a row, from ``first`` to ``last``, whose three weights are not negative; weights are given at 0."""
-    low, high = narrow(float(first), float(last), wb, step_b)
-    low, high = narrow(low, high, wc, step_c)
-    low, high = narrow(low, high, 1 - wb - wc, -step_b - step_c)
-    return math.ceil(low), math.floor(high)
 
 
 @kernel("void(f8[:, ::1], i8[:, ::1], f8, i4[:, ::1], f8[:, ::1])")
@@ -61,18 +40,18 @@ def nearest_faces(points, faces, tolerance, face, depth):
         area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
         if abs(area) < 1e-12:
             continue
-        left = first_pixel(a[0], b[0], c[0])
-        right = last_pixel(a[0], b[0], c[0], width)
-        low = first_pixel(a[1], b[1], c[1])
-        high = last_pixel(a[1], b[1], c[1], height)
         step_b, step_c = (c[1] - a[1]) / area, (a[1] - b[1]) / area
         slope = step_b * (b[2] - a[2]) + step_c * (c[2] - a[2])
+        low = max(0, math.ceil(min(a[1], b[1], c[1]) - 0.5))
+        high = min(height - 1, math.floor(max(a[1], b[1], c[1]) - 0.5))
         for y in range(low, high + 1):
             wb = ((0.5 - a[0]) * (c[1] - a[1]) - (y + 0.5 - a[1]) * (c[0] - a[0])) / area
             wc = ((b[0] - a[0]) * (y + 0.5 - a[1]) - (b[1] - a[1]) * (0.5 - a[0])) / area
-            first, last = covered(wb, wc, step_b, step_c, left, right)
+            left, right = narrow(0.0, width - 1.0, wb, step_b)
+            left, right = narrow(left, right, wc, step_c)
+            left, right = narrow(left, right, 1 - wb - wc, -step_b - step_c)
             start = a[2] + wb * (b[2] - a[2]) + wc * (c[2] - a[2])
-            for x in range(first, last + 1):
+            for x in range(math.ceil(left), math.floor(right) + 1):
                 value = start + x * slope
                 if value > depth[y, x] * (1 + tolerance):
                     depth[y, x] = value

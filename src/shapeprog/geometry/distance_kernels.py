@@ -15,73 +15,63 @@ FARTHEST = 1e18  # coordinates whose squares fit into single precision, in which
 
 
 @helper
-def _boxes(table, first, per_scene, listed, box):
-    """Fill the columns of ``box`` with the primitives that are there; returns how many, and how far they reach.
+def boxes_around(table, first, per_scene, box):
+    """Fill the columns of ``box`` (6, N) with the boxes around primitives: centre and half extent along each axis.
 
-    Of each: centre, local axes and half extents of the turned box around it.
+    The box of padding is infinitely far away.  Returns how far the others reach.
     """
-    used, extent = 0, 0.0
+    extent = 0.0
     for slot in range(per_scene):
         row = first + slot
+        box[:3, slot], box[3:, slot] = 0, -np.inf
         if table[row, KIND] < 0:
             continue
+        half = bound(table, row)
         for axis in range(3):
-            box[axis, used] = table[row, CENTRE + axis]
+            reach = 0.0
             for column in range(3):
-                box[3 + 3 * axis + column, used] = table[row, ROTATION + 3 * column + axis]
-        box[12, used], box[13, used], box[14, used] = bound(table, row)
-        for entry in range(3):
-            reach = abs(box[entry, used]) + box[12 + entry, used]
+                reach += abs(table[row, ROTATION + 3 * axis + column]) * half[column]
+            box[axis, slot], box[3 + axis, slot] = table[row, CENTRE + axis], reach
+            reach += abs(table[row, CENTRE + axis])
             extent = max(extent, reach if reach < FARTHEST else np.inf)
-        listed[used] = slot
-        used += 1
-    return used, extent
+    return extent
 
 
 @helper(forceinline=True)
-def _over(box, axis, count, x, y, z, over):
-    """How far a point is beyond the faces of each box along one of its axes."""
-    for n in range(count):
-        dx, dy, dz = x - box[0, n], y - box[1, n], z - box[2, n]
-        along = box[3 + 3 * axis, n] * dx + box[4 + 3 * axis, n] * dy + box[5 + 3 * axis, n] * dz
-        over[n] = abs(along) - box[12 + axis, n]
+def lower_bounds(box, x, y, z, extent, lower):
+    """Lower bounds of the signed distances of a point: those to the boxes around the primitives.
 
-
-@helper(forceinline=True)
-def _bounds(box, count, x, y, z, extent, up, depth, lower):
-    """Lower bounds of the signed distances of a point: those to the turned boxes around the primitives.
-
-    One short loop after another, because the compiler makes vectors of loops over few arrays only; in single
-    precision, lowered by more than its rounding.
+    In single precision, lowered by more than its rounding; without bound where coordinates are too large for that, or
+    no numbers.
     """
-    slack, zero = np.float32(ROUNDING * (abs(x) + abs(y) + abs(z) + extent)), np.float32(0)
+    far = abs(x) + abs(y) + abs(z) + extent
+    slack, zero = np.float32(ROUNDING * far if far < FARTHEST else np.inf), np.float32(0)
     x, y, z = np.float32(x), np.float32(y), np.float32(z)
-    _over(box, 0, count, x, y, z, up)
-    _over(box, 1, count, x, y, z, depth)
-    _over(box, 2, count, x, y, z, lower)
-    for n in range(count):
-        u, v, w = up[n], depth[n], lower[n]
+    for slot in range(len(lower)):  # the compiler makes vectors of this loop
+        u = abs(x - box[0, slot]) - box[3, slot]
+        v = abs(y - box[1, slot]) - box[4, slot]
+        w = abs(z - box[2, slot]) - box[5, slot]
         p, q, r = max(u, zero), max(v, zero), max(w, zero)
-        lower[n] = math.sqrt(p * p + q * q + r * r) + min(max(u, max(v, w)), zero) - slack
+        lower[slot] = math.sqrt(p * p + q * q + r * r) + min(max(u, max(v, w)), zero) - slack
 
 
 @helper(forceinline=True)
-def _best(table, first, listed, lower, count, x, y, z):
-    """The best primitive by its exact distance, looking only at those whose bound is below the best so far."""
-    closest, lowest = 0, lower[0]
-    for n in range(count):
-        value = lower[n]
+def _best(table, first, lower, x, y, z):
+    """The nearest primitive and its exact distance, looking only at those whose bound is below the best so far."""
+    start, lowest = 0, np.float32(np.inf)
+    for slot in range(len(lower)):
+        value = lower[slot]
         if value < lowest:
-            lowest, closest = value, n
-    best, start = np.inf, closest
-    for turn in range(-1, count):
-        n = start if turn < 0 else turn
-        if (turn >= 0 and n == start) or lower[n] > best:
+            start, lowest = slot, value
+    best, closest = np.inf, start
+    for turn in range(-1 if len(lower) else 0, len(lower)):
+        slot = start if turn < 0 else turn
+        if (turn >= 0 and slot == start) or lower[slot] > best or table[first + slot, KIND] < 0:
             continue
-        a, b, c = local(table, first + listed[n], x, y, z)
-        closer = distance(table, first + listed[n], a, b, c)
-        if closer < best or (closer == best and n < closest):
-            best, closest = closer, n
+        a, b, c = local(table, first + slot, x, y, z)
+        closer = distance(table, first + slot, a, b, c)
+        if closer < best or (closer == best and slot < closest):
+            best, closest = closer, slot
     return best, closest
 
 
@@ -89,27 +79,18 @@ def _best(table, first, listed, lower, count, x, y, z):
 def nearest(table, per_scene, points, count, slots, values, begin, end):
     """Nearest primitive and signed distance of the union for the points ``begin`` to ``end`` of all scenes.
 
-    Each scene has ``per_scene`` rows of the table and ``count`` points.  The turned box around a primitive bounds its
-    signed distance from below, inside too.  Where coordinates are too large for bounds, or no numbers, every primitive
-    is looked at.
+    Each scene has ``per_scene`` rows of the table and ``count`` points.  The box around a primitive bounds its signed
+    distance from below, inside too.
     """
-    listed, box = np.empty(per_scene, np.int64), np.empty((15, per_scene), np.float32)
-    up, depth, lower = np.empty(per_scene, np.float32), np.empty(per_scene, np.float32), np.empty(per_scene, np.float32)
-    scene, used, extent = -1, 0, 0.0
+    box, lower = np.empty((6, per_scene), np.float32), np.empty(per_scene, np.float32)
+    scene, extent = -1, 0.0
     for item in range(begin, end):
         if item // count != scene:
             scene = item // count
-            used, extent = _boxes(table, scene * per_scene, per_scene, listed, box)
-        if used == 0:
-            slots[item], values[item] = 0, np.inf
-            continue
+            extent = boxes_around(table, scene * per_scene, per_scene, box)
         x, y, z = points[item, 0], points[item, 1], points[item, 2]
-        if abs(x) + abs(y) + abs(z) + extent < FARTHEST:
-            _bounds(box, used, x, y, z, extent, up, depth, lower)
-        else:
-            lower[:used] = -np.inf
-        best, closest = _best(table, scene * per_scene, listed, lower, used, x, y, z)
-        slots[item], values[item] = listed[closest], best
+        lower_bounds(box, x, y, z, extent, lower)
+        values[item], slots[item] = _best(table, scene * per_scene, lower, x, y, z)
 
 
 @kernel("void(f8[:, ::1], i8, f8[:, ::1], i8, i8[::1], f8[::1], f8[:, ::1], f8[:, ::1], i8, i8)")

@@ -4,28 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from shapeprog.geometry.dispatch import bound, excess, normal, place, sample
+from shapeprog.geometry.dispatch import excess, normal, place, sample
 from shapeprog.geometry.dispatch import pull as pull_sizes
-from shapeprog.geometry.distance_kernels import FARTHEST
+from shapeprog.geometry.distance_kernels import FARTHEST, boxes_around, lower_bounds
 from shapeprog.kernels.bits import uniform
 from shapeprog.kernels.compile import helper, kernel
-from shapeprog.kernels.table import CENTRE, KIND, ROTATION, local, turned
+from shapeprog.kernels.table import CENTRE, ROTATION, local, turned
 
 GUIDE = 256  # steps of the table that shortens the search for a face
-
-
-@helper
-def _around(table, first, per_scene, skin, box):
-    """Boxes around the primitives: centre and reach along each axis, which is negative for padding."""
-    for slot in range(per_scene):
-        box[:3, slot], box[3:, slot] = 0.0, -1.0
-        if table[first + slot, KIND] < 0:
-            continue
-        half = bound(table, first + slot)
-        for axis in range(3):
-            box[axis, slot], box[3 + axis, slot] = table[first + slot, CENTRE + axis], skin
-            for column in range(3):
-                box[3 + axis, slot] += abs(table[first + slot, ROTATION + 3 * axis + column]) * half[column]
 
 
 @helper
@@ -36,13 +22,13 @@ def _inside(table, row, x, y, z):
 
 
 @helper
-def _hidden(table, first, per_scene, box, gap, slot, x, y, z, dx, dy, dz):
-    """Whether another part begins just outside the point, or an earlier part has the same face there."""
-    for rival in range(per_scene):  # a loop of its own, which the compiler makes vectors of
-        over_x, over_y = abs(x - box[0, rival]) - box[3, rival], abs(y - box[1, rival]) - box[4, rival]
-        gap[rival] = max(max(over_x, over_y), abs(z - box[2, rival]) - box[5, rival])
-    for rival in range(per_scene):
-        if rival == slot or gap[rival] > 0:
+def _hidden(table, first, lower, skin, slot, x, y, z, dx, dy, dz):
+    """Whether another part begins just outside the point, or an earlier part has the same face there.
+
+    ``lower`` are lower bounds of the distances of the primitives.
+    """
+    for rival in range(len(lower)):
+        if rival == slot or lower[rival] > skin:
             continue
         if _inside(table, first + rival, x + dx, y + dy, z + dz):
             return True
@@ -59,11 +45,12 @@ def visible(table, per_scene, shares, seed, skin, attempts, n, chosen, places, f
     (B * n, 9) the unit place, the grid position and the normal, and ``found`` (B,) how many of at most ``attempts``
     candidates were visible, n at most; -1 if one of them is farther away than ``FARTHEST``.
     """
-    box, gap, guide = np.empty((6, per_scene)), np.empty(per_scene), np.empty(GUIDE + 1, np.int64)
+    box, lower = np.empty((6, per_scene), np.float32), np.empty(per_scene, np.float32)
+    guide = np.empty(GUIDE + 1, np.int64)
     faces = shares.shape[1] // max(per_scene, 1)
     for scene in range(begin, end):
         first, stream, base = scene * per_scene, scene << 40, scene * n
-        _around(table, first, per_scene, skin, box)
+        extent = boxes_around(table, first, per_scene, box)
         cell = 0
         for step in range(GUIDE + 1):
             while cell < shares.shape[1] and shares[scene, cell] <= step / GUIDE:
@@ -87,7 +74,8 @@ def visible(table, per_scene, shares, seed, skin, attempts, n, chosen, places, f
             x, y, z = x + table[row, CENTRE], y + table[row, CENTRE + 1], z + table[row, CENTRE + 2]
             a, b, c = normal(table, row, face, u, v, w)
             a, b, c = turned(table, row, a, b, c)
-            if _hidden(table, first, per_scene, box, gap, slot, x, y, z, skin * a, skin * b, skin * c):
+            lower_bounds(box, x, y, z, extent, lower)
+            if _hidden(table, first, lower, skin, slot, x, y, z, skin * a, skin * b, skin * c):
                 continue
             if not abs(x) + abs(y) + abs(z) < FARTHEST:
                 accepted = -1

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import sys
-from itertools import chain
 from pathlib import Path
 
 import numpy as np
 import pytest
 import torch
+import trimesh
 import twins
 from geometry_helpers import make_scene, random_scene, require
 
@@ -89,30 +89,23 @@ def test_too_many_triangles_are_refused_with_the_number_allowed(monkeypatch):
 
 
 def test_parts_that_touch_nothing_are_put_into_the_union_as_they_are():
-    vertices, faces = mesh.union_mesh(unroll(parse(row(20_000, 3))))
-    assert len(vertices) == 8 * 20_000
-    near = vertices - 3 * np.repeat(np.arange(20_000), 8)[:, None] * [0, 0, 1]  # as if all stood in one place
-    assert np.linalg.det(near[faces]).sum() / 6 == pytest.approx(160_000)
+    vertices, faces = mesh.union_mesh(unroll(parse(row(mesh.MOST_JOINED, 3))))
+    assert len(vertices) == 8 * mesh.MOST_JOINED
+    assert trimesh.Trimesh(vertices, faces).volume == pytest.approx(8 * mesh.MOST_JOINED)
 
 
 @pytest.mark.parametrize("step", [2, 1.5])
 def test_a_long_chain_is_one_solid(step):
-    vertices, faces = mesh.union_mesh(unroll(parse(row(3 * mesh.AT_ONCE, step))))
+    vertices, faces = mesh.union_mesh(unroll(parse(row(192, step))))
     volume = np.linalg.det(vertices[faces]).sum() / 6
-    assert volume == pytest.approx(4 * (2 + (3 * mesh.AT_ONCE - 1) * step), rel=1e-5)
+    assert volume == pytest.approx(4 * (2 + 191 * step), rel=1e-5)
 
 
-def test_parts_hang_together_where_their_boxes_touch(monkeypatch):
-    low = np.random.default_rng(0).uniform(-8, 8, (60, 3)).astype(np.float32)
-    boxes = [np.stack([corner, corner + 2]) for corner in low]
-    near = (np.abs(low[:, None] - low) <= 2).all(-1)
-    expected = np.linalg.matrix_power(near.astype(float), 60) > 0
-    groups = mesh._groups(boxes)
-    assert sorted(chain(*groups)) == list(range(60))
-    assert all((np.flatnonzero(expected[group[0]]) == group).all() for group in groups)
-    monkeypatch.setattr(mesh, "MOST_TOUCHING", int(np.triu(near, 1).sum()) - 1)
-    with pytest.raises(ShapeProgError, match="pairs of the 60 parts touch"):
-        mesh._groups(boxes)
+def test_too_many_parts_for_one_solid_are_refused_with_the_number_allowed(monkeypatch):
+    monkeypatch.setattr(mesh, "MOST_JOINED", 10)
+    assert len(mesh.union_mesh(unroll(parse(row(10, 3))))[0]) == 80
+    with pytest.raises(ShapeProgError, match="11 parts are too many to join into one solid: at most 10"):
+        mesh.union_mesh(unroll(parse(row(11, 3))))
 
 
 def test_normals_of_many_parts_are_those_of_each():
@@ -143,8 +136,8 @@ def test_files_of_too_many_parts_are_refused_with_the_number_allowed(
 
 
 def test_why_there_is_no_solid_is_said(tmp_path: Path):
-    with pytest.raises(OutputError, match="parts touch"):
-        export(parse(row(300, 0)), tmp_path / "a.stl")
+    with pytest.raises(OutputError, match="too many to join"):
+        export(parse(row(mesh.MOST_JOINED + 1, 0)), tmp_path / "a.stl")
     far = make_scene(["cuboid"], [[1.0, 1, 1]], [[0.0, 2.0**24, 0]])
     with pytest.raises(ShapeProgError, match="reach farther than 16777216 cells"):
         mesh.union_mesh(far)

@@ -11,7 +11,7 @@ from functools import cache
 import numpy as np
 
 from shapeprog.geometry.batch import Batch
-from shapeprog.kernels.table import CENTRE, KIND, ROTATION, SIZE, WIDTH
+from shapeprog.kernels.table import CENTRE, ROTATION, SIZE, WIDTH
 from shapeprog.lazy_torch import Tensor, torch
 from shapeprog.space import Array
 
@@ -35,13 +35,10 @@ def cast(values: Array, like: Tensor) -> Tensor:
 
 def table_of(batch: Batch) -> Array:
     """All primitives as rows of the table (B * N, WIDTH) for kernels, see ``kernels.table``."""
-    count = batch.mask.numel()
-    table: Array = np.empty((count, WIDTH))
-    table[:, KIND] = np.where(array(batch.mask), array(batch.kind), -1).reshape(count)
-    table[:, SIZE:CENTRE] = array(batch.size).reshape(count, CENTRE - SIZE)
-    table[:, CENTRE:ROTATION] = array(batch.centre).reshape(count, 3)
-    table[:, ROTATION:] = array(batch.rotation).reshape(count, 9)
-    return table
+    mask = array(batch.mask)
+    kind, rotation = np.where(mask, array(batch.kind), -1), array(batch.rotation).reshape(*mask.shape, 9)
+    columns = kind[..., None], array(batch.size), array(batch.centre), rotation
+    return np.concatenate(columns, -1, dtype=np.float64).reshape(-1, WIDTH)
 
 
 def gradients(table: Array, like: Tensor, *shape: int) -> tuple[Tensor, Tensor, Tensor]:

@@ -6,12 +6,15 @@ import math
 
 import numpy as np
 
-from shapeprog.geometry.dispatch import bound, distance, slopes
+from shapeprog.geometry.dispatch import bound, distance, place, slopes
 from shapeprog.kernels.compile import helper, kernel
 from shapeprog.kernels.table import CENTRE, KIND, ROTATION, SIZE, local, turned
 
 ROUNDING = 2e-6  # error of a bound in single precision against the size of the coordinates, generously
 FARTHEST = 1e18  # coordinates whose squares fit into single precision, in which bounds are taken and points drawn
+
+CONVERGED = 1 - 1e-12  # ratio of distances of two projections above which the gap between primitives is known
+STARTS = 9  # points of a primitive from which the nearest ones of another are looked for
 
 
 @helper
@@ -120,25 +123,57 @@ def pull(table, per_scene, points, count, slots, slope, to_table, to_points, beg
                 to_points[item, axis] = weight * moved
 
 
+@helper
+def _between(table, row, x, y, z, rounds, ratio, part):
+    """A point moved onto the primitive of the next row and back onto that of a row, so many times.
+
+    Inside a primitive it stays where it is.  It stops when a distance is more than ``ratio`` times the one before.
+    Returns its last distance, and the point.
+    """
+    far, before, still = np.inf, np.inf, 0
+    for step in range(2 * rounds):
+        there = row + 1 - step % 2
+        a, b, c = local(table, there, x, y, z)
+        far = distance(table, there, a, b, c)
+        still = 0 if far > 0 else still + 1
+        converged = step > 1 and there > row and far > before * ratio
+        if still == 2 or converged:
+            break
+        before = far
+        if far > 0:
+            slopes(table, there, a, b, c, part)
+            up, depth, side = turned(table, there, part[0], part[1], part[2])
+            x, y, z = x - far * up, y - far * depth, z - far * side
+    return far, x, y, z
+
+
 @kernel("void(f8[:, ::1], f8[:, ::1], i8, i8, i8)")
 def project(table, points, rounds, begin, end):
     """Move the points ``begin`` to ``end`` onto the second and the first of two primitives in turn.
 
-    Point k belongs to rows 2 k and 2 k + 1 of the table.  Inside a primitive it stays where it is.
+    Point k belongs to rows 2 k and 2 k + 1 of the table.
     """
     part = np.empty(7)
     for item in range(begin, end):
-        still = 0
-        for step in range(2 * rounds):
-            row = 2 * item + 1 - step % 2
-            a, b, c = local(table, row, points[item, 0], points[item, 1], points[item, 2])
-            far = distance(table, row, a, b, c)
-            still = 0 if far > 0 else still + 1
-            if still == 2:
+        x, y, z = points[item, 0], points[item, 1], points[item, 2]
+        _, x, y, z = _between(table, 2 * item, x, y, z, rounds, np.inf, part)
+        points[item, 0], points[item, 1], points[item, 2] = x, y, z
+
+
+@kernel("void(f8[:, ::1], i8, f8, f8[::1])")
+def gaps(table, rounds, enough, gap):
+    """Distances between two primitives, or such as are small enough, by projections of points of the first.
+
+    Those of gap k are in rows 2 k and 2 k + 1 of the table.  The points are on the local axis 0.
+    """
+    part = np.empty(7)
+    for item in range(len(gap)):
+        row, gap[item] = 2 * item, np.inf
+        for start in range(STARTS):
+            a, b, c = place(table, row, 2.0 * start / (STARTS - 1) - 1, 0.0, 0.0)
+            x, y, z = turned(table, row, a, b, c)
+            x, y, z = x + table[row, CENTRE], y + table[row, CENTRE + 1], z + table[row, CENTRE + 2]
+            far, _, _, _ = _between(table, row, x, y, z, rounds, CONVERGED, part)
+            gap[item] = min(gap[item], far)
+            if far <= enough:
                 break
-            if far > 0:
-                slopes(table, row, a, b, c, part)
-                up, depth, side = turned(table, row, part[0], part[1], part[2])
-                points[item, 0] -= far * up
-                points[item, 1] -= far * depth
-                points[item, 2] -= far * side

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 from itertools import combinations
 from typing import Any, NamedTuple
 
@@ -15,7 +14,6 @@ from shapeprog.geometry.arrays import array
 from shapeprog.geometry.batch import Batch
 from shapeprog.geometry.primitive import Mesh as Triangles
 from shapeprog.geometry.primitives import primitives
-from shapeprog.geometry.primitives.cuboid import CUBOID
 from shapeprog.lazy_torch import torch
 from shapeprog.space import Array, FloatArray
 
@@ -28,10 +26,7 @@ FARTHEST = 1 << 24
 beyond."""
 
 MOST_TRIANGLES = 1 << 21  # most triangles of the parts of a scene together
-MOST_TOUCHING = 1 << 14  # most pairs of parts that touch, of which one solid is made: each takes up to a millisecond
-AT_ONCE = 64  # solids that are joined together
-Single = tuple[npt.NDArray[np.float32], npt.NDArray[np.int64]]  # vertices in single precision and triangles
-
+MOST_JOINED = 1 << 13  # most parts of which one solid is made, which takes seconds
 
 STEP = 1 / 16384
 """Cells to whose whole multiples vertices are rounded before solids are joined: faces that meet but for the rounding of
@@ -82,22 +77,14 @@ def solids_of(scene: Batch) -> Solids:
 
 
 def bounds(scene: Batch) -> Iterator[tuple[int, FloatArray, FloatArray]]:
-    """The slot of each solid part of one scene, and the low and high corner (3,) of the box around it.
+    """The slot of each solid part of one scene, and the low and high corner (3,) of a box around it.
 
-    They are exact for boxes and along the axes of the grid, else those of the mesh; raises what :func:`part_meshes`
-    does.
+    It is the smallest one for boxes and for parts along the axes of the grid; raises what :func:`solids_of` does.
     """
     parts = solids_of(scene)
-    turn = np.abs(parts.rotation)
-    half = (turn @ parts.half[..., None])[..., 0]
-    low, high = parts.centre - half, parts.centre + half
-    exact = (turn.max(-1) > 1 - 1e-12).all(-1) | (array(scene.kind) == primitives.index(CUBOID)) & (
-        parts.size[:, 3] == 0
-    )
-    if (parts.solid & ~exact).any():
-        for slot, vertices, _ in part_meshes(replace(scene, mask=scene.mask & torch.tensor(~exact))):
-            low[slot], high[slot] = vertices.min(0), vertices.max(0)
-    return ((slot, low[slot], high[slot]) for slot in np.flatnonzero(parts.solid).tolist())
+    half = (np.abs(parts.rotation) @ parts.half[..., None])[..., 0]
+    for slot in np.flatnonzero(parts.solid).tolist():
+        yield slot, parts.centre[slot] - half[slot], parts.centre[slot] + half[slot]
 
 
 def part_meshes(scene: Batch) -> list[PartMesh]:
@@ -129,19 +116,30 @@ def part_meshes(scene: Batch) -> list[PartMesh]:
 def union_mesh(scene: Batch) -> Triangles:
     """One watertight mesh of the union of all primitives of one scene.
 
-    Only parts that touch are joined; the others are appended unchanged.  A ``ShapeProgError`` if the scene
-    holds no solid part, a batch is given, or more than ``MOST_TOUCHING`` pairs of parts touch.
+    A ``ShapeProgError`` if the scene holds no solid part or more than ``MOST_JOINED``, or a batch is given.
     """
-    solids: list[Single] = []
-    for group in _touching(scene):
-        if len(group) == 1:
-            solids += group
-        else:
-            merged = _joined(group).to_mesh()
-            solids.append((merged.vert_properties[:, :3], np.asarray(merged.tri_verts, np.int64)))
-    if not any(len(vertices) for vertices, _ in solids):
+    from manifold3d import Manifold, OpType
+
+    parts = part_meshes(scene)
+    if not parts:
+        raise ShapeProgError("the scene holds no solid part", "draw something that has a thickness")
+    if len(parts) > MOST_JOINED:
+        raise ShapeProgError(
+            f"{len(parts)} parts are too many to join into one solid: at most {MOST_JOINED}",
+            "lower the counts, or export the parts as they are, as .ply",
+        )
+    solids = [manifold(np.round(part.vertices / STEP) * STEP, part.faces) for part in parts]
+    union = Manifold.batch_boolean(solids, OpType.Add).to_mesh()
+    if not len(union.tri_verts):
         raise ShapeProgError("the union of the parts is empty", "a part may be too thin; give it some thickness")
-    return joined(solids)
+    return union.vert_properties[:, :3].astype(np.float64), np.asarray(union.tri_verts, np.int64)
+
+
+def manifold(vertices: Array, faces: Array) -> Any:
+    """A mesh as a solid of manifold3d, in single precision."""
+    from manifold3d import Manifold, Mesh
+
+    return Manifold(Mesh(vertices.astype(np.float32), faces.astype(np.uint32)))
 
 
 def joined(meshes: Sequence[tuple[Array, Array]]) -> Triangles:
@@ -153,18 +151,13 @@ def joined(meshes: Sequence[tuple[Array, Array]]) -> Triangles:
 
 def pieces(vertices: Array, faces: Array) -> int:
     """How many connected solids a watertight mesh, such as a union, is; a cavity within one is no piece."""
-    from manifold3d import Manifold, Mesh
-
-    solid = Manifold(Mesh(vertices.astype(np.float32), faces.astype(np.uint32)))
-    return sum(piece.volume() > 0 for piece in solid.decompose())
+    return sum(piece.volume() > 0 for piece in manifold(vertices, faces).decompose())
 
 
 def gaps(scene: Batch, within: float) -> dict[tuple[int, int], float]:
     """The distance between primitives of one scene, for pairs of slots nearer than ``within``; 0 where they overlap."""
-    from manifold3d import Manifold, Mesh
-
     parts = part_meshes(scene)
-    solids = [Manifold(Mesh(part.vertices.astype(np.float32), part.faces.astype(np.uint32))) for part in parts]
+    solids = [manifold(part.vertices, part.faces) for part in parts]
     low, high = (np.array([corner(part.vertices, 0) for part in parts]) for corner in (np.min, np.max))
     results = {}
     for i, j in combinations(range(len(parts)), 2):
@@ -173,54 +166,3 @@ def gaps(scene: Batch, within: float) -> dict[tuple[int, int], float]:
             if gap < within:
                 results[parts[i].slot, parts[j].slot] = float(gap)
     return results
-
-
-def _touching(scene: Batch) -> list[list[Single]]:
-    """The parts of a scene in single precision, those together whose boxes touch."""
-    parts = [((np.round(part.vertices / STEP) * STEP).astype(np.float32), part.faces) for part in part_meshes(scene)]
-    if not parts:
-        raise ShapeProgError("the scene holds no solid part", "draw something that has a thickness")
-    return [[parts[number] for number in group] for group in _groups([vertices for vertices, _ in parts])]
-
-
-def _joined(parts: list[Single]) -> Any:
-    """The union of parts as a manifold: some at once, since the time of all at once grows with the square."""
-    from manifold3d import Manifold, Mesh, OpType
-
-    solids = [Manifold(Mesh(vertices, faces.astype(np.uint32))) for vertices, faces in parts]
-    while len(solids) > 1:
-        solids = [Manifold.batch_boolean(solids[n : n + AT_ONCE], OpType.Add) for n in range(0, len(solids), AT_ONCE)]
-        for solid in solids:
-            solid.num_tri()  # manifold3d computes lazily
-    return solids[0]
-
-
-def _groups(parts: list[npt.NDArray[np.float32]]) -> list[list[int]]:
-    """Numbers of the parts that hang together: their boxes touch.
-
-    Boxes are swept along the axis on which the fewest overlap.
-    """
-    low, high = (np.array([corner(vertices, 0) for vertices in parts]) for corner in (np.min, np.max))
-    sweeps = []
-    for axis in range(3):
-        order = np.argsort(low[:, axis], kind="stable")
-        last = np.searchsorted(low[order, axis], high[order, axis], "right")
-        sweeps.append((int(last.sum()), axis, order, last.tolist()))
-    _, _, order, last = min(sweeps, key=lambda sweep: sweep[:2])
-    groups, pairs = [[number] for number in range(len(parts))], 0
-    for place, first in enumerate(order.tolist()):
-        later = order[place + 1 : last[place]]
-        touching = later[((low[later] <= high[first]) & (low[first] <= high[later])).all(1)].tolist()
-        pairs += len(touching)
-        if pairs > MOST_TOUCHING:
-            raise ShapeProgError(
-                f"more than {MOST_TOUCHING} pairs of the {len(parts)} parts touch, too many to join into one solid",
-                "lower the counts, or export the parts as they are, as .ply",
-            )
-        for second in touching:
-            small, large = sorted((groups[first], groups[second]), key=len)
-            if small is not large:
-                large += small
-                for number in small:
-                    groups[number] = large
-    return [sorted(group) for group in {id(group): group for group in groups}.values()]

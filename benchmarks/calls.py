@@ -1,4 +1,4 @@
-"""Functions of libraries among what inference chooses from: what that finds, against recognising them afterwards alone.
+"""Calls of functions of libraries: how many are found by moving parts to them, against recognition afterwards alone.
 
     python -m benchmarks.calls --out calls.jsonl
     python -m benchmarks.calls --data DATA --sets bench cabinet ikea --objects 4 --out calls.jsonl
@@ -14,7 +14,7 @@ method      how a program is written
 ==========  ============================================================================================================
 plain       without a library
 recognised  with functions, once it is inferred
-proposed    the functions compete with single blocks, too
+moved       parts that are nearly a call are moved to where it draws them, too
 ==========  ============================================================================================================
 """
 
@@ -34,7 +34,7 @@ from benchmarks.rows import measure_all, read_rows
 from benchmarks.structure import Task as Object
 from benchmarks.structure import given, objects
 
-METHODS = ("plain", "recognised", "proposed")
+METHODS = ("plain", "recognised", "moved")
 
 COLUMNS = (
     "planted", "found", "statements", "parts", "f1_half_percent", "f1_percent", "silhouette", "one_piece", "numbers",
@@ -130,7 +130,7 @@ def measure(task: Task) -> dict[str, Any]:
     library = library_of(parse(f"width, depth, height = 1, 1, 1\n{LIBRARY}")) if own else load_library(task.library)
     parts, shape = _apart(text) if own else given(Object(task.set, task.name, task.files, seed=task.seed))
     cpu = time.process_time()
-    offered = [library] if task.method == "proposed" else []
+    offered = [library] if task.method == "moved" else []
     program = infer(shape, libraries=offered, seed=task.seed, budget=BUDGET).program
     if task.method == "recognised":
         program = with_library(program, library)

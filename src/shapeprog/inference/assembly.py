@@ -1,34 +1,21 @@
 """Structure from the surface: a program of few blocks that explains the visible surface of a target.
 
-Pieces of the target become single blocks, copies among them loops, and functions calls.  A first choice is fitted
-briefly, then competes with its neighbours and with boxes around unexplained points.  The result is connected, fitted,
-restored where fitting did harm, and connected again.  Then all parts get roles.  No statement is treated by name.
+Pieces of the target become single blocks, and copies among them loops.  A first choice is fitted briefly, then competes
+with its neighbours and with boxes around unexplained points.  The result is connected, fitted, restored where fitting
+did harm, and connected again.  Then all parts get roles.  No statement is treated by name.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 from shapeprog.data.shape import Shape
 from shapeprog.inference.budget import NEVER, Deadline, Progress
-from shapeprog.inference.candidates.calls import (
-    Called,
-    Part,
-    drawn,
-    moved,
-    named,
-    placed,
-    program_of,
-    regrouped,
-    relations,
-)
 from shapeprog.inference.candidates.drawings import canonical_side, simplest
 from shapeprog.inference.candidates.loops import images, repeated
 from shapeprog.inference.candidates.moments import distinct
 from shapeprog.inference.candidates.neighbours import neighbours
-from shapeprog.inference.candidates.recognition import proposed
 from shapeprog.inference.candidates.residual import residual_candidates
 from shapeprog.inference.candidates.singles import single_candidates
 from shapeprog.inference.choice.choice import Choice, choose, explained, missed, value
@@ -36,11 +23,10 @@ from shapeprog.inference.choice.connecting import connected
 from shapeprog.inference.choice.coverage import Coverage, CoverageTable, Prices
 from shapeprog.inference.fit.adjustment import adjust, tidy
 from shapeprog.inference.pieces.pieces import find_pieces
-from shapeprog.inference.roles.roles import in_order
+from shapeprog.inference.roles.roles import in_order, with_roles
 from shapeprog.inference.surface.evidence import Evidence
-from shapeprog.language.free import numbers_outside
-from shapeprog.language.program import Program
-from shapeprog.library.matching import Pattern
+from shapeprog.language.free import numbers
+from shapeprog.language.program import Node, Program
 
 MOST_CANDIDATES = 1_500
 """Most candidates that are compared; half of them may be single blocks."""
@@ -85,7 +71,6 @@ def assemble(
     evidence: Evidence,
     *,
     blocks: int = 10,
-    functions: Sequence[Pattern] = (),
     detail: float = 1.0,
     seed: int = 0,
     deadline: Deadline = NEVER,
@@ -99,8 +84,6 @@ def assemble(
         A mesh or a point cloud, and the evidence of its surface.
     blocks
         Most blocks of the program.
-    functions
-        Functions whose calls compete with blocks; each call counts as one.
     detail
         Factor by which the prices of blocks and numbers are divided: above 1 the program is finer.
     deadline, progress
@@ -115,39 +98,32 @@ def assemble(
     prices = replace(usual, **{name: getattr(usual, name) / detail for name in ("statement", "loop", "number")})
     coverage = Coverage(evidence, prices, seed)
     report(0.1)
-    candidates = _candidates(shape, functions, seed, deadline)
+    candidates = _candidates(shape, seed)
     if not candidates or evidence.area <= 0:
         return Assembly(Program(), 0.0, "")
     report(0.7)
-    choice, candidates = _chosen(candidates, functions, coverage, blocks, seed, deadline)
+    choice, candidates = _chosen(candidates, coverage, blocks, seed, deadline)
     report(1.0)
-    start = _connected([candidates[index] for index in choice.best.chosen], coverage)
-    adjusted = _adjusted(start, evidence, seed=seed, deadline=deadline, progress=progress)
-    parts = _connected(_unharmed(adjusted, start, coverage), coverage)
-    program = tidy(Program(tuple(canonical_side(simplest(node)) for node in drawn(parts).body)))
-    program = in_order(named(parts, program))
+    start = connected(Program(tuple(candidates[index] for index in choice.best.chosen)), coverage)
+    adjusted = adjust(start, evidence, seed=seed, deadline=deadline, progress=progress)
+    program = connected(_unharmed(adjusted, start, coverage), coverage)
+    program = tidy(Program(tuple(canonical_side(simplest(node)) for node in program.body)))
+    program = in_order(with_roles(program))
     share = explained(_table(program.body, coverage), range(len(program.body)))
-    return Assembly(program, share, _reason(len(parts), share, choice, candidates, blocks))
+    return Assembly(program, share, _reason(len(program.body), share, choice, candidates, blocks))
 
 
-def _candidates(shape: Shape, functions: Sequence[Pattern], seed: int, deadline: Deadline) -> list[Part]:
-    """Single blocks for the pieces of a shape, the most important first, loops over copies of them, and calls."""
+def _candidates(shape: Shape, seed: int) -> list[Node]:
+    """Single blocks for the pieces of a shape, the most important first, and loops over copies of them."""
     pieces = find_pieces(shape, seed)
     singles = distinct(single_candidates(pieces))
     loops = distinct([*repeated(singles), *images(singles, pieces.cloud.points)])
-    basic = [*singles[: MOST_CANDIDATES // 2], *loops][:MOST_CANDIDATES]
-    composite = [function for function in functions if function.blocks > 1]
-    return [*basic, *proposed(composite, basic, deadline)]
+    return [*singles[: MOST_CANDIDATES // 2], *loops][:MOST_CANDIDATES]
 
 
 def _chosen(
-    candidates: list[Part],
-    functions: Sequence[Pattern],
-    coverage: Coverage,
-    blocks: int,
-    seed: int,
-    deadline: Deadline,
-) -> tuple[Choice, list[Part]]:
+    candidates: list[Node], coverage: Coverage, blocks: int, seed: int, deadline: Deadline
+) -> tuple[Choice, list[Node]]:
     """The better of two choices, and its candidates.
 
     The second is among the first choice, a choice with a wide tolerance, their adjusted forms and neighbours, boxes
@@ -156,60 +132,38 @@ def _chosen(
     evidence = coverage.evidence
     table = _table(candidates, coverage)
     choice = choose(table, blocks, seed=seed)
-    first = [candidates[index] for index in choice.best.chosen]
+    first = tuple(candidates[index] for index in choice.best.chosen)
     if not first or deadline.passed("another choice among neighbours"):
         return choice, candidates
     wide = replace(evidence, tolerance=LOOSE * evidence.tolerance, reach=LOOSE * evidence.reach)
     loose = choose(_table(candidates, Coverage(wide, coverage.prices, seed)), blocks, seed=seed)
     pool = list(first)
-    for parts in dict.fromkeys([tuple(first), tuple(candidates[index] for index in loose.best.chosen)]):
-        adjusted = _adjusted(parts, evidence, steps=ROUGH, seed=seed, deadline=deadline)
-        pool += [*parts, *adjusted, *drawn(parts).body, *drawn(adjusted).body, *neighbours(drawn(adjusted))]
-        pool += residual_candidates(drawn(adjusted), evidence)
+    for nodes in dict.fromkeys([first, tuple(candidates[index] for index in loose.best.chosen)]):
+        adjusted = adjust(Program(nodes), evidence, steps=ROUGH, seed=seed, deadline=deadline)
+        pool += [*nodes, *adjusted.body, *neighbours(adjusted), *residual_candidates(adjusted, evidence)]
     remaining = [candidates[index] for index in missed(table, choice.best.chosen)[:REST]]
     pool = list(dict.fromkeys([*pool, *remaining]))  # the first choice first: the search starts there
-    pool += proposed(functions, [part for part in pool if not isinstance(part, Called)], deadline)
     again = choose(_table(pool, coverage), blocks, start=range(len(first)), seed=seed)
     return (again, pool) if again.best.value > choice.best.value + LEAST_GAIN else (choice, candidates)
 
 
-def _adjusted(parts: Sequence[Part], evidence: Evidence, **options: Any) -> list[Part]:
-    """The parts as they fit the evidence together; calls move only as their functions allow."""
-    program, calls = drawn(parts), placed(parts)
-    held = relations(program, calls) if calls else None
-    return moved(parts, adjust(program, evidence, relations=held, **options))
-
-
-def _connected(parts: Sequence[Part], coverage: Coverage) -> list[Part]:
-    """The parts with single blocks that float extended to others; calls do not change."""
-    fixed = {node for part in parts if isinstance(part, Called) for node in part.nodes}
-    return regrouped(parts, connected(drawn(parts), coverage, fixed))
-
-
-def _unharmed(adjusted: Sequence[Part], start: Sequence[Part], coverage: Coverage) -> list[Part]:
-    """The adjusted parts; those whose adjustment has clearly done harm are restored.
-
-    Calls that no longer pay are removed: after all have moved, another may draw the same.
-    """
-    count, union = len(start), [*adjusted, *start]
+def _unharmed(adjusted: Program, start: Program, coverage: Coverage) -> Program:
+    """The adjusted program; blocks whose adjustment has clearly done harm are restored."""
+    count, union = len(start.body), [*adjusted.body, *start.body]
     table = _table(union, coverage)
     selected = tuple(range(count))
     for index in range(count):
         trial = (*selected[:index], count + index, *selected[index + 1 :])
         if value(table, trial) > value(table, selected) + HARM:
             selected = trial
-    for index in [index for index in selected if isinstance(union[index], Called)]:
-        trial = tuple(member for member in selected if member != index)
-        if value(table, trial) > value(table, selected):
-            selected = trial
-    return [union[index] for index in selected]
+    return Program(tuple(union[index] for index in selected))
 
 
-def _table(parts: Sequence[Part], coverage: Coverage) -> CoverageTable:
-    return coverage.table([program_of(part) for part in parts])
+def _table(nodes: Sequence[Node], coverage: Coverage) -> CoverageTable:
+    return coverage.table([Program((node,)) for node in nodes])
 
 
-def _reason(used: int, share: float, choice: Choice, candidates: Sequence[Part], allowed: int) -> str:
+def _reason(used: int, share: float, choice: Choice, candidates: Sequence[Node], allowed: int) -> str:
     """Why the program has so many blocks, which explain this share, and not more."""
     text = f"{used} drawing statement{'s cover' if used != 1 else ' covers'} {share:.0%} of the surface"
     if used >= allowed:
@@ -218,9 +172,8 @@ def _reason(used: int, share: float, choice: Choice, candidates: Sequence[Part],
     if more is None or more.explained - share < LEAST_GAIN:
         return f"{text}; no other candidate would cover more."
 
-    def numbers(indices: Sequence[int]) -> int:
-        return sum(numbers_outside(program_of(candidates[index])) for index in indices)
-
-    gain, cost = more.explained - share, max(numbers(more.chosen) - numbers(choice.best.chosen), 0)
-    price = f"with {cost} more numbers" if cost else "without more numbers"
+    many, few = (
+        numbers(Program(tuple(candidates[index] for index in option.chosen))) for option in (more, choice.best)
+    )
+    gain, price = more.explained - share, f"with {many - few} more numbers" if many > few else "without more numbers"
     return f"{text}; one more would cover another {gain:.1%} {price}: raise --detail to add it."

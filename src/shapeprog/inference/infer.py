@@ -23,10 +23,11 @@ from shapeprog.geometry.arrays import one_tensor_thread
 from shapeprog.geometry.cells import iou, pack
 from shapeprog.inference.assembly import assemble
 from shapeprog.inference.budget import BUDGET, Deadline, Progress
-from shapeprog.inference.candidates.calls import recognised
+from shapeprog.inference.calls import with_calls
 from shapeprog.inference.cells.reconstruct import description_length, reconstruct
 from shapeprog.inference.cells.refine import Schedule
 from shapeprog.inference.cells.structure import Settings
+from shapeprog.inference.choice.coverage import Coverage, Prices
 from shapeprog.inference.readable import CELLS, in_readable_unit, unit_of_result
 from shapeprog.inference.roles.roles import named_anew
 from shapeprog.inference.surface.evidence import doubt_of_furniture, evidence_of
@@ -152,11 +153,9 @@ def infer(
     snapped: Program | None = None
     evidence = None if statements == "paper" else evidence_of(target, seed)
     if evidence is not None and target.points is not None:
-        functions = [pattern for library in libraries for pattern in library.patterns if pattern.shortens]
         assembly = assemble(
-            target, evidence, blocks=blocks, functions=functions, detail=detail, seed=seed, deadline=refining,
-            progress=progress,
-        )  # fmt: skip
+            target, evidence, blocks=blocks, detail=detail, seed=seed, deadline=refining, progress=progress
+        )
         program, reason = assembly.program, assembly.reason
         scores["explained"] = assembly.explained
     if not program.body:  # voxels, or no surface to speak of
@@ -170,8 +169,10 @@ def infer(
         integral, plain = snapped, program
         if snapped is not None:
             program, snapped = named_anew(program), None
+        held: frozenset[int] = frozenset()
+        if libraries:
+            program, held = with_calls(program, libraries, Coverage(evidence, Prices(), seed))
         if ties:
-            held = {index for call in recognised(program, libraries) for index in call.places}
             program = tie(program, evidence, held=held, seed=seed, progress=progress).program
         if integral is not None and description_length(plain, target.voxels, integral) < description_length(
             program, target.voxels

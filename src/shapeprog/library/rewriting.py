@@ -120,11 +120,6 @@ class Offer(NamedTuple):
     around: tuple[Loop, ...]
 
 
-def offers(program: Program, library: Library) -> list[Offer]:
-    """The calls of functions of a library that shorten a plain program most; no two of them share a line."""
-    return _offered(_separated(source_of(program)), library)
-
-
 def _offered(cells: Source, library: Library) -> list[Offer]:
     names = names_of(cells)
     return _selected(cells, [pattern for pattern in library.patterns if pattern.function.name not in names])

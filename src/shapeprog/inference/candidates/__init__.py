@@ -1,1 +1,1 @@
-"""Blocks that may be part of the program: statements on pieces, loops over copies, and calls of functions."""
+"""Blocks that may be part of the program: statements on pieces, and loops over copies."""

@@ -5,7 +5,7 @@ Furniture is one piece.  The share explained is hardly affected by a gap of one 
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Iterator
 
 import numpy as np
 import torch
@@ -34,21 +34,20 @@ FLUSH = 1e-4
 """Largest gap in cells between touching parts: coincident faces touch."""
 
 
-def connected(program: Program, coverage: Coverage, fixed: Collection[Node] = ()) -> Program:
-    """The program with floating parts extended to others where the loss of value is small; each of its nodes is one
-    block, and nodes in ``fixed`` do not change."""
-    while (better := _better_connected(program, coverage, fixed)) is not None:
+def connected(program: Program, coverage: Coverage) -> Program:
+    """The program with floating parts extended to others where the loss of value is small; each node is one block."""
+    while (better := _better_connected(program, coverage)) is not None:
         program = better
     return program
 
 
-def _better_connected(program: Program, coverage: Coverage, fixed: Collection[Node]) -> Program | None:
+def _better_connected(program: Program, coverage: Coverage) -> Program | None:
     """The most valuable program with one block changed or removed and fewer floating parts, if the loss is small."""
     loose = _loose_parts(program)
     count = sum(map(sum, loose))
     if not count:
         return None
-    every = [program, *_options(program, loose, fixed)]
+    every = [program, *_options(program, loose)]
     nodes = list(dict.fromkeys(node for option in every for node in option.body))
     index = {node: number for number, node in enumerate(nodes)}
     table = coverage.table([Program((node,)) for node in nodes])
@@ -85,13 +84,11 @@ def _loose_parts(program: Program, flush: float = FLUSH) -> list[list[bool]]:
     return loose
 
 
-def _options(program: Program, loose: list[list[bool]], fixed: Collection[Node]) -> list[Program]:
+def _options(program: Program, loose: list[list[bool]]) -> list[Program]:
     """Programs without one floating block, and programs with one block extended to join floating and other parts."""
     body, chains, options = program.body, program.chains, list[Program]()
     boxes, originals = solid_boxes(body), solid_boxes([chain[-1] for chain in chains])
     for index, (copies, floats) in enumerate(zip(boxes, loose, strict=True)):
-        if body[index] in fixed:
-            continue
         ways: list[tuple[Node, ...]] = [()] if any(floats) else []
         for side in (True, False):
             mine = [copy for copy, lone in zip(copies, floats, strict=True) if lone is side]

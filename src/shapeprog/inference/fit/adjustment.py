@@ -18,7 +18,6 @@ from shapeprog.inference.fit.residuals import Pairs, Target, pull
 from shapeprog.inference.fit.tunable import Poses, Tunable
 from shapeprog.inference.surface.evidence import TOLERANCE, Evidence
 from shapeprog.language.program import Program
-from shapeprog.space import FloatArray
 
 STEPS, LAST = 12, 5
 """Steps, of which the last ones fix rounded angles and close the joints that are still open."""
@@ -46,16 +45,12 @@ OPEN = 0.15
 UPRIGHT = 0.7
 """Degrees below which an angle is none."""
 
-SAME = 1e-6
-"""Singular value of relations below which one follows from others."""
-
 
 def adjust(
     program: Program,
     evidence: Evidence,
     *,
     steps: int = STEPS,
-    relations: FloatArray | None = None,
     seed: int = 0,
     deadline: Deadline = NEVER,
     progress: Progress | None = None,
@@ -66,8 +61,6 @@ def adjust(
     ----------
     steps
         Steps of Gauss and Newton, at least ``LAST`` of them with fixed angles.
-    relations
-        Rows (R, F) of factors: these sums of the numbers that move stay constant.
     seed
         Of the samples that each step draws.
     deadline
@@ -79,7 +72,6 @@ def adjust(
     values, held = tunable.values, torch.zeros(len(tunable.values), dtype=torch.bool)
     generator, target, angles = torch.Generator().manual_seed(seed), Target(evidence), tunable.are("angle")
     narrow = EXPLAINED * evidence.tolerance
-    ways = _ways(relations, held)
     wide = max(CAPTURE, narrow)
     with one_tensor_thread(kernels=1):
         poses = tunable.poses(values)
@@ -90,7 +82,6 @@ def adjust(
             done = min(step / max(steps - LAST, 1), 1.0)
             if done == 1 and not held.any():
                 held = angles
-                ways = _ways(relations, held)
                 values = torch.where(held, tunable.rounded(values * (values.abs() >= UPRIGHT)), values)
                 poses = tunable.poses(values)
             joints = moved(poses.scene, joints)
@@ -99,8 +90,7 @@ def adjust(
                 of_target(poses, pairs, wide ** (1 - done) * narrow**done),
                 of_joints(poses, joints, closing=done == 1),
             ]
-            onwards = torch.maximum(values + _move(systems, tunable, values, ways), tunable.low)
-            values = onwards if relations is None else values + ways @ (ways.T @ (onwards - values))
+            values = torch.maximum(values + _move(systems, tunable, values, held), tunable.low)
             poses = tunable.poses(values)
             if progress:
                 progress("adjusting", (step + 1) / steps)
@@ -140,24 +130,17 @@ def of_joints(poses: Poses, joints: Joints, *, closing: bool) -> System:
     return weighted.T @ gaps.residual, weighted.T @ gaps.slopes
 
 
-def _ways(relations: FloatArray | None, held: Bool[Tensor, " F"]) -> Float[Tensor, "F Z"]:
-    """Orthonormal directions in which numbers may move: not those that are held, nor against relations."""
-    single = torch.eye(len(held), dtype=torch.float64)
-    if relations is None:
-        return single[:, ~held]
-    _, sizes, directions = torch.linalg.svd(torch.cat([torch.from_numpy(relations), single[held]]))
-    return directions[int((sizes > SAME).sum()) :].T
-
-
 def _move(
-    systems: list[System], tunable: Tunable, values: Float[Tensor, " F"], ways: Float[Tensor, "F Z"]
+    systems: list[System], tunable: Tunable, values: Float[Tensor, " F"], held: Bool[Tensor, " F"]
 ) -> Float[Tensor, " F"]:
-    """The step to the minimum of the sum of squares, with the prior of every number at its start."""
+    """The step to the minimum of the sum of squares, with the prior of every number at its start; some are held."""
     slope, curvature = (sum(parts) for parts in zip(*systems, strict=True))
     gentle = torch.tensor([GENTLE.get(kind, PLACE) for kind in tunable.kinds]).double() * tunable.scale**2
     slope = slope + gentle * (values - tunable.values)
     curvature = curvature + torch.diag(gentle)
-    move = ways @ -torch.linalg.solve(ways.T @ curvature @ ways, ways.T @ slope)
+    free = (~held).nonzero()[:, 0]
+    move = torch.zeros_like(values)
+    move[free] = -torch.linalg.solve(curvature[free[:, None], free], slope[free])
     farthest = FARTHEST / tunable.scale
     return torch.minimum(torch.maximum(move, -farthest), farthest)
 

@@ -6,16 +6,14 @@ import numpy as np
 import pytest
 
 from shapeprog.data.random import outside_published
-from shapeprog.geometry.cells import pack, words_of
 from shapeprog.geometry.cells import voxels as voxels_of
 from shapeprog.inference.budget import Deadline
 from shapeprog.inference.cells import editing, ruin
 from shapeprog.inference.cells.blocks import to_program
-from shapeprog.inference.cells.chance_kernels import start
 from shapeprog.inference.cells.descent_kernels import moves, statements, valid
 from shapeprog.inference.cells.drawing import draw_all
-from shapeprog.inference.cells.families import families
-from shapeprog.inference.cells.structure import MOST_COPIES, PLANES, Settings, search_structure
+from shapeprog.inference.cells.settings import Settings
+from shapeprog.inference.cells.structure import search_structure
 from shapeprog.language.parser import parse
 from shapeprog.language.unroll import unroll
 
@@ -50,11 +48,8 @@ def cells(text):
     return voxels_of(unroll(parse(text))).numpy().astype(bool)
 
 
-def target(solid, price=0.001):
-    places = np.argwhere(solid)
-    low, high = places.min(0), places.max(0) + 1
-    table = families((high - low).tolist(), PLANES, MOST_COPIES)
-    return editing.Target(words_of(pack(solid)).reshape(-1), low, high, table, price, len(places))
+def target(solid):
+    return editing.Target.of(solid, Settings(blocks=6, families=40))
 
 
 @pytest.mark.parametrize(
@@ -110,13 +105,12 @@ def test_the_search_stops_when_nothing_has_gained_for_long():
 
 
 def test_a_block_of_the_pool_is_put_in_where_it_gains():
-    aim = target(cells(STAR))
+    aim = editing.Target.of(cells(STAR), Settings(recall=1.0))
     whole = search_structure(cells(STAR), Settings()).blocks
-    plan = ruin.Plan(10, len(aim.table), forms=0.0, heat=0.0, recall=1.0, pool=ruin.Pool.of([whole, whole], aim))
-    assert len(plan.pool.blocks) == len(whole)
+    pool = ruin.Pool.of([whole, whole], aim)
+    assert len(pool.blocks) == len(whole)
     for missing in range(len(whole)):
-        start(0)
-        found = ruin.recreate(np.delete(whole, missing, 0), 1, aim, plan)
+        found = ruin.recreate(np.delete(whole, missing, 0), 1, aim, pool, 0.0, np.random.default_rng(0))
         assert editing.value_of(found, aim) == pytest.approx(editing.value_of(whole, aim))
 
 
@@ -137,16 +131,16 @@ def test_descent_polish_and_rounds_never_lower_the_objective(seed):
     aim = target(solid)
     blocks = noisy_blocks(solid, seed)
     others = draw_all(blocks[1:])
-    better, value = editing.improve_block(blocks[0], aim.occupied, others, aim.price, 2)
-    before = editing.iou(blocks, aim) - aim.price * statements(blocks[0])
-    after = editing.iou(np.concatenate([better[None], blocks[1:]]), aim) - aim.price * statements(better)
+    better, value = editing.improve_block(blocks[0], aim.occupied, others, aim.settings.price, 2)
+    before = editing.iou(blocks, aim) - aim.settings.price * statements(blocks[0])
+    after = editing.iou(np.concatenate([better[None], blocks[1:]]), aim) - aim.settings.price * statements(better)
     assert value == pytest.approx(after, abs=1e-12)
     assert after >= before
     polished = editing.polish(blocks, aim, 1, 3)
     start = editing.value_of(blocks, aim)
     assert editing.value_of(polished, aim) >= start
-    plan = ruin.Plan(blocks=6, families=40, forms=0.3, heat=0.004)
-    rebuilt, best = ruin.rebuild(polished, aim, plan, 6, seed)
+    pool = ruin.Pool.of([blocks], aim)
+    rebuilt, best = ruin.rebuild(polished, aim, pool, 6, aim.settings.heat, np.random.default_rng(seed))
     assert best == pytest.approx(editing.value_of(rebuilt, aim), abs=1e-12)
     assert best >= editing.value_of(polished, aim)
     assert len(rebuilt) <= 6

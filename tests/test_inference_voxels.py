@@ -11,7 +11,7 @@ import shapeprog as sp
 from shapeprog.data.placement import shape_from_mesh
 from shapeprog.data.shape import Shape
 from shapeprog.formats.parts import solid
-from shapeprog.inference import Schedule, Settings
+from shapeprog.inference import Schedule
 from shapeprog.inference.cells.reconstruct import description_length
 from shapeprog.inference.fit.residuals import Target
 from shapeprog.inference.fit.tunable import Tunable
@@ -67,7 +67,7 @@ def test_full_grids_single_cells_and_flat_sheets_are_one_block(kind):
 
 
 def test_a_program_found_on_cells_is_tied():
-    shape, quick = Shape("planted", cells(CHAIR)), {"settings": Settings(rounds=20), "schedule": Schedule(steps=2)}
+    shape, quick = Shape("planted", cells(CHAIR)), {"schedule": Schedule(steps=2)}
     tied, plain = (sp.infer(shape, ties=ties, **quick) for ties in (True, False))
     assert [each.name for each in sp.names(tied.program)][:2] == ["width", "depth"]
     assert tied.scores["numbers"] < plain.scores["numbers"]

@@ -26,7 +26,7 @@ from shapeprog.inference.budget import BUDGET, Deadline, Progress
 from shapeprog.inference.calls import with_calls
 from shapeprog.inference.cells.reconstruct import description_length, reconstruct
 from shapeprog.inference.cells.refine import Schedule
-from shapeprog.inference.cells.structure import Settings
+from shapeprog.inference.cells.settings import Settings
 from shapeprog.inference.choice.coverage import Coverage, Prices
 from shapeprog.inference.readable import CELLS, in_readable_unit, unit_of_result
 from shapeprog.inference.roles.roles import named_anew

@@ -5,14 +5,18 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
+from shapeprog.geometry.cells import pack, words_of
 from shapeprog.inference.cells.block_layout import WIDTH
 from shapeprog.inference.cells.descent_kernels import MOST_MOVES, descend, statements
 from shapeprog.inference.cells.drawing import Rows, Whole, cells_shared, draw_all, draw_each, low_corners
+from shapeprog.inference.cells.families import families
 from shapeprog.inference.cells.fold_kernels import VOLUMES
 from shapeprog.inference.cells.form_kernels import guess
 from shapeprog.inference.cells.proposal_kernels import propose
 from shapeprog.inference.cells.raster_kernels import ROWS
+from shapeprog.inference.cells.settings import Settings
 from shapeprog.space import RESOLUTION, FloatArray
 
 GUESSES = 30
@@ -34,23 +38,36 @@ class Target:
         Bounding box of its cells, in cells of the grid from 0.
     table
         The ways of repeating a box.
-    price
-        Price of a statement in IoU.
     cells
         Number of occupied cells.
+    settings
+        Limits and prices.
     """
 
     occupied: Rows
     low: Whole
     high: Whole
     table: Whole
-    price: float
     cells: int
+    settings: Settings
+
+    @classmethod
+    def of(cls, voxels: npt.NDArray[np.bool_], settings: Settings) -> Target:
+        """The target for a solid of cells (32, 32, 32)."""
+        cells = np.argwhere(voxels)
+        low, high = cells.min(0), cells.max(0) + 1
+        table = families((high - low).tolist(), settings.planes, settings.copies)
+        return cls(words_of(pack(voxels)).reshape(-1), low, high, table, len(cells), settings)
+
+    @property
+    def statement(self) -> float:
+        """Price of a statement in cells."""
+        return self.settings.price * self.cells
 
 
 def value_of(blocks: FloatArray, target: Target) -> float:
     """IoU minus price x statements."""
-    return iou(blocks, target) - target.price * int(statements(blocks.T).sum())
+    return iou(blocks, target) - target.settings.price * int(statements(blocks.T).sum())
 
 
 def iou(blocks: FloatArray, target: Target) -> float:
@@ -100,7 +117,7 @@ def polish(blocks: FloatArray, target: Target, far: int, sweeps: int) -> FloatAr
         for k in range(len(blocks)):
             if settled[k]:
                 continue
-            better, _value = improve_block(blocks[k], target.occupied, _union(rows, k), target.price, far)
+            better, _value = improve_block(blocks[k], target.occupied, _union(rows, k), target.settings.price, far)
             settled[k] = True
             if not np.array_equal(better, blocks[k]):
                 changed = True
@@ -113,7 +130,7 @@ def polish(blocks: FloatArray, target: Target, far: int, sweeps: int) -> FloatAr
     k, current = 0, _iou(_union(rows, len(rows)), target)
     while k < len(blocks):
         without = _iou(_union(rows, k), target)
-        if without >= current - target.price * statements(blocks[k]):
+        if without >= current - target.settings.price * statements(blocks[k]):
             blocks, rows, current = np.delete(blocks, k, 0), np.delete(rows, k, 0), without
         else:
             k += 1
@@ -126,7 +143,9 @@ def _union(rows: Rows, left_out: int) -> Rows:
     return np.asarray(before | np.bitwise_or.reduce(rows[left_out + 1 :], axis=0))
 
 
-def propose_form(form: int, covered: Rows, waste: float, box: FloatArray, target: Target) -> tuple[float, FloatArray]:
+def propose_form(
+    form: int, covered: Rows, waste: float, box: FloatArray, target: Target, random: np.random.Generator
+) -> tuple[float, FloatArray]:
     """The best of several guesses of one form on uncovered cells, improved by descent: its gain and the block.
 
     Parameters
@@ -143,12 +162,12 @@ def propose_form(form: int, covered: Rows, waste: float, box: FloatArray, target
     if len(cells) < FEWEST:
         return 0.0, np.zeros(WIDTH)
     rough: FloatArray = np.empty((GUESSES, WIDTH))
-    rough = rough[: guess(form, cells, box, rough)]
+    rough = rough[: guess(form, cells, box, int(random.integers(2**31)), rough)]
     if not len(rough):
         return 0.0, np.zeros(WIDTH)
     best = rough[int(_nets(rough, gained, wasted, waste).argmax())]
-    block, _value = improve_block(best, target.occupied, covered, target.price, 2)
-    return float(_nets(block[None], gained, wasted, waste)[0] - target.price * target.cells * statements(block)), block
+    block, _value = improve_block(best, target.occupied, covered, target.settings.price, 2)
+    return float(_nets(block[None], gained, wasted, waste)[0] - target.statement * statements(block)), block
 
 
 def _nets(blocks: FloatArray, gained: Rows, wasted: Rows, waste: float) -> FloatArray:
@@ -169,7 +188,7 @@ def best_box(covered: Rows, waste: float, picks: Whole, target: Target) -> tuple
     """
     block, volumes = np.zeros(WIDTH), np.empty((VOLUMES, RESOLUTION**3), np.float32)
     gain = propose(
-        target.occupied, covered, waste, target.low, target.high, target.table, picks, target.price * target.cells,
+        target.occupied, covered, waste, target.low, target.high, target.table, picks, target.statement,
         volumes, block,
     )  # fmt: skip
     return gain, block

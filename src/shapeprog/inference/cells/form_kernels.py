@@ -19,13 +19,12 @@ from shapeprog.inference.cells.block_layout import (
     ROTATE,
     TILT,
 )
-from shapeprog.inference.cells.chance_kernels import one_of
 from shapeprog.inference.cells.descent_kernels import valid
 from shapeprog.kernels.compile import helper, kernel
 
 
-@kernel("i8(i8, i8[:, ::1], f8[::1], f8[:, ::1])")
-def guess(form, cells, box, out):
+@kernel("i8(i8, i8[:, ::1], f8[::1], i8, f8[:, ::1])")
+def guess(form, cells, box, seed, out):
     """Rough blocks of a form, each from two random cells or from a proposed box; the number of valid ones.
 
     Parameters
@@ -36,17 +35,20 @@ def guess(form, cells, box, out):
         Low corners (n, 3) of the cells to choose from.
     box
         The proposed box.
+    seed
+        Seed of the random numbers.
     out
         Output for G guesses (G, 20); the valid blocks come first.
     """
+    np.random.seed(seed)
     count = 0
     for _ in range(len(out)):
         block = out[count]
         for slot in range(len(block)):
             block[slot] = 0
         block[FORM], block[COUNT1], block[COUNT2] = form, 1, 1
-        a = cells[one_of(len(cells))]
-        b = cells[one_of(len(cells))]
+        a = cells[np.random.randint(len(cells))]
+        b = cells[np.random.randint(len(cells))]
         if form == LINE:
             guess_line(block, a, b, box)
         elif form == BACK:
@@ -85,15 +87,15 @@ def guess_back(block, a, b, box):
     if box[EXTENT] <= 0 or np.random.random() < 0.5:
         low, high = (a, b) if a[0] <= b[0] else (b, a)
         block[FIRST], block[EXTENT] = low[0], high[0] - low[0] + 1
-        block[FIRST + 1] = low[1] - one_of(2)
-        block[EXTENT + 1] = 1 + one_of(3)
+        block[FIRST + 1] = low[1] - np.random.randint(2)
+        block[EXTENT + 1] = 1 + np.random.randint(3)
         block[FIRST + 2], block[EXTENT + 2] = min(a[2], b[2]), abs(a[2] - b[2]) + 1
-        block[TILT] = high[1] - low[1] + one_of(3) - 1
+        block[TILT] = high[1] - low[1] + np.random.randint(3) - 1
         return
     copy_loops(block, box)
     for axis in range(3):
         block[FIRST + axis], block[EXTENT + axis] = box[FIRST + axis], box[EXTENT + axis]
-    tilt = (1 + one_of(5)) * (1 if np.random.random() < 0.7 else -1)
+    tilt = (1 + np.random.randint(5)) * (1 if np.random.random() < 0.7 else -1)
     block[TILT] = tilt
     if np.random.random() < 0.5 and block[EXTENT + 1] > abs(tilt):
         block[EXTENT + 1] -= abs(tilt)
@@ -114,7 +116,7 @@ def guess_disc(block, a, b, box):
         block[FIRST], block[EXTENT] = min(a[0], b[0]), abs(a[0] - b[0]) + 1
         for axis in range(1, 3):
             block[FIRST + axis] = np.rint((a[axis] + b[axis] + 1) / 2)
-        block[RADIUS] = max(1, int(max(abs(a[1] - b[1]), abs(a[2] - b[2])) / 2) + one_of(2))
+        block[RADIUS] = max(1, int(max(abs(a[1] - b[1]), abs(a[2] - b[2])) / 2) + np.random.randint(2))
 
 
 @helper
@@ -130,18 +132,18 @@ def guess_star(block, a, cells):
     block[FIRST] = a[0]
     if block[FORM] == CROSS:
         block[FIRST + 1], block[FIRST + 2] = np.rint(centre1), np.rint(centre2)
-        block[EXTENT] = 1 + one_of(3)
+        block[EXTENT] = 1 + np.random.randint(3)
         block[RADIUS] = max(2.0, np.rint(np.sqrt((a[1] - centre1) ** 2 + (a[2] - centre2) ** 2)))
-        block[RADIUS + 1] = one_of(4)
+        block[RADIUS + 1] = np.random.randint(4)
         block[ROTATE] = 4
     else:
         block[FORM] = LINE
         block[FIRST + 1], block[FIRST + 2] = np.floor(centre1), np.floor(centre2)
         for axis in range(3):
             block[EXTENT + axis] = a[axis]
-        block[FIRST] = a[0] + one_of(4)
+        block[FIRST] = a[0] + np.random.randint(4)
         block[TILT] = 1
-        block[ROTATE] = 3 + one_of(4)
+        block[ROTATE] = 3 + np.random.randint(4)
 
 
 @helper

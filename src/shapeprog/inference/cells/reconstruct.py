@@ -17,7 +17,8 @@ from shapeprog.geometry.distance import nearest_primitive
 from shapeprog.inference.budget import NEVER, Deadline, Progress
 from shapeprog.inference.cells.blocks import to_program
 from shapeprog.inference.cells.refine import REACH, Schedule, refine
-from shapeprog.inference.cells.structure import Settings, search_structure
+from shapeprog.inference.cells.settings import Settings
+from shapeprog.inference.cells.structure import search_structure
 from shapeprog.inference.choice.coverage import Prices
 from shapeprog.inference.surface.cells import points_of_cells
 from shapeprog.language.program import Program

@@ -3,25 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from shapeprog.inference.cells.block_layout import WIDTH
-from shapeprog.inference.cells.chance_kernels import below, shuffle, start, uniform
 from shapeprog.inference.cells.descent_kernels import GAIN, statements
 from shapeprog.inference.cells.drawing import Rows, cells_shared, draw_all, draw_each, low_corners
 from shapeprog.inference.cells.editing import Target, best_box, improve_block, polish, propose_form, value_of
 from shapeprog.space import FloatArray
 
-CLUSTERS = 0.25
-"""Share of the rounds that remove a block together with its nearest neighbours."""
-
 CLUSTER, MOST_DROPPED = 3, 6
-"""Smallest and largest number of blocks that such a round removes."""
-
-CLUSTER_FORMS = 0.7
-"""Share of the proposals of such a round that also try a form other than a box."""
+"""Smallest and largest number of blocks that are removed together with their nearest neighbours."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +32,7 @@ class Pool:
     def of(cls, programs: Sequence[FloatArray], target: Target) -> Pool:
         """The blocks of all programs, each once."""
         blocks = np.unique(np.concatenate(programs), axis=0)
-        return cls(blocks, draw_each(blocks), target.price * target.cells * statements(blocks.T))
+        return cls(blocks, draw_each(blocks), target.statement * statements(blocks.T))
 
     def best(self, covered: Rows, waste: float, target: Target) -> tuple[float, FloatArray]:
         """The block with the largest gain on uncovered cells, and its gain in cells; zero when none gains."""
@@ -50,77 +43,53 @@ class Pool:
         return max(float(gains.max()), 0.0), self.blocks[int(gains.argmax())]
 
 
-@dataclass(frozen=True)
-class Plan:
-    """Parameters of rounds of ruin and recreate.
+def rebuild(
+    blocks: FloatArray, target: Target, pool: Pool, rounds: int, heat: float, random: np.random.Generator
+) -> tuple[FloatArray, float]:
+    """Ruin and recreate: drop some blocks, propose others on uncovered cells, accept losses up to the heat.
 
     Parameters
     ----------
-    blocks
-        Largest number of blocks.
-    families
-        Number of random ways of repeating a box that one proposal tries.
-    forms
-        Share of proposals that also try a form other than a box.
-    heat
-        Largest loss of the objective that the first round may accept; it cools linearly.
-    recall
-        Share of proposals that use a block of the pool, if one gains, instead of a new search.
     pool
         Blocks of earlier programs.
-    """
-
-    blocks: int
-    families: int
-    forms: float
-    heat: float
-    recall: float = 0.0
-    pool: Pool | None = None
-
-
-def rebuild(blocks: FloatArray, target: Target, plan: Plan, rounds: int, seed: int) -> tuple[FloatArray, float]:
-    """Ruin and recreate: drop some blocks, propose others on uncovered cells, accept losses up to the heat.
+    heat
+        Largest loss of the objective that the first round may accept; it cools linearly.
 
     Returns
     -------
     blocks, value
         The best blocks of all rounds, including the initial ones.
     """
-    start(seed)
     current, current_value = blocks, value_of(blocks, target)
     best, best_value = current, current_value
+    settings = target.settings
     for turn in range(rounds):
-        if len(current) >= CLUSTER and uniform() < CLUSTERS:
-            trial = recreate(*ruin_cluster(current), target, replace(plan, forms=CLUSTER_FORMS))
+        if len(current) >= CLUSTER and random.random() < settings.clusters:
+            trial = recreate(*ruin_cluster(current, random), target, pool, settings.cluster_forms, random)
         else:
-            trial = recreate(*ruin(current, plan), target, plan)
+            trial = recreate(*ruin(current, settings.blocks, random), target, pool, settings.forms, random)
         trial = polish(trial, target, 1, 3)
         value = value_of(trial, target)
-        if value > current_value - plan.heat * (1 - turn / rounds) * uniform():
+        if value > current_value - heat * (1 - turn / rounds) * random.random():
             current, current_value = trial, value
             if value > best_value + GAIN:
                 best, best_value = trial, value
     return best, best_value
 
 
-def ruin(blocks: FloatArray, plan: Plan) -> tuple[FloatArray, int]:
+def ruin(blocks: FloatArray, most: int, random: np.random.Generator) -> tuple[FloatArray, int]:
     """The blocks without up to three of them, mostly one, and the largest number of new ones: one more than removed."""
-    drops = 0
-    if len(blocks):
-        chance = uniform()
-        drops = min(len(blocks), 1 + int(chance * chance * 3))
-        if len(blocks) < plan.blocks and uniform() < 0.3:
-            drops -= 1
-    for _ in range(drops):
-        blocks = np.delete(blocks, below(len(blocks)), 0)
-    return blocks, drops + 1
+    drops = min(len(blocks), 1 + int(random.random() ** 2 * 3))
+    if 0 < len(blocks) < most and random.random() < 0.3:
+        drops -= 1
+    return np.delete(blocks, random.permutation(len(blocks))[:drops], 0), drops + 1
 
 
-def ruin_cluster(blocks: FloatArray) -> tuple[FloatArray, int]:
+def ruin_cluster(blocks: FloatArray, random: np.random.Generator) -> tuple[FloatArray, int]:
     """The blocks without one and its nearest neighbours, and the number of new ones: stairs become one slope."""
     centres = np.stack([_centre(block) for block in blocks])
-    around = np.linalg.norm(centres - centres[below(len(blocks))], axis=1)
-    drops = CLUSTER + below(min(len(blocks), MOST_DROPPED) - CLUSTER + 1)
+    around = np.linalg.norm(centres - random.choice(centres), axis=1)
+    drops = int(random.integers(CLUSTER, min(len(blocks), MOST_DROPPED) + 1))
     return np.delete(blocks, np.argsort(around, kind="stable")[:drops], 0), drops
 
 
@@ -130,37 +99,32 @@ def _centre(block: FloatArray) -> FloatArray:
     return cells.mean(0) if len(cells) else np.zeros(3)
 
 
-def recreate(blocks: FloatArray, count: int, target: Target, plan: Plan) -> FloatArray:
-    """The blocks and up to ``count`` new ones, each the best proposal on uncovered cells, improved by descent."""
-    waste = _single(0.6 + 0.5 * uniform())
-    if uniform() < 0.25:  # sometimes search for thin boards, and for more of them
-        waste = _single(1.0 + 3.0 * uniform())
-        count += below(3)
-    for _ in range(min(count, plan.blocks - len(blocks))):
+def recreate(
+    blocks: FloatArray, count: int, target: Target, pool: Pool, forms: float, random: np.random.Generator
+) -> FloatArray:
+    """The blocks and up to ``count`` new ones, each the best proposal on uncovered cells, improved by descent.
+
+    A share ``forms`` of the proposals also tries a form other than a box.
+    """
+    settings, waste = target.settings, 0.6 + 0.5 * random.random()
+    if random.random() < 0.25:  # sometimes search for thin boards, and for more of them
+        waste = 1.0 + 3.0 * random.random()
+        count += int(random.integers(3))
+    waste = float(np.float32(waste))  # as the weights are kept
+    for _ in range(min(count, settings.blocks - len(blocks))):
         covered, gain = draw_all(blocks), 0.0
-        if plan.pool is not None and uniform() < plan.recall:
-            gain, block = plan.pool.best(covered, waste, target)
+        if random.random() < settings.recall:
+            gain, block = pool.best(covered, waste, target)
         if gain <= 0:
-            gain, block = _sought(covered, waste, target, plan)
-        if uniform() < plan.forms:
-            form_gain, form_block = propose_form(1 + below(5), covered, waste, block, target)
-            if form_gain > gain or (form_gain > 0 and uniform() < 0.3):
+            picks = random.permutation(len(target.table))[: settings.families]
+            picks[0] = 0  # the single box
+            gain, block = best_box(covered, waste, picks, target)
+        if random.random() < forms:
+            form_gain, form_block = propose_form(int(random.integers(1, 6)), covered, waste, block, target, random)
+            if form_gain > gain or (form_gain > 0 and random.random() < 0.3):
                 gain, block = form_gain, form_block
         if gain <= 0:
             break
-        better, _value = improve_block(block, target.occupied, covered, target.price, 1)
+        better, _value = improve_block(block, target.occupied, covered, settings.price, 1)
         blocks = np.concatenate([blocks, better[None]])
     return blocks
-
-
-def _sought(covered: Rows, waste: float, target: Target, plan: Plan) -> tuple[float, FloatArray]:
-    """The repeated box that gains most among random families, which include the single box."""
-    picks = np.arange(len(target.table))
-    shuffle(picks)
-    picks[0] = 0
-    return best_box(covered, waste, picks[: plan.families], target)
-
-
-def _single(value: float) -> float:
-    """A number rounded to single precision, as the weights are kept."""
-    return float(np.float32(value))

@@ -16,69 +16,14 @@ from shapeprog.space import DEPTH, SIDE, UP, FloatArray
 
 Mask = npt.NDArray[np.bool_]
 
-NEAR = 0.04
-"""Share of the longest side of the whole within which heights are the same."""
-
-FLAT = 0.8
-"""What lies is at most so high, as a share of the side of a square as large as its upper face."""
-
-STOOL, BENEATH = 1.2, 0.75
-"""Where nothing lies, a body is the main surface that is at most so high, as such a share, and ends at most at this
-share of the height of the whole: an upholstered seat that reaches the floor."""
-
-PLATE = 0.25
-"""A plate is at most so high, as such a share."""
-
-UPWARD = 0.75
-"""Least cosine between the vertical and the axis of a lying part that is nearest to it."""
-
-SEATLIKE = 0.5
-"""The main surface covers at least this share of what the widest level covers; it is the highest that does."""
-
-AMONG = 0.3
-"""What lies at that level belongs to it, as the slats of a seat do, from this share of the largest there."""
-
-SMALLER = 0.2
-"""Share of a plate on the floor from which what lies higher is the main surface instead."""
-
-WALL = 0.5
-"""An upright board is a wall or a front, however slender, from this share of the depth or the width of the whole."""
-
-REAR = 0.15
-"""The middle of the main surface is at most this share of the depth to the rear of that of the whole."""
-
-WIDE = 0.3
-"""A wide part has at least this share of the upper face of the main surface."""
-
-SLENDER = 0.3
-"""The two short sides of something slender are at most this share of its length."""
-
-THIN = 0.3
-"""A board is at most this share of its second side thick."""
-
-BULKY = 0.3
-"""A body fills at least this share of the bounding box of the whole."""
-
-SMALL = 0.12
-"""A small part, such as a foot or a handle, is at most this share of the longest side of the whole long."""
-
-STUBBY = 0.25
-"""Something stubby covers at most this share of the depth and the width of the whole, and is higher than that."""
-
-LOWEST = 0.2
-"""The bottom board of a case is at most at this share of its height."""
-
-UPRIGHT, LEVEL = 0.75, 0.35
-"""Sine of the slope from which a slender part stands, and up to which it lies."""
-
 
 class Parts:
     """The parts of one scene, N of them, in its frame: up, depth (positive to the rear), left-right.
 
     The frame may be turned by so many quarters about up, for furniture that faces another way.
 
-    The *main* surface is the seat, the table top or the mattress: the highest of those that cover most of the
-    floor, or the whole where nothing does.
+    The *main* surface is the seat, the table top or the mattress: the highest that covers at least half of what the
+    widest level covers, or the whole where nothing does.  A body is the main surface only where nothing lies.
 
     ======================================== =========================================================================
     ``block``, ``count``                     the block that drew each part; how many parts there are
@@ -133,14 +78,14 @@ class Parts:
         self.face = self.depth * self.side
         self.surface = 2 * (self.up * self.depth + self.depth * self.side + self.side * self.up)
         self.rise = steep[every, half.argmax(1)]
-        straight, square = steep[every, up] >= UPWARD, np.sqrt(self.face)
-        self.lying: Mask = (self.up <= FLAT * square) & straight & ~bent
-        self.squat: Mask = (self.up <= STOOL * square) & straight & ~bent
-        self.flat: Mask = (self.up <= PLATE * square) & ~bent
-        self.slender: Mask = (self.middle <= SLENDER * self.long) | bent
-        self.upright: Mask = self.slender & (self.rise >= UPRIGHT)
-        self.level: Mask = self.slender & (self.rise <= LEVEL)
-        self.board: Mask = (self.thin <= THIN * self.middle) & ~bent
+        straight, square = steep[every, up] >= 0.75, np.sqrt(self.face)
+        self.lying: Mask = (self.up <= 0.8 * square) & straight & ~bent
+        self.squat: Mask = (self.up <= 1.2 * square) & straight & ~bent
+        self.flat: Mask = (self.up <= 0.25 * square) & ~bent
+        self.slender: Mask = (self.middle <= 0.3 * self.long) | bent
+        self.upright: Mask = self.slender & (self.rise >= 0.75)
+        self.level: Mask = self.slender & (self.rise <= 0.35)
+        self.board: Mask = (self.thin <= 0.3 * self.middle) & ~bent
         self.facing_front: Mask = self.board & ~self.slender & (self.depth == self.thin)
         self.facing_side: Mask = self.board & ~self.slender & (self.side == self.thin)
 
@@ -150,28 +95,28 @@ class Parts:
         self.bottom, self.top = self.low[:, UP], self.high[:, UP]
         first, last = self.low.min(0), self.high.max(0)
         self.size = last - first
-        self.near = NEAR * max(float(self.size.max()), 1e-6)  # a point has no size
+        self.near = 0.04 * max(float(self.size.max()), 1e-6)  # a point has no size
         self.floor = float(first[UP])
         off = centre - (first + last) / 2
-        central = (off[:, DEPTH] <= REAR * self.size[DEPTH]) & (np.abs(off[:, SIDE]) <= self.size[SIDE] / 4)
+        central = (off[:, DEPTH] <= 0.15 * self.size[DEPTH]) & (np.abs(off[:, SIDE]) <= self.size[SIDE] / 4)
         fitting, cover = self.lying & central, self._cover()
-        if not fitting.any():
+        if not fitting.any():  # an upholstered seat that reaches the floor
             cover = self.face
-            fitting = self.squat & central & (self.top <= self.floor + BENEATH * self.size[UP])
-            fitting &= self.face >= SEATLIKE * self.size[DEPTH] * self.size[SIDE]
+            fitting = self.squat & central & (self.top <= self.floor + 0.75 * self.size[UP])
+            fitting &= self.face >= self.size[DEPTH] * self.size[SIDE] / 2
         plate = fitting & (self.bottom <= self.floor + self.near)
         raised = fitting & ~plate
-        if self.face[raised].max(initial=0) >= SMALLER * self.face[plate].max(initial=0):
+        if self.face[raised].max(initial=0) >= 0.2 * self.face[plate].max(initial=0):
             fitting = raised  # the plate under a column is no seat
         self.main: Mask = np.zeros(self.count, bool)
         self.main_low, self.main_high = first, last
         if fitting.any():
-            able = fitting & (cover >= SEATLIKE * cover[fitting].max())
+            able = fitting & (cover >= cover[fitting].max() / 2)
             level = (self.lying | fitting) & (np.abs(self.top - self.top[able].max()) <= self.near)
             plates = level & self.flat
-            if self.face[plates].max(initial=0) >= SEATLIKE * self.face[level].max():
+            if self.face[plates].max(initial=0) >= self.face[level].max() / 2:
                 level = plates  # without the body that carries them
-            self.main = level & (self.face >= AMONG * self.face[level].max())
+            self.main = level & (self.face >= 0.3 * self.face[level].max())  # with all slats of a seat
             self.main_low, self.main_high = self.low[self.main].min(0), self.high[self.main].max(0)
 
     def _cover(self) -> FloatArray:
@@ -194,27 +139,27 @@ class Parts:
         bottom, top = float(self.main_low[UP]), float(self.main_high[UP])
         middle = (self.bottom + self.top) / 2
         self.grounded: Mask = self.bottom <= self.floor + 1.5 * self.near
-        self.wide: Mask = self.lying & (self.face >= WIDE * extent[DEPTH] * extent[SIDE])
+        self.wide: Mask = self.lying & (self.face >= 0.3 * extent[DEPTH] * extent[SIDE])
         self.alongside: Mask = (middle >= bottom) & (self.top <= top + 2 * self.near)
         self.below: Mask = ~self.main & (middle < bottom)
         self.rising: Mask = (self.top >= top + 2 * self.near) | (middle >= top)
         self.above: Mask = self.bottom >= top - 2 * self.near
         self.headroom = np.full(self.count, self.floor + self.size[UP] - top)
-        self.small: Mask = self.long <= SMALL * self.size.max()
-        stubby = (self.depth <= STUBBY * self.size[DEPTH]) & (self.side <= STUBBY * self.size[SIDE])
+        self.small: Mask = self.long <= 0.12 * self.size.max()
+        stubby = (self.depth <= self.size[DEPTH] / 4) & (self.side <= self.size[SIDE] / 4)
         self.stubby: Mask = stubby & (self.up >= np.maximum(self.depth, self.side))
-        self.bulky: Mask = self.up * self.face >= BULKY * self.size.prod()
+        self.bulky: Mask = self.up * self.face >= 0.3 * self.size.prod()
         self.central: Mask = (np.abs(self.rear) <= 0.15) & (self.aside <= 0.15)
         self.behind: Mask = (self.rear > 0.1) & (self.aside < 0.3)
         self.outermost: Mask = self.aside + self.span / 2 >= 0.4
         self.in_front: Mask = self.low[:, DEPTH] <= self.low[:, DEPTH].min() + 3 * self.near
-        plate = self.wide & self.flat & (self.bottom <= self.floor + LOWEST * self.size[UP])
+        plate = self.wide & self.flat & (self.bottom <= self.floor + 0.2 * self.size[UP])
         self.lowest: Mask = plate & (self.bottom <= self.bottom[plate].min(initial=np.inf) + self.near)
 
         standing = self.board & self.upright
-        wide = (self.side == self.thin) & (self.depth >= WALL * self.size[DEPTH])
+        wide = (self.side == self.thin) & (self.depth >= self.size[DEPTH] / 2)
         self.wall: Mask = self.facing_side | (standing & wide)
-        wide = (self.depth == self.thin) & (self.side >= WALL * self.size[SIDE])
+        wide = (self.depth == self.thin) & (self.side >= self.size[SIDE] / 2)
         self.front: Mask = self.facing_front | (standing & wide)
         sides = self.wall & self.outermost & (self.up >= self.size[UP] / 2)
         carrying = self.wide & self.below & ~self.grounded & (self.top >= bottom - 1.5 * self.near)

@@ -23,25 +23,6 @@ from shapeprog.space import DEPTH, SIDE, UP, Array, FloatArray
 
 Rule = tuple[str, Callable[[Parts], Mask]]
 
-BACKED = 0.12
-"""Share of the height by which the back of a seat rises above it."""
-
-BROAD = 0.4
-"""Share of the width of the main surface that a back is wide, with all its posts and rails."""
-
-ENCLOSED, CASED = 0.9, 0.6
-"""Walls at both sides that end at this share of the height, or higher, and are themselves so high, make a case: parts
-behind its main surface are no back to lean on."""
-
-LOW = 0.6
-"""A bed is at most this share of its depth high."""
-
-ONE_SIDED = 0.5
-"""A back has at most this share of its surface on the other side of the seat, as arm rests that end there."""
-
-MANY = 3
-"""So many equal parts are slats."""
-
 
 def anything(p: Parts) -> Mask:
     """All parts."""
@@ -73,14 +54,14 @@ SEATING: tuple[Rule, ...] = (
     # A part from the ground to above the seat is a leg as well.
     ("leg", lambda p: p.rising & p.grounded & p.upright),
     # Behind: a back, its rails and slats, its posts.
-    ("slat", lambda p: p.rising & p.behind & (p.span >= 0.5) & p.level & (p.equal >= MANY)),
+    ("slat", lambda p: p.rising & p.behind & (p.span >= 0.5) & p.level & (p.equal >= 3)),
     ("rail", lambda p: p.rising & p.behind & (p.span >= 0.5) & p.level & (p.up <= 0.5 * p.headroom)),
     ("back", lambda p: p.rising & p.behind & (p.span >= 0.5)),
     # At the sides: arm rests and their posts.
     ("arm_post", lambda p: p.rising & (p.aside > 0.3) & (p.rear < 0.25) & p.upright),
     ("arm", lambda p: p.rising & (p.aside > 0.3) & ((p.rear < 0.25) | (p.run > 0.5))),
     ("arm", lambda p: (p.top >= p.main_high[UP]) & ~p.slender & (p.aside > 0.4) & (p.run > 0.5)),
-    ("slat", lambda p: p.rising & p.upright & (p.aside < 0.35) & (p.equal >= MANY)),
+    ("slat", lambda p: p.rising & p.upright & (p.aside < 0.35) & (p.equal >= 3)),
     ("post", lambda p: p.rising & p.slender),
     ("back", lambda p: p.rising),
     *STANDING,
@@ -100,7 +81,7 @@ BED: tuple[Rule, ...] = (
     ("slat", lambda p: p.rising & p.behind & p.upright & (p.aside < 0.35)),
     ("post", lambda p: p.rising & p.slender),
     ("side", lambda p: (p.aside > 0.3) & (p.run >= 0.5)),
-    ("slat", lambda p: p.level & (p.equal >= MANY)),
+    ("slat", lambda p: p.level & (p.equal >= 3)),
     *STANDING,
     ("body", anything),
 )
@@ -143,9 +124,6 @@ CASE: tuple[Rule, ...] = (
 
 MIXED = ({"top", "base", "shelf"}, "shelf"), ({"door", "drawer", "panel", "side"}, "panel")
 """Roles of copies whose positions have different roles, as the top and the base of one loop."""
-
-MOSTLY = 0.75
-"""Share of the surface of its copies from which a role is that of the block."""
 
 
 def with_roles(program: Program) -> Program:
@@ -210,7 +188,7 @@ def roles_of_blocks(program: Program) -> list[str]:
 def _common(share: dict[str, float]) -> str:
     """One role for copies that have so much surface in each of several."""
     role = max(share, key=share.__getitem__, default="")
-    if role and share[role] < MOSTLY * sum(share.values()):
+    if role and share[role] < 0.75 * sum(share.values()):
         return next((common for names, common in MIXED if set(share) <= names), role)
     return role
 
@@ -239,22 +217,22 @@ def _leaned_on(p: Parts) -> float:
     """How much surface rises behind the main surface and not before it, if the whole has a back there; 0 if not."""
     behind = float(p.surface[p.rising & (p.rear > 0.25)].sum())
     before = float(p.surface[p.rising & (p.rear < -0.25)].sum())
-    return behind - before if _kind(p) is not CASE and before < ONE_SIDED * behind else 0.0
+    return behind - before if _kind(p) is not CASE and before < behind / 2 else 0.0  # arm rests may end before it
 
 
 def _kind(p: Parts) -> tuple[Rule, ...]:
     """The rules for the kind of the whole."""
-    walls = p.wall & p.outermost & (p.run >= 0.5) & (p.up >= CASED * p.size[UP])
-    walls &= p.top >= p.floor + ENCLOSED * p.size[UP]
+    walls = p.wall & p.outermost & (p.run >= 0.5) & (p.up >= 0.6 * p.size[UP])
+    walls &= p.top >= p.floor + 0.9 * p.size[UP]
     open_above = not (p.main & p.flat).any() and not (p.wide & p.above).any()  # a deep seat between wings
     if not p.main.any() or (walls.sum() > 1 and not open_above):
         return CASE
     back, height = p.rising & (p.rear > 0.1) & (p.aside < 0.6), p.top - p.main_high[UP]
     if _backed(p, back, height):
-        if p.size[DEPTH] <= p.size[SIDE] or p.size[UP] >= LOW * p.size[DEPTH]:
+        if p.size[DEPTH] <= p.size[SIDE] or p.size[UP] >= 0.6 * p.size[DEPTH]:
             return SEATING
         return CASE if (p.rising & p.bulky).any() else BED
-    arms = p.rising & (p.aside > 0.3) & (height >= BACKED * p.size[UP])
+    arms = p.rising & (p.aside > 0.3) & (height >= 0.12 * p.size[UP])
     middle = p.low[:, SIDE] + p.high[:, SIDE] - p.main_low[SIDE] - p.main_high[SIDE]
     return SEATING if (arms & (middle < 0)).any() and (arms & (middle > 0)).any() and not p.cased.any() else CASE
 
@@ -264,4 +242,4 @@ def _backed(p: Parts, back: Mask, height: FloatArray) -> bool:
     if not back.any():
         return False
     width = p.high[back, SIDE].max() - p.low[back, SIDE].min()
-    return bool(height[back].max() >= BACKED * p.size[UP] and width >= BROAD * (p.main_high[SIDE] - p.main_low[SIDE]))
+    return bool(height[back].max() >= 0.12 * p.size[UP] and width >= 0.4 * (p.main_high[SIDE] - p.main_low[SIDE]))

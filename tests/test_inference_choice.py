@@ -328,12 +328,12 @@ def test_inner_faces_count_little_and_space_within_is_not_free():
     made = evidence_of(shape_from_mesh(np.concatenate([places, others]), np.concatenate([faces, more + len(places)])))
     inside = np.abs(made.points).max(1) < 7
     assert inside.mean() > 0.1
-    assert made.weights[inside].max() == pytest.approx(seen.HIDDEN * made.weights[~inside].min())
+    assert made.weights[inside].max() == pytest.approx(0.1 * made.weights[~inside].min())
     assert made.weights.sum() == pytest.approx(1)
     assert not cell(made, 0, 0, 0)
     assert not cell(made, 10, 0, 0)
     assert cell(made, 14, 0, 0)
-    assert made.area == pytest.approx(2 * (24 * 16 * 2 + 24 * 24) + seen.HIDDEN * 2 * (12 * 8 * 2 + 144), rel=0.03)
+    assert made.area == pytest.approx(2 * (24 * 16 * 2 + 24 * 24) + 0.1 * 2 * (12 * 8 * 2 + 144), rel=0.03)
 
 
 def test_space_behind_an_open_front_is_free():
@@ -357,7 +357,7 @@ def test_the_tolerance_of_a_scan_follows_its_noise(deviation):
     points = sample_surface(shape.vertices, shape.faces, 5000, 1).astype(np.float64)
     noisy = points + np.random.default_rng(2).normal(0, deviation, points.shape)
     made = evidence_of(Shape("scan", shape.voxels, noisy.astype(np.float32), kind="points"))
-    assert made.tolerance == pytest.approx(max(seen.TOLERANCE, seen.NOISE * deviation), rel=0.25)
+    assert made.tolerance == pytest.approx(max(seen.TOLERANCE, 2 * deviation), rel=0.25)
     clean = evidence_of(Shape("scan", shape.voxels, points.astype(np.float32), kind="points"))
     assert clean.tolerance == seen.TOLERANCE
     assert clean.area == pytest.approx(evidence_of(shape).area, rel=0.2)

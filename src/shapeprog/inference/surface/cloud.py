@@ -16,31 +16,14 @@ from scipy.spatial import cKDTree
 from shapeprog.data.shape import Shape
 from shapeprog.space import Array, FloatArray
 
-NEAREST = 12
-"""Neighbours of a point."""
-
-AROUND = 20
-"""Neighbours from which a normal is estimated."""
+NEAREST, AROUND = 12, 20
+"""Neighbours of a point, and those from which a normal is estimated."""
 
 NOISY = 0.05
 """Noise in cells above which points are projected onto planes, and normals are less reliable."""
 
-PROJECTED, PROJECTIONS = 24, 2
-"""Neighbours to which such a plane is fitted, and the number of projections."""
-
 CLOSEST = 1e-3
 """Least spacing in cells: points may coincide."""
-
-LIKE = 0.98
-"""Cosine between normals that face the same way."""
-
-
-FLAT_NEIGHBOURS = 8
-"""Number of points, including neighbours, that lie on a plane of a clean scan."""
-
-FLATTEST, CLEAN = 0.1, 0.02
-"""Least share of the points on flat surface that is assumed; and the largest noise in cells about their planes of a
-clean scan."""
 
 
 class Cloud(NamedTuple):
@@ -68,8 +51,8 @@ def cloud_of(points: Array, normals: Array | None = None) -> Cloud:
 
 def projected(points: FloatArray) -> FloatArray:
     """Points (N, 3) projected repeatedly onto weighted planes through their neighbours (Alexa et al. 2003)."""
-    for _ in range(PROJECTIONS):
-        distance, neighbours = cKDTree(points).query(points, k=min(PROJECTED, len(points)))
+    for _ in range(2):
+        distance, neighbours = cKDTree(points).query(points, k=min(24, len(points)))
         normals, _ = planes(points, neighbours)
         weight = np.exp(-((distance / np.maximum(distance[:, -1:] / 2, CLOSEST)) ** 2))[..., None]
         middle = (points[neighbours] * weight).sum(1) / weight.sum(1)
@@ -106,7 +89,7 @@ def planes(points: FloatArray, neighbours: npt.NDArray[np.int64]) -> tuple[Float
 
 def roughness(points: FloatArray, normals: FloatArray, neighbours: npt.NDArray[np.int64]) -> float:
     """Median distance of neighbours with similar normals from the plane of a point."""
-    parallel = np.abs(np.einsum("nki,ni->nk", normals[neighbours[:, 1:]], normals)) > LIKE
+    parallel = np.abs(np.einsum("nki,ni->nk", normals[neighbours[:, 1:]], normals)) > 0.98
     off = np.abs(np.einsum("nki,ni->nk", points[neighbours[:, 1:]] - points[:, None], normals))[parallel]
     return float(np.median(off)) if len(off) else 0.0
 
@@ -125,9 +108,8 @@ def points_of_scan(shape: Shape) -> FloatArray:
 
 
 def is_clean(points: FloatArray) -> bool:
-    """Whether points (P, 3) lie on planes with their nearest neighbours where the surface is flattest."""
-    if len(points) <= FLAT_NEIGHBOURS:
+    """Whether the flattest tenth of points (P, 3) lies within .02 cells of planes with seven neighbours."""
+    if len(points) <= 8:
         return False
-    neighbours = cKDTree(points).query(points, k=FLAT_NEIGHBOURS)[1]
-    _, squared = planes(points, neighbours)
-    return bool(np.quantile(np.sqrt(squared / (FLAT_NEIGHBOURS - 3)), FLATTEST) < CLEAN)
+    _, squared = planes(points, cKDTree(points).query(points, k=8)[1])
+    return bool(np.quantile(np.sqrt(squared / 5), 0.1) < 0.02)

@@ -37,15 +37,6 @@ POINTS, SURFACE = 6_000, 40_000
 TOLERANCE = 0.008 * SPAN
 """Largest distance between a clean point and a surface that explains it; .8 % of the longest side."""
 
-NOISE = 2.0
-"""The same for scans, in standard deviations of their noise."""
-
-CELL_TOLERANCE = 0.65
-"""The same for cells: a surface is anywhere within the cells that it touches."""
-
-THIN = 0.5
-"""Mean thickness of parts that are one cell thick: .50 for parts of furniture (IKEA, val)."""
-
 AGREEMENT, SCANNED = 0.5, 0.6
 """Least cosine between normals that agree; and for scans, where noise could be mistaken for a surface otherwise.
 
@@ -53,33 +44,14 @@ The bound is wide, to separate the two sides of a part only: near an edge of a t
 another one, and a slope in cells is a staircase.
 """
 
-HIDDEN = 0.1
-"""Weight of a point that cannot be seen from outside."""
-
-MOST_TOLERANCE = 0.75
-"""Largest tolerance of a scan: with more noise, the position of its surface is too uncertain for a wider tolerance."""
-
 NEIGHBOURS = 16
 """Points of a scan to which a plane is fitted."""
-
-FLAT = 0.25
-"""Quantile of the distances to such planes that is the noise: at edges and in thin parts the planes do not fit."""
-
-AGREED = 0.95
-"""Least share of the oriented normals that agree in sign, for all normals to get that sign."""
 
 LOOKING, FREE = 128, 64
 """Cells along each side of the grid for visibility, and of the grid of free space."""
 
-WALL = 0.5 + 1e-6
-"""Half the side in cells of the cube that a triangle must intersect.  The longest side ends on cell boundaries, and
-rounding would leave holes in faces there, through which the inside is visible."""
-
 DIRECTIONS = 32
 """Directions of the rays; half of them, and their opposites, where both ways must be clear."""
-
-CLEAR, CLEAR_THROUGH = 2, 4
-"""Least number of clear directions of a free cell; and the same where both ways must be clear: scans have holes."""
 
 LEAST_LEVEL, LEAST_ALONG = 0.35, 0.45
 """Shares of the plan that level surfaces cover, and of the surface that faces along an axis; below both, a target does
@@ -159,7 +131,7 @@ def _of_mesh(mesh: Components, seed: int) -> Evidence:
     barrier = touched(corners, LOOKING)
     points = surface[:POINTS]
     front, back = (visible(points, sign * normals[:POINTS], barrier) for sign in (1, -1))
-    weights = np.where(front | back, 1.0, HIDDEN)
+    weights = np.where(front | back, 1.0, 0.1)  # what cannot be seen from outside counts little
     facing, oriented = outward(normals[:POINTS], front, back)
     area = float(mesh.area.sum())
     coarse: Flags = np.any(barrier.reshape((FREE, LOOKING // FREE) * 3), (1, 3, 5))
@@ -173,7 +145,8 @@ def _of_points(surface: FloatArray, voxels: Flags, seed: int) -> Evidence:
     """The evidence of a scan: noise is the distance from local planes; area follows from distances between points."""
     normals, noise, point_area = local_planes(surface)
     selected = np.sort(np.random.default_rng(seed).permutation(len(surface))[:POINTS])
-    tolerance, area = min(max(TOLERANCE, NOISE * noise), MOST_TOLERANCE), point_area * len(surface)
+    # With more noise, the position of the surface is too uncertain for a wider tolerance.
+    tolerance, area = min(max(TOLERANCE, 2 * noise), 0.75), point_area * len(surface)
     reach = _reach(tolerance, area, len(surface))
     fine = voxels.repeat(FREE // RESOLUTION, 0).repeat(FREE // RESOLUTION, 1).repeat(FREE // RESOLUTION, 2)
     free = free_cells(fine, surface, through=True)
@@ -189,7 +162,8 @@ def _of_points(surface: FloatArray, voxels: Flags, seed: int) -> Evidence:
 def _of_cells(voxels: Flags) -> Evidence:
     """The evidence of cells: one point for each exposed face, at the estimated depth of the surface; see ``INSET``.
 
-    Parts that are one cell thick have the thickness ``THIN``, so that their two sides do not cross.
+    Parts that are one cell thick have half that thickness, the mean of such parts of furniture (IKEA, val): their two
+    sides do not cross.
     """
     faces, occupied = exposed_faces(voxels), np.argwhere(voxels)
     cells, axis, sign = faces[:, :3], faces[:, 3], faces[:, 4]
@@ -197,13 +171,13 @@ def _of_cells(voxels: Flags) -> Evidence:
     coordinate = cells[np.arange(len(faces)), axis]
     exact = (high - low == SPAN) & (coordinate == np.where(sign < 0, low, high - 1))
     single = exposed(voxels, cells, axis, 1) & exposed(voxels, cells, axis, -1)
-    inset = np.where(exact, 0.0, np.where(single, (1 - THIN) / 2, INSET))
+    inset = np.where(exact, 0.0, np.where(single, 0.25, INSET))
     normals = sign[:, None] * np.eye(3)[axis]
     surface = cells + 0.5 - HALF + (0.5 - inset)[:, None] * normals
     count = len(surface)
     return Evidence(
-        surface, normals, np.full(count, 1 / count), np.ones(count, np.bool_), CELL_TOLERANCE, AGREEMENT,
-        surface, normals, np.zeros(count, np.bool_), _reach(CELL_TOLERANCE, count, count), float(count), ~voxels,
+        surface, normals, np.full(count, 1 / count), np.ones(count, np.bool_), INSET, AGREEMENT,
+        surface, normals, np.zeros(count, np.bool_), _reach(INSET, count, count), float(count), ~voxels,
     )  # fmt: skip
 
 
@@ -215,7 +189,8 @@ def _reach(tolerance: float, area: float, count: int = SURFACE) -> float:
 def touched(triangles: FloatArray, resolution: int) -> Flags:
     """The cells (R, R, R) of the cube of the grid that triangles (F, 3, 3) touch."""
     cells = np.zeros((resolution,) * 3, np.bool_)
-    mark_triangles(np.ascontiguousarray((triangles + HALF) * (resolution / RESOLUTION)), WALL, cells)
+    # The longest side ends on cell boundaries: rounding would leave holes in faces there, which show the inside.
+    mark_triangles(np.ascontiguousarray((triangles + HALF) * (resolution / RESOLUTION)), 0.5 + 1e-6, cells)
     return cells
 
 
@@ -238,7 +213,7 @@ def outward(normals: FloatArray, front: Flags, back: Flags) -> tuple[FloatArray,
     """
     oriented = (front != back) & ((normals**2).sum(1) > 0.25)
     share = float(front[oriented].mean()) if oriented.any() else 0.5
-    if max(share, 1 - share) >= AGREED:
+    if max(share, 1 - share) >= 0.95:
         return normals * (1.0 if share > 0.5 else -1.0), np.ones(len(oriented), np.bool_)
     return normals * np.where(oriented & back, -1.0, 1.0)[:, None], oriented
 
@@ -261,7 +236,7 @@ def free_cells(barrier: Flags, surface: FloatArray, *, through: bool) -> Flags:
     starts = np.argwhere(np.ones_like(barrier)) + 0.5
     within = ((starts >= low) & (starts <= high)).all(1).reshape(barrier.shape)
     free: Flags = ~(barrier | within) & (not through)
-    steps, minimum = (directions(DIRECTIONS)[::2], CLEAR_THROUGH) if through else (directions(DIRECTIONS), CLEAR)
+    steps, minimum = (directions(DIRECTIONS)[::2], 4) if through else (directions(DIRECTIONS), 2)
     free[within] = looking(barrier, starts[within.reshape(-1)], steps, minimum, through=through)
     return free
 
@@ -284,12 +259,15 @@ def looking(barrier: Flags, starts: FloatArray, steps: FloatArray, minimum: int,
 
 
 def local_planes(points: FloatArray) -> tuple[FloatArray, float, float]:
-    """Normals (P, 3) of the planes through the neighbours of each point, noise about them, and area of each point."""
+    """Normals (P, 3) of the planes through the neighbours of each point, noise about them, and area of each point.
+
+    The noise is a low quantile of the distances: planes do not fit at edges and in thin parts.
+    """
     from scipy.spatial import cKDTree
 
     distance, neighbours = cKDTree(points).query(points, k=NEIGHBOURS)
     normals, squared = planes(points, neighbours)
-    noise = float(np.quantile(np.sqrt(squared / (NEIGHBOURS - 3)), FLAT))
+    noise = float(np.quantile(np.sqrt(squared / (NEIGHBOURS - 3)), 0.25))
     area = float(np.median(distance[:, -1]) ** 2 * math.pi / (NEIGHBOURS - 1))
     return normals, noise, area
 

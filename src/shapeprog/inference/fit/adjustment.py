@@ -22,28 +22,13 @@ from shapeprog.language.program import Program
 STEPS, LAST = 12, 5
 """Steps, of which the last ones fix rounded angles and close the joints that are still open."""
 
-CAPTURE, EXPLAINED = 1.2, 2.0
-"""Width of the weights of residuals: in cells at first, and in tolerances of the evidence at the end."""
+EXPLAINED = 2.0
+"""Width of the weights of residuals at the end, in tolerances of the evidence."""
 
 GENTLE = {"length": 3e-5, "angle": 3e-5}
 PLACE = 1e-6
 """Weights, against that of the whole target, of a squared move in cells from the start: of lengths and angles, which
 nothing else may hold, and of places."""
-
-FARTHEST = 0.7
-"""Farthest that one step moves the surface by one number, in cells."""
-
-KEPT, CLOSED = 0.003, 0.03
-"""Weight of a squared gap, while parts still move and at the end: it stretches a leg, but does not lift a seat."""
-
-WIDEST = 1.0
-"""Gap in cells up to which parts that touched at the start are brought together again at the end."""
-
-OPEN = 0.15
-"""Height in cells up to which feet are put on the floor at the end, whatever it costs."""
-
-UPRIGHT = 0.7
-"""Degrees below which an angle is none."""
 
 
 def adjust(
@@ -72,7 +57,7 @@ def adjust(
     values, held = tunable.values, torch.zeros(len(tunable.values), dtype=torch.bool)
     generator, target, angles = torch.Generator().manual_seed(seed), Target(evidence), tunable.are("angle")
     narrow = EXPLAINED * evidence.tolerance
-    wide = max(CAPTURE, narrow)
+    wide = max(1.2, narrow)  # in cells, at first
     with one_tensor_thread(kernels=1):
         poses = tunable.poses(values)
         joints = find_joints(poses.scene, _floor(evidence), generator)
@@ -82,7 +67,7 @@ def adjust(
             done = min(step / max(steps - LAST, 1), 1.0)
             if done == 1 and not held.any():
                 held = angles
-                values = torch.where(held, tunable.rounded(values * (values.abs() >= UPRIGHT)), values)
+                values = torch.where(held, tunable.rounded(values * (values.abs() >= 0.7)), values)  # upright below
                 poses = tunable.poses(values)
             joints = moved(poses.scene, joints)
             pairs = target.pairs(poses.scene, generator)
@@ -117,15 +102,18 @@ def of_target(poses: Poses, pairs: Pairs, width: float) -> System:
 
 
 def of_joints(poses: Poses, joints: Joints, *, closing: bool) -> System:
-    """Of gaps; one that the target insists on opens: its weight falls.  At the end the gaps
-    that would divide the program are closed, and all feet are put on the floor."""
+    """The part of gaps, whose weight falls where the target opens them: it stretches a leg, but does not lift a seat.
+
+    At the end the gaps up to a cell that would divide the program are closed, and feet up to .15 cells above the floor
+    are put on it.
+    """
     gaps = needs(poses.scene, poses.slopes, joints)
-    weight = KEPT * (NEARLY**2 / (NEARLY**2 + gaps.residual**2)) ** 2
+    weight = 0.003 * (NEARLY**2 / (NEARLY**2 + gaps.residual**2)) ** 2
     if closing:
         count = len(joints.first)
-        needed = joining(joints.first, joints.second, gaps.residual[:count], len(poses.scene.mask), WIDEST)
-        needed = torch.cat([needed, gaps.residual[count:].abs() < OPEN])
-        weight = torch.where(needed, CLOSED, weight)
+        needed = joining(joints.first, joints.second, gaps.residual[:count], len(poses.scene.mask), 1.0)
+        needed = torch.cat([needed, gaps.residual[count:].abs() < 0.15])
+        weight = torch.where(needed, 0.03, weight)
     weighted = weight[:, None] * gaps.slopes
     return weighted.T @ gaps.residual, weighted.T @ gaps.slopes
 
@@ -141,7 +129,7 @@ def _move(
     free = (~held).nonzero()[:, 0]
     move = torch.zeros_like(values)
     move[free] = -torch.linalg.solve(curvature[free[:, None], free], slope[free])
-    farthest = FARTHEST / tunable.scale
+    farthest = 0.7 / tunable.scale  # so far, in cells, one number may move the surface in a step
     return torch.minimum(torch.maximum(move, -farthest), farthest)
 
 

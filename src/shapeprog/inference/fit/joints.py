@@ -24,18 +24,6 @@ from shapeprog.inference.fit.tunable import ROW
 NEARLY, TOUCHING = 0.3, 0.05
 """Gaps in cells up to which parts nearly touch, and touch."""
 
-CLOSED = 0.02
-"""How far in cells a joint should reach into the other part: more than rounding takes away."""
-
-LOOKED = 64
-"""Samples of each primitive from which its contacts are estimated."""
-
-CANDIDATE = 2.0
-"""Gap between samples up to which primitives may touch, in cells: a face may have no sample."""
-
-FIRST, AGAIN = 24, 6
-"""Rounds of projections when a joint is looked for, and when its parts have moved."""
-
 
 class Joints(NamedTuple):
     """Pairs of primitives that should touch, and primitives that should touch the floor.
@@ -89,12 +77,12 @@ class Gaps(NamedTuple):
 
 def gaps(scene: Scene, generator: torch.Generator) -> Gaps:
     """The gaps of a scene, those between parts that overlap below zero; the smaller part of each pair comes first."""
-    nearest, distance = _samples(scene, generator)
-    first, second = (torch.minimum(distance, distance.T) < CANDIDATE).triu(1).nonzero(as_tuple=True)
+    nearest, distance = _samples(scene, generator)  # a face may have no sample: primitives two cells apart may touch
+    first, second = (torch.minimum(distance, distance.T) < 2.0).triu(1).nonzero(as_tuple=True)
     area = scene.bounds.prod(-1)
     swap = area[first] > area[second]
     first, second = torch.where(swap, second, first), torch.where(swap, first, second)
-    points = between(scene, first, second, nearest[first, second], FIRST)
+    points = between(scene, first, second, nearest[first, second], 24)
     width = signed_distance(rows_of(scene, second)[0], points[:, None])[:, 0].detach()
     width = width + signed_distance(rows_of(scene, first)[0], points[:, None])[:, 0].detach().clamp(min=0)
     return Gaps(first, second, points, width)
@@ -118,7 +106,7 @@ def moved(scene: Scene, joints: Joints) -> Joints:
     """The same joints after their parts have moved: the points deepest in both parts, or nearest to both."""
     if not len(joints.first):
         return joints
-    points = between(scene, joints.first, joints.second, positions_of(scene, joints), AGAIN)
+    points = between(scene, joints.first, joints.second, positions_of(scene, joints), 6)
     inner = _inner(scene, joints.first, points)
     return joints._replace(normalized=inner)
 
@@ -133,7 +121,7 @@ def positions_of(scene: Scene, joints: Joints) -> Float[Tensor, "C 3"]:
 def needs(scene: Scene, slopes: Float[Tensor, "N 16 F"], joints: Joints) -> Needs:
     """Gap of every joint, zero if it is closed, and height above the floor of every part that should touch it."""
     reach = depths(scene, slopes, joints)
-    gap = reach.residual + CLOSED
+    gap = reach.residual + 0.02  # into the other part, by more than rounding takes away
     joined = torch.where((gap >= 0)[:, None], reach.slopes, 0.0)  # on an axis the slope of a depth is no number
     stand, feet = rows_of(scene, joints.standing)
     low = _inner(scene, joints.standing, _lowest(scene, joints.standing))
@@ -167,7 +155,7 @@ def between(
 def _samples(scene: Scene, generator: torch.Generator) -> tuple[Float[Tensor, "N N 3"], Float[Tensor, "N N"]]:
     """Mean of the samples of each primitive that are nearest to each other primitive, and their distance."""
     single = Batch(*(tensor[:, None] for tensor in (scene.kind, scene.size, scene.centre, scene.rotation, scene.mask)))
-    samples = sample_surface(single, LOOKED, generator).points
+    samples = sample_surface(single, 64, generator).points
     away = each_distance(scene, samples.flatten(0, 1)).unflatten(0, samples.shape[:2])
     distance, nearest = away.topk(4, 1, largest=False)
     midpoints = samples[torch.arange(len(samples))[:, None, None], nearest].mean(1)

@@ -35,16 +35,8 @@ NEAR = 6
 TURNED = 0.5
 """How far away, in cells, a sample of right place counts whose normal is at a right angle to that of the point."""
 
-NEVER = 1e9
-"""The same for a sample that faces the other way than a point whose normal is known to point outwards."""
-
-SAME, OTHER = 0.5, 0.5
-"""Least cosine between normals on one face; and the share of its distance from which a sample leaves a point alone
-that the opposite side of the same part explains: a sheet is evidence for one side of a board, not for both."""
-
-BACK, PLAIN = 0.5, 0.03
-"""Weights, against that of the points of the target, of the samples of the program, and of plain distances of points
-to the union: only these determine how far a part reaches along a sheet that has no edges."""
+SAME = 0.5
+"""Least cosine between normals on one face."""
 
 
 class Pairs(NamedTuple):
@@ -98,7 +90,11 @@ class Target:
         ]))  # fmt: skip
 
     def pairs(self, scene: Scene, generator: torch.Generator) -> Pairs:
-        """Pairs both ways, drawn at random: from points to the program, and from its surface to points."""
+        """Pairs both ways, drawn at random: from points to the program, and from its surface to points.
+
+        Plain distances of points to the union have little weight: they alone determine how far a part reaches along a
+        sheet that has no edges.
+        """
         sample = sample_surface(scene, SAMPLES, generator)
         samples, facing = sample.points, sample.normals
         spacing = 1.5 * math.sqrt(self.evidence.area / min(SAMPLES, len(self._points)))
@@ -127,7 +123,7 @@ class Target:
             torch.cat([facing[partner], facing, normals]),
             torch.cat([sample.slot[partner], sample.slot, union]),
             torch.cat([offset, back_offset, zeros]),
-            torch.cat([ones / POINTS, torch.full((SAMPLES,), BACK / SAMPLES).double(), PLAIN * ones / POINTS]),
+            torch.cat([ones / POINTS, torch.full((SAMPLES,), 0.5 / SAMPLES).double(), 0.03 * ones / POINTS]),
             torch.cat([either, torch.zeros(POINTS).bool()]),
             torch.cat([torch.zeros(POINTS + SAMPLES), ones]).bool(),
         )
@@ -141,7 +137,7 @@ class Target:
         points = (tensor.numpy() for tensor in (self._points, self._normals, self._sides))
         samples = (sample.points.numpy(), sample.normals.numpy())
         at, candidates = np.ascontiguousarray(at), np.ascontiguousarray(candidates)
-        kernels.closest(*points, at, *samples, candidates, spacing, TURNED, NEVER, offset, best)
+        kernels.closest(*points, at, *samples, candidates, spacing, TURNED, 1e9, offset, best)
         return torch.from_numpy(offset), best[:, None]
 
 
@@ -156,7 +152,8 @@ def pull(scene: Scene, pairs: Pairs, width: float) -> Pull:
     plane = ((pairs.points - pairs.samples) * pairs.normals).sum(1)
     same = (cosine >= SAME) | pairs.anywhere
     residual = torch.where(same, value, plane)
-    explained = pairs.either & ~same & (value.abs() < OTHER * plane.abs())
+    # The opposite side of a part explains the point: a sheet is evidence for one side of a board, not for both.
+    explained = pairs.either & ~same & (value.abs() < plane.abs() / 2)
     if len(off_face := (~same).nonzero()[:, 0]):  # the nearest point is on another face: use the plane at the sample
         single, leaves = rows_of(scene, pairs.slots[off_face])
         at = (pairs.samples + 1e-3 * pairs.normals)[off_face, None]

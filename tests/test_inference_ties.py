@@ -582,8 +582,24 @@ def test_neighbours_that_fill_a_box_are_its_division():
     )
 
 
+def test_the_handle_of_each_drawer_is_in_the_same_division():
+    head = "width, depth, height = 12, 12, 12\na = 1\n"
+    drawer, handle = "drawer(front=a, depth=a, height=2.7)", "handle(width=3, front=0, depth=a, {})"
+    row = f"for _ in row(4, last=at(top=0)):\n    {drawer}\n    {handle}\n"
+    middle, below = row.format("bottom=1.1, height=0.5"), row.format("bottom=0.3, height=0.5")
+    division = "for _ in divide(4, z, gap=0.4):\n    drawer(front=a, depth=a)\n    handle(width=3, front=0, depth=a, "
+    assert grouped_text(head + middle).startswith(division + "z=0, height=0.5)")
+    assert grouped_text(head + below).startswith(division + "bottom=0.3, height=0.5)")
+    assert grouped_text(head + row.format("bottom=1, height=height / 9")).startswith("for _ in row(4")
+
+
 def test_parts_with_equal_clearances_are_drawn_in_a_box_if_that_is_shorter():
     head = "width, depth, height = 24, 12, 12\na, b = 1, 2\n"
+    drawers = "for _ in divide(3, z, gap=0.2, left=a, right=a, front=0, depth=1, bottom=b):\n    drawer()\n"
+    assert grouped_text(head + "base(left=a, right=a, bottom=b, height=1)\n" + drawers) == (
+        "with inside(left=a, right=a, bottom=b):\n"
+        "    base(height=1)\n    for _ in divide(3, z, gap=0.2, front=0, depth=1):\n        drawer()"
+    )
     parts = (
         "base(left=a, right=a, bottom=b, height=1)\n"
         "panel(left=a, right=a, bottom=b, rear=0, depth=1)\n"

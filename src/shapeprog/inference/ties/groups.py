@@ -19,6 +19,9 @@ BOXES = ("box", "cushion")
 GAP, LEAST = 0.25, 2.0
 """Neighbours divide a box if the gap between them is at most this share of their size, which is this many cells."""
 
+CENTRED = 0.1
+"""Cells by which the clearances of a part in the middle differ at most."""
+
 Side = tuple[str, str]
 """A keyword of a side, and the text of its value."""
 
@@ -100,12 +103,13 @@ def _mirrored(row: Group) -> Group:
 
 
 def _divided(loop: Group, numbers: dict[str, float]) -> Group:
-    """A row, or a mirror, of equal neighbours as the division of a box."""
-    part = loop.body[0] if len(loop.body) == 1 else None
-    if not isinstance(part, Part) or part.kind not in BOXES or {"tilt", "lean"} & dict(part.keywords).keys():
+    """A row, or a mirror, of equal neighbours as the division of a box; further parts of a row are placed in each."""
+    part, *others = loop.body
+    if not all(isinstance(line, Part) and _is_upright(line) for line in loop.body):
         return loop
+    assert isinstance(part, Part)
     keywords = dict(part.keywords)
-    if loop.kind == "mirror" and len(loop.keywords) == 1:
+    if loop.kind == "mirror" and len(loop.keywords) == 1 and not others:
         (word, plane), *_ = loop.keywords
         axis = axis_of(word)
         words, middle = AXES[axis], Binary("/", Name(SIZES[axis]), 2.0)
@@ -131,7 +135,9 @@ def _divided(loop: Group, numbers: dict[str, float]) -> Group:
     first_word = words.high if word == words.low else words.low if word == words.high else ""
     if (
         not isinstance(size, float)
-        or size < LEAST
+        or (size < LEAST and not others)
+        or (others and any(SIZES[axis] in names_in(value) for line in loop.body for value in values(line)))
+        or any(words.size not in dict(other.keywords) for other in others if isinstance(other, Part))
         or (first_word not in keywords and not (axis == 2 and first_word == "bottom"))
     ):
         return loop
@@ -140,16 +146,53 @@ def _divided(loop: Group, numbers: dict[str, float]) -> Group:
     gap = (numbers[SIZES[axis]] - occupied - loop.count * size) / (loop.count - 1)
     if not 0 <= round(gap, 2) <= GAP * size:
         return loop
-    return _division(part, axis, float(loop.count), (clearances[words.low], clearances[words.high]), round(gap, 2))
+    further = tuple(_in_division(other, part, axis, numbers) for other in others if isinstance(other, Part))
+    return _division(part, axis, loop.count, (clearances[words.low], clearances[words.high]), round(gap, 2), further)
 
 
-def _division(part: Part, axis: int, count: float, clearances: tuple[Argument, Argument], gap: float) -> Group:
+def _division(
+    part: Part,
+    axis: int,
+    count: float,
+    clearances: tuple[Argument, Argument],
+    gap: float,
+    others: tuple[Part, ...] = (),
+) -> Group:
+    """The division of a box; it has the sides of its only part."""
     words = AXES[axis]
     mine = [(word, value) for word, value in zip(words[:2], clearances, strict=True) if value != 0]
-    sides = [(word, value) for word, value in part.keywords if word in BOX and word not in words]
-    remaining = tuple((word, value) for word, value in part.keywords if word not in BOX)
+    sides = [(word, value) for word, value in part.keywords if word in BOX and word not in words and not others]
+    remaining = tuple(
+        (word, value) for word, value in part.keywords if word not in words and (word, value) not in sides
+    )
     keywords: Keywords = (*([("gap", to_float32(gap))] if gap else []), *ordered((*mine, *sides)))
-    return Group("divide", keywords, (replace(part, keywords=remaining),), count, "xyz"[axis])
+    return Group("divide", keywords, (replace(part, keywords=remaining), *others), float(count), "xyz"[axis])
+
+
+def _in_division(part: Part, first: Part, axis: int, numbers: dict[str, float]) -> Part:
+    """A part of a row in the box of the first one, in the middle of it if it nearly is."""
+    words = AXES[axis]
+    (low, size), (start, whole) = (_interval(each, axis, numbers) for each in (part, first))
+    remaining = [(word, value) for word, value in part.keywords if word not in words or word == words.size]
+    centred = abs(2 * (low - start) + size - whole) < CENTRED
+    place = (words.offset, 0.0) if centred else (words.low, to_float32(round(low - start, 2)))
+    return replace(part, keywords=ordered((place, *remaining)))
+
+
+def _interval(part: Part, axis: int, numbers: dict[str, float]) -> tuple[float, float]:
+    """The low end and the length of a part along an axis."""
+    words, whole = AXES[axis], numbers[SIZES[axis]]
+    given = {word: value_at(value, numbers) for word, value in part.keywords if word in words}  # type: ignore[arg-type]
+    size = given.get(words.size, whole - given.get(words.low, 0.0) - given.get(words.high, 0.0))
+    if words.low in given or (axis == 2 and not {words.high, words.offset} & given.keys()):
+        return given.get(words.low, 0.0), size
+    return whole - given[words.high] - size if words.high in given else (whole - size) / 2 + given.get(
+        words.offset, 0
+    ), size
+
+
+def _is_upright(part: Part) -> bool:
+    return part.kind in BOXES and not {"tilt", "lean"} & dict(part.keywords).keys()
 
 
 def _solids(line: Line) -> Iterator[Part]:
@@ -196,13 +239,20 @@ def _is_box(line: Line) -> bool:
     return isinstance(line, Group) and line.kind == "inside"
 
 
+def _outer(line: Line) -> Iterator[Line]:
+    """A line and those in it, without what is placed in the boxes of a division."""
+    yield line
+    if isinstance(line, Group) and line.kind != "divide":
+        for inner in line.body:
+            yield from _outer(inner)
+
+
 def _parts(line: Line) -> Iterator[Part | Group]:
     """The parts in a line, and the divisions, which have a box as well."""
-    if isinstance(line, Part) or (isinstance(line, Group) and line.kind == "divide"):
-        yield line
-    elif isinstance(line, Group):
-        for inner in line.body:
-            yield from _parts(inner)
+    return (
+        inner for inner in _outer(line)
+        if isinstance(inner, Part) or (isinstance(inner, Group) and inner.kind == "divide")
+    )  # fmt: skip
 
 
 def _sides(line: Line) -> dict[str, str]:
@@ -227,9 +277,9 @@ def _fits(line: Line, frame: dict[str, str]) -> bool:
         if not {words.low, words.high} & frame.keys():
             continue
         even = frame.get(words.low) == frame.get(words.high)
-        for inner in Source((line,)).walk():
-            if any(SIZES[axis] in names_in(value) for value in values(inner)):
-                return False
+        if any(SIZES[axis] in names_in(value) for inner in Source((line,)).walk() for value in values(inner)):
+            return False
+        for inner in _outer(line):
             if isinstance(inner, Group) and inner.kind not in ("divide", "mirror"):
                 return False
             arguments = dict(inner.keywords) if isinstance(inner, Part | Group) else {}

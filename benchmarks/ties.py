@@ -13,6 +13,7 @@ alone      the same programs without any evidence: how ``shapeprog tidy`` ties
 rows       placed programs with a row of 3 to 30 equal parts, with parts that divide a box, or with parts in an inner
            box, with the same noise and evidence
 inferred   what inference finds for the meshes of those
+small      the same for meshes with 3 to 12 small parts in a row: drawers with handles, rungs, feet
 chairs     what inference finds for PartNet chairs, of which it is known which parts are copies of each other
 =========  ============================================================================================================
 
@@ -51,14 +52,14 @@ from scipy.linalg import null_space
 
 from benchmarks.rows import measure_all, read_rows
 
-SETS = ("fitted", "alone", "rows", "inferred", "chairs")
+SETS = ("fitted", "alone", "rows", "inferred", "small", "chairs")
 
 COLUMNS = {
     "fitted": ("recall", "false", "chance", "mixed", "planted", "found", "free", "seconds"),
     "rows": ("found", "counted", "near", "grouped", "count", "seconds"),
     "chairs": ("recall", "false", "plain_recall", "plain_false", "copies", "shared", "parts", "matched", "free"),
 }
-COLUMNS |= {"alone": COLUMNS["fitted"], "inferred": COLUMNS["rows"]}
+COLUMNS |= {"alone": COLUMNS["fitted"], "inferred": COLUMNS["rows"], "small": COLUMNS["rows"]}
 
 NOISE = 0.05
 """Standard deviation of the noise, in cells."""
@@ -109,7 +110,9 @@ def measure(task: Task) -> dict[str, Any]:
     import torch
 
     torch.set_num_threads(1)
-    found = {"chairs": of_chair, "rows": of_group, "inferred": of_group}.get(task.set, of_furniture)(task)
+    found = {"chairs": of_chair, "rows": of_group, "inferred": of_group, "small": of_group}.get(task.set, of_furniture)(
+        task
+    )
     return {"set": task.set, "number": task.number, "seed": task.seed, **found}
 
 
@@ -325,7 +328,9 @@ def of_group(task: Task) -> dict[str, Any]:
     from shapeprog.language.program import Program
     from shapeprog.language.unroll import unroll
 
-    kind, role, text = design(task.number, np.random.default_rng((task.seed, task.number)))
+    kind, role, text = (design_of_small if task.set == "small" else design)(
+        task.number, np.random.default_rng((task.seed, task.number))
+    )
     drawn = parse(text)
     planted, scene = Program(drawn.body), unroll(drawn)
     started = time.process_time()
@@ -419,6 +424,31 @@ def design(number: int, random: Any) -> tuple[str, str, str]:
             f"        drawer()\n"
         ),
     )
+
+
+def design_of_small(number: int, random: Any) -> tuple[str, str, str]:
+    """The same of furniture with a row of small parts."""
+    count, thick = int(random.integers(3, 13)), random.uniform(0.5, 0.8)
+    wide, deep, high = random.uniform(14, 26), random.uniform(7, 12), random.uniform(14, 26)
+    whole = f"width, depth, height = {wide:.2f}, {deep:.2f}, {high:.2f}\n"
+    if number % 3 == 0:  # drawers with handles
+        role, size = ("drawer", "handle")[number // 3 % 2], random.uniform(0.1, 0.3) * wide
+        box = f"gap={random.uniform(0.15, 0.4):.2f}, front=.5, depth={thick:.2f}"
+        handle = f"handle(width={size:.2f}, front=-.5, depth=.5, z=0, height=.4)"
+        body = f"body(front={thick + 0.5:.2f})\n"
+        return "row", role, whole + body + f"for _ in divide({count}, z, {box}):\n    drawer()\n    {handle}\n"
+    if number % 3 == 1:  # rungs between the posts of a back
+        pitch = (high - 4) / (count + 1)
+        seat = f"seat(bottom=4, height={thick:.2f})\n"
+        posts = f"for _ in mirror(x=0):\n    leg(left=0, width={thick:.2f}, depth={thick:.2f}, {{}})\n"
+        start = f"start=at(left={thick / 2:.2f}, rear={thick / 2:.2f}, bottom={4 + pitch:.2f})"
+        rung = f"rod({start}, end=at(right={thick / 2:.2f}), radius={min(random.uniform(0.15, 0.3) * pitch, 0.4):.2f})"
+        row = f"for _ in row({count}, last=at(top={pitch:.2f})):\n    stretcher({rung})\n"
+        return "row", "stretcher", whole + seat + posts.format("front=0, height=4") + posts.format("rear=0") + row
+    size, lift = random.uniform(0.2, 0.5) * wide / count, random.uniform(0.8, 1.5)
+    foot = f"foot(left=.5, width={size:.2f}, front=.5, depth={size:.2f}, height={lift:.2f})"
+    row = f"for _ in mirror(y=0):\n    for _ in row({count}, last=at(right=.5)):\n        {foot}\n"
+    return "row", "foot", whole + f"body(bottom={lift:.2f})\n" + row
 
 
 def of_chair(task: Task) -> dict[str, Any]:

@@ -68,18 +68,21 @@ def choose(
     continues from the best set.  A second search starts from ``start``.
     """
     gains = np.bitwise_count(table.rows[:, : table.evidence]) @ table.weights[: table.evidence]
-    bounds = gains - table.prices
-    order = np.argsort(-bounds, kind="stable")
-    order = order[bounds[order] > 0]
-    words = *_words(table.rows[:, : len(table.weights)]), *_words(table.interior)
-    searches = len(INTERIOR) + 2 if table.interior.any() else 1
+    useful = gains > table.prices
+    useful[list(start)] = True
+    index, last = np.flatnonzero(useful), len(table.weights)
+    rows = table.rows[np.ix_(index, [*range(last), *(last + index)])]
+    hidden, interior = np.ascontiguousarray(rows[:, last:].T), table.interior[index]
+    words, begins = _words(rows[:, :last])
+    bits = np.concatenate([row[row != 0] for row in rows[:, :last]]) if len(rows) else rows.reshape(-1)
+    data = (
+        rows, interior, hidden, table.weights, words, bits, begins, *_words(interior), table.exposed[index],
+        table.sample_price[index], table.prices[index],
+    )  # fmt: skip
+    searches = len(INTERIOR) + 2 if interior.any() else 1
 
     def searched(penalty: float, initial: Array, best_sets: BestSets) -> BestSets:
-        search(
-            table.rows, table.interior, table.weights, *words, table.exposed, table.sample_price, table.prices, penalty,
-            bounds,
-            order, rounds // searches, BLINK, seed, initial, *best_sets,
-        )  # fmt: skip
+        search(*data, penalty, rounds // searches, BLINK, seed, initial, *best_sets)
         return best_sets
 
     best = _no_sets(blocks)
@@ -88,10 +91,10 @@ def choose(
         for penalty in INTERIOR:
             initial = searched(penalty, initial, _no_sets(blocks)).set
         best = searched(0.0, initial, best)
-    best = searched(0.0, np.array(start, np.int64), best)
+    best = searched(0.0, np.searchsorted(index, np.array(start, np.int64)), best)
     options = [
-        Option(tuple(map(int, indices[:size])), float(value), explained(table, indices[:size]))
-        for size, (value, indices) in enumerate(zip(*best, strict=True))
+        Option(tuple(index[chosen[:size]].tolist()), float(value), explained(table, index[chosen[:size]]))
+        for size, (value, chosen) in enumerate(zip(*best, strict=True))
         if np.isfinite(value)
     ]
     return Choice(max(options, key=lambda option: option.value), tuple(options))

@@ -10,29 +10,27 @@ from shapeprog.kernels.compile import helper, kernel
 RUIN_LEAST, RUIN_MOST = 0.1, 0.6
 """Range of the share of selected candidates that a round drops, in addition to one that it always drops."""
 
+ROUNDING = 1e-12
+"""How far rounding may take a gain above its upper bound."""
+
 
 @helper
-def gain(rows, weights, words, begins, exposed, sample_price, prices, cover, selected, count, candidate):
+def gain(
+    rows, interior, hidden, weights, words, bits, begins, inner, starts, exposed, sample_price, prices, penalty,
+    cover, under, selected, count, candidate,
+):  # fmt: skip
     """Increase in value of the selected candidates with one more candidate."""
     total, last = -prices[candidate], len(weights)
     for index in range(begins[candidate], begins[candidate + 1]):
-        word = words[index]
-        total += weights[word] * ones(rows[candidate, word] & ~cover[word])
+        total += weights[words[index]] * ones(bits[index] & ~cover[words[index]])
     total -= sample_price[candidate] * ones(exposed[candidate] & ~cover[last + candidate])
     for index in range(count):  # samples of the others that it hides are no longer charged
         peer = selected[index]
-        total += sample_price[peer] * ones(exposed[peer] & rows[candidate, last + peer] & ~cover[last + peer])
-    return total
-
-
-@helper
-def occlusion_loss(interior, weights, inner, starts, penalty, cover, under, candidate):
-    """Weight of the explained points that a candidate hides in its interior, plus the penalty of the interior."""
-    total = 0.0
-    for index in range(starts[candidate], starts[candidate + 1]):
+        total += sample_price[peer] * ones(exposed[peer] & hidden[peer, candidate] & ~cover[last + peer])
+    for index in range(starts[candidate], starts[candidate + 1]):  # explained points in its interior; and the penalty
         word = inner[index]
         new = interior[candidate, word] & ~under[word]
-        total += weights[word] * (ones(new & cover[word]) + penalty * ones(new))
+        total -= weights[word] * (ones(new & cover[word]) + penalty * ones(new))
     return total
 
 
@@ -45,38 +43,58 @@ def include(rows, interior, cover, under, candidate):
 
 
 @helper
-def charge(exposed, sample_price, cover, last, candidate):
-    """Cost of the exposed samples of a candidate, an upper bound on the gain from hiding them."""
-    return sample_price[candidate] * ones(exposed[candidate] & ~cover[last + candidate])
+def relate(
+    rows, interior, hidden, weights, words, bits, begins, inner, starts, exposed, sample_price, penalty,
+    overlap, slack, candidate,
+):  # fmt: skip
+    """How much the gain of every candidate falls, at least, and rises, at most, when this candidate is selected.
+
+    It falls by the points that both explain, and rises by the free points that both fill, the interior that they
+    share, and the samples of one that the other hides.
+    """
+    last, held = len(weights), interior.shape[1]
+    for other in range(len(exposed)):
+        both, more = 0.0, ROUNDING
+        for index in range(begins[other], begins[other + 1]):
+            word = words[index]
+            cover = rows[candidate, word] | interior[candidate, word] if word < held else rows[candidate, word]
+            common = weights[word] * ones(bits[index] & cover)
+            both += max(common, 0.0)
+            more -= min(common, 0.0)
+        for index in range(starts[other], starts[other + 1]):
+            word = inner[index]
+            more += (1.0 + penalty) * weights[word] * ones(interior[other, word] & interior[candidate, word])
+        more += sample_price[candidate] * ones(exposed[candidate] & hidden[candidate, other])
+        more += sample_price[other] * ones(exposed[other] & rows[candidate, last + other])
+        overlap[candidate, other], slack[candidate, other] = both, more
 
 
 @kernel(
-    "void(u8[:, ::1], u8[:, ::1], f8[::1], i8[::1], i8[::1], i8[::1], i8[::1], u8[::1], f8[::1], f8[::1], f8, f8[::1],"
-    " i8[::1], i8, f8, i8, i8[::1], f8[::1], i8[:, ::1])"
+    "void(u8[:, ::1], u8[:, ::1], u8[:, ::1], f8[::1], i8[::1], u8[::1], i8[::1], i8[::1], i8[::1], u8[::1], f8[::1],"
+    " f8[::1], f8, i8, f8, i8, i8[::1], f8[::1], i8[:, ::1])"
 )
 def search(
-    rows, interior, weights, words, begins, inner, starts, exposed, sample_price, prices, penalty, bounds, order,
-    rounds, blink, seed,
-    initial_set, values, sets,
+    rows, interior, hidden, weights, words, bits, begins, inner, starts, exposed, sample_price, prices, penalty,
+    rounds, blink, seed, initial_set, values, sets,
 ):  # fmt: skip
     """Ruin and recreate: drop some of the selected, refill greedily, accept a set that is no worse; best of each size.
 
-    A gain does not grow while others are added, except by the cost of their samples that the candidate could hide.  An
-    earlier gain without the occlusion loss plus that cost is therefore an upper bound, and few gains are computed
-    again.  With probability ``blink`` the best candidate is overlooked (Christiaens and Vanden Berghe 2020).
+    The greedy step computes few gains: an upper bound of a gain is one computed earlier in the round, less the largest
+    overlap with a candidate selected since then, plus all that those may add.  With probability ``blink`` it overlooks
+    a candidate (Christiaens and Vanden Berghe 2020).
 
     Parameters
     ----------
     rows, interior, weights, exposed, sample_price, prices
         See ``CoverageTable``.
-    words, begins
-        Indices of the weighted words with bits of each candidate, one candidate after another, and the first of each.
+    hidden
+        The last columns of ``rows``, transposed: the samples of each candidate (C, C) that every other hides.
+    words, bits, begins
+        Indices and bits of the weighted words of each candidate, one candidate after another, and the first of each.
     inner, starts
-        The same for the words of each interior.
+        Indices of the words of each interior, likewise.
     penalty
         Price of interior points as a multiple of their weight, whether others explain them or not.
-    bounds, order
-        Value of each candidate (C,) alone without the cost of its samples; and its descending order.
     rounds, blink, seed
         Number of rounds; see above; seed of the random numbers.
     initial_set
@@ -85,71 +103,79 @@ def search(
         Input and output: the best value for each number of blocks (M + 1,) and its candidates (M + 1, M), initially
         those of another search, or minus infinity and -1.
     """
-    max_size, last = sets.shape[1], len(weights)
-    cover, under = np.empty(rows.shape[1], np.uint64), np.empty(interior.shape[1], np.uint64)
+    max_size, total = sets.shape[1], len(exposed)
+    cover, under = np.zeros(rows.shape[1], np.uint64), np.zeros(interior.shape[1], np.uint64)
     incumbent, selected = np.empty(max_size, np.int64), np.empty(max_size, np.int64)
-    gains, since = np.empty(len(rows)), np.empty(len(rows))
+    alone, base, less, more = np.empty(total), np.empty(total), np.empty(total), np.empty(total)
+    known, overlap, slack = np.zeros(total, np.bool_), np.empty((total, total)), np.empty((total, total))
     size, best_value, draws = len(initial_set), 0.0, 0
     incumbent[:size] = initial_set
+    for candidate in range(total):
+        alone[candidate] = gain(
+            rows, interior, hidden, weights, words, bits, begins, inner, starts, exposed, sample_price, prices, penalty,
+            cover, under, selected, 0, candidate,
+        )  # fmt: skip
     for turn in range(rounds + 1):
         share = RUIN_LEAST + (RUIN_MOST - RUIN_LEAST) * uniform(seed, draws)
         dropped = int(uniform(seed, draws + 1) * size)
         draws += 2
-        count, value = 0, 0.0
+        count, step, value = 0, 0, 0.0
         cover[:] = np.uint64(0)
         under[:] = np.uint64(0)
-        for index in range(size):
-            draws += 1
-            if turn > 0 and (index == dropped or uniform(seed, draws) < share):
-                continue
-            candidate = incumbent[index]
-            value += gain(
-                rows, weights, words, begins, exposed, sample_price, prices, cover, selected, count, candidate
-            )
-            value -= occlusion_loss(interior, weights, inner, starts, penalty, cover, under, candidate)
-            include(rows, interior, cover, under, candidate)
-            selected[count] = candidate
-            count += 1
-        since[:] = 0.0
-        gains[:] = bounds
-        charged = 0.0
-        for index in range(count):
-            charged += charge(exposed, sample_price, cover, last, selected[index])
+        base[:] = alone
+        less[:] = 0.0
+        more[:] = 0.0
         while True:
-            if value > values[count]:
-                values[count] = value
-                sets[count, :count] = selected[:count]
-            if count == max_size:
-                break
-            best, best_candidate, first = 0.0, -1, -1
-            for index in range(len(order)):
-                candidate = order[index]
-                if gains[candidate] + charged - since[candidate] > best:
-                    best, first = gains[candidate] + charged - since[candidate], index
-            best = 0.0
-            for step in range(-1, len(order)):
-                candidate = order[first if step < 0 else step]
-                if first < 0 or bounds[candidate] + charged <= best:
-                    break
-                if step == first or gains[candidate] + charged - since[candidate] <= best:
-                    continue
+            best, best_candidate, trial = 0.0, -1, -1
+            if step < size:  # one of the incumbent that is not dropped
+                best_candidate = incumbent[step]
+                step += 1
                 draws += 1
-                if turn > 0 and uniform(seed, draws) < blink:
+                if turn > 0 and (step - 1 == dropped or uniform(seed, draws) < share):
                     continue
-                more = gain(
-                    rows, weights, words, begins, exposed, sample_price, prices, cover, selected, count, candidate
-                )
-                gains[candidate], since[candidate] = more, charged
-                more -= occlusion_loss(interior, weights, inner, starts, penalty, cover, under, candidate)
-                if more > best:
-                    best, best_candidate = more, candidate
-            if best_candidate < 0:
-                break
+                best = gain(
+                    rows, interior, hidden, weights, words, bits, begins, inner, starts, exposed, sample_price, prices,
+                    penalty, cover, under, selected, count, best_candidate,
+                )  # fmt: skip
+            else:
+                if value > values[count]:
+                    values[count] = value
+                    sets[count, :count] = selected[:count]
+                if count == max_size:
+                    break
+                first, upper = 0, 0.0
+                for candidate in range(total):  # the largest bound first: with its gain, most others are no better
+                    if base[candidate] - less[candidate] + more[candidate] > upper:
+                        first, upper = candidate, base[candidate] - less[candidate] + more[candidate]
+                while trial < total and upper > 0:
+                    candidate = first if trial < 0 else trial
+                    trial += 1
+                    if base[candidate] - less[candidate] + more[candidate] <= best:
+                        continue
+                    if turn > 0 and uniform(seed, draws + candidate) < blink:
+                        continue
+                    base[candidate], less[candidate], more[candidate] = gain(
+                        rows, interior, hidden, weights, words, bits, begins, inner, starts, exposed, sample_price,
+                        prices, penalty, cover, under, selected, count, candidate,
+                    ), 0.0, ROUNDING  # fmt: skip
+                    if base[candidate] > best:
+                        best, best_candidate = base[candidate], candidate
+                draws += total
+                if best_candidate < 0:
+                    break
             value += best
+            if not known[best_candidate]:
+                known[best_candidate] = True
+                relate(
+                    rows, interior, hidden, weights, words, bits, begins, inner, starts, exposed, sample_price, penalty,
+                    overlap, slack, best_candidate,
+                )  # fmt: skip
+            for candidate in range(total):
+                less[candidate] = max(less[candidate], overlap[best_candidate, candidate])
+                more[candidate] += slack[best_candidate, candidate]
             include(rows, interior, cover, under, best_candidate)
             selected[count] = best_candidate
             count += 1
-            charged += charge(exposed, sample_price, cover, last, best_candidate)
         if value >= best_value:
             best_value, size = value, count
             incumbent[:count] = selected[:count]

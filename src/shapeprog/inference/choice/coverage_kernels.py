@@ -27,14 +27,21 @@ def cell_of(value, cells):
 
 
 @helper
-def box_of(table, row, margin, cells, ends):
-    """First and last cells along each axis that the box around a primitive reaches, widened by a margin."""
+def box_of(table, row, margin, cells, ends, box):
+    """The box around a primitive, widened by a margin, and the first and last cells along each axis that it reaches."""
     a, b, c = bound(table, row)
     for axis in range(3):
         column = ROTATION + 3 * axis
         reach = abs(table[row, column]) * a + abs(table[row, column + 1]) * b + abs(table[row, column + 2]) * c
-        ends[axis] = cell_of(table[row, CENTRE + axis] - reach - margin, cells)
-        ends[3 + axis] = cell_of(table[row, CENTRE + axis] + reach + margin, cells)
+        box[axis], box[3 + axis] = table[row, CENTRE + axis] - reach - margin, table[row, CENTRE + axis] + reach + margin
+        ends[axis], ends[3 + axis] = cell_of(box[axis], cells), cell_of(box[3 + axis], cells)
+
+
+@helper
+def outside(points, item, box):
+    """Whether a point is outside a box."""
+    x, y, z = points[item, 0], points[item, 1], points[item, 2]
+    return x < box[0] or x > box[3] or y < box[1] or y > box[4] or z < box[2] or z > box[5]
 
 
 @helper
@@ -52,16 +59,16 @@ def put(rows, row, bit):
 @kernel("void(f8[:, ::1], i8, f8[:, ::1], f8[:, ::1], i8[::1], i8[::1], i8, f8, f8, u8[:, ::1], i8, i8)")
 def explain(table, primitives, points, normals, bits, starts, cells, tolerance, agreement, rows, begin, end):
     """Set the bits of the points within a tolerance of a surface whose normal fits theirs; zero normals fit all."""
-    ends, part = np.empty(6, np.int64), np.empty(7)
+    ends, box, part = np.empty(6, np.int64), np.empty(6), np.empty(7)
     for row in range(begin * primitives, end * primitives):
         if table[row, KIND] < 0:
             continue
-        box_of(table, row, tolerance, cells, ends)
+        box_of(table, row, tolerance, cells, ends, box)
         for i in range(ends[0], ends[3] + 1):
             for j in range(ends[1], ends[4] + 1):
                 line = (i * cells + j) * cells
                 for item in range(starts[line + ends[2]], starts[line + ends[5] + 1]):
-                    if has(rows, row // primitives, bits[item]):
+                    if outside(points, item, box) or has(rows, row // primitives, bits[item]):
                         continue
                     a, b, c = local(table, row, points[item, 0], points[item, 1], points[item, 2])
                     if abs(distance(table, row, a, b, c)) > tolerance:
@@ -79,16 +86,16 @@ def explain(table, primitives, points, normals, bits, starts, cells, tolerance, 
 @kernel("void(f8[:, ::1], i8, f8[:, ::1], i8[::1], i8[::1], i8, f8, u8[:, ::1], i8, i8)")
 def hold(table, primitives, points, bits, starts, cells, depth, rows, begin, end):
     """Set the bits of the points that lie deeper than ``depth`` inside a primitive."""
-    ends = np.empty(6, np.int64)
+    ends, box = np.empty(6, np.int64), np.empty(6)
     for row in range(begin * primitives, end * primitives):
         if table[row, KIND] < 0:
             continue
-        box_of(table, row, 0.0, cells, ends)
+        box_of(table, row, 0.0, cells, ends, box)
         for i in range(ends[0], ends[3] + 1):
             for j in range(ends[1], ends[4] + 1):
                 line = (i * cells + j) * cells
                 for item in range(starts[line + ends[2]], starts[line + ends[5] + 1]):
-                    if has(rows, row // primitives, bits[item]):
+                    if outside(points, item, box) or has(rows, row // primitives, bits[item]):
                         continue
                     a, b, c = local(table, row, points[item, 0], points[item, 1], points[item, 2])
                     if distance(table, row, a, b, c) < -depth:

@@ -163,7 +163,7 @@ class AxisAnchors:
         self.share = np.stack([low, high]) / extent
         self.long = high - low >= settings.spanning * extent
         first, second = contacts.first, contacts.second
-        self.contacts, self.ends = contacts, ends
+        self.contacts, self.ends, self._passed = contacts, ends, set[bytes]()
         self.overlap = self._overlaps(low, high)
         moved_by = (np.abs(slopes).max((0, 3)) > 0).astype(int)  # (N, K)
         shared = moved_by[first].T @ moved_by[second] if len(first) else np.zeros((len(elements),) * 2)
@@ -218,6 +218,9 @@ class AxisAnchors:
         total = float(self._costs(state[None])[0])
         for _ in range(ROUNDS):
             before = total
+            if state.tobytes() in self._passed:  # the descent from another start came through here
+                break
+            self._passed.add(state.tobytes())
             for group in (*([k] for k in range(len(state))), *self.together):
                 options = np.array([*product(*(range(len(self.choices[k])) for k in group))])
                 trials = np.repeat(state[None], len(options), 0)

@@ -23,7 +23,7 @@ import sys
 import numpy as np
 from shapeprog.errors import ShapeProgError
 from shapeprog.formats.cuts import cut_list
-from shapeprog.formats.openscad import write_scad
+from shapeprog.formats.openscad import scad_text
 from shapeprog.formats.parts import parts, solid
 from shapeprog.language import Draw, Loop, Program, language
 from shapeprog.space import Frame
@@ -53,8 +53,7 @@ def drawn():
             yield "solid", *solid(program)
         except ShapeProgError as error:
             yield error.message, np.zeros(0), np.zeros(0)
-        write_scad(program, Path("a.scad"), Frame())
-        yield Path("a.scad").read_text(), np.zeros(0), np.zeros(0)
+        yield scad_text(program, Frame()), np.zeros(0), np.zeros(0)
         yield str(cut_list(program, Frame())), np.zeros(0), np.zeros(0)
 
 light = list(drawn())

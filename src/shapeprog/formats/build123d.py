@@ -9,12 +9,12 @@ from collections.abc import Iterator
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
 
 from shapeprog.errors import OutputError
-from shapeprog.files import atomic_path, write_text
 from shapeprog.formats.parts import drawn_parts
 from shapeprog.formats.scripts import Script, needed, number, prelude, script
 from shapeprog.language.ast import Call, Function, Line, Part, body_of, changed_lines
@@ -28,28 +28,25 @@ _UNITS = {"mm": "MM", "cm": "CM", "m": "M", "in": "IN"}  # units of build123d
 MOST_SOLIDS = 1 << 11  # most solids of a STEP file: build123d takes some milliseconds for each
 
 
-def write_script(program: Program, path: Path, frame: Frame, unit: str = "") -> None:
-    """Write a build123d script; run, it makes a compound of named, coloured solids and writes it as STEP."""
-    write_text(path, script_text(program, frame, path.stem, unit))
-
-
-def write_step(program: Program, path: Path, frame: Frame, unit: str = "") -> None:
-    """Write named, coloured solids as STEP; an ``OutputError`` if build123d is not installed, or the program draws
-    nothing or more than ``MOST_SOLIDS``."""
+def step(program: Program, frame: Frame, stem: str, unit: str = "") -> bytes:
+    """Named, coloured solids as STEP; an ``OutputError`` if build123d is not installed, or the program draws nothing or
+    more than ``MOST_SOLIDS``."""
     if (count := len(drawn_parts(program))) > MOST_SOLIDS:
         raise OutputError(
             f"the {count} parts of this program are too many for STEP, which takes at most {MOST_SOLIDS}",
             "lower the counts, or export a .py script, which keeps the loops, and run it where there is time",
         )
     if importlib.util.find_spec("build123d") is None:
-        message = f"cannot write {path}: STEP needs the library build123d, which is not installed"
+        message = "cannot write STEP: it needs the library build123d, which is not installed"
         raise OutputError(message, "pip install build123d, or export a .py script and run it where build123d is")
     made: dict[str, Any] = {"__name__": "shapeprog_model"}
     # The script consists of checked names and numbers; running it avoids a second implementation of the geometry.
-    exec(compile(script_text(program, frame, path.stem, unit), f"{path.stem}.py", "exec"), made)
-    with atomic_path(path) as temporary:
-        if not made["export_step"](made["model"], str(temporary), unit=getattr(made["Unit"], _UNITS.get(unit, "MM"))):
-            raise OutputError(f"cannot write {path}: build123d could not write the STEP file", "check path and disk")
+    exec(compile(script_text(program, frame, stem, unit), f"{stem}.py", "exec"), made)
+    with TemporaryDirectory() as folder:
+        file = Path(folder) / f"{stem}.step"
+        if not made["export_step"](made["model"], str(file), unit=getattr(made["Unit"], _UNITS.get(unit, "MM"))):
+            raise OutputError("build123d could not write the STEP file", "check the disk of temporary files")
+        return file.read_bytes()
 
 
 def script_text(program: Program, frame: Frame, stem: str = "model", unit: str = "") -> str:

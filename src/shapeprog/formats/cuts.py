@@ -8,21 +8,17 @@ import math
 from collections import Counter
 from collections.abc import Callable, Iterator
 from functools import lru_cache, partial
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from shapeprog.files import write_text
 from shapeprog.formats.format import format_of
 from shapeprog.formats.frames import placement
+from shapeprog.formats.parts import exact_scene
 from shapeprog.geometry.mesh import solids_of
 from shapeprog.geometry.primitives import primitives
 from shapeprog.language.program import Program
-from shapeprog.language.tensors import encode
 from shapeprog.language.unit import METRES
-from shapeprog.language.unroll import on_numpy_if_shipped, unroll
-from shapeprog.lazy_torch import torch
 from shapeprog.space import FloatArray, Frame
 
 FINEST = 1e-4  # metres to which sizes are rounded
@@ -98,8 +94,8 @@ class CutList(NamedTuple):
 @lru_cache(maxsize=1)  # the command writes and prints the same list
 def cut_list(program: Program, frame: Frame, unit: str = "") -> CutList:
     """The distinct parts of a program; ``frame.scale`` is the size of a cell in ``unit``, which is empty if unknown."""
-    with on_numpy_if_shipped(program):
-        copies = list(_copies(program, frame.scale, unit))
+    with exact_scene(program) as scene:
+        copies = list(_copies(scene, program, frame.scale, unit))
     distinct = set(copies)
     counts = Counter(cut for cut, _ in distinct)
     rows = sorted(counts.items(), key=_order)
@@ -112,11 +108,11 @@ def _order(row: tuple[Cut, int]) -> tuple[bool, float, float, Cut]:
     return cut.diameter > 0, -cut.thickness - cut.diameter, -cut.length, cut
 
 
-def write_cuts(program: Program, path: Path, frame: Frame, unit: str = "") -> None:
-    """Write the cut list as CSV, see :func:`cut_list`."""
+def cuts_csv(program: Program, frame: Frame, unit: str = "") -> str:
+    """The cut list as CSV, see :func:`cut_list`."""
     text = io.StringIO()
     csv.writer(text, lineterminator="\n").writerows(cut_list(program, frame, unit).rows)
-    write_text(path, text.getvalue())
+    return text.getvalue()
 
 
 def cut_table(program: Program, frame: Frame | None = None, **asked: Any) -> str:
@@ -128,9 +124,8 @@ def cut_table(program: Program, frame: Frame | None = None, **asked: Any) -> str
     return cut_list(program, lies.frame, lies.unit).table
 
 
-def _copies(program: Program, scale: float, unit: str) -> Iterator[tuple[Cut, tuple[float, ...]]]:
+def _copies(scene: Any, program: Program, scale: float, unit: str) -> Iterator[tuple[Cut, tuple[float, ...]]]:
     """The entry of every part that has a volume, and where it lies: its centre and the square of its extents."""
-    scene = unroll(encode(program, dtype=torch.float64))
     words, blocks, kinds = [draw.word for draw in program.draws], scene.block.tolist(), scene.kind.tolist()
     solid, sizes, centre, rotation, halves = solids_of(scene)
     rounded = partial(_rounded, scale=scale, unit=unit)

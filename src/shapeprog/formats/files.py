@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from pathlib import Path
 
 from shapeprog.errors import InputError, OutputError, did_you_mean
-from shapeprog.files import output_error
+from shapeprog.files import write_bytes
 from shapeprog.formats.format import format_of, listed, program_suffixes, suffixes
 from shapeprog.formats.frames import placement
 from shapeprog.language.program import Program
@@ -135,14 +136,15 @@ def export(
         wrong = f"no export ends in {suffix!r}" if suffix else f"{target} has no suffix, so its format is unknown"
         raise OutputError(wrong, did_you_mean(suffix, suffixes()))
     lies = placement(file_format, program, frame, unit=unit, file_unit=file_unit, up=up, on_input=on_input)
+    known: dict[str, int | str] = {"unit": lies.unit, "stem": target.stem}
     takes = file_format.options
     for name in options.keys() - takes:
-        raise OutputError(f"{suffix} takes no {name}", f"it takes {', '.join({*takes} - {'unit'}) or 'no options'}")
-    named = {"unit": lies.unit} if "unit" in takes else {}
-    try:
-        file_format.write(program, target, lies.frame, **options, **named)
-    except OSError as error:
-        raise output_error(target, error) from error
+        raise OutputError(f"{suffix} takes no {name}", f"it takes {', '.join(takes - known.keys()) or 'no options'}")
+    known = {name: known[name] for name in known.keys() & takes}
+    content = file_format.content(program, lies.frame, **known, **options)
+    for ending, part in content.items() if isinstance(content, Mapping) else [(suffix, content)]:
+        file = target if ending == suffix else target.with_suffix(ending)
+        write_bytes(file, part if isinstance(part, bytes) else part.encode("utf-8", "surrogateescape"))
     return target
 
 

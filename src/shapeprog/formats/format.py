@@ -9,6 +9,7 @@ from __future__ import annotations
 import inspect
 import os
 import pkgutil
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -20,6 +21,8 @@ if TYPE_CHECKING:
 Kind = Literal["program", "solid", "list", "sample", "shape"]
 
 CELLS = "cells"  # the word for lengths in cells
+
+Content = str | bytes | Mapping[str, str]  # of a file, or by their suffix of several that belong together
 
 Axes = tuple[str, str]  # world axes that point up and that the front faces, such as ``("+y", "+z")``
 Y_UP: Axes = ("+y", "+z")  # axes of glTF, and of most mesh files
@@ -48,8 +51,8 @@ class Format:
     doc
         Contents of such a file, in one line.
     reader, writer
-        ``module:function`` of this package: ``(path) -> (program, frame or None)`` and ``(program, path, frame)``,
-        perhaps with the name of the ``unit`` and further options.
+        ``module:function`` of this package: ``(path) -> (program, frame or None)`` and ``(program, frame) -> content``,
+        perhaps with the name of the ``unit``, the ``stem`` of the file, and further options.
     unit
         Unit of the coordinates of a file unless another is asked for; ``text`` for that of the program, empty for that
         of the input, or of the program if no input is known, ``cells`` for cells always.  Files in millimetres are for
@@ -71,50 +74,50 @@ class Format:
         return self.unit == "mm"
 
     @property
-    def options(self) -> tuple[str, ...]:
+    def options(self) -> set[str]:
         """Further arguments of the writer."""
-        return tuple(inspect.signature(_function(self.writer)).parameters)[3:]
+        return {*inspect.signature(_function(self.writer)).parameters} - {"program", "frame"}
 
     def read(self, path: Path) -> tuple[Program, Frame | None]:
         """The program in a file of this format, and its frame if the file has one."""
         return _function(self.reader)(path)
 
-    def write(self, program: Program, path: Path, frame: Frame | None, **options: int | str) -> None:
-        """Write a program; ``frame`` maps the grid to the coordinates of the file."""
-        _function(self.writer)(program, path, frame, **options)
+    def content(self, program: Program, frame: Frame | None, **options: int | str) -> Content:
+        """What a file with the program holds; ``frame`` maps the grid to the coordinates of the file."""
+        return _function(self.writer)(program, frame, **options)
 
 
 FORMATS = (
     Format("program text", "program", (".shape",), None, "the program, with its frame in a comment where one is known",
-        reader="shape:read_shape", writer="shape:write_shape"),
+        reader="shape:read_shape", writer="shape:program_text"),
     Format("JSON", "program", (".json",), None, "the text with a list of the solids that it draws, for other programs",
-        reader="json_form:read_json", writer="json_form:write_json"),
+        reader="json_form:read_json", writer="json_form:program_to_json"),
     Format("plain text", "program", (".txt",), None, "program text under another suffix",
         reader="shape:read_shape"),
     Format("GLB", "solid", (".glb",), Y_UP, "one named node per part, coloured by statement",
-        writer="meshes:write_glb", unit="m"),
+        writer="meshes:glb", unit="m"),
     Format("OBJ", "solid", (".obj",), Y_UP, "one object per part, colours in an .mtl file next to it",
-        writer="meshes:write_obj"),
+        writer="meshes:obj"),
     Format("PLY", "solid", (".ply",), Y_UP, "all parts in one mesh, colours at the vertices",
-        writer="meshes:write_ply"),
+        writer="meshes:ply"),
     Format("STL", "solid", (".stl",), Z_UP, "the union of all parts: one watertight solid",
-        writer="meshes:write_stl", unit="mm"),
+        writer="meshes:stl", unit="mm"),
     Format("3MF", "solid", (".3mf",), Z_UP, "one named, coloured object per part, for 3D printing",
-        writer="meshes:write_3mf", unit="mm"),
+        writer="meshes:three_mf", unit="mm"),
     Format("OpenSCAD", "solid", (".scad",), Z_UP,
         "the program as a script: groups, functions, loops; its named numbers for the customizer",
-        writer="openscad:write_scad", unit="mm"),
+        writer="openscad:scad_text", unit="mm"),
     Format("build123d", "solid", (".py",), Z_UP, "the same as a Python script, which writes a STEP file when run",
-        writer="build123d:write_script", unit="mm"),
+        writer="build123d:script_text", unit="mm"),
     Format("STEP", "solid", (".step", ".stp"), Z_UP,
         "named, coloured solids, through build123d (pip install build123d)",
-        writer="build123d:write_step", unit="mm"),
+        writer="build123d:step", unit="mm"),
     Format("cut list", "list", (".csv",), Z_UP, "count, role and size of each distinct part",
-        writer="cuts:write_cuts", unit="text"),
+        writer="cuts:cuts_csv", unit="text"),
     Format("NPY", "sample", (".npy",), GRID, "the 32^3 cells; others with render --resolution",
-        writer="samples:write_grid", unit=CELLS),
+        writer="samples:npy", unit=CELLS),
     Format("XYZ", "sample", (".xyz",), Z_UP, "points on the surface, one line 'x y z nx ny nz' each",
-        writer="samples:write_points"),
+        writer="samples:xyz"),
     Format("binvox", "shape", (".binvox",), Y_UP, "cells"),
     Format("NPZ", "shape", (".npz",), GRID, "cells or points, of one shape or many"),
     Format("OFF", "shape", (".off",), Y_UP, "a mesh"),

@@ -21,7 +21,6 @@ from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from shapeprog.errors import InputError, ShapeProgError
-from shapeprog.files import write_text
 from shapeprog.formats.frames import frame_of_text, scale_of
 from shapeprog.formats.shape import LARGEST_FILE, program_in, program_text, read_text
 from shapeprog.language.ast import Draw, Part
@@ -31,7 +30,6 @@ from shapeprog.language.printer import printed, source_of
 from shapeprog.language.program import Program
 from shapeprog.language.statement import language
 from shapeprog.language.text import Text
-from shapeprog.lazy_torch import torch
 from shapeprog.space import Frame
 
 FORMAT = "shapeprog"
@@ -95,11 +93,6 @@ def read_json(path: Path) -> tuple[Program, Frame | None]:
     return result.program, result.frame
 
 
-def write_json(program: Program, path: Path, frame: Frame | None) -> None:
-    """Write the JSON form."""
-    write_text(path, program_to_json(program, frame))
-
-
 def program_to_json(program: Program, frame: Frame | None = None, **more: Any) -> str:
     """A program as JSON text, with a line for each solid; numbers of its text have the fewest digits that are exact.
 
@@ -131,9 +124,8 @@ def program_to_json(program: Program, frame: Frame | None = None, **more: Any) -
 
 def _solids(program: Program, framed: bool) -> list[dict[str, Any]]:
     """The line, role, kind and bounds of each solid that a program draws; ``framed`` if a comment is above its text."""
+    from shapeprog.formats.parts import exact_scene  # reading a program needs no geometry
     from shapeprog.geometry.mesh import bounds
-    from shapeprog.language.tensors import encode
-    from shapeprog.language.unroll import on_numpy_if_shipped, unroll
 
     if program.size > MOST_SOLIDS:
         raise ShapeProgError(f"more than {MOST_SOLIDS} solids")
@@ -143,18 +135,14 @@ def _solids(program: Program, framed: bool) -> list[dict[str, Any]]:
         if isinstance(line, Draw | Part):
             lines |= dict.fromkeys(drawn[id(line)], (row, line.kind if isinstance(line, Part) else line.name))
     roles = [draw.word if draw.word in language().roles else "" for draw in program.draws]
-    with on_numpy_if_shipped(program):
-        scene = unroll(encode(program, dtype=torch.float64))
-        blocks, boxes = (
-            scene.block.tolist(),
-            [(slot, *low.tolist(), *high.tolist()) for slot, low, high in bounds(scene)],
-        )
     solids = []
-    for slot, bottom, front, right, top, rear, left in boxes:  # the third axis of the grid points to the left
-        corners = (-left, front, bottom - scale.floor), (-right, rear, top - scale.floor)
-        low, high = ([float(f"{value / scale.cells_per_unit + 0.0:.6g}") for value in corner] for corner in corners)
-        row, kind = lines[blocks[slot]]
-        solids.append({"line": row, "role": roles[blocks[slot]], "kind": kind, "low": low, "high": high})
+    with exact_scene(program) as scene:
+        blocks = scene.block.tolist()
+        for slot, (bottom, front, right), (top, rear, left) in bounds(scene):  # the third axis points to the left
+            corners = (-left, front, bottom - scale.floor), (-right, rear, top - scale.floor)
+            low, high = ([float(f"{value / scale.cells_per_unit + 0.0:.6g}") for value in corner] for corner in corners)
+            row, kind = lines[blocks[slot]]
+            solids.append({"line": row, "role": roles[blocks[slot]], "kind": kind, "low": low, "high": high})
     return solids
 
 

@@ -5,14 +5,12 @@ from __future__ import annotations
 import io
 import zipfile
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
 from shapeprog.errors import OutputError
-from shapeprog.files import write_bytes, write_text
 from shapeprog.formats.colours import colour, hexadecimal
 from shapeprog.formats.parts import Faces, Part, Vertices, drawn_parts, part_normals, solid
 from shapeprog.geometry.mesh import joined
@@ -36,7 +34,7 @@ _RELATIONS = (
 )
 
 
-def write_glb(program: Program, path: Path, frame: Frame) -> None:
+def glb(program: Program, frame: Frame) -> bytes:
     """One named node per part (``leg_1``, ``leg_2``...) and one material per statement.
 
     The material is what a viewer shows; vertices are split along creases, so that boards look flat and bars round.
@@ -66,15 +64,13 @@ def write_glb(program: Program, path: Path, frame: Frame) -> None:
         mesh = trimesh.Trimesh(vertices, faces, vertex_normals=normals, process=False)
         mesh.visual = make_visual(uv=np.zeros((len(vertices), 2)), material=materials[part.word])
         scene.add_geometry(mesh, node_name=part.name, geom_name=part.name)
-    content: Any = scene.export(file_type="glb", include_normals=True)
-    write_bytes(path, content)
+    return _exported(scene, "glb", include_normals=True)
 
 
-def write_obj(program: Program, path: Path, frame: Frame) -> None:
+def obj(program: Program, frame: Frame, stem: str) -> dict[str, str]:
     """One named object per part; its colours in an ``.mtl`` file of the same name beside it."""
     each = drawn_parts(program, frame)
-    library = path.with_suffix(".mtl")
-    lines, first = [f"mtllib {library.name}"], 1
+    lines, first = [f"mtllib {stem}.mtl"], 1
     for part in each:
         lines += [f"o {part.name}", f"usemtl {part.word}"]
         lines += ["v {:.9g} {:.9g} {:.9g}".format(*vertex) for vertex in part.vertices.tolist()]
@@ -83,11 +79,10 @@ def write_obj(program: Program, path: Path, frame: Frame) -> None:
     materials = []
     for word in dict.fromkeys(part.word for part in each):
         materials.append("newmtl {}\nKd {:.4f} {:.4f} {:.4f}\n".format(word, *(c / 255 for c in colour(word))))
-    write_text(library, "\n".join(materials))
-    write_text(path, "\n".join([*lines, ""]))
+    return {".mtl": "\n".join(materials), ".obj": "\n".join([*lines, ""])}
 
 
-def write_ply(program: Program, path: Path, frame: Frame) -> None:
+def ply(program: Program, frame: Frame) -> bytes:
     """All parts in one mesh with a colour at each vertex; parts overlap as they do in the program."""
     import trimesh
 
@@ -95,20 +90,18 @@ def write_ply(program: Program, path: Path, frame: Frame) -> None:
     colours = [np.tile([*colour(part.word), 255], (len(part.vertices), 1)) for part in each]
     vertices, faces = joined([(part.vertices, part.faces) for part in each])
     mesh = trimesh.Trimesh(vertices, faces, vertex_colors=np.concatenate(colours).astype(np.uint8), process=False)
-    content: Any = mesh.export(file_type="ply")
-    write_bytes(path, content)
+    return _exported(mesh, "ply")
 
 
-def write_stl(program: Program, path: Path, frame: Frame) -> None:
+def stl(program: Program, frame: Frame) -> bytes:
     """The union of all parts as one watertight solid, ready to print."""
     import trimesh
 
-    content: Any = trimesh.Trimesh(*solid(program, frame), process=False).export(file_type="stl")
-    write_bytes(path, content)
+    return _exported(trimesh.Trimesh(*solid(program, frame), process=False), "stl")
 
 
-def write_3mf(program: Program, path: Path, frame: Frame, unit: str = "") -> None:
-    """Write one object per part, as the 3MF core specification 1.3 describes them; an unknown unit counts as mm."""
+def three_mf(program: Program, frame: Frame, unit: str = "") -> bytes:
+    """One object per part, as the 3MF core specification 1.3 describes them; an unknown unit counts as mm."""
     content = io.BytesIO()
     with zipfile.ZipFile(content, "w", zipfile.ZIP_DEFLATED) as package:
         for name, text in (
@@ -117,7 +110,7 @@ def write_3mf(program: Program, path: Path, frame: Frame, unit: str = "") -> Non
             ("3D/3dmodel.model", "".join(_model(program, frame, _UNITS.get(unit, "millimeter")))),
         ):
             package.writestr(zipfile.ZipInfo(name), text, zipfile.ZIP_DEFLATED)
-    write_bytes(path, content.getvalue())
+    return content.getvalue()
 
 
 def _model(program: Program, frame: Frame, unit: str) -> Iterator[str]:
@@ -137,6 +130,11 @@ def _model(program: Program, frame: Frame, unit: str) -> Iterator[str]:
         yield "</triangles></mesh></object>"
     items = "".join(f'<item objectid="{number}"/>' for number in range(2, len(solids) + 2))
     yield f"</resources><build>{items}</build></model>"
+
+
+def _exported(shape: Any, suffix: str, **options: bool) -> bytes:
+    content: bytes = shape.export(file_type=suffix, **options)
+    return content
 
 
 def _split(part: Part, of_corners: Vertices) -> tuple[Vertices, Vertices, Faces]:

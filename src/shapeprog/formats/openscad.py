@@ -5,11 +5,9 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Collection, Iterable, Iterator
-from pathlib import Path
 
 import numpy as np
 
-from shapeprog.files import write_text
 from shapeprog.formats.scripts import Script, needed, number, prelude, script
 from shapeprog.geometry.primitives.frustum import SEGMENTS
 from shapeprog.language.ast import (
@@ -43,11 +41,6 @@ linear_extrude rotate_extrude children intersection_for assign child echo roof
 
 _GROUPS = {"mirror": "mirrored", "rotate": "rotated", "translate": "translated"}
 """Names of groups that OpenSCAD has for other modules."""
-
-
-def write_scad(program: Program, path: Path, frame: Frame, unit: str = "") -> None:
-    """Write an OpenSCAD model in the coordinates of ``frame``, whose unit is ``unit`` if it is known."""
-    write_text(path, scad_text(program, frame, unit))
 
 
 def scad_text(program: Program, frame: Frame, unit: str = "") -> str:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
@@ -46,6 +47,13 @@ class Part:
     faces: Faces
 
 
+@contextmanager
+def exact_scene(program: Program) -> Iterator[Any]:
+    """What a program draws, in double precision; without torch for statements that ship."""
+    with on_numpy_if_shipped(program):
+        yield unroll(encode(program, dtype=torch.float64))
+
+
 def parts(program: Program, frame: Frame | None = None) -> list[Part]:
     """The parts of a program in the order they are drawn, in the world of ``frame`` (the grid by default).
 
@@ -58,15 +66,13 @@ def parts(program: Program, frame: Frame | None = None) -> list[Part]:
     OutputError
         If the frame maps them beyond single precision, which mesh files store.
     """
-    with on_numpy_if_shipped(program):
-        scene = unroll(encode(program, dtype=torch.float64))
+    with exact_scene(program) as scene:
         blocks, meshes = scene.block.tolist(), part_meshes(scene)
     numbers: Counter[str] = Counter()
     result = []
     words = [draw.word for draw in program.draws]
     for slot, vertices, faces in meshes:
-        block = blocks[slot]
-        word = words[block]
+        word = words[block := blocks[slot]]
         numbers[word] += 1
         result.append(Part(f"{word}_{numbers[word]}", word, block, placed(vertices, frame), faces))
     return result
@@ -96,8 +102,8 @@ def solid(program: Program, frame: Frame | None = None) -> tuple[Vertices, Faces
     """The union of all parts as one watertight mesh; an ``OutputError`` if no part has a volume, there are too many to
     join, or a coordinate exceeds single precision."""
     try:
-        with on_numpy_if_shipped(program):
-            vertices, faces = union_mesh(unroll(encode(program, dtype=torch.float64)))
+        with exact_scene(program) as scene:
+            vertices, faces = union_mesh(scene)
     except ShapeProgError as error:
         if not program.body:
             raise OutputError("this program is empty", "write a part below its size, such as box(height=2)") from error

@@ -8,7 +8,6 @@ import stat
 from pathlib import Path
 
 from shapeprog.errors import InputError
-from shapeprog.files import write_text
 from shapeprog.formats.frames import frame_comment, frame_of_grid, scale_of, split_frame
 from shapeprog.language.parser import parse
 from shapeprog.language.printer import format_program
@@ -28,11 +27,6 @@ def program_in(text: str, name: str) -> tuple[Program, Frame | None]:
     text, frame = split_frame(text, name)
     program = parse(text, name)
     return program, None if frame is None else frame_of_grid(frame, scale_of(program))
-
-
-def write_shape(program: Program, path: Path, frame: Frame | None) -> None:
-    """Write canonical program text."""
-    write_text(path, program_text(program, frame))
 
 
 def program_text(program: Program, frame: Frame | None) -> str:

@@ -216,13 +216,9 @@ def test_the_functions_that_a_declaration_names_are_there_and_take_its_options(e
 
 
 def test_help_and_errors_list_the_declared_formats(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
-    helped = {}
-    for command in ("export", "render"):
-        with pytest.raises(SystemExit):
-            main([command, "--help"])
-        helped[command] = " ".join(capsys.readouterr().out.replace("│", " ").split())
-    assert " ".join(suffixes()) in helped["export"]
-    assert " ".join(suffixes("sample")) in helped["render"]
+    with pytest.raises(SystemExit):
+        main(["export", "--help"])
+    assert " ".join(suffixes()) in " ".join(capsys.readouterr().out.replace("│", " ").split())
     assert listed().splitlines()[0] in str(sp.export.__doc__)
     with pytest.raises(OutputError, match=re.escape(", ".join(suffixes()))):
         export(PROGRAM, tmp_path / "table.unheard")

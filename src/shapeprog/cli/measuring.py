@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -75,14 +74,13 @@ def evaluate_command(
     seed: terminal.Seed = 0,
     up: terminal.Up = None,
     front: terminal.Front = None,
-    per_shape: Annotated[bool, typer.Option("--each", help="Also print a row per shape.")] = False,
     every: Annotated[bool, typer.Option("--all", help="Print all measures, not only the main ones.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print rows and summary as JSON.")] = False,
     modules: terminal.With = None,
 ) -> None:
     """Score predictions against targets of the same name.
 
-    Example: shapeprog evaluate results originals --each
+    Example: shapeprog evaluate results originals --all
 
     \b
     F1@1%, F1@.5%   of 20,000 points per surface, within that share of the bounding box diagonal
@@ -141,7 +139,7 @@ def evaluate_command(
         content = {"rows": [_finite(row) for row in rows], "summary": totals, "missing": missing_names}
         terminal.print_json({"seed": seed, **content})
     else:
-        _table(rows, summary if every else {name: summary[name] for name in _MAIN if name in summary}, per_shape, seed)
+        _table(summary if every else {name: summary[name] for name in _MAIN if name in summary}, len(rows), seed)
     if missing_names:
         names = ", ".join(missing_names[:_FEW]) + (", ..." if len(missing_names) > _FEW else "")
         without = f"{len(missing_names)} of {len(shapes)} targets"
@@ -149,21 +147,13 @@ def evaluate_command(
     terminal.finish(failures)
 
 
-def _table(rows: Sequence[Metrics], summary: dict[str, Summary], per_shape: bool, seed: int) -> None:
+def _table(summary: dict[str, Summary], shapes: int, seed: int) -> None:
     from rich import box
     from rich.table import Table
 
     console = terminal.output()
     names = [name for name in _LABELS if name in summary and summary[name].count]
-    if per_shape:
-        shown = [name for name in names if not name.endswith("floor")]
-        table = Table("shape", box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0))
-        for name in shown:
-            table.add_column(_LABELS[name], justify="right", min_width=7, overflow="fold")
-        for row in rows:
-            table.add_row(row.name, *(_number(name, getattr(row, name)) for name in shown))
-        console.print(table, crop=False)
-    table = Table(f"{len(rows)} shape{'s' if len(rows) != 1 else ''}, seed {seed}", box=box.SIMPLE_HEAD)
+    table = Table(f"{shapes} shape{'s' if shapes != 1 else ''}, seed {seed}", box=box.SIMPLE_HEAD)
     for heading in ("mean", "standard error", "median"):
         table.add_column(heading, justify="right")
     for name in names:

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from shapeprog.data.shape import Shape
     from shapeprog.space import Frame
 
-_SAMPLES = " ".join(suffixes("sample"))
+PAGES = (".html", ".htm")
 
 ProgramFile = Annotated[Path, typer.Argument(metavar="PROGRAM", help=f"Program file: {' '.join(program_suffixes())}")]
 Outputs = Annotated[
@@ -65,8 +65,10 @@ def export_command(
 
     check_units(unit, file_unit)
     terminal.load_modules(modules)
-    if not overwrite:
-        _refuse_programs(program, outputs)
+    for path in outputs:
+        if path.suffix == program.suffix and path.is_file() and not overwrite and not path.samefile(program):
+            cure = "give one program, then the files to write; --overwrite replaces existing programs"
+            raise OutputError(f"{path} exists and is another program than {program}", cure)
     loaded, frame = terminal.read_program_file(program, changes)
     makers = any(chosen.maker for path in outputs if (chosen := format_of(path)) is not None)
     known = file_unit is not None or (loaded.unit is not None and loaded.unit.name)
@@ -94,53 +96,18 @@ def export_command(
         raise failures[-1]
 
 
-def _refuse_programs(program: Path, outputs: Sequence[Path]) -> None:
-    """Refuse to replace another program with the same suffix as the one that is read: ``*.json`` may have named both;
-    an ``OutputError`` if one of the files to write is another program."""
-    for path in outputs:
-        same = path.suffix.lower() == program.suffix.lower() and path.suffix.lower() in program_suffixes()
-        if same and path.is_file() and not path.samefile(program) and path.read_bytes() != program.read_bytes():
-            raise OutputError(
-                f"{path} exists and is another program than {program}",
-                "give one program, then the files to write; --overwrite replaces existing programs",
-            )
-
-
 def render_command(
     program: ProgramFile,
-    output: Annotated[
-        Path, typer.Argument(metavar="OUTPUT", help=f"Picture (.png .jpg .pdf), voxels or points ({_SAMPLES}).")
-    ],
+    output: Annotated[Path, typer.Argument(metavar="OUTPUT", help="Picture to write: .png .jpg .webp .tiff .pdf")],
     shape: Input = None,
-    resolution: Annotated[int, typer.Option(metavar="N", help="Voxels along each side (.npy).", min=1, max=512)] = 32,
-    points: Annotated[int, typer.Option(metavar="N", help="Number of points (.xyz).", min=1)] = 5000,
-    seed: terminal.Seed = 0,
     changes: terminal.Changes = None,
     modules: terminal.With = None,
 ) -> None:
-    """Render a program as a picture, as voxels, or as points on its surface.
+    """Render a program as a picture.
 
     Example: shapeprog render chair.shape chair.png
-
-    Voxels are those of the program with all numbers rounded. A .xyz file has lines 'x y z nx ny nz' in the coordinates
-    of the input; z is up if these are not known.
     """
-    from shapeprog.formats import export
-    from shapeprog.view.page import SUFFIXES, picture
-
-    terminal.load_modules(modules)
-    loaded, frame = terminal.read_program_file(program, changes)
-    suffix, chosen = output.suffix.lower(), format_of(output)
-    if suffix in SUFFIXES:
-        beside, scores = _input_and_scores(program, shape, changes)
-        picture(beside, loaded, output, title=program.stem, scores=scores)
-    elif chosen is not None and chosen.kind == "sample":
-        given: dict[str, Any] = {"resolution": resolution, "points": points, "seed": seed}
-        export(loaded, output, frame, **{name: given[name] for name in chosen.options})
-    else:
-        known = " ".join((*SUFFIXES, *suffixes("sample")))
-        raise OutputError(f"cannot render to {suffix or 'a file without a suffix'}", f"known suffixes: {known}")
-    terminal.say(f"wrote {output}")
+    _draw(program, output, shape, changes, modules)
 
 
 def show_command(
@@ -159,20 +126,30 @@ def show_command(
 
     The page is one file and needs no network.
     """
-    from shapeprog.view import viewer
-
-    terminal.load_modules(modules)
-    loaded, frame = terminal.read_program_file(program, changes)
     page = output or Path(f"{program.stem}.html")
-    if page.suffix.lower() not in (".html", ".htm"):
+    if page.suffix.lower() not in PAGES:
         raise OutputError(f"{page} is not an HTML file", "pages end in .html; for pictures use 'shapeprog render'")
-    beside, scores = _input_and_scores(program, shape, changes)
-    viewer(loaded, page, shape=beside, title=program.stem, scores=scores, frame=frame)
-    terminal.say(f"wrote {page}")
+    _draw(program, page, shape, changes, modules)
     if browse:
         import webbrowser
 
         webbrowser.open(page.absolute().as_uri())
+
+
+def _draw(
+    program: Path, output: Path, named: Path | None, changes: Sequence[str] | None, modules: Sequence[Path] | None
+) -> None:
+    """Write a picture or a page of a program, beside its input."""
+    from shapeprog.view import picture, viewer
+
+    terminal.load_modules(modules)
+    loaded, frame = terminal.read_program_file(program, changes)
+    shape, scores = _input_and_scores(program, named, changes)
+    if output.suffix.lower() in PAGES:
+        viewer(loaded, output, shape=shape, title=program.stem, scores=scores, frame=frame)
+    else:
+        picture(shape, loaded, output, title=program.stem, scores=scores)
+    terminal.say(f"wrote {output}")
 
 
 def sheet_command(

@@ -114,7 +114,7 @@ FORMATS = (
         writer="build123d:step", unit="mm"),
     Format("cut list", "list", (".csv",), Z_UP, "count, role and size of each distinct part",
         writer="cuts:cuts_csv", unit="text"),
-    Format("NPY", "sample", (".npy",), GRID, "the 32^3 cells; others with render --resolution",
+    Format("NPY", "sample", (".npy",), GRID, "the 32^3 cells, or those of another resolution",
         writer="samples:npy", unit=CELLS),
     Format("XYZ", "sample", (".xyz",), Z_UP, "points on the surface, one line 'x y z nx ny nz' each",
         writer="samples:xyz"),

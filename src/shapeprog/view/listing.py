@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import textwrap
 from dataclasses import dataclass, replace
 
 from shapeprog.language.ast import (
@@ -89,20 +90,12 @@ def parted(line: Row) -> tuple[str, str, str]:
 
 
 def wrapped(line: Row, length: int) -> list[Row]:
-    """A line as several of at most ``length`` letters, broken behind commas, else between words; later lines have
-    no word and are indented.  Text without a point to break is cut."""
+    """A line as several of at most ``length`` letters, broken between words; later lines have no word and are
+    indented."""
     indent = " " * (len(line.text) - len(line.text.lstrip(" ")) + 4)
-    result, text, word = [], line.text, line.word
-    while len(text) > length:
-        limit = max(length, len(indent) + 2)
-        cuts = (text.rfind(end, len(indent), limit) + len(end) for end in ("), ", ", ", " "))
-        cut = next((cut for cut in cuts if cut > len(indent) + 2), 0)
-        if not cut:
-            text = text[: limit - 1] + "…"
-            break
-        result.append(replace(line, text=text[:cut].rstrip(), word=word))
-        text, word = indent + text[cut:], ""
-    return [*result, replace(line, text=text, word=word)]
+    width = max(length, len(indent) + 2)
+    first, *others = textwrap.wrap(line.text, width, subsequent_indent=indent, break_on_hyphens=False) or [""]
+    return [replace(line, text=first), *(replace(line, text=text, word="") for text in others)]
 
 
 def _word(line: Line) -> str:

@@ -5,29 +5,15 @@ from __future__ import annotations
 import operator
 import re
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
-
-from typer.core import TyperCommand
+from typing import TYPE_CHECKING
 
 from shapeprog.errors import InputError
 
 if TYPE_CHECKING:
     from shapeprog.language.program import Program
 
-_CHANGE = re.compile(r"([^\W\d]\w*)\s*([-+*/]?)=\s*(.*)", re.DOTALL)
+CHANGE = re.compile(r"([^\W\d]\w*)\s*([-+*/]?)=\s*(.*)", re.DOTALL)
 _APPLY = {"": lambda _, number: number, "+": operator.add, "-": operator.sub, "*": operator.mul, "/": operator.truediv}
-
-
-class ChangingCommand(TyperCommand):
-    """A command whose option ``--set`` takes all the changes that follow it."""
-
-    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Read the words of the command line, with the option before each change."""
-        words: list[str] = []
-        for word in args:
-            following = "--set" in words[-2:-1] and _CHANGE.fullmatch(word)
-            words += ["--set", word] if following else [word]
-        return super().parse_args(ctx, words)
 
 
 def changed(program: Program, changes: Sequence[str]) -> Program:
@@ -48,7 +34,7 @@ def changed(program: Program, changes: Sequence[str]) -> Program:
     values = {named.name: named.value for named in names(program)}
     wanted: dict[str, float] = {}
     for change in changes:
-        match = _CHANGE.fullmatch(change.strip())
+        match = CHANGE.fullmatch(change.strip())
         if match is None:
             raise InputError(f"invalid change {change!r}", "write name=number, or name*=number with one of + - * /")
         name, sign, text = match.groups()

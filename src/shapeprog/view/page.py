@@ -21,7 +21,7 @@ from shapeprog.formats.parts import Part, parts
 from shapeprog.language.program import Program
 from shapeprog.view.listing import Row, listing, parted, wrapped
 from shapeprog.view.model import of_parts, of_shape
-from shapeprog.view.render import Image, camera_for, render
+from shapeprog.view.render import camera_for, render
 
 if TYPE_CHECKING:
     from PIL.ImageDraw import ImageDraw
@@ -93,14 +93,12 @@ def png(program: Program, scores: Mapping[str, float] | None = None) -> bytes:
 
 
 def _picture(shape: Shape | None, program: Program, title: str, scores: Mapping[str, float] | None, view: int) -> Any:
+    names = [title or (shape.name if shape is not None else ""), "reconstruction"]
     views = _views(shape, parts(program), view, view)
     head, column = 44, int(view * 1.12)
-    width = view * len(views) + column + 2 * _PAD
-    page, draw = _sheet(width, view + head + 20)
-    name = title or (shape.name if shape is not None else "")
-    names = [name, "reconstruction"][: len(views)]
-    for index, (image, name) in enumerate(zip(views, names, strict=True)):
-        _paste(page, image, index * view, head)
+    page, draw = _sheet(view * len(views) + column + 2 * _PAD, view + head + 20)
+    for index, (image, name) in enumerate(zip(views, names, strict=False)):
+        page.paste(image, (index * view, head))
         draw.text((index * view + view / 2, 16), _cut(name, 46), _FAINT, typeface(19), "ma")
     _panel(draw, program, scores, (view * len(views) + _PAD, head), (column, view))
     return page
@@ -120,34 +118,27 @@ def contact_sheet(
     if not items:
         raise OutputError("there is nothing to put on the contact sheet", "name a folder that holds programs")
     wide, tall = SMALL
+    room = wide * (1 + any(item.shape is not None for item in items))  # for inputs only where there are any
     across = min(columns, len(items))
-    pairs = [_pair(item) for item in items]
-    input_width = (
-        wide if any(image is not None for image, _, _ in pairs) else 0
-    )  # room for inputs only where there are any
-    cell, row = wide + input_width + _PAD, tall + 52
-    words = sorted({word for _, _, used in pairs for word in used})
-    width = across * cell + _PAD
+    drawn = [parts(item.program) for item in items]
+    words = sorted({part.word for solids in drawn for part in solids})
+    width = across * (room + _PAD) + _PAD
     per_row = max(1, (width - 2 * _PAD) // LEGEND)
     top = 54 if title else 14
     head = top + 30 * -(-len(words) // per_row)
-    page, draw = _sheet(width, head + row * -(-len(items) // across) + 8)
-    if title:
-        draw.text((_PAD, 16), title, _INK, typeface(22, bold=True))
+    page, draw = _sheet(width, head + (tall + 52) * -(-len(items) // across) + 8)
+    draw.text((_PAD, 16), title, _INK, typeface(22, bold=True))
     for number, word in enumerate(words):
         x, y = _PAD + LEGEND * (number % per_row), top + 30 * (number // per_row)
         _swatch(draw, x, y + 4, 13, word)
         draw.text((x + 20, y), word, _INK, typeface(15))
-    for number, (item, (input_image, reconstruction, _)) in enumerate(zip(items, pairs, strict=True)):
-        x, y = _PAD + number % across * cell, head + number // across * row
-        for offset, image in ((0, input_image), (input_width, reconstruction)):
-            if image is not None:
-                _paste(page, image, x + offset, y)
-        middle = x + (wide + input_width) // 2
-        draw.text(
-            (middle, y + tall + 2), _cut(item.name, 44 if input_width else 24), _INK, typeface(14, bold=True), "ma"
-        )
-        draw.text((middle, y + tall + 21), _cut(item.note, 56 if input_width else 32), _FAINT, typeface(13), "ma")
+    for number, (item, solids) in enumerate(zip(items, drawn, strict=True)):
+        x, y = _PAD + number % across * (room + _PAD), head + number // across * (tall + 52)
+        for place, image in enumerate(reversed(_views(item.shape, solids, *SMALL)), 1):
+            page.paste(image, (x + room - place * wide, y))
+        middle, below = x + room // 2, y + tall + 2
+        draw.text((middle, below), _cut(item.name, room // 9), _INK, typeface(14, bold=True), "ma")
+        draw.text((middle, below + 19), _cut(item.note, room * 3 // 20), _FAINT, typeface(13), "ma")
     _save(page, target)
     return target
 
@@ -203,18 +194,14 @@ def scores_text(scores: Mapping[str, float] | None, program: Program) -> list[st
     return [" · ".join(words), size] if words else [size]
 
 
-def _views(shape: Shape | None, drawn: Sequence[Part], width: int, height: int) -> list[Image]:
+def _views(shape: Shape | None, drawn: Sequence[Part], width: int, height: int) -> list[Any]:
     """The input if there is one, and the parts, from the same camera; kernels hold no lock, so threads help."""
+    from PIL import Image
+
     models = [*([] if shape is None else [of_shape(shape)]), of_parts(drawn)]
     camera = camera_for(models, width / height)
     with ThreadPoolExecutor(2) as pool:
-        return list(pool.map(lambda model: render(model, camera, width, height), models))
-
-
-def _pair(item: Item) -> tuple[Image | None, Image, set[str]]:
-    solids = parts(item.program)
-    views = _views(item.shape, solids, *SMALL)
-    return (views[0] if len(views) > 1 else None), views[-1], {part.word for part in solids}
+        return [Image.fromarray(each) for each in pool.map(lambda model: render(model, camera, width, height), models)]
 
 
 def _line(draw: ImageDraw, corner: tuple[float, float], line: Row, size: int, advance: float) -> None:
@@ -252,17 +239,10 @@ def _cut(text: str, length: int) -> str:
 
 
 def _sheet(width: int, height: int) -> tuple[Any, ImageDraw]:
-    from PIL import Image as Pillow
-    from PIL import ImageDraw as Drawing
+    from PIL import Image, ImageDraw
 
-    page = Pillow.new("RGB", (width, height), "white")
-    return page, Drawing.Draw(page)
-
-
-def _paste(page: Any, image: Image, x: int, y: int) -> None:
-    from PIL import Image as Pillow
-
-    page.paste(Pillow.fromarray(image), (x, y))
+    page = Image.new("RGB", (width, height), "white")
+    return page, ImageDraw.Draw(page)
 
 
 def _checked(path: str | os.PathLike[str]) -> Path:

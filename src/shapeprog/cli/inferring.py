@@ -13,7 +13,6 @@ import typer
 
 from shapeprog.cli import terminal
 from shapeprog.cli.terminal import about_program, about_search
-from shapeprog.cli.units import AsUnit, FileUnit, assumed, check_units
 from shapeprog.errors import InputError, OutputError, ShapeProgError
 from shapeprog.inference.budget import BUDGET
 
@@ -40,12 +39,12 @@ def infer_command(
     ],
     up: terminal.Up = None,
     front: terminal.Front = None,
-    file_unit: FileUnit = None,
+    file_unit: terminal.FileUnit = None,
     blocks: Annotated[int, about_program(metavar="N", help="Maximum number of drawing statements.", min=1)] = 10,
     detail: Annotated[
         float, about_program(metavar="FACTOR", help="Higher: longer program, closer fit.", min=0.01, max=100)
     ] = 1.0,
-    unit: AsUnit = None,
+    unit: terminal.AsUnit = None,
     no_ties: Annotated[bool, about_program("--no-ties", help="Plain numbers, no names and expressions.")] = False,
     library: terminal.WithLibrary = False,
     modules: terminal.WithLibraries = None,
@@ -76,7 +75,7 @@ def infer_command(
     from shapeprog.view import picture
 
     terminal.check_axes(up, front)
-    check_units(unit, file_unit)
+    terminal.check_units(unit, file_unit)
     report = None if as_json else lambda sentence: terminal.note(f"{sentence.capitalize()}.")
     prepare(modules_of("data", "geometry", "inference", *([] if no_picture else ["view"])), report)
     inference = partial(
@@ -165,7 +164,7 @@ def _report(written: Written, folder: Path, default_up: bool, units: set[str]) -
     unit = shape.file_unit or "m"
     if result.program.unit and result.program.unit.name and not shape.states_unit and unit not in units:
         units.add(unit)
-        console.print(assumed(shape.frame, unit), style="dim")
+        console.print(terminal.assumed(shape.frame, unit), style="dim")
     lines = [*scores_text(result.scores | {"seconds": result.seconds}, result.program), result.reason]
     for line in (*lines, f"Wrote {', '.join(names)} in {folder}; the files keep every digit.", ""):
         console.print(line, style="dim")

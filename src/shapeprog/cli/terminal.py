@@ -16,12 +16,15 @@ import typer
 
 from shapeprog.errors import InputError, ShapeProgError
 from shapeprog.files import output_error
+from shapeprog.formats.format import CELLS
 
 if TYPE_CHECKING:
     from rich.console import Console
 
     from shapeprog.language.program import Program
+    from shapeprog.language.unit import Unit
     from shapeprog.library import Library
+    from shapeprog.space import Frame
 
 debugging = False  # whether errors show their traceback
 quiet = False  # whether errors alone are printed
@@ -64,6 +67,16 @@ Up = Annotated[
 ]
 Front = Annotated[str | None, about_input(metavar="AXIS", help="Axis that the front faces, such as -z.")]
 Seed = Annotated[int, typer.Option(metavar="N", help="Seed of all random numbers.", min=0, callback=_checked_seed)]
+AsUnit = Annotated[
+    str | None,
+    about_program(
+        "--unit", metavar="UNIT", help="mm, cm, m, in, or cells (24 = the longest side). Default: that of the input."
+    ),
+]
+FileUnit = Annotated[
+    str | None,
+    about_input("--file-unit", metavar="UNIT", help="Unit of the input file: mm, cm, m or in. Default: m, up to 10 m."),
+]
 
 
 class Interrupted(KeyboardInterrupt):
@@ -195,6 +208,50 @@ def check_axes(up: str | None, front: str | None) -> None:
     axes_of(Path("--up and --front"), up, front)
 
 
+def check_units(unit: str | None, file_unit: str | None, needed: bool = False) -> None:
+    """Refuse units that are none before the first file is read; ``needed`` if --file-unit needs --unit."""
+    from shapeprog.language.unit import metres
+
+    for option, name in (("--unit", unit), ("--file-unit", file_unit)):
+        if name is not None and (option, name) != ("--unit", CELLS):
+            try:
+                metres(name)
+            except ShapeProgError as mistake:
+                raise InputError(f"{option}: {mistake.message}", mistake.hint) from None
+    if file_unit is not None and (unit == CELLS or (needed and unit is None)):
+        raise InputError("--file-unit has no effect on lengths in cells", "add --unit cm")
+
+
+def assumed(frame: Frame, unit: str = "") -> str:
+    """What is assumed of the unit of an input with a frame; ``unit`` where it does not follow from its size."""
+    from shapeprog.language.unit import assumed_unit, metres
+    from shapeprog.space import SPAN
+
+    longest = SPAN * frame.scale
+    unit = unit or assumed_unit(longest)
+    message = f"The unit of the file is assumed to be {unit}, so that the longest side is"
+    return f"{message} {longest * metres(unit):.3g} m. Another unit: --file-unit {'cm' if unit == 'mm' else 'mm'}"
+
+
+def asked_unit(
+    own: Unit | None, frame: Frame | None, path: Path | str, unit: str | None, file_unit: str | None
+) -> Unit | None:
+    """The unit that was asked for, of the object in a file, or that which its program is in already; an ``InputError``
+    if the size of the object is not known."""
+    from shapeprog.language.unit import Unit
+
+    if unit is None:
+        return own
+    if unit == CELLS:
+        return None
+    if own is not None and own.name and file_unit is None:
+        return own.to(unit)
+    if frame is None:
+        message = f"cannot write {path} in {unit}: the size of its cells is unknown"
+        raise InputError(message, "infer it with --unit, or name its unit at the top, as in '# unit: cm'")
+    return Unit.of(frame, unit, file_unit or "")
+
+
 def load_modules(modules: Sequence[Path] | None) -> None:
     """Declare the statements of a user's modules."""
     if modules:
@@ -213,7 +270,7 @@ def load_libraries(files: Sequence[Path] | None, shipped: bool) -> list[Library]
     return [*map(load_library, libraries), *([load_library()] if shipped else [])]
 
 
-def read_program_file(path: Path, changes: Sequence[str] | None = None) -> tuple[Program, Any]:
+def read_program_file(path: Path, changes: Sequence[str] | None = None) -> tuple[Program, Frame | None]:
     """The program and frame of a file, with other numbers for its names as ``--set`` has them; prints its warnings."""
     from shapeprog.cli.changes import changed
     from shapeprog.formats import load_with_frame

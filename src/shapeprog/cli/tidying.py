@@ -9,19 +9,18 @@ import typer
 
 from shapeprog.cli import terminal
 from shapeprog.cli.terminal import about_program
-from shapeprog.cli.units import AsUnit, FileUnit, asked_unit, check_units
 from shapeprog.errors import InputError
 
 
 def tidy_command(
     program: Annotated[Path, typer.Argument(metavar="PROGRAM", help="Program file: .shape .json .txt")],
     out: Annotated[Path | None, typer.Argument(metavar="OUTPUT", help="File to write: .shape .json")] = None,
-    file_unit: FileUnit = None,
+    file_unit: terminal.FileUnit = None,
     price: Annotated[
         float,
         about_program(metavar="FACTOR", help="Higher: fewer free numbers, parts may move further.", min=0, max=1000),
     ] = 1.0,
-    unit: AsUnit = None,
+    unit: terminal.AsUnit = None,
     library: terminal.WithLibrary = False,
     modules: terminal.WithLibraries = None,
     seed: terminal.Seed = 0,
@@ -41,7 +40,7 @@ def tidy_command(
     from shapeprog.language.free import numbers
     from shapeprog.library import with_library
 
-    check_units(unit, file_unit, needed=True)
+    terminal.check_units(unit, file_unit, needed=True)
     libraries = terminal.load_libraries(modules, library)
     given, frame = terminal.read_program_file(program)
     if not given.size:
@@ -50,7 +49,7 @@ def tidy_command(
     if any(isinstance(line, Function) or getattr(line, "kind", "") in ("inside", "divide") for line in lines):
         cure = "tidy is for programs of plain numbers; edit this one by hand"
         raise InputError(f"{program} has groups or functions already, which tidy would write out", cure)
-    wanted = asked_unit(given.unit, frame, program, unit, file_unit)
+    wanted = terminal.asked_unit(given.unit, frame, program, unit, file_unit)
     result = tie(given, evidence_of_program(given, seed), price=price, known=True, seed=seed).program
     for each in libraries:
         result = with_library(result, each)

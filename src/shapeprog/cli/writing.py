@@ -11,7 +11,6 @@ import typer
 
 from shapeprog.cli import terminal
 from shapeprog.cli.terminal import about_input
-from shapeprog.cli.units import AsUnit, FileUnit, asked_unit, assumed, check_units
 from shapeprog.errors import OutputError, ShapeProgError
 from shapeprog.formats.format import format_of, program_suffixes, suffixes
 
@@ -39,8 +38,8 @@ def export_command(
     outputs: Outputs,
     changes: terminal.Changes = None,
     modules: terminal.With = None,
-    unit: AsUnit = None,
-    file_unit: FileUnit = None,
+    unit: terminal.AsUnit = None,
+    file_unit: terminal.FileUnit = None,
     up: Annotated[
         str, terminal.about_program("--up", metavar="AXIS", help="Axis of the file that points up: x, y or z.")
     ] = "",
@@ -63,7 +62,7 @@ def export_command(
     from shapeprog.language.unit import MOST_METRES
     from shapeprog.space import SPAN
 
-    check_units(unit, file_unit)
+    terminal.check_units(unit, file_unit)
     terminal.load_modules(modules)
     for path in outputs:
         if path.suffix == program.suffix and path.is_file() and not overwrite and not path.samefile(program):
@@ -73,7 +72,7 @@ def export_command(
     makers = any(chosen.maker for path in outputs if (chosen := format_of(path)) is not None)
     known = file_unit is not None or (loaded.unit is not None and loaded.unit.name)
     if frame is not None and makers and not known and SPAN * frame.scale > MOST_METRES:
-        terminal.note(assumed(frame))
+        terminal.note(terminal.assumed(frame))
     asked: dict[str, Any] = {"unit": unit or "", "file_unit": file_unit or "", "up": up, "on_input": on_input}
     failures: list[ShapeProgError] = []
     for path in outputs:
@@ -82,7 +81,7 @@ def export_command(
             if unit is not None and path.suffix.lower() in suffixes("program"):
                 from shapeprog.inference.readable import in_readable_unit
 
-                written = in_readable_unit(loaded, asked_unit(loaded.unit, frame, program, unit, file_unit))
+                written = in_readable_unit(loaded, terminal.asked_unit(loaded.unit, frame, program, unit, file_unit))
             export(written, path, frame, **asked)
         except ShapeProgError as error:  # the other files do not depend on this one
             failures.append(error)
@@ -223,7 +222,7 @@ def _input_and_scores(
     from shapeprog.language.program import Program
 
     kept = not changes and program.suffix.lower() == ".json"
-    result = read_result(program) if kept else Result(str(program), Program())
+    result = read_result(program) if kept else Result(Program())
     if named is not None and not named.is_dir():
         return load(named), result.scores
     place, mark, member = (result.source or "").partition("#")

@@ -51,8 +51,8 @@ class Format:
     doc
         Contents of such a file, in one line.
     reader, writer
-        ``module:function`` of this package: ``(path) -> (program, frame or None)`` and ``(program, frame) -> content``,
-        perhaps with the name of the ``unit``, the ``stem`` of the file, and further options.
+        ``module:function`` of this package: ``(path) -> (program, frame or None, ...)`` and ``(program, frame) ->
+        content``, perhaps with the name of the ``unit``, the ``stem`` of the file, and further options.
     unit
         Unit of the coordinates of a file unless another is asked for; ``text`` for that of the program, empty for that
         of the input, or of the program if no input is known, ``cells`` for cells always.  Files in millimetres are for
@@ -80,7 +80,8 @@ class Format:
 
     def read(self, path: Path) -> tuple[Program, Frame | None]:
         """The program in a file of this format, and its frame if the file has one."""
-        return _function(self.reader)(path)
+        program, frame, *_ = _function(self.reader)(path)
+        return program, frame
 
     def content(self, program: Program, frame: Frame | None, **options: int | str) -> Content:
         """What a file with the program holds; ``frame`` maps the grid to the coordinates of the file."""
@@ -91,7 +92,7 @@ FORMATS = (
     Format("program text", "program", (".shape",), None, "the program, with its frame in a comment where one is known",
         reader="shape:read_shape", writer="shape:program_text"),
     Format("JSON", "program", (".json",), None, "the text with a list of the solids that it draws, for other programs",
-        reader="json_form:read_json", writer="json_form:program_to_json"),
+        reader="json_form:read_result", writer="json_form:program_to_json"),
     Format("plain text", "program", (".txt",), None, "program text under another suffix",
         reader="shape:read_shape"),
     Format("GLB", "solid", (".glb",), Y_UP, "one named node per part, coloured by statement",

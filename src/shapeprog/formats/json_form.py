@@ -43,8 +43,6 @@ class Result(NamedTuple):
 
     Parameters
     ----------
-    name
-        Name of the file.
     program, frame
         The program, and the frame of the input if its text has one.
     snapped
@@ -55,7 +53,6 @@ class Result(NamedTuple):
         The file that the program was inferred from, if recorded.
     """
 
-    name: str
     program: Program
     frame: Frame | None = None
     snapped: Program | None = None
@@ -81,16 +78,10 @@ def result_from_json(text: str, name: str) -> Result:
     scores, source = content.get("scores"), content.get("source")
     named = scores.items() if isinstance(scores, dict) else ()
     return Result(
-        name, *parsed("text"), parsed("snapped")[0] if "snapped" in content else None,
+        *parsed("text"), parsed("snapped")[0] if "snapped" in content else None,
         {word: value for word, value in named if type(value) in (int, float) and abs(value) <= LARGEST},
         source if isinstance(source, str) else None,
     )  # fmt: skip
-
-
-def read_json(path: Path) -> tuple[Program, Frame | None]:
-    """The program of a JSON file, and its frame if it has one."""
-    result = read_result(path)
-    return result.program, result.frame
 
 
 def program_to_json(program: Program, frame: Frame | None = None, **more: Any) -> str:

@@ -64,7 +64,7 @@ def glb(program: Program, frame: Frame) -> bytes:
         mesh = trimesh.Trimesh(vertices, faces, vertex_normals=normals, process=False)
         mesh.visual = make_visual(uv=np.zeros((len(vertices), 2)), material=materials[part.word])
         scene.add_geometry(mesh, node_name=part.name, geom_name=part.name)
-    return _exported(scene, "glb", include_normals=True)
+    return scene.export(file_type="glb", include_normals=True)
 
 
 def obj(program: Program, frame: Frame, stem: str) -> dict[str, str]:
@@ -89,15 +89,16 @@ def ply(program: Program, frame: Frame) -> bytes:
     each = drawn_parts(program, frame)
     colours = [np.tile([*colour(part.word), 255], (len(part.vertices), 1)) for part in each]
     vertices, faces = joined([(part.vertices, part.faces) for part in each])
-    mesh = trimesh.Trimesh(vertices, faces, vertex_colors=np.concatenate(colours).astype(np.uint8), process=False)
-    return _exported(mesh, "ply")
+    mesh: Any = trimesh.Trimesh(vertices, faces, vertex_colors=np.concatenate(colours).astype(np.uint8), process=False)
+    return mesh.export(file_type="ply")
 
 
 def stl(program: Program, frame: Frame) -> bytes:
     """The union of all parts as one watertight solid, ready to print."""
     import trimesh
 
-    return _exported(trimesh.Trimesh(*solid(program, frame), process=False), "stl")
+    mesh: Any = trimesh.Trimesh(*solid(program, frame), process=False)
+    return mesh.export(file_type="stl")
 
 
 def three_mf(program: Program, frame: Frame, unit: str = "") -> bytes:
@@ -130,11 +131,6 @@ def _model(program: Program, frame: Frame, unit: str) -> Iterator[str]:
         yield "</triangles></mesh></object>"
     items = "".join(f'<item objectid="{number}"/>' for number in range(2, len(solids) + 2))
     yield f"</resources><build>{items}</build></model>"
-
-
-def _exported(shape: Any, suffix: str, **options: bool) -> bytes:
-    content: bytes = shape.export(file_type=suffix, **options)
-    return content
 
 
 def _split(part: Part, of_corners: Vertices) -> tuple[Vertices, Vertices, Faces]:

@@ -12,7 +12,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperCommand
 
-from shapeprog.cli import inferring, libraries, measuring, sampling, terminal, tidying, writing
+from shapeprog.cli import data_sets, inferring, libraries, terminal, tidying, writing
 from shapeprog.cli.changes import CHANGE
 from shapeprog.liang2022.cli import app as paper
 
@@ -62,9 +62,9 @@ for name, command in (
     ("render", writing.render_command),
     ("show", writing.show_command),
     ("sheet", writing.sheet_command),
-    ("evaluate", measuring.evaluate_command),
-    ("prepare", measuring.prepare_command),
-    ("sample", sampling.sample_command),
+    ("evaluate", data_sets.evaluate_command),
+    ("prepare", data_sets.prepare_command),
+    ("sample", data_sets.sample_command),
 ):
     app.command(name, cls=Command)(terminal.guarded(command))
 

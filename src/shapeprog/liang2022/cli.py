@@ -18,7 +18,7 @@ from typing import Annotated, Any, Literal, get_origin, get_type_hints
 import typer
 
 from shapeprog.cli import terminal
-from shapeprog.cli.sampling import write_samples
+from shapeprog.cli.data_sets import write_samples
 from shapeprog.errors import InputError, ShapeProgError
 from shapeprog.liang2022.settings import BEST, WEIGHTS, AdaptSettings, ExecutorSettings, PretrainSettings
 

@@ -78,14 +78,12 @@ class Camera:
         return np.stack([across, down, 1 / depth], 1)
 
 
-def camera_for(
-    models: Sequence[Model], aspect: float = 1.0, direction: tuple[float, float, float] = DIRECTION
-) -> Camera:
+def camera_for(models: Sequence[Model], aspect: float = 1.0) -> Camera:
     """The camera that shows all models as large as they fit into a picture of width / height ``aspect``."""
     clouds = [model.vertices for model in models if len(model.vertices)] or [np.zeros((1, 3))]
     low, high = np.min([cloud.min(0) for cloud in clouds], 0), np.max([cloud.max(0) for cloud in clouds], 0)
     centre, span = (low + high) / 2, max(float(np.linalg.norm(high - low)) / 2, 1.0)
-    back = np.array(direction) / np.linalg.norm(direction)
+    back = np.array(DIRECTION) / np.linalg.norm(DIRECTION)
     right = np.cross(-back, [1.0, 0, 0])
     right /= np.linalg.norm(right)
     up = np.cross(right, -back)
@@ -104,7 +102,7 @@ def camera_for(
     return Camera(eye, right, up, -back, float(focal), (first + last) / 2, float(low[0]), radius)
 
 
-def render(model: Model, camera: Camera, width: int, height: int, samples: int = SAMPLES) -> Image:
+def render(model: Model, camera: Camera, width: int, height: int) -> Image:
     """A picture (height, width, 3) of a model on white ground with its soft shadow.
 
     Parameters
@@ -115,12 +113,10 @@ def render(model: Model, camera: Camera, width: int, height: int, samples: int =
         Use the same one for pictures to be compared.
     width, height
         In pixels.
-    samples
-        Samples along each side of a pixel.
     """
     from shapeprog.view import raster_kernels as kernels
 
-    wide, tall = width * samples, height * samples
+    wide, tall = width * SAMPLES, height * SAMPLES
     vertices = np.ascontiguousarray(model.vertices, np.float64)
     faces = np.ascontiguousarray(model.faces, np.int64)
     shown = np.ascontiguousarray(model.normals, np.float64)
@@ -134,19 +130,19 @@ def render(model: Model, camera: Camera, width: int, height: int, samples: int =
     view = np.stack([camera.eye, corner, across, down])
     kernels.surface(face, depth, points, faces, shown, view, position, normal)
     large = int(width >= LARGE)
-    lights = samples**2 * max(1, min(LIGHTS[large], WORK // max(len(faces), 1)) // samples**2)
+    lights = SAMPLES**2 * max(1, min(LIGHTS[large], WORK // max(len(faces), 1)) // SAMPLES**2)
     frames, weights = _sky(lights)
     maps = np.stack([_height_map(vertices, faces, frame, camera.radius, MAP_SIZE[large]) for frame in frames])
     bias = 2.2 * camera.radius / MAP_SIZE[large]
     sky = (maps, frames, weights, camera.radius)
     lit = np.zeros((tall, wide), np.float32)
-    kernels.irradiance(position, normal, face, *sky, samples, bias, lit)
-    ground = _ground(view * [[1], [1], [samples], [samples]], camera.low, sky, bias, height, width)
+    kernels.irradiance(position, normal, face, *sky, SAMPLES, bias, lit)
+    ground = _ground(view * [[1], [1], [SAMPLES], [SAMPLES]], camera.low, sky, bias, height, width)
     lines = _lines(face, np.asarray(model.group, np.int64), position, normal)
     colours = (np.ascontiguousarray(model.colours, np.float32).reshape(-1, 3) / 255) ** GAMMA
     total = np.zeros((height, width, 3), np.float32)
-    kernels.develop(face, colours, lit, lines, INKS, AMBIENT, ground, samples, total)
-    linear = total / np.float64(samples * samples)
+    kernels.develop(face, colours, lit, lines, INKS, AMBIENT, ground, SAMPLES, total)
+    linear = total / np.float64(SAMPLES * SAMPLES)
     return (np.clip(linear, 0, 1) ** (1 / GAMMA) * 255 + 0.5).astype(np.uint8)
 
 

@@ -15,19 +15,8 @@ import math
 
 import numpy as np
 
-from shapeprog.geometry.formulas import (
-    Four,
-    Number,
-    Triple,
-    at_least,
-    atan2,
-    cos,
-    maximum,
-    positive,
-    root,
-    sin,
-    where,
-)  # fmt: skip
+from shapeprog.geometry import formulas as f
+from shapeprog.geometry.formulas import Four, Number, Triple
 from shapeprog.geometry.primitive import Mesh, Primitive
 from shapeprog.geometry.primitives.frustum import SEGMENTS, tube
 from shapeprog.kernels.compile import helper
@@ -43,29 +32,29 @@ PIECES = 24  # straight pieces of a mesh along the arc
 
 def _bend(size: Four) -> Four:
     """Half the chord, radius in force, sagitta and curvature."""
-    half, radius, sagitta = at_least(size[0], SHORTEST), positive(size[1]), positive(size[2])
+    half, radius, sagitta = f.at_least(size[0], SHORTEST), f.positive(size[1]), f.positive(size[2])
     curvature = 2 * sagitta / (half**2 + sagitta**2)
-    return half, radius / at_least(curvature * radius, 1.0), sagitta, curvature
+    return half, radius / f.at_least(curvature * radius, 1.0), sagitta, curvature
 
 
 def _sinc(angle: Number) -> Number:
     """sin(x) / x, whose gradient is as exact near zero as elsewhere."""
     small, square = abs(angle) < SERIES, angle**2
     series = 1 - square / 6 * (1 - square / 20 * (1 - square / 42 * (1 - square / 72)))
-    return where(small, series, sin(angle) / where(small, 1.0, angle))
+    return f.where(small, series, f.sin(angle) / f.where(small, 1.0, angle))
 
 
 def _length(size: Four) -> tuple[Number, Number]:
     """Half the length of the arc, and half its angle seen from the centre of the circle."""
     half, _, sagitta, _ = _bend(size)
-    angle = atan2(sagitta, half)
-    return root(half**2 + sagitta**2) / _sinc(angle), 2 * angle
+    angle = f.atan2(sagitta, half)
+    return f.root(half**2 + sagitta**2) / _sinc(angle), 2 * angle
 
 
 def _beyond(curvature: Number, along: Number, out: Number) -> Number:
     """How far a point is beyond the circle: (k (x^2 + y^2) + 2 y) / (turn + 1), where x is along and y out from the
     apex, and turn is k times its distance from the centre."""
-    turn = root((curvature * along) ** 2 + (1 + curvature * out) ** 2)
+    turn = f.root((curvature * along) ** 2 + (1 + curvature * out) ** 2)
     return (curvature * (along**2 + out**2) + 2 * out) / (turn + 1)
 
 
@@ -73,14 +62,14 @@ def distance(size: Four, point: Triple) -> Number:
     """Exact signed distance: the nearer one of the tube and the cap at the end of a point's side."""
     half, radius, sagitta, curvature = _bend(size)
     along, out, side = abs(point[0]), point[1] - sagitta / 2, point[2]
-    tube = root(_beyond(curvature, along, out) ** 2 + side**2) - radius
+    tube = f.root(_beyond(curvature, along, out) ** 2 + side**2) - radius
 
     sine, cosine = curvature * half, 1 - curvature * sagitta
     ahead, above = along - half, out + sagitta
     over_cap = ahead * cosine - above * sine
-    across = root((ahead * sine + above * cosine) ** 2 + side**2)
-    cap = root(over_cap**2 + positive(across - radius) ** 2)
-    return where(over_cap > 0, cap, maximum(tube, -cap))
+    across = f.root((ahead * sine + above * cosine) ** 2 + side**2)
+    cap = f.root(over_cap**2 + f.positive(across - radius) ** 2)
+    return f.where(over_cap > 0, cap, f.maximum(tube, -cap))
 
 
 def excess(size: Four, point: Triple) -> Number:
@@ -89,15 +78,15 @@ def excess(size: Four, point: Triple) -> Number:
     along, out = abs(point[0]), point[1] - sagitta / 2
     over_cap = (along - half) * (1 - curvature * sagitta) - (out + sagitta) * curvature * half
     over_tube = _beyond(curvature, along, out) ** 2 + point[2] ** 2 - radius**2
-    return where(over_cap > 0, over_cap, maximum(over_cap, over_tube))
+    return f.where(over_cap > 0, over_cap, f.maximum(over_cap, over_tube))
 
 
 def bound(size: Four) -> Triple:
     """Half extents of the box around the arc; beyond half a ring it is wider than its chord."""
     half, radius, sagitta, curvature = _bend(size)
     over = sagitta > half
-    along = where(over, (half**2 + sagitta**2) / at_least(2 * sagitta, SHORTEST), half)
-    return along + radius * where(over, 1.0, curvature * half), sagitta / 2 + radius, radius
+    along = f.where(over, (half**2 + sagitta**2) / f.at_least(2 * sagitta, SHORTEST), half)
+    return along + radius * f.where(over, 1.0, curvature * half), sagitta / 2 + radius, radius
 
 
 def areas(size: Four) -> Triple:
@@ -117,11 +106,11 @@ def sample(size: Four, face: Number, uniform: Triple) -> Triple:
     _, radius, _, curvature = _bend(size)
     u, v, w = uniform
     angle, tube = 2 * math.pi * u, face > 1
-    cosine = cos(angle)
+    cosine = f.cos(angle)
     inner = tube & (2 * v > 1 + curvature * radius * cosine)
-    rim = where(tube, 1.0, root(v))
-    along = where(tube, 2 * w - 1, 2.0 * face - 1.0)
-    return along, rim * where(inner, -cosine, cosine), rim * sin(angle)
+    rim = f.where(tube, 1.0, f.root(v))
+    along = f.where(tube, 2 * w - 1, 2.0 * face - 1.0)
+    return along, rim * f.where(inner, -cosine, cosine), rim * f.sin(angle)
 
 
 def place(size: Four, unit: Triple) -> Triple:
@@ -133,7 +122,7 @@ def place(size: Four, unit: Triple) -> Triple:
     length, full = _length(size)
     tilt, out = unit[0] * full / 2, radius * unit[1]
     chord = unit[0] * length * _sinc(tilt)
-    low, high = sin(tilt), cos(tilt)
+    low, high = f.sin(tilt), f.cos(tilt)
     sine, cosine = 2 * low * high, 1 - 2 * low**2
     return chord * high + out * sine, sagitta / 2 - chord * low + out * cosine, radius * unit[2]
 
@@ -142,8 +131,9 @@ def normal(size: Four, unit: Triple, face: Number) -> Triple:
     """Outward normal: along the arc on the caps, away from it on the tube."""
     along, out, side = unit
     angle, tube = along * _length(size)[1], face > 1
-    sine, cosine = sin(angle), cos(angle)
-    return where(tube, out * sine, along * cosine), where(tube, out * cosine, -along * sine), where(tube, side, 0.0)
+    sine, cosine = f.sin(angle), f.cos(angle)
+    up, across = f.where(tube, out * sine, along * cosine), f.where(tube, out * cosine, -along * sine)
+    return up, across, f.where(tube, side, 0.0)
 
 
 def mesh(size: FloatArray) -> Mesh:

@@ -10,22 +10,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from shapeprog.geometry.formulas import (
-    TINY,
-    Four,
-    Number,
-    Triple,
-    at_least,
-    clamp,
-    constant,
-    maximum,
-    meet,
-    minimum,
-    plain_root,
-    positive,
-    root,
-    where,
-)  # fmt: skip
+from shapeprog.geometry import formulas as f
+from shapeprog.geometry.formulas import TINY, Four, Number, Triple
 from shapeprog.geometry.primitive import Mesh, Primitive
 from shapeprog.kernels.compile import helper
 from shapeprog.kernels.rows import clip, fill_box
@@ -40,31 +26,33 @@ def distance(size: Four, point: Triple) -> Number:
     point symmetry; extrusion combines it with the distance along axis 2, which keeps it exact.  The
     foot on the slanted edge is where the squared distance is least, so it need not be differentiated.
     """
-    half_up, half_depth, half_side = map(positive, size[:3])
+    half_up, half_depth, half_side = map(f.positive, size[:3])
     slant = size[3] / 2
     up, depth, side = point
 
-    fold = where(up < 0, -1.0, 1.0)
+    fold = f.where(up < 0, -1.0, 1.0)
     up, depth = up * fold, depth * fold
-    over_up, over_depth = up - half_up, positive(abs(depth - slant) - half_depth)
+    over_up, over_depth = up - half_up, f.positive(abs(depth - slant) - half_depth)
     to_cap = over_up**2 + over_depth**2
 
     cross = depth * half_up - up * slant
-    fold = where(cross < 0, -1.0, 1.0)
+    fold = f.where(cross < 0, -1.0, 1.0)
     edge_up, edge_depth = up * fold, depth * fold - half_depth
-    foot = constant(clamp((edge_up * half_up + edge_depth * slant) / at_least(half_up**2 + slant**2, TINY), -1.0, 1.0))
+    foot = f.constant(
+        f.clamp((edge_up * half_up + edge_depth * slant) / f.at_least(half_up**2 + slant**2, TINY), -1.0, 1.0)
+    )
     to_side = (edge_up - foot * half_up) ** 2 + (edge_depth - foot * slant) ** 2
 
     inside = (over_up < 0) & (abs(cross) < half_depth * half_up)
-    return meet(root(minimum(to_cap, to_side)) * where(inside, -1.0, 1.0), abs(side) - half_side)
+    return f.meet(f.root(f.minimum(to_cap, to_side)) * f.where(inside, -1.0, 1.0), abs(side) - half_side)
 
 
 def value(size: Four, point: Triple) -> Number:
     """The same distance, cheaper where nothing is sheared, but without the slope by ``lean`` there."""
-    up, depth, side = (abs(at) - positive(half) for at, half in zip(point, size[:3], strict=True))
-    inside = maximum(maximum(up, depth), side)
-    outside = plain_root(positive(up) ** 2 + positive(depth) ** 2 + positive(side) ** 2)
-    return where(abs(size[3]) > 0, distance(size, point), where(inside > 0, outside, inside))
+    up, depth, side = (abs(at) - f.positive(half) for at, half in zip(point, size[:3], strict=True))
+    inside = f.maximum(f.maximum(up, depth), side)
+    outside = f.plain_root(f.positive(up) ** 2 + f.positive(depth) ** 2 + f.positive(side) ** 2)
+    return f.where(abs(size[3]) > 0, distance(size, point), f.where(inside > 0, outside, inside))
 
 
 def excess(size: Four, point: Triple) -> Number:
@@ -73,18 +61,18 @@ def excess(size: Four, point: Triple) -> Number:
     up, depth, side = point
     over_up = abs(up) - half_up
     over_depth = abs(depth * half_up - up * (lean / 2)) - half_depth * half_up
-    return where(over_up > 0, over_up, maximum(maximum(over_up, over_depth), abs(side) - half_side))
+    return f.where(over_up > 0, over_up, f.maximum(f.maximum(over_up, over_depth), abs(side) - half_side))
 
 
 def bound(size: Four) -> Triple:
     """Half extents of the box around the sheared cuboid."""
-    return positive(size[0]), positive(size[1]) + abs(size[3]) / 2, positive(size[2])
+    return f.positive(size[0]), f.positive(size[1]) + abs(size[3]) / 2, f.positive(size[2])
 
 
 def areas(size: Four) -> tuple[Number, ...]:
     """Areas of the faces -0, +0, -1, +1, -2, +2; a shear keeps those of the caps and of the two ends."""
-    up, depth, side = (2 * positive(half) for half in size[:3])
-    cap, end, slanted = depth * side, up * depth, side * root(up**2 + size[3] ** 2)
+    up, depth, side = (2 * f.positive(half) for half in size[:3])
+    cap, end, slanted = depth * side, up * depth, side * f.root(up**2 + size[3] ** 2)
     return cap, cap, slanted, slanted, end, end
 
 
@@ -92,7 +80,7 @@ def sample(size: Four, face: Number, uniform: Triple) -> Triple:
     """Uniform position on a face of the cube [-1, 1]^3."""
     sign = 2.0 * (face % 2) - 1.0
     u, v, w = (2 * number - 1 for number in uniform)
-    return where(face < 2, sign, u), where((face < 2) | (face > 3), v, sign), where(face > 3, sign, w)
+    return f.where(face < 2, sign, u), f.where((face < 2) | (face > 3), v, sign), f.where(face > 3, sign, w)
 
 
 def place(size: Four, unit: Triple) -> Triple:
@@ -104,10 +92,10 @@ def place(size: Four, unit: Triple) -> Triple:
 def normal(size: Four, unit: Triple, face: Number) -> Triple:
     """Outward normal of a face; the two slanted faces lean with the shear."""
     half_up, slant = size[0], size[3] / 2
-    length, sign = root(half_up**2 + slant**2), 2.0 * (face % 2) - 1.0
+    length, sign = f.root(half_up**2 + slant**2), 2.0 * (face % 2) - 1.0
     slanted = (face > 1) & (face < 4)
-    up = where(face < 2, sign, where(slanted, -sign * slant / length, 0.0))
-    return up, where(slanted, sign * half_up / length, 0.0), where(face > 3, sign, 0.0)
+    up = f.where(face < 2, sign, f.where(slanted, -sign * slant / length, 0.0))
+    return up, f.where(slanted, sign * half_up / length, 0.0), f.where(face > 3, sign, 0.0)
 
 
 def mesh(size: FloatArray) -> Mesh:
@@ -122,7 +110,7 @@ def mesh(size: FloatArray) -> Mesh:
 
 def volume(size: Four) -> Number:
     """Eight times the product of the half extents: a shear keeps the volume."""
-    half_up, half_depth, half_side = map(positive, size[:3])
+    half_up, half_depth, half_side = map(f.positive, size[:3])
     return 8 * half_up * half_depth * half_side
 
 

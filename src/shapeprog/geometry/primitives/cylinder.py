@@ -9,7 +9,8 @@ import math
 
 import numpy as np
 
-from shapeprog.geometry.formulas import Four, Number, Triple, cos, maximum, meet, positive, root, sin, where
+from shapeprog.geometry import formulas as f
+from shapeprog.geometry.formulas import Four, Number, Triple
 from shapeprog.geometry.primitive import Formula, Primitive
 from shapeprog.geometry.primitives import frustum
 from shapeprog.kernels.compile import helper
@@ -24,21 +25,21 @@ def distance(size: Four, point: Triple) -> Number:
     Appendix A of Liang (2022) mixes full and half height and takes a squared length for a length; here both
     coordinates are lengths, and the height is the half height.
     """
-    rho = root(point[1] ** 2 + point[2] ** 2)
-    return meet(abs(point[0]) - positive(size[0]), rho - positive(size[1]))
+    rho = f.root(point[1] ** 2 + point[2] ** 2)
+    return f.meet(abs(point[0]) - f.positive(size[0]), rho - f.positive(size[1]))
 
 
 def excess(size: Four, point: Triple) -> Number:
     """How far a point is beyond the caps, or its squared distance from the axis beyond that of the side."""
     over = abs(point[0]) - size[0]
-    return where(over > 0, over, maximum(over, point[1] ** 2 + point[2] ** 2 - size[1] ** 2))
+    return f.where(over > 0, over, f.maximum(over, point[1] ** 2 + point[2] ** 2 - size[1] ** 2))
 
 
 def sample(size: Four, face: Number, uniform: Triple) -> Triple:
     """Axial coordinate in [-1, 1] and a point of the unit disc, on its rim for the lateral surface."""
     u, v, w = uniform
-    axial, rim = where(face > 1, 2 * w - 1, 2.0 * face - 1.0), where(face > 1, 1.0, root(v))
-    return axial, rim * cos(2 * math.pi * u), rim * sin(2 * math.pi * u)
+    axial, rim = f.where(face > 1, 2 * w - 1, 2.0 * face - 1.0), f.where(face > 1, 1.0, f.root(v))
+    return axial, rim * f.cos(2 * math.pi * u), rim * f.sin(2 * math.pi * u)
 
 
 def place(size: Four, unit: Triple) -> Triple:
@@ -49,7 +50,7 @@ def place(size: Four, unit: Triple) -> Triple:
 def normal(size: Four, unit: Triple, face: Number) -> Triple:
     """Outward normal: along the axis on the caps, radial on the side."""
     side = face > 1
-    return where(side, 0.0, unit[0]), where(side, unit[1], 0.0), where(side, unit[2], 0.0)
+    return f.where(side, 0.0, unit[0]), f.where(side, unit[1], 0.0), f.where(side, unit[2], 0.0)
 
 
 @helper

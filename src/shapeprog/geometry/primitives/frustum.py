@@ -6,22 +6,8 @@ import math
 
 import numpy as np
 
-from shapeprog.geometry.formulas import (
-    TINY,
-    Four,
-    Number,
-    Triple,
-    at_least,
-    clamp,
-    constant,
-    cos,
-    maximum,
-    minimum,
-    positive,
-    root,
-    sin,
-    where,
-)  # fmt: skip
+from shapeprog.geometry import formulas as f
+from shapeprog.geometry.formulas import TINY, Four, Number, Triple
 from shapeprog.geometry.primitive import Mesh, Primitive
 from shapeprog.space import FloatArray
 
@@ -33,15 +19,15 @@ def distance(size: Four, point: Triple) -> Number:
 
     The foot on the side is where the squared distance is least, so it need not be differentiated.
     """
-    half, bottom, top = map(positive, size[:3])
-    axial, radial = point[0], root(point[1] ** 2 + point[2] ** 2)
-    over_cap, over_rim = abs(axial) - half, positive(radial - where(axial < 0, bottom, top))
+    half, bottom, top = map(f.positive, size[:3])
+    axial, radial = point[0], f.root(point[1] ** 2 + point[2] ** 2)
+    over_cap, over_rim = abs(axial) - half, f.positive(radial - f.where(axial < 0, bottom, top))
     to_cap = over_rim**2 + over_cap**2
     rise, run, up, out = 2 * half, top - bottom, axial + half, radial - bottom
-    foot = constant(clamp((up * rise + out * run) / at_least(rise**2 + run**2, TINY), 0.0, 1.0))
+    foot = f.constant(f.clamp((up * rise + out * run) / f.at_least(rise**2 + run**2, TINY), 0.0, 1.0))
     to_side = (up - foot * rise) ** 2 + (out - foot * run) ** 2
     inside = (over_cap < 0) & (out * rise < up * run)
-    return root(minimum(to_cap, to_side)) * where(inside, -1.0, 1.0)
+    return f.root(f.minimum(to_cap, to_side)) * f.where(inside, -1.0, 1.0)
 
 
 def excess(size: Four, point: Triple) -> Number:
@@ -49,46 +35,46 @@ def excess(size: Four, point: Triple) -> Number:
     half, bottom, top, _ = size
     over_cap, radius = abs(point[0]) - half, bottom * (half - point[0]) + top * (half + point[0])
     over_side = 4 * half**2 * (point[1] ** 2 + point[2] ** 2) - radius**2
-    return where(over_cap > 0, over_cap, maximum(over_cap, over_side))
+    return f.where(over_cap > 0, over_cap, f.maximum(over_cap, over_side))
 
 
 def bound(size: Four) -> Triple:
     """Half extents of the box around the frustum."""
-    widest = positive(maximum(size[1], size[2]))
-    return positive(size[0]), widest, widest
+    widest = f.positive(f.maximum(size[1], size[2]))
+    return f.positive(size[0]), widest, widest
 
 
 def areas(size: Four) -> Triple:
     """Areas of bottom cap, top cap and slanted side."""
-    half, bottom, top = map(positive, size[:3])
-    slant = root(4 * half**2 + (top - bottom) ** 2)
+    half, bottom, top = map(f.positive, size[:3])
+    slant = f.root(4 * half**2 + (top - bottom) ** 2)
     return math.pi * bottom**2, math.pi * top**2, math.pi * (bottom + top) * slant
 
 
 def sample(size: Four, face: Number, uniform: Triple) -> Triple:
     """Axial coordinate in [-1, 1] and a point of the unit disc; the side has more area where it is wider."""
-    _, bottom, top = map(positive, size[:3])
+    _, bottom, top = map(f.positive, size[:3])
     u, v, w = uniform
-    widths = root(bottom**2 + (top**2 - bottom**2) * w)
-    along = 2 * w * (bottom + top) / at_least(bottom + widths, 1e-12) - 1
-    axial, rim = where(face > 1, along, 2.0 * face - 1.0), where(face > 1, 1.0, root(v))
-    return axial, rim * cos(2 * math.pi * u), rim * sin(2 * math.pi * u)
+    widths = f.root(bottom**2 + (top**2 - bottom**2) * w)
+    along = 2 * w * (bottom + top) / f.at_least(bottom + widths, 1e-12) - 1
+    axial, rim = f.where(face > 1, along, 2.0 * face - 1.0), f.where(face > 1, 1.0, f.root(v))
+    return axial, rim * f.cos(2 * math.pi * u), rim * f.sin(2 * math.pi * u)
 
 
 def place(size: Four, unit: Triple) -> Triple:
     """The point of the frustum for an axial coordinate and a point of the unit disc."""
-    half, bottom, top = map(positive, size[:3])
+    half, bottom, top = map(f.positive, size[:3])
     radius = (bottom * (1 - unit[0]) + top * (1 + unit[0])) / 2
     return half * unit[0], radius * unit[1], radius * unit[2]
 
 
 def normal(size: Four, unit: Triple, face: Number) -> Triple:
     """Outward normal: along the axis on the caps, leaning with the taper on the side."""
-    half, bottom, top = map(positive, size[:3])
+    half, bottom, top = map(f.positive, size[:3])
     lean, out = bottom - top, 2 * half
-    length, side = root(lean**2 + out**2), face > 1
-    across = where(side, out / length, 0.0)
-    return where(side, lean / length, unit[0]), across * unit[1], across * unit[2]
+    length, side = f.root(lean**2 + out**2), face > 1
+    across = f.where(side, out / length, 0.0)
+    return f.where(side, lean / length, unit[0]), across * unit[1], across * unit[2]
 
 
 def mesh(size: FloatArray) -> Mesh:
@@ -126,7 +112,7 @@ def tube(rings: FloatArray, ends: FloatArray) -> Mesh:
 
 def volume(size: Four) -> Number:
     """Height times the mean of the areas of the circles between bottom and top."""
-    half, bottom, top = map(positive, size[:3])
+    half, bottom, top = map(f.positive, size[:3])
     return 2 / 3 * math.pi * half * (bottom**2 + bottom * top + top**2)
 
 

@@ -10,19 +10,8 @@ from itertools import product
 
 import numpy as np
 
-from shapeprog.geometry.formulas import (
-    Four,
-    Number,
-    Triple,
-    clamp,
-    cos,
-    maximum,
-    minimum,
-    positive,
-    root,
-    sin,
-    where,
-)  # fmt: skip
+from shapeprog.geometry import formulas as f
+from shapeprog.geometry.formulas import Four, Number, Triple
 from shapeprog.geometry.primitive import Mesh, Primitive
 from shapeprog.geometry.primitives import cuboid
 from shapeprog.space import FloatArray
@@ -32,8 +21,8 @@ PER_QUARTER = 8  # edges of the polygon that approximates a quarter of a circle 
 
 def _inner(size: Four) -> Four:
     """Half extents of the inner box, and the radius, which is at most the smallest half extent."""
-    up, depth, side, radius = map(positive, size)
-    radius = minimum(radius, minimum(minimum(up, depth), side))
+    up, depth, side, radius = map(f.positive, size)
+    radius = f.minimum(radius, f.minimum(f.minimum(up, depth), side))
     return up - radius, depth - radius, side - radius, radius
 
 
@@ -46,22 +35,22 @@ def _beyond(size: Four, point: Triple) -> Four:
 def distance(size: Four, point: Triple) -> Number:
     """Exact signed distance: that to the inner box, less the radius."""
     up, depth, side, radius = _beyond(size, point)
-    inside = maximum(maximum(up, depth), side)
-    outside = root(positive(up) ** 2 + positive(depth) ** 2 + positive(side) ** 2)
-    return where(inside > 0, outside, inside) - radius
+    inside = f.maximum(f.maximum(up, depth), side)
+    outside = f.root(f.positive(up) ** 2 + f.positive(depth) ** 2 + f.positive(side) ** 2)
+    return f.where(inside > 0, outside, inside) - radius
 
 
 def excess(size: Four, point: Triple) -> Number:
     """How far a point is beyond the surface within the inner box, elsewhere by squared distances from that box."""
     up, depth, side, radius = _beyond(size, point)
-    inside = maximum(maximum(up, depth), side)
-    squared = positive(up) ** 2 + positive(depth) ** 2 + positive(side) ** 2
-    return where(inside > 0, squared - radius**2, inside - radius)
+    inside = f.maximum(f.maximum(up, depth), side)
+    squared = f.positive(up) ** 2 + f.positive(depth) ** 2 + f.positive(side) ** 2
+    return f.where(inside > 0, squared - radius**2, inside - radius)
 
 
 def bound(size: Four) -> Triple:
     """The half extents."""
-    return positive(size[0]), positive(size[1]), positive(size[2])
+    return f.positive(size[0]), f.positive(size[1]), f.positive(size[2])
 
 
 def areas(size: Four) -> tuple[Number, ...]:
@@ -78,15 +67,15 @@ def sample(size: Four, face: Number, uniform: Triple) -> Triple:
     """
     first_uniform, second_uniform, third_uniform = uniform
     u, angle, flat, ball = 2 * first_uniform - 1, 2 * math.pi * second_uniform, face < 3, face > 5
-    rim = where(ball, root(positive(1 - u**2)), 1.0)
-    first = where(flat, where(first_uniform < 0.5, -2.0, 2.0), where(ball, u + where(u < 0, -1.0, 1.0), u))
-    second, third = rim * cos(angle), rim * sin(angle)
-    second = where(flat, 2 * second_uniform - 1, second + where(second < 0, -1.0, 1.0))
-    third = where(flat, 2 * third_uniform - 1, third + where(third < 0, -1.0, 1.0))
+    rim = f.where(ball, f.root(f.positive(1 - u**2)), 1.0)
+    first = f.where(flat, f.where(first_uniform < 0.5, -2.0, 2.0), f.where(ball, u + f.where(u < 0, -1.0, 1.0), u))
+    second, third = rim * f.cos(angle), rim * f.sin(angle)
+    second = f.where(flat, 2 * second_uniform - 1, second + f.where(second < 0, -1.0, 1.0))
+    third = f.where(flat, 2 * third_uniform - 1, third + f.where(third < 0, -1.0, 1.0))
     axis = face % 3
 
     def turned(zero: Number, first_uniform: Number, second_uniform: Number) -> Number:
-        return where(axis < 1, zero, where(axis < 2, first_uniform, second_uniform))
+        return f.where(axis < 1, zero, f.where(axis < 2, first_uniform, second_uniform))
 
     return turned(first, third, second), turned(second, first, third), turned(third, second, first)
 
@@ -94,13 +83,13 @@ def sample(size: Four, face: Number, uniform: Triple) -> Triple:
 def place(size: Four, unit: Triple) -> Triple:
     """Point of the rounded box for such a position."""
     up, depth, side, radius = _inner(size)
-    u, v, w = (clamp(number, -1.0, 1.0) for number in unit)
+    u, v, w = (f.clamp(number, -1.0, 1.0) for number in unit)
     return up * u + radius * (unit[0] - u), depth * v + radius * (unit[1] - v), side * w + radius * (unit[2] - w)
 
 
 def normal(size: Four, unit: Triple, face: Number) -> Triple:
     """Outward normal: how far a position is beyond the inner box."""
-    u, v, w = (number - clamp(number, -1.0, 1.0) for number in unit)
+    u, v, w = (number - f.clamp(number, -1.0, 1.0) for number in unit)
     return u, v, w
 
 

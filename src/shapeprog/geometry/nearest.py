@@ -6,17 +6,15 @@ They run on the CPU, wherever the tensors are.
 from __future__ import annotations
 
 from functools import partial
-from typing import Any
 
 import numpy as np
 import torch
 from jaxtyping import Float, Int
 from torch import Tensor
-from torch.autograd.function import once_differentiable
 
 from shapeprog.errors import ShapeProgError
 from shapeprog.geometry import neighbour_kernels as kernels
-from shapeprog.geometry.arrays import cast, numbers, over_threads
+from shapeprog.geometry.arrays import numbers, over_threads
 from shapeprog.space import Array
 
 Cloud = Float[Tensor, "*batch P 3"]
@@ -28,9 +26,9 @@ def nearest(queries: Cloud, points: Other) -> Int[Tensor, "*batch P"]:
 
     A ``ShapeProgError`` if there are no points, or the leading dimensions differ.
     """
-    source, few = _pair(queries.detach(), points.detach())
-    index = torch.from_numpy(_neighbours(source, few)[0] - np.arange(len(few))[:, None] * few.shape[1])
-    return index.reshape(queries.shape[:-1]).to(queries.device)
+    source, few = _pair(queries, points)
+    index = _neighbours(source, few) - np.arange(len(few))[:, None] * few.shape[1]
+    return torch.from_numpy(index).reshape(queries.shape[:-1]).to(queries.device)
 
 
 def squared_distance(queries: Cloud, points: Other) -> Float[Tensor, "*batch P"]:
@@ -38,30 +36,10 @@ def squared_distance(queries: Cloud, points: Other) -> Float[Tensor, "*batch P"]
 
     Neighbours are found without gradient; the gradient of the distance to them is that of the minimum.
     """
-    squared: Tensor = _Squared.apply(*_pair(queries, points))  # type: ignore[no-untyped-call]
-    return squared.reshape(queries.shape[:-1])
-
-
-class _Squared(torch.autograd.Function):
-    """The kernels as one differentiable step."""
-
-    @staticmethod
-    def forward(ctx: Any, queries: Tensor, points: Tensor) -> Tensor:
-        ctx.index, squared = _neighbours(queries, points)
-        ctx.save_for_backward(queries, points)
-        return cast(squared, queries)
-
-    @staticmethod
-    @once_differentiable
-    def backward(ctx: Any, slope: Tensor) -> tuple[Tensor, ...]:
-        queries, points = clouds = [numbers(cloud) for cloud in ctx.saved_tensors]
-        results = [np.zeros(cloud.shape) for cloud in clouds]
-        data = (
-            queries.reshape(-1, 3), queries.shape[1], points.reshape(-1, 3), ctx.index.reshape(-1), numbers(slope),
-            *(result.reshape(-1, 3) for result in results),
-        )  # fmt: skip
-        over_threads(partial(kernels.pull, *data), len(queries), least=8)
-        return tuple(cast(result, cloud) for result, cloud in zip(results, ctx.saved_tensors, strict=True))
+    source, few = _pair(queries, points)
+    index = torch.from_numpy(_neighbours(source, few)).to(source.device)
+    nearest_points = few.flatten(0, 1).index_select(0, index.flatten()).reshape(source.shape)
+    return (source - nearest_points).square().sum(-1).reshape(queries.shape[:-1])
 
 
 def _pair(queries: Cloud, points: Other) -> tuple[Float[Tensor, "B P 3"], Float[Tensor, "B Q 3"]]:
@@ -76,10 +54,10 @@ def _pair(queries: Cloud, points: Other) -> tuple[Float[Tensor, "B P 3"], Float[
     return source, points.to(source).reshape(count, points.shape[-2], 3).contiguous()
 
 
-def _neighbours(queries: Tensor, points: Tensor) -> tuple[Array, Array]:
-    """Rows of the nearest points among those of all clouds, and squared distances, (B, P) each."""
+def _neighbours(queries: Tensor, points: Tensor) -> Array:
+    """Rows of the nearest points among those of all clouds (B, P), without gradient."""
     (clouds, source), count = queries.shape[:2], points.shape[1]
-    index, squared = np.empty(clouds * source, np.int64), np.empty(clouds * source)
-    data = numbers(queries).reshape(-1, 3), source, numbers(points).reshape(-1, 3), count, index, squared
+    index = np.empty(clouds * source, np.int64)
+    data = numbers(queries).reshape(-1, 3), source, numbers(points).reshape(-1, 3), count, index
     over_threads(partial(kernels.neighbours, *data), clouds)
-    return index.reshape(clouds, source), squared.reshape(clouds, source)
+    return index.reshape(clouds, source)

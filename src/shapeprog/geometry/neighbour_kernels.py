@@ -112,14 +112,14 @@ def _search(x, y, z, ordered, starts, low, side, cells, best, closest):
                     first = _cell(z - reach, low[2], inverse, cells[2])
                     last = _cell(z + reach, low[2], inverse, cells[2])
                     best, closest = _column(x, y, z, ordered, starts, base, first, last, best, closest)
-    return best, closest
+    return closest
 
 
-@kernel("void(f8[:, ::1], i8, f8[:, ::1], i8, i8[::1], f8[::1], i8, i8)")
-def neighbours(queries, query_count, points, count, index, squared, begin, end):
+@kernel("void(f8[:, ::1], i8, f8[:, ::1], i8, i8[::1], i8, i8)")
+def neighbours(queries, query_count, points, count, index, begin, end):
     """Nearest of the ``count`` points to each of the ``query_count`` queries of the clouds ``begin`` to ``end``.
 
-    Fills the row of ``points`` (B * count, 3), and the squared distance, for each of ``queries`` (B * many, 3).
+    Fills the row of ``points`` (B * count, 3) for each of ``queries`` (B * many, 3).
     """
     low, cells = np.empty(3), np.empty(3, np.int64)
     key, order, visit = (
@@ -139,17 +139,5 @@ def neighbours(queries, query_count, points, count, index, squared, begin, end):
             query = visit[turn]
             x, y, z = queries[query, 0], queries[query, 1], queries[query, 2]
             dx, dy, dz = ordered[closest, 0] - x, ordered[closest, 1] - y, ordered[closest, 2] - z
-            best, closest = _search(x, y, z, ordered, starts, low, side, cells, dx * dx + dy * dy + dz * dz, closest)
-            index[query], squared[query] = order[closest], best
-
-
-@kernel("void(f8[:, ::1], i8, f8[:, ::1], i8[::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], i8, i8)")
-def pull(queries, query_count, points, index, slope, to_queries, to_points, begin, end):
-    """Add the gradient of squared distances to known neighbours, given the gradient (B, many) of a loss by each."""
-    for cloud in range(begin, end):
-        for turn in range(query_count):
-            query, twice = cloud * query_count + turn, 2 * slope[cloud, turn]
-            for axis in range(3):
-                part = twice * (queries[query, axis] - points[index[query], axis])
-                to_queries[query, axis] += part
-                to_points[index[query], axis] -= part
+            closest = _search(x, y, z, ordered, starts, low, side, cells, dx * dx + dy * dy + dz * dz, closest)
+            index[query] = order[closest]

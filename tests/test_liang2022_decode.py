@@ -9,13 +9,13 @@ from torch import Tensor
 from torch.nn.functional import max_pool3d
 
 from shapeprog.data.packs import read_pack
-from shapeprog.geometry.cells import count, union, unpack
+from shapeprog.geometry.cells import count, unpack
 from shapeprog.language import encode
 from shapeprog.language.parser import parse
 from shapeprog.language.unroll import draw_blocks, unroll
 from shapeprog.liang2022.decode import EXACT_WEIGHT, Decoded, decode
 from shapeprog.liang2022.evaluate import decode_all, measure, scores_on_packs
-from shapeprog.liang2022.generator import Generator
+from shapeprog.liang2022.generator import Generator, union
 from shapeprog.liang2022.pretrain import scheduled_sampling, teacher_forcing
 from shapeprog.liang2022.prior import PRIORS
 from shapeprog.liang2022.weights import load_generator

@@ -7,11 +7,12 @@ import torch
 
 from shapeprog.data.random import outside_published
 from shapeprog.errors import InputError
-from shapeprog.geometry.cells import preceding, union, unpack, voxels
+from shapeprog.geometry.cells import unpack, voxels
 from shapeprog.language import standard
 from shapeprog.language.statement import END
 from shapeprog.language.tensors import Code, decode
 from shapeprog.language.unroll import draw_blocks, unroll
+from shapeprog.liang2022.generator import preceding, union
 from shapeprog.liang2022.prior import BLOCKS, PRIORS, Prior, own_cells, programs
 from shapeprog.space import HALF, SPAN
 
@@ -110,3 +111,11 @@ def test_a_batch_depends_on_prior_seed_and_index_alone(each: Prior) -> None:
 def test_wrong_names_are_refused_in_words() -> None:
     with pytest.raises(InputError, match=r"there is no prior 'wyde'\n.*did you mean 'wide'"):
         programs("wyde", 1, 0)
+
+
+def test_unions_and_preceding_cells_are_those_of_the_blocks():
+    blocks = draw_blocks(PRIORS["narrow"].sample(20, 0).code)
+    grids = unpack(blocks).bool()
+    assert (unpack(union(blocks)) == grids.any(1)).all()
+    assert not preceding(blocks)[:, 0].any()
+    assert (unpack(preceding(blocks)[:, 2]) == grids[:, :2].any(1)).all()

@@ -101,19 +101,3 @@ def iou(a: Int[Tensor, "*one words R"], b: Int[Tensor, "*two words R"]) -> Float
     first, second = torch.broadcast_tensors(a, b)
     intersection, either = count(first & second).double(), count(first | second)
     return torch.where(either > 0, intersection / either.clamp(min=1), 1.0)
-
-
-def union(parts: Int[Tensor, "*batch K words R"]) -> Cells:
-    """The cells of all parts together."""
-    cells = torch.zeros_like(parts[..., 0, :, :])
-    for part in parts.unbind(-3):
-        cells |= part
-    return cells
-
-
-def preceding(parts: Int[Tensor, "*batch K words R"]) -> Int[Tensor, "*batch K words R"]:
-    """For each part, the cells of all parts before it."""
-    cells = torch.zeros_like(parts)
-    for k in range(1, parts.shape[-3]):
-        cells[..., k, :, :] = cells[..., k - 1, :, :] | parts[..., k - 1, :, :]
-    return cells

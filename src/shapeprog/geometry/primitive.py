@@ -149,11 +149,6 @@ def _join(numbers: tuple[Number, ...], like: Tensor) -> Tensor:
     return torch.stack([number if type(number) is type(zero) else zero + number for number in numbers], -1).to(like)
 
 
-def safe_norm(squared: Scalars) -> Scalars:
-    """Square root whose gradient is zero, not infinite, at zero."""
-    return torch.sqrt(squared.clamp(min=1e-24))
-
-
 def __getattr__(name: str) -> Any:
     """The tuple ``primitives`` of :mod:`shapeprog.geometry.primitives`, where release 0.1.0 had it."""
     if name == "primitives":

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import torch
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 from torch import Tensor
 from torch.autograd.function import once_differentiable
 
@@ -104,12 +104,6 @@ def sample_surface(batch: Batch, n: int, generator: torch.Generator | None = Non
 
 
 sample = sample_surface  # its public name, shapeprog.sample
-
-
-def has_surface(batch: Batch) -> Bool[Tensor, "*batch"]:
-    """Which elements have a surface to draw points from."""
-    area = face_areas(batch.detach().flatten()).double().flatten(1).sum(-1)
-    return ((area > 0) & area.isfinite()).reshape(batch.batch_shape)
 
 
 def face_areas(flat: Batch) -> Float[Tensor, "B N F"]:

@@ -5,7 +5,8 @@ from __future__ import annotations
 from jaxtyping import Float, Int
 
 from shapeprog.geometry.batch import Solids
-from shapeprog.geometry.primitive import SIZES, Primitive, safe_norm
+from shapeprog.geometry.formulas import root as safe_norm
+from shapeprog.geometry.primitive import SIZES, Primitive
 from shapeprog.geometry.primitives import primitives
 from shapeprog.geometry.primitives.arc import ARC
 from shapeprog.geometry.primitives.cuboid import CUBOID

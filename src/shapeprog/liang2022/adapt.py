@@ -31,7 +31,7 @@ from torch import Tensor, nn
 
 from shapeprog.data.packs import read_pack
 from shapeprog.errors import ShapeProgError
-from shapeprog.geometry.surface import has_surface
+from shapeprog.geometry.surface import face_areas
 from shapeprog.inference.surface.cells import points_of_cells
 from shapeprog.language import Code, Draw, Program, encode, unroll
 from shapeprog.language.statement import EMPTY
@@ -133,7 +133,8 @@ class AdaptTask:
         out its empty blocks.
         """
         code = predicted_code(prediction, base=self._settings.learn == "all")
-        draws = has_surface(unroll(code.having(code.parameters.detach())))[:, None, None]
+        area = face_areas(unroll(code.having(code.parameters.detach()))).double().flatten(1).sum(-1)
+        draws = ((area > 0) & area.isfinite())[:, None, None]
         dot = encode([DOT] * len(draws), blocks=code.ids.shape[1])
         ids = torch.where(draws, code.ids, dot.ids.to(code.ids))
         numbers = torch.where(draws[..., None], code.parameters, dot.parameters.to(code.parameters))

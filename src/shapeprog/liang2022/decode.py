@@ -18,12 +18,20 @@ from jaxtyping import Float, Int, UInt8
 from torch import Tensor
 
 from shapeprog.errors import ShapeProgError, did_you_mean
-from shapeprog.geometry.cells import count, iou, pack, union, unpack
+from shapeprog.geometry.cells import count, iou, pack, unpack
 from shapeprog.language import Code, Program, unroll
 from shapeprog.language import decode as programs_of
 from shapeprog.language.statement import EMPTY, SLOTS
 from shapeprog.language.unroll import draw_blocks
-from shapeprog.liang2022.generator import STEPS, Generator, TeacherForcingBatch, live_blocks, preceding_blocks, take
+from shapeprog.liang2022.generator import (
+    STEPS,
+    Generator,
+    TeacherForcingBatch,
+    live_blocks,
+    preceding_blocks,
+    take,
+    union,
+)
 from shapeprog.liang2022.settings import Decoder
 from shapeprog.space import HALF
 

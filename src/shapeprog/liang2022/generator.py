@@ -217,3 +217,19 @@ def take(code: Code, block: Int[Tensor, "B L"], keep: Bool[Tensor, "B L"]) -> Co
     """Blocks of programs in another order, emptied where not kept."""
     row = torch.arange(len(block), device=block.device)[:, None]
     return Code(code.ids[row, block] * keep[..., None], code.parameters[row, block] * keep[..., None, None])
+
+
+def union(parts: Int[Tensor, "*batch K words R"]) -> Int[Tensor, "*batch words R"]:
+    """The packed cells of all parts together."""
+    cells = torch.zeros_like(parts[..., 0, :, :])
+    for part in parts.unbind(-3):
+        cells |= part
+    return cells
+
+
+def preceding(parts: Int[Tensor, "*batch K words R"]) -> Int[Tensor, "*batch K words R"]:
+    """For each part, the cells of all parts before it."""
+    cells = torch.zeros_like(parts)
+    for k in range(1, parts.shape[-3]):
+        cells[..., k, :, :] = cells[..., k - 1, :, :] | parts[..., k - 1, :, :]
+    return cells

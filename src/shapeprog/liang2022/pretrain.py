@@ -15,11 +15,11 @@ from torch import Tensor
 from torch.nn.functional import pad
 
 from shapeprog.errors import ShapeProgError
-from shapeprog.geometry.cells import count, preceding
+from shapeprog.geometry.cells import count
 from shapeprog.language.tensors import Code
 from shapeprog.language.unroll import draw_blocks
 from shapeprog.liang2022.decode import decode
-from shapeprog.liang2022.generator import Generator, TeacherForcingBatch, live_blocks, preceding_blocks, take
+from shapeprog.liang2022.generator import Generator, TeacherForcingBatch, live_blocks, preceding, preceding_blocks, take
 from shapeprog.liang2022.prior import PRIORS
 from shapeprog.liang2022.settings import Order, PretrainSettings
 from shapeprog.liang2022.weights import build_generator, load_generator

@@ -11,13 +11,13 @@ from jaxtyping import Bool, Int, UInt8
 from torch import Tensor
 
 from shapeprog.errors import InputError, did_you_mean
-from shapeprog.geometry.cells import preceding, union, unpack
+from shapeprog.geometry.cells import unpack
 from shapeprog.kernels.bits import FIRST, GOLDEN
 from shapeprog.language import Code, Program, decode, encode
 from shapeprog.language.unroll import draw_blocks
 from shapeprog.liang2022 import narrow, wide
 from shapeprog.liang2022.draft import Draft, Rng, Template
-from shapeprog.liang2022.generator import take
+from shapeprog.liang2022.generator import preceding, take, union
 
 BLOCKS = 10  # largest number of blocks K of a program
 

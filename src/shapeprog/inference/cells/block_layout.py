@@ -1,41 +1,38 @@
 """Layout of the row of numbers in which the structure search stores a block.
 
-A block is a row of 20 whole numbers (as float64): a form, its own numbers, and the loops around it.
+A block is a row of 16 whole numbers (as float64): a form, its own numbers, and the loops around it.
 
 =========  ============================================================================================
 slots      hold
 =========  ============================================================================================
-0          FORM: ``BOX``, ``DISC``, ``BACK``, ``LINE`` or ``CROSS``
+0          FORM: ``BOX``, ``DISC``, ``BACK`` or ``LINE``
 1 to 7     FIRST and on, the numbers of the form in the order of its statement, in cells, others unused:
            BOX   low corner (up, depth, side), extents (up, depth, side)
            DISC  centre of the bottom (up, depth, side), thickness, radius
            BACK  low corner, extents, tilt
            LINE  cell of one end, cell of the other end, radius
-           CROSS hub (up, depth, side), thickness, length, quarter turn
 8          COUNT1: copies of the first translation loop, 1 for none
 9 to 11    SHIFT1: its step (up, depth, side)
 12         COUNT2: copies of the second translation loop, 1 for none
 13 to 15   SHIFT2: its step
-16         ROTATE: copies of the rotation loop around a line or cross, 0 for none
-17 to 19   unused
 =========  ============================================================================================
 """
 
 from __future__ import annotations
 
-WIDTH = 20
+WIDTH = 16
 """Numbers of one block."""
 
-BOX, DISC, BACK, LINE, CROSS = 0, 1, 2, 3, 4
+BOX, DISC, BACK, LINE = 0, 1, 2, 3
 
 FORM, FIRST = 0, 1
 EXTENT = FIRST + 3
-"""Extents of a box or back; thickness of a disc or cross; the far end of a line."""
+"""Extents of a box or back; thickness of a disc; the far end of a line."""
 
 RADIUS = FIRST + 4
-"""Radius of a disc, and the length of an arm of a cross."""
+"""Radius of a disc."""
 
 TILT = FIRST + 6
 """Tilt of a back, and the radius of a line."""
 
-COUNT1, SHIFT1, COUNT2, SHIFT2, ROTATE = 8, 9, 12, 13, 16
+COUNT1, SHIFT1, COUNT2, SHIFT2 = 8, 9, 12, 13

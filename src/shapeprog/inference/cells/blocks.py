@@ -9,13 +9,11 @@ from shapeprog.inference.cells.block_layout import (
     BOX,
     COUNT1,
     COUNT2,
-    CROSS,
     DISC,
     EXTENT,
     FIRST,
     FORM,
     LINE,
-    ROTATE,
     SHIFT1,
     SHIFT2,
     TILT,
@@ -24,7 +22,7 @@ from shapeprog.inference.roles.roles import roles_of_blocks
 from shapeprog.language.program import Chain, Draw, Loop, Program, nest
 from shapeprog.space import FloatArray
 
-FORMS = {BOX: "locker", BACK: "back", LINE: "line", CROSS: "base_cross", DISC: "support_cylinder"}
+FORMS = {BOX: "locker", BACK: "back", LINE: "line", DISC: "support_cylinder"}
 """Statements of the paper that draw the forms."""
 
 BOXES = {
@@ -49,7 +47,7 @@ CORNER = {
 
 
 def to_program(blocks: FloatArray) -> Program:
-    """The program of blocks (K, 20), largest part first, every part named by its role."""
+    """The program of blocks (K, 16), largest part first, every part named by its role."""
     if not len(blocks):
         return Program()
     tidied = np.stack([tidy(block) for block in blocks])
@@ -92,13 +90,11 @@ def tidy(block: FloatArray) -> FloatArray:
 
 def _cells(block: FloatArray) -> float:
     values = block[FIRST : FIRST + 7]
-    copies = block[COUNT1] * block[COUNT2] * max(block[ROTATE], 1)
+    copies = block[COUNT1] * block[COUNT2]
     if int(block[FORM]) in (BOX, BACK):
         return float(values[3:6].prod() * copies)
     if int(block[FORM]) == LINE:
         return float(3 * np.linalg.norm(values[3:6] - values[:3]) * values[6] ** 2 * copies)
-    if int(block[FORM]) == CROSS:
-        return float(2 * values[3] * values[4] * copies)
     return float(3.14 * values[3] * values[4] ** 2 * copies)
 
 
@@ -108,7 +104,7 @@ def _node(block: FloatArray, name: str) -> Draw | Loop:
     middle = [low[0], low[1] + depth / 2, low[2] + side / 2, up, depth / 2]
     even, square = depth % 2 == side % 2 == 0, depth == side
     if form != BOX:
-        numbers = list(values[: {LINE: 7, BACK: 7, CROSS: 6}.get(form, 5)])
+        numbers = list(values[: {LINE: 7, BACK: 7}.get(form, 5)])
     elif name == "top_rectangle" and even and square:
         name, numbers = "top_square", middle
     elif name in ("top_rectangle", "layer") and even:
@@ -129,6 +125,4 @@ def _loops(block: FloatArray) -> list[Loop]:
     for count, shift in ((COUNT1, SHIFT1), (COUNT2, SHIFT2)):
         if block[count] > 1:
             loops.append(Loop("translate", (float(block[count]), *map(float, block[shift : shift + 3])), ()))
-    if block[ROTATE] > 1:
-        loops.append(Loop("rotate", (float(block[ROTATE]), 1.0), ()))
     return loops

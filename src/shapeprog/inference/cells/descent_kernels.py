@@ -15,7 +15,6 @@ from shapeprog.inference.cells.block_layout import (
     FORM,
     LINE,
     RADIUS,
-    ROTATE,
     TILT,
 )
 from shapeprog.inference.cells.raster_kernels import draw_block
@@ -45,7 +44,7 @@ GAIN = 1e-9
 @helper
 def statements(block):
     """Statements of a block: itself and its loops; from Python also for each column of a transposed array of blocks."""
-    return 1 + (block[COUNT1] > 1) + (block[COUNT2] > 1) + (block[ROTATE] > 1)
+    return 1 + (block[COUNT1] > 1) + (block[COUNT2] > 1)
 
 
 @helper
@@ -54,7 +53,7 @@ def valid(block):
     form = int(block[FORM])
     if block[COUNT1] < 1 or block[COUNT2] < 1 or block[COUNT1] * block[COUNT2] > MOST_COPIES:
         return False
-    for level in range(COUNT1, ROTATE, LOOP):
+    for level in (COUNT1, COUNT2):
         if block[level] > 1:
             separate = False
             for axis in range(3):
@@ -81,7 +80,7 @@ def layers(block):
     if block[FORM] == LINE:
         margin = REACH * block[TILT] + 2
         start, end = min(block[FIRST], block[EXTENT]) - margin, max(block[FIRST], block[EXTENT]) + margin
-    for level in range(COUNT1, ROTATE, LOOP):
+    for level in (COUNT1, COUNT2):
         reach = (block[level] - 1) * block[level + 1]
         start += min(reach, 0.0)
         end += max(reach, 0.0)
@@ -141,7 +140,7 @@ def moves(block, out, far):
                     n = put(out, n, block, FIRST + axis, delta, EXTENT + axis, delta)
             else:
                 n = put(out, n, block, FIRST, delta, EXTENT, -delta)
-        for level in range(COUNT1, ROTATE, LOOP):
+        for level in (COUNT1, COUNT2):
             if block[level] > 1:
                 for axis in range(3):
                     step = level + 1 + axis
@@ -153,8 +152,6 @@ def moves(block, out, far):
                 if which < 2:
                     n = put(out, n, block, level, delta, level, 0.0)
                     n = put_loop(out, n, block, level, delta, -1, delta)
-        if block[ROTATE] > 0 and which < 2:
-            n = put(out, n, block, ROTATE, delta, ROTATE, 0.0)
     return n
 
 
@@ -171,7 +168,7 @@ def descend(block, occupied, covered, price, far, scratch_rows, scratch_words, a
     price, far
         Price of a statement in IoU, and largest step of one move in cells.
     scratch_rows, scratch_words, around
-        Scratch: the same three times 1024 words of 32 cells as 512 of 64, and room for all neighbours (M, 20).
+        Scratch: the same three times 1024 words of 32 cells as 512 of 64, and room for all neighbours (M, 16).
     """
     rows, words, gained, wasted = scratch_rows[0], scratch_words[0], scratch_words[1], scratch_words[2]
     inter = 0

@@ -151,7 +151,7 @@ def propose_form(
     Parameters
     ----------
     form
-        ``DISC``, ``BACK``, ``LINE``, ``CROSS``, or one more for a star of lines.
+        ``DISC``, ``BACK`` or ``LINE``.
     waste
         Weight of an empty cell against an occupied one.
     box

@@ -1,4 +1,4 @@
-"""Kernels that guess forms other than upright boxes: discs, sheared backs, oblique bars, stars and crosses."""
+"""Kernels that guess forms other than upright boxes: discs, sheared backs and oblique bars."""
 
 from __future__ import annotations
 
@@ -9,14 +9,11 @@ from shapeprog.inference.cells.block_layout import (
     BOX,
     COUNT1,
     COUNT2,
-    CROSS,
-    DISC,
     EXTENT,
     FIRST,
     FORM,
     LINE,
     RADIUS,
-    ROTATE,
     TILT,
 )
 from shapeprog.inference.cells.descent_kernels import valid
@@ -30,7 +27,7 @@ def guess(form, cells, box, seed, out):
     Parameters
     ----------
     form
-        ``LINE``, ``BACK``, ``DISC``, ``CROSS``, or one more for a star of lines.
+        ``LINE``, ``BACK`` or ``DISC``.
     cells
         Low corners (n, 3) of the cells to choose from.
     box
@@ -38,7 +35,7 @@ def guess(form, cells, box, seed, out):
     seed
         Seed of the random numbers.
     out
-        Output for G guesses (G, 20); the valid blocks come first.
+        Output for G guesses (G, 16); the valid blocks come first.
     """
     np.random.seed(seed)
     count = 0
@@ -53,10 +50,8 @@ def guess(form, cells, box, seed, out):
             guess_line(block, a, b, box)
         elif form == BACK:
             guess_back(block, a, b, box)
-        elif form == DISC:
-            guess_disc(block, a, b, box)
         else:
-            guess_star(block, a, cells)
+            guess_disc(block, a, b, box)
         if valid(block):
             count += 1
     return count
@@ -120,34 +115,7 @@ def guess_disc(block, a, b, box):
 
 
 @helper
-def guess_star(block, a, cells):
-    """A cross, or a star of bars where the form is a bar, around the middle of the grid or of the cells."""
-    centre1, centre2 = 0.0, 0.0
-    for i in range(len(cells)):
-        centre1 += cells[i, 1]
-        centre2 += cells[i, 2]
-    centre1, centre2 = centre1 / len(cells) + 0.5, centre2 / len(cells) + 0.5
-    if np.random.random() < 0.5:
-        centre1, centre2 = 0.0, 0.0
-    block[FIRST] = a[0]
-    if block[FORM] == CROSS:
-        block[FIRST + 1], block[FIRST + 2] = np.rint(centre1), np.rint(centre2)
-        block[EXTENT] = 1 + np.random.randint(3)
-        block[RADIUS] = max(2.0, np.rint(np.sqrt((a[1] - centre1) ** 2 + (a[2] - centre2) ** 2)))
-        block[RADIUS + 1] = np.random.randint(4)
-        block[ROTATE] = 4
-    else:
-        block[FORM] = LINE
-        block[FIRST + 1], block[FIRST + 2] = np.floor(centre1), np.floor(centre2)
-        for axis in range(3):
-            block[EXTENT + axis] = a[axis]
-        block[FIRST] = a[0] + np.random.randint(4)
-        block[TILT] = 1
-        block[ROTATE] = 3 + np.random.randint(4)
-
-
-@helper
 def copy_loops(block, box):
     """Give a block the translation loops of another."""
-    for slot in range(COUNT1, ROTATE):
+    for slot in range(COUNT1, len(block)):
         block[slot] = box[slot]

@@ -42,7 +42,7 @@ def propose(occupied, covered, waste, low, high, table, picks, price, volumes, b
     volumes
         Scratch for ``VOLUMES`` volumes of 32^3 cells.
     block
-        Output (20), initially zeros.
+        Output (16), initially zeros.
 
     Returns
     -------

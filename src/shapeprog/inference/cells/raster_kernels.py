@@ -6,7 +6,6 @@ import numpy as np
 
 from shapeprog.inference.cells.block_layout import (
     BACK,
-    BOX,
     COUNT1,
     COUNT2,
     DISC,
@@ -14,8 +13,6 @@ from shapeprog.inference.cells.block_layout import (
     FIRST,
     FORM,
     LINE,
-    RADIUS,
-    ROTATE,
     SHIFT1,
     SHIFT2,
     TILT,
@@ -26,9 +23,6 @@ from shapeprog.kernels.rows import CAP, REACH
 
 ROWS = 1024
 """Rows of the grid: row 32 i + j holds the cells at height i and depth j."""
-
-ARM = 2
-"""Width of an arm of a cross base in cells."""
 
 
 @helper
@@ -97,37 +91,19 @@ def reached(middle, slope, half, r):
 @helper
 def draw_block(rows, block):
     """Set the cells of all copies of a block, clipped to the grid."""
-    form = int(block[FORM])
-    p0, p1, p2 = block[FIRST], block[FIRST + 1], block[FIRST + 2]
-    p3, p4, p5, radius = block[EXTENT], block[RADIUS], block[EXTENT + 2], block[TILT]
-    ta, tb, tc = int(p3), int(p4), int(p5)
-    turns = int(block[ROTATE])
+    form, p0, p1, p2 = int(block[FORM]), int(block[FIRST]), int(block[FIRST + 1]), int(block[FIRST + 2])
+    p3, p4, p5, last = int(block[EXTENT]), int(block[EXTENT + 1]), int(block[EXTENT + 2]), int(block[TILT])
     for i1 in range(int(block[COUNT1])):
         for i2 in range(int(block[COUNT2])):
             s0 = int(i1 * block[SHIFT1] + i2 * block[SHIFT2])
             s1 = int(i1 * block[SHIFT1 + 1] + i2 * block[SHIFT2 + 1])
             s2 = int(i1 * block[SHIFT1 + 2] + i2 * block[SHIFT2 + 2])
-            a, b, c = int(p0) + s0, int(p1) + s1, int(p2) + s2
-            if form in (BOX, BACK):
-                draw_back(rows, a, b, c, ta, tb, tc, int(radius) if form == BACK else 0)
-                continue
             if form == DISC:
-                draw_disc(rows, a, b, c, ta, tb)
-                continue
-            y, z = p4 - p1, p5 - p2
-            for turn in range(max(turns, 1)):
-                if form == LINE:
-                    cos, sin = 1.0, 0.0
-                    if turns > 0:
-                        angle = 2 * np.pi * turn / turns
-                        cos, sin = np.cos(angle), np.sin(angle)
-                    end1, end2 = p1 + y * cos - z * sin, p2 + y * sin + z * cos
-                    draw_line(rows, p0 + s0, p1 + s1, p2 + s2, p3 + s0, end1 + s1, end2 + s2, radius)
-                else:  # one arm of a cross, in the direction of a quarter turn
-                    quarter = (tc + turn) % 4
-                    along = quarter % 2 == 0  # sideways, else in depth
-                    front, side = (1, tb if quarter == 0 else 0) if along else (tb if quarter == 3 else 0, 1)
-                    draw_back(rows, a, b - front, c - side, ta, ARM if along else tb, tb if along else ARM, 0)
+                draw_disc(rows, p0 + s0, p1 + s1, p2 + s2, p3, p4)
+            elif form == LINE:
+                draw_line(rows, p0 + s0, p1 + s1, p2 + s2, p3 + s0, p4 + s1, p5 + s2, last)
+            else:
+                draw_back(rows, p0 + s0, p1 + s1, p2 + s2, p3, p4, p5, last if form == BACK else 0)
 
 
 @kernel("void(f8[:, ::1], u4[:, ::1])")

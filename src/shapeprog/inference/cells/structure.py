@@ -1,7 +1,7 @@
 """Structure search: voxels to blocks of whole numbers that maximise IoU minus price x statements.
 
 Blocks are first added one by one, each the repeated box with the largest gain on uncovered cells.  Then rounds of ruin
-and recreate remove some and insert others, including discs, sheared backs, bars, stars and crosses.
+and recreate remove some and insert others, including discs, sheared backs and bars.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Structure:
-    """Blocks (K, 20), their IoU, and why the search stopped."""
+    """Blocks (K, 16), their IoU, and why the search stopped."""
 
     blocks: FloatArray
     iou: float

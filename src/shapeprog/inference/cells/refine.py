@@ -1,8 +1,7 @@
 """Refinement: all continuous parameters of a program together, by gradient through the renderer.
 
 The loss has both directions of a chamfer distance, one of them exact: target points to the surface of the union by
-signed distance, and points sampled on the visible surface to their nearest target points.  A further term keeps
-parts in contact that touch on the grid: contact faces are hidden, so no point constrains them.
+signed distance, and points sampled on the visible surface to their nearest target points.
 """
 
 from __future__ import annotations
@@ -13,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 import torch
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float
 from torch import Tensor
 
 from shapeprog.errors import InputError
@@ -23,26 +22,15 @@ from shapeprog.geometry.nearest import squared_distance
 from shapeprog.geometry.scene import Scene
 from shapeprog.geometry.surface import sample_surface
 from shapeprog.inference.budget import NEVER, Deadline, Progress
-from shapeprog.inference.fit.tunable import least
+from shapeprog.inference.fit.tunable import Tunable
 from shapeprog.language.program import Program
-from shapeprog.language.statement import language
-from shapeprog.language.tensors import Code, decode, encode
-from shapeprog.language.unroll import Plan
 from shapeprog.space import HALF
-
-DECIMALS = 2
-"""Decimals of a cell that refined parameters keep: a hundredth is .04 % of the longest side."""
 
 BETAS = (0.8, 0.95)
 """Decay rates of Adam for gradients and for their squares."""
 
 REACH = 1.49
 """Largest change of a parameter from a whole number, in cells: rounding and one step lead back."""
-
-
-TOUCH = 0.03
-"""Weight of a squared gap between two parts that touch on the grid, against squared distances of points."""
-
 
 OCCUPANCY = 0.3
 """Weight of the cross-entropy of a touched cell against squared distances of points."""
@@ -107,89 +95,47 @@ def refine(
         If there are no target points or some are not finite.
     """
     plan = schedule or Schedule()
-    points = torch.as_tensor(target, dtype=torch.float32)
+    points = torch.as_tensor(target, dtype=torch.float64)
     if not len(points) or not bool(torch.isfinite(points).all()):
         raise InputError("refinement needs finite target points", "load the target with shapeprog.load_shape")
     if not program.size:
         return program
-    start = encode(program.flat())
-    free, low = _slots(start)
-    values = start.parameters.clone()
-    high = torch.full_like(low, torch.inf)
+    tunable = Tunable(program)
+    values, low, high = tunable.values, tunable.low, torch.full_like(tunable.values, torch.inf)
     if reach is not None:
         low, high = torch.maximum(low, values - reach), values + reach
     moved = values.clone().requires_grad_()
-    render = Plan(start)
     mean, square = torch.zeros_like(values), torch.zeros_like(values)
     generator = torch.Generator().manual_seed(seed)
-    touching = _contacts(render.scene(values))
     shell = None if voxels is None else _shell(voxels)
     with one_tensor_thread(kernels=1):
         for step in range(plan.steps):
             if deadline.passed(f"the refinement after {step} of {plan.steps} steps"):
                 break
-            scene = render.scene(moved)
+            scene = tunable.scene(moved)
             if not bool(scene.mask.any()):
                 break
             some = points[torch.randint(len(points), (plan.points,), generator=generator)]
             sample = sample_surface(scene, plan.samples, generator)
             surface_loss = (squared_distance(sample.points, points) * sample.weights).mean()
-            loss = (signed_distance(scene, some) ** 2).mean() + surface_loss + TOUCH * _gaps(scene, touching)
+            loss = (signed_distance(scene, some) ** 2).mean() + surface_loss
             if shell is not None:
                 cells = torch.randint(len(shell), (plan.cells,), generator=generator)
                 loss = loss + OCCUPANCY * _occupancy_loss(scene, shell[cells])
             moved.grad = None
             loss.backward()
             assert moved.grad is not None
-            slope = moved.grad.nan_to_num_(0).mul_(free)
+            slope = moved.grad.nan_to_num_(0)
             # Adam (Kingma & Ba 2015) by hand: the first use of torch.optim imports its compiler, for 1.5 s.
             mean.lerp_(slope, 1 - BETAS[0])
             square.lerp_(slope**2, 1 - BETAS[1])
             rate = plan.rate * (0.55 + 0.45 * math.cos(math.pi * step / plan.steps)) / (1 - BETAS[0] ** (step + 1))
             with torch.no_grad():
                 moved.sub_(rate * mean / ((square / (1 - BETAS[1] ** (step + 1))).sqrt() + 1e-8))
-                moved.copy_(torch.where(free, torch.minimum(torch.maximum(moved, low), high), values))
+                moved.copy_(torch.minimum(torch.maximum(moved, low), high))
             if progress:
                 progress("refining", (step + 1) / plan.steps)
-    tidy = torch.where(free, moved.detach().double().round(decimals=DECIMALS).to(values), values)
-    return decode(start.having(tidy))[0]
-
-
-def _slots(code: Code) -> tuple[Bool[Tensor, "K J slots"], Float[Tensor, "K J slots"]]:
-    """Which slots of a program may change, and the smallest value of each, so that no part vanishes.
-
-    Continuous parameters change; a shift that is exactly zero stays zero, so that a loop stays along its axis.
-    """
-    free = torch.zeros(code.parameters.shape, dtype=torch.bool)
-    low = torch.full_like(code.parameters, -torch.inf)
-    for declared in language():
-        mask = code.ids == declared.id
-        if not bool(mask.any()):
-            continue
-        for slot, quantity in enumerate(declared.quantities):
-            still = (code.parameters[..., slot] == 0) & (quantity.kind == "shift")
-            free[..., slot] |= mask & (not quantity.discrete) & ~still
-            low[..., slot] = torch.where(mask, least(quantity), low[..., slot])
-    return free, low
-
-
-def _contacts(scene: Scene) -> Int[Tensor, "C 3"]:
-    """Pairs of primitives and the axis along which the first ends where the second begins: (below, above, axis)."""
-    upright = scene.mask & (scene.rotation.diagonal(dim1=-2, dim2=-1) > 0.999).all(-1)
-    low, high = scene.centre - scene.bounds, scene.centre + scene.bounds
-    overlap = torch.minimum(high[:, None], high[None]) - torch.maximum(low[:, None], low[None])
-    meets = (high[:, None] - low[None]).abs() < 1e-3
-    facing = torch.stack([(overlap[..., [a for a in range(3) if a != axis]] > 0.5).all(-1) for axis in range(3)], -1)
-    return (meets & facing & (upright[:, None] & upright[None])[..., None]).nonzero()
-
-
-def _gaps(scene: Scene, touching: Int[Tensor, "C 3"]) -> Float[Tensor, ""]:
-    """Sum of the squared gaps, in cells, between primitives that should touch."""
-    if not len(touching):
-        return scene.centre.new_zeros(())
-    low, high = scene.centre - scene.bounds, scene.centre + scene.bounds
-    below, above, axis = touching.unbind(-1)
-    return ((low[above, axis] - high[below, axis]).clamp(min=0) ** 2).sum()
+    return tunable.settled(moved.detach())
 
 
 def _shell(voxels: npt.NDArray[np.bool_]) -> Float[Tensor, "S 4"]:
@@ -200,7 +146,7 @@ def _shell(voxels: npt.NDArray[np.bool_]) -> Float[Tensor, "S 4"]:
     outer = ndimage.binary_dilation(voxels)
     cells = np.argwhere(outer & ~inner)
     inside = voxels[tuple(cells.T)]
-    return torch.from_numpy(np.column_stack([cells - HALF + 0.5, inside]).astype(np.float32))
+    return torch.from_numpy(np.column_stack([cells - HALF + 0.5, inside]).astype(np.float64))
 
 
 def _occupancy_loss(scene: Scene, cells: Float[Tensor, "S 4"]) -> Float[Tensor, ""]:

@@ -92,9 +92,8 @@ class Tunable:
         self.scale = self._scales(nodes, first)
 
     def scene(self, values: Float[Tensor, " F"]) -> Scene:
-        """The primitives (N,) where the numbers are these, without gradient."""
-        with torch.no_grad():
-            return self._once.scene(self._filled(values))
+        """The primitives (N,) where the numbers are these."""
+        return self._once.scene(self._filled(values))
 
     def poses(self, values: Float[Tensor, " F"]) -> Poses:
         """Primitives and slopes where the numbers are these.

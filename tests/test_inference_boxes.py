@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from shapeprog.geometry.cells import voxels as voxels_of
-from shapeprog.inference.cells.box_kernels import heaviest
+from shapeprog.inference.cells import box_kernels
 from shapeprog.inference.cells.families import MIRROR, families
 from shapeprog.inference.cells.fold_kernels import VOLUMES, mirrors, search_family
-from shapeprog.inference.cells.greedy import greedy_boxes
+from shapeprog.inference.cells.structure import greedy_boxes
 from shapeprog.language.unroll import unroll
 
 ANY = 1 << 20
@@ -20,7 +20,7 @@ ANY = 1 << 20
 def heaviest_box(weights, limit0, limit1, floor):
     """The compiled search, its sum and its box."""
     box = np.zeros(6, np.int64)
-    return heaviest(weights.reshape(-1), *weights.shape, limit0, limit1, floor, box), box
+    return box_kernels.heaviest_box(weights.reshape(-1), *weights.shape, limit0, limit1, floor, box), box
 
 
 def all_boxes(shape):

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from shapeprog.kernels.compile import helper, kernel
+from shapeprog.kernels.compile import helper
 
 SLACK = 0.01
 """Margin below the best at which a bound prunes: more than the rounding error of a sum in single precision."""
@@ -88,9 +88,3 @@ def heaviest_box(weights, size0, size1, size2, limit0, limit1, floor, box):
                             box[0], box[1], box[2] = lo0, hi0 + 1, lo1
                             box[3], box[4], box[5] = hi1 + 1, start, k + 1
     return best
-
-
-@kernel("f8(f4[::1], i8, i8, i8, i8, i8, f8, i8[::1])")
-def heaviest(weights, size0, size1, size2, limit0, limit1, floor, box):
-    """``heaviest_box`` from Python."""
-    return heaviest_box(weights, size0, size1, size2, limit0, limit1, floor, box)

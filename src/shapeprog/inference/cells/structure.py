@@ -6,19 +6,20 @@ and recreate remove some and insert others, including discs, sheared backs and b
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 
 from shapeprog.inference.budget import NEVER, Deadline, Progress
 from shapeprog.inference.cells.block_layout import WIDTH
+from shapeprog.inference.cells.blocks import to_program
+from shapeprog.inference.cells.drawing import draw_all
+from shapeprog.inference.cells.editing import Target, best_box, iou, polish, value_of
+from shapeprog.inference.cells.ruin import Pool, rebuild
 from shapeprog.inference.cells.settings import Settings
+from shapeprog.language.program import Program
 from shapeprog.space import FloatArray
-
-if TYPE_CHECKING:
-    from shapeprog.inference.cells.editing import Target
 
 
 @dataclass(frozen=True)
@@ -47,13 +48,11 @@ def search_structure(
     progress
         Called with the name of the current step and the completed share of it.
     """
-    from shapeprog.inference.cells import editing, ruin
-
-    target = editing.Target.of(voxels, settings)
+    target = Target.of(voxels, settings)
     rough = greedy_starts(target)
-    starts = [editing.polish(blocks, target, 1, 3) for blocks in rough]
-    best = max(starts, key=lambda blocks: editing.value_of(blocks, target))
-    best_value = editing.value_of(best, target)
+    starts = [polish(blocks, target, 1, 3) for blocks in rough]
+    best = max(starts, key=lambda blocks: value_of(blocks, target))
+    best_value = value_of(best, target)
     earlier = [*rough, *starts]
     done, gained, reason = 0, 0, f"all {settings.rounds} rounds"
     while done < settings.rounds:
@@ -65,8 +64,8 @@ def search_structure(
             break
         rounds = min(settings.chunk, settings.rounds - done)
         heat = settings.heat * (1 - done / settings.rounds)
-        pool = ruin.Pool.of(earlier[-settings.kept :], target)
-        blocks, value = ruin.rebuild(best, target, pool, rounds, heat, np.random.default_rng((seed, done)))
+        pool = Pool.of(earlier[-settings.kept :], target)
+        blocks, value = rebuild(best, target, pool, rounds, heat, np.random.default_rng((seed, done)))
         done += rounds
         if value > best_value:
             earlier.append(blocks)
@@ -75,15 +74,12 @@ def search_structure(
             best, best_value = blocks, value
         if progress:
             progress("searching structure", done / settings.rounds)
-    polished = editing.polish(best, target, 3, 5)
-    return Structure(polished, editing.iou(polished, target), reason)
+    polished = polish(best, target, 3, 5)
+    return Structure(polished, iou(polished, target), reason)
 
 
 def greedy_starts(target: Target) -> list[FloatArray]:
     """For each weight of an empty cell, the repeated boxes with the largest gains, one after another."""
-    from shapeprog.inference.cells.drawing import draw_all
-    from shapeprog.inference.cells.editing import best_box
-
     everything = np.arange(len(target.table))
     starts = []
     for waste in target.settings.starts:
@@ -95,3 +91,12 @@ def greedy_starts(target: Target) -> list[FloatArray]:
             blocks = np.concatenate([blocks, block[None]])
         starts.append(blocks)
     return starts
+
+
+def greedy_boxes(voxels: npt.NDArray[np.bool_], boxes: int = 10) -> Program:
+    """At most ``boxes`` boxes, each with the largest count of newly covered occupied minus empty cells.
+
+    No learning, no loops, no search beyond the exact maximum-sum box: a baseline for programs of equal size.
+    """
+    target = Target.of(voxels, Settings(blocks=boxes, price=0.0, starts=(1.0,)))
+    return to_program(greedy_starts(replace(target, table=target.table[:1]))[0])

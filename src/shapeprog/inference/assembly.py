@@ -31,18 +31,6 @@ from shapeprog.language.program import Node, Program
 MOST_CANDIDATES = 1_500
 """Most candidates that are compared; half of them may be single blocks."""
 
-LOOSE = 1.5
-"""Wide tolerance of a first choice, as a multiple of that of the evidence."""
-
-ROUGH = 8
-"""Steps of adjustment before the second choice."""
-
-HARM = 0.005
-"""Loss of coverage from which the adjustment of a block is undone, as a share of the target."""
-
-REST = 200
-"""Maximum number of the rejected candidates that compete again: those with the largest gain."""
-
 LEAST_GAIN = 0.0005
 """Share of the surface from which a second choice is accepted, and another block is mentioned."""
 
@@ -135,26 +123,26 @@ def _chosen(
     first = tuple(candidates[index] for index in choice.best.chosen)
     if not first or deadline.passed("another choice among neighbours"):
         return choice, candidates
-    wide = replace(evidence, tolerance=LOOSE * evidence.tolerance, reach=LOOSE * evidence.reach)
+    wide = replace(evidence, tolerance=1.5 * evidence.tolerance, reach=1.5 * evidence.reach)
     loose = choose(_table(candidates, Coverage(wide, coverage.prices, seed)), blocks, seed=seed)
     pool = list(first)
     for nodes in dict.fromkeys([first, tuple(candidates[index] for index in loose.best.chosen)]):
-        adjusted = adjust(Program(nodes), evidence, steps=ROUGH, seed=seed, deadline=deadline)
+        adjusted = adjust(Program(nodes), evidence, steps=8, seed=seed, deadline=deadline)
         pool += [*nodes, *adjusted.body, *neighbours(adjusted), *residual_candidates(adjusted, evidence)]
-    remaining = [candidates[index] for index in missed(table, choice.best.chosen)[:REST]]
+    remaining = [candidates[index] for index in missed(table, choice.best.chosen)[:200]]
     pool = list(dict.fromkeys([*pool, *remaining]))  # the first choice first: the search starts there
     again = choose(_table(pool, coverage), blocks, start=range(len(first)), seed=seed)
     return (again, pool) if again.best.value > choice.best.value + LEAST_GAIN else (choice, candidates)
 
 
 def _unharmed(adjusted: Program, start: Program, coverage: Coverage) -> Program:
-    """The adjusted program; blocks whose adjustment has clearly done harm are restored."""
+    """The adjusted program; blocks whose adjustment costs more than .005 of the target are restored."""
     count, union = len(start.body), [*adjusted.body, *start.body]
     table = _table(union, coverage)
     selected = tuple(range(count))
     for index in range(count):
         trial = (*selected[:index], count + index, *selected[index + 1 :])
-        if value(table, trial) > value(table, selected) + HARM:
+        if value(table, trial) > value(table, selected) + 0.005:
             selected = trial
     return Program(tuple(union[index] for index in selected))
 

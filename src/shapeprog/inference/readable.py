@@ -26,18 +26,6 @@ from shapeprog.language.unroll import unroll
 TOLERANCES = (0.015, 0.004, 0.001)
 """How far a face may move, in cells; the smaller ones where parts come apart, and for programs in cells."""
 
-STEPS = (0.5, 1.0)
-"""Shares of that in two rounds: numbers that are nearly round go first."""
-
-SHARE = 0.03
-"""Share of itself by which a number may change, so that thin parts keep their thickness."""
-
-FINER = 2
-"""Decimals that are tried beyond those that suffice for one number alone."""
-
-MOST = 256
-"""Most primitives of a program that is rounded."""
-
 CELLS = "cells"
 """The word for lengths in cells of the grid."""
 
@@ -74,7 +62,7 @@ def in_readable_unit(program: Program, unit: Unit | None, seed: int = 0) -> Prog
     if program.unit == unit:
         return program
     exact = in_unit(program, unit)
-    if not 0 < exact.size <= MOST:
+    if not 0 < exact.size <= 256:  # rounding takes long for more primitives
         return exact
     floating = afloat(program, seed)
     for tolerance in TOLERANCES[unit is None :]:
@@ -88,9 +76,10 @@ def _rounded(program: Program, tolerance: float) -> Program:
     lengths, with_numbers = literal_lengths(program)
     numbers, before = [*lengths], _faces(program)
     per_cell = 1.0 if program.unit is None else program.unit.per_cell
-    for step in STEPS:
+    for step in (0.5, 1.0):  # shares of the tolerance: numbers that are nearly round go first
         for index, number in enumerate(lengths):
-            for tried in _rounder(number, min(step * tolerance * per_cell, SHARE * abs(number))):
+            # Numbers change by at most 3 %, so that thin parts keep their thickness.
+            for tried in _rounder(number, min(step * tolerance * per_cell, 0.03 * abs(number))):
                 if tried == numbers[index]:
                     break
                 try:
@@ -107,7 +96,7 @@ def _rounded(program: Program, tolerance: float) -> Program:
 def _rounder(number: float, farthest: float) -> Iterator[float]:
     """Numbers near one, those with the fewest decimals first."""
     fewest, maximum = (-math.floor(math.log10(value)) for value in (abs(number), farthest))
-    for digits in range(fewest - 1, maximum + FINER):
+    for digits in range(fewest - 1, maximum + 2):  # finer than one number alone needs
         nearest, step = round(number, digits), math.copysign(10.0**-digits, number - round(number, digits))
         for tried in (to_float32(nearest), to_float32(round(nearest + step, digits))):
             if abs(tried - number) <= farthest:

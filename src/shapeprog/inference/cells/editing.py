@@ -19,12 +19,6 @@ from shapeprog.inference.cells.raster_kernels import ROWS
 from shapeprog.inference.cells.settings import Settings
 from shapeprog.space import RESOLUTION, FloatArray
 
-GUESSES = 30
-"""Number of rough blocks of a form, the best of which starts a descent."""
-
-FEWEST = 4
-"""Smallest number of uncovered cells for a form other than a box."""
-
 
 @dataclass(frozen=True)
 class Target:
@@ -159,9 +153,9 @@ def propose_form(
     """
     gained, wasted = target.occupied & ~covered, ~target.occupied & ~covered
     cells = low_corners(gained)
-    if len(cells) < FEWEST:
+    if len(cells) < 4:
         return 0.0, np.zeros(WIDTH)
-    rough: FloatArray = np.empty((GUESSES, WIDTH))
+    rough: FloatArray = np.empty((30, WIDTH))
     rough = rough[: guess(form, cells, box, int(random.integers(2**31)), rough)]
     if not len(rough):
         return 0.0, np.zeros(WIDTH)

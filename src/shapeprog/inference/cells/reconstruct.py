@@ -24,9 +24,6 @@ from shapeprog.inference.surface.cells import points_of_cells
 from shapeprog.language.program import Program
 from shapeprog.language.unroll import unroll
 
-DEEP = 2.5
-"""Depth in cells below the surface of the snapped program beyond which points are inner faces; chosen on val."""
-
 
 @dataclass(frozen=True)
 class Reconstruction:
@@ -93,11 +90,11 @@ def description_length(program: Program, voxels: npt.NDArray[np.bool_], snapped:
 def outer_points(shape: Shape, snapped: Program, seed: int) -> Float[Tensor, "P 3"]:
     """Points that the surface of the program should meet.
 
-    Points deep inside the solid lie on inner faces of the mesh, such as the back of a drawer.  The surface of a union
-    cannot reach them; in the loss they would pull its outer faces inwards.
+    Points deeper than 2.5 cells inside the snapped solid lie on inner faces of the mesh, such as the back of a drawer.
+    The surface of a union cannot reach them; in the loss they would pull its outer faces inwards.
     """
     if shape.points is None:
         return torch.from_numpy(points_of_cells(shape.voxels, seed=seed))
     points = torch.from_numpy(np.asarray(shape.points, np.float32))
-    outer = points[nearest_primitive(unroll(snapped), points)[1] > -DEEP] if snapped.size else points
+    outer = points[nearest_primitive(unroll(snapped), points)[1] > -2.5] if snapped.size else points
     return outer if len(outer) else points

@@ -26,17 +26,8 @@ from shapeprog.inference.fit.tunable import Tunable
 from shapeprog.language.program import Program
 from shapeprog.space import HALF
 
-BETAS = (0.8, 0.95)
-"""Decay rates of Adam for gradients and for their squares."""
-
 REACH = 1.49
 """Largest change of a parameter from a whole number, in cells: rounding and one step lead back."""
-
-OCCUPANCY = 0.3
-"""Weight of the cross-entropy of a touched cell against squared distances of points."""
-
-SHARPNESS = 6.0
-"""How fast a soft cell fills, per cell of distance."""
 
 
 @dataclass(frozen=True)
@@ -121,17 +112,17 @@ def refine(
             loss = (signed_distance(scene, some) ** 2).mean() + surface_loss
             if shell is not None:
                 cells = torch.randint(len(shell), (plan.cells,), generator=generator)
-                loss = loss + OCCUPANCY * _occupancy_loss(scene, shell[cells])
+                loss = loss + 0.3 * _occupancy_loss(scene, shell[cells])
             moved.grad = None
             loss.backward()
             assert moved.grad is not None
             slope = moved.grad.nan_to_num_(0)
             # Adam (Kingma & Ba 2015) by hand: the first use of torch.optim imports its compiler, for 1.5 s.
-            mean.lerp_(slope, 1 - BETAS[0])
-            square.lerp_(slope**2, 1 - BETAS[1])
-            rate = plan.rate * (0.55 + 0.45 * math.cos(math.pi * step / plan.steps)) / (1 - BETAS[0] ** (step + 1))
+            mean.lerp_(slope, 1 - 0.8)
+            square.lerp_(slope**2, 1 - 0.95)
+            rate = plan.rate * (0.55 + 0.45 * math.cos(math.pi * step / plan.steps)) / (1 - 0.8 ** (step + 1))
             with torch.no_grad():
-                moved.sub_(rate * mean / ((square / (1 - BETAS[1] ** (step + 1))).sqrt() + 1e-8))
+                moved.sub_(rate * mean / ((square / (1 - 0.95 ** (step + 1))).sqrt() + 1e-8))
                 moved.copy_(torch.minimum(torch.maximum(moved, low), high))
             if progress:
                 progress("refining", (step + 1) / plan.steps)
@@ -151,5 +142,5 @@ def _shell(voxels: npt.NDArray[np.bool_]) -> Float[Tensor, "S 4"]:
 
 def _occupancy_loss(scene: Scene, cells: Float[Tensor, "S 4"]) -> Float[Tensor, ""]:
     """Cross-entropy of touched cells: a solid touches a cell when it comes within half a cell of its centre."""
-    logits = SHARPNESS * (0.5 - signed_distance(scene, cells[:, :3]))
+    logits = 6 * (0.5 - signed_distance(scene, cells[:, :3]))
     return torch.nn.functional.binary_cross_entropy_with_logits(logits, cells[:, 3])

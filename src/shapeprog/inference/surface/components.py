@@ -11,15 +11,6 @@ from scipy.sparse.csgraph import connected_components
 
 from shapeprog.space import Array, FloatArray
 
-WELD = 2.0**-12
-"""Vertices that round to the same multiple of this, in cells, are one: a hundred-thousandth of the longest side."""
-
-OPEN = 0.02
-"""Share of its edges at which a component may be open and yet bound a solid."""
-
-THICK = 0.2
-"""Least thickness of such a solid in cells, on average: the sign of the volume of a crumpled sheet is random."""
-
 
 class Components(NamedTuple):
     """Components by falling area, and the welded mesh that contains them.
@@ -65,10 +56,13 @@ def components(vertices: Array, faces: Array) -> Components:
 
 
 def weld(vertices: FloatArray, faces: npt.NDArray[np.int64]) -> tuple[FloatArray, npt.NDArray[np.int64]]:
-    """Vertices with coinciding ones merged, in the order of first use by faces, and the faces."""
+    """Vertices with coinciding ones merged, in the order of first use by faces, and the faces.
+
+    Vertices coincide if they round to the same multiple of 2^-12 cells, a hundred-thousandth of the longest side.
+    """
     used = np.zeros(len(vertices), np.bool_)
     used[faces.reshape(-1)] = True
-    cell = np.round(vertices[used] / WELD + 0.3).astype(np.int64)  # round numbers are well inside their cell
+    cell = np.round(vertices[used] * 2**12 + 0.3).astype(np.int64)  # round numbers are well inside their cell
     cell -= cell.min(0)
     size = cell.max(0) + 1
     key = (cell[:, 0] * size[1] + cell[:, 1]) * size[2] + cell[:, 2]
@@ -97,7 +91,8 @@ def solid_sides(mesh: Components) -> npt.NDArray[np.int64]:
     """For each face (F,) of a component that bounds a solid, 1 if it faces outwards and -1 if inwards; 0 for others.
 
     At each edge of a closed surface, equally many faces run in both directions, and the signed volume is positive if
-    the faces point outwards.
+    the faces point outwards.  Some 2 % of the edges may be open.  The solid is at least .2 cells thick on average: the
+    sign of the volume of a crumpled sheet is random.
     """
     faces, counts = mesh.faces, np.diff(mesh.face_start)
     component = np.repeat(np.arange(len(counts)), counts)
@@ -108,7 +103,7 @@ def solid_sides(mesh: Components) -> npt.NDArray[np.int64]:
     corners = mesh.vertices[faces]
     across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     volume = np.bincount(component, (corners[:, 0] * across).sum(1), minlength=len(counts)) / 6
-    solid = (gaps <= OPEN) & (2 * np.abs(volume) > THICK * mesh.area)
+    solid = (gaps <= 0.02) & (2 * np.abs(volume) > 0.2 * mesh.area)
     sides: npt.NDArray[np.int64] = np.where(solid, np.sign(volume), 0).astype(np.int64)[component]
     return sides
 

@@ -176,9 +176,7 @@ def sheet_command(
     terminal.load_modules(modules)
     items: list[Item] = []
     failures: list[ShapeProgError] = []
-    for path in program_files(folder):
-        if len(items) == most:
-            break
+    for path in program_files(folder)[:most]:
         try:
             loaded, _ = terminal.read_program_file(path)
         except ShapeProgError as error:

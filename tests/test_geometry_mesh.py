@@ -9,7 +9,7 @@ from geometry_helpers import make_scene, random_scene
 import shapeprog as sp
 from shapeprog.data.random import random_program
 from shapeprog.errors import ShapeProgError
-from shapeprog.geometry.contacts import contact_groups
+from shapeprog.geometry.contacts import TOUCHING, contact_groups
 from shapeprog.geometry.mesh import gaps, part_meshes, union_mesh
 from shapeprog.geometry.primitives import primitives
 
@@ -102,3 +102,27 @@ def test_groups_of_touching_parts_are_those_of_their_meshes():
     for program, found in zip(programs, contact_groups(sp.unroll(programs)), strict=True):
         scene = sp.unroll(program)
         assert groups(scene, 0.2) <= found <= groups(scene, 0.002)
+
+
+def turned_about_side(*angles):
+    """Rotations by angles in degrees about the axis left-right."""
+    angle = torch.deg2rad(torch.tensor(angles, dtype=torch.float64))
+    low, high, zero, one = angle.sin(), angle.cos(), 0 * angle, 1 + 0 * angle
+    return torch.stack([high, -low, zero, low, high, zero, zero, zero, one], -1).reshape(-1, 3, 3)
+
+
+@pytest.mark.parametrize("angle", [3, 10, 90])
+@pytest.mark.parametrize("gap", [0.5, 1.5])
+def test_rods_that_lean_touch_by_the_gap_at_their_ends(angle, gap):
+    """The second rod leaves the first at an end of its axis, in a plane beside it."""
+    low, high = np.sin(np.deg2rad(angle)), np.cos(np.deg2rad(angle))
+    centre = [[0.0, 0, 0], [5 + 5 * high, 5 * low, 1 + TOUCHING * gap]]
+    rods = make_scene(["cylinder"] * 2, [[5.0, 0.5]] * 2, centre, turned_about_side(0, angle), torch.float64, (1,))
+    assert contact_groups(rods) == [1 if gap < 1 else 2]
+
+
+def test_a_bent_rod_touches_with_both_ends_and_not_with_what_it_spans():
+    sizes, centres = [[5.0, 0.5, 5.0], [1.0, 1, 1], [1.0, 1, 1], [1.0, 1, 1]], [[0.0, 0, 0]]
+    centres += [[-5.0, -3.5, 0], [5.0, -3.5, 0], [0.0, -2.5, 0]]
+    scene = make_scene(["arc", "cuboid", "cuboid", "cuboid"], sizes, centres, lead=(1,))
+    assert contact_groups(scene) == [2]

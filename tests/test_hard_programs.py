@@ -96,7 +96,8 @@ def test_endless_products_of_counts_are_refused_and_those_with_a_zero_draw_nothi
 
 
 SCORES = [
-    "good", [1, 2], 3, None, {"iou": "x"}, {"iou": None}, {"cd": [1]}, {"f1_percent": True}, {"seconds": {}}, {"iou": 10**400},
+    "good", [1, 2], 3, None, {"iou": "x"}, {"iou": None}, {"cd": [1]}, {"f1_percent": True}, {"seconds": {}},
+    {"iou": 10**400},
 ]  # fmt: skip
 
 

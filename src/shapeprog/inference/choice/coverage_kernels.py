@@ -33,7 +33,8 @@ def box_of(table, row, margin, cells, ends, box):
     for axis in range(3):
         column = ROTATION + 3 * axis
         reach = abs(table[row, column]) * a + abs(table[row, column + 1]) * b + abs(table[row, column + 2]) * c
-        box[axis], box[3 + axis] = table[row, CENTRE + axis] - reach - margin, table[row, CENTRE + axis] + reach + margin
+        centre = table[row, CENTRE + axis]
+        box[axis], box[3 + axis] = centre - reach - margin, centre + reach + margin
         ends[axis], ends[3 + axis] = cell_of(box[axis], cells), cell_of(box[3 + axis], cells)
 
 

@@ -79,7 +79,8 @@ class Kernel:
         """Load it from the cache, or compile it and keep it there."""
         with _lock:
             if self._compiled is None:
-                self._dispatcher.compile(self.signature)
+                with suppress(OSError):  # on a full disk, it is compiled but not kept
+                    self._dispatcher.compile(self.signature)
                 self._dispatcher.disable_compile()
                 self._compiled = self._dispatcher
 

@@ -17,7 +17,6 @@ import numpy as np
 from shapeprog.inference.ties.anchored import Anchored
 from shapeprog.inference.ties.layout import HIGH, LOW, MIDDLE, Element, Slot
 from shapeprog.language.ast import Part
-from shapeprog.language.placement import AXES
 from shapeprog.space import FloatArray
 
 WITHIN, HIDDEN = 0.3, 1.5
@@ -118,68 +117,44 @@ class Reading(NamedTuple):
 
 
 class Face(NamedTuple):
-    """An end of an element: its anchor, its row of factors (P,), its coordinate from the low side of the whole, whether
-    it faces the low or the high side (-1 or 1; 0 for the middle), and whether it is one number."""
+    """A low or high end of an element, or its middle.
+
+    Parameters
+    ----------
+    element
+        The element.
+    anchor
+        From where it is measured.
+    row
+        How its coordinate from the low side of the whole follows from the numbers (P,).
+    facing
+        Whether it faces the low or the high side, -1 or 1; 0 for the middle.
+    """
 
     element: Element
     anchor: int
     row: FloatArray
-    at: float
     facing: int
-    single: bool
+
+    @property
+    def single(self) -> bool:
+        """Whether it is one number, the distance from its anchor."""
+        return int((self.row[3:] != 0).sum()) == 1
 
 
-def faces(anchored: Anchored, numbers: FloatArray) -> list[Face]:
-    """All ends of all elements."""
-    count, result = len(anchored.slots), list[Face]()
+def faces(anchored: Anchored) -> list[Face]:
+    """All ends and middles of all elements, and those of their mirror images."""
+    result = list[Face]()
+    for element, low, high in anchored.ends():
+        rows = [(low + high) / 2] if element.kind == "coordinate" else [low, (low + high) / 2, high]
+        facing = [0] if element.kind == "coordinate" else [-1, 0, 1]
+        result += [Face(element, _anchor(row, element), row, way) for row, way in zip(rows, facing, strict=True)]
+    return result + [_image(face) for face in result if _is_mirrored(anchored, face.element)]
 
-    def unit(line: int, word: str) -> FloatArray:
-        row = np.zeros(count)
-        row[anchored.index[line, word]] = 1.0
-        return row
 
-    for (line, key, axis), element in anchored.layout.elements.items():
-        anchors, words, extent = anchored.anchors[line, key, axis], AXES[axis], numbers[axis]
-        word = (words.low, words.offset, words.high)
-
-        def face(anchor: int, row: FloatArray, facing: int, element: Element = element, extent: float = extent) -> Face:
-            value = float(row @ numbers)
-            at = (value, extent / 2 + value, extent - value)[anchor]
-            return Face(element, anchor, row, at, facing, int((row != 0).sum()) == 1)
-
-        if key == "across":
-            if anchors == (LOW, HIGH):
-                row = unit(line, words.low)
-                result += [face(LOW, row, -1), face(HIGH, row, 1)]
-            continue
-        if element.kind == "interval":
-            low, high = anchors
-            if low == high == MIDDLE:
-                middle, half = unit(line, words.offset), unit(line, words.size) / 2
-                result += [face(MIDDLE, middle - half, -1), face(MIDDLE, middle + half, 1)]
-            elif low == high:
-                clearance, size = unit(line, word[low]), unit(line, words.size)
-                sign = -1 if low == LOW else 1
-                result += [face(low, clearance, sign), face(low, clearance + size, -sign)]
-            else:
-                result.append(face(low, unit(line, words.low), -1))
-                result.append(face(high, unit(line, words.high) * (-1 if high == MIDDLE else 1), 1))
-            continue
-        (anchor,) = anchors
-        name = f"{key}.{word[anchor]}" if key else word[anchor]
-        if (line, name) not in anchored.index:
-            continue  # the plane in the middle
-        row = unit(line, name)
-        if element.kind == "coordinate":
-            result.append(face(anchor, row, 0))
-            continue
-        radius = unit(line, "radius") if (line, "radius") in anchored.index else unit(line, "radius.0")
-        if anchor == MIDDLE:
-            result += [face(anchor, row - radius, -1), face(anchor, row, 0), face(anchor, row + radius, 1)]
-        else:
-            sign = -1 if anchor == LOW else 1
-            result += [face(anchor, row, sign), face(anchor, row + radius, 0), face(anchor, row + 2 * radius, -sign)]
-    return result + [_image(face, numbers) for face in result if _is_mirrored(anchored, face.element)]
+def _anchor(row: FloatArray, element: Element) -> int:
+    """The anchor of a coordinate: that of the low side moves with none of the whole, of the high side with all."""
+    return round(2 * row[element.axis])
 
 
 def _is_mirrored(anchored: Anchored, element: Element) -> bool:
@@ -191,11 +166,11 @@ def _is_mirrored(anchored: Anchored, element: Element) -> bool:
     return any(plane is not None and abs(plane.low - layout.extents[axis] / 2) < WITHIN for plane in planes)
 
 
-def _image(face: Face, numbers: FloatArray) -> Face:
+def _image(face: Face) -> Face:
     """The face of the mirror image of a part."""
-    extent = numbers[face.element.axis]
-    row = -face.row if face.anchor == MIDDLE else face.row
-    return face._replace(anchor=2 - face.anchor, row=row, at=extent - face.at, facing=-face.facing)
+    row = -face.row
+    row[face.element.axis] += 1
+    return face._replace(anchor=2 - face.anchor, row=row, facing=-face.facing)
 
 
 def relations(anchored: Anchored, numbers: FloatArray, touching: set[tuple[int, int]], trust: Trust) -> list[Relation]:
@@ -239,7 +214,7 @@ def _readings(
             yield Reading(eye[k], trust.symmetric(slot.axis), hidden=slot.axis == 0)
         elif slot.kind == "angle" and not slot.word.startswith("step"):
             yield Reading(eye[k], trust.zero, DEGREES)
-    all_faces = faces(anchored, numbers)
+    all_faces = faces(anchored)
     for axis in range(3):
         axis_faces = [face for face in all_faces if face.element.axis == axis]
         for face, partner in combinations(axis_faces, 2):
@@ -266,76 +241,41 @@ def _pair(
     anchored: Anchored, face: Face, partner: Face, touching: set[tuple[int, int]], trust: Trust, upright: list[bool]
 ) -> Iterator[Reading]:
     """Relations of two faces of one axis."""
-    first, second = face.element, partner.element
-    axis, same = first.axis, first.line == second.line
-    if face.anchor != partner.anchor:
-        if {face.anchor, partner.anchor} == {LOW, HIGH} and face.single and partner.single and axis < 2:
-            if same:
-                yield Reading(face.row - partner.row, trust.symmetric(axis))
-            elif first.key == "last" or second.key == "last":
-                yield Reading(face.row - partner.row, trust.even)
-            else:
-                yield Reading(face.row - partner.row, trust.opposite)
-        return
-    row = face.row - partner.row
-    if same:
+    first, second, axis = face.element, partner.element, face.element.axis
+    keys, anchors = {first.key, second.key}, {face.anchor, partner.anchor}
+    same, single = first.line == second.line, face.single and partner.single
+    row, image = face.row - partner.row, face.row + partner.row
+    image[axis] -= 1  # zero where one is the mirror image of the other
+    points = [f.element.kind == "coordinate" for f in (face, partner)]
+    middles = [f.facing == 0 and f.element.kind == "interval" for f in (face, partner)]
+    lines = sorted(anchored.layout.first(line)[0] if key == "last" else line
+                   for line, key in ((first.line, first.key), (second.line, second.key)))  # fmt: skip
+    touches = lines[0] != lines[1] and tuple(lines) in touching
+    if len(anchors) > 1:
+        if anchors == {LOW, HIGH} and single and axis < 2 and not any(middles):
+            yield Reading(image, trust.symmetric(axis) if same else trust.even if "last" in keys else trust.opposite)
+    elif any(middles):
+        if touches and axis < 2 and any(points) and not single and not keys & {"last", "plane", "centre"}:
+            yield Reading(row, trust.centre)
+    elif same:
         if first.key and second.key:  # both ends of a rod
             yield Reading(row, trust.straight)
             if face.anchor == MIDDLE:
-                yield Reading(face.row + partner.row, trust.symmetric(axis))
-        return
-    if face.anchor == MIDDLE and face.facing == -partner.facing and face.single and partner.single:
-        yield Reading(face.row + partner.row, trust.opposite)
-    if "last" in (first.key, second.key):
-        loop, element = (first, second) if first.key == "last" else (second, first)
-        part = anchored.layout.first(loop.line)[0]
-        if not (face.single or partner.single):
-            return
-        if element.line == part:
-            if face.single and partner.single:
-                yield Reading(row, trust.straight)
-        elif (min(part, element.line), max(part, element.line)) in touching:
+                yield Reading(image, trust.symmetric(axis))
+    elif keys & {"last", "plane", "centre"}:
+        if "last" in keys and touches and (face.single or partner.single):
             yield Reading(row, trust.contact)
-        elif face.single and partner.single:
-            yield Reading(row, trust.aligned)
-        return
-    if "plane" in (first.key, second.key) or "centre" in (first.key, second.key):
-        if face.single and partner.single:
-            yield Reading(row, trust.aligned)
-        return
-    touches = (min(first.line, second.line), max(first.line, second.line)) in touching
-    straight = axis == 0 or (upright[first.line] and upright[second.line])
-    if touches and face.facing * partner.facing == -1 and straight:
-        yield Reading(row, trust.contact, hidden=True)
-    elif touches and 0 in (face.facing, partner.facing) and straight:
-        middle = face.facing == 0 and partner.facing == 0
-        ends = first.kind == second.kind == "coordinate"
-        if ends or not middle:
+        elif single:
+            yield Reading(row, trust.straight if lines[0] == lines[1] else trust.aligned)
+    else:
+        if face.anchor == MIDDLE and face.facing == -partner.facing and single:
+            yield Reading(image, trust.opposite)
+        if axis > 0 and not (upright[first.line] and upright[second.line]):
+            return
+        if touches and (face.facing * partner.facing == -1 or all(points) or bool(face.facing) != bool(partner.facing)):
             yield Reading(row, trust.contact, hidden=True)
-        else:
-            yield Reading(row, trust.flush)
-    elif face.facing == partner.facing and straight:
-        if face.single and partner.single:
+        elif face.facing == partner.facing and single:
             yield Reading(row, trust.flush if touches else trust.aligned)
-        elif touches:
-            yield Reading(row, trust.middle)
-    if touches and axis < 2 and (first.kind, second.kind) in (("coordinate", "interval"), ("interval", "coordinate")):
-        point, box = (face, partner) if first.kind == "coordinate" else (partner, face)
-        if not box.single and box.facing:  # the middle of a box that it touches
-            yield Reading(point.row - (box.row + _opposite_row(anchored, box)) / 2, trust.centre)
-
-
-def _opposite_row(anchored: Anchored, face: Face) -> FloatArray:
-    """The row of the near face of an interval whose far face this is."""
-    element, row = face.element, np.zeros(len(anchored.slots))
-    if face.anchor == MIDDLE:
-        size = anchored.index[element.line, AXES[element.axis].size]
-        row[size] = -np.sign(face.row[size])
-        return face.row + row
-    words = AXES[element.axis]
-    anchor = anchored.anchors[element.line, element.key, element.axis][0]
-    row[anchored.index[element.line, words.low if anchor == LOW else words.high]] = 1.0
-    return row
 
 
 def _equal(anchored: Anchored, slot: Slot, partner: Slot, a: float, b: float, trust: Trust) -> float:

@@ -19,8 +19,8 @@ from shapeprog.inference.ties.layout import HIGH, LOW, MIDDLE, Element, Slot
 from shapeprog.language.ast import Part
 from shapeprog.space import FloatArray
 
-WITHIN, HIDDEN = 0.3, 1.5
-"""Cells by which a relation may be off; and one between parts that touch, which may end inside each other."""
+WITHIN = 0.3
+"""Cells by which a relation may be off."""
 
 DEGREES = 2.0
 """The same for angles, in degrees."""
@@ -41,53 +41,30 @@ class Trust:
 
     Parameters
     ----------
-    zero
-        A clearance of zero.
     floor
         A part that ends just above the floor.
-    centred, even
-        Equal clearances on both sides, left-right and front-rear.
+    centred
+        Equal clearances on the left and right.
     contact
-        Faces that meet.
-    flush
-        Faces of touching parts that lie in one plane.
+        Faces that meet; equal clearances in front and at the rear.
     straight
-        Ends of a rod at equal distances, or a row along one axis.
-    same_part, section, different
-        Equal sizes of parts of one role; of thin sides of different roles; and others.
-    aligned, opposite, across
-        Equal clearances of parts that do not touch, at one side or at opposite sides; and of one part at a corner.
-    centre
-        An end of a rod on the middle line of a part that it touches.
-    middle
-        Faces in one plane of parts that touch, of which one is a sum.
-    half
-        An edge that is half a thin side of its part.
-    hidden
-        Contacts and centred parts with so large an error that only hidden surfaces can explain it.
+        Ends of a rod at equal distances, or on the middle line of a part that it touches; a row along one axis.
+    equal
+        Zeros; equal sections, equal sizes of parts of one role, and faces of touching parts in one plane.
+    similar
+        Equal clearances of parts that do not touch, at one side, at opposite sides or at a corner.
     """
 
-    zero: float = 1.0
     floor: float = 6.0
     centred: float = 4.0
-    even: float = 2.0
     contact: float = 2.0
-    flush: float = 1.0
     straight: float = 1.5
-    same_part: float = 1.0
-    section: float = 1.0
-    different: float = 0.4
-    aligned: float = 0.8
-    opposite: float = 0.6
-    across: float = 0.6
-    centre: float = 1.5
-    middle: float = 0.4
-    half: float = 0.5
-    hidden: float = 0.6
+    equal: float = 1.0
+    similar: float = 0.7
 
     def symmetric(self, axis: int) -> float:
         """That of equal clearances on both sides along a horizontal axis."""
-        return self.centred if axis == 0 else self.even
+        return self.centred if axis == 0 else self.contact
 
 
 class Relation(NamedTuple):
@@ -106,14 +83,11 @@ class Reading(NamedTuple):
         As of :class:`Relation`.
     limit
         Largest deviation, in cells or degrees.
-    hidden
-        Whether it may be off by up to ``HIDDEN`` with less trust, since only hidden surfaces would move.
     """
 
     row: FloatArray
     trust: float
     limit: float = WITHIN
-    hidden: bool = False
 
 
 class Face(NamedTuple):
@@ -182,16 +156,14 @@ def relations(anchored: Anchored, numbers: FloatArray, touching: set[tuple[int, 
         Pairs of lines, the smaller first, whose parts touch.
     """
     best: dict[bytes, Relation] = {}
-    for row, weight, limit, hidden in _readings(anchored, numbers, touching, trust):
+    for row, weight, limit in _readings(anchored, numbers, touching, trust):
         used = np.flatnonzero(row)
         if not len(used):
             continue
         row = row / row[used[0]]
         off = abs(float(row @ numbers)) / float(np.abs(row).max())
         if off > limit:
-            if not hidden or off > HIDDEN:
-                continue
-            weight = trust.hidden if weight < trust.centred else 1.3
+            continue
         key = np.round(row, 6).tobytes()
         if key not in best or best[key].trust < weight:
             best[key] = Relation(row, weight)
@@ -209,11 +181,11 @@ def _readings(
         if slot.kind == "clearance":
             floor = FLOOR * numbers[2]
             stands = slot.axis == 2 and slot.anchor == LOW and numbers[k] < floor
-            yield Reading(eye[k], trust.floor, max(WITHIN, floor)) if stands else Reading(eye[k], trust.zero)
+            yield Reading(eye[k], trust.floor, max(WITHIN, floor)) if stands else Reading(eye[k], trust.equal)
         elif slot.kind == "offset":
-            yield Reading(eye[k], trust.symmetric(slot.axis), hidden=slot.axis == 0)
+            yield Reading(eye[k], trust.symmetric(slot.axis))
         elif slot.kind == "angle" and not slot.word.startswith("step"):
-            yield Reading(eye[k], trust.zero, DEGREES)
+            yield Reading(eye[k], trust.equal, DEGREES)
     all_faces = faces(anchored)
     for axis in range(3):
         axis_faces = [face for face in all_faces if face.element.axis == axis]
@@ -227,14 +199,10 @@ def _readings(
                 yield Reading(eye[a] + eye[b], weight / 2, DEGREES)
             else:
                 yield Reading(eye[a] - eye[b], weight)
-        small, side = (a, b) if slots[b].kind == "size" else (b, a)
-        kinds = slots[small].kind, slots[side].kind
-        if kinds == ("edge", "size") and slots[small].line == slots[side].line and numbers[side] < THIN:
-            yield Reading(eye[small] - eye[side] / 2, trust.half)
     across = [k for k, slot in enumerate(slots) if slot.kind == "clearance" and slot.axis < 2 and numbers[k] > WITHIN]
     for a, b in combinations(across, 2):
         if slots[a].axis != slots[b].axis and slots[a].line == slots[b].line and max(numbers[a], numbers[b]) < THIN:
-            yield Reading(eye[a] - eye[b], trust.across)
+            yield Reading(eye[a] - eye[b], trust.similar)
 
 
 def _pair(
@@ -253,10 +221,10 @@ def _pair(
     touches = lines[0] != lines[1] and tuple(lines) in touching
     if len(anchors) > 1:
         if anchors == {LOW, HIGH} and single and axis < 2 and not any(middles):
-            yield Reading(image, trust.symmetric(axis) if same else trust.even if "last" in keys else trust.opposite)
+            yield Reading(image, trust.symmetric(axis) if same else trust.contact if "last" in keys else trust.similar)
     elif any(middles):
         if touches and axis < 2 and any(points) and not single and not keys & {"last", "plane", "centre"}:
-            yield Reading(row, trust.centre)
+            yield Reading(row, trust.straight)
     elif same:
         if first.key and second.key:  # both ends of a rod
             yield Reading(row, trust.straight)
@@ -266,35 +234,30 @@ def _pair(
         if "last" in keys and touches and (face.single or partner.single):
             yield Reading(row, trust.contact)
         elif single:
-            yield Reading(row, trust.straight if lines[0] == lines[1] else trust.aligned)
+            yield Reading(row, trust.straight if lines[0] == lines[1] else trust.similar)
     else:
         if face.anchor == MIDDLE and face.facing == -partner.facing and single:
-            yield Reading(image, trust.opposite)
+            yield Reading(image, trust.similar)
         if axis > 0 and not (upright[first.line] and upright[second.line]):
             return
         if touches and (face.facing * partner.facing == -1 or all(points) or bool(face.facing) != bool(partner.facing)):
-            yield Reading(row, trust.contact, hidden=True)
+            yield Reading(row, trust.contact)
         elif face.facing == partner.facing and single:
-            yield Reading(row, trust.flush if touches else trust.aligned)
+            yield Reading(row, trust.equal if touches else trust.similar)
 
 
 def _equal(anchored: Anchored, slot: Slot, partner: Slot, a: float, b: float, trust: Trust) -> float:
     """The trust in the equality of two sizes; 0 for sizes that are not compared."""
     if slot.kind != partner.kind:
         return 0.0
-    if slot.kind != "angle" and abs(a - b) > ALIKE * max(a, b) + ROUNDING:
-        return 0.0
-    roles = _role(anchored, slot.line), _role(anchored, partner.line)
     if slot.kind == "angle":
-        return trust.same_part if slot.word == partner.word else 0.0
-    if slot.kind in ("radius", "edge", "length"):
-        return trust.same_part if roles[0] == roles[1] or slot.line == partner.line else trust.section * 0.6
-    thin = max(a, b) < THIN
-    if slot.axis != partner.axis and not thin:
+        return trust.equal if slot.word == partner.word else 0.0
+    if abs(a - b) > ALIKE * max(a, b) + ROUNDING:
         return 0.0
-    if roles[0] == roles[1]:
-        return trust.same_part
-    return trust.section if thin else trust.different
+    same = slot.line == partner.line or _role(anchored, slot.line) == _role(anchored, partner.line)
+    if slot.kind == "size":
+        return trust.equal if max(a, b) < THIN or (same and slot.axis == partner.axis) else 0.0
+    return trust.equal if same else trust.similar
 
 
 def _role(anchored: Anchored, line: int) -> str:

@@ -23,7 +23,17 @@ from shapeprog.language.ast import (
     with_values,
 )
 from shapeprog.language.evaluate import placed_source
-from shapeprog.language.expression import Binary, Expression, Name, Value, combined, replaced
+from shapeprog.language.expression import (
+    Binary,
+    Expression,
+    Linear,
+    Name,
+    Value,
+    combined,
+    names_in,
+    replaced,
+    value_at,
+)
 from shapeprog.language.merging import merged_lines
 from shapeprog.language.parameters import to_float32
 from shapeprog.language.placement import AXES, ROUND, SIZES
@@ -88,11 +98,8 @@ def written(anchored: Anchored, solution: Solution, numbers: FloatArray, *, grou
         table.setdefault(anchored.name(p), 0.0)
 
     def final(line: Line) -> Line:
-        new = [
-            _without_zeros(replaced(v, lambda n: table.get(n.name, n) if isinstance(n, Name) else n))
-            for v in values(line)
-        ]
-        return _simplified(with_values(line, new))
+        new = (replaced(v, lambda n: table.get(n.name, n) if isinstance(n, Name) else n) for v in values(line))
+        return _simplified(with_values(line, [_combined(v) if isinstance(v, Binary) else v for v in new]))
 
     extents: list[Value] = [to_float32(round(float(numbers[k]), CELLS)) for k in range(3)]
     height = extents[2]
@@ -166,15 +173,8 @@ def _is_zero(value: Argument) -> bool:
     return isinstance(value, float | int) and value == 0
 
 
-def _without_zeros(value: Value) -> Value:
-    """An expression without terms that are zero, and products of plain numbers."""
-    if not isinstance(value, Binary):
-        return value
-    left, right = _without_zeros(value.left), _without_zeros(value.right)
-    if value.operator == "*" and (_is_zero(left) or _is_zero(right)):
-        return 0.0
-    if value.operator == "*" and isinstance(left, float | int) and isinstance(right, float | int):
-        return to_float32(left * right)
-    if value.operator in "+-" and _is_zero(right):
-        return left
-    return Binary(value.operator, left, right)
+def _combined(value: Value) -> Value:
+    """The same sum with each name and number once."""
+    form = value_at(value, {name: Linear.of(name) for name in names_in(value)})
+    terms = sorted(form.factors, key=lambda term: term[1] < 0)
+    return combined(to_float32(form.constant), [(Name(name), factor) for name, factor in terms])

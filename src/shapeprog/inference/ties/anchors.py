@@ -210,9 +210,7 @@ class AxisAnchors:
 
     def solved(self) -> list[Anchors]:
         """The anchors of every element."""
-        order = np.argsort(self.costs, axis=1, kind="stable")
-        last = np.array([len(choices) - 1 for choices in self.choices], np.int64)
-        starts = [order[np.arange(len(order)), np.minimum(rank, last)] for rank in range(3)]
+        starts = [self.costs.argmin(1)]
         for side in (LOW, HIGH):  # all faces measured from one side
             one_sided = ([set(choice) == {side} for choice in choices] for choices in self.choices)
             starts.append(np.array([flags.index(True) if any(flags) else 0 for flags in one_sided], np.int64))

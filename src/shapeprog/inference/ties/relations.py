@@ -19,8 +19,8 @@ from shapeprog.inference.ties.layout import HIGH, LOW, MIDDLE, Element, Slot
 from shapeprog.language.ast import Part
 from shapeprog.space import FloatArray
 
-WITHIN = 0.3
-"""Cells by which a relation may be off."""
+WITHIN, ASKEW = 0.3, 1.0
+"""Cells by which a relation may be off, and by which equal clearances on both sides may."""
 
 DEGREES = 2.0
 """The same for angles, in degrees."""
@@ -183,7 +183,7 @@ def _readings(
             stands = slot.axis == 2 and slot.anchor == LOW and numbers[k] < floor
             yield Reading(eye[k], trust.floor, max(WITHIN, floor)) if stands else Reading(eye[k], trust.equal)
         elif slot.kind == "offset":
-            yield Reading(eye[k], trust.symmetric(slot.axis))
+            yield Reading(eye[k], trust.symmetric(slot.axis), ASKEW)
         elif slot.kind == "angle" and not slot.word.startswith("step"):
             yield Reading(eye[k], trust.equal, DEGREES)
     all_faces = faces(anchored)
@@ -221,7 +221,10 @@ def _pair(
     touches = lines[0] != lines[1] and tuple(lines) in touching
     if len(anchors) > 1:
         if anchors == {LOW, HIGH} and single and axis < 2 and not any(middles):
-            yield Reading(image, trust.symmetric(axis) if same else trust.contact if "last" in keys else trust.similar)
+            if same:
+                yield Reading(image, trust.symmetric(axis), ASKEW)
+            else:
+                yield Reading(image, trust.contact if "last" in keys else trust.similar)
     elif any(middles):
         if touches and axis < 2 and any(points) and not single and not keys & {"last", "plane", "centre"}:
             yield Reading(row, trust.straight)
@@ -229,7 +232,7 @@ def _pair(
         if first.key and second.key:  # both ends of a rod
             yield Reading(row, trust.straight)
             if face.anchor == MIDDLE:
-                yield Reading(image, trust.symmetric(axis))
+                yield Reading(image, trust.symmetric(axis), ASKEW)
     elif keys & {"last", "plane", "centre"}:
         if "last" in keys and touches and (face.single or partner.single):
             yield Reading(row, trust.contact)
@@ -256,8 +259,15 @@ def _equal(anchored: Anchored, slot: Slot, partner: Slot, a: float, b: float, tr
         return 0.0
     same = slot.line == partner.line or _role(anchored, slot.line) == _role(anchored, partner.line)
     if slot.kind == "size":
-        return trust.equal if max(a, b) < THIN or (same and slot.axis == partner.axis) else 0.0
+        sections = same or (_is_section(anchored, slot) and _is_section(anchored, partner))
+        return trust.equal if sections and (max(a, b) < THIN or (same and slot.axis == partner.axis)) else 0.0
     return trust.equal if same else trust.similar
+
+
+def _is_section(anchored: Anchored, slot: Slot) -> bool:
+    """Whether a size is that of a cross-section: not the longest of its part."""
+    box = [anchored.layout.elements.get((slot.line, "", axis)) for axis in range(3)]
+    return any(element is None or element.high - element.low > slot.value + ROUNDING for element in box)
 
 
 def _role(anchored: Anchored, line: int) -> str:

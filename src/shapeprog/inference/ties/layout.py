@@ -31,6 +31,9 @@ CENTRED = 0.02
 FILLS = 0.9
 """Share of the whole from which a round part fills it."""
 
+STRAIGHT = 2.0
+"""Degrees by which a bar may be turned about itself whose sides follow those of the whole."""
+
 ANGLES = ("tilt", "turn", "step")
 ALIGNED = 1e-5
 """Cells by which coordinates may differ that are the same."""
@@ -170,13 +173,12 @@ class Layout:
 
     def _across(self, index: int, keywords: dict[str, Argument]) -> Iterator[Element]:
         """The sizes of a bar across its direction, where it lies in the middle of the whole."""
-        start = keywords["start"]
         for axis, size in enumerate(SIZES):
-            if size in keywords and axis < 2 and "turn" not in keywords:
-                middle = self._coordinate(axis, start, None)
-                straight = middle == self._coordinate(axis, keywords["end"], [middle] * 3)
-                if straight and abs(middle - self.extents[axis] / 2) < CENTRED * self.extents[axis]:
-                    half = float(keywords[size]) / 2  # type: ignore[arg-type]
+            if size in keywords and axis < 2 and abs(float(keywords.get("turn", 0))) < STRAIGHT:  # type: ignore[arg-type]
+                start = self._coordinate(axis, keywords["start"], None)
+                end = self._coordinate(axis, keywords["end"], [start] * 3)
+                middle, half = self.extents[axis] / 2, float(keywords[size]) / 2  # type: ignore[arg-type]
+                if max(abs(start - middle), abs(end - middle)) < CENTRED * self.extents[axis]:
                     yield Element(index, "across", axis, "interval", middle - half, middle + half)
 
     def first(self, loop: int) -> tuple[int, str]:

@@ -50,9 +50,8 @@ class Trust:
     straight
         Ends of a rod at equal distances, or on the middle line of a part that it touches; a row along one axis.
     equal
-        Zeros; equal sections, equal sizes of parts of one role, and faces of touching parts in one plane.
-    similar
-        Equal clearances of parts that do not touch, at one side, at opposite sides or at a corner.
+        Zeros; equal sections, equal sizes of parts of one role, and equal clearances, of a part at a corner or of parts
+        at one side or at opposite sides.
     """
 
     floor: float = 6.0
@@ -60,7 +59,6 @@ class Trust:
     contact: float = 2.0
     straight: float = 1.5
     equal: float = 1.0
-    similar: float = 0.7
 
     def symmetric(self, axis: int) -> float:
         """That of equal clearances on both sides along a horizontal axis."""
@@ -193,16 +191,15 @@ def _readings(
             yield from _pair(anchored, face, partner, touching, trust, upright)
     lengths = [k for k, slot in enumerate(slots) if slot.kind in ("size", "radius", "edge", "angle", "length")]
     for a, b in combinations(lengths, 2):
-        if weight := _equal(anchored, slots[a], slots[b], numbers[a], numbers[b], trust):
-            if slots[a].kind == "angle":
-                yield Reading(eye[a] - eye[b], weight, DEGREES)
-                yield Reading(eye[a] + eye[b], weight / 2, DEGREES)
-            else:
-                yield Reading(eye[a] - eye[b], weight)
+        if _comparable(anchored, slots[a], slots[b], numbers[a], numbers[b]):
+            angles = slots[a].kind == "angle"
+            yield Reading(eye[a] - eye[b], trust.equal, DEGREES if angles else WITHIN)
+            if angles:
+                yield Reading(eye[a] + eye[b], trust.equal / 2, DEGREES)
     across = [k for k, slot in enumerate(slots) if slot.kind == "clearance" and slot.axis < 2 and numbers[k] > WITHIN]
     for a, b in combinations(across, 2):
         if slots[a].axis != slots[b].axis and slots[a].line == slots[b].line and max(numbers[a], numbers[b]) < THIN:
-            yield Reading(eye[a] - eye[b], trust.similar)
+            yield Reading(eye[a] - eye[b], trust.equal)
 
 
 def _pair(
@@ -224,7 +221,7 @@ def _pair(
             if same:
                 yield Reading(image, trust.symmetric(axis), ASKEW)
             else:
-                yield Reading(image, trust.contact if "last" in keys else trust.similar)
+                yield Reading(image, trust.contact if "last" in keys else trust.equal)
     elif any(middles):
         if touches and axis < 2 and any(points) and not single and not keys & {"last", "plane", "centre"}:
             yield Reading(row, trust.straight)
@@ -237,31 +234,31 @@ def _pair(
         if "last" in keys and touches and (face.single or partner.single):
             yield Reading(row, trust.contact)
         elif single:
-            yield Reading(row, trust.straight if lines[0] == lines[1] else trust.similar)
+            yield Reading(row, trust.straight if lines[0] == lines[1] else trust.equal)
     else:
         if face.anchor == MIDDLE and face.facing == -partner.facing and single:
-            yield Reading(image, trust.similar)
+            yield Reading(image, trust.equal)
         if axis > 0 and not (upright[first.line] and upright[second.line]):
             return
         if touches and (face.facing * partner.facing == -1 or all(points) or bool(face.facing) != bool(partner.facing)):
             yield Reading(row, trust.contact)
         elif face.facing == partner.facing and single:
-            yield Reading(row, trust.equal if touches else trust.similar)
+            yield Reading(row, trust.equal)
 
 
-def _equal(anchored: Anchored, slot: Slot, partner: Slot, a: float, b: float, trust: Trust) -> float:
-    """The trust in the equality of two sizes; 0 for sizes that are not compared."""
+def _comparable(anchored: Anchored, slot: Slot, partner: Slot, a: float, b: float) -> bool:
+    """Whether two sizes, which are about equal, measure the same quantity of parts of one role, or of two sections."""
     if slot.kind != partner.kind:
-        return 0.0
+        return False
     if slot.kind == "angle":
-        return trust.equal if slot.word == partner.word else 0.0
+        return slot.word == partner.word
     if abs(a - b) > ALIKE * max(a, b) + ROUNDING:
-        return 0.0
+        return False
+    if slot.kind != "size":
+        return True
     same = slot.line == partner.line or _role(anchored, slot.line) == _role(anchored, partner.line)
-    if slot.kind == "size":
-        sections = same or (_is_section(anchored, slot) and _is_section(anchored, partner))
-        return trust.equal if sections and (max(a, b) < THIN or (same and slot.axis == partner.axis)) else 0.0
-    return trust.equal if same else trust.similar
+    sections = same or (_is_section(anchored, slot) and _is_section(anchored, partner))
+    return (sections and max(a, b) < THIN) or (same and slot.axis == partner.axis)
 
 
 def _is_section(anchored: Anchored, slot: Slot) -> bool:

@@ -196,11 +196,11 @@ class AxisAnchors:
 
     def _unary(self, element: Element, anchors: Anchors) -> float:
         s, extent = self.settings, self.extent
-        cost = 0.0
-        for end, anchor in zip((element.low, element.high), anchors, strict=False):
-            end = end if len(anchors) > 1 else element.middle
+        cost, centred = 0.0, abs(element.middle - extent / 2) <= CENTRED * extent and len(set(anchors)) == 1
+        ends = (element.low, element.high) if len(anchors) > 1 else (element.middle,)
+        for end, anchor in zip(ends, anchors, strict=True):
             if anchor == MIDDLE:
-                cost += s.middle * (abs(end - extent / 2) > CENTRED * extent or len(set(anchors)) > 1)
+                cost += s.middle * (not centred)
             elif self.axis < 2 or element.key == "last":  # heights are measured from the floor as well as from the top
                 distance = end if anchor == LOW else extent - end
                 cost += s.farther * max(0.0, 2 * distance / extent - 1)

@@ -1,6 +1,7 @@
 """The numbers of a program as expressions of few free ones.
 
-Relations are solved by Gauss-Jordan elimination, small and late numbers first: sizes stay free where clearances follow.
+Relations are solved by Gauss-Jordan elimination.  Which numbers stay free is then improved by pivoting, as in the
+simplex method, until no exchange of a free number for another makes the text shorter.
 """
 
 from __future__ import annotations
@@ -17,6 +18,12 @@ ELIMINATED = {"clearance": 0, "offset": 0, "edge": 1, "radius": 2, "size": 3, "l
 
 NOTHING = 1e-7
 """Factors up to this are zero."""
+
+NEGATIVE = 1.5
+"""Cost of a size that is a difference: it can become negative when a name is changed."""
+
+REPEATED = 0.3
+"""Cost of a sum for every use after the first: it can be named."""
 
 
 @dataclass(frozen=True)
@@ -36,7 +43,7 @@ class Solution:
 
 
 def solved(slots: list[Slot], rows: FloatArray) -> Solution:
-    """The free numbers, and how all follow from them.
+    """The free numbers for which the text is short.
 
     Parameters
     ----------
@@ -68,4 +75,41 @@ def solved(slots: list[Slot], rows: FloatArray) -> Solution:
     factors = np.zeros((len(slots), len(free_columns)))
     factors[[columns[c] for c in free_columns], np.arange(len(free_columns))] = 1
     factors[[columns[c] for c in pivots]] = -matrix[: len(pivots), free_columns]
-    return Solution(np.where(np.abs(factors) < NOTHING, 0.0, factors), [columns[c] for c in free_columns])
+    return _shortened(slots, factors, [columns[c] for c in free_columns])
+
+
+def _shortened(slots: list[Slot], factors: FloatArray, free: list[int]) -> Solution:
+    """Exchange free numbers for others while the text gets shorter."""
+    factors = _clean(factors)
+    sizes = np.array([slot.kind in ("size", "radius") for slot in slots])
+    fixed = np.array([slot.kind == "extent" for slot in slots])
+    best = _cost(factors, sizes)
+    while True:
+        exchange = None
+        composite = (factors != 0).sum(1) > 1
+        for p, z in zip(*np.nonzero((np.abs(np.abs(factors) - 1) < NOTHING) & composite[:, None]), strict=True):
+            if fixed[free[z]]:
+                continue
+            new = factors - np.outer(factors[:, z], factors[p] / factors[p, z])
+            new[:, z] = factors[:, z] / factors[p, z]
+            new = _clean(new)
+            if (cost := _cost(new, sizes)) < best - NOTHING:
+                best, exchange = cost, (new, int(p), int(z))
+        if exchange is None:
+            return Solution(factors, free)
+        factors, p, z = exchange
+        free = [*free[:z], p, *free[z + 1 :]]
+
+
+def _clean(factors: FloatArray) -> FloatArray:
+    return np.where(np.abs(factors) < NOTHING, 0.0, factors)
+
+
+def _cost(factors: FloatArray, sizes: np.ndarray) -> float:
+    """Number of operators of all different sums, and the cost of their repetitions."""
+    used = factors != 0
+    operators = np.maximum(used.sum(1) - 1, 0) + (used & (np.abs(np.abs(factors) - 1) > NOTHING)).sum(1)
+    operators = operators + 0.5 * (factors < 0).sum(1) + NEGATIVE * (sizes & (factors < 0).any(1))
+    composite = np.flatnonzero(operators)
+    _, first = np.unique(factors[composite].round(6), axis=0, return_index=True)
+    return float(operators[composite[first]].sum() + REPEATED * (len(composite) - len(first)))

@@ -242,8 +242,8 @@ def _pair(
             return
         if touches and (face.facing * partner.facing == -1 or all(points) or bool(face.facing) != bool(partner.facing)):
             yield Reading(row, trust.contact)
-        elif face.facing == partner.facing and single:
-            yield Reading(row, trust.equal)
+        elif face.facing == partner.facing and (single or touches):
+            yield Reading(row, trust.equal if single else trust.equal / 2)
 
 
 def _comparable(anchored: Anchored, slot: Slot, partner: Slot, a: float, b: float) -> bool:

@@ -25,7 +25,7 @@ DRAWS = 4
 STEPS = 4
 """Steps of Gauss and Newton of a refit."""
 
-TOGETHER = 0.01
+TOGETHER = 0.03
 """Weight of a squared gap between parts that touched."""
 
 FARTHEST = 0.5

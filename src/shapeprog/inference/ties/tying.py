@@ -38,7 +38,7 @@ from shapeprog.language.program import Program
 from shapeprog.language.unroll import unroll
 from shapeprog.space import FloatArray
 
-PRICE = 3.5e-4
+PRICE = 3e-4
 """Price of a free number, as a mean squared distance in cells; chosen on validation shapes."""
 
 FAR = 2.0

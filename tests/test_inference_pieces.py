@@ -212,6 +212,16 @@ def test_components_come_by_falling_area_and_no_face_is_lost():
     assert found.area.sum() == pytest.approx(2 * 144 + 4 * 12 + 4 * (4 * 12 + 2), rel=1e-6)
 
 
+def test_closed_solids_that_share_an_edge_are_separate_components():
+    case, door = box(np.zeros(3), np.array([4.0, 3, 5])), box(np.array([0.0, -4, 3]), np.array([4.0, 1, 2]))
+    found = components(*together(case, door))
+    assert found.area == pytest.approx([2 * (48 + 80 + 60), 2 * (16 + 32 + 8)], rel=1e-6)
+    assert np.diff(found.corner_start).tolist() == [8, 8]
+    joined = components(*together((case[0], case[1][1:]), door))  # the case is open, the door is not
+    assert len(joined.area) == 2
+    assert len(components(*together((case[0], case[1][1:]), (door[0], door[1][1:]))).area) == 1
+
+
 def test_faces_of_closed_solids_are_told_which_way_they_face():
     cube = box(np.zeros(3), np.ones(3))
     turned = box(np.array([5.0, 0, 0]), np.ones(3))

@@ -10,22 +10,25 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from shapeprog.data.shape import Shape
 from shapeprog.inference.budget import NEVER, Deadline, Progress
 from shapeprog.inference.candidates.drawings import canonical_side, simplest
 from shapeprog.inference.candidates.loops import images, repeated
 from shapeprog.inference.candidates.moments import distinct
-from shapeprog.inference.candidates.neighbours import neighbours
+from shapeprog.inference.candidates.neighbours import neighbours, rows, shorter
 from shapeprog.inference.candidates.residual import residual_candidates
 from shapeprog.inference.candidates.singles import single_candidates
 from shapeprog.inference.choice.choice import Choice, choose, explained, missed, value
 from shapeprog.inference.choice.connecting import connected
 from shapeprog.inference.choice.coverage import Coverage, CoverageTable, Prices
 from shapeprog.inference.fit.adjustment import adjust, tidy
-from shapeprog.inference.pieces.pieces import find_pieces
+from shapeprog.inference.pieces.pieces import Source, find_pieces
 from shapeprog.inference.roles.roles import in_order, with_roles
 from shapeprog.inference.surface.evidence import Evidence
 from shapeprog.language.free import numbers
+from shapeprog.language.hints import STRAIGHT, Box
 from shapeprog.language.program import Node, Program
 
 MOST_CANDIDATES = 1_500
@@ -105,7 +108,10 @@ def _candidates(shape: Shape, seed: int) -> list[Node]:
     """Single blocks for the pieces of a shape, the most important first, and loops over copies of them."""
     pieces = find_pieces(shape, seed)
     singles = distinct(single_candidates(pieces))
-    loops = distinct([*repeated(singles), *images(singles, pieces.cloud.points)])
+    upright = (np.abs(pieces.boxes.rotation).max(1) >= STRAIGHT).all(1)
+    components = pieces.boxes.take(upright & (pieces.source == Source.COMPONENT.value))
+    boxes = [[Box(*box)] for box in zip(*components, strict=True)]
+    loops = distinct([*repeated(singles, list(rows(boxes))), *images(singles, pieces.cloud.points)])
     return [*singles[: MOST_CANDIDATES // 2], *loops][:MOST_CANDIDATES]
 
 
@@ -136,13 +142,23 @@ def _chosen(
 
 
 def _unharmed(adjusted: Program, start: Program, coverage: Coverage) -> Program:
-    """The adjusted program; blocks whose adjustment costs more than .005 of the target are restored."""
-    count, union = len(start.body), [*adjusted.body, *start.body]
+    """The adjusted program; blocks whose adjustment costs more than .005 of the target are restored.
+
+    A loop is removed where that costs less than .001, the error of the coverage.
+    """
+    count = len(start.body)
+    shortened = [(index, node) for index, block in enumerate(adjusted.body) for node in shorter(block)]
+    union = [*adjusted.body, *start.body, *(node for _, node in shortened)]
     table = _table(union, coverage)
     selected = tuple(range(count))
     for index in range(count):
         trial = (*selected[:index], count + index, *selected[index + 1 :])
         if value(table, trial) > value(table, selected) + 0.005:
+            selected = trial
+    for place, (index, _) in enumerate(shortened, 2 * count):
+        trial = (*selected[:index], place, *selected[index + 1 :])
+        cheaper = table.prices[place] < table.prices[selected[index]]
+        if cheaper and value(table, trial) > value(table, selected) - 0.001:
             selected = trial
     return Program(tuple(union[index] for index in selected))
 

@@ -62,9 +62,9 @@ CENTRED = 0.2
 """Cells within which a mirror plane is taken as the middle plane of the shape, and a step as along an axis."""
 
 
-def repeated(singles: Sequence[Node]) -> list[Node]:
-    """Runs, mirror images and turns of candidates, and runs and mirror images of these; each once."""
-    loops = _rolled(singles)
+def repeated(singles: Sequence[Node], rows: Sequence[Node] = ()) -> list[Node]:
+    """Runs, mirror images and turns of candidates, and runs and mirror images of these and of other rows."""
+    loops = [*rows, *_rolled(singles)]
     nested = _rolled(loops)
     return [*loops, *nested]
 

@@ -43,8 +43,8 @@ OFF_LEAST, OFF_MOST = 0.02, 2.5
 OFF_LINE, OFF_SIZE = 0.35, 0.2
 """Largest deviation in cells of the positions of parts of one row, and of their extents; or a quarter, if more."""
 
-LEAST_ROW, PRESENT = 3, 0.75
-"""Fewest parts of a row, and the least share of its positions at which a part is present."""
+LEAST_ROW, MOST_ROW, PRESENT = 3, 32, 0.75
+"""Fewest and most parts of a row, and the least share of its positions at which a part is present."""
 
 CORNERS = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
 
@@ -57,7 +57,7 @@ def neighbours(program: Program) -> list[Node]:
     draws = [drawing_of(chain) for chain in chains]
     boxes = [solids[0] if len(solids) == 1 else None for solids in solid_boxes(draws)]
     block_boxes = solid_boxes(program.body)
-    result: list[Node] = [*repeated([*draws, *program.body]), *_rows(block_boxes)]
+    result: list[Node] = [*repeated([*draws, *program.body]), *rows(block_boxes)]
     for index, (chain, box) in enumerate(zip(chains, boxes, strict=True)):
         result += _unlooped(chain)
         result += _mirrored(chain)
@@ -86,7 +86,15 @@ def neighbours(program: Program) -> list[Node]:
     return [node for node in dict.fromkeys(result) if node not in existing]
 
 
-def _rows(blocks: Sequence[Sequence[Box]]) -> Iterator[Node]:
+def shorter(node: Node) -> Iterator[Node]:
+    """A block without one of its loops, and rows of the copies that several loops draw."""
+    (chain,) = Program((node,)).chains
+    yield from _unlooped(chain)
+    if len(chain) > 2:
+        yield from rows([[box] for box in solid_boxes([node])[0]])
+
+
+def rows(blocks: Sequence[Sequence[Box]]) -> Iterator[Node]:
     """Rows along an axis of boxes of one size that belong to several blocks, such as rungs, slats and shelves."""
     boxes = [box for parts in blocks for box in parts]
     owner = np.repeat(np.arange(len(blocks)), [len(parts) for parts in blocks])
@@ -104,7 +112,7 @@ def _rows(blocks: Sequence[Sequence[Box]]) -> Iterator[Node]:
             continue
         existing.add(key)
         count, start, step = _evenly(centre[members, axis], 2 * float(np.median(half[members, axis])))
-        if count < LEAST_ROW:
+        if not LEAST_ROW <= count <= MOST_ROW:
             continue
         middle, size = np.median(centre[members], 0), np.median(half[members], 0)
         middle[axis] = start
@@ -114,7 +122,7 @@ def _rows(blocks: Sequence[Sequence[Box]]) -> Iterator[Node]:
 
 def _evenly(positions: FloatArray, minimum: float) -> tuple[int, float, float]:
     """Count, start and step of a row of positions (N,) at equal steps of at least ``minimum``; count 0 if none."""
-    positions = np.unique(positions.round(2))
+    positions = np.sort(positions)
     steps = np.diff(positions)
     steps = steps[steps >= minimum]
     if not len(steps):
@@ -125,7 +133,10 @@ def _evenly(positions: FloatArray, minimum: float) -> tuple[int, float, float]:
     index = np.round((positions - first) / step)
     on = np.abs(positions - first - index * step) <= min(OFF_LINE, step / 4)
     even = on.mean() >= PRESENT and len(set(index[on])) >= PRESENT * count
-    return (count if even else 0), first, step
+    if not even:
+        return 0, 0.0, 0.0
+    step, first = np.polyfit(index[on], positions[on], 1)
+    return count, float(first), float(step)
 
 
 def drawing_of(chain: Chain) -> Draw:

@@ -1,6 +1,6 @@
 """Selection of a few candidates that explain as much of the target as possible with as little text as possible.
 
-    value = share explained - unsupported surface - free space filled - price of the text
+    value = share explained + parts drawn - unsupported surface - free space filled - price of the text
 
 all in shares of the target, see :class:`~shapeprog.inference.choice.coverage.Prices`.  A candidate that explains only
 points of others gains nothing and costs its price.  Surface inside another selected candidate costs nothing and
@@ -26,7 +26,7 @@ ROUNDS = 1000
 BLINK = 0.05
 """Probability with which a round overlooks a candidate."""
 
-INTERIOR = (4.0, 1.0)
+INTERIOR = (8.0, 1.0)
 """Initial penalties of points in interiors, as multiples of their weights."""
 
 
@@ -67,7 +67,7 @@ def choose(
     of a few candidates cannot leave it.  So all points in interiors have a penalty at first.  It falls while the search
     continues from the best set.  A second search starts from ``start``.
     """
-    gains = np.bitwise_count(table.rows[:, : table.evidence]) @ table.weights[: table.evidence]
+    gains = np.bitwise_count(table.rows[:, : len(table.weights)]) @ np.maximum(table.weights, 0)
     useful = gains > table.prices
     useful[list(start)] = True
     index, last = np.flatnonzero(useful), len(table.weights)

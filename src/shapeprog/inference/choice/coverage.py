@@ -5,6 +5,7 @@ A candidate is a program of one block.  All data for the selection is computed o
 *   points of the evidence that its surface explains (near enough, with a fitting normal);
 *   points deep inside it, where it hides every other candidate;
 *   points of free space that it fills;
+*   parts of a mesh that one of its primitives draws;
 *   samples of its surface that the target does not support, or that face the other way than the target's.  They are
     charged by their area unless they are hidden inside a selected candidate, including other copies of the same one.
 """
@@ -25,7 +26,7 @@ from shapeprog.geometry.batch import Batch
 from shapeprog.geometry.scene import Scene
 from shapeprog.geometry.surface import face_areas, sample_surface
 from shapeprog.inference.candidates.loops import mirrors
-from shapeprog.inference.choice.bits import FINE, WORD, Bits, by_word, explains, holds, nearby, sorted_by_cell
+from shapeprog.inference.choice.bits import FINE, WORD, Bits, by_word, explains, holds, nearby, pack, sorted_by_cell
 from shapeprog.inference.choice.coverage_kernels import charged
 from shapeprog.inference.surface.evidence import Evidence
 from shapeprog.language.ast import Assignment, Comment
@@ -48,6 +49,9 @@ AWAY = 4.0 * HALF
 FREE_POINTS = 2048
 """Points drawn in free space."""
 
+MANY = 16
+"""Parts of a mesh from which the value of all is constant: a lattice of many slats is not drawn at any price."""
+
 CENTRED = 0.1
 """Cells within which a candidate is in the middle."""
 
@@ -65,6 +69,9 @@ class Prices:
     statement, loop, number
         Of a drawing statement or call, of a loop, and of every continuous number in the text.  Each further block of a
         call costs as much as a loop; otherwise a box could be written as a drawer whose handle is hidden.
+    part
+        Added for every part of a mesh that one primitive draws, ``MANY`` times at most: the gaps between drawers have
+        little surface.
     """
 
     unsupported: float = 0.4
@@ -72,6 +79,7 @@ class Prices:
     statement: float = 0.005
     loop: float = 0.002
     number: float = 0.0005
+    part: float = 0.002
 
     def of(self, program: Program) -> float:
         """The price of the text of a program; function definitions cost nothing."""
@@ -94,10 +102,10 @@ class CoverageTable(NamedTuple):
     Parameters
     ----------
     rows
-        For each candidate (C, E + F + C) the points explained, the free points filled, and the hidden samples of every
-        candidate.
+        For each candidate (C, E + F + K + C) the points explained, the free points filled, the parts drawn, and the
+        hidden samples of every candidate.
     weights
-        Value of a bit of each of the first E + F words, negative for free points.
+        Value of a bit of each of the first E + F + K words, negative for free points.
     evidence
         E, the number of words for points to be explained.
     interior
@@ -145,7 +153,8 @@ class Coverage:
         self._points, self._normals = evidence.points[order], evidence.normals[order]
         self._free, volume = free_points(evidence, seed)
         free = np.full(len(self._free), -self.prices.free * volume / max(evidence.area, 1e-9))
-        self._weights = np.concatenate([by_word(evidence.weights[order]), by_word(free)])
+        parts = np.full(len(evidence.parts), self.prices.part / max(1.0, len(evidence.parts) / MANY))
+        self._weights = np.concatenate([by_word(evidence.weights[order]), by_word(free), by_word(parts)])
         self._rows: dict[Program, _Row] = {}
 
     def table(self, candidates: Sequence[Program]) -> CoverageTable:
@@ -173,7 +182,8 @@ class Coverage:
         price = np.array([prices.of(program) for program in candidates]) - prices.number * centred(scene, candidates)
         interior = holds(scene, self._points, evidence.tolerance)
         explained = explains(scene, self._points, self._normals, evidence) & ~interior
-        covered = np.concatenate([explained, holds(scene, self._free, evidence.tolerance)], 1)
+        free, parts = holds(scene, self._free, evidence.tolerance), pack(parts_drawn(scene, evidence))
+        covered = np.concatenate([explained, free, parts], 1)
         points, owners, areas = unsupported(scene, evidence, self.seed)
         starts = np.searchsorted(owners, np.arange(len(candidates) + 1))
         for k, program in enumerate(candidates):
@@ -199,6 +209,17 @@ def centred(scene: Scene, candidates: Sequence[Program]) -> npt.NDArray[np.int64
         ]
         count += (np.abs(middle[:, axis]) < CENTRED) & ~np.array(around, np.bool_)
     return count
+
+
+def parts_drawn(scene: Scene, evidence: Evidence) -> npt.NDArray[np.bool_]:
+    """Which parts of a mesh (B, K) each candidate draws: a primitive has the same box, up to the tolerance."""
+    reach = (scene.rotation.abs() @ scene.bounds[..., None])[..., 0]
+    low, high = ((scene.centre + sign * reach).numpy() for sign in (-1, 1))
+    result = np.zeros((len(low), len(evidence.parts)), np.bool_)
+    for k, mask in enumerate(scene.mask.numpy().T):
+        boxes = np.stack([low[mask, k], high[mask, k]], 1)[:, None]
+        result[mask] |= (np.abs(boxes - evidence.parts) <= evidence.tolerance).all((2, 3))
+    return result
 
 
 def free_points(evidence: Evidence, seed: int) -> tuple[FloatArray, float]:

@@ -32,9 +32,13 @@ class Components(NamedTuple):
 
 
 def components(vertices: Array, faces: Array) -> Components:
-    """The components of a triangle mesh in cells, after welding vertices and removing duplicate and empty faces."""
+    """The components of a triangle mesh in cells, after welding vertices and removing duplicate and empty faces.
+
+    Closed surfaces that share vertices or edges only, such as a door and its case, are separate components.
+    """
     welded, listed = weld(np.asarray(vertices, np.float64), np.asarray(faces, np.int64))
     listed, area = unique_faces(welded, listed)
+    welded, listed = separated(welded, listed)
     label = linked(np.concatenate([listed[:, :2], listed[:, 1:]]), len(welded))
     count, of_face = int(label.max(initial=-1)) + 1, label[listed[:, 0]]
     total = np.bincount(of_face, area, minlength=count)
@@ -87,6 +91,36 @@ def unique_faces(vertices: FloatArray, faces: npt.NDArray[np.int64]) -> tuple[np
     return faces[area > 0], area[area > 0]
 
 
+def separated(vertices: FloatArray, faces: npt.NDArray[np.int64]) -> tuple[FloatArray, npt.NDArray[np.int64]]:
+    """The mesh with separate vertices for each closed surface.
+
+    Faces belong to one surface if edges that exactly two faces share link them.  It is closed if equally many of its
+    faces run in both directions at each edge.
+    """
+    edge = edges(faces, len(vertices))
+    manifold = np.bincount(edge)[edge] == 2
+    face = np.repeat(np.arange(len(faces)), 3)
+    order = np.argsort(edge[manifold], kind="stable")
+    surface = linked(face[manifold][order].reshape(-1, 2), len(faces))
+    direction = np.sign(faces[:, [1, 2, 0]] - faces).reshape(-1)
+    own, name = np.unique(surface[face] * len(edge) + edge, return_inverse=True)
+    closed = np.bincount(own // len(edge), np.bincount(name, direction) != 0) == 0
+    surface = np.where(closed[surface], surface + 1, 0)
+    key = (faces + len(vertices) * surface[:, None]).reshape(-1)
+    _, first, name = np.unique(key, return_index=True, return_inverse=True)
+    rank = np.argsort(np.argsort(first))  # in the order of the file
+    return vertices[faces.reshape(-1)[np.sort(first)]], rank[name].reshape(-1, 3)
+
+
+def edges(faces: npt.NDArray[np.int64], count: int) -> npt.NDArray[np.int64]:
+    """The index (3 F,) of each edge of the faces, equal for both directions, of ``count`` vertices."""
+    start, end = faces.reshape(-1), faces[:, [1, 2, 0]].reshape(-1)
+    name: npt.NDArray[np.int64] = np.unique(
+        np.minimum(start, end) * count + np.maximum(start, end), return_inverse=True
+    )[1]
+    return name
+
+
 def solid_sides(mesh: Components) -> npt.NDArray[np.int64]:
     """For each face (F,) of a component that bounds a solid, 1 if it faces outwards and -1 if inwards; 0 for others.
 
@@ -97,7 +131,7 @@ def solid_sides(mesh: Components) -> npt.NDArray[np.int64]:
     faces, counts = mesh.faces, np.diff(mesh.face_start)
     component = np.repeat(np.arange(len(counts)), counts)
     start, end = faces.reshape(-1), faces[:, [1, 2, 0]].reshape(-1)
-    _, edge = np.unique(np.minimum(start, end) * len(mesh.vertices) + np.maximum(start, end), return_inverse=True)
+    edge = edges(faces, len(mesh.vertices))
     uneven = np.bincount(edge, np.sign(end - start)) != 0
     gaps = np.bincount(np.repeat(component, 3), uneven[edge], minlength=len(counts)) / (3 * counts)
     corners = mesh.vertices[faces]
@@ -106,6 +140,18 @@ def solid_sides(mesh: Components) -> npt.NDArray[np.int64]:
     solid = (gaps <= 0.02) & (2 * np.abs(volume) > 0.2 * mesh.area)
     sides: npt.NDArray[np.int64] = np.where(solid, np.sign(volume), 0).astype(np.int64)[component]
     return sides
+
+
+def simple_parts(mesh: Components, sides: npt.NDArray[np.int64], seen: npt.NDArray[np.int64]) -> FloatArray:
+    """Low and high corners (K, 2, 3) of the boxes of solid, visible components that fill most of their box.
+
+    ``sides`` (F,) are those of :func:`solid_sides`; ``seen`` has the indices of visible faces.
+    """
+    at, face, corner = mesh.vertices[mesh.corner], mesh.face_start[:-1], mesh.corner_start[:-1]
+    low, high = np.minimum.reduceat(at, corner), np.maximum.reduceat(at, corner)
+    volume = np.abs(np.add.reduceat(np.linalg.det(mesh.vertices[mesh.faces]), face)) / 6
+    simple = (sides[face] != 0) & (volume >= 0.5 * (high - low).prod(1))  # a ball fills .52 of its box
+    return np.stack([low, high], 1)[simple & np.isin(np.arange(len(face)), mesh.component_of(seen))]
 
 
 def linked(pairs: Array, count: int) -> npt.NDArray[np.int64]:

@@ -25,7 +25,7 @@ from shapeprog.geometry.arrays import over_threads
 from shapeprog.geometry.mesh import union_mesh
 from shapeprog.inference.surface.cells import INSET, exposed, exposed_faces
 from shapeprog.inference.surface.cloud import planes, points_of_scan
-from shapeprog.inference.surface.components import Components, components, solid_sides
+from shapeprog.inference.surface.components import Components, components, simple_parts, solid_sides
 from shapeprog.inference.surface.evidence_kernels import look_out
 from shapeprog.language.program import Program
 from shapeprog.language.unroll import unroll
@@ -87,6 +87,8 @@ class Evidence:
         Area in cells of the surface that the points represent, in proportion to their weights.
     free
         Cells (R, R, R) of the cube of the grid that are known to be free; other space may be free or not.
+    parts
+        Low and high corners (K, 2, 3) of the boxes of components of simple form, the largest ones; none of scans.
     """
 
     points: FloatArray
@@ -101,6 +103,7 @@ class Evidence:
     reach: float
     area: float
     free: Flags
+    parts: FloatArray
 
 
 def evidence_of(shape: Shape, seed: int = 0) -> Evidence:
@@ -126,7 +129,8 @@ def _of_mesh(mesh: Components, seed: int) -> Evidence:
     samples, face = sample_with_faces(mesh.vertices, mesh.faces, SURFACE, seed)
     surface, corners = samples.astype(np.float64), mesh.vertices[mesh.faces]
     across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])[face]
-    side = solid_sides(mesh)[face]
+    sides = solid_sides(mesh)
+    side = sides[face]
     normals = np.where(side < 0, -1, 1)[:, None] * across / np.linalg.norm(across, axis=1, keepdims=True)
     barrier = touched(corners, LOOKING)
     points = surface[:POINTS]
@@ -138,6 +142,7 @@ def _of_mesh(mesh: Components, seed: int) -> Evidence:
     return Evidence(
         points, facing, weights / weights.sum(), oriented, TOLERANCE, AGREEMENT, surface, normals, side != 0,
         _reach(TOLERANCE, area), area * float(weights.mean()), free_cells(coarse, surface, through=False),
+        simple_parts(mesh, sides, face[:POINTS][front | back])[:64],
     )  # fmt: skip
 
 
@@ -155,7 +160,7 @@ def _of_points(surface: FloatArray, voxels: Flags, seed: int) -> Evidence:
     facing, oriented = outward(normals[selected], *(_within(free, points + sign * above) for sign in (1, -1)))
     return Evidence(
         points, facing, weights, oriented, tolerance, SCANNED, surface, normals,
-        np.zeros(len(surface), np.bool_), reach, area, free,
+        np.zeros(len(surface), np.bool_), reach, area, free, np.zeros((0, 2, 3)),
     )  # fmt: skip
 
 
@@ -178,6 +183,7 @@ def _of_cells(voxels: Flags) -> Evidence:
     return Evidence(
         surface, normals, np.full(count, 1 / count), np.ones(count, np.bool_), INSET, AGREEMENT,
         surface, normals, np.zeros(count, np.bool_), _reach(INSET, count, count), float(count), ~voxels,
+        np.zeros((0, 2, 3)),
     )  # fmt: skip
 
 

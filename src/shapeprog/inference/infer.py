@@ -128,7 +128,7 @@ def infer(
         expressions for all others.
     libraries
         Functions that the program is written with wherever that is shorter, unless it has the paper's statements alone.
-        Their calls compete with single blocks, at the price of a call; a call counts as one block.
+        Parts that are nearly a call of a function move to where the call draws them.
     unit
         Unit of the lengths of the program: ``mm``, ``cm``, ``m``, ``in`` or ``cells``; by default that of the file, and
         cells for voxels.  The numbers are rounded as a person would, by which nothing moves farther than .015 cells.

@@ -77,6 +77,8 @@ def assemble(
         Most blocks of the program.
     detail
         Factor by which the prices of blocks and numbers are divided: above 1 the program is finer.
+    seed
+        Of the search among candidates.  Samples of surfaces are the same for all seeds.
     deadline, progress
         As for :func:`shapeprog.inference.infer`.
     """
@@ -87,16 +89,16 @@ def assemble(
 
     usual = Prices()
     prices = replace(usual, **{name: getattr(usual, name) / detail for name in ("statement", "loop", "number")})
-    coverage = Coverage(evidence, prices, seed)
+    coverage = Coverage(evidence, prices)
     report(0.1)
-    candidates = _candidates(shape, seed)
+    candidates = _candidates(shape)
     if not candidates or evidence.area <= 0:
         return Assembly(Program(), 0.0, "")
     report(0.7)
     choice, candidates = _chosen(candidates, coverage, blocks, seed, deadline)
     report(1.0)
     start = connected(Program(tuple(candidates[index] for index in choice.best.chosen)), coverage)
-    adjusted = adjust(start, evidence, seed=seed, deadline=deadline, progress=progress)
+    adjusted = adjust(start, evidence, deadline=deadline, progress=progress)
     program = connected(_unharmed(adjusted, start, coverage), coverage)
     program = tidy(Program(tuple(canonical_side(simplest(node)) for node in program.body)))
     program = in_order(with_roles(program))
@@ -104,9 +106,9 @@ def assemble(
     return Assembly(program, share, _reason(len(program.body), share, choice, candidates, blocks))
 
 
-def _candidates(shape: Shape, seed: int) -> list[Node]:
+def _candidates(shape: Shape) -> list[Node]:
     """Single blocks for the pieces of a shape, the most important first, and loops over copies of them."""
-    pieces = find_pieces(shape, seed)
+    pieces = find_pieces(shape)
     singles = distinct(single_candidates(pieces))
     upright = (np.abs(pieces.boxes.rotation).max(1) >= STRAIGHT).all(1)
     components = pieces.boxes.take(upright & (pieces.source == Source.COMPONENT.value))
@@ -130,10 +132,10 @@ def _chosen(
     if not first or deadline.passed("another choice among neighbours"):
         return choice, candidates
     wide = replace(evidence, tolerance=1.5 * evidence.tolerance, reach=1.5 * evidence.reach)
-    loose = choose(_table(candidates, Coverage(wide, coverage.prices, seed)), blocks, seed=seed)
+    loose = choose(_table(candidates, Coverage(wide, coverage.prices)), blocks, seed=seed)
     pool = list(first)
     for nodes in dict.fromkeys([first, tuple(candidates[index] for index in loose.best.chosen)]):
-        adjusted = adjust(Program(nodes), evidence, steps=8, seed=seed, deadline=deadline)
+        adjusted = adjust(Program(nodes), evidence, steps=8, deadline=deadline)
         pool += [*nodes, *adjusted.body, *neighbours(adjusted), *residual_candidates(adjusted, evidence)]
     remaining = [candidates[index] for index in missed(table, choice.best.chosen)[:200]]
     pool = list(dict.fromkeys([*pool, *remaining]))  # the first choice first: the search starts there

@@ -117,6 +117,8 @@ def infer(
     budget
         Seconds after which no further step of search, fitting or refinement starts.  Choice and ties are not
         interrupted.
+    seed
+        Of the searches.  Samples of surfaces are the same for all seeds.
     settings, schedule
         Settings of the search on cells and of its refinement; the search on the surface does not use them.
     statements
@@ -151,7 +153,7 @@ def infer(
     scores: dict[str, float] = {}
     program, reason = Program(), ""
     snapped: Program | None = None
-    evidence = None if statements == "paper" else evidence_of(target, seed)
+    evidence = None if statements == "paper" else evidence_of(target)
     if evidence is not None and target.points is not None:
         assembly = assemble(
             target, evidence, blocks=blocks, detail=detail, seed=seed, deadline=refining, progress=progress
@@ -173,7 +175,7 @@ def infer(
         if libraries:
             program, held = with_calls(program, libraries, Coverage(evidence, Prices(), seed))
         if ties:
-            program = tie(program, evidence, held=held, seed=seed, progress=progress).program
+            program = tie(program, evidence, held=held, progress=progress).program
         if integral is not None and description_length(plain, target.voxels, integral) < description_length(
             program, target.voxels
         ):

@@ -16,6 +16,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import count
 from typing import Any, get_type_hints
 
@@ -121,7 +122,7 @@ class Statement:
         """Number of tensor slots in use."""
         return sum(parameter.quantity.width for parameter in self.parameters)
 
-    @property
+    @cached_property
     def quantities(self) -> tuple[Quantity, ...]:
         """Quantity of every slot in use, in order."""
         return tuple(p.quantity for p in self.parameters for _ in range(p.quantity.width))

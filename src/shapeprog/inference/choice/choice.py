@@ -20,8 +20,11 @@ from shapeprog.inference.choice.choice_kernels import search
 from shapeprog.inference.choice.coverage import CoverageTable
 from shapeprog.space import Array, FloatArray
 
-ROUNDS = 1000
+ROUNDS = 3000
 """Rounds of ruin and recreate."""
+
+RESTARTS = 4
+"""Independent searches, of which the best set counts."""
 
 BLINK = 0.05
 """Probability with which a round overlooks a candidate."""
@@ -65,7 +68,7 @@ def choose(
 
     A solid whose interior holds visible points is a local optimum: the greedy step selects it first, and an exchange
     of a few candidates cannot leave it.  So all points in interiors have a penalty at first.  It falls while the search
-    continues from the best set.  A second search starts from ``start``.
+    continues from the best set.  The last of several searches starts from ``start``.
     """
     gains = np.bitwise_count(table.rows[:, : len(table.weights)]) @ np.maximum(table.weights, 0)
     useful = gains > table.prices
@@ -79,21 +82,21 @@ def choose(
         rows, interior, hidden, table.weights, words, bits, begins, *_words(interior), table.exposed[index],
         table.sample_price[index], table.prices[index],
     )  # fmt: skip
-    searches = len(INTERIOR) + 2 if interior.any() else 1
+    penalties = (*INTERIOR, 0.0) if interior.any() else (0.0,)
+    searches = len(penalties) * RESTARTS + 1
+    best, draws = _no_sets(blocks), iter(range(searches * seed, searches * (seed + 1)))
 
     def searched(penalty: float, initial: Array, best_sets: BestSets) -> BestSets:
-        search(*data, penalty, rounds // searches, BLINK, seed, initial, *best_sets)
+        search(*data, penalty, rounds // searches, BLINK, next(draws), initial, *best_sets)
         return best_sets
 
-    best = _no_sets(blocks)
-    if searches > 1:
-        initial = best.set
-        for penalty in INTERIOR:
-            initial = searched(penalty, initial, _no_sets(blocks)).set
-        best = searched(0.0, initial, best)
+    for _ in range(RESTARTS):
+        initial = _no_sets(blocks).set
+        for penalty in penalties:
+            initial = searched(penalty, initial, _no_sets(blocks) if penalty else best).set
     best = searched(0.0, np.searchsorted(index, np.array(start, np.int64)), best)
     options = [
-        Option(tuple(index[chosen[:size]].tolist()), float(value), explained(table, index[chosen[:size]]))
+        Option(tuple(index[np.sort(chosen[:size])].tolist()), float(value), explained(table, index[chosen[:size]]))
         for size, (value, chosen) in enumerate(zip(*best, strict=True))
         if np.isfinite(value)
     ]

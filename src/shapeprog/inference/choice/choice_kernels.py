@@ -10,6 +10,9 @@ from shapeprog.kernels.compile import helper, kernel
 RUIN_LEAST, RUIN_MOST = 0.1, 0.6
 """Range of the share of selected candidates that a round drops, in addition to one that it always drops."""
 
+THRESHOLD = 0.01
+"""How much worse than the incumbent a set may be that takes its place; it falls to zero (Dueck and Scheuer 1990)."""
+
 ROUNDING = 1e-12
 """How far rounding may take a gain above its upper bound."""
 
@@ -176,6 +179,6 @@ def search(
             include(rows, interior, cover, under, best_candidate)
             selected[count] = best_candidate
             count += 1
-        if value >= best_value:
+        if value >= best_value - THRESHOLD * (1.0 - turn / (rounds + 1.0)):
             best_value, size = value, count
             incumbent[:count] = selected[:count]

@@ -26,7 +26,18 @@ from shapeprog.geometry.batch import Batch
 from shapeprog.geometry.scene import Scene
 from shapeprog.geometry.surface import face_areas, sample_surface
 from shapeprog.inference.candidates.loops import mirrors
-from shapeprog.inference.choice.bits import FINE, WORD, Bits, by_word, explains, holds, nearby, pack, sorted_by_cell
+from shapeprog.inference.choice.bits import (
+    FINE,
+    WORD,
+    BinnedPoints,
+    Bits,
+    by_word,
+    explains,
+    holds,
+    nearby,
+    pack,
+    sorted_by_cell,
+)
 from shapeprog.inference.choice.coverage_kernels import charged
 from shapeprog.inference.surface.evidence import Evidence
 from shapeprog.language.ast import Assignment, Comment
@@ -155,6 +166,7 @@ class Coverage:
         free = np.full(len(self._free), -self.prices.free * volume / max(evidence.area, 1e-9))
         parts = np.full(len(evidence.parts), self.prices.part / max(1.0, len(evidence.parts) / MANY))
         self._weights = np.concatenate([by_word(evidence.weights[order]), by_word(free), by_word(parts)])
+        self._surface = sorted_by_cell(evidence.surface, FINE)
         self._rows: dict[Program, _Row] = {}
 
     def table(self, candidates: Sequence[Program]) -> CoverageTable:
@@ -184,7 +196,7 @@ class Coverage:
         explained = explains(scene, self._points, self._normals, evidence) & ~interior
         free, parts = holds(scene, self._free, evidence.tolerance), pack(parts_drawn(scene, evidence))
         covered = np.concatenate([explained, free, parts], 1)
-        points, owners, areas = unsupported(scene, evidence, self.seed)
+        points, owners, areas = unsupported(scene, evidence, self._surface, self.seed)
         starts = np.searchsorted(owners, np.arange(len(candidates) + 1))
         for k, program in enumerate(candidates):
             mine = np.arange(starts[k], starts[k + 1])
@@ -235,8 +247,10 @@ def free_points(evidence: Evidence, seed: int) -> tuple[FloatArray, float]:
     return points[np.argsort(nearby(points), kind="stable")], len(cells) * side**3 / max(count, 1)
 
 
-def unsupported(scene: Scene, evidence: Evidence, seed: int) -> tuple[FloatArray, npt.NDArray[np.int64], FloatArray]:
-    """Samples of the surfaces of candidates (B, N) that the target does not support.
+def unsupported(
+    scene: Scene, evidence: Evidence, binned: BinnedPoints, seed: int
+) -> tuple[FloatArray, npt.NDArray[np.int64], FloatArray]:
+    """Samples of the surfaces of candidates (B, N) that the target, whose surface is ``binned``, does not support.
 
     Returns points (S, 3) just above the surface, indices of their candidates (S,), and the area charged for each (S,).
     """
@@ -252,7 +266,7 @@ def unsupported(scene: Scene, evidence: Evidence, seed: int) -> tuple[FloatArray
         return np.zeros((0, 3)), np.zeros(0, np.int64), np.zeros(0)
     sample = sample_surface(single, DRAWN, torch.Generator().manual_seed(seed))
     points, normals = (part.double().reshape(-1, 3).numpy() for part in (sample.points, sample.normals))
-    share = shares(points, normals, evidence)
+    share = shares(points, normals, evidence, binned)
     bare = share > 0
     source = np.repeat(row.numpy(), DRAWN)[bare]
     lifted = points[bare] + SKIN * evidence.tolerance * normals[bare]
@@ -263,13 +277,12 @@ def unsupported(scene: Scene, evidence: Evidence, seed: int) -> tuple[FloatArray
     )
 
 
-def shares(samples: FloatArray, normals: FloatArray, evidence: Evidence) -> FloatArray:
-    """Share of the price of unsupported surface that each sample (S, 3) pays.
+def shares(samples: FloatArray, normals: FloatArray, evidence: Evidence, binned: BinnedPoints) -> FloatArray:
+    """Share of the price of unsupported surface that each sample (S, 3) pays; ``binned`` is the surface of the target.
 
     It is zero where a point of the target within reach has a normal that agrees, ``TURNED`` where an outward normal
     faces the other way, such as behind the wall of a solid, and one elsewhere.
     """
-    binned = sorted_by_cell(evidence.surface, FINE)
     share = np.zeros(len(samples))
     data = (
         samples, normals, binned.points, evidence.surface_normals[binned.order],

@@ -28,7 +28,7 @@ def cell_of(value, cells):
 
 @helper
 def box_of(table, row, margin, cells, ends, box):
-    """The box around a primitive, widened by a margin, and the first and last cells along each axis that it reaches."""
+    """The box around a primitive, widened by a margin, and the first and last cells along each axis in it."""
     a, b, c = bound(table, row)
     for axis in range(3):
         column = ROTATION + 3 * axis

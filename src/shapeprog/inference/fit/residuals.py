@@ -21,12 +21,13 @@ from shapeprog.geometry.batch import Batch
 from shapeprog.geometry.distance import nearest_primitive, signed_distance
 from shapeprog.geometry.scene import Scene
 from shapeprog.geometry.surface import SurfaceSample, sample_surface
+from shapeprog.inference.choice.bits import nearby
 from shapeprog.inference.fit import residual_kernels as kernels
 from shapeprog.inference.fit.tunable import ROW
 from shapeprog.inference.surface.evidence import Evidence
 from shapeprog.space import Array, FloatArray
 
-POINTS, SAMPLES = 1_500, 1_500
+POINTS, SAMPLES = 1_200, 1_200
 """Points of the target, and samples of the surface of the program, that one step uses."""
 
 NEAR = 6
@@ -82,7 +83,8 @@ class Target:
         self._points = torch.from_numpy(evidence.points)
         normals, sides = evidence.normals, evidence.outward
         self._normals, self._sides = torch.from_numpy(normals), torch.from_numpy(sides)
-        self._shares = np.cumsum(evidence.weights)
+        self._order = np.argsort(nearby(evidence.points), kind="stable")
+        self._shares = np.cumsum(evidence.weights[self._order])
         unsure = np.flatnonzero(~sides)
         self._owner: Array = np.concatenate([np.arange(len(sides)), unsure])
         self._tree = cKDTree(np.concatenate([
@@ -98,8 +100,9 @@ class Target:
         sample = sample_surface(scene, SAMPLES, generator)
         samples, facing = sample.points, sample.normals
         spacing = 1.5 * math.sqrt(self.evidence.area / min(SAMPLES, len(self._points)))
-        thresholds = torch.rand(POINTS, generator=generator, dtype=torch.float64).numpy() * self._shares[-1]
-        selected = np.searchsorted(self._shares, thresholds).clip(0, len(self._points) - 1)
+        jitter = torch.rand(POINTS, generator=generator, dtype=torch.float64).numpy()
+        thresholds = (np.arange(POINTS) + jitter) * (self._shares[-1] / POINTS)  # stratified: evenly over the surface
+        selected = self._order[np.searchsorted(self._shares, thresholds).clip(0, len(self._points) - 1)]
         points, normals, sides = self._points[selected], self._normals[selected], self._sides[selected]
         tree = cKDTree(_joint(samples.numpy(), facing.numpy()))
         candidates = tree.query(_joint(points.numpy(), normals.numpy()), NEAR)[1]

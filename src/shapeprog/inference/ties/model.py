@@ -19,7 +19,7 @@ from shapeprog.language.expression import Linear
 from shapeprog.language.program import Program
 from shapeprog.space import FloatArray
 
-DRAWS = 4
+DRAWS = 2
 """Times that pairs of points are drawn for one curvature."""
 
 STEPS = 4

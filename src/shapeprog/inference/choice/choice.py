@@ -26,6 +26,9 @@ ROUNDS = 3000
 RESTARTS = 4
 """Independent searches, of which the best set counts."""
 
+EARLIER = 1e-4
+"""Price of the last candidate above that of the first: of nearly equal sets, all seeds prefer the same."""
+
 BLINK = 0.05
 """Probability with which a round overlooks a candidate."""
 
@@ -80,7 +83,7 @@ def choose(
     bits = np.concatenate([row[row != 0] for row in rows[:, :last]]) if len(rows) else rows.reshape(-1)
     data = (
         rows, interior, hidden, table.weights, words, bits, begins, *_words(interior), table.exposed[index],
-        table.sample_price[index], table.prices[index],
+        table.sample_price[index], table.prices[index] + EARLIER * index / len(table.prices),
     )  # fmt: skip
     penalties = (*INTERIOR, 0.0) if interior.any() else (0.0,)
     searches = len(penalties) * RESTARTS + 1
@@ -95,11 +98,8 @@ def choose(
         for penalty in penalties:
             initial = searched(penalty, initial, _no_sets(blocks) if penalty else best).set
     best = searched(0.0, np.searchsorted(index, np.array(start, np.int64)), best)
-    options = [
-        Option(tuple(index[np.sort(chosen[:size])].tolist()), float(value), explained(table, index[chosen[:size]]))
-        for size, (value, chosen) in enumerate(zip(*best, strict=True))
-        if np.isfinite(value)
-    ]
+    sets = [tuple(index[np.sort(best.sets[size, :size])].tolist()) for size in np.flatnonzero(np.isfinite(best.values))]
+    options = [Option(chosen, value(table, chosen), explained(table, chosen)) for chosen in sets]
     return Choice(max(options, key=lambda option: option.value), tuple(options))
 
 

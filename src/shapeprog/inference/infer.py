@@ -173,7 +173,7 @@ def infer(
             program, snapped = named_anew(program), None
         held: frozenset[int] = frozenset()
         if libraries:
-            program, held = with_calls(program, libraries, Coverage(evidence, Prices(), seed))
+            program, held = with_calls(program, libraries, Coverage(evidence, Prices()))
         if ties:
             program = tie(program, evidence, held=held, progress=progress).program
         if integral is not None and description_length(plain, target.voxels, integral) < description_length(

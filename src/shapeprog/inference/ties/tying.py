@@ -17,6 +17,7 @@ from shapeprog.errors import ShapeProgError
 from shapeprog.geometry.arrays import one_tensor_thread
 from shapeprog.geometry.scene import Scene
 from shapeprog.inference.budget import Progress
+from shapeprog.inference.choice.connecting import afloat
 from shapeprog.inference.fit.joints import Joints, find_joints
 from shapeprog.inference.surface.evidence import Evidence
 from shapeprog.inference.ties.anchored import Anchored
@@ -51,8 +52,11 @@ KNOWN = 0.1
 """Weight of a squared move of a number that somebody wrote."""
 
 LOST, CHEAPER, ATTEMPTS = 0.03, 3.0, 3
-"""Largest decrease of closeness when numbers are tied; beyond that the price of a number is divided by this factor, in
-so many attempts."""
+"""Largest decrease of closeness when numbers are tied; beyond that, or where parts are separated, the price of a number
+is divided by this factor, in so many attempts."""
+
+APART = 0.005
+"""Gap in cells from which parts are separated."""
 
 NOWHERE = -1e6
 """A floor that no part touches: parts on the floor have a clearance of zero."""
@@ -105,14 +109,16 @@ def tie(
         ties = _Ties(Layout(source), evidence, seed, known=known, held=held)
         price *= KNOWN_PRICE if known else PRICE
         closeness = None if known else Closeness(evidence, seed)
-        before = closeness.of(unroll(plain)) if closeness else 0.0
+        before, floating = (closeness.of(unroll(plain)), afloat(plain, seed, APART)) if closeness else (0.0, 0)
         tied = evaluated(source)
         for attempt in range(ATTEMPTS):
             try:
                 tied = ties.tied(price / CHEAPER**attempt)
             except Fault:  # relations left a part without length
                 continue
-            if closeness is None or before - closeness.of(unroll(tied)) <= LOST:
+            if closeness is None:
+                break
+            if before - closeness.of(unroll(tied)) <= LOST and afloat(tied, seed, APART) <= floating:
                 break
         if progress:
             progress("tying numbers", 1.0)

@@ -295,6 +295,13 @@ def both(text: str) -> tuple[Program, Frame | None]:
     return result.program, result.frame
 
 
+@pytest.mark.parametrize("unit", ["", "# unit: m\n"])
+def test_the_size_of_a_unit_is_written_without_the_error_of_rounding(unit: str) -> None:
+    program = parse(unit + "width, depth, height = 1, 0.5, 0.5\ntop(height=0.1)")
+    written = frame_comment(Frame(scale=(1 - 3e-8) / 24), program)
+    assert written.endswith(f"1 unit = 1{' m' if unit else ''}\n")
+
+
 def test_the_frame_of_a_placed_text_is_a_line_to_read():
     scale = scale_of(parse(PLACED))
     metres = frame_of_grid(Frame(0.01, (0, 0.5, 0), ((1, 0, 0), (0, 0, 1), (0, -1, 0))), scale)

@@ -174,17 +174,18 @@ def frame_comment(frame: Frame | None, program: Program) -> str:
     if frame is None:
         return ""
     scale = scale_of(program)
-    text, size = frame_of_text(frame, scale), ""
-    own = "" if program.unit is None else program.unit.name
-    for name, length in METRES.items() if own else ():
-        if math.isclose(METRES[own] / length, text.scale, rel_tol=2e-7):
-            size = f"{METRES[own] / length:.8g} {name}"
+    text, own = frame_of_text(frame, scale), "" if program.unit is None else program.unit.name
+    size = f"{text.scale:.8g}"
+    factors = {name: METRES[own] / length for name, length in METRES.items()} if own else {"": 1.0}
+    for name, factor in factors.items():
+        if math.isclose(factor, text.scale, rel_tol=2e-7):
+            size = f"{factor:.8g} {name}".rstrip()
     step = _ROUNDED * text.scale * LONGEST_SIDE / scale.cells_per_unit
     digits = -math.ceil(math.log10(max(step, 1e-300)))
     origin = " ".join(f"{round(value, digits) + 0.0:.15g}" for value in text.centre)
     axes = np.asarray(text.axes)
     up, front = _direction_text(axes[:, 2]), _direction_text(-axes[:, 1])
-    return f"# placed: up {up}, front {front}, origin {origin}, 1 unit = {size or f'{text.scale:.8g}'}\n"
+    return f"# placed: up {up}, front {front}, origin {origin}, 1 unit = {size}\n"
 
 
 def split_frame(text: str, name: str) -> tuple[str, Frame | None]:

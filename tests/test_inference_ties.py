@@ -667,3 +667,12 @@ def test_a_program_that_cannot_be_drawn_is_tied_for_less(monkeypatch):
 def test_what_lies_between_equal_clearances_is_written_with_one_number():
     text = tied_text("box(at=(0, -8, -12), size=(1, 16, 24))\nboard(at=(1, -6, -8.5), size=(6, .5, 17), tilt=20)\n")
     assert "width=width - 7, " in text
+
+
+def test_steps_that_would_be_shorter_as_a_row_are_tied():
+    text = "top(box(at=(10, -8, -12), size=(1, 16, 24)))\nfor i in translate(2, by=(-2.4, -5.2, 0.44)):\n"
+    program = sp.parse(f"{text}    stretcher(box(at=(5, 2, -10), size=(2, 2, 20)))\n")
+    assert source_of(placed(program)).lines[-1].kind == "row"
+    tied = tie(program, evidence_of_program(program)).program
+    assert tied.source.lines[-1].kind == "row"
+    assert float((unroll(tied).centre - unroll(program).centre).abs().max()) < 0.5

@@ -102,7 +102,7 @@ def tie(
         return Tied(program, 0)
     with one_tensor_thread(kernels=1):
         try:
-            source = placed(plain if held else merged(plain), merge=not held).source
+            source = placed(plain if held else merged(plain), merge=not held, rows=False).source
         except ShapeProgError:  # a statement without a placed form
             return Tied(program, free_numbers(program))
         assert source is not None

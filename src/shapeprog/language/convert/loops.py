@@ -21,7 +21,9 @@ PIVOTED = ("line", "base_cross")
 
 
 class Loops(Parts):
-    """The conversion of loops."""
+    """The conversion of loops; ``rows`` is whether loops with fixed steps may become rows."""
+
+    rows = True
 
     def line(self, line: Node | Call) -> Converted:
         """The placed lines of a statement, a loop or a call with a box; none for a part that draws nothing."""
@@ -122,7 +124,7 @@ class Loops(Parts):
         if number is not None:
             keywords = tuple(pair for axis in moving for pair in self._extra("xyz"[axis], by[axis]))
             options.append(Group("translate", keywords or (("x", 0.0),), body.lines, written))
-        if body.first and moving and (number is None or number > 1):
+        if body.first and moving and (number is None or (self.rows and number > 1)):
             ways = {axis: by[axis] * float(1 if number is None else number - 1) for axis in moving}
             options.append(Group("row", (("last", self._last(body.first, ways)),), body.lines, written))
         best = min(options, key=lambda group: cost(group.keywords))

@@ -38,7 +38,7 @@ from shapeprog.lazy_torch import torch
 from shapeprog.space import DEPTH, SIDE, UP
 
 
-def placed(program: Program, *, merge: bool = True) -> Program:
+def placed(program: Program, *, merge: bool = True, rows: bool = True) -> Program:
     """The same shape with its parts placed from the sides of its bounding box about the middle of the grid.
 
     Parameters
@@ -47,6 +47,8 @@ def placed(program: Program, *, merge: bool = True) -> Program:
         The program, in either notation.
     merge
         Whether loops that repeat in the same way become one; otherwise lines keep their order.
+    rows
+        Whether loops with equal steps may be written as rows, where that is shorter.
 
     Raises
     ------
@@ -57,7 +59,9 @@ def placed(program: Program, *, merge: bool = True) -> Program:
         return program
     sizes = [to_float32(float(f"{extent:.7g}")) or 1.0 for extent in _extents(program)]
     forms = [Linear(float(shortest(size))) for size in sizes]
-    body = with_joined_mirrors(Loops((forms[0], forms[1], forms[2]), {}, {}).lines(program.body).lines)
+    converter = Loops((forms[0], forms[1], forms[2]), {}, {})
+    converter.rows = rows
+    body = with_joined_mirrors(converter.lines(program.body).lines)
     header = Assignment(tuple(zip(SIZES, sizes, strict=True)))
     return _in_own_cells((header, *(merged_lines(body) if merge else body)))
 

@@ -9,13 +9,14 @@ import pytest
 
 from shapeprog.data.placement import shape_from_mesh
 from shapeprog.geometry.mesh import pieces, union_mesh
-from shapeprog.inference.candidates.neighbours import neighbours
+from shapeprog.inference.candidates.neighbours import neighbours, rows
 from shapeprog.inference.choice.choice import choose
 from shapeprog.inference.choice.connecting import connected, floating
 from shapeprog.inference.choice.coverage import Coverage
 from shapeprog.inference.fit.adjustment import adjust, tidy
 from shapeprog.inference.surface.evidence import Evidence, evidence_of
 from shapeprog.language import Draw, Loop, Program
+from shapeprog.language.hints import Box
 from shapeprog.language.parser import parse
 from shapeprog.language.program import Node
 from shapeprog.language.unroll import unroll
@@ -174,3 +175,11 @@ def test_parts_of_one_size_at_equal_steps_are_one_row_whatever_draws_them():
     assert any(node.body[0].name == "box" and np.allclose(node.values[1:], (3, 0, 0), atol=0.05) for node in rows)
     table = neighbours(parse(SEAT + LEGS.format(height=14)))
     assert not any(node.count > 2 for node in table if isinstance(node, Loop))
+
+
+def test_sheets_that_coincide_are_no_row() -> None:
+    def sheets(*sides: float) -> list[list[Box]]:
+        return [[Box(np.array([0.0, 0.0, side]), np.eye(3), np.array([2.0, 2.0, 0.0]))] for side in sides]
+
+    assert not list(rows(sheets(0, 0, 0, 0)))
+    assert list(rows(sheets(-3, -1, 1, 3)))

@@ -124,7 +124,7 @@ def _evenly(positions: FloatArray, minimum: float) -> tuple[int, float, float]:
     """Count, start and step of a row of positions (N,) at equal steps of at least ``minimum``; count 0 if none."""
     positions = np.sort(positions)
     steps = np.diff(positions)
-    steps = steps[steps >= minimum]
+    steps = steps[steps >= max(minimum, 1e-3)]  # sheets have no thickness, and may coincide
     if not len(steps):
         return 0, 0.0, 0.0
     first, length = float(positions[0]), float(positions[-1] - positions[0])

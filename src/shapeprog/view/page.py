@@ -181,10 +181,7 @@ def scores_text(scores: Mapping[str, float] | None, program: Program) -> list[st
     size = f"{parts} part{'s' * (parts != 1)} · {blocks} drawing statement{'s' * (blocks != 1)}"
     if not scores:
         return [size]
-    labels = {
-        "iou": "IoU", "cd": "CD", "f1_half_percent": "F1@.5%", "f1_percent": "F1@1%", "silhouette": "silhouette",
-        "seconds": "time",
-    }  # fmt: skip
+    labels = {"iou": "IoU", "cd": "CD", "f1_half_percent": "F1@.5%", "silhouette": "silhouette", "seconds": "time"}
     words = []
     for key, label in labels.items():
         if key in scores and np.isfinite(scores[key]):

@@ -53,7 +53,7 @@ def tidy_command(
     result = tie(given, evidence_of_program(given, seed), price=price, known=True, seed=seed).program
     for each in libraries:
         result = with_library(result, each)
-    result = in_readable_unit(result, wanted, seed)
+    result = in_readable_unit(result, wanted)
     if out is not None:
         save(result, out, frame)
     terminal.print_program(result)

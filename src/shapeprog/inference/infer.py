@@ -184,7 +184,7 @@ def infer(
         program = placed_if_possible(merged(program))
         for library in libraries:
             program = with_library(program, library)
-    program = in_readable_unit(program, unit_of_result(target, program, unit), seed)
+    program = in_readable_unit(program, unit_of_result(target, program, unit))
     doubt = "" if evidence is None else doubt_of_furniture(evidence)
     reason = " ".join(sentence for sentence in (reason, doubt, target.note) if sentence)
     cut = tuple(deadline.cut for deadline in (searching, refining) if deadline.cut)

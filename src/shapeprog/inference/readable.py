@@ -48,7 +48,7 @@ def unit_of_result(shape: Shape, program: Program, name: str = "") -> Unit | Non
     return Unit(shape.file_unit, shape.frame.scale)
 
 
-def in_readable_unit(program: Program, unit: Unit | None, seed: int = 0) -> Program:
+def in_readable_unit(program: Program, unit: Unit | None) -> Program:
     """The program with its lengths in a unit, or in cells, rounded as a person would.
 
     No number and no face moves by more than .015 cells; where parts would come apart, by less.  A program in this
@@ -64,10 +64,10 @@ def in_readable_unit(program: Program, unit: Unit | None, seed: int = 0) -> Prog
     exact = in_unit(program, unit)
     if not 0 < exact.size <= 256:  # rounding takes long for more primitives
         return exact
-    floating = afloat(program, seed)
+    floating = afloat(program)
     for tolerance in TOLERANCES[unit is None :]:
         result = _rounded(exact, tolerance)
-        if afloat(result, seed) <= floating:
+        if afloat(result) <= floating:
             return result
     return exact
 

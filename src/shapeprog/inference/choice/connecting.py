@@ -65,7 +65,7 @@ def floating(program: Program, flush: float = FLUSH) -> list[int]:
     return [block for block, parts in enumerate(_loose_parts(program, flush)) if any(parts)]
 
 
-def afloat(program: Program, seed: int = 0, flush: float = FLUSH) -> int:
+def afloat(program: Program, flush: float = FLUSH) -> int:
     """How many blocks are ``floating``."""
     return len(floating(program, flush))
 

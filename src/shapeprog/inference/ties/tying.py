@@ -109,7 +109,7 @@ def tie(
         ties = _Ties(Layout(source), evidence, seed, known=known, held=held)
         price *= KNOWN_PRICE if known else PRICE
         closeness = None if known else Closeness(evidence, seed)
-        before, floating = (closeness.of(unroll(plain)), afloat(plain, seed, APART)) if closeness else (0.0, 0)
+        before, floating = (closeness.of(unroll(plain)), afloat(plain, APART)) if closeness else (0.0, 0)
         tied = evaluated(source)
         for attempt in range(ATTEMPTS):
             try:
@@ -118,7 +118,7 @@ def tie(
                 continue
             if closeness is None:
                 break
-            if before - closeness.of(unroll(tied)) <= LOST and afloat(tied, seed, APART) <= floating:
+            if before - closeness.of(unroll(tied)) <= LOST and afloat(tied, APART) <= floating:
                 break
         if progress:
             progress("tying numbers", 1.0)

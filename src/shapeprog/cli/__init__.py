@@ -29,6 +29,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
         if arguments is None and isinstance(stop.code, int | None):
             _leave(stop.code or 0, stop.code == terminal.INTERRUPTED)
         raise
+    finally:  # the next call in this process is not quiet because this one was
+        terminal.debugging = terminal.quiet = False
 
 
 def _leave(code: int, interrupted: bool) -> None:

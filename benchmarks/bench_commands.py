@@ -49,7 +49,7 @@ def main():
     from shapeprog.inference.infer import prepare_kernels
     from shapeprog.view import Item, contact_sheet, picture
 
-    prepare_kernels()
+    prepare_kernels(cells=True)
     load(EXAMPLES[0])
     times, found = [], []
     for path in EXAMPLES:

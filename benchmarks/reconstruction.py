@@ -49,7 +49,7 @@ def measure(task: Task) -> list[dict[str, Any]]:
     from shapeprog.inference.surface.cells import points_of_cells
 
     torch.set_num_threads(1)
-    prepare_kernels()
+    prepare_kernels(cells=True)
     pack, index, blocks, methods, seed = task
     shape = read_pack(Path(pack))[index]
     cloud = None if shape.points is None else torch.from_numpy(np.asarray(shape.points, np.float32))

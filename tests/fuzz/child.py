@@ -166,7 +166,7 @@ def _warm_up(seeds: dict[str, bytes], folder: Path) -> None:
     from shapeprog.kernels.compile import modules_of, prepare
 
     torch.set_num_threads(1)
-    prepare(modules_of("data", "geometry"))
+    prepare(modules_of("data/", "geometry/"))
     for name in {name.rpartition(".")[2]: name for name in seeds}.values():  # one of each format
         path = _fresh(folder / "case") / name
         path.write_bytes(seeds[name])

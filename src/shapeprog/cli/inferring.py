@@ -70,6 +70,7 @@ def infer_command(
     from shapeprog.data import load_all
     from shapeprog.files import make_folder
     from shapeprog.inference import Settings, infer
+    from shapeprog.inference.infer import SURFACE_KERNELS
     from shapeprog.inference.results import document, free_stem, measured, write
     from shapeprog.kernels.compile import modules_of, prepare
     from shapeprog.view import picture
@@ -77,7 +78,8 @@ def infer_command(
     terminal.check_axes(up, front)
     terminal.check_units(unit, file_unit)
     report = None if as_json else lambda sentence: terminal.note(f"{sentence.capitalize()}.")
-    prepare(modules_of("data", "geometry", "inference", *([] if no_picture else ["view"])), report)
+    others = ["data/", "geometry/neighbour", "evaluation/", *([] if no_picture else ["view/"])]
+    prepare(modules_of(*SURFACE_KERNELS, *others), report)
     inference = partial(
         infer, blocks=blocks, budget=budget, seed=seed, settings=None if rounds is None else Settings(rounds=rounds),
         statements="paper" if paper else "all", detail=detail, ties=not no_ties,

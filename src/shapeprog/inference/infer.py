@@ -44,6 +44,14 @@ SEARCH_SHARE = 0.65
 """Share of the time budget after which the search on cells hands over to refinement."""
 
 
+SURFACE_KERNELS = (
+    "geometry/distance", "geometry/surface", "inference/choice/coverage", "inference/surface/", "inference/fit/",
+    "inference/candidates/", "inference/pieces/", "inference/choice/choice",
+)  # fmt: skip
+CELL_KERNELS = ("geometry/cell", "inference/cells/")
+"""Where the kernels of the search on the surface and of that on cells are; those with the same helpers together."""
+
+
 @dataclass(frozen=True)
 class Result:
     """The result of inference.
@@ -146,10 +154,10 @@ def infer(
     """
     if unit not in ("", CELLS):
         metres(unit)
-    prepare_kernels()
+    target = _load(shape)
+    prepare_kernels(cells=statements == "paper" or target.points is None)
     started = time.monotonic()
     searching, refining = (Deadline(started + share * budget) for share in (SEARCH_SHARE, 1.0))
-    target = _load(shape)
     scores: dict[str, float] = {}
     program, reason = Program(), ""
     snapped: Program | None = None
@@ -203,14 +211,19 @@ def infer(
 
 
 @cache
-def prepare_kernels() -> None:
+def prepare_kernels(*, cells: bool = False) -> None:
     """Compile, or load from the cache, all kernels that inference runs, so that no time budget pays for it.
 
     The first call on a machine takes some seconds, the first in a process a fraction of one.
+
+    Parameters
+    ----------
+    cells
+        Whether the search on cells runs too.
     """
     from shapeprog.kernels.compile import modules_of, prepare
 
-    prepare(modules_of("inference", "geometry"))
+    prepare(modules_of(*SURFACE_KERNELS, *(CELL_KERNELS if cells else ())))
 
 
 def _load(shape: Shape | str | Path) -> Shape:

@@ -122,10 +122,11 @@ class Kernel:
         return digest.hexdigest()[:16]
 
 
-def modules_of(*packages: str) -> list[str]:
-    """Names of the modules with the kernels of packages."""
-    files = ((name, path) for name in packages for path in (Path(__file__).parents[1] / name).glob("*_kernels.py"))
-    return sorted(f"shapeprog.{name}.{path.stem}" for name, path in files)
+def modules_of(*paths: str) -> list[str]:
+    """Names of the modules with kernels in folders, such as ``geometry/``, and in files, as ``geometry/surface``."""
+    root = Path(__file__).parents[1]
+    files = (file for path in paths for file in sorted(root.glob(f"{path}*_kernels.py")))
+    return [".".join(["shapeprog", *file.relative_to(root).with_suffix("").parts]) for file in files]
 
 
 def prepare(modules: Sequence[str], tell: Callable[[str], None] | None = None) -> None:

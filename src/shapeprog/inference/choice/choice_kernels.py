@@ -38,11 +38,20 @@ def gain(
 
 
 @helper
+def copy(values, count, result):
+    """Write the first values over those of another array; a loop compiles faster than an assignment of slices."""
+    for k in range(count):
+        result[k] = values[k]
+
+
+@helper
 def include(rows, interior, cover, under, candidate):
     """Add the cover and the interior of one more candidate: no later candidate gains there."""
-    cover |= rows[candidate]
-    cover[: len(under)] |= interior[candidate]
-    under |= interior[candidate]
+    for word in range(len(cover)):
+        cover[word] |= rows[candidate, word]
+    for word in range(len(under)):
+        cover[word] |= interior[candidate, word]
+        under[word] |= interior[candidate, word]
 
 
 @helper
@@ -107,12 +116,15 @@ def search(
         those of another search, or minus infinity and -1.
     """
     max_size, total = sets.shape[1], len(exposed)
-    cover, under = np.zeros(rows.shape[1], np.uint64), np.zeros(interior.shape[1], np.uint64)
+    cover, under = np.empty(rows.shape[1], np.uint64), np.empty(interior.shape[1], np.uint64)
     incumbent, selected = np.empty(max_size, np.int64), np.empty(max_size, np.int64)
     alone, base, less, more = np.empty(total), np.empty(total), np.empty(total), np.empty(total)
-    known, overlap, slack = np.zeros(total, np.bool_), np.empty((total, total)), np.empty((total, total))
+    known, overlap, slack = np.empty(total, np.bool_), np.empty((total, total)), np.empty((total, total))
     size, best_value, draws = len(initial_set), 0.0, 0
-    incumbent[:size] = initial_set
+    copy(initial_set, size, incumbent)
+    cover[:] = np.uint64(0)
+    under[:] = np.uint64(0)
+    known[:] = False
     for candidate in range(total):
         alone[candidate] = gain(
             rows, interior, hidden, weights, words, bits, begins, inner, starts, exposed, sample_price, prices, penalty,
@@ -125,7 +137,7 @@ def search(
         count, step, value = 0, 0, 0.0
         cover[:] = np.uint64(0)
         under[:] = np.uint64(0)
-        base[:] = alone
+        copy(alone, total, base)
         less[:] = 0.0
         more[:] = 0.0
         while True:
@@ -143,7 +155,7 @@ def search(
             else:
                 if value > values[count]:
                     values[count] = value
-                    sets[count, :count] = selected[:count]
+                    copy(selected, count, sets[count])
                 if count == max_size:
                     break
                 first, upper = 0, 0.0
@@ -181,4 +193,4 @@ def search(
             count += 1
         if value >= best_value - THRESHOLD * (1.0 - turn / (rounds + 1.0)):
             best_value, size = value, count
-            incumbent[:count] = selected[:count]
+            copy(selected, count, incumbent)

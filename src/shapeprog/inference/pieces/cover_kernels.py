@@ -31,11 +31,17 @@ def near_boxes(points, centre, rotation, half, tolerance, explained, fill):
     """
     covered = np.empty((6, 8, 8), np.bool_)
     at, ends = np.empty(3), np.empty(6, np.int64)
-    cells = np.empty(len(points), np.int64)
+    cells, order = np.empty(len(points), np.int64), np.empty(len(points), np.int64)
+    starts = np.empty(CELLS**3 + 1, np.int64)
+    starts[:] = 0
     for k in range(len(points)):
         cells[k] = (cell_of(points[k, 0]) * CELLS + cell_of(points[k, 1])) * CELLS + cell_of(points[k, 2])
-    order = np.argsort(cells)
-    starts = np.searchsorted(cells[order], np.arange(CELLS**3 + 1))
+        starts[cells[k]] += 1
+    for cell in range(1, len(starts)):
+        starts[cell] += starts[cell - 1]
+    for k in range(len(points)):  # from the ends of the cells to their starts
+        starts[cells[k]] -= 1
+        order[starts[cells[k]]] = k
     for b in range(len(centre)):
         covered[:] = False
         for row in range(3):
@@ -46,8 +52,8 @@ def near_boxes(points, centre, rotation, half, tolerance, explained, fill):
         for i in range(ends[0], ends[3] + 1):
             for j in range(ends[1], ends[4] + 1):
                 line = (i * CELLS + j) * CELLS
-                for k in order[starts[line + ends[2]] : starts[line + ends[5] + 1]]:
-                    outside = False
+                for index in range(starts[line + ends[2]], starts[line + ends[5] + 1]):
+                    k, outside = order[index], False
                     for axis in range(3):
                         at[axis] = 0.0
                         for row in range(3):

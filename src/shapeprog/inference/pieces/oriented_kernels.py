@@ -23,6 +23,14 @@ MANY = 160
 
 
 @helper
+def copy(frame, result):
+    """Write a frame over another; the compiler takes a second for an assignment of whole arrays."""
+    for row in range(3):
+        for column in range(3):
+            result[row, column] = frame[row, column]
+
+
+@helper
 def extents(points, first, last, frame, low, high):
     """Write how far the points ``first`` to ``last - 1`` reach along the columns of a frame."""
     for axis in range(3):
@@ -138,7 +146,8 @@ def outermost(points, first, last, directions, selected):
     """Copy the points that lie farthest out along some directions, or all of a few; their number is returned."""
     if last - first <= MANY:
         for k in range(first, last):
-            selected[k - first] = points[k]
+            for axis in range(3):
+                selected[k - first, axis] = points[k, axis]
         return last - first
     for d in range(directions.shape[0]):
         low, high = first, first
@@ -149,7 +158,8 @@ def outermost(points, first, last, directions, selected):
                 minimum, low = at, k
             if at > maximum:
                 maximum, high = at, k
-        selected[2 * d], selected[2 * d + 1] = points[low], points[high]
+        for axis in range(3):
+            selected[2 * d, axis], selected[2 * d + 1, axis] = points[low, axis], points[high, axis]
     return 2 * directions.shape[0]
 
 
@@ -176,47 +186,42 @@ def box_each(points, start, directions, frames, kind, floor, centre, rotation, h
     selected, flat = np.empty((MANY, 3)), np.empty((MANY, 2))
     order, outline = np.empty(MANY, np.int64), np.empty(2 * MANY + 2, np.int64)
     low, high = np.empty(3), np.empty(3)
-    frame, trial = np.empty((3, 3)), np.empty((3, 3))
+    world, frame, trial = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
+    for row in range(3):
+        for column in range(3):
+            world[row, column] = 1.0 if row == column else 0.0
     for g in range(len(start) - 1):
         first, last = start[g], start[g + 1]
         count = outermost(points, first, last, directions, selected)
         flattened = kind[g] == FLAT
-        if flattened:
-            frame[:] = frames[g]
-        else:
-            frame[:] = np.eye(3)
+        start_frame = frames[g] if flattened else world
+        copy(start_frame, frame)
         start_volume = volume(selected, count, frame, floor, low, high)
         best = WORTH * start_volume
         plain = True
         for axis in range(2 if flattened else 0, 3):
-            if flattened:
-                trial[:] = frames[g]
-            else:
-                trial[:] = np.eye(3)
+            copy(start_frame, trial)
             turn_about(selected, count, trial, axis, floor, flat, order, outline)
             size = volume(selected, count, trial, floor, low, high)
             if size < best:
                 best, plain = size, False
-                frame[:] = trial
+                copy(trial, frame)
         if not flattened:
             best = WORTH * (start_volume if plain else best)
             free = False
             for way in range(2):
-                if way == 0:
-                    trial[:] = frame
-                else:
-                    trial[:] = frames[g]
+                copy(frame if way == 0 else frames[g], trial)
                 size = settle(selected, count, trial, floor, flat, order, outline, low, high)
                 if size < best:
                     best, free = size, True
-                    rotation[g] = trial
+                    copy(trial, rotation[g])
             if free:
-                frame[:] = rotation[g]
+                copy(rotation[g], frame)
                 if kind[g] == ROD:
-                    trial[:] = frames[g]
+                    copy(frames[g], trial)
                     turn_about(selected, count, trial, 0, floor, flat, order, outline)
                     if volume(selected, count, trial, floor, low, high) < SLACK * best:
-                        frame[:] = trial
+                        copy(trial, frame)
         extents(points, first, last, frame, low, high)
         for row in range(3):
             centre[g, row] = 0.0

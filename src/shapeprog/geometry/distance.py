@@ -20,7 +20,7 @@ from shapeprog.geometry.arrays import array, gradients, numbers, over_threads, t
 from shapeprog.geometry.batch import Batch
 from shapeprog.geometry.primitive import SIZES
 from shapeprog.geometry.primitives import primitives
-from shapeprog.kernels.table import WIDTH
+from shapeprog.kernels.table import SIZE, WIDTH
 from shapeprog.space import Array
 
 Nearest = tuple[Int[Tensor, "*batch P"], Float[Tensor, "*batch P"]]
@@ -62,6 +62,32 @@ def signed_distance(batch: Batch, points: Float[Tensor, "*shared P 3"]) -> Float
     return result.reshape(*batch.batch_shape, points.shape[-2])
 
 
+def distance_and_slopes(batch: Batch, points: Float[Tensor, "B P 3"]) -> tuple[Tensor, Tensor, Tensor]:
+    """Signed distance (B, P) of points to the union of each element of a batch (B, N), without gradient.
+
+    Besides, the gradient of its sum by sizes, centres and rotations (B, N, 16) and by points (B, P, 3).
+    """
+    table = table_of(batch)
+    slots, values = _nearest(table, points)
+    to_table, to_points = _pulled(table, slots, points, torch.ones_like(values))
+    rows = torch.from_numpy(to_table).to(points).reshape(*batch.mask.shape, WIDTH)[..., SIZE:]
+    return values, rows, to_points
+
+
+def _pulled(
+    table: Array, slots: Int[Tensor, "B P"], points: Float[Tensor, "B P 3"], slope: Float[Tensor, "B P"]
+) -> tuple[Array, Float[Tensor, "B P 3"]]:
+    """Gradient by rows of the table and by points, given that by the distances to known primitives."""
+    (scenes, count), per_scene = slots.shape, len(table) // max(len(slots), 1)
+    to_table, to_points = np.zeros((len(table), WIDTH)), np.zeros((scenes * count, 3))
+    data = (
+        table, per_scene, numbers(points).reshape(-1, 3), count, array(slots).reshape(-1), numbers(slope).reshape(-1),
+        to_table, to_points,
+    )  # fmt: skip
+    over_threads(partial(kernels.pull, *data), scenes)
+    return to_table, torch.from_numpy(to_points.reshape(scenes, count, 3)).to(points)
+
+
 class _UnionDistance(torch.autograd.Function):
     """The kernels as one differentiable step, on the CPU wherever the tensors are."""
 
@@ -77,15 +103,8 @@ class _UnionDistance(torch.autograd.Function):
     @once_differentiable
     def backward(ctx: Any, slope: Tensor) -> tuple[Tensor | None, ...]:
         points, slots = ctx.saved_tensors
-        (scenes, count), per_scene = slots.shape, len(ctx.table) // max(len(slots), 1)
-        to_table, to_points = np.zeros((len(ctx.table), WIDTH)), np.zeros((scenes * count, 3))
-        data = (
-            ctx.table, per_scene, numbers(points).reshape(-1, 3), count, array(slots).reshape(-1),
-            numbers(slope).reshape(-1), to_table, to_points,
-        )  # fmt: skip
-        over_threads(partial(kernels.pull, *data), scenes)
-        to_points = to_points.reshape(scenes, count, 3)
-        return None, *gradients(to_table, points, scenes, per_scene), torch.from_numpy(to_points).to(points)
+        to_table, to_points = _pulled(ctx.table, slots, points, slope)
+        return None, *gradients(to_table, points, len(slots), len(ctx.table) // max(len(slots), 1)), to_points
 
 
 def _aligned(batch: Batch, points: Tensor) -> tuple[Batch, Float[Tensor, "B P 3"]]:

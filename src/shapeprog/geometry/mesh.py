@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from itertools import combinations
+from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -157,12 +157,17 @@ def pieces(vertices: Array, faces: Array) -> int:
 def gaps(scene: Batch, within: float) -> dict[tuple[int, int], float]:
     """The distance between primitives of one scene, for pairs of slots nearer than ``within``; 0 where they overlap."""
     parts = part_meshes(scene)
-    solids = [manifold(part.vertices, part.faces) for part in parts]
+    if len(parts) < 2:
+        return {}
     low, high = (np.array([corner(part.vertices, 0) for part in parts]) for corner in (np.min, np.max))
+    straight = [bool(((p.vertices == a) | (p.vertices == b)).all()) for p, a, b in zip(parts, low, high, strict=True)]
+    solid = cache(lambda index: manifold(parts[index].vertices, parts[index].faces))
+    between = np.linalg.norm(
+        np.maximum(low[:, None] - high, low - high[:, None]).clip(0), axis=-1
+    )  # those of the boxes
     results = {}
-    for i, j in combinations(range(len(parts)), 2):
-        if (low[i] <= high[j] + within).all() and (low[j] <= high[i] + within).all():
-            gap = solids[i].min_gap(solids[j], 2 * within)
-            if gap < within:
-                results[parts[i].slot, parts[j].slot] = float(gap)
+    for i, j in np.argwhere(np.triu(between <= within, 1)).tolist():
+        gap = between[i, j] if straight[i] and straight[j] else solid(i).min_gap(solid(j), 2 * within)
+        if gap < within:
+            results[parts[i].slot, parts[j].slot] = float(gap)
     return results

@@ -15,13 +15,14 @@ from torch import Tensor
 
 from shapeprog.data.shape import Shape
 from shapeprog.errors import ShapeProgError
+from shapeprog.geometry.scene import Scene
 from shapeprog.inference.choice.connecting import afloat
 from shapeprog.language.dimensions import in_unit, literal_lengths
 from shapeprog.language.parameters import to_float32
 from shapeprog.language.program import Program
 from shapeprog.language.tensors import encode
 from shapeprog.language.unit import Unit
-from shapeprog.language.unroll import unroll
+from shapeprog.language.unroll import Plan
 
 TOLERANCES = (0.015, 0.004, 0.001)
 """How far a face may move, in cells; the smaller ones where parts come apart, and for programs in cells."""
@@ -74,7 +75,9 @@ def in_readable_unit(program: Program, unit: Unit | None) -> Program:
 
 def _rounded(program: Program, tolerance: float) -> Program:
     lengths, with_numbers = literal_lengths(program)
-    numbers, before = [*lengths], _faces(program)
+    code = encode(program, dtype=torch.float64)
+    plan = Plan(code)  # that of all these programs
+    numbers, before = [*lengths], _faces(plan.scene(code.parameters))
     per_cell = 1.0 if program.unit is None else program.unit.per_cell
     for step in (0.5, 1.0):  # shares of the tolerance: numbers that are nearly round go first
         for index, number in enumerate(lengths):
@@ -84,7 +87,8 @@ def _rounded(program: Program, tolerance: float) -> Program:
                     break
                 try:
                     result = with_numbers([*numbers[:index], tried, *numbers[index + 1 :]])
-                    close = float((_faces(result) - before).abs().max()) <= step * tolerance
+                    scene = plan.scene(encode(result, dtype=torch.float64).parameters)
+                    close = float((_faces(scene) - before).abs().max()) <= step * tolerance
                 except ShapeProgError:  # something has no size any more
                     continue
                 if close:
@@ -103,7 +107,6 @@ def _rounder(number: float, farthest: float) -> Iterator[float]:
                 yield tried
 
 
-def _faces(program: Program) -> Float[Tensor, "N 2 3"]:
-    """The lowest and highest corners of the boxes around the primitives of a program, along the axes of the grid."""
-    scene = unroll(encode(program, dtype=torch.float64))
+def _faces(scene: Scene) -> Float[Tensor, "N 2 3"]:
+    """The lowest and highest corners of the boxes around the primitives of a scene, along the axes of the grid."""
     return torch.stack([scene.centre - scene.reach, scene.centre + scene.reach], 1)

@@ -6,6 +6,7 @@ import importlib
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
 from shapeprog.language.ast import Draw as Draw
 from shapeprog.language.ast import Loop as Loop
@@ -57,7 +58,7 @@ class Program:
         """The drawing statements, in the order of the text."""
         return [node for node in self.walk() if isinstance(node, Draw)]
 
-    @property
+    @cached_property
     def chains(self) -> list[Chain]:
         """The blocks, each as the loops around a drawing statement, outermost first, then the statement.
 

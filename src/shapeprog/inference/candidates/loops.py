@@ -91,17 +91,17 @@ def images(singles: Sequence[Node], surface: FloatArray) -> list[Node]:
     points = sample_surface(scene, POINTS, torch.Generator().manual_seed(0)).points.numpy()
     tree = cKDTree(surface)
 
-    def on(*axes: int) -> FloatArray:
-        """Share of points on the surface, for the mirror image of each candidate."""
-        image = points * [-1.0 if axis in axes else 1.0 for axis in range(3)]
-        share: FloatArray = np.isfinite(tree.query(image, distance_upper_bound=ON)[0]).mean(1)
+    def on(tested: npt.NDArray[np.bool_], *axes: int) -> FloatArray:
+        """Share of points on the surface, for the mirror image of each candidate that is tested; zero for others."""
+        image, share = points[tested] * [-1.0 if axis in axes else 1.0 for axis in range(3)], np.zeros(len(points))
+        share[tested] = np.isfinite(tree.query(image, distance_upper_bound=ON)[0]).mean(1)
         return share
 
-    original = on()
-    minimum = np.where(original >= SUPPORTED, AS_WELL * original, np.inf)
     one_sided = (points.min(1) > 0) | (points.max(1) < 0)
-    side, depth = (one_sided[:, axis] & (on(axis) >= minimum) for axis in (SIDE, DEPTH))
-    four = side & depth & (on(SIDE, DEPTH) >= minimum)
+    original = on(one_sided[:, [SIDE, DEPTH]].any(1))
+    minimum = np.where(original >= SUPPORTED, AS_WELL * original, np.inf)
+    side, depth = (on(one_sided[:, axis] & (minimum < np.inf), axis) >= minimum for axis in (SIDE, DEPTH))
+    four = on(side & depth, SIDE, DEPTH) >= minimum
     return [
         *(_mirrored(node, SIDE) for node in compress(singles, side)),
         *(_mirrored(node, DEPTH) for node in compress(singles, depth)),

@@ -226,6 +226,9 @@ def met(box: Box, parts: Sequence[Box], within: Sequence[float] = (WITHIN,), *, 
     ``within`` are the distances from the middle to the lines, as shares of those to the corners.  ``longer`` restricts
     the face to outward moves.
     """
+    if not parts:
+        return
+    around = Box(*map(np.array, zip(*parts, strict=True)))  # all of them as arrays
     for axis in range(3):
         corners = CORNERS * box.half * (np.arange(3) != axis)
         starts = (
@@ -234,8 +237,8 @@ def met(box: Box, parts: Sequence[Box], within: Sequence[float] = (WITHIN,), *, 
         minimum = box.half[axis] if longer else -np.inf
         for sign in (-1.0, 1.0):
             along = sign * box.rotation[:, axis]
-            ends = {end for part in parts for end in _crossed(starts, along, part) if end > minimum}
-            for end in sorted(ends, key=lambda end: abs(end - box.half[axis]))[:4]:
+            ends = _crossed(starts, along, around)
+            for end in sorted(ends[ends > minimum].tolist(), key=lambda end: abs(end - box.half[axis]))[:4]:
                 length = (box.half[axis] + end) / 2
                 if abs(end - box.half[axis]) <= REACH and length >= SHORTEST / 2:
                     half = box.half.copy()
@@ -259,11 +262,11 @@ def centred(box: Box) -> Iterator[Box]:
                 yield Box(centre, box.rotation, half)
 
 
-def _crossed(starts: FloatArray, along: FloatArray, part: Box) -> set[float]:
-    """Distances at which lines (L, 3) of one direction enter a box, increased by ``INTO`` for a joint."""
-    at, step = (starts - part.centre) @ part.rotation, along @ part.rotation
+def _crossed(starts: FloatArray, along: FloatArray, parts: Box) -> FloatArray:
+    """Distances at which lines (L, 3) of one direction enter any of several boxes, plus ``INTO`` for a joint."""
+    at, step = (starts - parts.centre[:, None]) @ parts.rotation, (along @ parts.rotation)[:, None]
     step = np.where(np.abs(step) < 1e-9, 1e-9, step)
-    first, second = (-part.half - at) / step, (part.half - at) / step
-    enters, leaves = np.minimum(first, second).max(1), np.maximum(first, second).min(1)
-    through = enters < leaves
-    return set(np.minimum(enters + INTO, leaves)[through].round(2).tolist())
+    half = parts.half[:, None]
+    first, second = (-half - at) / step, (half - at) / step
+    enters, leaves = np.minimum(first, second).max(-1), np.maximum(first, second).min(-1)
+    return np.unique(np.minimum(enters + INTO, leaves)[enters < leaves].round(2))

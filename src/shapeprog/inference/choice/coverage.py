@@ -174,23 +174,23 @@ class Coverage:
 
         A ``ShapeProgError`` if one draws more copies than :func:`shapeprog.language.unroll` takes.
         """
+        scene = unroll(candidates).detach()
         if new := [candidate for candidate in dict.fromkeys(candidates) if candidate not in self._rows]:
-            self._add(new)
+            self._add(new, scene if len(new) == len(candidates) else unroll(new).detach())
         mine, count = [self._rows[candidate] for candidate in candidates], len(candidates)
         words = -(-len(self._points) // WORD)
         covered = np.array([row.covered for row in mine], np.uint64).reshape(count, len(self._weights))
         interior = np.array([row.interior for row in mine], np.uint64).reshape(count, words)
         samples = np.array([row.samples for row in mine]).reshape(-1, 3)
-        hidden = holds(unroll(candidates).detach(), samples, 0.0)
+        hidden = holds(scene, samples, 0.0)
         exposed = np.array([2**row.sampled - 1 for row in mine], np.uint64) & ~hidden.diagonal()
         return CoverageTable(
             np.concatenate([covered, hidden], 1), self._weights, words, interior, exposed,
             np.array([row.sample_price for row in mine]), np.array([row.price for row in mine]),
         )  # fmt: skip
 
-    def _add(self, candidates: Sequence[Program]) -> None:
+    def _add(self, candidates: Sequence[Program], scene: Scene) -> None:
         evidence, prices = self.evidence, self.prices
-        scene = unroll(candidates).detach()
         price = np.array([prices.of(program) for program in candidates]) - prices.number * centred(scene, candidates)
         interior = holds(scene, self._points, evidence.tolerance)
         explained = explains(scene, self._points, self._normals, evidence) & ~interior

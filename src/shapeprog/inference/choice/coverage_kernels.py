@@ -91,7 +91,7 @@ def hold(table, primitives, points, bits, starts, cells, depth, rows, begin, end
     for row in range(begin * primitives, end * primitives):
         if table[row, KIND] < 0:
             continue
-        box_of(table, row, 0.0, cells, ends, box)
+        box_of(table, row, -depth, cells, ends, box)
         for i in range(ends[0], ends[3] + 1):
             for j in range(ends[1], ends[4] + 1):
                 line = (i * cells + j) * cells

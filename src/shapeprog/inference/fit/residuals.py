@@ -18,7 +18,7 @@ from scipy.spatial import cKDTree
 from torch import Tensor
 
 from shapeprog.geometry.batch import Batch
-from shapeprog.geometry.distance import nearest_primitive, signed_distance
+from shapeprog.geometry.distance import distance_and_slopes, nearest_primitive
 from shapeprog.geometry.scene import Scene
 from shapeprog.geometry.surface import SurfaceSample, sample_surface
 from shapeprog.inference.choice.bits import nearby
@@ -87,9 +87,8 @@ class Target:
         self._shares = np.cumsum(evidence.weights[self._order])
         unsure = np.flatnonzero(~sides)
         self._owner: Array = np.concatenate([np.arange(len(sides)), unsure])
-        self._tree = cKDTree(np.concatenate([
-            _joint(evidence.points, normals), _joint(evidence.points[unsure], -normals[unsure])
-        ]))  # fmt: skip
+        both = _joint(evidence.points, normals), _joint(evidence.points[unsure], -normals[unsure])
+        self._tree = cKDTree(np.concatenate(both), 24, balanced_tree=False)  # faster than by default
 
     def pairs(self, scene: Scene, generator: torch.Generator) -> Pairs:
         """Pairs both ways, drawn at random: from points to the program, and from its surface to points.
@@ -146,22 +145,18 @@ class Target:
 
 def pull(scene: Scene, pairs: Pairs, width: float) -> Pull:
     """Slope and curvature of the misfit, where residuals of ``width`` cells have a quarter of the weight."""
-    single, leaves = rows_of(scene, pairs.slots)
-    at = pairs.points[:, None].clone().requires_grad_()
-    level = signed_distance(single, at)[:, 0]
-    slope, *by = torch.autograd.grad(level.sum(), [at, *leaves])
-    value, by_row = level.detach(), torch.cat([gradient.flatten(1) for gradient in by], 1)
-    cosine = (slope[:, 0] * pairs.normals).sum(1)
+    fields = (scene.kind, scene.size, scene.centre, scene.rotation, scene.mask)
+    single = Batch(*(field[pairs.slots][:, None] for field in fields))
+    value, by_row, slope = (result[:, 0] for result in distance_and_slopes(single, pairs.points[:, None]))
+    cosine = (slope * pairs.normals).sum(1)
     plane = ((pairs.points - pairs.samples) * pairs.normals).sum(1)
     same = (cosine >= SAME) | pairs.anywhere
     residual = torch.where(same, value, plane)
     # The opposite side of a part explains the point: a sheet is evidence for one side of a board, not for both.
     explained = pairs.either & ~same & (value.abs() < plane.abs() / 2)
     if len(off_face := (~same).nonzero()[:, 0]):  # the nearest point is on another face: use the plane at the sample
-        single, leaves = rows_of(scene, pairs.slots[off_face])
-        at = (pairs.samples + 1e-3 * pairs.normals)[off_face, None]
-        gradients = torch.autograd.grad(signed_distance(single, at).sum(), leaves)
-        by_row[off_face] = torch.cat([gradient.flatten(1) for gradient in gradients], 1)
+        samples = (pairs.samples + 1e-3 * pairs.normals)[off_face, None]
+        by_row[off_face] = distance_and_slopes(single[off_face], samples)[1][:, 0]
     robust = (width**2 / (width**2 + residual**2 + pairs.offset)) ** 2
     weight = torch.where(explained, 0.0, pairs.weights * robust)
     count = len(scene.mask)

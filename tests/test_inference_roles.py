@@ -159,11 +159,30 @@ cushion(at=(-2, -5, -5), size=(2.5, 9, 10), edge=0.3)  # seat
 board(at=(0, 4, -5), size=(12, 1, 10), tilt=1)  # back
 """
 
+CHEST = """
+for i in mirror(side):
+    box(at=(-12, -5, 7), size=(24, 10, 0.6))  # side
+box(at=(11.4, -5, -7), size=(0.6, 10, 14))  # top
+box(at=(-12, -4.6, -7), size=(1.6, 0.4, 14))  # base
+for i in translate(7, by=(3.1, 0, 0)):
+    box(at=(-10.2, -5, -7), size=(2.8, 0.4, 14))  # drawer
+    box(at=(-9, -5.5, -2), size=(0.3, 0.5, 4))  # handle
+box(at=(-10.4, 4.7, -7), size=(21.8, 0.3, 14))  # panel
+"""
+
+DOORS = """
+box(at=(-12, -4, -6), size=(2, 9, 12))  # base
+box(at=(-10, -4.4, -6), size=(22, 9.4, 12))  # body
+for i in translate(4, by=(0, 0, 3)):
+    box(at=(-10, -5, -5.9), size=(22, 0.6, 2.8))  # door
+"""
+
 WHOLE = [
-    CHAIR, STOOL_BACK, UPHOLSTERED, TABLE, BOOKCASE, CABINET, WARDROBE, BED, SOFA, SLATTED, TALL, SIDEBOARD, DESK, PLATE
+    CHAIR, STOOL_BACK, UPHOLSTERED, TABLE, BOOKCASE, CABINET, WARDROBE, BED, SOFA, SLATTED, TALL, SIDEBOARD, DESK,
+    PLATE, CHEST, DOORS
 ]  # fmt: skip
 NAMES = ["chair", "swivel chair", "upholstered chair", "table", "bookcase", "cabinet", "wardrobe", "bed", "sofa"]
-NAMES += ["slatted bench", "tall cabinet", "sideboard", "desk", "chair on a plate"]
+NAMES += ["slatted bench", "tall cabinet", "sideboard", "desk", "chair on a plate", "chest of drawers", "doors"]
 
 
 def wanted(text: str) -> list[str]:

@@ -6,6 +6,8 @@ for all of them at once.  Lengths and distances are compared with shares of the 
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 import numpy.typing as npt
 
@@ -34,17 +36,18 @@ class Parts:
     ``lying``, ``flat``, ``wide``            its upper face is the larger one; and it is a plate; and large
     ``squat``                                a body that may be higher than it is wide, but not by much
     ``slender``, ``upright``, ``level``      a stick; that stands; that lies
+    ``board``                                one extent is small against both others
     ``facing_front``, ``facing_side``        a board by the way that it faces
-    ``front``, ``wall``                      the same, and uprights that are wide against the whole, however slender
-    ``small``, ``stubby``, ``bulky``         against the whole: its length; its plan; how much of it it fills
-    ``equal``                                how many parts of about its size there are
+    ``front``, ``wall``                      the same, and slender boards that are wide or high against the whole
+    ``small``, ``stubby``                    against the whole: its length; its plan
+    ``bulky``, ``solid``                     it fills much of the whole; some of it, and is no board
+    ``kind``, ``equal``                      parts of one kind have about the same extents; how many there are of it
     ``low``, ``high``, ``bottom``, ``top``   bounds (N, 3), and along up
     ``main``, ``main_low``, ``main_high``    which parts are the main surface; its bounds (3,)
     ``rear``, ``aside``                      from its middle to the rear, and to either side, .5 at its edges
     ``run``, ``span``                        extents along depth and left-right, as shares of those of the main surface
     ``grounded``, ``below``, ``alongside``   on the floor; under the main surface; at its height
     ``rising``, ``above``                    it ends clearly above the main surface; it begins there
-    ``headroom``                             height of the whole above the main surface
     ``central``, ``behind``, ``outermost``   by place along depth and left-right
     ``in_front``, ``lowest``                 at the front of the whole; the lowest plate, near the floor
     ``walled``, ``cased``                    of the whole: its sides reach the floor; it has some, or a body
@@ -61,9 +64,16 @@ class Parts:
         half, pose = half[mask], np.swapaxes(turned(np.swapaxes(pose, -1, -2), turns), -1, -2)
         self.block = scene.block.numpy()[mask]
         self.count = len(half)
+        reach = (np.abs(pose) @ half[..., None])[..., 0]
+        self.low, self.high = centre - reach, centre + reach
+        self.bottom, self.top = self.low[:, UP], self.high[:, UP]
+        self.size = self.high.max(0) - self.low.min(0)
+        self.near = 0.04 * max(float(self.size.max()), 1e-6)  # a point has no size
+        self.floor = float(self.bottom.min())
         self._form(half, pose, (scene.kind == primitives.index(ARC)).numpy()[mask])
-        self._whole(centre, (np.abs(pose) @ half[..., None])[..., 0])
+        self._main_surface()
         self._places()
+        self._case()
 
     def _form(self, half: FloatArray, pose: FloatArray, bent: Mask) -> None:
         """Form of the parts; bent rods, whose boxes are nearly empty, are sticks and no plates."""
@@ -88,16 +98,20 @@ class Parts:
         self.board: Mask = (self.thin <= 0.3 * self.middle) & ~bent
         self.facing_front: Mask = self.board & ~self.slender & (self.depth == self.thin)
         self.facing_side: Mask = self.board & ~self.slender & (self.side == self.thin)
+        self.small: Mask = self.long <= 0.12 * self.size.max()
+        stubby = (self.depth <= self.size[DEPTH] / 4) & (self.side <= self.size[SIDE] / 4)
+        self.stubby: Mask = stubby & (self.up >= np.maximum(self.depth, self.side))
+        volume = self.up * self.face / max(float(self.size.prod()), 1e-9)
+        self.bulky: Mask = volume >= 0.3
+        self.solid: Mask = (volume >= 0.1) & ~self.lying & ~self.board
+        sizes = np.round(np.stack([self.up, self.depth, self.side], 1) / self.near).astype(np.int64)
+        _, kind, copies = np.unique(sizes, axis=0, return_inverse=True, return_counts=True)
+        self.kind = kind.reshape(-1)
+        self.equal = copies[self.kind]
 
-    def _whole(self, centre: FloatArray, reach: FloatArray) -> None:
-        """Where the parts are, and the main surface among them."""
-        self.low, self.high = centre - reach, centre + reach
-        self.bottom, self.top = self.low[:, UP], self.high[:, UP]
+    def _main_surface(self) -> None:
         first, last = self.low.min(0), self.high.max(0)
-        self.size = last - first
-        self.near = 0.04 * max(float(self.size.max()), 1e-6)  # a point has no size
-        self.floor = float(first[UP])
-        off = centre - (first + last) / 2
+        off = (self.low + self.high - first - last) / 2
         central = (off[:, DEPTH] <= 0.15 * self.size[DEPTH]) & (np.abs(off[:, SIDE]) <= self.size[SIDE] / 4)
         fitting, cover = self.lying & central, self._cover()
         if not fitting.any():  # an upholstered seat that reaches the floor
@@ -144,34 +158,43 @@ class Parts:
         self.below: Mask = ~self.main & (middle < bottom)
         self.rising: Mask = (self.top >= top + 2 * self.near) | (middle >= top)
         self.above: Mask = self.bottom >= top - 2 * self.near
-        self.headroom = np.full(self.count, self.floor + self.size[UP] - top)
-        self.small: Mask = self.long <= 0.12 * self.size.max()
-        stubby = (self.depth <= self.size[DEPTH] / 4) & (self.side <= self.size[SIDE] / 4)
-        self.stubby: Mask = stubby & (self.up >= np.maximum(self.depth, self.side))
-        self.bulky: Mask = self.up * self.face >= 0.3 * self.size.prod()
         self.central: Mask = (np.abs(self.rear) <= 0.15) & (self.aside <= 0.15)
         self.behind: Mask = (self.rear > 0.1) & (self.aside < 0.3)
         self.outermost: Mask = self.aside + self.span / 2 >= 0.4
         self.in_front: Mask = self.low[:, DEPTH] <= self.low[:, DEPTH].min() + 3 * self.near
+        self.padded = (self.wide & self.below & ~self.grounded & (self.top >= bottom - 1.5 * self.near)).any()
+        self.on_pedestal = (self.below & self.central & self.upright).any()
+
+    def _case(self) -> None:
+        """The sides and fronts of a case."""
         plate = self.wide & self.flat & (self.bottom <= self.floor + 0.2 * self.size[UP])
         self.lowest: Mask = plate & (self.bottom <= self.bottom[plate].min(initial=np.inf) + self.near)
-
         standing = self.board & self.upright
         wide = (self.side == self.thin) & (self.depth >= self.size[DEPTH] / 2)
         self.wall: Mask = self.facing_side | (standing & wide)
-        wide = (self.depth == self.thin) & (self.side >= self.size[SIDE] / 2)
-        self.front: Mask = self.facing_front | (standing & wide)
         sides = self.wall & self.outermost & (self.up >= self.size[UP] / 2)
-        carrying = self.wide & self.below & ~self.grounded & (self.top >= bottom - 1.5 * self.near)
-        column = self.below & self.central & self.upright
-        self.walled: Mask = np.full(self.count, (sides & self.grounded).sum() > 1)
-        self.cased: Mask = np.full(self.count, sides.sum() > 1 or self.bulky.any())
-        self.padded: Mask = np.full(self.count, carrying.any())
-        self.on_pedestal: Mask = np.full(self.count, column.any())
+        self.walled = (sides & self.grounded).sum() > 1
+        self.cased = np.bool_(sides.sum() > 1 or (self.bulky | self.solid).any())
+        large = (self.up >= 0.12 * self.size[UP]) & (self.side >= 0.12 * self.size[SIDE]) & self.cased
+        wide = large | (self.upright & (self.side >= self.size[SIDE] / 2))
+        self.front: Mask = self.facing_front | (self.board & (self.depth == self.thin) & wide)
 
-        sizes = np.round(np.stack([self.thin, self.middle, self.long], 1) / self.near).astype(np.int64)
-        _, kind, copies = np.unique(sizes, axis=0, return_inverse=True, return_counts=True)
-        self.equal = copies[kind.reshape(-1)]
+    @cached_property
+    def stacked(self) -> Mask:
+        """Whether an equal part is right above or below each, with a gap of at most half of their height."""
+        gap = self.bottom - self.top[:, None]
+        close = (self.kind == self.kind[:, None]) & (gap >= -self.up / 4) & (gap <= self.up / 2)
+        close &= (np.abs(self.low - self.low[:, None])[..., DEPTH:] <= self.near).all(-1)
+        return close.any(0) | close.any(1)
+
+    @cached_property
+    def attached(self) -> Mask:
+        """Whether each is small and right in front of a larger one."""
+        area, middle = self.up * self.side, (self.low + self.high)[:, None] / 2
+        before = ((self.low <= middle) & (middle <= self.high))[..., [UP, SIDE]].all(-1)
+        before &= np.abs(self.low[:, DEPTH] - self.high[:, None, DEPTH]) <= self.near
+        before &= area[:, None] <= area / 4
+        return before.any(1) & (area <= 0.012 * self.size[UP] * self.size[SIDE]) & (self.depth <= self.size[DEPTH] / 4)
 
 
 def turned(vectors: FloatArray, turns: int) -> FloatArray:

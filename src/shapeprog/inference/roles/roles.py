@@ -19,7 +19,7 @@ from shapeprog.inference.roles.measures import Mask, Parts
 from shapeprog.language.program import Draw, Loop, Node, Program, nest
 from shapeprog.language.statement import language
 from shapeprog.language.unroll import unroll
-from shapeprog.space import DEPTH, SIDE, UP, Array, FloatArray
+from shapeprog.space import DEPTH, SIDE, UP
 
 Rule = tuple[str, Callable[[Parts], Mask]]
 
@@ -29,16 +29,14 @@ def anything(p: Parts) -> Mask:
     return np.ones(p.count, bool)
 
 
-STANDING: tuple[Rule, ...] = (
+SUPPORTING: tuple[Rule, ...] = (
     # What carries a main surface, or hangs below it.
-    ("pedestal", lambda p: p.below & p.central & p.upright),
+    ("pedestal", lambda p: p.below & p.central & p.upright & (p.equal == 1)),
     ("foot", lambda p: p.below & p.grounded & ~p.level & p.small),
     ("leg", lambda p: p.below & p.upright),
     ("base", lambda p: p.below & p.slender & (p.grounded | p.on_pedestal)),
     ("apron", lambda p: (p.below | p.alongside) & p.level & (p.top >= p.main_low[UP] - 1.5 * p.near)),
     ("stretcher", lambda p: p.below & p.level),
-    ("leg", lambda p: p.below & p.slender & p.grounded),
-    ("brace", lambda p: p.below & p.slender),
     ("leg", lambda p: p.below & p.facing_side & (p.aside > 0.25)),
     ("panel", lambda p: p.below & (p.facing_side | p.facing_front)),
     ("stretcher", lambda p: p.below & ~p.grounded & p.lying),
@@ -54,8 +52,8 @@ SEATING: tuple[Rule, ...] = (
     # A part from the ground to above the seat is a leg as well.
     ("leg", lambda p: p.rising & p.grounded & p.upright),
     # Behind: a back, its rails and slats, its posts.
-    ("slat", lambda p: p.rising & p.behind & (p.span >= 0.5) & p.level & (p.equal >= 3)),
-    ("rail", lambda p: p.rising & p.behind & (p.span >= 0.5) & p.level & (p.up <= 0.5 * p.headroom)),
+    ("slat", lambda p: p.rising & p.level & ((p.equal >= 5) | (p.behind & (p.span >= 0.5) & (p.equal >= 3)))),
+    ("rail", lambda p: p.rising & p.behind & (p.span >= 0.5) & p.level & (p.up <= p.size[UP] / 4)),
     ("back", lambda p: p.rising & p.behind & (p.span >= 0.5)),
     # At the sides: arm rests and their posts.
     ("arm_post", lambda p: p.rising & (p.aside > 0.3) & (p.rear < 0.25) & p.upright),
@@ -64,7 +62,7 @@ SEATING: tuple[Rule, ...] = (
     ("slat", lambda p: p.rising & p.upright & (p.aside < 0.35) & (p.equal >= 3)),
     ("post", lambda p: p.rising & p.slender),
     ("back", lambda p: p.rising),
-    *STANDING,
+    *SUPPORTING,
     ("panel", lambda p: p.facing_side | p.facing_front),
     ("block", anything),
 )
@@ -73,38 +71,38 @@ BED: tuple[Rule, ...] = (
     ("headboard", lambda p: p.rising & p.facing_front & (p.span >= 0.6) & (p.rear > 0.25)),
     ("footboard", lambda p: p.facing_front & (p.span >= 0.6) & (p.rear < -0.25)),
     ("footboard", lambda p: p.level & (p.up > 2 * p.depth) & (p.span >= 0.6) & (p.rear < -0.4)),
-    ("base", lambda p: p.below & p.wide & p.grounded),
     ("mattress", lambda p: p.wide & ~p.below & (p.top <= p.main_high[UP] + 2 * p.near)),
     ("base", lambda p: p.below & p.wide),
     ("pillow", lambda p: p.above & ~p.slender & (p.run <= 0.5)),
     ("rail", lambda p: p.rising & p.behind & p.level),
-    ("slat", lambda p: p.rising & p.behind & p.upright & (p.aside < 0.35)),
     ("post", lambda p: p.rising & p.slender),
     ("side", lambda p: (p.aside > 0.3) & (p.run >= 0.5)),
     ("slat", lambda p: p.level & (p.equal >= 3)),
-    *STANDING,
+    *SUPPORTING,
     ("body", anything),
 )
 
 CASE: tuple[Rule, ...] = (
+    # In front: a plinth, doors and drawers with their handles.
+    ("base", lambda p: p.front & p.level & p.grounded & (p.up <= 0.3 * p.size[UP]) & ~p.stacked),
+    ("handle", lambda p: p.attached & p.cased & ~p.grounded),
+    ("door", lambda p: p.front & p.in_front & p.cased & ((p.up >= p.side) | (p.up > 0.5 * p.size[UP]))),
+    ("drawer", lambda p: (p.front | p.stacked) & p.in_front & p.cased),
     # Lying boards: the highest is the top, one on the ground the base.
     ("top", lambda p: (p.wide | p.main) & (p.top >= p.floor + p.size[UP] - p.near) & (p.up <= 0.3 * p.size[UP])),
     ("base", lambda p: p.wide & p.flat & (p.grounded | (p.cased & p.lowest))),
     ("base", lambda p: p.wide & p.grounded & (p.up <= 0.2 * p.size[UP])),
-    ("shelf", lambda p: p.wide & p.flat),
+    ("shelf", lambda p: p.wide & p.flat & p.board),
     ("body", lambda p: p.bulky),
-    # Standing boards: at the sides, within, behind and in front.
+    # Standing boards at the sides, within and behind.
     ("side", lambda p: p.wall & p.outermost & (p.long >= 0.3 * p.size[UP])),
-    ("panel", lambda p: p.wall),
-    ("base", lambda p: p.front & p.in_front & p.grounded & (p.up <= 0.2 * p.size[UP])),
-    ("door", lambda p: p.front & p.in_front & p.cased & ((p.up >= p.side) | (p.up > 0.5 * p.size[UP]))),
-    ("drawer", lambda p: p.front & p.in_front & p.cased),
     ("side", lambda p: p.front & p.grounded & (np.abs(p.rear) > 0.25) & (p.equal > 1) & ~p.cased),
-    ("panel", lambda p: p.front),
+    ("panel", lambda p: p.wall | p.front),
     # Sticks.
     ("handle", lambda p: p.small & (p.rear < -0.4) & ~p.grounded),
     ("foot", lambda p: p.grounded & ~p.level & p.small),
-    ("pedestal", lambda p: p.upright & p.central),
+    ("brace", lambda p: p.slender & ~p.grounded & (p.rise > 0.35) & (p.rise < 0.97)),
+    ("pedestal", lambda p: p.upright & p.central & (p.equal == 1)),
     ("post", lambda p: p.upright & p.walled & (p.top >= p.floor + 0.6 * p.size[UP])),
     ("leg", lambda p: p.grounded & (p.upright | p.stubby)),
     ("post", lambda p: p.upright),
@@ -113,12 +111,12 @@ CASE: tuple[Rule, ...] = (
     ("rail", lambda p: p.level & p.cased),
     ("apron", lambda p: p.level & (p.top >= p.floor + 0.8 * p.size[UP])),
     ("stretcher", lambda p: p.level),
-    ("brace", lambda p: p.slender),
     # All other parts.
     ("top", lambda p: p.lying & (p.top >= p.floor + p.size[UP] - p.near) & (p.up <= 0.3 * p.size[UP])),
     ("base", lambda p: p.lying & p.flat & p.grounded),
     ("shelf", lambda p: p.lying & p.flat),
     ("drawer", lambda p: p.cased & p.in_front & ~p.grounded),
+    ("body", lambda p: p.solid),
     ("block", anything),
 )
 
@@ -166,21 +164,16 @@ def in_order(program: Program) -> Program:
     return Program(tuple(program.body[index] for index in order))
 
 
-def roles_of(parts: Parts) -> Array:
-    """The role of each part (N,)."""
-    roles = np.full(parts.count, "", object)
-    for role, fits in (("body", anything),) if parts.count == 1 else _kind(parts):
-        roles[(roles == "") & fits(parts)] = role
-    return roles
-
-
 def roles_of_blocks(program: Program) -> list[str]:
     """The role of each block: that of most of the surface of its copies, none where it draws nothing."""
     scene = unroll(program)
     shares: list[dict[str, float]] = [{} for _ in range(program.blocks)]
     if scene.mask.any():
         parts = _facing(scene)
-        for block, role, surface in zip(parts.block.tolist(), roles_of(parts), parts.surface.tolist(), strict=True):
+        roles = np.full(parts.count, "", object)
+        for role, fits in (("body", anything),) if parts.count == 1 else _kind(parts):
+            roles[(roles == "") & fits(parts)] = role
+        for block, role, surface in zip(parts.block.tolist(), roles, parts.surface.tolist(), strict=True):
             shares[block][role] = shares[block].get(role, 0.0) + surface
     return [_common(share) for share in shares]
 
@@ -225,21 +218,12 @@ def _kind(p: Parts) -> tuple[Rule, ...]:
     walls = p.wall & p.outermost & (p.run >= 0.5) & (p.up >= 0.6 * p.size[UP])
     walls &= p.top >= p.floor + 0.9 * p.size[UP]
     open_above = not (p.main & p.flat).any() and not (p.wide & p.above).any()  # a deep seat between wings
-    if not p.main.any() or (walls.sum() > 1 and not open_above):
+    if not p.main.any() or (walls.sum() > 1 and not open_above) or (p.rising & p.bulky).any():
         return CASE
-    back, height = p.rising & (p.rear > 0.1) & (p.aside < 0.6), p.top - p.main_high[UP]
-    if _backed(p, back, height):
-        if p.size[DEPTH] <= p.size[SIDE] or p.size[UP] >= 0.6 * p.size[DEPTH]:
-            return SEATING
-        return CASE if (p.rising & p.bulky).any() else BED
-    arms = p.rising & (p.aside > 0.3) & (height >= 0.12 * p.size[UP])
-    middle = p.low[:, SIDE] + p.high[:, SIDE] - p.main_low[SIDE] - p.main_high[SIDE]
-    return SEATING if (arms & (middle < 0)).any() and (arms & (middle > 0)).any() and not p.cased.any() else CASE
-
-
-def _backed(p: Parts, back: Mask, height: FloatArray) -> bool:
-    """Whether parts that rise above the main surface, so high (N,), make a back."""
-    if not back.any():
-        return False
-    width = p.high[back, SIDE].max() - p.low[back, SIDE].min()
-    return bool(height[back].max() >= 0.12 * p.size[UP] and width >= 0.4 * (p.main_high[SIDE] - p.main_low[SIDE]))
+    high, low_end, high_end = p.top >= p.main_high[UP] + 0.12 * p.size[UP], p.low[:, SIDE], p.high[:, SIDE]
+    left, right = p.main_low[SIDE], p.main_high[SIDE]
+    back = p.rising & (p.rear > 0.1) & (p.aside < 0.6)
+    if (back & high).any() and high_end[back].max() - low_end[back].min() >= 0.4 * (right - left):
+        return SEATING if p.size[DEPTH] <= p.size[SIDE] or p.size[UP] >= 0.6 * p.size[DEPTH] else BED
+    arms = (low_end + high_end - left - right)[p.rising & (p.aside > 0.3) & high]
+    return SEATING if (arms < 0).any() and (arms > 0).any() and not p.cased else CASE

@@ -181,9 +181,9 @@ class Parts:
 
     @cached_property
     def stacked(self) -> Mask:
-        """Whether an equal part is right above or below each, with a gap of at most half of their height."""
+        """Whether an equal part is right above or below each, with a gap of at most half their height."""
         gap = self.bottom - self.top[:, None]
-        close = (self.kind == self.kind[:, None]) & (gap >= -self.up / 4) & (gap <= self.up / 2)
+        close = (self.kind == self.kind[:, None]) & (gap > 0.02 * self.up) & (gap <= self.up / 2)
         close &= (np.abs(self.low - self.low[:, None])[..., DEPTH:] <= self.near).all(-1)
         return close.any(0) | close.any(1)
 

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import combinations
 
+from shapeprog.inference.ties.naming import interval
 from shapeprog.language.ast import Argument, Group, Keywords, Line, Part, Point, Source, changed_lines, values
 from shapeprog.language.convert.loops import with_joined_mirrors
 from shapeprog.language.convert.parts import ordered
@@ -172,23 +173,11 @@ def _division(
 def _in_division(part: Part, first: Part, axis: int, numbers: dict[str, float]) -> Part:
     """A part of a row in the box of the first one, in the middle of it if it nearly is."""
     words = AXES[axis]
-    (low, size), (start, whole) = (_interval(each, axis, numbers) for each in (part, first))
+    (low, size), (start, whole) = (interval(each, axis, numbers) for each in (part, first))
     remaining = [(word, value) for word, value in part.keywords if word not in words or word == words.size]
     centred = abs(2 * (low - start) + size - whole) < CENTRED
     place = (words.offset, 0.0) if centred else (words.low, to_float32(round(low - start, 2)))
     return replace(part, keywords=ordered((place, *remaining)))
-
-
-def _interval(part: Part, axis: int, numbers: dict[str, float]) -> tuple[float, float]:
-    """The low end and the length of a part along an axis."""
-    words, whole = AXES[axis], numbers[SIZES[axis]]
-    given = {word: value_at(value, numbers) for word, value in part.keywords if word in words}  # type: ignore[arg-type]
-    size = given.get(words.size, whole - given.get(words.low, 0.0) - given.get(words.high, 0.0))
-    if words.low in given or (axis == 2 and not {words.high, words.offset} & given.keys()):
-        return given.get(words.low, 0.0), size
-    return whole - given[words.high] - size if words.high in given else (whole - size) / 2 + given.get(
-        words.offset, 0
-    ), size
 
 
 def _is_upright(part: Part) -> bool:

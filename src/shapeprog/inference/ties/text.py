@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -10,7 +11,7 @@ import numpy as np
 from shapeprog.inference.ties.anchored import Anchored
 from shapeprog.inference.ties.expressions import Solution
 from shapeprog.inference.ties.groups import grouped
-from shapeprog.inference.ties.naming import Namer
+from shapeprog.inference.ties.naming import named
 from shapeprog.language.ast import (
     Argument,
     Assignment,
@@ -61,61 +62,74 @@ def written(anchored: Anchored, solution: Solution, numbers: FloatArray, *, grou
         Whether lines are grouped where that is shorter.
     """
     slots, factors, free = anchored.slots, solution.factors, solution.free
-    rounded = [round(float(numbers[k]), DEGREES if slots[k].kind == "angle" else CELLS) + 0.0 for k in free]
-    namer = Namer(anchored.layout, slots)
-    users: dict[bytes, list[int]] = {}
+    alike: dict[bytes, list[int]] = {}  # numbers that follow from the free ones in the same way
     for p in range(3, len(slots)):
         if factors[p].any():
-            users.setdefault(factors[p].round(6).tobytes(), []).append(p)
+            alike.setdefault(factors[p].round(6).tobytes(), []).append(p)
+    sizes = ["diameter" if k < 2 and np.array_equal(factors[0], factors[1]) else SIZES[k] for k in range(3)]
     terms: list[Value] = [0.0] * len(free)
-    named: list[tuple[str, Value]] = []
-    order = sorted(range(len(free)), key=lambda z: (slots[free[z]].line, free[z]))
-    for z in order:
+    shared: dict[str, Value] = {}
+    for z in sorted(range(len(free)), key=lambda z: (slots[free[z]].line, free[z])):
         k = free[z]
-        unit = np.zeros(len(free))
-        unit[z] = 1
-        members = users.get(unit.tobytes(), [k])
-        if k < 3:
-            terms[z] = Name("diameter" if k < 2 and np.array_equal(factors[0], factors[1]) else SIZES[k])
-        elif (factors[3:, z] != 0).sum() > 1:
-            name = namer.name(members)
-            named.append((name, to_float32(rounded[z])))
-            terms[z] = Name(name)
-        else:
-            terms[z] = to_float32(rounded[z])
-    table: dict[str, Value] = {}
-    sums: list[tuple[str, Value]] = []
-    for members in users.values():
+        number = to_float32(round(float(numbers[k]), DEGREES if slots[k].kind == "angle" else CELLS) + 0.0)
+        terms[z] = Name(sizes[k]) if k < 3 else number
+        if k >= 3 and (factors[3:, z] != 0).sum() > 1:
+            terms[z] = Name(anchored.name(k))
+            shared[anchored.name(k)] = number
+    table: dict[str, Value] = {anchored.name(p): 0.0 for p in range(3, len(slots))}
+    for members in alike.values():
         row = factors[members[0]]
-        parts = sorted(((terms[z], float(row[z])) for z in np.flatnonzero(row)), key=lambda part: part[1] < 0)
-        value = combined(0.0, parts)
+        value = combined(0.0, sorted(((terms[z], float(row[z])) for z in np.flatnonzero(row)), key=lambda t: t[1] < 0))
         if len(members) > 1 and isinstance(value, Expression) and not isinstance(value, Name):
-            name = namer.name(members)
-            sums.append((name, value))
-            value = Name(name)
+            shared[anchored.name(members[0])] = value
+            value = Name(anchored.name(members[0]))
         table |= dict.fromkeys((anchored.name(p) for p in members), value)
-    for p in range(3, len(slots)):
-        table.setdefault(anchored.name(p), 0.0)
-
-    def final(line: Line) -> Line:
-        new = (replaced(v, lambda n: table.get(n.name, n) if isinstance(n, Name) else n) for v in values(line))
-        return _simplified(with_values(line, [_combined(v) if isinstance(v, Binary) else v for v in new]))
 
     extents: list[Value] = [to_float32(round(float(numbers[k]), CELLS)) for k in range(3)]
     height = extents[2]
     above: list[Assignment] = []
-    if np.array_equal(factors[0], factors[1]):
+    if sizes[0] == "diameter":
         above = [Assignment((("diameter", extents[0]),))]
         extents[:2] = Name("diameter"), Name("diameter")
-    sizes = Assignment(tuple(zip(SIZES, extents, strict=True)))
-    header = (*above, sizes, *_assignments(named), *_assignments(sums))
-    body = changed_lines([line for line in anchored.lines if not isinstance(line, Assignment)], final)
-    lines = (*header, *(grouped(body, Source(header).evaluated_numbers()) if group else merged_lines(body)))
+    header = (*above, Assignment(tuple(zip(SIZES, extents, strict=True))))
+    known = Source((*header, Assignment(tuple(shared.items())))).evaluated_numbers()
+    body = changed_lines(
+        [line for line in anchored.lines if not isinstance(line, Assignment)],
+        lambda line: _simplified(_changed(line, table)),
+    )
+    body = grouped(body, known) if group else merged_lines(body)
+    uses = Counter(name for line in Source(body).walk() for value in values(line) for name in names_in(value))
+    uses += Counter(name for value in shared.values() for name in names_in(value))
+    once = {name: value for name, value in shared.items() if uses[name] < 2}
+    for name, value in once.items():  # sums come last
+        once[name] = _with(value, once)
+    shared = {name: _with(value, once) for name, value in shared.items() if name not in once}
+    body = changed_lines(body, lambda line: _changed(line, once))
+    names = named(body, shared, known)
+    final: dict[str, Value] = {provisional: Name(name) for provisional, name in names.items()}
+    pairs = [(names[name], _with(value, final)) for name, value in shared.items()]
+    plain, sums = ([pair for pair in pairs if isinstance(pair[1], Expression) == is_sum] for is_sum in (False, True))
+    lines = (
+        *header,
+        *_assignments(plain),
+        *_assignments(sums),
+        *changed_lines(body, lambda line: _changed(line, final)),
+    )
     scale = anchored.source.scale
     assert scale is not None
     assert isinstance(height, float)
     floor = -height * scale.cells_per_unit / 2
     return replace(placed_source(lines), scale=replace(scale, floor=floor), unit=anchored.source.unit)
+
+
+def _with(value: Value, table: Mapping[str, Value]) -> Value:
+    """A number or an expression with names replaced, and with each name and number once."""
+    new = replaced(value, lambda each: table.get(each.name, each) if isinstance(each, Name) else each)
+    return _combined(new) if isinstance(new, Binary) else new
+
+
+def _changed(line: Line, table: Mapping[str, Value]) -> Line:
+    return with_values(line, [_with(value, table) for value in values(line)])
 
 
 def _assignments(named: list[tuple[str, Value]]) -> Iterator[Assignment]:

@@ -576,10 +576,11 @@ def test_neighbours_that_fill_a_box_are_its_division():
         "for _ in divide(3, x, gap=0.5, left=a, right=a, front=0, depth=1):\n    drawer()"
     )
     assert grouped_text(head + row.replace("width=7", "width=3")).startswith("for _ in row(3")  # far apart
-    doors = "for _ in mirror(x=0):\n    door(left=a, right=width / 2 + 0.1, front=0, depth=1)\n"
-    assert grouped_text(head + doors).startswith(
-        "for _ in divide(2, x, gap=0.2, left=a, right=a, front=0, depth=1):\n    door()"
-    )
+    for place in ("left=a, right=width / 2 + 0.1", "right=a, width=10.9"):
+        doors = f"for _ in mirror(x=0):\n    door({place}, front=0, depth=1)\n"
+        assert grouped_text(head + doors).startswith(
+            "for _ in divide(2, x, gap=0.2, left=a, right=a, front=0, depth=1):\n    door()"
+        )
 
 
 def test_the_handle_of_each_drawer_is_in_the_same_division():

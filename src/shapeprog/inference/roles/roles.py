@@ -84,7 +84,7 @@ BED: tuple[Rule, ...] = (
 
 CASE: tuple[Rule, ...] = (
     # In front: a plinth, doors and drawers with their handles.
-    ("base", lambda p: p.front & p.grounded & (p.up <= np.minimum(0.3 * p.size[UP], p.side / 2)) & ~p.stacked),
+    ("base", lambda p: p.front & p.grounded & (p.up <= p.size[UP] * np.where(p.in_front, 0.2, 0.3)) & ~p.stacked),
     ("handle", lambda p: p.attached & p.cased & ~p.grounded),
     ("door", lambda p: p.front & p.in_front & p.cased & ((p.up >= p.side) | (p.up > 0.5 * p.size[UP]))),
     ("drawer", lambda p: (p.front | p.stacked) & p.in_front & p.cased),

@@ -11,7 +11,7 @@ from shapeprog.inference.ties.naming import interval
 from shapeprog.language.ast import Argument, Group, Keywords, Line, Part, Point, Source, changed_lines, values
 from shapeprog.language.convert.loops import with_joined_mirrors
 from shapeprog.language.convert.parts import ordered
-from shapeprog.language.expression import Binary, Expression, Name, Value, names_in, value_at
+from shapeprog.language.expression import Expression, Value, names_in, value_at
 from shapeprog.language.merging import merged_lines
 from shapeprog.language.parameters import to_float32
 from shapeprog.language.placement import AXES, BOX, SIZES, axis_of
@@ -19,6 +19,9 @@ from shapeprog.language.placement import AXES, BOX, SIZES, axis_of
 BOXES = ("box", "cushion")
 GAP, LEAST = 0.25, 2.0
 """Neighbours divide a box if the gap between them is at most this share of their size, which is this many cells."""
+
+STILL = 1e-6
+"""Cells from which the last copy of a row is elsewhere than the first."""
 
 CENTRED = 0.1
 """Cells by which the clearances of a part in the middle differ at most."""
@@ -39,38 +42,35 @@ def grouped(lines: Sequence[Line], numbers: dict[str, float]) -> tuple[Line, ...
     """
 
     def shorter(line: Line) -> Line:
-        return _divided(_mirrored(_straight(line)), numbers) if isinstance(line, Group) else line
+        return _divided(_mirrored(_straight(line, numbers)), numbers) if isinstance(line, Group) else line
 
-    changed = changed_lines(lines, shorter)
+    single = (
+        replace(line, body=(inner,)) if isinstance(line, Group) and line.kind == "mirror" else line
+        for line in lines
+        for inner in (line.body if isinstance(line, Group) and line.kind == "mirror" else (line,))
+    )
+    changed = changed_lines(single, shorter)
     return _in_boxes(with_joined_mirrors(merged_lines(changed_lines(changed, _nested))))
 
 
 # ---- rows ---------------------------------------------------------------------------------------------------------
 
 
-def _straight(row: Group) -> Group:
+def _straight(row: Group, numbers: dict[str, float]) -> Group:
     """A row without the axes along which its last copy is where the first is."""
     first = next(_solids(row), None)
     if row.kind != "row" or first is None:
         return row
     (_, last), *_ = row.keywords
     assert isinstance(last, Point)
-    arguments = dict(first.keywords)
-    start = arguments.get("start")
-    if isinstance(start, Point):
-        arguments = dict(start.keywords)
 
-    def same(word: str, value: Value) -> bool:
-        words = next(words for words in AXES if word in words)
-        full = word != words.offset and not {words.size, "radius"} & arguments.keys() and start is None
-        default = (
-            0.0
-            if full or word == "bottom" or (word == words.offset and not set(words[:2]) & arguments.keys())
-            else None
-        )
-        return arguments.get(word, default) == value
+    def moves(word: str, value: Value) -> bool:
+        axis = axis_of(word)
+        (low, size), whole = interval(first, axis, numbers), numbers[SIZES[axis]]
+        place = dict(zip(AXES[axis], (low, whole - low - size, size, low + (size - whole) / 2), strict=True))[word]
+        return abs(place - value_at(value, numbers)) > STILL
 
-    pairs = tuple((word, value) for word, value in last.keywords if not same(word, value))
+    pairs = tuple((word, value) for word, value in last.keywords if moves(word, value))
     return replace(row, keywords=(("last", Point(pairs or last.keywords)),))
 
 
@@ -105,69 +105,47 @@ def _mirrored(row: Group) -> Group:
 
 def _divided(loop: Group, numbers: dict[str, float]) -> Group:
     """A row, or a mirror, of equal neighbours as the division of a box; further parts of a row are placed in each."""
-    part, *others = loop.body
-    if not all(isinstance(line, Part) and _is_upright(line) for line in loop.body):
+    parts = [line for line in loop.body if isinstance(line, Part) and _is_upright(line)]
+    if len(parts) < len(loop.body) or len(loop.keywords) != 1 or loop.kind not in ("row", "mirror"):
         return loop
-    assert isinstance(part, Part)
-    keywords = dict(part.keywords)
-    if loop.kind == "mirror" and len(loop.keywords) == 1 and not others:
-        (word, plane), *_ = loop.keywords
-        axis = axis_of(word)
-        words, middle = AXES[axis], Binary("/", Name(SIZES[axis]), 2.0)
-        if word != words.offset or plane != 0 or words.size in keywords:
+    (part, *others), ((word, place),) = parts, loop.keywords
+    if isinstance(place, Point):
+        if len(place.keywords) != 1:
             return loop
-        clearance, inner = keywords.get(words.low, 0.0), keywords.get(words.high, 0.0)
-        if inner == middle:
-            gap = 0.0
-        elif isinstance(inner, Binary) and inner.left == middle and isinstance(inner.right, float):
-            gap = to_float32(2 * inner.right if inner.operator == "+" else -2 * inner.right)
-        else:
-            return loop
-        return _division(part, axis, 2.0, (clearance, clearance), gap) if gap >= 0 else loop
-    if loop.kind != "row" or len(loop.keywords) != 1 or not isinstance(loop.count, float | int):
-        return loop
-    (_, last), *_ = loop.keywords
-    if not isinstance(last, Point) or len(last.keywords) != 1:
-        return loop
-    (word, value), *_ = last.keywords
+        ((word, place),) = place.keywords
     axis = axis_of(word)
-    words = AXES[axis]
-    size = keywords.get(words.size)
-    first_word = words.high if word == words.low else words.low if word == words.high else ""
+    words, whole, keywords = AXES[axis], numbers[SIZES[axis]], dict(part.keywords)
+    size = keywords.get(words.size, "")
+    if loop.kind == "row":
+        first, count = words.high if word == words.low else words.low, loop.count
+        if word == words.offset or not (first in keywords or first == "bottom") or not isinstance(size, float):
+            return loop
+        clearances = {word: place, first: keywords.get(first, 0.0)}
+    else:  # the inner side is in the middle, or the size is a number
+        sides = sorted({*words[:2]} & keywords.keys(), key=lambda side: value_at(keywords[side], numbers))  # type: ignore[arg-type]
+        if others or axis == 2 or place != 0 or word != words.offset or not sides:
+            return loop
+        count, clearances = 2.0, dict.fromkeys(words[:2], keywords[sides[0]])
+        if not isinstance(size, float) and [*names_in(keywords[sides[-1]])] != [SIZES[axis]]:  # type: ignore[arg-type]
+            return loop
+    length, sized = interval(part, axis, numbers)[1], (words.size in dict(other.keywords) for other in others)
+    follows = any(SIZES[axis] in names_in(value) for line in parts for value in values(line))
     if (
-        not isinstance(size, float)
-        or (size < LEAST and not others)
-        or (others and any(SIZES[axis] in names_in(value) for line in loop.body for value in values(line)))
-        or any(words.size not in dict(other.keywords) for other in others if isinstance(other, Part))
-        or (first_word not in keywords and not (axis == 2 and first_word == "bottom"))
+        not isinstance(count, float | int)
+        or (length < LEAST and not others)
+        or (others and (follows or not all(sized)))
     ):
         return loop
-    clearances = {word: value, first_word: keywords.get(first_word, 0.0)}
     occupied = sum(value_at(clearance, numbers) for clearance in clearances.values())  # type: ignore[arg-type]
-    gap = (numbers[SIZES[axis]] - occupied - loop.count * size) / (loop.count - 1)
-    if not 0 <= round(gap, 2) <= GAP * size:
+    gap = to_float32(round((whole - occupied - count * length) / (count - 1), 2))
+    if not 0 <= gap <= GAP * length:
         return loop
-    further = tuple(_in_division(other, part, axis, numbers) for other in others if isinstance(other, Part))
-    return _division(part, axis, loop.count, (clearances[words.low], clearances[words.high]), round(gap, 2), further)
-
-
-def _division(
-    part: Part,
-    axis: int,
-    count: float,
-    clearances: tuple[Argument, Argument],
-    gap: float,
-    others: tuple[Part, ...] = (),
-) -> Group:
-    """The division of a box; it has the sides of its only part."""
-    words = AXES[axis]
-    mine = [(word, value) for word, value in zip(words[:2], clearances, strict=True) if value != 0]
-    sides = [(word, value) for word, value in part.keywords if word in BOX and word not in words and not others]
-    remaining = tuple(
-        (word, value) for word, value in part.keywords if word not in words and (word, value) not in sides
-    )
-    keywords: Keywords = (*([("gap", to_float32(gap))] if gap else []), *ordered((*mine, *sides)))
-    return Group("divide", keywords, (replace(part, keywords=remaining), *others), float(count), "xyz"[axis])
+    mine = [(side, clearances[side]) for side in words[:2] if clearances[side] != 0]
+    shared = [pair for pair in part.keywords if pair[0] in BOX and pair[0] not in words and not others]
+    remaining = tuple(pair for pair in part.keywords if pair[0] not in words and pair not in shared)
+    box: Keywords = (*([("gap", gap)] if gap else []), *ordered((*mine, *shared)))
+    inner = (_in_division(other, part, axis, numbers) for other in others)
+    return Group("divide", box, (replace(part, keywords=remaining), *inner), float(count), "xyz"[axis])
 
 
 def _in_division(part: Part, first: Part, axis: int, numbers: dict[str, float]) -> Part:
@@ -209,7 +187,8 @@ def _in_boxes(lines: tuple[Line, ...]) -> tuple[Line, ...]:
         best: tuple[int, tuple[Side, ...], list[int]] | None = None
         for frame in sorted(tuple(sorted(frame)) for frame in frames if frame):
             members = [k for k in drawing if _fits(lines[k], dict(frame))]
-            saved = sum(_saved(lines[k], dict(frame)) for k in members) - 2 - _length(frame)
+            saved = sum(_words(lines[k]) - _words(_inside(lines[k], dict(frame))) for k in members) - 2
+            saved -= sum(1 + len(text.split()) for _, text in frame)
             if len(members) > 1 and (best is None or saved > best[0]):
                 best = (saved, frame, members)
         if best is None or best[0] <= 0:
@@ -297,21 +276,9 @@ def _from_other(word: str, arguments: dict[str, Argument], axis: int) -> bool:
     return words.size in arguments and word not in arguments and (opposite in arguments or axis < 2)
 
 
-def _saved(line: Line, frame: dict[str, str]) -> int:
-    """How many words less it has."""
-    total = 0
-    for part in _parts(line):
-        arguments = dict(part.keywords)
-        for word, text in frame.items():
-            if str(arguments.get(word)) == text:
-                axis = axis_of(word)
-                sized = AXES[axis].size in arguments and not (axis == 2 and word == "bottom")
-                total += len(text.split()) - 1 if sized else 1 + len(text.split())
-    return total
-
-
-def _length(frame: tuple[Side, ...]) -> int:
-    return sum(1 + len(text.split()) for _, text in frame)
+def _words(line: Line) -> int:
+    """How many words its keywords and their values have."""
+    return sum(1 + len(str(value).split()) for part in _parts(line) for _, value in part.keywords)
 
 
 def _inside(line: Line, frame: dict[str, str]) -> Line:

@@ -20,8 +20,8 @@ from shapeprog.language.ast import (
     Point,
     Source,
     changed_lines,
+    changed_values,
     values,
-    with_values,
 )
 from shapeprog.language.evaluate import placed_source
 from shapeprog.language.expression import (
@@ -43,6 +43,9 @@ from shapeprog.space import FloatArray
 DEGREES, CELLS = 1, 2
 """Decimals of angles and lengths."""
 
+START: dict[str, Value] = {"x": 0.0, "y": 0.0, "bottom": 0.0}
+"""Where a point is for which nothing is given."""
+
 WIDE = 118
 """Letters of a line that names numbers, about."""
 
@@ -61,75 +64,75 @@ def written(anchored: Anchored, solution: Solution, numbers: FloatArray, *, grou
     group
         Whether lines are grouped where that is shorter.
     """
-    slots, factors, free = anchored.slots, solution.factors, solution.free
-    alike: dict[bytes, list[int]] = {}  # numbers that follow from the free ones in the same way
-    for p in range(3, len(slots)):
-        if factors[p].any():
-            alike.setdefault(factors[p].round(6).tobytes(), []).append(p)
-    sizes = ["diameter" if k < 2 and np.array_equal(factors[0], factors[1]) else SIZES[k] for k in range(3)]
-    terms: list[Value] = [0.0] * len(free)
-    shared: dict[str, Value] = {}
-    for z in sorted(range(len(free)), key=lambda z: (slots[free[z]].line, free[z])):
-        k = free[z]
-        number = to_float32(round(float(numbers[k]), DEGREES if slots[k].kind == "angle" else CELLS) + 0.0)
-        terms[z] = Name(sizes[k]) if k < 3 else number
-        if k >= 3 and (factors[3:, z] != 0).sum() > 1:
-            terms[z] = Name(anchored.name(k))
-            shared[anchored.name(k)] = number
-    table: dict[str, Value] = {anchored.name(p): 0.0 for p in range(3, len(slots))}
-    for members in alike.values():
-        row = factors[members[0]]
-        value = combined(0.0, sorted(((terms[z], float(row[z])) for z in np.flatnonzero(row)), key=lambda t: t[1] < 0))
-        if len(members) > 1 and isinstance(value, Expression) and not isinstance(value, Name):
-            shared[anchored.name(members[0])] = value
-            value = Name(anchored.name(members[0]))
-        table |= dict.fromkeys((anchored.name(p) for p in members), value)
-
-    extents: list[Value] = [to_float32(round(float(numbers[k]), CELLS)) for k in range(3)]
-    height = extents[2]
-    above: list[Assignment] = []
-    if sizes[0] == "diameter":
-        above = [Assignment((("diameter", extents[0]),))]
-        extents[:2] = Name("diameter"), Name("diameter")
-    header = (*above, Assignment(tuple(zip(SIZES, extents, strict=True))))
+    shared, table = _expressions(anchored, solution, numbers)
+    extents: dict[str, Value] = {size: to_float32(round(float(numbers[k]), CELLS)) for k, size in enumerate(SIZES)}
+    header = [Assignment(tuple(extents.items()))]
+    if np.array_equal(solution.factors[0], solution.factors[1]):
+        diameter, round_extents = Name("diameter"), {**extents, **dict.fromkeys(SIZES[:2], Name("diameter"))}
+        header = [Assignment(((diameter.name, extents["width"]),)), Assignment(tuple(round_extents.items()))]
     known = Source((*header, Assignment(tuple(shared.items())))).evaluated_numbers()
-    body = changed_lines(
-        [line for line in anchored.lines if not isinstance(line, Assignment)],
-        lambda line: _simplified(_changed(line, table)),
-    )
+    drawing = [line for line in anchored.lines if not isinstance(line, Assignment)]
+    body = changed_lines(drawing, lambda line: _simplified(_changed(line, table)))
     body = grouped(body, known) if group else merged_lines(body)
     uses = Counter(name for line in Source(body).walk() for value in values(line) for name in names_in(value))
     uses += Counter(name for value in shared.values() for name in names_in(value))
-    once = {name: value for name, value in shared.items() if uses[name] < 2}
-    for name, value in once.items():  # sums come last
-        once[name] = _with(value, once)
+    once: dict[str, Value] = {}
+    for name, value in shared.items():  # sums come last
+        if uses[name] < 2:
+            once[name] = _with(value, once)
     shared = {name: _with(value, once) for name, value in shared.items() if name not in once}
     body = changed_lines(body, lambda line: _changed(line, once))
     names = named(body, shared, known)
     final: dict[str, Value] = {provisional: Name(name) for provisional, name in names.items()}
     pairs = [(names[name], _with(value, final)) for name, value in shared.items()]
-    plain, sums = ([pair for pair in pairs if isinstance(pair[1], Expression) == is_sum] for is_sum in (False, True))
-    lines = (
-        *header,
-        *_assignments(plain),
-        *_assignments(sums),
-        *changed_lines(body, lambda line: _changed(line, final)),
-    )
+    for sums in (False, True):
+        header += _assignments([pair for pair in pairs if isinstance(pair[1], Expression) == sums])
     scale = anchored.source.scale
     assert scale is not None
-    assert isinstance(height, float)
-    floor = -height * scale.cells_per_unit / 2
-    return replace(placed_source(lines), scale=replace(scale, floor=floor), unit=anchored.source.unit)
+    floor = -float(known["height"]) * scale.cells_per_unit / 2
+    result = placed_source((*header, *changed_lines(body, lambda line: _changed(line, final))))
+    return replace(result, scale=replace(scale, floor=floor), unit=anchored.source.unit)
+
+
+def _expressions(
+    anchored: Anchored, solution: Solution, numbers: FloatArray
+) -> tuple[dict[str, Value], dict[str, Value]]:
+    """The numbers and sums that several numbers of a program share, by provisional name, and all of its numbers."""
+    slots, factors, free = anchored.slots, solution.factors, solution.free
+    terms: list[Value] = [0.0] * len(free)
+    shared: dict[str, Value] = {}
+    for z in sorted(range(len(free)), key=lambda z: (slots[free[z]].line, free[z])):
+        k = free[z]
+        terms[z] = to_float32(round(float(numbers[k]), DEGREES if slots[k].kind == "angle" else CELLS) + 0.0)
+        if k < 3:
+            terms[z] = Name("diameter" if k < 2 and np.array_equal(factors[0], factors[1]) else SIZES[k])
+        elif (factors[3:, z] != 0).sum() > 1:
+            shared[anchored.name(k)], terms[z] = terms[z], Name(anchored.name(k))
+    alike: dict[bytes, list[int]] = {}  # numbers that follow from the free ones in the same way
+    for p in range(3, len(slots)):
+        alike.setdefault(factors[p].round(6).tobytes(), []).append(p)
+    table: dict[str, Value] = {}
+    for members in alike.values():
+        row, name = factors[members[0]], anchored.name(members[0])
+        value = combined(0.0, sorted(((terms[z], float(row[z])) for z in np.flatnonzero(row)), key=lambda t: t[1] < 0))
+        if len(members) > 1 and isinstance(value, Expression) and not isinstance(value, Name):
+            shared[name], value = value, Name(name)
+        table |= dict.fromkeys(map(anchored.name, members), value)
+    return shared, table
 
 
 def _with(value: Value, table: Mapping[str, Value]) -> Value:
-    """A number or an expression with names replaced, and with each name and number once."""
+    """A number or an expression with names replaced; a sum has each name and number once."""
     new = replaced(value, lambda each: table.get(each.name, each) if isinstance(each, Name) else each)
-    return _combined(new) if isinstance(new, Binary) else new
+    if not isinstance(new, Binary):
+        return new
+    form = value_at(new, {name: Linear.of(name) for name in names_in(new)})
+    terms = sorted(form.factors, key=lambda term: term[1] < 0)
+    return combined(to_float32(form.constant), [(Name(name), factor) for name, factor in terms])
 
 
 def _changed(line: Line, table: Mapping[str, Value]) -> Line:
-    return with_values(line, [_with(value, table) for value in values(line)])
+    return changed_values(line, lambda value: _with(value, table))
 
 
 def _assignments(named: list[tuple[str, Value]]) -> Iterator[Assignment]:
@@ -149,46 +152,19 @@ def _simplified(line: Line) -> Line:
     if not isinstance(line, Part):
         return line
     arguments = dict(line.keywords)
+    defaults = {"tilt", "lean", "turn"}  # what can be left out where it is zero
+    for axis, words in enumerate(AXES):
+        sized = words.size in arguments or (axis < 2 and line.kind in ROUND and "radius" in arguments)
+        defaults |= {words.low if axis == 2 else words.offset} if sized else {words.low, words.high, words.offset}
     keywords: list[tuple[str, Argument]] = []
     for word, argument in line.keywords:
         if isinstance(argument, Point):
-            keywords.append((word, _simplified_point(word, argument, arguments)))
-        elif not (_is_zero(argument) and (word in ("tilt", "lean", "turn") or _is_default(line, word, arguments))):
+            start = arguments["start"]
+            before = dict(start.keywords) if isinstance(start, Point) and word != "start" else START
+            argument = Point(tuple(pair for pair in argument.keywords if before.get(pair[0]) != pair[1]))
+        if argument != 0 or word not in defaults:
             keywords.append((word, argument))
     radius = dict(keywords).get("radius")
     if line.kind == "taper" and isinstance(radius, tuple) and radius[0] == radius[1]:
         return replace(line, kind="rod", keywords=tuple((w, radius[0] if w == "radius" else v) for w, v in keywords))
     return replace(line, keywords=tuple(keywords))
-
-
-def _is_default(line: Part, word: str, arguments: dict[str, Argument]) -> bool:
-    """Whether a keyword of an axis that is zero can be left out."""
-    words = next((words for words in AXES if word in words), None)
-    if words is None or word == words.size:
-        return False
-    if line.kind in ROUND and words != AXES[2] and "radius" in arguments:
-        return word == words.offset
-    if words.size in arguments:
-        return word == words.offset if words != AXES[2] else word == words.low
-    return True
-
-
-def _simplified_point(word: str, point: Point, arguments: dict[str, Argument]) -> Point:
-    if word == "start":
-        pairs = tuple((w, v) for w, v in point.keywords if not (_is_zero(v) and w in ("x", "y", "bottom")))
-        return Point(pairs)
-    start = arguments["start"]
-    assert isinstance(start, Point)
-    before = dict(start.keywords)
-    return Point(tuple((w, v) for w, v in point.keywords if before.get(w) != v))
-
-
-def _is_zero(value: Argument) -> bool:
-    return isinstance(value, float | int) and value == 0
-
-
-def _combined(value: Value) -> Value:
-    """The same sum with each name and number once."""
-    form = value_at(value, {name: Linear.of(name) for name in names_in(value)})
-    terms = sorted(form.factors, key=lambda term: term[1] < 0)
-    return combined(to_float32(form.constant), [(Name(name), factor) for name, factor in terms])

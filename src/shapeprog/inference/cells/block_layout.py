@@ -5,12 +5,11 @@ A block is a row of 16 whole numbers (as float64): a form, its own numbers, and 
 =========  ============================================================================================
 slots      hold
 =========  ============================================================================================
-0          FORM: ``BOX``, ``DISC``, ``BACK`` or ``LINE``
+0          FORM: ``BOX``, ``DISC`` or ``BACK``
 1 to 7     FIRST and on, the numbers of the form in the order of its statement, in cells, others unused:
            BOX   low corner (up, depth, side), extents (up, depth, side)
            DISC  centre of the bottom (up, depth, side), thickness, radius
            BACK  low corner, extents, tilt
-           LINE  cell of one end, cell of the other end, radius
 8          COUNT1: copies of the first translation loop, 1 for none
 9 to 11    SHIFT1: its step (up, depth, side)
 12         COUNT2: copies of the second translation loop, 1 for none
@@ -23,16 +22,16 @@ from __future__ import annotations
 WIDTH = 16
 """Numbers of one block."""
 
-BOX, DISC, BACK, LINE = 0, 1, 2, 3
+BOX, DISC, BACK = 0, 1, 2
 
 FORM, FIRST = 0, 1
 EXTENT = FIRST + 3
-"""Extents of a box or back; thickness of a disc; the far end of a line."""
+"""Extents of a box or back; thickness of a disc."""
 
 RADIUS = FIRST + 4
 """Radius of a disc."""
 
 TILT = FIRST + 6
-"""Tilt of a back, and the radius of a line."""
+"""Tilt of a back."""
 
 COUNT1, SHIFT1, COUNT2, SHIFT2 = 8, 9, 12, 13

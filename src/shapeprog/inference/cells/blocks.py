@@ -10,10 +10,8 @@ from shapeprog.inference.cells.block_layout import (
     COUNT1,
     COUNT2,
     DISC,
-    EXTENT,
     FIRST,
     FORM,
-    LINE,
     SHIFT1,
     SHIFT2,
     TILT,
@@ -22,7 +20,7 @@ from shapeprog.inference.roles.roles import roles_of_blocks
 from shapeprog.language.program import Chain, Draw, Loop, Program, nest
 from shapeprog.space import FloatArray
 
-FORMS = {BOX: "locker", BACK: "back", LINE: "line", DISC: "support_cylinder"}
+FORMS = {BOX: "locker", BACK: "back", DISC: "support_cylinder"}
 """Statements of the paper that draw the forms."""
 
 BOXES = {
@@ -79,8 +77,6 @@ def tidy(block: FloatArray) -> FloatArray:
         elif step[moving[0]] < 0:
             reach = (block[count] - 1) * step
             block[FIRST : FIRST + 3] += reach
-            if int(block[FORM]) == LINE:
-                block[EXTENT : EXTENT + 3] += reach
             block[shift : shift + 3] = -step
     block += 0.0  # turns -0.0 into 0.0, which prints better
     if block[COUNT1] > 1 and block[COUNT1] >= block[COUNT2] > 1:
@@ -93,8 +89,6 @@ def _cells(block: FloatArray) -> float:
     copies = block[COUNT1] * block[COUNT2]
     if int(block[FORM]) in (BOX, BACK):
         return float(values[3:6].prod() * copies)
-    if int(block[FORM]) == LINE:
-        return float(3 * np.linalg.norm(values[3:6] - values[:3]) * values[6] ** 2 * copies)
     return float(3.14 * values[3] * values[4] ** 2 * copies)
 
 
@@ -104,7 +98,7 @@ def _node(block: FloatArray, name: str) -> Draw | Loop:
     middle = [low[0], low[1] + depth / 2, low[2] + side / 2, up, depth / 2]
     even, square = depth % 2 == side % 2 == 0, depth == side
     if form != BOX:
-        numbers = list(values[: {LINE: 7, BACK: 7}.get(form, 5)])
+        numbers = list(values[: 7 if form == BACK else 5])
     elif name == "top_rectangle" and even and square:
         name, numbers = "top_square", middle
     elif name in ("top_rectangle", "layer") and even:

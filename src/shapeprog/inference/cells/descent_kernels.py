@@ -6,21 +6,18 @@ import numpy as np
 
 from shapeprog.inference.cells.block_layout import (
     BACK,
-    BOX,
     COUNT1,
     COUNT2,
     DISC,
     EXTENT,
     FIRST,
     FORM,
-    LINE,
     RADIUS,
     TILT,
 )
 from shapeprog.inference.cells.raster_kernels import draw_block
 from shapeprog.kernels.bits import ones
 from shapeprog.kernels.compile import helper, kernel
-from shapeprog.kernels.rows import REACH
 
 MOST_MOVES = 200
 """An upper bound on the number of neighbours of a block."""
@@ -57,29 +54,17 @@ def valid(block):
         if block[level] > 1:
             separate = False
             for axis in range(3):
-                if form in (BOX, BACK):
-                    extent = block[EXTENT + axis]
-                elif form == DISC:
-                    extent = block[EXTENT] if axis == 0 else 2 * block[RADIUS]
-                else:
-                    extent = 2.0
+                extent = 2 * block[RADIUS] if form == DISC and axis > 0 else block[EXTENT + axis]
                 separate = separate or abs(block[level + 1 + axis]) >= extent
             if not separate:
                 return False
-    if form in (BOX, BACK):
-        return block[EXTENT] >= 1 and block[EXTENT + 1] >= 1 and block[EXTENT + 2] >= 1
-    if form == LINE:
-        return block[TILT] >= 1
-    return block[EXTENT] >= 1 and block[RADIUS] >= 1
+    return block[EXTENT] >= 1 and block[EXTENT + 1] >= 1 and (form == DISC or block[EXTENT + 2] >= 1)
 
 
 @helper
 def layers(block):
     """First layer of the grid that a block can touch, and the one after the last."""
     start, end = block[FIRST], block[FIRST] + block[EXTENT]
-    if block[FORM] == LINE:
-        margin = REACH * block[TILT] + 2
-        start, end = min(block[FIRST], block[EXTENT]) - margin, max(block[FIRST], block[EXTENT]) + margin
     for level in (COUNT1, COUNT2):
         reach = (block[level] - 1) * block[level + 1]
         start += min(reach, 0.0)
@@ -108,8 +93,6 @@ def put_loop(out, n, block, slot, by, shift, share):
         if shift < 0 or shift == axis:
             back = share * block[slot + 1 + axis] if shift < 0 else share
             out[n - 1, FIRST + axis] -= back
-            if block[FORM] == LINE:
-                out[n - 1, EXTENT + axis] -= back
     return n
 
 
@@ -118,10 +101,9 @@ def moves(block, out, far):
     """Neighbours of a block: faces, positions, ends, spacings and counts changed by up to ``far``; their number."""
     n = 0
     form = int(block[FORM])
-    last = RADIUS if form == DISC else (TILT if form == LINE else TILT - 1)
     for which in range(2 * far):
         delta = (which // 2 + 1.0) * (1.0 if which % 2 else -1.0)
-        if form in (BOX, BACK):
+        if form != DISC:
             for axis in range(3):
                 corner, extent = FIRST + axis, EXTENT + axis
                 n = put(out, n, block, corner, delta, corner, 0.0)
@@ -133,13 +115,9 @@ def moves(block, out, far):
                 n = put(out, n, block, TILT, delta, TILT, 0.0)
                 n = put(out, n, block, TILT, delta, FIRST + 1, -delta)
         else:
-            for slot in range(FIRST, last + 1):
+            for slot in range(FIRST, RADIUS + 1):
                 n = put(out, n, block, slot, delta, slot, 0.0)
-            if form == LINE:
-                for axis in range(3):
-                    n = put(out, n, block, FIRST + axis, delta, EXTENT + axis, delta)
-            else:
-                n = put(out, n, block, FIRST, delta, EXTENT, -delta)
+            n = put(out, n, block, FIRST, delta, EXTENT, -delta)
         for level in (COUNT1, COUNT2):
             if block[level] > 1:
                 for axis in range(3):

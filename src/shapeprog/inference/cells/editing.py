@@ -145,7 +145,7 @@ def propose_form(
     Parameters
     ----------
     form
-        ``DISC``, ``BACK`` or ``LINE``.
+        ``DISC`` or ``BACK``.
     waste
         Weight of an empty cell against an occupied one.
     box

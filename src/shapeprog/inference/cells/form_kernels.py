@@ -1,4 +1,4 @@
-"""Kernels that guess forms other than upright boxes: discs, sheared backs and oblique bars."""
+"""Kernels that guess forms other than upright boxes: discs and sheared backs."""
 
 from __future__ import annotations
 
@@ -6,13 +6,11 @@ import numpy as np
 
 from shapeprog.inference.cells.block_layout import (
     BACK,
-    BOX,
     COUNT1,
     COUNT2,
     EXTENT,
     FIRST,
     FORM,
-    LINE,
     RADIUS,
     TILT,
 )
@@ -27,7 +25,7 @@ def guess(form, cells, box, seed, out):
     Parameters
     ----------
     form
-        ``LINE``, ``BACK`` or ``DISC``.
+        ``BACK`` or ``DISC``.
     cells
         Low corners (n, 3) of the cells to choose from.
     box
@@ -46,34 +44,13 @@ def guess(form, cells, box, seed, out):
         block[FORM], block[COUNT1], block[COUNT2] = form, 1, 1
         a = cells[np.random.randint(len(cells))]
         b = cells[np.random.randint(len(cells))]
-        if form == LINE:
-            guess_line(block, a, b, box)
-        elif form == BACK:
+        if form == BACK:
             guess_back(block, a, b, box)
         else:
             guess_disc(block, a, b, box)
         if valid(block):
             count += 1
     return count
-
-
-@helper
-def guess_line(block, a, b, box):
-    """A bar along the middle of a box and repeated like it, or from one cell to the other."""
-    if np.random.random() < 0.4 and box[FORM] == BOX and box[EXTENT] > 0:
-        long = 0
-        for axis in range(3):
-            middle = int(box[FIRST + axis] + (box[EXTENT + axis] - 1) / 2)
-            block[FIRST + axis], block[EXTENT + axis] = middle, middle
-            if box[EXTENT + axis] > box[EXTENT + long]:
-                long = axis
-        block[FIRST + long] = box[FIRST + long]
-        block[EXTENT + long] = box[FIRST + long] + box[EXTENT + long] - 1
-        copy_loops(block, box)
-    else:
-        for axis in range(3):
-            block[FIRST + axis], block[EXTENT + axis] = a[axis], b[axis]
-    block[TILT] = 1 + (np.random.random() < 0.2)
 
 
 @helper

@@ -12,14 +12,13 @@ from shapeprog.inference.cells.block_layout import (
     EXTENT,
     FIRST,
     FORM,
-    LINE,
     SHIFT1,
     SHIFT2,
     TILT,
 )  # fmt: skip
 from shapeprog.kernels.bits import ones, span
 from shapeprog.kernels.compile import helper, kernel
-from shapeprog.kernels.rows import CAP, REACH
+from shapeprog.kernels.rows import REACH
 
 ROWS = 1024
 """Rows of the grid: row 32 i + j holds the cells at height i and depth j."""
@@ -54,41 +53,6 @@ def draw_disc(rows, a, yc, zc, t, r):
 
 
 @helper
-def draw_line(rows, s0, s1, s2, e0, e1, e2, r):
-    """Cells whose centre lies within ``REACH`` radii of the axis, between the flat caps."""
-    d0, d1, d2 = e0 - s0, e1 - s1, e2 - s2
-    length = np.sqrt(d0 * d0 + d1 * d1 + d2 * d2)
-    if length < 1e-9:
-        d0, d1, d2 = 1.0, 0.0, 0.0
-    else:
-        d0, d1, d2 = d0 / length, d1 / length, d2 / length
-    limit = (REACH * r) ** 2
-    m0, m1, m2 = (s0 + e0) / 2 + 0.5, (s1 + e1) / 2 + 0.5, (s2 + e2) / 2 + 0.5
-    half = length / 2
-    lo0, hi0 = reached(m0, d0, half, r)
-    lo1, hi1 = reached(m1, d1, half, r)
-    lo2, hi2 = reached(m2, d2, half, r)
-    for i in range(lo0, hi0 + 1):
-        p0 = i - 15.5 - m0
-        for j in range(lo1, hi1 + 1):
-            p1 = j - 15.5 - m1
-            bits = np.uint32(0)
-            for k in range(lo2, hi2 + 1):
-                p2 = k - 15.5 - m2
-                along = p0 * d0 + p1 * d1 + p2 * d2
-                if abs(along) <= half + CAP and p0 * p0 + p1 * p1 + p2 * p2 - along * along <= limit:
-                    bits |= np.uint32(1) << np.uint32(k)
-            rows[i * 32 + j] |= bits
-
-
-@helper
-def reached(middle, slope, half, r):
-    """First and last cell along one axis of the grid that a bar can touch."""
-    reach = half * abs(slope) + REACH * r * np.sqrt(max(0.0, 1 - slope * slope)) + 0.01
-    return max(0, int(np.ceil(middle + 15.5 - reach))), min(31, int(np.floor(middle + 15.5 + reach)))
-
-
-@helper
 def draw_block(rows, block):
     """Set the cells of all copies of a block, clipped to the grid."""
     form, p0, p1, p2 = int(block[FORM]), int(block[FIRST]), int(block[FIRST + 1]), int(block[FIRST + 2])
@@ -100,8 +64,6 @@ def draw_block(rows, block):
             s2 = int(i1 * block[SHIFT1 + 2] + i2 * block[SHIFT2 + 2])
             if form == DISC:
                 draw_disc(rows, p0 + s0, p1 + s1, p2 + s2, p3, p4)
-            elif form == LINE:
-                draw_line(rows, p0 + s0, p1 + s1, p2 + s2, p3 + s0, p4 + s1, p5 + s2, last)
             else:
                 draw_back(rows, p0 + s0, p1 + s1, p2 + s2, p3, p4, p5, last if form == BACK else 0)
 

@@ -1,7 +1,7 @@
 """Structure search: voxels to blocks of whole numbers that maximise IoU minus price x statements.
 
 Blocks are first added one by one, each the repeated box with the largest gain on uncovered cells.  Then rounds of ruin
-and recreate remove some and insert others, including discs, sheared backs and bars.
+and recreate remove some and insert others, including discs and sheared backs.
 """
 
 from __future__ import annotations

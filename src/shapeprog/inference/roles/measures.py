@@ -36,7 +36,7 @@ class Parts:
     ``lying``, ``flat``, ``wide``            its upper face is the larger one; and it is a plate; and large
     ``squat``                                a body that may be higher than it is wide, but not by much
     ``slender``, ``upright``, ``level``      a stick; that stands; that lies
-    ``board``                                one extent is small against both others
+    ``board``, ``plank``                     one extent is small against both others; such a stick that lies flat
     ``facing_front``, ``facing_side``        a board by the way that it faces
     ``front``, ``wall``                      the same, and slender boards that are wide or high against the whole
     ``small``, ``stubby``                    against the whole: its length; its plan
@@ -96,6 +96,7 @@ class Parts:
         self.upright: Mask = self.slender & (self.rise >= 0.75)
         self.level: Mask = self.slender & (self.rise <= 0.35)
         self.board: Mask = (self.thin <= 0.3 * self.middle) & ~bent
+        self.plank: Mask = self.board & self.level & (self.up == self.thin)
         self.facing_front: Mask = self.board & ~self.slender & (self.depth == self.thin)
         self.facing_side: Mask = self.board & ~self.slender & (self.side == self.thin)
         self.small: Mask = self.long <= 0.12 * self.size.max()

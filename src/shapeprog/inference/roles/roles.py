@@ -35,6 +35,7 @@ SUPPORTING: tuple[Rule, ...] = (
     ("foot", lambda p: p.below & p.grounded & ~p.level & p.small),
     ("leg", lambda p: p.below & p.upright),
     ("base", lambda p: p.below & p.slender & (p.grounded | p.on_pedestal)),
+    ("slat", lambda p: p.below & p.plank & (p.equal >= 3)),
     ("apron", lambda p: (p.below | p.alongside) & p.level & (p.top >= p.main_low[UP] - 1.5 * p.near)),
     ("stretcher", lambda p: p.below & p.level),
     ("leg", lambda p: p.below & p.facing_side & (p.aside > 0.25)),
@@ -49,6 +50,7 @@ SEATING: tuple[Rule, ...] = (
     ("cushion", lambda p: p.wide & p.alongside & p.padded & (p.bottom >= p.main_low[UP] - p.near)),
     ("base", lambda p: p.main & ~p.lying & p.grounded),
     ("seat", lambda p: p.main | (p.wide & (p.alongside | p.below) & (p.top <= p.main_high[UP] + 2 * p.near))),
+    ("seat", lambda p: p.plank & p.alongside & ~p.rising & (p.equal >= 3)),
     # A part from the ground to above the seat is a leg as well.
     ("leg", lambda p: p.rising & p.grounded & p.upright),
     # Behind: a back, its rails and slats, its posts.
@@ -84,7 +86,12 @@ BED: tuple[Rule, ...] = (
 
 CASE: tuple[Rule, ...] = (
     # In front: a plinth, doors and drawers with their handles.
-    ("base", lambda p: p.front & p.grounded & (p.up <= p.size[UP] * np.where(p.in_front, 0.2, 0.3)) & ~p.stacked),
+    (
+        "base",
+        lambda p: (
+            p.front & p.grounded & (p.up <= p.size[UP] * np.where(p.in_front, 0.2, 0.3)) & (p.rear < 0) & ~p.stacked
+        ),
+    ),
     ("handle", lambda p: p.attached & p.cased & ~p.grounded),
     ("door", lambda p: p.front & p.in_front & p.cased & ((p.up >= p.side) | (p.up > 0.5 * p.size[UP]))),
     ("drawer", lambda p: (p.front | p.stacked) & p.in_front & p.cased),
@@ -108,6 +115,7 @@ CASE: tuple[Rule, ...] = (
     ("post", lambda p: p.upright),
     ("base", lambda p: p.level & p.grounded),
     ("leg", lambda p: p.slender & p.grounded),
+    ("slat", lambda p: p.plank & (p.equal >= 3)),
     ("rail", lambda p: p.level & p.cased),
     ("apron", lambda p: p.level & (p.top >= p.floor + 0.8 * p.size[UP])),
     ("stretcher", lambda p: p.level),

@@ -120,11 +120,12 @@ def _candidates(uses: Sequence[Use], numbers: dict[str, float]) -> tuple[list[st
     (kind, _), *others = kinds.most_common()
     if others and kind in FURTHER:
         kind = "inset" if kinds.keys() <= {"inset", "setback"} else "clearance"
+    most, count = Counter(use.part for use in selected).most_common(1)[0]
     shared = []
-    if len(roles) > 1 and kind not in ("drop", "bottom", "offset"):
-        most, count = Counter(use.part for use in selected).most_common(1)[0]
-        square = kind in SIZES and count > 1  # the section of a part that no other owns
-        shared = [f"{_role(most)}_width"] if square else ["board_width"] if kind in SIZES else [kind]
+    if kind in SIZES and count > 1:  # the section of a square part
+        shared = [f"{_role(most)}_width"]
+    elif len(roles) > 1 and kind not in ("drop", "bottom", "offset"):
+        shared = ["board_width"] if kind in SIZES else [kind]
         shared += ["board_thickness"] if kind == "thickness" else []
     own = [f"{role}_{kind}" for role, _ in roles.most_common()]
     own += [f"{_role(use.part)}_{quantities[use]}" for use in selected]

@@ -50,6 +50,7 @@ class Parts:
     ``rising``, ``above``                    it ends clearly above the main surface; it begins there
     ``central``, ``behind``, ``outermost``   by place along depth and left-right
     ``in_front``, ``lowest``                 at the front of the whole; the lowest plate, near the floor
+    ``plinth``                               a low board on the floor that faces the front
     ``walled``, ``cased``                    of the whole: its sides reach the floor; it has some, or a body
     ``on_pedestal``, ``padded``              of the whole: one column carries the main surface; something wide lies
                                              right under it
@@ -179,6 +180,8 @@ class Parts:
         large = (self.up >= 0.12 * self.size[UP]) & (self.side >= 0.12 * self.size[SIDE]) & self.cased
         wide = large | (self.upright & (self.side >= self.size[SIDE] / 2))
         self.front: Mask = self.facing_front | (self.board & (self.depth == self.thin) & wide)
+        highest = np.where(self.in_front, 0.2, 0.3) * self.size[UP]
+        self.plinth: Mask = self.front & self.grounded & (self.up <= highest) & (self.rear < 0)
 
     @cached_property
     def stacked(self) -> Mask:

@@ -35,7 +35,7 @@ SUPPORTING: tuple[Rule, ...] = (
     ("foot", lambda p: p.below & p.grounded & ~p.level & p.small),
     ("leg", lambda p: p.below & p.upright),
     ("base", lambda p: p.below & p.slender & (p.grounded | p.on_pedestal)),
-    ("slat", lambda p: p.below & p.plank & (p.equal >= 3)),
+    ("slat", lambda p: p.below & p.plank & (p.equal >= 5)),
     ("apron", lambda p: (p.below | p.alongside) & p.level & (p.top >= p.main_low[UP] - 1.5 * p.near)),
     ("stretcher", lambda p: p.below & p.level),
     ("leg", lambda p: p.below & p.facing_side & (p.aside > 0.25)),
@@ -86,12 +86,7 @@ BED: tuple[Rule, ...] = (
 
 CASE: tuple[Rule, ...] = (
     # In front: a plinth, doors and drawers with their handles.
-    (
-        "base",
-        lambda p: (
-            p.front & p.grounded & (p.up <= p.size[UP] * np.where(p.in_front, 0.2, 0.3)) & (p.rear < 0) & ~p.stacked
-        ),
-    ),
+    ("base", lambda p: p.plinth & ~p.stacked),
     ("handle", lambda p: p.attached & p.cased & ~p.grounded),
     ("door", lambda p: p.front & p.in_front & p.cased & ((p.up >= p.side) | (p.up > 0.5 * p.size[UP]))),
     ("drawer", lambda p: (p.front | p.stacked) & p.in_front & p.cased),
@@ -115,7 +110,7 @@ CASE: tuple[Rule, ...] = (
     ("post", lambda p: p.upright),
     ("base", lambda p: p.level & p.grounded),
     ("leg", lambda p: p.slender & p.grounded),
-    ("slat", lambda p: p.plank & (p.equal >= 3)),
+    ("slat", lambda p: p.plank & (p.equal >= 5)),
     ("rail", lambda p: p.level & p.cased),
     ("apron", lambda p: p.level & (p.top >= p.floor + 0.8 * p.size[UP])),
     ("stretcher", lambda p: p.level),

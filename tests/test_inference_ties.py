@@ -18,7 +18,7 @@ from shapeprog.evaluation.editing import edit_scores
 from shapeprog.geometry.mesh import pieces, union_mesh
 from shapeprog.inference.fit.joints import Joints
 from shapeprog.inference.surface.evidence import evidence_of_program
-from shapeprog.inference.ties import tying
+from shapeprog.inference.ties import naming, tying
 from shapeprog.inference.ties.anchored import Anchored
 from shapeprog.inference.ties.anchors import AnchorSettings, anchors_of
 from shapeprog.inference.ties.closeness import Closeness
@@ -30,11 +30,13 @@ from shapeprog.inference.ties.model import Model
 from shapeprog.inference.ties.pricing import worthwhile
 from shapeprog.inference.ties.relations import Relation
 from shapeprog.inference.ties.tying import tie
-from shapeprog.language.ast import Assignment, Comment, Fault
+from shapeprog.language.ast import Assignment, Comment, Fault, Group, Line, Part, values
 from shapeprog.language.convert import placed
 from shapeprog.language.evaluate import evaluated
+from shapeprog.language.expression import names_in
 from shapeprog.language.free import free_numbers, free_values, multiplied, numbers
 from shapeprog.language.merging import merged
+from shapeprog.language.placement import SIZES
 from shapeprog.language.printer import format_program, source_of
 from shapeprog.language.program import Draw, Program
 from shapeprog.language.unroll import unroll
@@ -633,6 +635,14 @@ def test_grouping_changes_nothing_that_is_drawn(number: int):
 
 # ---- names ---------------------------------------------------------------------------------------------------------
 
+WHOLE: dict[str, float] = {"width": 20, "depth": 16, "height": 24}
+
+
+def parsed(body: str) -> list[Line]:
+    names = "\n".join(f"{name} = 1" for name in "abcdefghi")
+    source = source_of(sp.parse(f"width, depth, height = 20, 16, 24\n{names}\n{body}"))
+    return [line for line in source.lines if isinstance(line, Part | Group)]
+
 
 def test_names_say_what_a_person_would():
     text = tied_text("""
@@ -648,6 +658,47 @@ back(left=1.5, right=1.48, rear=1.5, depth=1, bottom=16, height=4)
     assert not any("2" in name for name in named)
     assert "seat_height" not in named  # of a seat that is the height of its upper side
     assert "seat_thickness" not in named or "seat(" in text
+
+
+def test_names_are_those_of_all_uses():
+    lines = parsed("""
+leg(left=a, width=b, front=a, depth=b, top=c)
+seat(left=d, right=d, top=e, height=c)
+stretcher(left=f, right=f, front=g, depth=c, bottom=h, height=1)
+stretcher(left=f, right=f, rear=g, depth=c, bottom=h, height=1)
+shelf(left=d, right=d, bottom=h, height=c)
+post(left=i, width=b, rear=i, depth=b)
+""")
+    known = WHOLE | {"a": 1, "b": 1.5, "c": 0.8, "d": 0.4, "e": 9, "f": 2, "g": 3, "h": 4, "i": 5}
+    names = naming.named(lines, {name: known[name] for name in "abcdefghi"}, known)
+    assert names == {
+        "a": "leg_inset",  # left-right and front-rear
+        "b": "leg_width",  # of a square section
+        "c": "thickness",  # of several roles; the clearance of the leg is that of the seat
+        "d": "inset",
+        "e": "seat_drop",
+        "f": "stretcher_inset",
+        "g": "stretcher_setback",
+        "h": "stretcher_bottom",
+        "i": "post_inset",
+    }
+
+
+def test_of_two_clearances_of_several_roles_the_larger_is_the_inner_one():
+    lines = parsed("leg(left=a, width=2)\nseat(left=a, right=b)\nshelf(left=b, right=c)\ntop(left=c, width=5)\n")
+    known = WHOLE | {"a": 2, "b": 3, "c": 1}
+    assert naming.named(lines, {name: known[name] for name in "abc"}, known) == {
+        "a": "inset",
+        "b": "inner_inset",
+        "c": "outer_inset",
+    }
+
+
+def test_no_name_is_used_once():
+    for text in (TABLE, CABINET):
+        source = source_of(sp.parse(tied_text(text)))
+        uses = [name for line in source.walk() for value in values(line) for name in names_in(value)]
+        assert all(uses.count(name) > 1 for name in source.numbers if name not in SIZES)
 
 
 def test_a_program_that_cannot_be_drawn_is_tied_for_less(monkeypatch):

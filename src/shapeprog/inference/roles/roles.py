@@ -63,9 +63,9 @@ SEATING: tuple[Rule, ...] = (
     ("arm", lambda p: (p.top >= p.main_high[UP]) & ~p.slender & (p.aside > 0.4) & (p.run > 0.5)),
     ("slat", lambda p: p.rising & p.upright & (p.aside < 0.35) & (p.equal >= 3)),
     ("post", lambda p: p.rising & p.slender),
+    ("arm", lambda p: p.rising & p.facing_side),
     ("back", lambda p: p.rising),
     *SUPPORTING,
-    ("panel", lambda p: p.facing_side | p.facing_front),
     ("block", anything),
 )
 
@@ -76,10 +76,7 @@ BED: tuple[Rule, ...] = (
     ("mattress", lambda p: p.wide & ~p.below & (p.top <= p.main_high[UP] + 2 * p.near)),
     ("base", lambda p: p.below & p.wide),
     ("pillow", lambda p: p.above & ~p.slender & (p.run <= 0.5)),
-    ("rail", lambda p: p.rising & p.behind & p.level),
-    ("post", lambda p: p.rising & p.slender),
     ("side", lambda p: (p.aside > 0.3) & (p.run >= 0.5)),
-    ("slat", lambda p: p.level & (p.equal >= 3)),
     *SUPPORTING,
     ("body", anything),
 )
@@ -98,10 +95,8 @@ CASE: tuple[Rule, ...] = (
     ("body", lambda p: p.bulky),
     # Standing boards at the sides, within and behind.
     ("side", lambda p: p.wall & p.outermost & (p.long >= 0.3 * p.size[UP])),
-    ("side", lambda p: p.front & p.grounded & (np.abs(p.rear) > 0.25) & (p.equal > 1) & ~p.cased),
     ("panel", lambda p: p.wall | p.front),
     # Sticks.
-    ("handle", lambda p: p.small & (p.rear < -0.4) & ~p.grounded),
     ("foot", lambda p: p.grounded & ~p.level & p.small),
     ("brace", lambda p: p.slender & ~p.grounded & (p.rise > 0.35) & (p.rise < 0.97)),
     ("pedestal", lambda p: p.upright & p.central & (p.equal == 1)),
@@ -109,14 +104,12 @@ CASE: tuple[Rule, ...] = (
     ("leg", lambda p: p.grounded & (p.upright | p.stubby)),
     ("post", lambda p: p.upright),
     ("base", lambda p: p.level & p.grounded),
-    ("leg", lambda p: p.slender & p.grounded),
     ("slat", lambda p: p.plank & (p.equal >= 5)),
     ("rail", lambda p: p.level & p.cased),
     ("apron", lambda p: p.level & (p.top >= p.floor + 0.8 * p.size[UP])),
     ("stretcher", lambda p: p.level),
     # All other parts.
     ("top", lambda p: p.lying & (p.top >= p.floor + p.size[UP] - p.near) & (p.up <= 0.3 * p.size[UP])),
-    ("base", lambda p: p.lying & p.flat & p.grounded),
     ("shelf", lambda p: p.lying & p.flat),
     ("drawer", lambda p: p.cased & p.in_front & ~p.grounded),
     ("body", lambda p: p.solid),

@@ -42,17 +42,18 @@ COLUMNS = (
 def measure(task: Task) -> list[dict[str, Any]]:
     """Rows of one shape for all methods that were asked for."""
     from shapeprog.data import read_pack
+    from shapeprog.data.shape import Shape
     from shapeprog.evaluation.metrics import evaluate_program
-    from shapeprog.inference import greedy_boxes, infer, refine
-    from shapeprog.inference.cells.refine import REACH
+    from shapeprog.inference import greedy_boxes, infer
+    from shapeprog.inference.cells.reconstruct import REACH
+    from shapeprog.inference.fit.adjustment import adjust
     from shapeprog.inference.infer import prepare_kernels
-    from shapeprog.inference.surface.cells import points_of_cells
+    from shapeprog.inference.surface.evidence import evidence_of
 
     torch.set_num_threads(1)
     prepare_kernels(cells=True)
     pack, index, blocks, methods, seed = task
     shape = read_pack(Path(pack))[index]
-    cloud = None if shape.points is None else torch.from_numpy(np.asarray(shape.points, np.float32))
     rows = []
 
     def keep(method: str, program: Any, snapped: Any, seconds: float, cpu_seconds: float = float("nan")) -> None:
@@ -65,18 +66,19 @@ def measure(task: Task) -> list[dict[str, Any]]:
     boxes = greedy_boxes(shape.voxels, blocks)
     if GREEDY in methods:
         keep(GREEDY, boxes, boxes, time.monotonic() - started)
-    if REFINED in methods and cloud is not None:
+    if REFINED in methods and shape.points is not None:
         started = time.monotonic()
-        keep(REFINED, refine(boxes, cloud, reach=REACH, seed=seed), boxes, time.monotonic() - started)
+        refined = adjust(boxes, evidence_of(shape), reach=REACH, seed=seed)
+        keep(REFINED, refined, boxes, time.monotonic() - started)
     for method, statements in ((SEARCH, "paper"), (EVERY, "all")):
         if method not in methods:
             continue
         before = time.thread_time()
         result = infer(shape, blocks=blocks, seed=seed, budget=math.inf, statements=statements, ties=False)
         keep(method, result.program, result.snapped, result.seconds, time.thread_time() - before)
-        if method == SEARCH and ALONE in methods and cloud is not None:  # the same structure: it is found on cells
-            guessed = torch.from_numpy(points_of_cells(shape.voxels, seed=seed))
-            alone = refine(result.snapped, guessed, voxels=shape.voxels, reach=REACH, seed=seed)
+        if method == SEARCH and ALONE in methods and shape.points is not None:  # the same structure
+            cells = evidence_of(Shape(shape.name, shape.voxels))
+            alone = adjust(result.snapped, cells, reach=REACH, seed=seed)
             keep(ALONE, alone, result.snapped, result.seconds)
     return rows
 

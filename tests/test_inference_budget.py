@@ -14,12 +14,12 @@ from test_inference_search import TABLE, cells
 from shapeprog import view
 from shapeprog.cli import main
 from shapeprog.data.shape import Shape
-from shapeprog.inference import Result, Schedule, Settings, infer
+from shapeprog.inference import Result, Settings, infer
 from shapeprog.inference.budget import BUDGET
 from shapeprog.inference.infer import SEARCH_SHARE
 
 SHAPE = Shape("table", cells(TABLE))
-SETTINGS, SCHEDULE = Settings(rounds=6, chunk=2), Schedule(steps=6, points=100, samples=100, cells=100)
+SETTINGS = Settings(rounds=6, chunk=2)
 
 Clock = Callable[[Iterator[float]], None]
 
@@ -37,7 +37,7 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
 
 @pytest.fixture(scope="module")
 def found() -> Callable[[float], Result]:
-    """What is found within a budget, by a search and a refinement that are both short."""
+    """What is found within a budget, by a short search, and by fitting."""
 
     def infer_within(budget: float) -> Result:
         return infer(
@@ -45,7 +45,6 @@ def found() -> Callable[[float], Result]:
             blocks=2,
             budget=budget,
             settings=SETTINGS,
-            schedule=SCHEDULE,
             statements="paper",
         )
 
@@ -78,7 +77,7 @@ def test_a_result_is_either_the_usual_one_or_says_what_the_budget_cut_short(
         stopped = "" if "search" in stages else "all 6 rounds"
         assert hurried.reason.startswith(f"The search ended after {stopped}")
         seen |= stages or {"nothing"}
-    assert seen == {"search", "refinement", "nothing"}
+    assert seen == {"search", "adjustment", "nothing"}
 
 
 def test_the_same_seed_writes_the_same_files_whatever_the_clock_says(

@@ -1,4 +1,4 @@
-"""Refinement and snapping find a planted program again, and inference holds its promises on hard input."""
+"""Refinement finds the numbers of planted programs again, and inference holds its promises on hard input."""
 
 from __future__ import annotations
 
@@ -11,12 +11,15 @@ from shapeprog.data.shape import Shape
 from shapeprog.errors import InputError
 from shapeprog.geometry.cells import voxels as voxels_of
 from shapeprog.geometry.surface import sample_surface
-from shapeprog.inference import Schedule, Settings, infer, refine
-from shapeprog.inference.budget import Deadline
+from shapeprog.inference import Settings, infer, refine
+from shapeprog.inference.cells.reconstruct import REACH
+from shapeprog.inference.fit.adjustment import adjust
 from shapeprog.inference.fit.tunable import THINNEST
+from shapeprog.inference.surface.evidence import evidence_of_program
 from shapeprog.language.parser import parse
 from shapeprog.language.tensors import encode
 from shapeprog.language.unroll import unroll
+from shapeprog.liang2022.refinement import refined
 
 TABLE = """
 top_rectangle(at=(4.2, 0.3, -0.2), thickness=2.3, half=(8.8, 11.3))
@@ -45,33 +48,36 @@ def numbers(program):
 
 def test_refinement_finds_planted_lengths_and_places():
     planted = parse(PAIR)
-    found = refine(planted.snap(), points(planted), schedule=Schedule(steps=80, rate=0.1), reach=1.49)
-    assert encode(found.flat()).ids.equal(encode(planted.flat()).ids)
-    assert (found.blocks, found.size) == (planted.blocks, planted.size)
-    assert float((numbers(found) - numbers(planted)).abs().max()) < 0.05
+    shape = Shape("planted", cells(planted), points(planted).numpy())
+    by_chamfer = refined(planted.snap(), points(planted), steps=80, rate=0.1)
+    for found in (refine(planted.snap(), shape), by_chamfer):
+        assert encode(found.flat()).ids.equal(encode(planted.flat()).ids)
+        assert (found.blocks, found.size) == (planted.blocks, planted.size)
+        assert float((numbers(found) - numbers(planted)).abs().max()) < 0.05
 
 
 def test_refinement_leaves_no_part_thinner_than_fitting_does():
     for text, slot in (("leg(at=(0, 0, 0), size=(1, 9, 9))", 3), ("top_square(at=(0, 0, 0), thickness=9, half=1)", 4)):
         program = parse(text)
         flat = points(program) * torch.tensor([1e-3, 1, 1] if slot == 3 else [1, 1e-3, 1e-3])
-        found = refine(program, flat, schedule=Schedule(steps=60, rate=0.3))
+        found = refined(program, flat, steps=60, rate=0.3)
         assert numbers(found)[0, 0, slot] >= (THINNEST if slot == 3 else THINNEST / 2) - 1e-6
 
 
 def test_refinement_moves_no_number_farther_than_its_reach():
     planted = parse(TABLE)
     start = planted.snap()
-    moved = refine(start, points(planted) + 3.0, schedule=Schedule(steps=30, rate=0.3), reach=0.5)
-    assert float((numbers(moved) - numbers(start)).abs().max()) <= 0.5 + 1e-6
-    assert refine(start, points(planted), deadline=Deadline(0.0)) == start
+    fitted = adjust(start, evidence_of_program(planted), reach=0.2)
+    assert 0.19 < float((numbers(fitted) - numbers(start)).abs().max()) <= 0.2 + 1e-6
+    by_chamfer = refined(start, points(planted) + 3.0, steps=30, rate=0.3)
+    assert float((numbers(by_chamfer) - numbers(start)).abs().max()) <= REACH + 1e-6
 
 
 def test_refinement_needs_finite_points():
     with pytest.raises(InputError, match="finite"):
-        refine(parse(TABLE), torch.full((4, 3), torch.nan))
+        refined(parse(TABLE), torch.full((4, 3), torch.nan))
     with pytest.raises(InputError):
-        refine(parse(TABLE), torch.zeros(0, 3))
+        refined(parse(TABLE), torch.zeros(0, 3))
 
 
 def snapped_from(program, snapped):
@@ -96,17 +102,17 @@ def check(result, blocks=10):
 def test_inference_rebuilds_a_table_from_cells_and_from_points(with_points):
     planted = parse(TABLE).snap()
     shape = Shape("table", cells(planted), points(planted).numpy() if with_points else None)
-    result = infer(shape, settings=QUICK, schedule=Schedule(steps=10), statements="paper")
+    result = infer(shape, settings=QUICK, statements="paper")
     check(result)
     assert result.scores["iou"] == 1
-    assert infer(shape, settings=QUICK, schedule=Schedule(steps=10), statements="paper") == result
+    assert infer(shape, settings=QUICK, statements="paper") == result
 
 
 @pytest.mark.parametrize("kind", ["full", "cell", "sheet"])
 def test_inference_survives_full_grids_single_cells_and_flat_sheets(kind):
     solid = np.zeros((32, 32, 32), np.bool_)
     solid[{"full": np.s_[:], "cell": np.s_[16, 16, 16], "sheet": np.s_[16, 4:28, 4:28]}[kind]] = True
-    result = infer(Shape(kind, solid), blocks=1, settings=QUICK, schedule=Schedule(steps=4), statements="paper")
+    result = infer(Shape(kind, solid), blocks=1, settings=QUICK, statements="paper")
     check(result, 1)
     assert result.scores["iou"] == 1
     assert "the limit of --blocks 1 is reached" in result.reason

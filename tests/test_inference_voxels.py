@@ -5,13 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import torch
-from test_inference_search import CHAIR, cells
 
 import shapeprog as sp
 from shapeprog.data.placement import shape_from_mesh
 from shapeprog.data.shape import Shape
 from shapeprog.formats.parts import solid
-from shapeprog.inference import Schedule
 from shapeprog.inference.cells.reconstruct import description_length
 from shapeprog.inference.fit.residuals import Target
 from shapeprog.inference.fit.tunable import Tunable
@@ -23,6 +21,14 @@ box(at=(6.3, -7.7, -11.7), size=(1.4, 15.4, 23.4))
 for i in mirror(side):
     for j in mirror(depth):
         box(at=(-7.7, 4.3, 8.3), size=(14, 1.4, 1.4))
+"""
+
+CHAIR = """\
+top_square(at=(-1.7, 0, 0), thickness=1.4, half=7.7)
+for i in translate(2, by=(0, 0, 14)):
+    for j in translate(2, by=(0, 14, 0)):
+        leg(at=(-12, -7.7, -7.7), size=(10.7, 1.4, 1.4))
+back(at=(-0.6, 6.3, -7.7), size=(12.6, 1.4, 15.4), tilt=0)
 """
 
 SHELF = """\
@@ -67,8 +73,8 @@ def test_full_grids_single_cells_and_flat_sheets_are_one_block(kind):
 
 
 def test_a_program_found_on_cells_is_tied():
-    shape, quick = Shape("planted", cells(CHAIR)), {"schedule": Schedule(steps=2)}
-    tied, plain = (sp.infer(shape, ties=ties, **quick) for ties in (True, False))
+    shape = cells_of(CHAIR)
+    tied, plain = (sp.infer(shape, ties=ties) for ties in (True, False))
     assert [each.name for each in sp.names(tied.program)][:2] == ["width", "depth"]
     assert tied.scores["numbers"] < plain.scores["numbers"]
     assert tied.scores["iou"] >= plain.scores["iou"] - 0.02

@@ -9,7 +9,7 @@ from .formats.plugins import load_statements
 from .geometry.losses import chamfer, coverage
 from .geometry.scene import Scene
 from .geometry.surface import sample
-from .inference.cells.refine import refine
+from .inference.fit.adjustment import refine
 from .inference.infer import infer
 from .language.ast import Source
 from .language.dimensions import in_unit

@@ -1,6 +1,6 @@
-from .cells.refine import Schedule, refine
 from .cells.settings import Settings
 from .cells.structure import greedy_boxes
+from .fit.adjustment import refine
 from .infer import Result, infer
 
-__all__ = ["Result", "Schedule", "Settings", "greedy_boxes", "infer", "refine"]
+__all__ = ["Result", "Settings", "greedy_boxes", "infer", "refine"]

@@ -25,7 +25,6 @@ from shapeprog.inference.assembly import assemble
 from shapeprog.inference.budget import BUDGET, Deadline, Progress
 from shapeprog.inference.calls import with_calls
 from shapeprog.inference.cells.reconstruct import description_length, reconstruct
-from shapeprog.inference.cells.refine import Schedule
 from shapeprog.inference.cells.settings import Settings
 from shapeprog.inference.choice.coverage import Coverage, Prices
 from shapeprog.inference.readable import CELLS, in_readable_unit, unit_of_result
@@ -41,7 +40,7 @@ from shapeprog.language.unroll import unroll
 from shapeprog.library import Library, with_library
 
 SEARCH_SHARE = 0.65
-"""Share of the time budget after which the search on cells hands over to refinement."""
+"""Share of the time budget after which the search on cells hands over to fitting."""
 
 
 SURFACE_KERNELS = (
@@ -103,7 +102,6 @@ def infer(
     budget: float = BUDGET,
     seed: int = 0,
     settings: Settings | None = None,
-    schedule: Schedule | None = None,
     statements: Literal["all", "paper"] = "all",
     detail: float = 1.0,
     ties: bool = True,
@@ -123,12 +121,12 @@ def infer(
     blocks
         Most blocks of the program.
     budget
-        Seconds after which no further step of search, fitting or refinement starts.  Choice and ties are not
+        Seconds after which no further step of search or fitting starts.  Choice and ties are not
         interrupted.
     seed
         Of the searches.  Samples of surfaces are the same for all seeds.
-    settings, schedule
-        Settings of the search on cells and of its refinement; the search on the surface does not use them.
+    settings
+        Settings of the search on cells; the search on the surface does not use them.
     statements
         All statements in force, or those of the paper alone.
     detail
@@ -161,8 +159,8 @@ def infer(
     scores: dict[str, float] = {}
     program, reason = Program(), ""
     snapped: Program | None = None
-    evidence = None if statements == "paper" else evidence_of(target)
-    if evidence is not None and target.points is not None:
+    evidence = evidence_of(target)
+    if statements == "all" and target.points is not None:
         assembly = assemble(
             target, evidence, blocks=blocks, detail=detail, seed=seed, deadline=refining, progress=progress
         )
@@ -171,11 +169,11 @@ def infer(
     if not program.body:  # voxels, or no surface to speak of
         usual = settings or Settings()
         on_cells = reconstruct(
-            target, settings=replace(usual, blocks=blocks, price=usual.price / detail), schedule=schedule, seed=seed,
+            target, evidence, settings=replace(usual, blocks=blocks, price=usual.price / detail), seed=seed,
             searching=searching, refining=refining, progress=progress,
         )  # fmt: skip
         program, snapped, reason = on_cells.program, on_cells.snapped, on_cells.reason
-    if evidence is not None:
+    if statements == "all":
         integral, plain = snapped, program
         if snapped is not None:
             program, snapped = named_anew(program), None
@@ -193,8 +191,8 @@ def infer(
         for library in libraries:
             program = with_library(program, library)
     program = in_readable_unit(program, unit_of_result(target, program, unit))
-    doubt = "" if evidence is None else doubt_of_furniture(evidence)
-    reason = " ".join(sentence for sentence in (reason, doubt, target.note) if sentence)
+    sentences = reason, doubt_of_furniture(evidence), target.note
+    reason = " ".join(sentence for sentence in sentences if sentence)
     cut = tuple(deadline.cut for deadline in (searching, refining) if deadline.cut)
     if cut:
         reason += f" The time limit of {budget:g} s ended {' and '.join(cut)}: "

@@ -25,6 +25,7 @@ from pathlib import Path
 from typing import TypeAlias
 
 import numpy as np
+import numpy.typing as npt
 import torch
 from jaxtyping import Float, UInt8
 from torch import Tensor, nn
@@ -32,7 +33,7 @@ from torch import Tensor, nn
 from shapeprog.data.packs import read_pack
 from shapeprog.errors import ShapeProgError
 from shapeprog.geometry.surface import face_areas
-from shapeprog.inference.surface.cells import points_of_cells
+from shapeprog.inference.surface.cells import exposed_faces
 from shapeprog.language import Code, Draw, Program, encode, unroll
 from shapeprog.language.statement import EMPTY
 from shapeprog.liang2022.decode import Decoded, decode
@@ -43,6 +44,10 @@ from shapeprog.liang2022.pretrain import teacher_forcing
 from shapeprog.liang2022.prior import PRIORS, scramble
 from shapeprog.liang2022.settings import METHODS, NEURAL, AdaptSettings
 from shapeprog.liang2022.weights import load_executor, load_generator
+from shapeprog.space import HALF, SPAN
+
+INSET = 0.65
+"""Mean depth in cells of a surface below the faces of the cells that it touches; tuned on val."""
 
 REHEARSAL_CANVASES = 3  # canvases of each synthetic shape that a step rehearses
 RLOO_SAMPLES = 4  # programs sampled for each shape by the leave-one-out estimator
@@ -73,6 +78,29 @@ class TargetStream:
             cells.append(shape.voxels.astype(np.uint8))
             points.append(np.resize(rng.permutation(cloud)[: self._points], (self._points, 3)))
         return torch.from_numpy(np.stack(cells)), torch.from_numpy(np.stack(points).astype(np.float32))
+
+
+def points_of_cells(voxels: npt.NDArray[np.bool_], count: int = 5000, *, seed: int = 0) -> npt.NDArray[np.float32]:
+    """Points (count, 3) on the estimated surface of a shape with these touched cells, in the grid frame.
+
+    Uniform on the exposed faces of the cells, moved inwards by ``INSET``; a face at the end of the longest side
+    is exact, since that side is 24 cells long by definition, and stays.
+    """
+    low, high = np.argwhere(voxels).min(0), np.argwhere(voxels).max(0) + 1
+    faces = exposed_faces(voxels)
+    outer = np.where(faces[:, 4] < 0, low[faces[:, 3]], high[faces[:, 3]] - 1)
+    exact = (high - low == SPAN)[faces[:, 3]] & (faces[np.arange(len(faces)), faces[:, 3]] == outer)
+    table = np.column_stack([faces, np.where(exact, 0.0, INSET)])
+    random = np.random.default_rng(seed)
+    selected = table[random.integers(len(table), size=count)]
+    points = selected[:, :3] + random.random((count, 3))
+    along, outwards, inwards = selected[:, 3].astype(int), selected[:, 4], selected[:, 5]
+    rows = np.arange(count)
+    points[rows, along] = selected[rows, along] + np.where(outwards > 0, 1 - inwards, inwards)
+    edge_low, edge_high = low + INSET, high - INSET
+    full = high - low == SPAN
+    points = np.clip(points, np.where(full, low, edge_low), np.where(full, high, edge_high))
+    return (points - HALF).astype(np.float32)
 
 
 class AdaptTask:

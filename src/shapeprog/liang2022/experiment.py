@@ -18,12 +18,12 @@ from shapeprog.data.packs import read_pack, write_pack
 from shapeprog.data.synthetic.shapes import shapes_of
 from shapeprog.errors import InputError, did_you_mean
 from shapeprog.files import make_folder
-from shapeprog.inference import greedy_boxes, refine
-from shapeprog.inference.cells.refine import REACH
+from shapeprog.inference import greedy_boxes
 from shapeprog.liang2022.adapt import AdaptTask
 from shapeprog.liang2022.evaluate import decode_all, measure
 from shapeprog.liang2022.loop import append_line, read_log, train
 from shapeprog.liang2022.prior import programs
+from shapeprog.liang2022.refinement import refined
 from shapeprog.liang2022.settings import BEST, LOG, STATE, AdaptSettings, Decoder
 from shapeprog.liang2022.weights import load_generator
 
@@ -145,7 +145,7 @@ def _measured(
             fine = rounded = [greedy_boxes(shape.voxels) for shape in shapes]
         for program, on_canvas, shape in zip(fine, rounded, shapes, strict=True):
             if row.refine:
-                program = refine(program, torch.from_numpy(np.array(shape.points)), reach=REACH, seed=seed)
+                program = refined(program, torch.from_numpy(np.array(shape.points)), seed=seed)
             key = {"row": name, "category": category, "seed": seed, "decoder": decoder}
             made.append(key | asdict(measure(program, on_canvas, shape, seed=seed)))
         for line in made:

@@ -1,4 +1,4 @@
-"""Programs in the statements of the paper for the cells of a shape: searched with whole numbers, then refined."""
+"""Programs in the statements of the paper for the cells of a shape: searched with whole numbers, then fitted."""
 
 from __future__ import annotations
 
@@ -6,23 +6,22 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-import torch
-from jaxtyping import Float
-from torch import Tensor
 
 from shapeprog.data.shape import Shape
 from shapeprog.data.touched import occupied
 from shapeprog.geometry.cells import iou, pack
-from shapeprog.geometry.distance import nearest_primitive
 from shapeprog.inference.budget import NEVER, Deadline, Progress
 from shapeprog.inference.cells.blocks import to_program
-from shapeprog.inference.cells.refine import REACH, Schedule, refine
 from shapeprog.inference.cells.settings import Settings
 from shapeprog.inference.cells.structure import search_structure
 from shapeprog.inference.choice.coverage import Prices
-from shapeprog.inference.surface.cells import points_of_cells
+from shapeprog.inference.fit.adjustment import adjust
+from shapeprog.inference.surface.evidence import Evidence
 from shapeprog.language.program import Program
 from shapeprog.language.unroll import unroll
+
+REACH = 1.49
+"""Largest change of a number by fitting, in cells: rounding and one step lead back."""
 
 
 @dataclass(frozen=True)
@@ -46,9 +45,9 @@ class Reconstruction:
 
 def reconstruct(
     shape: Shape,
+    evidence: Evidence,
     *,
     settings: Settings,
-    schedule: Schedule | None = None,
     seed: int = 0,
     searching: Deadline = NEVER,
     refining: Deadline = NEVER,
@@ -58,19 +57,16 @@ def reconstruct(
 
     Parameters
     ----------
-    schedule
-        Steps of refinement.
+    shape, evidence
+        A shape, whose cells are searched, and its surface, to which the numbers are fitted.
     searching, refining
-        When no further round of the search, and no further step of refinement, starts.
+        When no further round of the search, and no further step of fitting, starts.
     progress
         Called with the name of the current step and the completed share of it.
     """
     structure = search_structure(shape.voxels, settings, seed=seed, deadline=searching, progress=progress)
     snapped = to_program(structure.blocks)
-    program = refine(
-        snapped, outer_points(shape, snapped, seed), voxels=shape.voxels if shape.points is None else None,
-        schedule=schedule, reach=REACH, seed=seed, deadline=refining, progress=progress,
-    )  # fmt: skip
+    program = adjust(snapped, evidence, reach=REACH, seed=seed, deadline=refining, progress=progress)
     reason = f"The search ended after {structure.reason}"
     if searching.cut:
         reason += "."
@@ -85,16 +81,3 @@ def reconstruct(
 def description_length(program: Program, voxels: npt.NDArray[np.bool_], snapped: Program | None = None) -> float:
     """Description length of cells (32, 32, 32) by a program: 1 - IoU, plus the price of its text."""
     return 1 - float(iou(occupied(program, unroll(program), snapped), pack(voxels))) + Prices().of(program)
-
-
-def outer_points(shape: Shape, snapped: Program, seed: int) -> Float[Tensor, "P 3"]:
-    """Points that the surface of the program should meet.
-
-    Points deeper than 2.5 cells inside the snapped solid lie on inner faces of the mesh, such as the back of a drawer.
-    The surface of a union cannot reach them; in the loss they would pull its outer faces inwards.
-    """
-    if shape.points is None:
-        return torch.from_numpy(points_of_cells(shape.voxels, seed=seed))
-    points = torch.from_numpy(np.asarray(shape.points, np.float32))
-    outer = points[nearest_primitive(unroll(snapped), points)[1] > -2.5] if snapped.size else points
-    return outer if len(outer) else points

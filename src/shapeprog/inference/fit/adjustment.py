@@ -7,16 +7,19 @@ thickness behind a sheet, do not change.
 
 from __future__ import annotations
 
+import math
+
 import torch
 from jaxtyping import Bool, Float
 from torch import Tensor
 
+from shapeprog.data.shape import Shape
 from shapeprog.geometry.arrays import one_tensor_thread
 from shapeprog.inference.budget import NEVER, Deadline, Progress
 from shapeprog.inference.fit.joints import NEARLY, Joints, find_joints, joining, moved, needs
 from shapeprog.inference.fit.residuals import Pairs, Target, pull
 from shapeprog.inference.fit.tunable import Poses, Tunable
-from shapeprog.inference.surface.evidence import TOLERANCE, Evidence
+from shapeprog.inference.surface.evidence import TOLERANCE, Evidence, evidence_of
 from shapeprog.language.program import Program
 
 STEPS, LAST = 12, 5
@@ -31,11 +34,27 @@ PLACE = 1e-6
 nothing else may hold, and of places."""
 
 
+def refine(program: Program, shape: Shape, *, seed: int = 0) -> Program:
+    """The same program with continuous numbers that fit a shape: those of hundredths of cells and tenths of degrees.
+
+    Parameters
+    ----------
+    program
+        A program in cells whose surface is within a cell or two of that of the shape.
+    shape
+        A mesh, a point cloud or voxels.
+    seed
+        Of the samples that each step draws.
+    """
+    return adjust(program, evidence_of(shape), seed=seed)
+
+
 def adjust(
     program: Program,
     evidence: Evidence,
     *,
     steps: int = STEPS,
+    reach: float = math.inf,
     seed: int = 0,
     deadline: Deadline = NEVER,
     progress: Progress | None = None,
@@ -46,6 +65,8 @@ def adjust(
     ----------
     steps
         Steps of Gauss and Newton, at least ``LAST`` of them with fixed angles.
+    reach
+        Largest change of a number.
     seed
         Of the samples that each step draws.
     deadline
@@ -54,7 +75,8 @@ def adjust(
     if not program.size:
         return program
     tunable = Tunable(program)
-    values, held = tunable.values, torch.zeros(len(tunable.values), dtype=torch.bool)
+    values, low, high = tunable.values, (tunable.values - reach).maximum(tunable.low), tunable.values + reach
+    held = torch.zeros(len(tunable.values), dtype=torch.bool)
     generator, target, angles = torch.Generator().manual_seed(seed), Target(evidence), tunable.are("angle")
     narrow = EXPLAINED * evidence.tolerance
     wide = max(1.2, narrow)  # in cells, at first
@@ -75,7 +97,7 @@ def adjust(
                 of_target(poses, pairs, wide ** (1 - done) * narrow**done),
                 of_joints(poses, joints, closing=done == 1),
             ]
-            values = torch.maximum(values + _move(systems, tunable, values, held), tunable.low)
+            values = (values + _move(systems, tunable, values, held)).clamp(low, high)
             poses = tunable.poses(values)
             if progress:
                 progress("adjusting", (step + 1) / steps)

@@ -23,7 +23,7 @@ from shapeprog.data.shape import Shape
 from shapeprog.data.voxelise_kernels import mark_triangles
 from shapeprog.geometry.arrays import over_threads
 from shapeprog.geometry.mesh import union_mesh
-from shapeprog.inference.surface.cells import INSET, exposed, exposed_faces
+from shapeprog.inference.surface.cells import exposed, exposed_faces
 from shapeprog.inference.surface.cloud import planes, points_of_scan
 from shapeprog.inference.surface.components import Components, components, simple_parts, solid_sides
 from shapeprog.inference.surface.evidence_kernels import look_out
@@ -34,14 +34,21 @@ from shapeprog.space import HALF, RESOLUTION, SPAN, UP, FloatArray
 POINTS, SURFACE = 6_000, 40_000
 """Points to be explained, and points of the same surface that support the surface of a program."""
 
-TOLERANCE = 0.008 * SPAN
-"""Largest distance between a clean point and a surface that explains it; .8 % of the longest side."""
+TOLERANCE, CELL_TOLERANCE = 0.008 * SPAN, 0.65
+"""Largest distance between a clean point, or one of a cell, and a surface that explains it; the first is .8 % of the
+longest side."""
 
 AGREEMENT, SCANNED = 0.5, 0.6
 """Least cosine between normals that agree; and for scans, where noise could be mistaken for a surface otherwise.
 
 The bound is wide, to separate the two sides of a part only: near an edge of a thin part the nearest surface is often
 another one, and a slope in cells is a staircase.
+"""
+
+INSET = 0.45
+"""Depth in cells of the surface of a program below the faces of the cells that it should touch; tuned on val.
+
+The surface is anywhere within the cells that it touches.  Near their middles, errors of fits change no cell.
 """
 
 NEIGHBOURS = 16
@@ -165,10 +172,9 @@ def _of_points(surface: FloatArray, voxels: Flags, seed: int) -> Evidence:
 
 
 def _of_cells(voxels: Flags) -> Evidence:
-    """The evidence of cells: one point for each exposed face, at the estimated depth of the surface; see ``INSET``.
+    """The evidence of cells: one point for each exposed face, at the depth ``INSET``.
 
-    Parts that are one cell thick have half that thickness, the mean of such parts of furniture (IKEA, val): their two
-    sides do not cross.
+    Parts that are one cell thick have .7 of that thickness: their two sides do not cross.
     """
     faces, occupied = exposed_faces(voxels), np.argwhere(voxels)
     cells, axis, sign = faces[:, :3], faces[:, 3], faces[:, 4]
@@ -176,13 +182,13 @@ def _of_cells(voxels: Flags) -> Evidence:
     coordinate = cells[np.arange(len(faces)), axis]
     exact = (high - low == SPAN) & (coordinate == np.where(sign < 0, low, high - 1))
     single = exposed(voxels, cells, axis, 1) & exposed(voxels, cells, axis, -1)
-    inset = np.where(exact, 0.0, np.where(single, 0.25, INSET))
+    inset = np.where(exact, 0.0, np.where(single, 0.15, INSET))
     normals = sign[:, None] * np.eye(3)[axis]
     surface = cells + 0.5 - HALF + (0.5 - inset)[:, None] * normals
     count = len(surface)
     return Evidence(
-        surface, normals, np.full(count, 1 / count), np.ones(count, np.bool_), INSET, AGREEMENT,
-        surface, normals, np.zeros(count, np.bool_), _reach(INSET, count, count), float(count), ~voxels,
+        surface, normals, np.full(count, 1 / count), np.ones(count, np.bool_), CELL_TOLERANCE, AGREEMENT,
+        surface, normals, np.zeros(count, np.bool_), _reach(CELL_TOLERANCE, count, count), float(count), ~voxels,
         np.zeros((0, 2, 3)),
     )  # fmt: skip
 

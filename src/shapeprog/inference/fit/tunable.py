@@ -27,6 +27,9 @@ ROW = SIZES + 3 + 9
 THINNEST = 0.1
 """Least thickness in cells of any part; the eye takes thinner ones for slivers."""
 
+STEP = 1e-4
+"""Step of differences in cells and degrees: primitives are linear or trigonometric in it, with errors below 1e-10."""
+
 DEGREES, CELLS = 1, 2
 """Decimals that tidy numbers keep: tenths of degrees, hundredths of cells."""
 
@@ -84,36 +87,21 @@ class Tunable:
         self.values = torch.tensor([nodes[n].values[slot] for n, slot in moving], dtype=torch.float64)
         self.low = torch.tensor([least(quantity) for quantity in quantities], dtype=torch.float64)
         self._once = Plan(code)
-        first = self._once.scene(code.parameters)
-        self._row = _rank(first.block)
-        self._copies = int(self._row.max()) + 1
-        repeated = (part.expand(self._copies * ROW, *part.shape) for part in (code.ids, code.parameters))
+        repeated = (part.expand(2 * len(moving), *part.shape) for part in (code.ids, code.parameters))
         self._plan = Plan(Code(*repeated))
-        self.scale = self._scales(nodes, first)
+        self.scale = self._scales(nodes, self._once.scene(code.parameters))
 
     def scene(self, values: Float[Tensor, " F"]) -> Scene:
         """The primitives (N,) where the numbers are these."""
         return self._once.scene(self._filled(values))
 
     def poses(self, values: Float[Tensor, " F"]) -> Poses:
-        """Primitives and slopes where the numbers are these.
-
-        Primitives of different blocks have no numbers of a block in common, so one backward pass through a batch of
-        equal programs gives them all: each of these asks for one number of one primitive of every block.
-        """
-        inner = self._filled(values).expand(self._copies * ROW, *self._index.shape).clone().requires_grad_()
-        scene = self._plan.scene(inner)
-        rows = torch.cat([scene.size, scene.centre, scene.rotation.flatten(-2)], -1)
-        asked = rows.unflatten(0, (self._copies, ROW))
-        slot, which = torch.arange(len(self._row))[:, None], torch.arange(ROW)
-        (slope,) = torch.autograd.grad(asked[self._row[:, None], which, slot, which].sum(), inner)
-        gradients = slope.unflatten(0, (self._copies, ROW))
-        block = scene.block[0]
-        mine = gradients[self._row[:, None], which, block[:, None]].nan_to_num(0).flatten(2)  # (N, 16, J * slots)
-        index = self._index[block].flatten(1)
-        slopes = mine.new_zeros(*mine.shape[:2], len(self.moving) + 1)
-        slopes.scatter_add_(2, (index % slopes.shape[2])[:, None].expand_as(mine), mine)
-        return Poses(scene[0].detach(), slopes[..., :-1])
+        """Primitives and slopes where the numbers are these, by central differences in one batch of programs."""
+        steps = STEP * torch.eye(len(values), dtype=values.dtype)
+        scenes = self._plan.scene(self._filled(values + torch.cat([steps, -steps])))
+        rows = torch.cat([scenes.size, scenes.centre, scenes.rotation.flatten(-2)], -1)
+        upper, lower = rows.unflatten(0, (2, len(values)))
+        return Poses(self.scene(values), ((upper - lower) / (2 * STEP)).permute(1, 2, 0).contiguous())
 
     def settled(self, values: Float[Tensor, " F"]) -> Program:
         """The program with these numbers, rounded."""
@@ -135,10 +123,10 @@ class Tunable:
         """Which numbers are of a kind."""
         return torch.tensor([item == kind for item in self.kinds], dtype=torch.bool)
 
-    def _filled(self, values: Float[Tensor, " F"]) -> Float[Tensor, "K J slots"]:
-        if not len(values):
-            return self._start
-        return torch.where(self._index >= 0, values[self._index.clamp(min=0)], self._start)
+    def _filled(self, values: Float[Tensor, "*batch F"]) -> Float[Tensor, "*batch K J slots"]:
+        if not values.shape[-1]:
+            return self._start.expand(*values.shape[:-1], *self._start.shape)
+        return torch.where(self._index >= 0, values[..., self._index.clamp(min=0)], self._start)
 
     def _scales(self, nodes: Sequence[Node], scene: Scene) -> Float[Tensor, " F"]:
         reach = scene.bounds.norm(dim=-1)
@@ -191,9 +179,3 @@ def _rebuilt(body: Sequence[Node], counter: Iterator[int], table: dict[tuple[int
         else:
             nodes.append(Loop(node.name, values, _rebuilt(node.body, counter, table)))
     return tuple(nodes)
-
-
-def _rank(block: Int[Tensor, " N"]) -> Int[Tensor, " N"]:
-    """Of each primitive how many of its block come before it."""
-    same = block[:, None] == block
-    return (same.tril(-1)).sum(1)

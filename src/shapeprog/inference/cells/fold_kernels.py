@@ -36,46 +36,27 @@ def fold(volume, out, outer, size, inner, kind, a, b):
     Returns its cells along that axis, none where the copies do not fit.
     """
     left, right = mirrors(a)
-    length = max(0, min(left + 1, size - right) if kind == MIRROR else size - (a - 1) * b)
-    for o in range(outer):
-        for i in range(length):
-            to = np.uint64((o * length + i) * inner)
-            if kind == MIRROR:
-                source, far = np.uint64((o * size + left - i) * inner), np.uint64((o * size + right + i) * inner)
-                for k in range(inner):
-                    step = np.uint64(k)
-                    out[to + step] = volume[source + step] + volume[far + step]
+    mirrored = kind == MIRROR
+    length = max(0, min(left + 1, size - right) if mirrored else size - (a - 1) * b)
+    for cell in range(outer * length * inner):
+        out[np.uint64(cell)] = 0
+    for copy in range(2 if mirrored else a):
+        first = (right if copy else left) if mirrored else copy * b
+        step = -1 if mirrored and copy == 0 else 1
+        for o in range(outer):
+            if inner == 1:  # the compiler makes fast code of each of these two loops
+                to, source = np.uint64(o * length), np.uint64(o * size + first)
+                if step > 0:
+                    for i in range(length):
+                        out[to + np.uint64(i)] += volume[source + np.uint64(i)]
+                else:
+                    for i in range(length):
+                        out[to + np.uint64(i)] += volume[source - np.uint64(i)]
             else:
-                for k in range(inner):
-                    out[to + np.uint64(k)] = 0
-                for copy in range(a):
-                    source = np.uint64((o * size + i + copy * b) * inner)
-                    for k in range(inner):
-                        step = np.uint64(k)
-                        out[to + step] += volume[source + step]
-    return length
-
-
-@helper
-def fold_rows(volume, out, rows, size, kind, a, b):
-    """Fold the last axis of a volume (rows, size), as ``fold`` does a middle one."""
-    left, right = mirrors(a)
-    length = max(0, min(left + 1, size - right) if kind == MIRROR else size - (a - 1) * b)
-    for r in range(rows):
-        to = np.uint64(r * length)
-        if kind == MIRROR:
-            source, far = np.uint64(r * size + left), np.uint64(r * size + right)
-            for i in range(length):
-                step = np.uint64(i)
-                out[to + step] = volume[source - step] + volume[far + step]
-        else:
-            for i in range(length):
-                out[to + np.uint64(i)] = 0
-            for copy in range(a):
-                source = np.uint64(r * size + copy * b)
                 for i in range(length):
-                    step = np.uint64(i)
-                    out[to + step] += volume[source + step]
+                    to, source = np.uint64((o * length + i) * inner), np.uint64((o * size + first + i * step) * inner)
+                    for k in range(inner):
+                        out[to + np.uint64(k)] += volume[source + np.uint64(k)]
     return length
 
 
@@ -125,12 +106,9 @@ def search_family(volumes, size0, size1, size2, family, floor, result):
         if axis < 0:
             continue
         volume, out = volumes[held], volumes[held + 1]
-        if axis == 2:
-            sizes[2] = fold_rows(volume, out, sizes[0] * sizes[1], sizes[2], kind, a, b)
-        elif axis == 1:
-            sizes[1] = fold(volume, out, sizes[0], sizes[1], sizes[2], kind, a, b)
-        else:
-            sizes[0] = fold(volume, out, 1, sizes[0], sizes[1] * sizes[2], kind, a, b)
+        outer = (1, sizes[0], sizes[0] * sizes[1])[axis]
+        inner = (sizes[1] * sizes[2], sizes[2], 1)[axis]
+        sizes[axis] = fold(volume, out, outer, sizes[axis], inner, kind, a, b)
         held += 1
         if kind == PERIOD:
             limits[axis] = b - 1

@@ -1,4 +1,4 @@
-"""Groups of parts that touch, for many scenes at once.
+"""Parts that touch, for many scenes at once.
 
 Pairs whose boxes along the axes of the grid overlap are compared by alternating projections (von Neumann 1933).
 """
@@ -6,6 +6,7 @@ Pairs whose boxes along the axes of the grid overlap are compared by alternating
 from __future__ import annotations
 
 import numpy as np
+import numpy.typing as npt
 
 from shapeprog.geometry import distance_kernels as kernels
 from shapeprog.geometry.arrays import array, table_of
@@ -23,8 +24,17 @@ def contact_groups(scenes: Batch) -> list[int]:
     """The number of groups of touching primitives in each scene of a batch (B, N)."""
     from scipy.sparse.csgraph import connected_components
 
+    graphs = zip(touching(scenes, TOUCHING), array(scenes.mask), strict=True)
+    return [connected_components(graph[here][:, here])[0] for graph, here in graphs]
+
+
+def touching(scenes: Batch, within: float) -> npt.NDArray[np.bool_]:
+    """Which primitives of each scene of a batch (B, N) lie ``within`` cells of which later ones (B, N, N).
+
+    Projections of parts that barely overlap may end before they meet: such parts count as apart.
+    """
     mask, centre, reach = array(scenes.mask), array(scenes.centre.double()), array(scenes.reach.double())
-    low, high = centre - reach, centre + reach + TOUCHING
+    low, high = centre - reach, centre + reach + within
     near = (low[:, :, None] <= high[:, None]).all(-1) & mask[:, :, None] & mask[:, None]
     near &= np.triu(near.swapaxes(1, 2), 1)
     scene, first, second = np.nonzero(near)
@@ -33,6 +43,6 @@ def contact_groups(scenes: Batch) -> list[int]:
     pairs[..., CENTRE:ROTATION] = (pairs[..., CENTRE:ROTATION] - pairs[:, :1, CENTRE:ROTATION]).round(6) + 0.0
     different, number = np.unique(pairs, axis=0, return_inverse=True)  # copies of a pair are compared once
     gap = np.empty(len(different))
-    kernels.gaps(different.reshape(-1, WIDTH), ROUNDS, TOUCHING, gap)
-    near[scene, first, second] = (gap <= TOUCHING)[number.reshape(-1)]
-    return [connected_components(graph[here][:, here])[0] for graph, here in zip(near, mask, strict=True)]
+    kernels.gaps(different.reshape(-1, WIDTH), ROUNDS, within, gap)
+    near[scene, first, second] = (gap <= within)[number.reshape(-1)]
+    return near

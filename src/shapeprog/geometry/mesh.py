@@ -154,8 +154,11 @@ def pieces(vertices: Array, faces: Array) -> int:
     return sum(piece.volume() > 0 for piece in manifold(vertices, faces).decompose())
 
 
-def gaps(scene: Batch, within: float) -> dict[tuple[int, int], float]:
-    """The distance between primitives of one scene, for pairs of slots nearer than ``within``; 0 where they overlap."""
+def gaps(scene: Batch, within: float, group: npt.NDArray[np.int64] | None = None) -> dict[tuple[int, int], float]:
+    """The distance between primitives of one scene, for pairs of slots nearer than ``within``; 0 where they overlap.
+
+    Pairs of the same ``group`` (N,) are left out, if primitives have any.
+    """
     parts = part_meshes(scene)
     if len(parts) < 2:
         return {}
@@ -165,8 +168,11 @@ def gaps(scene: Batch, within: float) -> dict[tuple[int, int], float]:
     between = np.linalg.norm(
         np.maximum(low[:, None] - high, low - high[:, None]).clip(0), axis=-1
     )  # those of the boxes
-    results = {}
-    for i, j in np.argwhere(np.triu(between <= within, 1)).tolist():
+    near, results = between <= within, {}
+    if group is not None:
+        label = group[[part.slot for part in parts]]
+        near &= label[:, None] != label
+    for i, j in np.argwhere(np.triu(near, 1)).tolist():
         gap = between[i, j] if straight[i] and straight[j] else solid(i).min_gap(solid(j), 2 * within)
         if gap < within:
             results[parts[i].slot, parts[j].slot] = float(gap)

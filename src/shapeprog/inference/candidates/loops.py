@@ -143,6 +143,8 @@ def runs(stats: Moments) -> Iterator[tuple[int, int, tuple[float, float, float]]
         steps = positions[None] - positions[:, None]
         onwards = (np.abs(steps).max(-1) > LEAST_STEP) & ~_backwards(steps) & ~_overlap(stats.spread[group[0]], steps)
         first = onwards & (_at_steps(positions, -1) < 0)
+        if not first.any():
+            continue
         before, after, beyond = (_at_steps(positions, times) for times in (-2, 2, 3))
         for a, b in np.argwhere(first).tolist():
             run = _followed(after, [a, b])
@@ -251,7 +253,7 @@ def _nearest(positions: FloatArray, target: FloatArray) -> Array:
 def _overlap(spread: FloatArray, steps: FloatArray) -> npt.NDArray[np.bool_]:
     """Whether copies at these steps (..., 3) overlap considerably."""
     length = np.linalg.norm(steps, axis=-1)
-    reach = np.sqrt(np.einsum("...i,ij,...j->...", steps, spread, steps)) / np.maximum(length, 1e-9)
+    reach = np.sqrt((steps @ spread * steps).sum(-1).clip(0)) / np.maximum(length, 1e-9)
     overlaps: npt.NDArray[np.bool_] = length < APART * reach
     return overlaps
 

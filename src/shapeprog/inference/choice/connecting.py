@@ -10,6 +10,7 @@ from collections.abc import Iterator
 import numpy as np
 import torch
 
+from shapeprog.geometry.contacts import touching
 from shapeprog.geometry.mesh import gaps
 from shapeprog.inference.candidates.drawings import redrawn, solid_boxes
 from shapeprog.inference.candidates.neighbours import drawing_of, met, with_drawing
@@ -75,8 +76,12 @@ def _loose_parts(program: Program, flush: float = FLUSH) -> list[list[bool]]:
     loose: list[list[bool]] = [[] for _ in range(program.blocks)]
     if not program.size:
         return loose
-    scene = unroll(encode(program, dtype=torch.float64))
-    group = linked(np.array(list(gaps(scene, flush)), np.int64).reshape(-1, 2), len(scene.mask))
+    (scene,) = scenes = unroll(encode([program], dtype=torch.float64))
+    pairs = np.argwhere(touching(scenes, flush)[0])
+    group = linked(pairs, len(scene.mask))
+    if group.any():  # meshes of the groups may touch too, which takes longer to find
+        pairs = np.array([*pairs, *gaps(scene, flush, group)], np.int64).reshape(-1, 2)
+        group = linked(pairs, len(scene.mask))
     half = scene.bounds
     sizes = np.bincount(group, weights=(half * half.roll(1, -1)).sum(-1).numpy())
     for block, label in zip(scene.block.tolist(), group, strict=True):

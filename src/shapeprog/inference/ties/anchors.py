@@ -155,8 +155,9 @@ class AxisAnchors:
         for k, (element, choices) in enumerate(zip(self.elements, self.choices, strict=True)):
             self.costs[k, : len(choices)] = [self._unary(element, anchors) for anchors in choices]
             self.shifts[k, : len(choices)] = [(SHIFTS[ends[0]], SHIFTS[ends[-1]]) for ends in choices]
-        self.slopes = motion.by_element(self.elements, motion.slopes[:, axis])  # (2, N, K, 2)
-        self.gap_slopes = motion.by_element(self.elements, motion.gap_slopes)  # (L, K, 2)
+        slopes = motion.by_element(self.elements, motion.slopes[:, axis])  # (2, N, K, 2)
+        self.slopes = slopes.reshape(*slopes.shape[:2], -1).swapaxes(1, 2)  # (2, 2 K, N)
+        self.gap_slopes = motion.by_element(self.elements, motion.gap_slopes).reshape(-1, 2 * count).T  # (2 K, L)
         # Mirror images move with the high side of the whole while all coordinates stay.
         self.base, self.gap_base = motion.slopes[:, axis, :, axis] + 0.5, motion.gap_slopes[:, axis]
         low, high = motion.ends[:, axis]
@@ -168,7 +169,7 @@ class AxisAnchors:
             beyond = np.stack([self.reaches[0], high >= high.max() - settings.below * extent])
         self.near = self.reaches | beyond
         self.overlap, self._passed = self._overlaps(low, high), set[bytes]()
-        moves = (np.abs(self.slopes).max((0, 3)) > 0).astype(int)  # (N, K)
+        moves = (np.abs(slopes).max((0, 3)) > 0).astype(int)  # (N, K)
         shared = moves.T @ moves + moves[motion.first].T @ moves[motion.second]
         # Elements of parts that touch are often better changed together.
         self.together = [(int(a), int(b)) for a, b in np.argwhere(np.triu(shared + shared.T, 1) > 0)]
@@ -249,7 +250,8 @@ class AxisAnchors:
             cost += penalty * (states[:, start] != states[:, end])
         for last, first in self.rows.items():  # a row gives a side or the middle of its last copy
             shifts[:, last] -= shifts[:, last, :1] * (shifts[:, first, 1:] - shifts[:, first, :1])
-        low, high = (self.base[end] + np.tensordot(shifts, self.slopes[end], ((1, 2), (1, 2))) for end in (0, 1))
+        flat = shifts.reshape(len(states), -1)
+        low, high = self.base[:, None] + flat @ self.slopes
         # A face near a side moves with it, or keeps its proportion.
         stays = np.abs(low - np.clip(low, -0.13, np.maximum(self.share[0], 0) + 0.13)) > 1e-9
         lags = np.abs(high - np.clip(high, np.minimum(self.share[1], 1) - 0.13, 1.13)) > 1e-9
@@ -260,7 +262,7 @@ class AxisAnchors:
         below, above = motion.ends[:, self.axis]
         grown = self._overlaps(below + growth * low, above + growth * high)
         separated = grown < np.minimum(self.overlap, 0) - TOUCH
-        gaps = motion.gaps + growth * (self.gap_base + np.tensordot(shifts, self.gap_slopes, ((1, 2), (1, 2))))
+        gaps = motion.gaps + growth * (self.gap_base + flat @ self.gap_slopes)
         separated[:, motion.leaning] |= gaps > np.maximum(motion.gaps, 0) + TOUCH
         per_copy += s.separated * separated.sum(1)
         return cost + per_copy / max(1.0, low.shape[1] / len(elements))

@@ -73,8 +73,8 @@ def test_results_of_another_input_or_of_somebody_else_are_spared(run: Run, tmp_p
 
 @pytest.mark.usefixtures("quick")
 def test_a_disk_that_takes_nothing_ends_the_run(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    from shapeprog.cli import results
     from shapeprog.errors import OutputError
-    from shapeprog.inference import results
 
     def full(*_: object) -> list[str]:
         raise OutputError("the disk is full", "free some space")

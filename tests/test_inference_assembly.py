@@ -21,6 +21,7 @@ from shapeprog.inference.assembly import Assembly, assemble
 from shapeprog.inference.candidates.drawings import canonical_side, simplest
 from shapeprog.inference.candidates.loops import images, repeated
 from shapeprog.inference.candidates.moments import distinct, moments
+from shapeprog.inference.choice.coverage import Coverage
 from shapeprog.inference.surface.evidence import evidence_of, evidence_of_program
 from shapeprog.language import Draw, Language, Loop, Program, language, standard, statement, using
 from shapeprog.language.hints import Box
@@ -54,7 +55,7 @@ def whole(text: str) -> Shape:
 
 def assembled(shape: Shape, **options) -> Assembly:
     """A program for a shape, from its own surface."""
-    return assemble(shape, evidence_of(shape, options.get("seed", 0)), **options)
+    return assemble(shape, Coverage(evidence_of(shape, options.get("seed", 0))), **options)
 
 
 def apart(text: str) -> Shape:

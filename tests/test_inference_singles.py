@@ -14,6 +14,7 @@ from shapeprog.formats.parts import parts
 from shapeprog.inference.assembly import assemble
 from shapeprog.inference.candidates.drawings import starts
 from shapeprog.inference.candidates.singles import single_candidates
+from shapeprog.inference.choice.coverage import Coverage
 from shapeprog.inference.pieces.pieces import find_pieces
 from shapeprog.inference.surface.evidence import evidence_of
 from shapeprog.language import Statement, using
@@ -66,7 +67,7 @@ def test_every_leg_of_a_planted_table_is_a_statement_of_a_users_own_without_a_hi
     with using(without_the_paper()) as own:
         own.register(replace(LANGUAGE["cone_leg"], hint=None))
         shape = shape_of(TABLE)
-        found = assemble(shape, evidence_of(shape)).program
+        found = assemble(shape, Coverage(evidence_of(shape))).program
         (legs,) = (chain for chain in found.chains if chain[-1].name == "cone_leg")
         assert [loop.name for loop in legs[:-1]] == ["mirror", "mirror"]
         assert found.blocks == 2

@@ -67,11 +67,11 @@ def infer_command(
     The program keeps the position of the input, so later exports lie on it. The same seed gives the same files.
     An input that cannot be read is reported at the end; the others are processed.
     """
+    from shapeprog.cli.results import document, free_stem, measured, write
     from shapeprog.data import load_all
     from shapeprog.files import make_folder
     from shapeprog.inference import Settings, infer
     from shapeprog.inference.infer import SURFACE_KERNELS
-    from shapeprog.inference.results import document, free_stem, measured, write
     from shapeprog.kernels.compile import modules_of, prepare
     from shapeprog.view import picture
 

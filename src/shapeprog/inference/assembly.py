@@ -22,11 +22,10 @@ from shapeprog.inference.candidates.residual import residual_candidates
 from shapeprog.inference.candidates.singles import single_candidates
 from shapeprog.inference.choice.choice import Choice, choose, explained, missed, value
 from shapeprog.inference.choice.connecting import connected
-from shapeprog.inference.choice.coverage import Coverage, CoverageTable, Prices
+from shapeprog.inference.choice.coverage import Coverage, CoverageTable
 from shapeprog.inference.fit.adjustment import adjust, tidy
 from shapeprog.inference.pieces.pieces import Source, find_pieces
 from shapeprog.inference.roles.roles import in_order, with_roles
-from shapeprog.inference.surface.evidence import Evidence
 from shapeprog.language.free import numbers
 from shapeprog.language.hints import STRAIGHT, Box
 from shapeprog.language.program import Node, Program
@@ -59,10 +58,9 @@ class Assembly:
 
 def assemble(
     shape: Shape,
-    evidence: Evidence,
+    coverage: Coverage,
     *,
     blocks: int = 10,
-    detail: float = 1.0,
     seed: int = 0,
     deadline: Deadline = NEVER,
     progress: Progress | None = None,
@@ -71,12 +69,10 @@ def assemble(
 
     Parameters
     ----------
-    shape, evidence
-        A mesh or a point cloud, and the evidence of its surface.
+    shape, coverage
+        A mesh or a point cloud, and the coverage of its surface with the prices of text.
     blocks
         Most blocks of the program.
-    detail
-        Factor by which the prices of blocks and numbers are divided: above 1 the program is finer.
     seed
         Of the search among candidates.  Samples of surfaces are the same for all seeds.
     deadline, progress
@@ -87,9 +83,7 @@ def assemble(
         if progress:
             progress("finding structure", share)
 
-    usual = Prices()
-    prices = replace(usual, **{name: getattr(usual, name) / detail for name in ("statement", "loop", "number")})
-    coverage = Coverage(evidence, prices)
+    evidence = coverage.evidence
     report(0.1)
     candidates = _candidates(shape)
     if not candidates or evidence.area <= 0:

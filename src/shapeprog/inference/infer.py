@@ -159,17 +159,17 @@ def infer(
     scores: dict[str, float] = {}
     program, reason = Program(), ""
     snapped: Program | None = None
-    evidence = evidence_of(target)
+    evidence, usual = evidence_of(target), Prices()
+    prices = {name: getattr(usual, name) / detail for name in ("statement", "loop", "number")}
+    coverage = Coverage(evidence, replace(usual, **prices))
     if statements == "all" and target.points is not None:
-        assembly = assemble(
-            target, evidence, blocks=blocks, detail=detail, seed=seed, deadline=refining, progress=progress
-        )
+        assembly = assemble(target, coverage, blocks=blocks, seed=seed, deadline=refining, progress=progress)
         program, reason = assembly.program, assembly.reason
         scores["explained"] = assembly.explained
     if not program.body:  # voxels, or no surface to speak of
-        usual = settings or Settings()
+        limits = settings or Settings()
         on_cells = reconstruct(
-            target, evidence, settings=replace(usual, blocks=blocks, price=usual.price / detail), seed=seed,
+            target, evidence, settings=replace(limits, blocks=blocks, price=limits.price / detail), seed=seed,
             searching=searching, refining=refining, progress=progress,
         )  # fmt: skip
         program, snapped, reason = on_cells.program, on_cells.snapped, on_cells.reason
@@ -179,7 +179,7 @@ def infer(
             program, snapped = named_anew(program), None
         held: frozenset[int] = frozenset()
         if libraries:
-            program, held = with_calls(program, libraries, Coverage(evidence, Prices()))
+            program, held = with_calls(program, libraries, coverage)
         if ties:
             program = tie(program, evidence, held=held, progress=progress).program
         if integral is not None and description_length(plain, target.voxels, integral) < description_length(

@@ -33,7 +33,7 @@ from torch import Tensor, nn
 from shapeprog.data.packs import read_pack
 from shapeprog.errors import ShapeProgError
 from shapeprog.geometry.surface import face_areas
-from shapeprog.inference.surface.cells import exposed_faces
+from shapeprog.inference.surface.evidence import exposed_sides
 from shapeprog.language import Code, Draw, Program, encode, unroll
 from shapeprog.language.statement import EMPTY
 from shapeprog.liang2022.decode import Decoded, decode
@@ -86,20 +86,16 @@ def points_of_cells(voxels: npt.NDArray[np.bool_], count: int = 5000, *, seed: i
     Uniform on the exposed faces of the cells, moved inwards by ``INSET``; a face at the end of the longest side
     is exact, since that side is 24 cells long by definition, and stays.
     """
-    low, high = np.argwhere(voxels).min(0), np.argwhere(voxels).max(0) + 1
-    faces = exposed_faces(voxels)
-    outer = np.where(faces[:, 4] < 0, low[faces[:, 3]], high[faces[:, 3]] - 1)
-    exact = (high - low == SPAN)[faces[:, 3]] & (faces[np.arange(len(faces)), faces[:, 3]] == outer)
-    table = np.column_stack([faces, np.where(exact, 0.0, INSET)])
-    random = np.random.default_rng(seed)
-    selected = table[random.integers(len(table), size=count)]
-    points = selected[:, :3] + random.random((count, 3))
-    along, outwards, inwards = selected[:, 3].astype(int), selected[:, 4], selected[:, 5]
-    rows = np.arange(count)
-    points[rows, along] = selected[rows, along] + np.where(outwards > 0, 1 - inwards, inwards)
-    edge_low, edge_high = low + INSET, high - INSET
-    full = high - low == SPAN
-    points = np.clip(points, np.where(full, low, edge_low), np.where(full, high, edge_high))
+    occupied, random, rows = np.argwhere(voxels), np.random.default_rng(seed), np.arange(count)
+    low, high = occupied.min(0), occupied.max(0) + 1
+    faces = np.argwhere(exposed_sides(voxels))
+    along, above, *cell = faces[random.integers(len(faces), size=count)].T
+    cells, full = np.stack(cell, 1), high - low == SPAN
+    ends = full[along] & (cells[rows, along] == np.where(above, high[along] - 1, low[along]))
+    inwards = np.where(ends, 0.0, INSET)
+    points = cells + random.random((count, 3))
+    points[rows, along] = cells[rows, along] + np.where(above, 1 - inwards, inwards)
+    points = np.clip(points, np.where(full, low, low + INSET), np.where(full, high, high - INSET))
     return (points - HALF).astype(np.float32)
 
 

@@ -22,15 +22,6 @@ from shapeprog.kernels.compile import helper, kernel
 MOST_MOVES = 200
 """An upper bound on the number of neighbours of a block."""
 
-LOOP = COUNT2 - COUNT1
-"""Numbers of one translation loop."""
-
-LAYER = 16
-"""Words of 64 cells in one horizontal layer."""
-
-MOST_STEPS = 60
-"""Largest number of steps of one descent."""
-
 MOST_COPIES = 64
 """Largest number of copies of one block."""
 
@@ -160,18 +151,19 @@ def descend(block, occupied, covered, price, far, scratch_rows, scratch_words, a
     for slot in range(len(block)):
         around[0, slot] = block[slot]
     number = 1  # the block alone first, its neighbours later
-    for step in range(MOST_STEPS + 1):
+    for step in range(61):
         best_index = -1
         for m in range(number):
             if step > 0 and not valid(around[m]):
                 continue
             first, last = layers(around[m])
-            for i in range(first * LAYER, last * LAYER):
+            first, last = 16 * first, 16 * last  # a layer has 16 words
+            for i in range(first, last):
                 words[i] = 0
             draw_block(rows, around[m])
             good = inter
             bad = union
-            for i in range(first * LAYER, last * LAYER):
+            for i in range(first, last):
                 good += ones(words[i] & gained[i])
                 bad += ones(words[i] & wasted[i])
             value = good / max(bad, 1) - price * statements(around[m])

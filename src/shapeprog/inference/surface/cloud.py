@@ -66,17 +66,12 @@ def _cloud(points: Array, normals: Array | None) -> Cloud:
     distance, neighbours = cKDTree(points).query(points, k=range(1, min(around, len(points)) + 1), workers=2)
     spacing = max(float(np.median(distance[:, -1])) * (np.pi / neighbours.shape[1]) ** 0.5, CLOSEST)
     if normals is None:
-        facing, noise = plane_normals(points, neighbours)
+        facing, squared = planes(points, neighbours)
+        noise = float(np.sqrt(np.median(squared) / neighbours.shape[1]))
     else:
         facing = np.ascontiguousarray(normals, np.float64)
         noise = roughness(points, facing, neighbours)
     return Cloud(points, facing, np.ascontiguousarray(neighbours[:, 1 : NEAREST + 1], np.int32), spacing, noise)
-
-
-def plane_normals(points: FloatArray, neighbours: npt.NDArray[np.int64]) -> tuple[FloatArray, float]:
-    """Unit normals (N, 3) of the best planes through neighbours (N, k), and the typical distance of these from them."""
-    normals, squared = planes(points, neighbours)
-    return normals, float(np.sqrt(np.median(squared) / neighbours.shape[1]))
 
 
 def planes(points: FloatArray, neighbours: npt.NDArray[np.int64]) -> tuple[FloatArray, FloatArray]:

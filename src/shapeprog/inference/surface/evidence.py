@@ -23,7 +23,6 @@ from shapeprog.data.shape import Shape
 from shapeprog.data.voxelise_kernels import mark_triangles
 from shapeprog.geometry.arrays import over_threads
 from shapeprog.geometry.mesh import union_mesh
-from shapeprog.inference.surface.cells import exposed, exposed_faces
 from shapeprog.inference.surface.cloud import planes, points_of_scan
 from shapeprog.inference.surface.components import Components, components, simple_parts, solid_sides
 from shapeprog.inference.surface.evidence_kernels import look_out
@@ -176,12 +175,13 @@ def _of_cells(voxels: Flags) -> Evidence:
 
     Parts that are one cell thick have .7 of that thickness: their two sides do not cross.
     """
-    faces, occupied = exposed_faces(voxels), np.argwhere(voxels)
-    cells, axis, sign = faces[:, :3], faces[:, 3], faces[:, 4]
+    sides, occupied = exposed_sides(voxels), np.argwhere(voxels)
+    faces = np.ascontiguousarray(np.argwhere(sides))  # kernels need contiguous arrays
+    axis, sign, cells = faces[:, 0], 2 * faces[:, 1] - 1, faces[:, 2:]
     low, high = occupied.min(0)[axis], occupied.max(0)[axis] + 1
     coordinate = cells[np.arange(len(faces)), axis]
     exact = (high - low == SPAN) & (coordinate == np.where(sign < 0, low, high - 1))
-    single = exposed(voxels, cells, axis, 1) & exposed(voxels, cells, axis, -1)
+    single = (sides[:, 0] & sides[:, 1])[(axis, *cells.T)]
     inset = np.where(exact, 0.0, np.where(single, 0.15, INSET))
     normals = sign[:, None] * np.eye(3)[axis]
     surface = cells + 0.5 - HALF + (0.5 - inset)[:, None] * normals
@@ -191,6 +191,12 @@ def _of_cells(voxels: Flags) -> Evidence:
         surface, normals, np.zeros(count, np.bool_), _reach(CELL_TOLERANCE, count, count), float(count), ~voxels,
         np.zeros((0, 2, 3)),
     )  # fmt: skip
+
+
+def exposed_sides(voxels: Flags) -> Flags:
+    """Whether a cell is touched and its neighbour along an axis, below and above, is not: (3, 2, 32, 32, 32)."""
+    padded, inner = np.pad(voxels, 1), np.s_[1:-1, 1:-1, 1:-1]
+    return np.array([[voxels & ~np.roll(padded, by, axis)[inner] for by in (1, -1)] for axis in range(3)])
 
 
 def _reach(tolerance: float, area: float, count: int = SURFACE) -> float:

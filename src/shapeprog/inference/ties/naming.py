@@ -23,7 +23,7 @@ FURTHER = {
     "clearance": ("outer", "inner"),
     "drop": ("upper", "lower"),
     "bottom": ("lower", "upper"),
-    "offset": ("first", "further"),
+    "offset": ("inner", "outer"),
 }
 """The quantities that measure where a part is, with words for the less and the larger of two of them."""
 

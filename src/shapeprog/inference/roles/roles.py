@@ -88,6 +88,7 @@ CASE: tuple[Rule, ...] = (
     ("door", lambda p: p.front & p.in_front & p.cased & ((p.up >= p.side) | (p.up > 0.5 * p.size[UP]))),
     ("drawer", lambda p: (p.front | p.stacked) & p.in_front & p.cased),
     # Lying boards: the highest is the top, one on the ground the base.
+    ("rail", lambda p: p.plank & p.cased & (p.side < p.size[SIDE] / 3)),
     ("top", lambda p: (p.wide | p.main) & (p.top >= p.floor + p.size[UP] - p.near) & (p.up <= 0.3 * p.size[UP])),
     ("base", lambda p: p.wide & p.flat & (p.grounded | (p.cased & p.lowest))),
     ("base", lambda p: p.wide & p.grounded & (p.up <= 0.2 * p.size[UP])),

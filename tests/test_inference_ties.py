@@ -639,7 +639,7 @@ WHOLE: dict[str, float] = {"width": 20, "depth": 16, "height": 24}
 
 
 def parsed(body: str) -> list[Line]:
-    names = "\n".join(f"{name} = 1" for name in "abcdefghi")
+    names = "\n".join(f"{name} = 1" for name in "abcdefghij")
     source = source_of(sp.parse(f"width, depth, height = 20, 16, 24\n{names}\n{body}"))
     return [line for line in source.lines if isinstance(line, Part | Group)]
 
@@ -668,9 +668,13 @@ stretcher(left=f, right=f, front=g, depth=c, bottom=h, height=1)
 stretcher(left=f, right=f, rear=g, depth=c, bottom=h, height=1)
 shelf(left=d, right=d, bottom=h, height=c)
 post(left=i, width=b, rear=i, depth=b)
+for _ in divide(2, x, front=0, depth=j):
+    door()
+for _ in divide(3, x, rear=0, depth=j):
+    door()
 """)
-    known = WHOLE | {"a": 1, "b": 1.5, "c": 0.8, "d": 0.4, "e": 9, "f": 2, "g": 3, "h": 4, "i": 5}
-    names = naming.named(lines, {name: known[name] for name in "abcdefghi"}, known)
+    known = WHOLE | {"a": 1, "b": 1.5, "c": 0.8, "d": 0.4, "e": 9, "f": 2, "g": 3, "h": 4, "i": 5, "j": 0.6}
+    names = naming.named(lines, {name: known[name] for name in "abcdefghij"}, known)
     assert names == {
         "a": "leg_inset",  # left-right and front-rear
         "b": "leg_width",  # of a square section
@@ -681,6 +685,7 @@ post(left=i, width=b, rear=i, depth=b)
         "g": "stretcher_setback",
         "h": "stretcher_bottom",
         "i": "post_inset",
+        "j": "door_thickness",  # the size of the box that they divide
     }
 
 

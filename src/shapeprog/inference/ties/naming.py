@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 from shapeprog.language.ast import Group, Line, Part, Point, Source
@@ -104,6 +105,9 @@ def _uses(lines: Sequence[Line]) -> Iterator[tuple[Use, Value]]:
         if isinstance(line, Part | Group):
             inner = [each for each in Source((line,)).walk() if isinstance(each, Part)]
             parts = inner if isinstance(line, Group) and line.kind == "inside" else inner[:1]
+            if isinstance(line, Group) and line.kind == "divide":  # its parts have the sides of its box
+                box = tuple(pair for pair in line.keywords if pair[0] in BOX)
+                parts = [replace(part, keywords=(*box, *part.keywords)) for part in parts]
             for key, argument in line.keywords:
                 point, pairs = (key, argument.keywords) if isinstance(argument, Point) else ("", ((key, argument),))
                 for word, value in pairs:

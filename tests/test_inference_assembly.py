@@ -20,7 +20,7 @@ from shapeprog.geometry.batch import Solids
 from shapeprog.inference.assembly import Assembly, assemble
 from shapeprog.inference.candidates.drawings import canonical_side, simplest
 from shapeprog.inference.candidates.loops import images, repeated
-from shapeprog.inference.candidates.moments import distinct, moments
+from shapeprog.inference.candidates.profiles import distinct, profiles
 from shapeprog.inference.choice.coverage import Coverage
 from shapeprog.inference.surface.evidence import evidence_of, evidence_of_program
 from shapeprog.language import Draw, Language, Loop, Program, language, standard, statement, using
@@ -133,13 +133,6 @@ def test_three_copies_are_no_run_of_four():
     assert all(node.count < 4 for node in repeated(copies) if isinstance(node, Loop))
 
 
-def test_mirror_images_are_found_about_any_plane():
-    one = Draw("taper", (-12.0, 1.0, 6.0, 2.0, 2.0, 5.0, 0.5, 1.0))
-    other = Draw("taper", (-12.0, 1.0, -3.0, 2.0, 2.0, -2.0, 0.5, 1.0))
-    (found,) = repeated([one, other])
-    assert found == Loop("mirror", (2.0, 2.0, 1.5), (one,))
-
-
 def test_a_copy_that_is_no_candidate_is_found_on_the_surface():
     surface = evidence_of_program(parse(SPLAYED)).surface
     top, leg = Draw("box", (3, -7, -7, 1, 14, 14)), Draw("bar", (-12, 7, 7, 3, 5, 5, 1.5, 1.5, 0))
@@ -171,17 +164,37 @@ def spokes(count):
 @pytest.mark.parametrize("count", [3, 4, 5, 6])
 def test_legs_around_the_middle_are_turned(count):
     scene, singles = spokes(count)
-    found = [node for node in repeated(singles) if node.name == "rotate" and node.values[0] == count]
+    surface = evidence_of_program(Program(tuple(singles))).surface
+    found = [node for node in images(singles, surface) if node.name == "rotate" and node.values[0] == count]
     assert any(torch.cdist(sp.unroll(Program((node,))).centre, scene.centre).amin(1).max() < 1e-3 for node in found)
 
 
 def test_single_parts_are_turned_whatever_stands_before_them_and_pairs_never():
     _, singles = spokes(3)
-    pairs = [Loop("translate", (2.0, 30.0, 0.0, 0.0), (spoke,)) for spoke in singles]
+    surface = evidence_of_program(Program(tuple(singles))).surface
+    pairs = [Loop("translate", (2.0, 0.01, 0.0, 0.0), (spoke,)) for spoke in singles]
     for nodes in ([*pairs, *singles], [*singles, *pairs]):
-        turned = [node for node in repeated(nodes) if node.name == "rotate"]
+        turned = [node for node in images(nodes, surface) if node.name == "rotate"]
         assert turned
         assert all(isinstance(node.body[0], Draw) for node in turned)
+
+
+STAR = """\
+cylinder(at=(-8, 1.5, 0), height=20, radius=1)
+for i in rotate_about(5, step=72, at=(1.5, 0)):
+    box(at=(-9, 2, -0.5), size=(1, 10, 1))
+"""
+
+
+def test_the_arms_of_a_star_are_turned_about_its_column_though_that_is_not_the_middle():
+    program = parse(STAR)
+    column, star = program.body
+    assert images([column, star.body[0]], evidence_of_program(program).surface) == [star]
+    found = assembled(apart(STAR)).program
+    (arms,) = (node for node in found.body if isinstance(node, Loop))
+    (middle,) = (node.values[1:3] for node in found.body if node.name in ("cylinder", "support_cylinder"))
+    assert arms.values == pytest.approx((5, 72, *middle), abs=0.1)
+    assert found.size == 6
 
 
 def test_a_block_is_written_by_the_plainest_statement_that_draws_it():
@@ -220,9 +233,9 @@ def test_looks_do_not_depend_on_how_a_solid_is_written():
     upright = Draw("box", (-2.0, -1.0, -0.5, 4.0, 2.0, 1.0))
     as_bar = Draw("bar", (-2.0, 0.0, 0.0, 2.0, 0.0, 0.0, 2.0, 1.0, 0.0))
     other_way = Draw("bar", (0.0, -1.0, 0.0, 0.0, 1.0, 0.0, 4.0, 1.0, 0.0))
-    seen = moments([upright, as_bar, other_way])
-    np.testing.assert_allclose(seen.spread[1:], seen.spread[:1].repeat(2, 0), atol=1e-5)
-    np.testing.assert_allclose(seen.skew, 0, atol=1e-5)
+    seen = profiles([upright, as_bar, other_way])
+    np.testing.assert_allclose(seen.half[1:], seen.half[:1].repeat(2, 0), atol=1e-5)
+    np.testing.assert_allclose(seen.distance[1:], seen.distance[:1].repeat(2, 0), atol=1e-5)
     assert distinct([upright, as_bar, as_bar]) == [upright, as_bar]
 
 

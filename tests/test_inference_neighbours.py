@@ -9,7 +9,8 @@ import pytest
 
 from shapeprog.data.placement import shape_from_mesh
 from shapeprog.geometry.mesh import pieces, union_mesh
-from shapeprog.inference.candidates.neighbours import neighbours, rows
+from shapeprog.inference.candidates.loops import rows
+from shapeprog.inference.candidates.neighbours import neighbours
 from shapeprog.inference.choice.choice import choose
 from shapeprog.inference.choice.connecting import connected, floating
 from shapeprog.inference.choice.coverage import Coverage

@@ -15,9 +15,9 @@ import numpy as np
 from shapeprog.data.shape import Shape
 from shapeprog.inference.budget import NEVER, Deadline, Progress
 from shapeprog.inference.candidates.drawings import canonical_side, simplest
-from shapeprog.inference.candidates.loops import images, repeated
-from shapeprog.inference.candidates.moments import distinct
-from shapeprog.inference.candidates.neighbours import neighbours, rows, shorter
+from shapeprog.inference.candidates.loops import images, repeated, rows
+from shapeprog.inference.candidates.neighbours import neighbours, shorter
+from shapeprog.inference.candidates.profiles import distinct
 from shapeprog.inference.candidates.residual import residual_candidates
 from shapeprog.inference.candidates.singles import single_candidates
 from shapeprog.inference.choice.choice import Choice, choose, explained, missed, value
@@ -107,7 +107,8 @@ def _candidates(shape: Shape) -> list[Node]:
     upright = (np.abs(pieces.boxes.rotation).max(1) >= STRAIGHT).all(1)
     components = pieces.boxes.take(upright & (pieces.source == Source.COMPONENT.value))
     boxes = [[Box(*box)] for box in zip(*components, strict=True)]
-    loops = distinct([*repeated(singles, list(rows(boxes))), *images(singles, pieces.cloud.points)])
+    loops = repeated(singles, list(rows(boxes)))
+    loops = distinct([*loops, *images([*singles, *loops], pieces.cloud.points)])
     return [*singles[: MOST_CANDIDATES // 2], *loops][:MOST_CANDIDATES]
 
 

@@ -14,7 +14,7 @@ import numpy as np
 import torch
 
 from shapeprog.inference.candidates.drawings import drawings, hinted, redrawn, solid_boxes
-from shapeprog.inference.candidates.loops import loop_values, mirrors, repeated
+from shapeprog.inference.candidates.loops import mirrors, repeated, rows
 from shapeprog.language.hints import STRAIGHT, Box
 from shapeprog.language.program import Chain, Draw, Loop, Node, Program, nest
 from shapeprog.language.statement import language
@@ -39,12 +39,6 @@ GAP = 1.5
 
 OFF_LEAST, OFF_MOST = 0.02, 2.5
 """Range in cells of the distance from the middle plane of the shape within which a part may be centred."""
-
-OFF_LINE, OFF_SIZE = 0.35, 0.2
-"""Largest deviation in cells of the positions of parts of one row, and of their extents; or a quarter, if more."""
-
-LEAST_ROW, MOST_ROW, PRESENT = 3, 32, 0.75
-"""Fewest and most parts of a row, and the least share of its positions at which a part is present."""
 
 CORNERS = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
 
@@ -92,51 +86,6 @@ def shorter(node: Node) -> Iterator[Node]:
     yield from _unlooped(chain)
     if len(chain) > 2:
         yield from rows([[box] for box in solid_boxes([node])[0]])
-
-
-def rows(blocks: Sequence[Sequence[Box]]) -> Iterator[Node]:
-    """Rows along an axis of boxes of one size that belong to several blocks, such as rungs, slats and shelves."""
-    boxes = [box for parts in blocks for box in parts]
-    owner = np.repeat(np.arange(len(blocks)), [len(parts) for parts in blocks])
-    centre = np.array([box.centre for box in boxes])
-    half = np.array([np.abs(box.rotation) @ box.half for box in boxes])
-    existing: set[tuple[int, ...]] = set()
-    for axis, first in itertools.product(range(3), range(len(boxes))):
-        limit = np.maximum(OFF_SIZE, half[first] / 4)
-        limit[axis] = max(OFF_SIZE / 2, half[first, axis] / 2)
-        similar = (np.abs(half - half[first]) <= limit).all(1)
-        similar &= (np.abs(centre - centre[first])[:, np.arange(3) != axis] <= OFF_LINE).all(1)
-        members = np.flatnonzero(similar)
-        key = (axis, *members.tolist())
-        if len(members) < LEAST_ROW or len(set(owner[members])) < 2 or key in existing:
-            continue
-        existing.add(key)
-        count, start, step = _evenly(centre[members, axis], 2 * float(np.median(half[members, axis])))
-        if not LEAST_ROW <= count <= MOST_ROW:
-            continue
-        middle, size = np.median(centre[members], 0), np.median(half[members], 0)
-        middle[axis] = start
-        loop = Loop("translate", loop_values(count, *(step if k == axis else 0 for k in range(3))), ())
-        yield from (nest((loop, drawing)) for drawing in drawings(Box(middle, np.eye(3), size)))
-
-
-def _evenly(positions: FloatArray, minimum: float) -> tuple[int, float, float]:
-    """Count, start and step of a row of positions (N,) at equal steps of at least ``minimum``; count 0 if none."""
-    positions = np.sort(positions)
-    steps = np.diff(positions)
-    steps = steps[steps >= max(minimum, 1e-3)]  # sheets have no thickness, and may coincide
-    if not len(steps):
-        return 0, 0.0, 0.0
-    first, length = float(positions[0]), float(positions[-1] - positions[0])
-    count = round(length / float(np.median(steps))) + 1
-    step = length / max(count - 1, 1)
-    index = np.round((positions - first) / step)
-    on = np.abs(positions - first - index * step) <= min(OFF_LINE, step / 4)
-    even = on.mean() >= PRESENT and len(set(index[on])) >= PRESENT * count
-    if not even:
-        return 0, 0.0, 0.0
-    step, first = np.polyfit(index[on], positions[on], 1)
-    return count, float(first), float(step)
 
 
 def drawing_of(chain: Chain) -> Draw:

@@ -20,7 +20,7 @@ from shapeprog.inference.choice.choice_kernels import search
 from shapeprog.inference.choice.coverage import CoverageTable
 from shapeprog.space import Array, FloatArray
 
-ROUNDS = 3000
+ROUNDS = 1000
 """Rounds of ruin and recreate."""
 
 RESTARTS = 4
@@ -73,8 +73,8 @@ def choose(
     of a few candidates cannot leave it.  So all points in interiors have a penalty at first.  It falls while the search
     continues from the best set.  The last of several searches starts from ``start``.
     """
-    gains = np.bitwise_count(table.rows[:, : len(table.weights)]) @ np.maximum(table.weights, 0)
-    useful = gains > table.prices
+    gains = np.bitwise_count(table.rows[:, : len(table.weights)]) @ np.maximum(table.weights, 0) - table.prices
+    useful = gains > 0
     useful[list(start)] = True
     index, last = np.flatnonzero(useful), len(table.weights)
     rows = table.rows[np.ix_(index, [*range(last), *(last + index)])]
@@ -83,7 +83,7 @@ def choose(
     bits = np.concatenate([row[row != 0] for row in rows[:, :last]]) if len(rows) else rows.reshape(-1)
     data = (
         rows, interior, hidden, table.weights, words, bits, begins, *_words(interior), table.exposed[index],
-        table.sample_price[index], table.prices[index] + EARLIER * index / len(table.prices),
+        table.sample_price[index], table.prices[index] + EARLIER * index / len(table.prices), gains[index],
     )  # fmt: skip
     penalties = (*INTERIOR, 0.0) if interior.any() else (0.0,)
     searches = len(penalties) * RESTARTS + 1

@@ -13,9 +13,6 @@ RUIN_LEAST, RUIN_MOST = 0.1, 0.6
 THRESHOLD = 0.01
 """How much worse than the incumbent a set may be that takes its place; it falls to zero (Dueck and Scheuer 1990)."""
 
-ROUNDING = 1e-12
-"""How far rounding may take a gain above its upper bound."""
-
 
 @helper
 def gain(
@@ -54,51 +51,26 @@ def include(rows, interior, cover, under, candidate):
         under[word] |= interior[candidate, word]
 
 
-@helper
-def relate(
-    rows, interior, hidden, weights, words, bits, begins, inner, starts, exposed, sample_price, penalty,
-    overlap, slack, candidate,
-):  # fmt: skip
-    """How much the gain of every candidate falls, at least, and rises, at most, when this candidate is selected.
-
-    It falls by the points that both explain, and rises by the free points that both fill, the interior that they
-    share, and the samples of one that the other hides.
-    """
-    last, held = len(weights), interior.shape[1]
-    for other in range(len(exposed)):
-        both, more = 0.0, ROUNDING
-        for index in range(begins[other], begins[other + 1]):
-            word = words[index]
-            cover = rows[candidate, word] | interior[candidate, word] if word < held else rows[candidate, word]
-            common = weights[word] * ones(bits[index] & cover)
-            both += max(common, 0.0)
-            more -= min(common, 0.0)
-        for index in range(starts[other], starts[other + 1]):
-            word = inner[index]
-            more += (1.0 + penalty) * weights[word] * ones(interior[other, word] & interior[candidate, word])
-        more += sample_price[candidate] * ones(exposed[candidate] & hidden[candidate, other])
-        more += sample_price[other] * ones(exposed[other] & rows[candidate, last + other])
-        overlap[candidate, other], slack[candidate, other] = both, more
-
-
 @kernel(
     "void(u8[:, ::1], u8[:, ::1], u8[:, ::1], f8[::1], i8[::1], u8[::1], i8[::1], i8[::1], i8[::1], u8[::1], f8[::1],"
-    " f8[::1], f8, i8, f8, i8, i8[::1], f8[::1], i8[:, ::1])"
+    " f8[::1], f8[::1], f8, i8, f8, i8, i8[::1], f8[::1], i8[:, ::1])"
 )
 def search(
-    rows, interior, hidden, weights, words, bits, begins, inner, starts, exposed, sample_price, prices, penalty,
-    rounds, blink, seed, initial_set, values, sets,
+    rows, interior, hidden, weights, words, bits, begins, inner, starts, exposed, sample_price, prices, gains,
+    penalty, rounds, blink, seed, initial_set, values, sets,
 ):  # fmt: skip
     """Ruin and recreate: drop some of the selected, refill greedily, accept a set that is no worse; best of each size.
 
-    The greedy step computes few gains: an upper bound of a gain is one computed earlier in the round, less the largest
-    overlap with a candidate selected since then, plus all that those may add.  With probability ``blink`` it overlooks
-    a candidate (Christiaens and Vanden Berghe 2020).
+    The greedy step is lazy (Minoux 1978): a gain computed earlier in the round bounds the present one, nearly, as gains
+    rise only where a selected candidate hides samples or fills free space.  With probability ``blink`` it overlooks a
+    candidate (Christiaens and Vanden Berghe 2020).
 
     Parameters
     ----------
     rows, interior, weights, exposed, sample_price, prices
         See ``CoverageTable``.
+    gains
+        Upper bounds (C,) of the gain of each candidate: what it explains, less the price of its text.
     hidden
         The last columns of ``rows``, transposed: the samples of each candidate (C, C) that every other hides.
     words, bits, begins
@@ -118,18 +90,9 @@ def search(
     max_size, total = sets.shape[1], len(exposed)
     cover, under = np.empty(rows.shape[1], np.uint64), np.empty(interior.shape[1], np.uint64)
     incumbent, selected = np.empty(max_size, np.int64), np.empty(max_size, np.int64)
-    alone, base, less, more = np.empty(total), np.empty(total), np.empty(total), np.empty(total)
-    known, overlap, slack = np.empty(total, np.bool_), np.empty((total, total)), np.empty((total, total))
+    bound = np.empty(total)
     size, best_value, draws = len(initial_set), 0.0, 0
     copy(initial_set, size, incumbent)
-    cover[:] = np.uint64(0)
-    under[:] = np.uint64(0)
-    known[:] = False
-    for candidate in range(total):
-        alone[candidate] = gain(
-            rows, interior, hidden, weights, words, bits, begins, inner, starts, exposed, sample_price, prices, penalty,
-            cover, under, selected, 0, candidate,
-        )  # fmt: skip
     for turn in range(rounds + 1):
         share = RUIN_LEAST + (RUIN_MOST - RUIN_LEAST) * uniform(seed, draws)
         dropped = int(uniform(seed, draws + 1) * size)
@@ -137,9 +100,7 @@ def search(
         count, step, value = 0, 0, 0.0
         cover[:] = np.uint64(0)
         under[:] = np.uint64(0)
-        copy(alone, total, base)
-        less[:] = 0.0
-        more[:] = 0.0
+        copy(gains, total, bound)
         while True:
             best, best_candidate, trial = 0.0, -1, -1
             if step < size:  # one of the incumbent that is not dropped
@@ -156,38 +117,30 @@ def search(
                 if value > values[count]:
                     values[count] = value
                     copy(selected, count, sets[count])
-                if count == max_size:
+                if count == min(max_size, total):
                     break
-                first, upper = 0, 0.0
-                for candidate in range(total):  # the largest bound first: with its gain, most others are no better
-                    if base[candidate] - less[candidate] + more[candidate] > upper:
-                        first, upper = candidate, base[candidate] - less[candidate] + more[candidate]
-                while trial < total and upper > 0:
+                first = int(np.argmax(bound))  # the largest bound first: with its gain, most others are no better
+                while trial < total:
                     candidate = first if trial < 0 else trial
                     trial += 1
-                    if base[candidate] - less[candidate] + more[candidate] <= best:
+                    if bound[candidate] <= best:
                         continue
                     if turn > 0 and uniform(seed, draws + candidate) < blink:
                         continue
-                    base[candidate], less[candidate], more[candidate] = gain(
+                    bound[candidate] = gain(
                         rows, interior, hidden, weights, words, bits, begins, inner, starts, exposed, sample_price,
                         prices, penalty, cover, under, selected, count, candidate,
-                    ), 0.0, ROUNDING  # fmt: skip
-                    if base[candidate] > best:
-                        best, best_candidate = base[candidate], candidate
+                    )  # fmt: skip
+                    if bound[candidate] > best:
+                        best, best_candidate = bound[candidate], candidate
                 draws += total
                 if best_candidate < 0:
                     break
             value += best
-            if not known[best_candidate]:
-                known[best_candidate] = True
-                relate(
-                    rows, interior, hidden, weights, words, bits, begins, inner, starts, exposed, sample_price, penalty,
-                    overlap, slack, best_candidate,
-                )  # fmt: skip
-            for candidate in range(total):
-                less[candidate] = max(less[candidate], overlap[best_candidate, candidate])
-                more[candidate] += slack[best_candidate, candidate]
+            for candidate in range(total):  # samples of the one that the other hides are charged no longer
+                bound[candidate] += sample_price[best_candidate] * ones(
+                    exposed[best_candidate] & hidden[best_candidate, candidate]
+                )
             include(rows, interior, cover, under, best_candidate)
             selected[count] = best_candidate
             count += 1

@@ -217,7 +217,7 @@ def centred(scene: Scene, candidates: Sequence[Program]) -> npt.NDArray[np.int64
     count = np.zeros(len(candidates), np.int64)
     for axis in (SIDE, DEPTH):
         around = [
-            any(mirrors(node, axis) or node.name == "rotate" for node in program.walk()) for program in candidates
+            any(mirrors(n, axis) or n.name.startswith("rotate") for n in program.walk()) for program in candidates
         ]
         count += (np.abs(middle[:, axis]) < CENTRED) & ~np.array(around, np.bool_)
     return count

@@ -52,8 +52,9 @@ class Poses(NamedTuple):
 class Tunable:
     """The numbers of a program that may move, as a vector (F,), and the way from such a vector to its primitives.
 
-    Counts, turns and axes stay, and so do exact zeros of a shift or of the plane of a mirror: the loop along
-    an axis keeps to it, the symmetric object stays symmetric.  A loop around several statements has its numbers once.
+    Counts, turns and axes stay, and so do steps of a full turn and exact zeros of a shift or of the plane of a mirror:
+    the loop along an axis keeps to it, the symmetric object stays symmetric.  A loop around several statements has its
+    numbers once.
 
     Attributes
     ----------
@@ -152,7 +153,8 @@ def _moving(node: Node) -> Iterator[int]:
     """The slots of a node that may move."""
     declared = language()[node.name]
     for slot, quantity in enumerate(declared.quantities):
-        fixed = declared.is_loop and node.values[slot] == 0
+        even = quantity.kind == "angle" and abs(node.values[slot] * node.values[0] - 360) < 0.01
+        fixed = declared.is_loop and (node.values[slot] == 0 or even)
         if not quantity.discrete and not fixed:
             yield slot
 

@@ -52,72 +52,41 @@ def volume(points, count, frame, floor, low, high):
 
 
 @helper
-def sort(flat, count, order):
-    """Write the order of points in the plane along a direction that no edges of furniture are square to."""
-    for k in range(count):
-        key, at = flat[k, 0] * 0.7648 + flat[k, 1] * 0.6442, k
-        while at > 0 and flat[order[at - 1], 0] * 0.7648 + flat[order[at - 1], 1] * 0.6442 > key:
-            order[at] = order[at - 1]
-            at -= 1
-        order[at] = k
-
-
-@helper
-def hull(flat, order, count, outline):
-    """Write the corners of the convex hull of points in the plane, anticlockwise; their number is returned.
-
-    Andrew's monotone chain, along the order given.
-    """
-    corners = 0
-    for way in range(2):
-        minimum = corners + 1
-        for step in range(count):
-            k = order[step] if way == 0 else order[count - 1 - step]
-            while corners > minimum:
-                a, b = outline[corners - 2], outline[corners - 1]
-                turn = (flat[b, 0] - flat[a, 0]) * (flat[k, 1] - flat[a, 1])
-                turn -= (flat[b, 1] - flat[a, 1]) * (flat[k, 0] - flat[a, 0])
-                if turn > 0:
-                    break
-                corners -= 1
-            outline[corners] = k
-            corners += 1
-        corners -= 1
-    return max(corners, 1)
-
-
-@helper
-def turn_about(points, count, frame, axis, floor, flat, order, outline):
+def turn_about(points, count, frame, axis, floor, flat):
     """Turn a frame about one of its columns so that the rectangle about the first points, seen along it, is smallest.
 
-    One of its sides lies on an edge of the convex hull (Freeman and Shapira 1975).
+    One of its sides lies on an edge of the convex hull (Freeman and Shapira 1975), along which it is wrapped (Jarvis
+    1973).
     """
     first, second = (axis + 1) % 3, (axis + 2) % 3
+    start = 0
     for k in range(count):
         for side in range(2):
             at = first if side == 0 else second
             flat[k, side] = points[k, 0] * frame[0, at] + points[k, 1] * frame[1, at] + points[k, 2] * frame[2, at]
-    sort(flat, count, order)
-    corners = hull(flat, order, count, outline)
-    best, cosine, sine = np.inf, 1.0, 0.0
-    for k in range(corners + 1):
-        x, y = 1.0, 0.0  # the first candidate is the frame itself
-        if k > 0:
-            a, b = outline[k - 1], outline[k % corners]
-            x, y = flat[b, 0] - flat[a, 0], flat[b, 1] - flat[a, 1]
-            length = np.sqrt(x * x + y * y)
-            if length < 1e-9:
-                continue
-            x, y = x / length, y / length
+        # a corner: no edges of furniture are square to this direction
+        if 0.7648 * (flat[k, 0] - flat[start, 0]) + 0.6442 * (flat[k, 1] - flat[start, 1]) < 0:
+            start = k
+    best, cosine, sine, corner = np.inf, 1.0, 0.0, start
+    x, y = 1.0, 0.0  # the first candidate is the frame itself
+    for step in range(count + 1):
         low0, high0, low1, high1 = np.inf, -np.inf, np.inf, -np.inf
-        for m in range(corners):
-            c = outline[m]
-            along, across = flat[c, 0] * x + flat[c, 1] * y, flat[c, 1] * x - flat[c, 0] * y
+        after, u, v = -1, 0.0, 0.0
+        for k in range(count):
+            along, across = flat[k, 0] * x + flat[k, 1] * y, flat[k, 1] * x - flat[k, 0] * y
             low0, high0 = min(low0, along), max(high0, along)
             low1, high1 = min(low1, across), max(high1, across)
+            p, q = flat[k, 0] - flat[corner, 0], flat[k, 1] - flat[corner, 1]
+            square, turn = p * p + q * q, u * q - v * p
+            if square > 1e-18 and (after < 0 or turn < 0 or (turn == 0 and square > u * u + v * v)):
+                after, u, v = k, p, q
         area = max(high0 - low0, floor) * max(high1 - low1, floor)
         if area < best * (1 - 1e-6):
             best, cosine, sine = area, x, y
+        if after < 0 or (step > 0 and corner == start):
+            break
+        length = np.sqrt(u * u + v * v)
+        x, y, corner = u / length, v / length, after
     if abs(sine) > abs(cosine):  # the same rectangle, turned by less
         cosine, sine = (sine, -cosine) if sine > 0 else (-sine, cosine)
     if cosine < 0:
@@ -128,13 +97,13 @@ def turn_about(points, count, frame, axis, floor, flat, order, outline):
 
 
 @helper
-def settle(points, count, frame, floor, flat, order, outline, low, high):
+def settle(points, count, frame, floor, flat, low, high):
     """Turn a frame about its axes in turn while the box becomes smaller; its volume is returned."""
     best = volume(points, count, frame, floor, low, high)
     for _ in range(SWEEPS):
         before = best
         for axis in range(3):
-            turn_about(points, count, frame, axis, floor, flat, order, outline)
+            turn_about(points, count, frame, axis, floor, flat)
         best = volume(points, count, frame, floor, low, high)
         if best > before * 0.999:
             break
@@ -184,7 +153,6 @@ def box_each(points, start, directions, frames, kind, floor, centre, rotation, h
         Output (G, 3), (G, 3, 3) with axes as columns, and (G, 3).
     """
     selected, flat = np.empty((MANY, 3)), np.empty((MANY, 2))
-    order, outline = np.empty(MANY, np.int64), np.empty(2 * MANY + 2, np.int64)
     low, high = np.empty(3), np.empty(3)
     world, frame, trial = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
     for row in range(3):
@@ -201,7 +169,7 @@ def box_each(points, start, directions, frames, kind, floor, centre, rotation, h
         plain = True
         for axis in range(2 if flattened else 0, 3):
             copy(start_frame, trial)
-            turn_about(selected, count, trial, axis, floor, flat, order, outline)
+            turn_about(selected, count, trial, axis, floor, flat)
             size = volume(selected, count, trial, floor, low, high)
             if size < best:
                 best, plain = size, False
@@ -211,7 +179,7 @@ def box_each(points, start, directions, frames, kind, floor, centre, rotation, h
             free = False
             for way in range(2):
                 copy(frame if way == 0 else frames[g], trial)
-                size = settle(selected, count, trial, floor, flat, order, outline, low, high)
+                size = settle(selected, count, trial, floor, flat, low, high)
                 if size < best:
                     best, free = size, True
                     copy(trial, rotation[g])
@@ -219,7 +187,7 @@ def box_each(points, start, directions, frames, kind, floor, centre, rotation, h
                 copy(rotation[g], frame)
                 if kind[g] == ROD:
                     copy(frames[g], trial)
-                    turn_about(selected, count, trial, 0, floor, flat, order, outline)
+                    turn_about(selected, count, trial, 0, floor, flat)
                     if volume(selected, count, trial, floor, low, high) < SLACK * best:
                         copy(trial, frame)
         extents(points, first, last, frame, low, high)

@@ -9,15 +9,13 @@ from typing import Any
 import numpy as np
 
 from shapeprog.language.ast import Assignment, Call, Draw, Loop, Scale, Source, assignments, used_names
+from shapeprog.language.convert.forms import EVEN
 from shapeprog.language.dimensions import counted_names, in_unit
 from shapeprog.language.evaluate import symbolic
 from shapeprog.language.expression import Expression, Linear, Name, combined
 from shapeprog.language.placement import BOX_IN_CELLS, SIZES
 from shapeprog.language.printer import source_of
 from shapeprog.language.program import Node, Program
-
-EVEN = 1e-4
-"""Degrees by which the copies of a rotation may miss a full circle."""
 
 
 def in_cells(program: Program) -> Program:

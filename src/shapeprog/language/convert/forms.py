@@ -11,6 +11,7 @@ from shapeprog.language.parameters import shortest, to_float32
 from shapeprog.language.placement import AXES
 
 NOTHING = 2e-6  # cells; a length up to this is none
+EVEN = 1e-4  # degrees by which the copies of a rotation may miss a full circle
 
 Triple: TypeAlias = tuple[Linear, Linear, Linear]
 """Along x, y and z, measured from the middle of the whole."""

@@ -8,7 +8,7 @@ from dataclasses import replace
 from shapeprog.errors import ShapeProgError
 from shapeprog.language.ast import Call, Draw, Function, Group, Keywords, Line, Loop, Part, Point, Source
 from shapeprog.language.builtin import CELL_CENTRE
-from shapeprog.language.convert.forms import NOTHING, Span, cost
+from shapeprog.language.convert.forms import EVEN, NOTHING, Span, cost
 from shapeprog.language.convert.parts import Converted, Parts, from_corner, ordered
 from shapeprog.language.expression import Binary, Expression, Linear, Value
 from shapeprog.language.merging import separate_loops
@@ -71,7 +71,8 @@ class Loops(Parts):
                 return self._tilted(body, v)
             case "rotate_about":
                 point = self.point((-v[3], v[2], self.sizes[2] / -2.0)).keywords
-                keywords = (*point, ("step", self.written(v[1])))
+                full = not (v[0].factors or v[1].factors) and abs(v[0].constant * v[1].constant - 360) < EVEN
+                keywords = point if full else (*point, ("step", self.written(v[1])))
                 return Converted((Group("rotate", keywords, body.lines, self.written(v[0])),))
         raise ShapeProgError(f"{line.name} has no placed form", "keep this program as statements in cells")
 

@@ -102,8 +102,8 @@ def _translated(node: Node, count: int, step: FloatArray) -> Loop:
     return Loop("translate", loop_values(count, *step.tolist()), (node,))
 
 
-def equal_steps(positions: FloatArray, half: FloatArray) -> list[list[int]]:
-    """Runs of positions (N, 3) at equal steps, as indices, upwards or to the rear or to the left.
+def equal_steps(positions: FloatArray, half: FloatArray, least: int = 2) -> list[list[int]]:
+    """Runs of at least so many positions (N, 3) at equal steps, as indices, upwards or to the rear or to the left.
 
     A copy may be missing, as ``MISSING``, if most are present: the copy that fills the gap has no support, which lowers
     its score.  ``half`` (3,) are the half extents of a copy.
@@ -116,28 +116,29 @@ def equal_steps(positions: FloatArray, half: FloatArray) -> list[list[int]]:
         index = tree.query(targets, p=np.inf, distance_upper_bound=STRAY)[1]
         return np.where(index < count, index, MISSING)
 
-    def followed(run: list[int], gaps: int) -> list[int]:
-        """The run extended by all copies that follow at the same step, over gaps of so many missing copies."""
-        while True:
-            step = (positions[run[-1]] - positions[run[0]]) / (len(run) - 1)
-            ahead = nearest(positions[run[-1]] + np.arange(1, gaps + 2)[:, None] * step)
-            gap = int((ahead >= 0).argmax())
-            if ahead[gap] < 0 or ahead[gap] in run:
-                return run
-            run = [*run, *[MISSING] * gap, int(ahead[gap])]
-
     far = (np.abs(steps) > np.maximum(APART * half, LEAST_STEP)).any(-1)
-    first = far & (nearest(positions[:, None] - steps) < 0)
-    onwards = (nearest(positions[None] + steps) >= 0) | (nearest(positions[None] + 2 * steps) >= 0)
+    first, second = np.nonzero(far & (nearest(positions[:, None] - steps) < 0))
+    step = steps[first, second]
+    forwards = np.sign(np.where(np.abs(step) < CENTRED, 0, step)) @ [9, 3, 1] > 0
+    onwards = (nearest(positions[second] + step * np.array([[[1]], [[2]]])) >= 0).any(0)
     runs: dict[tuple[int, ...], None] = {}
-    for a, b in np.argwhere(first).tolist():
-        for gaps in (0, 1) if onwards[a, b] else (0,):
-            run = followed([a, b], gaps) if onwards[a, b] else [a, b]
-            present = len(run) - run.count(MISSING)
-            if present == len(run) or present >= max(LEAST_PRESENT, PRESENT * len(run)):
-                signs = np.sign(np.where(np.abs(steps[a, b]) < CENTRED, 0, steps[a, b]))
-                runs[tuple(run if signs @ [9, 3, 1] > 0 else run[::-1])] = None
-    return [list(run) for run in runs]
+    for gaps in (0, 1):  # missing copies at once
+        run, last, end, going = [first, second], second.copy(), np.ones(len(second), np.int64), onwards.copy()
+        while going.any():
+            start, copy = positions[first[going]], len(run)
+            present = np.full(len(first), MISSING)
+            present[going] = nearest(start + copy * (positions[last[going]] - start) / end[going, None])
+            present[present == last] = MISSING
+            run.append(present)
+            last, end = np.where(present >= 0, present, last), np.where(present >= 0, copy, end)
+            going &= copy - end <= gaps
+        members = np.stack(run, 1)
+        number = (members >= 0).sum(1)
+        kept = forwards if gaps == 0 else (number <= end) & (number >= np.maximum(LEAST_PRESENT, PRESENT * (end + 1)))
+        for k in np.flatnonzero(kept & (end + 1 >= least)):
+            row = members[k, : end[k] + 1]
+            runs[tuple((row if forwards[k] else row[::-1]).tolist())] = None
+    return [list(row) for row in runs]
 
 
 def rows(blocks: Sequence[Sequence[Box]]) -> Iterator[Node]:
@@ -160,8 +161,8 @@ def rows(blocks: Sequence[Sequence[Box]]) -> Iterator[Node]:
         existing.add(key)
         middle, size = np.median(centre[members], 0), np.maximum(np.median(half[members], 0), THINNEST / 2)
         positions = np.where(across, middle, centre[members])
-        run = max(equal_steps(positions, size * ~across), key=len, default=[])
-        if LEAST_ROW <= len(run) <= MOST_ROW:
+        run = max(equal_steps(positions, size * ~across, LEAST_ROW), key=len, default=[])
+        if 0 < len(run) <= MOST_ROW:
             start, end = positions[run[0]], positions[run[-1]]
             for drawing in drawings(Box(start, np.eye(3), size)):
                 yield _translated(drawing, len(run), (end - start) / (len(run) - 1))

@@ -53,7 +53,7 @@ def join(parts: list[Boxes]) -> Boxes:
     return Boxes(*(np.concatenate(column) for column in zip(empty, *parts, strict=True)))
 
 
-def boxes_around(points: Array, start: Array) -> Boxes:
+def boxes_around(points: Array, start: Array, frames: FloatArray | None = None, floor: float = THIN) -> Boxes:
     """A small box around each run of points, along the world's axes or turned about one of them where that is small.
 
     Parameters
@@ -62,27 +62,23 @@ def boxes_around(points: Array, start: Array) -> Boxes:
         Points (P, 3), in cells.
     start
         Bounds (G + 1,) of the runs, none of them empty.
+    frames
+        Frames (G, 3, 3) about whose last axis the boxes are turned instead.
+    floor
+        Shorter sides count as so long in the selection of directions.
     """
-    points = np.ascontiguousarray(points, np.float64)
-    start = np.ascontiguousarray(start, np.int64)
+    points, start = np.ascontiguousarray(points, np.float64), np.ascontiguousarray(start, np.int64)
     runs = len(start) - 1
     boxes = Boxes(np.zeros((runs, 3)), np.zeros((runs, 3, 3)), np.zeros((runs, 3)))
-    if runs:
-        spread, axes = principal_axes(points, start)
+    if not runs:
+        return boxes
+    if frames is None:
+        spread, frames = principal_axes(points, start)
         rod = (spread[:, 0] > SLENDER * spread[:, 1]) & (spread[:, 2] > EVEN * spread[:, 1])
-        box_each(points, start, sphere(), axes, np.where(rod, ROD, COMPACT), THIN, *boxes)
-    return boxes
-
-
-def rectangles_around(points: FloatArray, start: Array, frames: FloatArray, floor: float) -> Boxes:
-    """Boxes around runs of points whose last axis is that of a frame (G, 3, 3), turned about it where that is smaller.
-
-    Shorter sides count as ``floor``.
-    """
-    runs = len(start) - 1
-    boxes = Boxes(np.zeros((runs, 3)), np.zeros((runs, 3, 3)), np.zeros((runs, 3)))
-    if runs:
-        box_each(points, start, sphere(), np.ascontiguousarray(frames), np.full(runs, FLAT), floor, *boxes)
+        kind = np.where(rod, ROD, COMPACT)
+    else:
+        kind = np.full(runs, FLAT)
+    box_each(points, start, sphere(), np.ascontiguousarray(frames), kind, floor, *boxes)
     return boxes
 
 

@@ -1,14 +1,14 @@
-"""Planar patches of points with normals, as rectangles."""
+"""Planar patches of points with normals, as rectangles: boxes without thickness, whose last axis is the normal."""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Iterator
 
 import numpy as np
 import numpy.typing as npt
 from scipy.ndimage import label as label_regions
 
-from shapeprog.inference.pieces.oriented import bounds, rectangles_around
+from shapeprog.inference.pieces.oriented import Boxes, bounds, boxes_around, join, principal_axes
 from shapeprog.inference.pieces.patch_kernels import grow_patches
 from shapeprog.inference.surface.cloud import NOISY, Cloud, tolerance
 from shapeprog.space import Array, FloatArray
@@ -32,15 +32,7 @@ MOST = 160
 """Largest number of patches."""
 
 
-class Patches(NamedTuple):
-    """Rectangles: centres (P, 3), frames (P, 3, 3) whose last column is the normal, half sides (P, 2)."""
-
-    centre: FloatArray
-    frame: FloatArray
-    half: FloatArray
-
-
-def planar_patches(cloud: Cloud) -> Patches:
+def planar_patches(cloud: Cloud) -> Boxes:
     """The planar patches of a surface and the bars that they consist of, largest first."""
     order = np.argsort(flatness(cloud), kind="stable")
     label = np.empty(len(cloud.points), np.int64)
@@ -52,7 +44,7 @@ def planar_patches(cloud: Cloud) -> Patches:
     first = np.searchsorted(label[sequence], np.arange(count + 1))
     members = [sequence[first[k] : first[k + 1]] for k in largest]
     patches = rectangles(cloud, members)
-    return bars(cloud, members, patches)
+    return join([patches, *bars(cloud, members, patches)])
 
 
 def flatness(cloud: Cloud) -> FloatArray:
@@ -61,19 +53,14 @@ def flatness(cloud: Cloud) -> FloatArray:
     return np.round(1 - facing.mean(1), 6)
 
 
-def rectangles(cloud: Cloud, members: list[npt.NDArray[np.int64]]) -> Patches:
+def rectangles(cloud: Cloud, members: list[npt.NDArray[np.int64]]) -> Boxes:
     """The rectangle around each planar set of points, along the world's axes where these are near."""
-    count = np.array([len(patch) for patch in members], np.int64)
-    if not len(count):
-        return Patches(np.zeros((0, 3)), np.zeros((0, 3, 3)), np.zeros((0, 2)))
-    start = bounds(members)
-    points = cloud.points[np.concatenate(members)]
-    mean = np.add.reduceat(points, start[:-1]) / count[:, None]
-    off = points - np.repeat(mean, count, axis=0)
-    moments = np.add.reduceat(off[:, :, None] * off[:, None], start[:-1])
-    normal = np.linalg.eigh(moments)[1][:, :, 0]
-    boxes = rectangles_around(points, start, upright(normal), 2 * cloud.spacing)
-    return Patches(boxes.centre, boxes.rotation, boxes.half[:, :2] + cloud.spacing / 4)
+    if not members:
+        return join([])
+    start, points = bounds(members), cloud.points[np.concatenate(members)]
+    normal = principal_axes(points, start)[1][:, :, 2]
+    boxes = boxes_around(points, start, upright(normal), 2 * cloud.spacing)
+    return boxes._replace(half=(boxes.half + cloud.spacing / 4) * [1, 1, 0])
 
 
 def upright(normal: FloatArray) -> FloatArray:
@@ -88,24 +75,21 @@ def upright(normal: FloatArray) -> FloatArray:
     return np.stack([across, np.cross(normal, across), normal], 2)
 
 
-def bars(cloud: Cloud, members: list[npt.NDArray[np.int64]], patches: Patches) -> Patches:
-    """The rectangles, and those of the bars in patches with a low fill, such as frames."""
-    centre, frame, half = list(patches.centre), list(patches.frame), list(patches.half)
+def bars(cloud: Cloud, members: list[npt.NDArray[np.int64]], patches: Boxes) -> Iterator[Boxes]:
+    """The rectangles of the bars in patches with a low fill, such as frames."""
     side = 1.8 * cloud.spacing
     for indices, middle, axes, reach in zip(members, *patches, strict=True):
-        flat = (cloud.points[indices] - middle) @ axes[:, :2] + reach
-        shape = np.maximum(np.ceil(2 * reach / side).astype(int), 1)
+        flat = (cloud.points[indices] - middle) @ axes[:, :2] + reach[:2]
+        shape = np.maximum(np.ceil(2 * reach[:2] / side).astype(int), 1)
         grid = np.zeros(shape, np.bool_)
-        at = np.minimum((flat / (2 * reach) * shape).astype(int), shape - 1)
+        at = np.minimum((flat / (2 * reach[:2]) * shape).astype(int), shape - 1)
         grid[at[:, 0], at[:, 1]] = True
         if grid.mean() > FULL or shape.max() < 6:
             continue
         for low, high in bars_of(grid):
-            ends = np.stack([low, high]) / shape * 2 * reach - reach
-            centre.append(middle + axes[:, :2] @ ends.mean(0))
-            frame.append(axes)
-            half.append((ends[1] - ends[0]) / 2)
-    return Patches(np.array(centre).reshape(-1, 3), np.array(frame).reshape(-1, 3, 3), np.array(half).reshape(-1, 2))
+            ends = np.stack([low, high]) / shape * 2 * reach[:2] - reach[:2]
+            centre, half = middle + axes[:, :2] @ ends.mean(0), np.append((ends[1] - ends[0]) / 2, 0)
+            yield Boxes(centre[None], axes[None], half[None])
 
 
 def bars_of(grid: npt.NDArray[np.bool_]) -> list[tuple[Array, Array]]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from shapeprog.inference.pieces.oriented import Boxes
-from shapeprog.inference.pieces.patches import Patches
 from shapeprog.space import SPAN, Array, FloatArray
 
 PARALLEL = 8.0
@@ -21,19 +20,20 @@ STRETCH = 1.6
 """Largest thickness of a pair as a multiple of the middle side of its box: above, other faces describe it better."""
 
 
-def slabs(patches: Patches) -> Boxes:
+def slabs(patches: Boxes) -> Boxes:
     """Boxes between pairs of patches: intersection and bounds of both rectangles, and each of them."""
-    normal = patches.frame[:, :, 2]
+    normal = patches.rotation[:, :, 2]
     distance = np.einsum("ijk,ik->ij", patches.centre[None] - patches.centre[:, None], normal)
     parallel = np.abs(normal @ normal.T) > np.cos(np.radians(PARALLEL))
-    larger = patches.half.prod(1)[:, None] >= patches.half.prod(1)[None]
+    area = patches.half[:, :2].prod(1)
+    larger = area[:, None] >= area
     thick = np.abs(distance)
     i, j = np.nonzero(parallel & larger & (thick >= THICKNESS[0]) & (thick <= THICKNESS[1]))
     i, j = i[i != j], j[i != j]
-    corner = corners(patches)[j] - patches.centre[i][:, None]
-    flat = np.einsum("nck,nka->nca", corner, patches.frame[i][:, :, :2])
+    corner = patches.corners()[j] - patches.centre[i][:, None]
+    flat = np.einsum("nck,nka->nca", corner, patches.rotation[i][:, :, :2])
     low, high = flat.min(1), flat.max(1)
-    half = patches.half[i]
+    half = patches.half[i, :2]
     inner = np.maximum(low, -half), np.minimum(high, half)
     shared = np.maximum(inner[1] - inner[0], 0).prod(1)
     keep = shared >= SHARED * np.minimum(4 * half.prod(1), (high - low).prod(1))
@@ -47,25 +47,17 @@ def slabs(patches: Patches) -> Boxes:
     return _between(patches, i, distance[i, j], spans)
 
 
-def sheets(patches: Patches, count: int) -> Boxes:
+def sheets(patches: Boxes, count: int) -> Boxes:
     """Thin boxes about the largest patches."""
-    first = np.argsort(-np.round(patches.half.prod(1), 6), kind="stable")[:count]
-    half = np.concatenate([patches.half[first], np.full((len(first), 1), THICKNESS[0] / 2)], 1)
-    return Boxes(patches.centre[first], patches.frame[first], half)
+    largest = patches.take(np.argsort(-np.round(patches.half[:, :2].prod(1), 6), kind="stable")[:count])
+    return largest._replace(half=np.maximum(largest.half, [0, 0, THICKNESS[0] / 2]))
 
 
-def corners(patches: Patches) -> FloatArray:
-    """The corners (P, 4, 3) of the rectangles."""
-    signs = np.array([[-1, -1], [-1, 1], [1, -1], [1, 1]], np.float64)
-    offset = np.einsum("pka,pca->pck", patches.frame[:, :, :2], signs * patches.half[:, None])
-    return patches.centre[:, None] + offset
-
-
-def _between(patches: Patches, i: Array, depth: FloatArray, spans: list[tuple[FloatArray, FloatArray]]) -> Boxes:
+def _between(patches: Boxes, i: Array, depth: FloatArray, spans: list[tuple[FloatArray, FloatArray]]) -> Boxes:
     """Boxes over spans (n, 2) in the planes of patches ``i``, as deep as the distance along their normals."""
     middle = np.concatenate([(low + high) / 2 for low, high in spans])
     half = np.concatenate([(high - low) / 2 for low, high in spans])
-    frame, deep = np.tile(patches.frame[i], (len(spans), 1, 1)), np.tile(depth, len(spans))
+    frame, deep = np.tile(patches.rotation[i], (len(spans), 1, 1)), np.tile(depth, len(spans))
     local = np.concatenate([middle, deep[:, None] / 2], 1)
     centre = np.tile(patches.centre[i], (len(spans), 1)) + np.einsum("nij,nj->ni", frame, local)
     box = Boxes(centre, frame, np.concatenate([half, np.abs(deep)[:, None] / 2], 1))

@@ -7,12 +7,15 @@ import numpy.typing as npt
 
 from shapeprog.inference.pieces.oriented import Boxes, join
 from shapeprog.inference.pieces.patches import upright
-from shapeprog.inference.pieces.rod_kernels import mark_rod, try_rods
+from shapeprog.inference.pieces.rod_kernels import count_rods, mark_rod
 from shapeprog.inference.surface.cloud import NOISY, Cloud, tolerance
 from shapeprog.space import Array, FloatArray
 
 TRIALS, STEPS = 1200, 8
 """Pairs of points tried, and the longest walk from one to the other."""
+
+PARALLEL = 0.8
+"""Cosine above which the normals of a pair do not determine an axis."""
 
 LARGEST = 5.0
 """Largest radius in cells."""
@@ -32,43 +35,83 @@ MOST = 60
 
 def rods(cloud: Cloud, seed: int = 0) -> Boxes:
     """Boxes around round rods, best first; the first axis is that of the rod."""
-    draws = np.random.default_rng(seed).integers(1 << 32, size=(TRIALS, STEPS))
     off, facing = tolerance(cloud), 0.85 if cloud.noise > NOISY else 0.94
-    tried = np.zeros((TRIALS, 10))
-    try_rods(cloud.points, cloud.normals, cloud.neighbours, draws, off, facing, LARGEST, tried)
-    support, radius, length = tried[:, 0], tried[:, 7], 2 * tried[:, 8]
-    expected = 2 * np.pi * radius * length * tried[:, 9] / cloud.spacing**2
-    good = (support >= LEAST) & (tried[:, 9] >= ROUND) & (length > 2 * radius) & (support > DENSE * expected)
-    order = np.flatnonzero(good)[np.argsort(-support[good], kind="stable")]
+    centre, axis, radius = through_pairs(cloud, off, seed)
+    counts = np.zeros((len(radius), 4))
+    count_rods(cloud.points, cloud.normals, centre, _frames(axis), radius, off, facing, counts)
+    support, start, end, share = counts.T
+    length = end - start
+    good = (support >= LEAST) & (share >= ROUND) & (length > 2 * radius)
+    good &= support > DENSE * 2 * np.pi * radius * length * share / cloud.spacing**2
+    centre = centre + axis * ((start + end) / 2)[:, None]
     used = np.zeros(len(cloud.points), np.bool_)
     result: list[Boxes] = []
-    for row in tried[order]:
+    for k in np.flatnonzero(good)[np.argsort(-support[good], kind="stable")]:
         if len(result) == MOST:
             break
-        middle, axis, width, half = row[1:4], row[4:7], float(row[7]), float(row[8])
-        inside = on_rod(cloud, middle, axis, width, half, off, facing)
+        rod = centre[k], axis[k], float(radius[k]), float(length[k]) / 2
+        inside = on_rod(cloud, *rod, off, facing)
         if len(inside) < LEAST or used[inside].mean() > 0.5:
             continue
         for _ in range(2):
-            middle, axis, width, half = fitted(cloud, inside, axis)
-            inside = on_rod(cloud, middle, axis, width, half + 0.5, off, facing)
+            middle, along, width, half = fitted(cloud, inside, rod[1])
+            inside = on_rod(cloud, middle, along, width, half + 0.5, off, facing)
             if len(inside) < LEAST:
                 break
+            rod = middle, along, width, half
         else:
-            middle, axis, width, half = fitted(cloud, inside, axis)
+            middle, along, width, half = fitted(cloud, inside, rod[1])
             used[inside] = True
-            frame = upright(axis[None])[0][:, [2, 0, 1]]
+            frame = upright(along[None])[0][:, [2, 0, 1]]
             result.append(Boxes(middle[None], frame[None], np.array([[half, width, width]])))
     return join(result)
 
 
+def through_pairs(cloud: Cloud, off: float, seed: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Points on the axes (T, 3), axes (T, 3) and radii (T,) of cylinders through pairs of points that are near.
+
+    The axis is normal to both normals, and passes through their intersection (as in Schnabel, Wahl and Klein 2007).
+    ``off`` is how far a point may be from the cylinder.
+    """
+    points, normals, neighbours = cloud.points, cloud.normals, cloud.neighbours
+    draws = np.random.default_rng(seed).integers(1 << 32, size=(TRIALS, STEPS))
+    first = second = draws[:, 0] % len(points)
+    cosine = np.ones(TRIALS)
+    for draw in draws[:, 1:].T:  # walk until the normals differ
+        going = np.abs(cosine) >= PARALLEL
+        second = np.where(going, neighbours[second, draw % neighbours.shape[1]], second)
+        cosine = np.einsum("ti,ti->t", normals[first], normals[second])
+    apart = np.abs(cosine) <= PARALLEL
+    first, second, cosine = first[apart], second[apart], cosine[apart]
+    p, q, away = normals[first], normals[second], points[second] - points[first]
+    axis = np.cross(p, q)
+    axis /= np.linalg.norm(axis, axis=1, keepdims=True)
+    # first + s p and second + t q are equally far along the axis; elsewhere they meet
+    along_p, along_q = np.einsum("ti,ti->t", away, p), np.einsum("ti,ti->t", away, q)
+    s, t = (along_p - cosine * along_q) / (1 - cosine**2), (cosine * along_p - along_q) / (1 - cosine**2)
+    radius = (np.abs(s) + np.abs(t)) / 2
+    good = np.abs(np.abs(s) - np.abs(t)) <= off + 0.1 * radius
+    good &= (radius <= LARGEST) & (radius >= 0.5 * off)
+    return (points[first] + s[:, None] * p)[good], axis[good], radius[good]
+
+
+def _frames(axis: FloatArray) -> FloatArray:
+    """Frames (T, 3, 3) whose last columns are axes (T, 3)."""
+    side = np.eye(3)[np.where(np.abs(axis[:, 0]) < 0.6, 0, 1)]
+    across = np.cross(axis, side)
+    across /= np.linalg.norm(across, axis=1, keepdims=True)
+    return np.ascontiguousarray(np.stack([np.cross(across, axis), across, axis], 2))
+
+
 def on_rod(
-    cloud: Cloud, middle: Array, axis: Array, radius: float, half: float, off: float, facing: float
+    cloud: Cloud, middle: Array, axis: FloatArray, radius: float, half: float, off: float, facing: float
 ) -> npt.NDArray[np.int64]:
     """The points on a cylinder that face across its axis."""
     inside = np.zeros(len(cloud.points), np.bool_)
-    line = np.ascontiguousarray(middle), np.ascontiguousarray(axis)
-    mark_rod(cloud.points, cloud.normals, *line, radius, half, off, facing, inside)
+    mark_rod(
+        cloud.points, cloud.normals, np.ascontiguousarray(middle), _frames(axis[None])[0], radius, half, off, facing,
+        inside,
+    )  # fmt: skip
     return np.flatnonzero(inside)
 
 

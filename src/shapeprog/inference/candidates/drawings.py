@@ -12,6 +12,7 @@ import torch
 
 from shapeprog.geometry.distance import signed_distance
 from shapeprog.geometry.surface import sample_surface
+from shapeprog.inference.candidates.settings import SETTINGS
 from shapeprog.language.hints import Box
 from shapeprog.language.parameters import Parameter
 from shapeprog.language.printer import numbers_written
@@ -20,22 +21,6 @@ from shapeprog.language.statement import END, Statement, language
 from shapeprog.language.tensors import encode
 from shapeprog.language.unroll import unroll
 from shapeprog.space import HALF, Array, FloatArray
-
-POINTS = 64
-"""Points of a surface by which two drawings are compared."""
-
-SAME = 0.02
-"""Distance in cells below which two surfaces are the same."""
-
-
-STARTS = 192
-"""Most starts of a statement without a hint in one box."""
-
-THIN = 0.3
-"""Share of the least extent that is tried as a length too: the wall thickness of hollow solids."""
-
-COUNTS = 6
-"""Largest initial value of a count."""
 
 
 def is_unhinted(declared: Statement) -> bool:
@@ -58,7 +43,7 @@ def starts(declared: Statement, box: Box) -> list[Draw]:
     """Possible drawings of a box by a statement without a hint: evenly sampled combinations of parameter values."""
     options = [_options(parameter, box) for parameter in declared.parameters]
     count = math.prod(map(len, options))
-    selected = np.unique(np.linspace(0, count - 1, min(count, STARTS)).astype(np.int64))
+    selected = np.unique(np.linspace(0, count - 1, min(count, SETTINGS.starts)).astype(np.int64))
     indices = np.unravel_index(selected, [len(values) for values in options])
     rows = np.concatenate([values[index] for values, index in zip(options, indices, strict=True)], 1)
     return [Draw(declared.name, tuple(row)) for row in rows.astype(np.float32).tolist()]
@@ -76,10 +61,10 @@ def _options(parameter: Parameter, box: Box) -> FloatArray:
     elif quantity.kind == "length" and width == len(reach):
         rows = [half * reach]
     elif quantity.kind in ("position", "length"):
-        sizes = half * np.concatenate([reach, box.half, [THIN * box.half.min()]])
+        sizes = half * np.concatenate([reach, box.half, [SETTINGS.wall * box.half.min()]])
         rows = product(np.unique((box.centre if quantity.kind == "position" else sizes).round(3)), repeat=width)
     elif quantity.discrete:
-        last = 3.0 if quantity.kind == "turn" else float(COUNTS)
+        last = 3.0 if quantity.kind == "turn" else float(SETTINGS.counts)
         rows = [[float(n)] * width for n in range(max(round(quantity.low), 0), round(min(quantity.high, last)) + 1)]
     else:
         rows = [[0.0] * width]
@@ -146,7 +131,8 @@ def _drawing_the_same(candidates: Sequence[Draw], node: Node, signs: FloatArray)
     if not candidates:
         return
     scene = unroll(encode(Program((node,)), dtype=torch.float64))
-    points = sample_surface(scene, POINTS, torch.Generator().manual_seed(0)).points.double() * torch.from_numpy(signs)
+    sample = sample_surface(scene, SETTINGS.equal_points, torch.Generator().manual_seed(0))
+    points = sample.points.double() * torch.from_numpy(signs)
     candidate_scene = unroll(encode([Program((candidate,)) for candidate in candidates], dtype=torch.float64))
     off = signed_distance(candidate_scene, points.expand(len(candidates), -1, -1)).abs().amax(-1).tolist()
-    yield from (candidate for candidate, far in zip(candidates, off, strict=True) if far < SAME)
+    yield from (candidate for candidate, far in zip(candidates, off, strict=True) if far < SETTINGS.equal_distance)

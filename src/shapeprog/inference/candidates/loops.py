@@ -20,6 +20,7 @@ from shapeprog.geometry.scene import Scene
 from shapeprog.geometry.surface import sample_surface
 from shapeprog.inference.candidates.drawings import drawings
 from shapeprog.inference.candidates.profiles import distinct, profiles
+from shapeprog.inference.candidates.settings import SETTINGS
 from shapeprog.inference.fit.tunable import THINNEST
 from shapeprog.language.hints import Box
 from shapeprog.language.parameters import to_float32
@@ -28,41 +29,8 @@ from shapeprog.language.tensors import encode
 from shapeprog.language.unroll import unroll
 from shapeprog.space import DEPTH, SIDE, FloatArray
 
-STRAY = 0.35
-"""Largest deviation in cells of a copy from its expected position."""
-
-LEAST_STEP, APART = 0.4, 1.6
-"""Least step between copies, in cells, and in half extents of the repeated block; at two, copies just touch."""
-
-MISSING, LEAST_PRESENT, PRESENT = -1, 4, 0.75
-"""Index of a missing copy; the least number and the share of present copies in a run with gaps."""
-
-MOST_ALIKE, MOST_RUNS = 48, 160
-"""Most copies of one group that are searched for runs, the first ones; and most runs of one search, the longest."""
-
-OFF_SIZE = 0.2
-"""Largest difference in cells of the extents of parts of one row; or a quarter, if more."""
-
-LEAST_ROW, MOST_ROW = 3, 32
-"""Fewest and most parts of a row."""
-
-CENTRED = 0.2
-"""Cells within which a step is along an axis, and an axis of turns is on the middle plane of the shape."""
-
-POINTS, ON = 48, 0.4
-"""Points on each candidate whose images are tested, and the largest distance in cells of one on the surface."""
-
-SUPPORTED, AS_WELL = 0.6, 0.8
-"""Least share of its points on the surface, and least ratio of the share of its image to that."""
-
-TURNS = (6, 5, 4, 3)
-"""Numbers of copies around a vertical axis that are searched for."""
-
-AXES, SQUARE = 4, 0.1
-"""Most axes of turns, and the largest relative difference between the horizontal extents of a part around one."""
-
-SECTOR = 0.75
-"""Least share of its points in the sector of a turned copy: the arms of a star meet at its axis."""
+MISSING = -1
+"""Index of a missing copy."""
 
 
 def loop_values(*numbers: float) -> tuple[float, ...]:
@@ -87,18 +55,18 @@ def _runs(nodes: Sequence[Node]) -> list[Node]:
         return []
     profile = profiles(nodes)
     step_of: dict[tuple[int, ...], FloatArray] = {}
-    groups = {tuple(np.flatnonzero(row)[:MOST_ALIKE].tolist()) for row in profile.copies()}
+    groups = {tuple(np.flatnonzero(row)[: SETTINGS.most_alike].tolist()) for row in profile.copies()}
     for group in sorted(group for group in groups if len(group) > 1):
         positions = profile.middle[list(group)]
         for run in equal_steps(positions, profile.half[group[0]]):
             members = tuple(group[index] if index != MISSING else MISSING for index in run)
             step_of.setdefault(members, (positions[run[-1]] - positions[run[0]]) / (len(run) - 1))
-    longest = sorted(step_of, key=lambda members: (-len(members), members))[:MOST_RUNS]
+    longest = sorted(step_of, key=lambda members: (-len(members), members))[: SETTINGS.most_runs]
     return distinct([_translated(nodes[members[0]], len(members), step_of[members]) for members in longest])
 
 
 def _translated(node: Node, count: int, step: FloatArray) -> Loop:
-    step = np.where(np.abs(step) * (count - 1) < CENTRED, 0.0, step)
+    step = np.where(np.abs(step) * (count - 1) < SETTINGS.centred, 0.0, step)
     return Loop("translate", loop_values(count, *step.tolist()), (node,))
 
 
@@ -113,13 +81,13 @@ def equal_steps(positions: FloatArray, half: FloatArray, least: int = 2) -> list
 
     def nearest(targets: FloatArray) -> npt.NDArray[np.int64]:
         """The index of the position at each target (..., 3); ``MISSING`` if none."""
-        index = tree.query(targets, p=np.inf, distance_upper_bound=STRAY)[1]
+        index = tree.query(targets, p=np.inf, distance_upper_bound=SETTINGS.stray)[1]
         return np.where(index < count, index, MISSING)
 
-    far = (np.abs(steps) > np.maximum(APART * half, LEAST_STEP)).any(-1)
+    far = (np.abs(steps) > np.maximum(SETTINGS.apart * half, SETTINGS.least_step)).any(-1)
     first, second = np.nonzero(far & (nearest(positions[:, None] - steps) < 0))
     step = steps[first, second]
-    forwards = np.sign(np.where(np.abs(step) < CENTRED, 0, step)) @ [9, 3, 1] > 0
+    forwards = np.sign(np.where(np.abs(step) < SETTINGS.centred, 0, step)) @ [9, 3, 1] > 0
     onwards = (nearest(positions[second] + step * np.array([[[1]], [[2]]])) >= 0).any(0)
     runs: dict[tuple[int, ...], None] = {}
     for gaps in (0, 1):  # missing copies at once
@@ -134,7 +102,8 @@ def equal_steps(positions: FloatArray, half: FloatArray, least: int = 2) -> list
             going &= copy - end <= gaps
         members = np.stack(run, 1)
         number = (members >= 0).sum(1)
-        kept = forwards if gaps == 0 else (number <= end) & (number >= np.maximum(LEAST_PRESENT, PRESENT * (end + 1)))
+        enough = number >= np.maximum(SETTINGS.least_present, SETTINGS.present * (end + 1))
+        kept = (number <= end) & enough if gaps else forwards
         for k in np.flatnonzero(kept & (end + 1 >= least)):
             row = members[k, : end[k] + 1]
             runs[tuple((row if forwards[k] else row[::-1]).tolist())] = None
@@ -149,20 +118,20 @@ def rows(blocks: Sequence[Sequence[Box]]) -> Iterator[Node]:
     half = np.array([np.abs(box.rotation) @ box.half for box in boxes])
     existing: set[tuple[int, ...]] = set()
     for axis, first in itertools.product(range(3), range(len(boxes))):
-        limit = np.maximum(OFF_SIZE, half[first] / 4)
-        limit[axis] = max(OFF_SIZE / 2, half[first, axis] / 2)
+        limit = np.maximum(SETTINGS.off_size, half[first] / 4)
+        limit[axis] = max(SETTINGS.off_size / 2, half[first, axis] / 2)
         across = np.arange(3) != axis
         similar = (np.abs(half - half[first]) <= limit).all(1)
-        similar &= (np.abs(centre - centre[first])[:, across] <= STRAY).all(1)
-        members = np.flatnonzero(similar)[:MOST_ALIKE]
+        similar &= (np.abs(centre - centre[first])[:, across] <= SETTINGS.stray).all(1)
+        members = np.flatnonzero(similar)[: SETTINGS.most_alike]
         key = (axis, *members.tolist())
-        if len(members) < LEAST_ROW or len(set(owner[members])) < 2 or key in existing:
+        if len(members) < SETTINGS.least_row or len(set(owner[members])) < 2 or key in existing:
             continue
         existing.add(key)
         middle, size = np.median(centre[members], 0), np.maximum(np.median(half[members], 0), THINNEST / 2)
         positions = np.where(across, middle, centre[members])
-        run = max(equal_steps(positions, size * ~across, LEAST_ROW), key=len, default=[])
-        if 0 < len(run) <= MOST_ROW:
+        run = max(equal_steps(positions, size * ~across, SETTINGS.least_row), key=len, default=[])
+        if 0 < len(run) <= SETTINGS.most_row:
             start, end = positions[run[0]], positions[run[-1]]
             for drawing in drawings(Box(start, np.eye(3), size)):
                 yield _translated(drawing, len(run), (end - start) / (len(run) - 1))
@@ -177,17 +146,18 @@ def images(nodes: Sequence[Node], surface: FloatArray) -> list[Node]:
     if not nodes:
         return []
     scene = unroll(encode([Program((node,)) for node in nodes], dtype=torch.float64))
-    points = sample_surface(scene, POINTS, torch.Generator().manual_seed(0)).points.numpy()
+    points = sample_surface(scene, SETTINGS.image_points, torch.Generator().manual_seed(0)).points.numpy()
     tree = cKDTree(surface)
 
     def on(image: FloatArray) -> FloatArray:
         """Share of points (C, P, 3) on the surface."""
-        share: FloatArray = np.isfinite(tree.query(image, distance_upper_bound=ON)[0]).mean(1)
+        share: FloatArray = np.isfinite(tree.query(image, distance_upper_bound=SETTINGS.image_distance)[0]).mean(1)
         return share
 
     share = on(points)
-    supported = np.flatnonzero(share >= SUPPORTED)
-    nodes, points, least = [nodes[k] for k in supported.tolist()], points[supported], AS_WELL * share[supported]
+    supported = np.flatnonzero(share >= SETTINGS.supported)
+    nodes, points = [nodes[k] for k in supported.tolist()], points[supported]
+    least = SETTINGS.as_well * share[supported]
 
     def kept(index: npt.NDArray[np.int64], image: FloatArray) -> npt.NDArray[np.int64]:
         """Those candidates whose images (C, P, 3) lie on the surface."""
@@ -205,10 +175,10 @@ def images(nodes: Sequence[Node], surface: FloatArray) -> list[Node]:
         for k in index
     ]
     plain = np.array([not isinstance(node, Loop) for node in nodes], np.bool_)
-    for axis, count in itertools.product(_axes(scene), TURNS):
+    for axis, count in itertools.product(_axes(scene), SETTINGS.turns):
         around = (points[..., DEPTH] - axis[0]) + 1j * (points[..., SIDE] - axis[1])
         turn = np.angle(around * around.mean(1, keepdims=True).conj())
-        index = np.flatnonzero(plain & ((np.abs(turn) < np.pi / count).mean(1) >= SECTOR))
+        index = np.flatnonzero(plain & ((np.abs(turn) < np.pi / count).mean(1) >= SETTINGS.sector))
         index = np.setdiff1d(index, four) if count == 4 else index  # two mirrors are easier to read
         for copy, every in ((1, 6), *((copy, 1) for copy in range(1, count))):  # few points settle most candidates
             turned = around[index, ::every] * np.exp(2j * np.pi * copy / count)
@@ -223,8 +193,8 @@ def images(nodes: Sequence[Node], surface: FloatArray) -> list[Node]:
 def _axes(scene: Scene) -> FloatArray:
     """Depth and side (A, 2) of the axis of the grid, and of those nearest to it of parts that are as wide as deep."""
     extents = (scene.reach * 2).numpy()[:, 0, 1:]
-    square = (scene.mask.sum(1) == 1).numpy() & (np.ptp(extents, axis=1) <= SQUARE * extents.max(1))
+    square = (scene.mask.sum(1) == 1).numpy() & (np.ptp(extents, axis=1) <= SETTINGS.square * extents.max(1))
     centre = scene.centre.numpy()[square, 0, 1:]
-    centre = np.concatenate([np.zeros((1, 2)), np.where(np.abs(centre) < CENTRED, 0.0, centre)])
-    first = np.sort(np.unique(np.round(centre / CENTRED), axis=0, return_index=True)[1])
-    return centre[first[np.argsort((centre[first] ** 2).sum(1), kind="stable")[:AXES]]]
+    centre = np.concatenate([np.zeros((1, 2)), np.where(np.abs(centre) < SETTINGS.centred, 0.0, centre)])
+    first = np.sort(np.unique(np.round(centre / SETTINGS.centred), axis=0, return_index=True)[1])
+    return centre[first[np.argsort((centre[first] ** 2).sum(1), kind="stable")[: SETTINGS.axes]]]

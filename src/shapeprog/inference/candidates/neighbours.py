@@ -15,30 +15,13 @@ import torch
 
 from shapeprog.inference.candidates.drawings import drawings, hinted, redrawn, solid_boxes
 from shapeprog.inference.candidates.loops import mirrors, repeated, rows
+from shapeprog.inference.candidates.settings import SETTINGS
 from shapeprog.language.hints import STRAIGHT, Box
 from shapeprog.language.program import Chain, Draw, Loop, Node, Program, nest
 from shapeprog.language.statement import language
 from shapeprog.language.tensors import encode
 from shapeprog.language.unroll import unroll
 from shapeprog.space import DEPTH, SIDE, FloatArray
-
-REACH = 4.0
-"""Largest move in cells of a face to meet another part."""
-
-INTO = 0.05
-"""Depth in cells to which an extended part enters the other part."""
-
-SHORTEST = 0.2
-"""Least length in cells of a shortened part."""
-
-WITHIN = 0.8
-"""Share of a face, along each side, within which lines across it are followed."""
-
-GAP = 1.5
-"""Largest gap in cells between two parts that may be merged."""
-
-OFF_LEAST, OFF_MOST = 0.02, 2.5
-"""Range in cells of the distance from the middle plane of the shape within which a part may be centred."""
 
 CORNERS = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
 
@@ -157,7 +140,7 @@ def _merged(first: Box, second: Box) -> Iterator[Box]:
         first, second = second, first
     inner = np.abs((second.centre - first.centre) @ first.rotation)
     reach = np.abs(first.rotation.T @ second.rotation) @ second.half
-    if (inner <= first.half + reach + GAP).all():
+    if (inner <= first.half + reach + SETTINGS.gap).all():
         yield _around(first, [first, second])
 
 
@@ -169,7 +152,9 @@ def _around(frame: Box, parts: Sequence[Box]) -> Box:
     return Box(frame.rotation @ ((low + high) / 2), frame.rotation, (high - low) / 2)
 
 
-def met(box: Box, parts: Sequence[Box], within: Sequence[float] = (WITHIN,), *, longer: bool = False) -> Iterator[Box]:
+def met(
+    box: Box, parts: Sequence[Box], within: Sequence[float] = (SETTINGS.within,), *, longer: bool = False
+) -> Iterator[Box]:
     """A box with one face moved to where a line normal to the face, at its middle or near a corner, enters a part.
 
     ``within`` are the distances from the middle to the lines, as shares of those to the corners.  ``longer`` restricts
@@ -189,7 +174,7 @@ def met(box: Box, parts: Sequence[Box], within: Sequence[float] = (WITHIN,), *, 
             ends = _crossed(starts, along, around)
             for end in sorted(ends[ends > minimum].tolist(), key=lambda end: abs(end - box.half[axis]))[:4]:
                 length = (box.half[axis] + end) / 2
-                if abs(end - box.half[axis]) <= REACH and length >= SHORTEST / 2:
+                if abs(end - box.half[axis]) <= SETTINGS.reach and length >= SETTINGS.shortest / 2:
                     half = box.half.copy()
                     half[axis] = length
                     yield Box(box.centre + (end - box.half[axis]) / 2 * along, box.rotation, half)
@@ -203,7 +188,8 @@ def centred(box: Box) -> Iterator[Box]:
     for axis in (SIDE, DEPTH):
         along = int(np.abs(box.rotation[axis]).argmax())
         off = abs(float(box.centre[axis]))
-        if np.abs(box.rotation[axis, along]) >= STRAIGHT and OFF_LEAST < off < min(OFF_MOST, box.half[along] / 2):
+        near = SETTINGS.off_least < off < min(SETTINGS.off_most, box.half[along] / 2)
+        if near and np.abs(box.rotation[axis, along]) >= STRAIGHT:
             for more in (-off, off):
                 centre, half = box.centre.copy(), box.half.copy()
                 centre[axis] = 0
@@ -212,10 +198,10 @@ def centred(box: Box) -> Iterator[Box]:
 
 
 def _crossed(starts: FloatArray, along: FloatArray, parts: Box) -> FloatArray:
-    """Distances at which lines (L, 3) of one direction enter any of several boxes, plus ``INTO`` for a joint."""
+    """Distances at which lines (L, 3) of one direction enter any of several boxes, and somewhat more for a joint."""
     at, step = (starts - parts.centre[:, None]) @ parts.rotation, (along @ parts.rotation)[:, None]
     step = np.where(np.abs(step) < 1e-9, 1e-9, step)
     half = parts.half[:, None]
     first, second = (-half - at) / step, (half - at) / step
     enters, leaves = np.minimum(first, second).max(-1), np.maximum(first, second).min(-1)
-    return np.unique(np.minimum(enters + INTO, leaves)[enters < leaves].round(2))
+    return np.unique(np.minimum(enters + SETTINGS.into, leaves)[enters < leaves].round(2))

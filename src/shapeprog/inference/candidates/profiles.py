@@ -11,16 +11,11 @@ import torch
 from scipy.spatial.distance import cdist
 
 from shapeprog.geometry.distance import signed_distance
+from shapeprog.inference.candidates.settings import SETTINGS
 from shapeprog.language.program import Loop, Node, Program
 from shapeprog.language.tensors import encode
 from shapeprog.language.unroll import unroll
 from shapeprog.space import FloatArray
-
-SAME = 0.03
-"""Difference of positions and extents, as a share of the size, below which two candidates are the same."""
-
-ALIKE, LEVEL = 0.06, 0.15
-"""Differences up to which two candidates are copies: of extents, as a share of the size, and of distances, in cells."""
 
 
 class Profiles(NamedTuple):
@@ -48,8 +43,8 @@ class Profiles(NamedTuple):
 
     def copies(self) -> npt.NDArray[np.bool_]:
         """Whether two candidates (C, C) are copies of each other by translation."""
-        alike = cdist(self.half, self.half, "chebyshev") <= ALIKE * self.size[:, None]
-        level = cdist(self.distance, self.distance, "chebyshev") <= LEVEL
+        alike = cdist(self.half, self.half, "chebyshev") <= SETTINGS.alike * self.size[:, None]
+        level = cdist(self.distance, self.distance, "chebyshev") <= SETTINGS.level
         same: npt.NDArray[np.bool_] = alike & level & (self.kind[:, None] == self.kind)
         return same
 
@@ -78,7 +73,7 @@ def distinct(nodes: Sequence[Node]) -> list[Node]:
     if not nodes:
         return []
     profile = profiles(nodes)
-    order = np.round(np.log2(np.maximum(profile.size, SAME)))  # order of magnitude
+    order = np.round(np.log2(np.maximum(profile.size, SETTINGS.same)))  # order of magnitude
     features = np.concatenate([profile.middle, profile.half, profile.distance], 1)
-    key = np.column_stack([profile.kind, order, np.round(features / (SAME * 2 ** order[:, None]))])
+    key = np.column_stack([profile.kind, order, np.round(features / (SETTINGS.same * 2 ** order[:, None]))])
     return [nodes[k] for k in np.sort(np.unique(key, axis=0, return_index=True)[1])]

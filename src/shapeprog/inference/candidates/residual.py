@@ -9,6 +9,7 @@ from scipy.spatial import cKDTree
 from shapeprog.geometry.distance import signed_distance
 from shapeprog.inference.candidates.drawings import drawings
 from shapeprog.inference.candidates.loops import images
+from shapeprog.inference.candidates.settings import SETTINGS
 from shapeprog.inference.fit.tunable import THINNEST
 from shapeprog.inference.pieces.oriented import bounds, boxes_around
 from shapeprog.inference.surface.components import linked
@@ -17,29 +18,20 @@ from shapeprog.language.hints import Box
 from shapeprog.language.program import Node, Program
 from shapeprog.language.unroll import unroll
 
-FAR = 1.5
-"""Distance from the surface of the program, in tolerances, from which a point is not explained."""
-
-NEAR = 2.0
-"""Distance between points of one cluster, as a multiple of the square root of the area per point."""
-
-LEAST, MOST = 8, 24
-"""Points of the smallest cluster, and the largest number of clusters."""
-
 
 def residual_candidates(program: Program, evidence: Evidence) -> list[Node]:
     """Drawings of the boxes around clusters of visible points far from a program, and their mirror images."""
     tensor = torch.from_numpy(evidence.points)
-    far = signed_distance(unroll(program), tensor).abs().numpy() > FAR * evidence.tolerance
+    far = signed_distance(unroll(program), tensor).abs().numpy() > SETTINGS.far * evidence.tolerance
     points = evidence.points[far & (evidence.weights > evidence.weights.max() / 2)]
-    if len(points) < LEAST:
+    if len(points) < SETTINGS.cluster_points:
         return []
-    reach = NEAR * (evidence.area / len(evidence.points)) ** 0.5
+    reach = SETTINGS.cluster_reach * (evidence.area / len(evidence.points)) ** 0.5
     pairs = cKDTree(points).query_pairs(reach, output_type="ndarray")
     cluster = linked(pairs, len(points))
     size = np.bincount(cluster)
-    largest = np.argsort(-size, kind="stable")[:MOST]
-    members = [np.flatnonzero(cluster == label) for label in largest[size[largest] >= LEAST]]
+    largest = np.argsort(-size, kind="stable")[: SETTINGS.clusters]
+    members = [np.flatnonzero(cluster == label) for label in largest[size[largest] >= SETTINGS.cluster_points]]
     if not members:
         return []
     around = boxes_around(points[np.concatenate(members)], bounds(members))

@@ -17,6 +17,7 @@ from torch import Tensor
 
 from shapeprog.geometry.distance import signed_distance
 from shapeprog.inference.candidates.drawings import drawings, is_unhinted, starts
+from shapeprog.inference.candidates.settings import SETTINGS
 from shapeprog.inference.fit.tunable import THINNEST, least
 from shapeprog.inference.pieces.cover_kernels import near_boxes
 from shapeprog.inference.pieces.pieces import Pieces
@@ -27,34 +28,6 @@ from shapeprog.language.statement import language
 from shapeprog.language.tensors import Code, encode
 from shapeprog.language.unroll import Plan, unroll
 from shapeprog.space import Array, FloatArray
-
-NEAR = 0.3
-"""Cells around a piece within which points of the surface belong to it."""
-
-POINTS, SEEN = 64, 5_000
-"""Points of a piece by which statements are compared, and points of the surface from which they are sampled."""
-
-FITTED = 48
-"""Pieces to which statements are fitted, and on which those without a hint are tried: the most important ones."""
-
-GOOD, WORTH = 0.08, 0.3
-"""Misfit up to which no fitting is needed, and largest excess over the best misfit of a statement that is fitted."""
-
-STEPS, WIDTH = 8, 0.3
-"""Gauss-Newton steps of fitting, and the residual in cells whose weight is a quarter."""
-
-PRIOR, FARTHEST = 3e-2, 2.0
-"""Weight of a squared move by a cell from the start, per point; and the largest change of one number in a step."""
-
-WRONG = 0.5
-"""Distance in cells that has the same misfit as a normal at a right angle."""
-
-OFFSET = 0.01
-"""Distance in cells from the surface at which gradients are evaluated: the distance has no gradient on the surface."""
-
-SLACK, BETTER = 0.05, 2 / 3
-"""Largest excess over the best misfit of a statement with fewer numbers; and the share of its misfit below which the
-best statement is a candidate too."""
 
 
 class Target(NamedTuple):
@@ -70,7 +43,7 @@ class Target(NamedTuple):
     @property
     def shifted(self) -> Float[Tensor, "B P 3"]:
         """The points shifted along their normals: the distance has no gradient on the surface."""
-        return self.points + OFFSET * self.normals
+        return self.points + SETTINGS.offset * self.normals
 
 
 def single_candidates(pieces: Pieces) -> list[Node]:
@@ -80,25 +53,25 @@ def single_candidates(pieces: Pieces) -> list[Node]:
     boxes = [Box(pieces.boxes.centre[piece], pieces.boxes.rotation[piece], half[piece]) for piece in indices]
     tried = [drawings(box) for box in boxes]
     for declared in filter(is_unhinted, language()):
-        for box, options in zip(boxes[:FITTED], tried, strict=False):
+        for box, options in zip(boxes[: SETTINGS.fitted], tried, strict=False):
             options += starts(declared, box)
     draws = [draw for options in tried for draw in options]
     owner = np.repeat(np.arange(len(boxes)), [len(options) for options in tried])
     misfit = misfits(draws, target.take(owner))
     best = _minimum(misfit, owner, len(boxes))[owner]
-    unsure = np.flatnonzero((owner < FITTED) & (best > GOOD) & (misfit <= best + WORTH))
+    unsure = np.flatnonzero((owner < SETTINGS.fitted) & (best > SETTINGS.good) & (misfit <= best + SETTINGS.worth))
     better = fitted([draws[k] for k in unsure], target.take(owner[unsure]))
     draws, owner = [*draws, *better], np.append(owner, owner[unsure])
     misfit = np.append(misfit, misfits(better, target.take(owner[len(misfit) :])))
     best = _minimum(misfit, owner, len(boxes))[owner]
-    order = np.flatnonzero(misfit <= best + SLACK).tolist()
+    order = np.flatnonzero(misfit <= best + SETTINGS.slack).tolist()
     order.sort(key=lambda k: (numbers_written(draws[k]), misfit[k]), reverse=True)
     simplest = {int(owner[k]): k for k in order}
     closest = {int(owner[k]): k for k in order if misfit[k] == best[k]}
     result: list[Node] = []
     for piece, k in sorted(simplest.items()):
         result.append(draws[k])
-        if misfit[closest[piece]] < min(GOOD, BETTER * misfit[k]):
+        if misfit[closest[piece]] < min(SETTINGS.good, SETTINGS.better * misfit[k]):
             result.append(draws[closest[piece]])
     return result
 
@@ -127,24 +100,24 @@ def fitted(draws: Sequence[Draw], target: Target) -> list[Draw]:
         low[row, : statement.size] = torch.tensor([least(quantity) for quantity in statement.quantities])
     ids = torch.tensor([statement.id for statement in declared])[:, None, None, None].expand(-1, points, 1, 1)
     plan = Plan(Code(ids, values[:, None, None, None].expand(-1, points, 1, 1, -1)))
-    start, prior = values, torch.where(free > 0, PRIOR * points, 1.0)
+    start, prior = values, torch.where(free > 0, SETTINGS.prior * points, 1.0)
     shifted = target.shifted[:, :, None]
-    for _ in range(STEPS):
+    for _ in range(SETTINGS.steps):
         moving = values[:, None, None, None].expand(-1, points, 1, 1, -1).clone().requires_grad_()
-        off = signed_distance(plan.scene(moving), shifted)[..., 0] - OFFSET
+        off = signed_distance(plan.scene(moving), shifted)[..., 0] - SETTINGS.offset
         (slopes,) = torch.autograd.grad(off.sum(), moving)
         slopes = slopes[:, :, 0, 0].nan_to_num(0) * free[:, None]
         residual = off.detach().nan_to_num(0)
-        weighted = ((WIDTH**2 / (WIDTH**2 + residual**2)) ** 2)[..., None] * slopes
+        weighted = ((SETTINGS.width**2 / (SETTINGS.width**2 + residual**2)) ** 2)[..., None] * slopes
         slope = (weighted * residual[..., None]).sum(1) + prior * (values - start)
         move = torch.linalg.solve(weighted.mT @ slopes + torch.diag_embed(prior), slope)
-        values = torch.maximum(values - move.clamp(-FARTHEST, FARTHEST), low)
+        values = torch.maximum(values - move.clamp(-SETTINGS.farthest, SETTINGS.farthest), low)
     rows = zip(declared, values.float().tolist(), strict=True)
     return [Draw(statement.name, tuple(row[: statement.size])) for statement, row in rows]
 
 
 def misfits(draws: Sequence[Draw], target: Target) -> FloatArray:
-    """Misfit (B,) of each statement to its points: mean distance over ``WRONG`` plus 1 - the mean cosine."""
+    """Misfit (B,) of each statement to its points: mean distance over ``SETTINGS.wrong`` plus 1 - the mean cosine."""
     if not draws:
         return np.zeros(0)
     shifted = target.shifted.requires_grad_()
@@ -152,19 +125,19 @@ def misfits(draws: Sequence[Draw], target: Target) -> FloatArray:
     distance = signed_distance(scene, shifted)
     (slope,) = torch.autograd.grad(distance.sum(), shifted)
     cosine = (slope * target.normals).sum(-1).abs().mean(1)
-    off = (distance.detach().abs() / WRONG).clamp(max=1).mean(1) + 1 - cosine
+    off = (distance.detach().abs() / SETTINGS.wrong).clamp(max=1).mean(1) + 1 - cosine
     return off.nan_to_num(np.inf).numpy()
 
 
 def _target(pieces: Pieces) -> tuple[Target, Array]:
     """Points of the surface close to the faces of the pieces, and the indices (N,) of the pieces with such points."""
-    step = max(1, len(pieces.cloud.points) // SEEN)
+    step = max(1, len(pieces.cloud.points) // SETTINGS.surface_points)
     points, normals = (np.ascontiguousarray(array[::step]) for array in (pieces.cloud.points, pieces.cloud.normals))
     mask = np.zeros((len(pieces.boxes.half), len(points)), np.bool_)
-    near_boxes(points, *map(np.ascontiguousarray, pieces.boxes), NEAR, mask, np.zeros(len(mask)))
+    near_boxes(points, *map(np.ascontiguousarray, pieces.boxes), SETTINGS.near, mask, np.zeros(len(mask)))
     indices = np.flatnonzero(mask.any(1))
     inside = [np.flatnonzero(mask[piece]) for piece in indices]
-    selected = np.array([members[np.arange(POINTS) * len(members) // POINTS] for members in inside], np.int64).reshape(
-        -1, POINTS
-    )
+    share = np.arange(SETTINGS.points) / SETTINGS.points
+    selected = np.array([members[(share * len(members)).astype(np.int64)] for members in inside], np.int64)
+    selected = selected.reshape(-1, SETTINGS.points)
     return Target(torch.from_numpy(points[selected]), torch.from_numpy(normals[selected])), indices

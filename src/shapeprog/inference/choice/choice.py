@@ -18,22 +18,8 @@ import numpy.typing as npt
 from shapeprog.inference.choice.bits import Bits
 from shapeprog.inference.choice.choice_kernels import search
 from shapeprog.inference.choice.coverage import CoverageTable
+from shapeprog.inference.choice.settings import SETTINGS
 from shapeprog.space import Array, FloatArray
-
-ROUNDS = 1000
-"""Rounds of ruin and recreate."""
-
-RESTARTS = 4
-"""Independent searches, of which the best set counts."""
-
-EARLIER = 1e-4
-"""Price of the last candidate above that of the first: of nearly equal sets, all seeds prefer the same."""
-
-BLINK = 0.05
-"""Probability with which a round overlooks a candidate."""
-
-INTERIOR = (8.0, 1.0)
-"""Initial penalties of points in interiors, as multiples of their weights."""
 
 
 class Option(NamedTuple):
@@ -65,7 +51,7 @@ class Choice(NamedTuple):
 
 
 def choose(
-    table: CoverageTable, blocks: int, *, start: Sequence[int] = (), rounds: int = ROUNDS, seed: int = 0
+    table: CoverageTable, blocks: int, *, start: Sequence[int] = (), rounds: int = SETTINGS.rounds, seed: int = 0
 ) -> Choice:
     """The most valuable at most ``blocks`` of the candidates: greedily, then by ruin and recreate.
 
@@ -83,17 +69,17 @@ def choose(
     bits = np.concatenate([row[row != 0] for row in rows[:, :last]]) if len(rows) else rows.reshape(-1)
     data = (
         rows, interior, hidden, table.weights, words, bits, begins, *_words(interior), table.exposed[index],
-        table.sample_price[index], table.prices[index] + EARLIER * index / len(table.prices), gains[index],
+        table.sample_price[index], table.prices[index] + SETTINGS.earlier * index / len(table.prices), gains[index],
     )  # fmt: skip
-    penalties = (*INTERIOR, 0.0) if interior.any() else (0.0,)
-    searches = len(penalties) * RESTARTS + 1
+    penalties = (*SETTINGS.interior, 0.0) if interior.any() else (0.0,)
+    searches = len(penalties) * SETTINGS.restarts + 1
     best, draws = _no_sets(blocks), iter(range(searches * seed, searches * (seed + 1)))
 
     def searched(penalty: float, initial: Array, best_sets: BestSets) -> BestSets:
-        search(*data, penalty, rounds // searches, BLINK, next(draws), initial, *best_sets)
+        search(*data, penalty, rounds // searches, SETTINGS.blink, next(draws), initial, *best_sets)
         return best_sets
 
-    for _ in range(RESTARTS):
+    for _ in range(SETTINGS.restarts):
         initial = _no_sets(blocks).set
         for penalty in penalties:
             initial = searched(penalty, initial, _no_sets(blocks) if penalty else best).set

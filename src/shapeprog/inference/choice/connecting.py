@@ -16,23 +16,12 @@ from shapeprog.inference.candidates.drawings import redrawn, solid_boxes
 from shapeprog.inference.candidates.neighbours import drawing_of, met, with_drawing
 from shapeprog.inference.choice.choice import value
 from shapeprog.inference.choice.coverage import Coverage
+from shapeprog.inference.choice.settings import SETTINGS
 from shapeprog.inference.surface.components import linked
 from shapeprog.language.hints import Box
 from shapeprog.language.program import Chain, Node, Program
 from shapeprog.language.tensors import encode
 from shapeprog.language.unroll import unroll
-
-FLOATING = 0.02
-"""Largest loss of value by connecting or removing a part, as a share of the target."""
-
-TRIED = 24
-"""Largest number of ways to connect a part that are tested, the most valuable first."""
-
-LINES = (0.8, 0.98)
-"""Shares of a face within which lines test which parts an extension reaches: boards may meet at their rims."""
-
-FLUSH = 1e-4
-"""Largest gap in cells between touching parts: coincident faces touch."""
 
 
 def connected(program: Program, coverage: Coverage) -> Program:
@@ -53,12 +42,12 @@ def _better_connected(program: Program, coverage: Coverage) -> Program | None:
     index = {node: number for number, node in enumerate(nodes)}
     table = coverage.table([Program((node,)) for node in nodes])
     start, *values = (value(table, tuple(index[node] for node in option.body)) for option in every)
-    order = np.argsort(np.negative(values), kind="stable")[:TRIED].tolist()
-    likely = (every[1 + number] for number in order if values[number] >= start - FLOATING)
+    order = np.argsort(np.negative(values), kind="stable")[: SETTINGS.ways].tolist()
+    likely = (every[1 + number] for number in order if values[number] >= start - SETTINGS.floating)
     return next((option for option in likely if sum(map(sum, _loose_parts(option))) < count), None)
 
 
-def floating(program: Program, flush: float = FLUSH) -> list[int]:
+def floating(program: Program, flush: float = SETTINGS.flush) -> list[int]:
     """Which blocks have a part that no chain of touching parts joins to the largest such group.
 
     Parts touch across a gap of ``flush`` cells.
@@ -66,12 +55,12 @@ def floating(program: Program, flush: float = FLUSH) -> list[int]:
     return [block for block, parts in enumerate(_loose_parts(program, flush)) if any(parts)]
 
 
-def afloat(program: Program, flush: float = FLUSH) -> int:
+def afloat(program: Program, flush: float = SETTINGS.flush) -> int:
     """How many blocks are ``floating``."""
     return len(floating(program, flush))
 
 
-def _loose_parts(program: Program, flush: float = FLUSH) -> list[list[bool]]:
+def _loose_parts(program: Program, flush: float = SETTINGS.flush) -> list[list[bool]]:
     """For every part of every block, whether it is outside the largest group of touching parts."""
     loose: list[list[bool]] = [[] for _ in range(program.blocks)]
     if not program.size:
@@ -113,7 +102,7 @@ def _options(program: Program, loose: list[list[bool]]) -> list[Program]:
 def _reaching(chain: Chain, original: Box, copies: list[Box], parts: list[Box]) -> Iterator[Node]:
     """A block, whose statement draws the ``original`` box, extended so that one of its copies reaches a part."""
     for copy in copies:
-        for longer in met(copy, parts, LINES, longer=True):
+        for longer in met(copy, parts, SETTINGS.lines, longer=True):
             for box in _as_copied(original, copy, longer):
                 yield from (with_drawing(chain, draw) for draw in redrawn(drawing_of(chain), box))
 

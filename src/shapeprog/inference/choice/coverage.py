@@ -39,6 +39,7 @@ from shapeprog.inference.choice.bits import (
     sorted_by_cell,
 )
 from shapeprog.inference.choice.coverage_kernels import charged
+from shapeprog.inference.choice.settings import SETTINGS
 from shapeprog.inference.surface.evidence import Evidence
 from shapeprog.language.ast import Assignment, Comment
 from shapeprog.language.free import numbers_outside
@@ -48,23 +49,8 @@ from shapeprog.language.unroll import unroll
 from shapeprog.library.length import outside
 from shapeprog.space import DEPTH, HALF, RESOLUTION, SIDE, FloatArray
 
-DRAWN, LEAST, MOST = 16, 64, 256
-"""Samples of one batch on a primitive; smallest and largest number for a candidate without loops, else one per cell."""
-
-SKIN = 0.5
-"""Height above the surface, in tolerances, at which the test whether another candidate hides a sample is made."""
-
 AWAY = 4.0 * HALF
 """A coordinate outside all candidates, for unused samples of a word."""
-
-FREE_POINTS = 2048
-"""Points drawn in free space."""
-
-MANY = 16
-"""Parts of a mesh from which the value of all is constant: a lattice of many slats is not drawn at any price."""
-
-CENTRED = 0.1
-"""Cells within which a candidate is in the middle."""
 
 
 @dataclass(frozen=True)
@@ -81,7 +67,7 @@ class Prices:
         Of a drawing statement or call, of a loop, and of every continuous number in the text.  Each further block of a
         call costs as much as a loop; otherwise a box could be written as a drawer whose handle is hidden.
     part
-        Added for every part of a mesh that one primitive draws, ``MANY`` times at most: the gaps between drawers have
+        Added for every part of a mesh that one primitive draws, 16 times at most: the gaps between drawers have
         little surface.
     """
 
@@ -164,7 +150,7 @@ class Coverage:
         self._points, self._normals = evidence.points[order], evidence.normals[order]
         self._free, volume = free_points(evidence, seed)
         free = np.full(len(self._free), -self.prices.free * volume / max(evidence.area, 1e-9))
-        parts = np.full(len(evidence.parts), self.prices.part / max(1.0, len(evidence.parts) / MANY))
+        parts = np.full(len(evidence.parts), self.prices.part / max(1.0, len(evidence.parts) / SETTINGS.parts))
         self._weights = np.concatenate([by_word(evidence.weights[order]), by_word(free), by_word(parts)])
         self._surface = sorted_by_cell(evidence.surface, FINE)
         self._rows: dict[Program, _Row] = {}
@@ -219,7 +205,7 @@ def centred(scene: Scene, candidates: Sequence[Program]) -> npt.NDArray[np.int64
         around = [
             any(mirrors(n, axis) or n.name.startswith("rotate") for n in program.walk()) for program in candidates
         ]
-        count += (np.abs(middle[:, axis]) < CENTRED) & ~np.array(around, np.bool_)
+        count += (np.abs(middle[:, axis]) < SETTINGS.centred) & ~np.array(around, np.bool_)
     return count
 
 
@@ -241,7 +227,7 @@ def free_points(evidence: Evidence, seed: int) -> tuple[FloatArray, float]:
     cells = np.argwhere(evidence.free)
     cells = cells[((cells + 0.5 >= low) & (cells + 0.5 <= high)).all(1)]
     random = np.random.default_rng(seed)
-    count = min(FREE_POINTS, len(cells))
+    count = min(SETTINGS.free_points, len(cells))
     selected = cells[np.sort(random.choice(len(cells), count, replace=False))] if count else cells
     points = (selected + random.random((count, 3))) * side - HALF
     return points[np.argsort(nearby(points), kind="stable")], len(cells) * side**3 / max(count, 1)
@@ -256,7 +242,8 @@ def unsupported(
     """
     area = np.where(scene.mask, face_areas(scene).double().sum(-1), 0.0)
     total = area.sum(1, keepdims=True)
-    expected = area / np.where(total > 0, total, 1) * total.clip(LEAST, MOST) / DRAWN
+    samples = total.clip(SETTINGS.least_samples, SETTINGS.most_samples) / SETTINGS.batch
+    expected = area / np.where(total > 0, total, 1) * samples
     times = np.where(area > 0, np.maximum(np.rint(expected), 1), 0).astype(np.int64).reshape(-1)
     row = torch.from_numpy(np.repeat(np.arange(len(times)), times))
     single = Batch(*(
@@ -264,16 +251,16 @@ def unsupported(
     ))  # fmt: skip
     if not len(row):
         return np.zeros((0, 3)), np.zeros(0, np.int64), np.zeros(0)
-    sample = sample_surface(single, DRAWN, torch.Generator().manual_seed(seed))
+    sample = sample_surface(single, SETTINGS.batch, torch.Generator().manual_seed(seed))
     points, normals = (part.double().reshape(-1, 3).numpy() for part in (sample.points, sample.normals))
     share = shares(points, normals, evidence, binned)
     bare = share > 0
-    source = np.repeat(row.numpy(), DRAWN)[bare]
-    lifted = points[bare] + SKIN * evidence.tolerance * normals[bare]
+    source = np.repeat(row.numpy(), SETTINGS.batch)[bare]
+    lifted = points[bare] + SETTINGS.skin * evidence.tolerance * normals[bare]
     return (
         lifted,
         source // max(scene.mask.shape[1], 1),
-        share[bare] * area.reshape(-1)[source] / (DRAWN * times[source]),
+        share[bare] * area.reshape(-1)[source] / (SETTINGS.batch * times[source]),
     )
 
 

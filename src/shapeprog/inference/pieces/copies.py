@@ -6,17 +6,9 @@ import numpy as np
 import numpy.typing as npt
 
 from shapeprog.inference.pieces.oriented import Boxes
+from shapeprog.inference.pieces.settings import SETTINGS
 from shapeprog.inference.surface.components import Components
 from shapeprog.space import FloatArray
-
-ALIKE = 0.02
-"""Distance in cells within which the vertices of copies meet."""
-
-LARGEST_COPY = 2000
-"""Vertices above which components are not compared."""
-
-KINDS = 64
-"""Largest number of different shapes among components with equal counts of vertices."""
 
 
 def align_copies(mesh: Components, boxes: Boxes) -> Boxes:
@@ -28,12 +20,12 @@ def align_copies(mesh: Components, boxes: Boxes) -> Boxes:
     count = np.diff(mesh.corner_start)[: len(boxes.half)]
     rotation, centre, half = boxes.rotation.copy(), boxes.centre.copy(), boxes.half.copy()
     turned = np.abs(boxes.rotation).max(1).sum(1)  # 3 along the axes
-    for size in np.unique(count[(count > 2) & (count <= LARGEST_COPY)]):
+    for size in np.unique(count[(count > 2) & (count <= SETTINGS.copy_vertices)]):
         remaining = np.flatnonzero(count == size)
         at = mesh.corner_start[remaining][:, None] + np.arange(size)
         middle = mesh.vertices[mesh.corner[at]].mean(1)
         cloud = mesh.vertices[mesh.corner[at]] - middle[:, None]
-        for _ in range(KINDS):
+        for _ in range(SETTINGS.copy_kinds):
             if len(remaining) < 2:
                 break
             model = 0
@@ -58,4 +50,4 @@ def _motions(model: FloatArray, clouds: FloatArray) -> tuple[npt.NDArray[np.bool
     u, _, vt = np.linalg.svd(np.einsum("gvi,vj->gij", clouds, model))
     turn = u @ vt
     off = np.abs(np.einsum("gij,vj->gvi", turn, model) - clouds).max((1, 2))
-    return off < ALIKE, turn
+    return off < SETTINGS.copy_distance, turn

@@ -8,12 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from shapeprog.inference.pieces.oriented import Boxes, bounds, boxes_around
-
-GAP = 0.3
-"""Largest distance in cells between touching boxes, and by which a neighbour may exceed the extent of the first."""
-
-MOST = 120
-"""Largest number of boxes to group, the first ones."""
+from shapeprog.inference.pieces.settings import SETTINGS
 
 
 def groups(boxes: Boxes) -> Boxes:
@@ -22,13 +17,13 @@ def groups(boxes: Boxes) -> Boxes:
     From each box, neighbours are added that do not exceed the extent of the first along some of its axes: one such axis
     yields frames and panels, two yield rods and stacks, and none yields all that touch.
     """
-    first = boxes.take(np.arange(min(len(boxes.half), MOST)))
+    first = boxes.take(np.arange(min(len(boxes.half), SETTINGS.grouped)))
     if len(first.half) < 2:
         return boxes.take(np.zeros(0, np.int64))
-    adjacent = touching(first, GAP)
+    adjacent = touching(first, SETTINGS.group_gap)
     at = np.einsum("jkc,icd->ijkd", first.corners(), first.rotation)
     at -= np.einsum("ic,icd->id", first.centre, first.rotation)[:, None, None]
-    within = np.abs(at).max(2) <= first.half[:, None] + GAP
+    within = np.abs(at).max(2) <= first.half[:, None] + SETTINGS.group_gap
     unique: dict[bytes, npt.NDArray[np.int64]] = {}
     for held in (held for count in (1, 2, 0) for held in combinations(range(3), count)):
         fits = within[:, :, held].all(2)

@@ -10,14 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from shapeprog.inference.pieces.oriented_kernels import COMPACT, FLAT, MANY, ROD, box_each
+from shapeprog.inference.pieces.settings import SETTINGS
 from shapeprog.space import Array, FloatArray
-
-THIN = 0.05
-"""Side in cells below which thickness is ignored in the selection of directions."""
-
-SLENDER, EVEN = 8.0, 0.5
-"""A rod's variance along its axis is at least so many times that across it, and that across is at least so even."""
-
 
 _LINES = np.array(
     [[1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 0], [1, -1, 0], [1, 0, 1], [1, 0, -1], [0, 1, 1], [0, 1, -1]]
@@ -53,7 +47,7 @@ def join(parts: list[Boxes]) -> Boxes:
     return Boxes(*(np.concatenate(column) for column in zip(empty, *parts, strict=True)))
 
 
-def boxes_around(points: Array, start: Array, frames: FloatArray | None = None, floor: float = THIN) -> Boxes:
+def boxes_around(points: Array, start: Array, frames: FloatArray | None = None, floor: float = SETTINGS.thin) -> Boxes:
     """A small box around each run of points, along the world's axes or turned about one of them where that is small.
 
     Parameters
@@ -74,7 +68,7 @@ def boxes_around(points: Array, start: Array, frames: FloatArray | None = None, 
         return boxes
     if frames is None:
         spread, frames = principal_axes(points, start)
-        rod = (spread[:, 0] > SLENDER * spread[:, 1]) & (spread[:, 2] > EVEN * spread[:, 1])
+        rod = (spread[:, 0] > SETTINGS.slender * spread[:, 1]) & (spread[:, 2] > SETTINGS.even * spread[:, 1])
         kind = np.where(rod, ROD, COMPACT)
     else:
         kind = np.full(runs, FLAT)

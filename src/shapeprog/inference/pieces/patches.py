@@ -10,26 +10,9 @@ from scipy.ndimage import label as label_regions
 
 from shapeprog.inference.pieces.oriented import Boxes, bounds, boxes_around, join, principal_axes
 from shapeprog.inference.pieces.patch_kernels import grow_patches
+from shapeprog.inference.pieces.settings import SETTINGS
 from shapeprog.inference.surface.cloud import NOISY, Cloud, tolerance
 from shapeprog.space import Array, FloatArray
-
-LEAST = 16
-"""Points of the smallest patch."""
-
-SNAP = 3.0
-"""Degrees within which the normal of a patch counts as one of the world's axes."""
-
-FULL = 0.8
-"""Share of a rectangle that its patch fills; below, its bars are detected as well."""
-
-RUNS = (0.6, 0.25, 0.1)
-"""Lengths of bars, as shares of the rectangle they lie in."""
-
-BAR = 0.7
-"""Share of its rectangle that a bar fills."""
-
-MOST = 160
-"""Largest number of patches."""
 
 
 def planar_patches(cloud: Cloud) -> Boxes:
@@ -37,9 +20,11 @@ def planar_patches(cloud: Cloud) -> Boxes:
     order = np.argsort(flatness(cloud), kind="stable")
     label = np.empty(len(cloud.points), np.int64)
     angle = np.cos(np.radians(25 if cloud.noise > NOISY else 15))
-    count = grow_patches(cloud.points, cloud.normals, cloud.neighbours, order, angle, tolerance(cloud), LEAST, label)
+    count = grow_patches(
+        cloud.points, cloud.normals, cloud.neighbours, order, angle, tolerance(cloud), SETTINGS.patch_points, label
+    )
     sizes = np.bincount(label[label >= 0], minlength=count)
-    largest = np.argsort(-sizes, kind="stable")[:MOST]
+    largest = np.argsort(-sizes, kind="stable")[: SETTINGS.patches]
     sequence = np.argsort(label, kind="stable")
     first = np.searchsorted(label[sequence], np.arange(count + 1))
     members = [sequence[first[k] : first[k + 1]] for k in largest]
@@ -67,7 +52,7 @@ def upright(normal: FloatArray) -> FloatArray:
     """Frames (P, 3, 3) about normals (P, 3), which snap to near axes of the world; so do the first columns."""
     normal = normal * np.sign(np.take_along_axis(normal, np.abs(normal).argmax(1)[:, None], 1))
     nearest = np.eye(3)[np.abs(normal).argmax(1)]
-    snapped = np.abs(normal).max(1) > np.cos(np.radians(SNAP))
+    snapped = np.abs(normal).max(1) > np.cos(np.radians(SETTINGS.snap))
     normal = np.where(snapped[:, None], nearest, normal)
     axis = np.eye(3)[np.abs(normal).argmin(1)]
     across = axis - normal * np.sum(axis * normal, 1, keepdims=True)
@@ -84,7 +69,7 @@ def bars(cloud: Cloud, members: list[npt.NDArray[np.int64]], patches: Boxes) -> 
         grid = np.zeros(shape, np.bool_)
         at = np.minimum((flat / (2 * reach[:2]) * shape).astype(int), shape - 1)
         grid[at[:, 0], at[:, 1]] = True
-        if grid.mean() > FULL or shape.max() < 6:
+        if grid.mean() > SETTINGS.full or shape.max() < 6:
             continue
         for low, high in bars_of(grid):
             ends = np.stack([low, high]) / shape * 2 * reach[:2] - reach[:2]
@@ -98,13 +83,13 @@ def bars_of(grid: npt.NDArray[np.bool_]) -> list[tuple[Array, Array]]:
     for axis in range(2):
         length = run_lengths(grid if axis else grid.T)
         length = length if axis else length.T
-        for share in RUNS:
+        for share in SETTINGS.bar_runs:
             min_length = max(share * grid.shape[axis], 3)
             regions, count = label_regions(length >= min_length)
             for k in range(1, count + 1):
                 cells = np.argwhere(regions == k)
                 low, high = cells.min(0), cells.max(0) + 1
-                if len(cells) >= BAR * np.prod(high - low):
+                if len(cells) >= SETTINGS.bar_full * np.prod(high - low):
                     corners[(*low.tolist(), *high.tolist())] = None
     return [(np.array(key[:2]), np.array(key[2:])) for key in corners]
 

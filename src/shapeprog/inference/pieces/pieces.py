@@ -32,27 +32,10 @@ from shapeprog.inference.pieces.limbs import limbs
 from shapeprog.inference.pieces.oriented import Boxes, bounds, boxes_around, distinct, join
 from shapeprog.inference.pieces.patches import planar_patches
 from shapeprog.inference.pieces.rods import rods
+from shapeprog.inference.pieces.settings import SETTINGS
 from shapeprog.inference.pieces.slabs import sheets, slabs
 from shapeprog.inference.surface.cloud import Cloud, cloud_of, is_clean, points_of_scan
 from shapeprog.inference.surface.components import Components, components
-
-POINTS = 20_000
-"""Points sampled on the surface of a mesh."""
-
-OWN = 48
-"""Smallest number of points on a component."""
-
-COMPONENTS, SLABS, SHEETS, LIMBS = 300, 600, 60, 100
-"""Largest number of pieces of these sources."""
-
-MOST = 600
-"""Largest number of pieces of one target."""
-
-SAME = 0.25
-"""Difference in cells in position and size below which two pieces are the same; components are never merged."""
-
-LEAST = 32
-"""Smallest number of points from which a surface is estimated."""
 
 
 class Source(Enum):
@@ -101,14 +84,14 @@ def find_pieces(shape: Shape, seed: int = 0) -> Pieces:
 
 def _of_mesh(mesh: Components, seed: int) -> Pieces:
     """Pieces of a mesh: from its components, and from sampled points, with at least some on each large component."""
-    count = min(len(mesh.area), COMPONENTS)
+    count = min(len(mesh.area), SETTINGS.components)
     corner = mesh.corner[: mesh.corner_start[count]]
     boxes = align_copies(mesh, boxes_around(mesh.vertices[corner], mesh.corner_start[: count + 1]))
-    samples = [sample_with_faces(mesh.vertices, mesh.faces, POINTS, seed)]
+    samples = [sample_with_faces(mesh.vertices, mesh.faces, SETTINGS.points, seed)]
     counts = np.bincount(mesh.component_of(samples[0][1]), minlength=count)
-    for component in np.flatnonzero(counts[:count] < OWN):
+    for component in np.flatnonzero(counts[:count] < SETTINGS.component_points):
         first, last = mesh.face_start[component : component + 2]
-        points, face = sample_with_faces(mesh.vertices, mesh.faces[first:last], OWN, seed)
+        points, face = sample_with_faces(mesh.vertices, mesh.faces[first:last], SETTINGS.component_points, seed)
         samples.append((points, face + first))
     points, face = (np.concatenate(column) for column in zip(*samples, strict=True))
     corners = mesh.vertices[mesh.faces[face]]
@@ -122,21 +105,21 @@ def _of_points(cloud: Cloud, seed: int, along: Sequence[npt.NDArray[np.int64]]) 
 
     ``along`` has the indices of the points of each limb.
     """
-    if len(cloud.points) < LEAST:
+    if len(cloud.points) < SETTINGS.least_points:
         return [(Source.GROUP, boxes_around(cloud.points, np.array([0, len(cloud.points)])))]
     patches = planar_patches(cloud)
     between = slabs(patches)
-    between = between.take(distinct(between, SAME))
+    between = between.take(distinct(between, SETTINGS.same))
     support = Support(cloud, between)
     selected = np.flatnonzero(support.filled)
-    selected = selected[np.argsort(-support.explained[selected].sum(1), kind="stable")[:SLABS]]
-    along = along[:LIMBS]
+    selected = selected[np.argsort(-support.explained[selected].sum(1), kind="stable")[: SETTINGS.slabs]]
+    along = along[:100]
     members = cloud.points[np.concatenate(along)] if along else np.zeros((0, 3))
     sources = [
         (Source.ROD, rods(cloud, seed)),
         (Source.LIMB, boxes_around(members, bounds(along))),
         (Source.SLAB, between.take(selected)),
-        (Source.SHEET, sheets(patches, SHEETS)),
+        (Source.SHEET, sheets(patches, SETTINGS.sheets)),
     ]
     boxes = join([part for _, part in sources])
     return [*sources, (Source.GROUP, groups(boxes.take(Support(cloud, boxes).cover())))]
@@ -148,7 +131,7 @@ def _ranked(cloud: Cloud, listed: list[tuple[Source, Boxes]], component_boxes: B
     listed = [(Source.COMPONENT, component_boxes), *listed]
     boxes = join([boxes for _, boxes in listed])
     source = np.concatenate([np.full(len(boxes.half), source.value) for source, boxes in listed])
-    unique = distinct(boxes, SAME)
+    unique = distinct(boxes, SETTINGS.same)
     unique = np.concatenate([np.arange(count), unique[unique >= count]])
     boxes, source = boxes.take(unique), source[unique]
     support = Support(cloud, boxes)
@@ -156,5 +139,5 @@ def _ranked(cloud: Cloud, listed: list[tuple[Source, Boxes]], component_boxes: B
     cover = support.cover()
     first[cover] = np.arange(len(cover))
     turn = np.searchsorted([Source.COMPONENT.value, Source.LIMB.value], source)
-    order = np.lexsort((-np.round(support.value, 6), turn, first))[:MOST]
+    order = np.lexsort((-np.round(support.value, 6), turn, first))[: SETTINGS.pieces]
     return Pieces(boxes.take(order), source[order], cloud)

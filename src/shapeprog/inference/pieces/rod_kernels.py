@@ -77,7 +77,6 @@ def count_rods(points, normals, centre, frame, radius, tolerance, cosine, counts
             high += 1
         counts[rod, 0] = np.sum(stretch[low:high])
         counts[rod, 1], counts[rod, 2] = REACH * (low - middle), REACH * (high - middle)
-        filled = 0
+        counts[rod, 3] = 0.0
         for b in range(BINS):
-            filled += np.any(sector[low:high, b])
-        counts[rod, 3] = filled / BINS
+            counts[rod, 3] += np.any(sector[low:high, b]) / BINS

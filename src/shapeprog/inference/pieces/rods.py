@@ -8,29 +8,9 @@ import numpy.typing as npt
 from shapeprog.inference.pieces.oriented import Boxes, join
 from shapeprog.inference.pieces.patches import upright
 from shapeprog.inference.pieces.rod_kernels import count_rods, mark_rod
+from shapeprog.inference.pieces.settings import SETTINGS
 from shapeprog.inference.surface.cloud import NOISY, Cloud, tolerance
 from shapeprog.space import Array, FloatArray
-
-TRIALS, STEPS = 1200, 8
-"""Pairs of points tried, and the longest walk from one to the other."""
-
-PARALLEL = 0.8
-"""Cosine above which the normals of a pair do not determine an axis."""
-
-LARGEST = 5.0
-"""Largest radius in cells."""
-
-ROUND = 0.6
-"""Smallest share of the sectors around a rod with points."""
-
-DENSE = 0.5
-"""Smallest number of points of a rod, as a share of the expected number on its surface."""
-
-LEAST = 24
-"""Points of the smallest rod."""
-
-MOST = 60
-"""Largest number of rods."""
 
 
 def rods(cloud: Cloud, seed: int = 0) -> Boxes:
@@ -41,22 +21,22 @@ def rods(cloud: Cloud, seed: int = 0) -> Boxes:
     count_rods(cloud.points, cloud.normals, centre, _frames(axis), radius, off, facing, counts)
     support, start, end, share = counts.T
     length = end - start
-    good = (support >= LEAST) & (share >= ROUND) & (length > 2 * radius)
-    good &= support > DENSE * 2 * np.pi * radius * length * share / cloud.spacing**2
+    good = (support >= SETTINGS.rod_points) & (share >= SETTINGS.rod_round) & (length > 2 * radius)
+    good &= support > SETTINGS.rod_dense * 2 * np.pi * radius * length * share / cloud.spacing**2
     centre = centre + axis * ((start + end) / 2)[:, None]
     used = np.zeros(len(cloud.points), np.bool_)
     result: list[Boxes] = []
     for k in np.flatnonzero(good)[np.argsort(-support[good], kind="stable")]:
-        if len(result) == MOST:
+        if len(result) == SETTINGS.rods:
             break
         rod = centre[k], axis[k], float(radius[k]), float(length[k]) / 2
         inside = on_rod(cloud, *rod, off, facing)
-        if len(inside) < LEAST or used[inside].mean() > 0.5:
+        if len(inside) < SETTINGS.rod_points or used[inside].mean() > 0.5:
             continue
         for _ in range(2):
             middle, along, width, half = fitted(cloud, inside, rod[1])
             inside = on_rod(cloud, middle, along, width, half + 0.5, off, facing)
-            if len(inside) < LEAST:
+            if len(inside) < SETTINGS.rod_points:
                 break
             rod = middle, along, width, half
         else:
@@ -74,14 +54,14 @@ def through_pairs(cloud: Cloud, off: float, seed: int) -> tuple[FloatArray, Floa
     ``off`` is how far a point may be from the cylinder.
     """
     points, normals, neighbours = cloud.points, cloud.normals, cloud.neighbours
-    draws = np.random.default_rng(seed).integers(1 << 32, size=(TRIALS, STEPS))
+    draws = np.random.default_rng(seed).integers(1 << 32, size=(SETTINGS.rod_trials, SETTINGS.rod_walk))
     first = second = draws[:, 0] % len(points)
-    cosine = np.ones(TRIALS)
+    cosine = np.ones(SETTINGS.rod_trials)
     for draw in draws[:, 1:].T:  # walk until the normals differ
-        going = np.abs(cosine) >= PARALLEL
+        going = np.abs(cosine) >= SETTINGS.rod_parallel
         second = np.where(going, neighbours[second, draw % neighbours.shape[1]], second)
         cosine = np.einsum("ti,ti->t", normals[first], normals[second])
-    apart = np.abs(cosine) <= PARALLEL
+    apart = np.abs(cosine) <= SETTINGS.rod_parallel
     first, second, cosine = first[apart], second[apart], cosine[apart]
     p, q, away = normals[first], normals[second], points[second] - points[first]
     axis = np.cross(p, q)
@@ -91,7 +71,7 @@ def through_pairs(cloud: Cloud, off: float, seed: int) -> tuple[FloatArray, Floa
     s, t = (along_p - cosine * along_q) / (1 - cosine**2), (cosine * along_p - along_q) / (1 - cosine**2)
     radius = (np.abs(s) + np.abs(t)) / 2
     good = np.abs(np.abs(s) - np.abs(t)) <= off + 0.1 * radius
-    good &= (radius <= LARGEST) & (radius >= 0.5 * off)
+    good &= (radius <= SETTINGS.rod_radius) & (radius >= 0.5 * off)
     return (points[first] + s[:, None] * p)[good], axis[good], radius[good]
 
 

@@ -5,30 +5,19 @@ from __future__ import annotations
 import numpy as np
 
 from shapeprog.inference.pieces.oriented import Boxes
-from shapeprog.space import SPAN, Array, FloatArray
-
-PARALLEL = 8.0
-"""Degrees between the normals of two patches of a pair, at most."""
-
-THICKNESS = (0.004 * SPAN, 0.35 * SPAN)
-"""Least and largest distance between them, in cells."""
-
-SHARED = 0.5
-"""Share of the smaller patch that the larger one faces, at least."""
-
-STRETCH = 1.6
-"""Largest thickness of a pair as a multiple of the middle side of its box: above, other faces describe it better."""
+from shapeprog.inference.pieces.settings import SETTINGS
+from shapeprog.space import Array, FloatArray
 
 
 def slabs(patches: Boxes) -> Boxes:
     """Boxes between pairs of patches: intersection and bounds of both rectangles, and each of them."""
     normal = patches.rotation[:, :, 2]
     distance = np.einsum("ijk,ik->ij", patches.centre[None] - patches.centre[:, None], normal)
-    parallel = np.abs(normal @ normal.T) > np.cos(np.radians(PARALLEL))
+    parallel = np.abs(normal @ normal.T) > np.cos(np.radians(SETTINGS.parallel))
     area = patches.half[:, :2].prod(1)
     larger = area[:, None] >= area
     thick = np.abs(distance)
-    i, j = np.nonzero(parallel & larger & (thick >= THICKNESS[0]) & (thick <= THICKNESS[1]))
+    i, j = np.nonzero(parallel & larger & (thick >= SETTINGS.thickness[0]) & (thick <= SETTINGS.thickness[1]))
     i, j = i[i != j], j[i != j]
     corner = patches.corners()[j] - patches.centre[i][:, None]
     flat = np.einsum("nck,nka->nca", corner, patches.rotation[i][:, :, :2])
@@ -36,7 +25,7 @@ def slabs(patches: Boxes) -> Boxes:
     half = patches.half[i, :2]
     inner = np.maximum(low, -half), np.minimum(high, half)
     shared = np.maximum(inner[1] - inner[0], 0).prod(1)
-    keep = shared >= SHARED * np.minimum(4 * half.prod(1), (high - low).prod(1))
+    keep = shared >= SETTINGS.shared * np.minimum(4 * half.prod(1), (high - low).prod(1))
     i, j, low, high, half = i[keep], j[keep], low[keep], high[keep], half[keep]
     spans = [
         (inner[0][keep], inner[1][keep]),
@@ -50,7 +39,7 @@ def slabs(patches: Boxes) -> Boxes:
 def sheets(patches: Boxes, count: int) -> Boxes:
     """Thin boxes about the largest patches."""
     largest = patches.take(np.argsort(-np.round(patches.half[:, :2].prod(1), 6), kind="stable")[:count])
-    return largest._replace(half=np.maximum(largest.half, [0, 0, THICKNESS[0] / 2]))
+    return largest._replace(half=np.maximum(largest.half, [0, 0, SETTINGS.thickness[0] / 2]))
 
 
 def _between(patches: Boxes, i: Array, depth: FloatArray, spans: list[tuple[FloatArray, FloatArray]]) -> Boxes:
@@ -62,4 +51,4 @@ def _between(patches: Boxes, i: Array, depth: FloatArray, spans: list[tuple[Floa
     centre = np.tile(patches.centre[i], (len(spans), 1)) + np.einsum("nij,nj->ni", frame, local)
     box = Boxes(centre, frame, np.concatenate([half, np.abs(deep)[:, None] / 2], 1))
     sides = np.sort(box.half, 1)
-    return box.take((box.half > 0).all(1) & (box.half[:, 2] <= STRETCH * sides[:, 1]))
+    return box.take((box.half > 0).all(1) & (box.half[:, 2] <= SETTINGS.stretch * sides[:, 1]))

@@ -34,7 +34,7 @@ MOST_CANDIDATES = 1_500
 """Most candidates that are compared; half of them may be single blocks."""
 
 LEAST_GAIN = 0.0005
-"""Share of the surface from which a second choice is accepted, and another block is mentioned."""
+"""Share of the surface from which another block is mentioned."""
 
 
 @dataclass(frozen=True)
@@ -115,10 +115,8 @@ def _candidates(shape: Shape) -> list[Node]:
 def _chosen(
     candidates: list[Node], coverage: Coverage, blocks: int, seed: int, deadline: Deadline
 ) -> tuple[Choice, list[Node]]:
-    """The better of two choices, and its candidates.
-
-    The second is among the first choice, a choice with a wide tolerance, their adjusted forms and neighbours, boxes
-    around unexplained points, and candidates passed over.
+    """A choice among a first one, one with a wide tolerance, their adjusted forms and neighbours, boxes around
+    unexplained points, and candidates passed over; and these candidates.
     """
     evidence = coverage.evidence
     table = _table(candidates, coverage)
@@ -134,8 +132,7 @@ def _chosen(
         pool += [*nodes, *adjusted.body, *neighbours(adjusted), *residual_candidates(adjusted, evidence)]
     remaining = [candidates[index] for index in missed(table, choice.best.chosen)[:200]]
     pool = list(dict.fromkeys([*pool, *remaining]))  # the first choice first: the search starts there
-    again = choose(_table(pool, coverage), blocks, start=range(len(first)), seed=seed)
-    return (again, pool) if again.best.value > choice.best.value + LEAST_GAIN else (choice, candidates)
+    return choose(_table(pool, coverage), blocks, start=range(len(first)), seed=seed), pool
 
 
 def _unharmed(adjusted: Program, start: Program, coverage: Coverage) -> Program:

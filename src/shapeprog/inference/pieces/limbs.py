@@ -14,70 +14,50 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial import cKDTree
 
+from shapeprog.inference.pieces.settings import SETTINGS
 from shapeprog.inference.surface.cloud import Cloud
 from shapeprog.inference.surface.components import linked
 from shapeprog.space import FloatArray
 
-COUNT = 5000
-"""Largest number of points whose balls are computed."""
-
-LARGEST = 3.0
-"""Radius of the largest ball in cells."""
-
-SHRINKS = 8
-"""Rounds of shrinking a ball until no point is within it."""
-
-MERGED, STEP = 0.25, 0.25
-"""Distance in cells, and in logarithms of the radius, within which balls are merged."""
-
-NEAREST = 24
-"""Neighbouring centres from which the direction is estimated."""
-
-LINEAR = 0.3
-"""Standard deviation across a line of centres, as a share of that along it, at most."""
-
-BEND = 25.0
-"""Degrees between the directions of neighbours in one limb, at most."""
-
-LEAST = 20
-"""Points of the smallest limb."""
-
-GAP, ASIDE, STRAIGHT = 6.0, 0.6, 15.0
-"""Cells between the ends of two straight limbs, cells between the lines that they lie on, and degrees between these, up
-to which they may be one."""
-
 
 def limbs(cloud: Cloud) -> list[npt.NDArray[np.int64]]:
     """The points of each limb, as indices of the evidence, largest first."""
-    step = -(-len(cloud.points) // COUNT)
+    step = -(-len(cloud.points) // SETTINGS.ball_points)
     which: npt.NDArray[np.int64] = np.arange(0, len(cloud.points), step, dtype=np.int64)
     centre, radius = inner_balls(cloud, which)
-    fine = (radius > 0) & (radius < LARGEST)
+    fine = (radius > 0) & (radius < SETTINGS.ball_radius)
     which, centre, radius = which[fine], centre[fine], radius[fine]
     if not len(which):
         return []
     name, centre, radius = merged(centre, radius)
-    distance, nearest = cKDTree(centre).query(centre, k=range(1, min(NEAREST, len(centre)) + 1), workers=2)
-    reach = 2 * radius[:, None] + 2.5 * MERGED
-    close = (distance < reach) & (np.abs(np.log(radius[nearest] / radius[:, None])) < 2 * STEP)
+    distance, nearest = cKDTree(centre).query(
+        centre, k=range(1, min(SETTINGS.limb_neighbours, len(centre)) + 1), workers=2
+    )
+    reach = 2 * radius[:, None] + 2.5 * SETTINGS.merged
+    close = (distance < reach) & (np.abs(np.log(radius[nearest] / radius[:, None])) < 2 * SETTINGS.merged_radius)
     weight = close.astype(np.float64)[..., None]
     off = (centre[nearest] - (centre[nearest] * weight).sum(1, keepdims=True) / weight.sum(1, keepdims=True)) * weight
     spread, axes = np.linalg.eigh(off.transpose(0, 2, 1) @ off)
     spread = np.sqrt(np.maximum(spread, 0))
     result = list[npt.NDArray[np.int64]]()
-    line = spread[:, 1] < LINEAR * spread[:, 2]
-    for kind, direction in ((line, axes[:, :, 2]), (~line & (spread[:, 0] < LINEAR * spread[:, 1]), axes[:, :, 0])):
-        facing = np.abs(np.einsum("nki,ni->nk", direction[nearest], direction)) > np.cos(np.radians(BEND))
+    line = spread[:, 1] < SETTINGS.linear * spread[:, 2]
+    for kind, direction in (
+        (line, axes[:, :, 2]),
+        (~line & (spread[:, 0] < SETTINGS.linear * spread[:, 1]), axes[:, :, 0]),
+    ):
+        facing = np.abs(np.einsum("nki,ni->nk", direction[nearest], direction)) > np.cos(np.radians(SETTINGS.bend))
         i, k = np.nonzero(close & facing & kind[:, None] & kind[nearest])
         of_point = linked(np.stack([i, nearest[i, k]], 1), len(nearest))[name]
-        mine = [which[of_point == label] for label in np.flatnonzero(np.bincount(of_point) >= LEAST)]
+        mine = [which[of_point == label] for label in np.flatnonzero(np.bincount(of_point) >= SETTINGS.limb_points)]
         result += [*mine, *(in_line(cloud.points, mine) if kind is line else [])]
     return sorted(result, key=len, reverse=True)
 
 
 def merged(centre: FloatArray, radius: FloatArray) -> tuple[npt.NDArray[np.int64], FloatArray, FloatArray]:
     """Balls with about the same centre and radius merged: the new index of each, new centres and radii."""
-    cell = np.concatenate([np.round(centre / MERGED), np.round(np.log(radius) / STEP)[:, None]], 1).astype(np.int64)
+    cell = np.concatenate(
+        [np.round(centre / SETTINGS.merged), np.round(np.log(radius) / SETTINGS.merged_radius)[:, None]], 1
+    ).astype(np.int64)
     _, name, count = np.unique(cell, axis=0, return_inverse=True, return_counts=True)
     name = name.reshape(-1)
     mean = [np.bincount(name, column) / count for column in (*centre.T, radius)]
@@ -92,9 +72,9 @@ def inner_balls(cloud: Cloud, which: npt.NDArray[np.int64]) -> tuple[FloatArray,
     tree = cKDTree(cloud.points)
     points = np.concatenate([cloud.points[which]] * 2)
     normals = np.concatenate([cloud.normals[which], -cloud.normals[which]])
-    radius = np.full(len(points), LARGEST)
+    radius = np.full(len(points), SETTINGS.ball_radius)
     going = np.arange(len(points))
-    for _ in range(SHRINKS):
+    for _ in range(SETTINGS.ball_rounds):
         middle = points[going] - normals[going] * radius[going, None]
         distance, nearest = tree.query(middle, workers=2)
         off = points[going] - cloud.points[nearest]
@@ -120,9 +100,9 @@ def in_line(points: FloatArray, stretches: Sequence[npt.NDArray[np.int64]]) -> l
     away = middle[None] - middle[:, None]
     ahead = np.einsum("ijc,ic->ij", away, along)
     aside = np.linalg.norm(away - ahead[..., None] * along[:, None], axis=2)
-    straight = np.abs(along @ along.T) > np.cos(np.radians(STRAIGHT))
-    first, second = np.nonzero(np.triu(straight & (np.maximum(aside, aside.T) < ASIDE), 1))
-    close = np.abs(ahead[first, second]) - half[first] - half[second] < GAP
+    straight = np.abs(along @ along.T) > np.cos(np.radians(SETTINGS.line_bend))
+    first, second = np.nonzero(np.triu(straight & (np.maximum(aside, aside.T) < SETTINGS.line_aside), 1))
+    close = np.abs(ahead[first, second]) - half[first] - half[second] < SETTINGS.line_gap
     label = linked(np.stack([first[close], second[close]], 1), len(stretches))
     groups = np.flatnonzero(np.bincount(label, minlength=1) > 1)
     return [np.concatenate([stretches[k] for k in np.flatnonzero(label == group).tolist()]) for group in groups]

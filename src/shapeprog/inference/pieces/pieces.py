@@ -113,7 +113,7 @@ def _of_points(cloud: Cloud, seed: int, along: Sequence[npt.NDArray[np.int64]]) 
     support = Support(cloud, between)
     selected = np.flatnonzero(support.filled)
     selected = selected[np.argsort(-support.explained[selected].sum(1), kind="stable")[: SETTINGS.slabs]]
-    along = along[:100]
+    along = along[: SETTINGS.limbs]
     members = cloud.points[np.concatenate(along)] if along else np.zeros((0, 3))
     sources = [
         (Source.ROD, rods(cloud, seed)),

@@ -15,7 +15,7 @@ class Settings:
     ----------
     points, component_points, least_points
         Points sampled on a mesh; smallest number on a component, and from which a surface is estimated.
-    components, slabs, sheets, pieces
+    components, slabs, sheets, limbs, pieces
         Largest numbers of pieces of these sources, and of all.
     same
         Difference in position and size below which two pieces are the same; components are never merged.
@@ -48,6 +48,16 @@ class Settings:
     thickness, stretch
         Least and largest distance between them; largest multiple of the middle side of their box: above, other faces
         describe it better.
+    ball_points, ball_radius, ball_rounds
+        Points whose inner balls are computed, radius of the largest, and rounds of shrinking one until it is empty.
+    merged, merged_radius
+        Distance, and difference of the logarithms of the radius, within which balls are merged.
+    limb_neighbours, linear, bend, limb_points
+        Neighbouring centres from which a direction is estimated; standard deviation across a line of centres, as a
+        share of that along it, at most; degrees between directions of neighbours in one limb; points of the smallest.
+    line_gap, line_aside, line_bend
+        Distance between the ends of two straight limbs, distance between the lines that they lie on, and degrees
+        between these, up to which they may be one.
     rods, rod_points
         Most rods, and points of the smallest.
     rod_trials, rod_walk, rod_parallel
@@ -62,6 +72,7 @@ class Settings:
     components: int = 300
     slabs: int = 600
     sheets: int = 60
+    limbs: int = 100
     pieces: int = 600
     same: float = 0.25
     copy_distance: float = 0.02
@@ -88,6 +99,18 @@ class Settings:
     shared: float = 0.5
     thickness: tuple[float, float] = (0.004 * SPAN, 0.35 * SPAN)
     stretch: float = 1.6
+    ball_points: int = 5000
+    ball_radius: float = 3.0
+    ball_rounds: int = 8
+    merged: float = 0.25
+    merged_radius: float = 0.25
+    limb_neighbours: int = 24
+    linear: float = 0.3
+    bend: float = 25.0
+    limb_points: int = 20
+    line_gap: float = 6.0
+    line_aside: float = 0.6
+    line_bend: float = 15.0
     rods: int = 60
     rod_points: int = 24
     rod_trials: int = 1200

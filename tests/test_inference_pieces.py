@@ -13,7 +13,6 @@ from shapeprog.data.placement import shape_from_mesh, shape_from_points
 from shapeprog.data.sampling import sample_surface
 from shapeprog.data.shape import Shape
 from shapeprog.geometry.mesh import union_mesh
-from shapeprog.inference.pieces.copies import align_copies
 from shapeprog.inference.pieces.limbs import limbs
 from shapeprog.inference.pieces.oriented import Boxes, bounds, boxes_around
 from shapeprog.inference.pieces.pieces import Pieces, Source, find_pieces
@@ -239,22 +238,6 @@ def test_faces_of_closed_solids_are_told_which_way_they_face():
     )
     sign = 1 if outwards else -1
     assert found == [{sign}, {-sign}, {1}, {0}, {0}, {0}]
-
-
-def test_copies_get_boxes_that_the_motions_between_them_take_to_each_other():
-    model, faces = cylinder(np.zeros(3), np.array([1.0, 0, 0]), 1, 3, 7)
-    model = model * [1, 1.3, 0.8]
-    motions = [np.eye(3), turn(0, 31), turn(1, 50) @ turn(2, 20), np.diag([1.0, -1, 1]) @ turn(2, 64)]
-    mesh = together(*((model @ motion.T + 8 * k, faces) for k, motion in enumerate(motions)))
-    found = components(*mesh)
-    boxes = align_copies(found, boxes_around(found.vertices[found.corner], found.corner_start))
-    np.testing.assert_allclose(boxes.half, np.tile(boxes.half[0], (4, 1)), atol=1e-6)
-    np.testing.assert_allclose(np.linalg.det(boxes.rotation), 1)
-    place = [int(np.round(centre.mean() / 8)) for centre in boxes.centre]
-    for k, box_rotation in zip(place, boxes.rotation, strict=True):
-        back = motions[k].T @ box_rotation
-        first = motions[place[0]].T @ boxes.rotation[0]
-        np.testing.assert_allclose(np.abs(back.T @ first), np.eye(3), atol=1e-6)
 
 
 def test_boards_side_by_side_are_also_offered_as_one_panel():

@@ -25,7 +25,6 @@ import numpy.typing as npt
 
 from shapeprog.data.sampling import sample_with_faces
 from shapeprog.data.shape import Shape
-from shapeprog.inference.pieces.copies import align_copies
 from shapeprog.inference.pieces.covering import Support
 from shapeprog.inference.pieces.grouping import groups
 from shapeprog.inference.pieces.limbs import limbs
@@ -86,7 +85,7 @@ def _of_mesh(mesh: Components, seed: int) -> Pieces:
     """Pieces of a mesh: from its components, and from sampled points, with at least some on each large component."""
     count = min(len(mesh.area), SETTINGS.components)
     corner = mesh.corner[: mesh.corner_start[count]]
-    boxes = align_copies(mesh, boxes_around(mesh.vertices[corner], mesh.corner_start[: count + 1]))
+    boxes = boxes_around(mesh.vertices[corner], mesh.corner_start[: count + 1])
     samples = [sample_with_faces(mesh.vertices, mesh.faces, SETTINGS.points, seed)]
     counts = np.bincount(mesh.component_of(samples[0][1]), minlength=count)
     for component in np.flatnonzero(counts[:count] < SETTINGS.component_points):

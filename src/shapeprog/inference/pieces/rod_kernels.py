@@ -75,8 +75,12 @@ def count_rods(points, normals, centre, frame, radius, tolerance, cosine, counts
             low -= 1
         while high < STRETCHES and stretch[high] > 0:
             high += 1
-        counts[rod, 0] = np.sum(stretch[low:high])
+        counts[rod, 0], counts[rod, 3] = 0.0, 0.0
         counts[rod, 1], counts[rod, 2] = REACH * (low - middle), REACH * (high - middle)
-        counts[rod, 3] = 0.0
+        for place in range(low, high):
+            counts[rod, 0] += stretch[place]
         for b in range(BINS):
-            counts[rod, 3] += np.any(sector[low:high, b]) / BINS
+            for place in range(low, high):
+                if sector[place, b]:
+                    counts[rod, 3] += 1.0 / BINS
+                    break

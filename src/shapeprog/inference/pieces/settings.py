@@ -19,9 +19,6 @@ class Settings:
         Largest numbers of pieces of these sources, and of all.
     same
         Difference in position and size below which two pieces are the same; components are never merged.
-    copy_distance, copy_vertices, copy_kinds
-        Distance within which the vertices of copies meet; vertices above which components are not compared; different
-        shapes that are told apart among components with equal counts of vertices.
     cover_points, cover_distance
         Surface points that are tested, and distance from the surface of a box within which it explains one.
     cover_price, cover_filled
@@ -75,9 +72,6 @@ class Settings:
     limbs: int = 100
     pieces: int = 600
     same: float = 0.25
-    copy_distance: float = 0.02
-    copy_vertices: int = 2000
-    copy_kinds: int = 64
     cover_points: int = 5000
     cover_distance: float = 0.2
     cover_price: float = 0.6

@@ -11,7 +11,6 @@ import itertools
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-import torch
 
 from shapeprog.inference.candidates.drawings import drawings, hinted, redrawn, solid_boxes
 from shapeprog.inference.candidates.loops import mirrors, repeated, rows
@@ -19,8 +18,6 @@ from shapeprog.inference.candidates.settings import SETTINGS
 from shapeprog.language.hints import STRAIGHT, Box
 from shapeprog.language.program import Chain, Draw, Loop, Node, Program, nest
 from shapeprog.language.statement import language
-from shapeprog.language.tensors import encode
-from shapeprog.language.unroll import unroll
 from shapeprog.space import DEPTH, SIDE, FloatArray
 
 CORNERS = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
@@ -43,22 +40,14 @@ def neighbours(program: Program) -> list[Node]:
             result += [with_drawing(chain, drawing) for drawing in drawings(box)]
             edited = list(met(box, parts))
             edited += [middle for candidate in [box, *edited] for middle in centred(candidate)]
-            result += [
-                with_drawing(chain, drawing)
-                for candidate in edited
-                for drawing in redrawn(drawing_of(chain), candidate)
-            ]
+            redraws = (drawing for candidate in edited for drawing in redrawn(drawing_of(chain), candidate))
+            result += [with_drawing(chain, drawing) for drawing in redraws]
             result += _recounted(chain, box)
             result += _filled(chain)
-    for (first_chain, first_box), (second_chain, second_box) in itertools.combinations(
-        zip(chains, boxes, strict=True), 2
-    ):
-        if first_box is not None and second_box is not None and _loops(first_chain) == _loops(second_chain):
-            result += [
-                with_drawing(first_chain, drawing)
-                for merged in _merged(first_box, second_box)
-                for drawing in drawings(merged)
-            ]
+    for (chain, box), (other, other_box) in itertools.combinations(zip(chains, boxes, strict=True), 2):
+        if box is not None and other_box is not None and _loops(chain) == _loops(other):
+            merged = (drawing for around in _merged(box, other_box) for drawing in drawings(around))
+            result += [with_drawing(chain, drawing) for drawing in merged]
     existing = set(program.body)
     return [node for node in dict.fromkeys(result) if node not in existing]
 
@@ -108,21 +97,16 @@ def _recounted(chain: Chain, box: Box) -> Iterator[Node]:
     for index, loop in enumerate(chain[:-1]):
         if not (isinstance(loop, Loop) and language()[loop.name].quantities[0].written_out):
             continue
-        first, second = _centres(nest((Loop(loop.name, (2.0, *loop.values[1:]), ()), chain[-1])))[:2]
+        ((first, second, *_),) = solid_boxes([nest((Loop(loop.name, (2.0, *loop.values[1:]), ()), chain[-1]))])
         for more in (-1, 1):
             if loop.count + more < 2:
                 continue
             outer = (*chain[:index], Loop(loop.name, (loop.count + float(more), *loop.values[1:]), ()))
             inner = chain[index + 1 :]
             yield nest((*outer, *inner))
-            moved = box._replace(centre=box.centre - more * (second - first))
+            moved = box._replace(centre=box.centre - more * (second.centre - first.centre))
             for drawing in hinted(language()[chain[-1].name], moved):
                 yield nest((*outer, *inner[:-1], drawing))
-
-
-def _centres(node: Node) -> FloatArray:
-    centres: FloatArray = unroll(encode(Program((node,)), dtype=torch.float64)).centre.numpy()
-    return centres
 
 
 def _filled(chain: Chain) -> Iterator[Node]:

@@ -179,6 +179,11 @@ def test_single_parts_are_turned_whatever_stands_before_them_and_pairs_never():
         assert all(isinstance(node.body[0], Draw) for node in turned)
 
 
+def test_parts_of_a_round_surface_are_not_turned():
+    surface = evidence_of_program(parse("cylinder(at=(0, 0, 0), height=1, radius=8)")).surface
+    assert {node.name for node in images([Draw("box", (0.0, 1.5, -1.0, 1.0, 6.0, 2.0))], surface)} == {"mirror"}
+
+
 STAR = """\
 cylinder(at=(-8, 1.5, 0), height=20, radius=1)
 for i in rotate_about(5, step=72, at=(1.5, 0)):

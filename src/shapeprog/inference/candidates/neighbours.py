@@ -95,7 +95,7 @@ def _mirrored(chain: Chain) -> Iterator[Node]:
 def _recounted(chain: Chain, box: Box) -> Iterator[Node]:
     """A run with one copy more or one less, at its end or at its beginning."""
     for index, loop in enumerate(chain[:-1]):
-        if not (isinstance(loop, Loop) and language()[loop.name].quantities[0].written_out):
+        if not isinstance(loop, Loop) or loop.name != "translate":
             continue
         ((first, second, *_),) = solid_boxes([nest((Loop(loop.name, (2.0, *loop.values[1:]), ()), chain[-1]))])
         for more in (-1, 1):

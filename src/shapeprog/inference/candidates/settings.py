@@ -100,7 +100,7 @@ class Settings:
     image_distance: float = 0.4
     supported: float = 0.6
     as_well: float = 0.8
-    turns: tuple[int, ...] = (6, 5, 4, 3)
+    turns: tuple[int, ...] = (8, 6, 5, 4, 3)
     axes: int = 4
     square: float = 0.1
     sector: float = 0.75

@@ -2,13 +2,10 @@
 
 The largest ball inside a solid that touches its surface at a point (the shrinking ball of Ma, Bae and Choi 2012) has
 its centre on the middle line of a bar and on the middle sheet of a board.  Where these centres continue in one
-direction, their points are one limb; where a leg meets a seat, the direction ends.  Where it continues beyond the seat,
-both parts are one limb, too.
+direction, their points are one limb; where a leg meets a seat, the direction ends.
 """
 
 from __future__ import annotations
-
-from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -30,9 +27,8 @@ def limbs(cloud: Cloud) -> list[npt.NDArray[np.int64]]:
     if not len(which):
         return []
     name, centre, radius = merged(centre, radius)
-    distance, nearest = cKDTree(centre).query(
-        centre, k=range(1, min(SETTINGS.limb_neighbours, len(centre)) + 1), workers=2
-    )
+    count = min(SETTINGS.limb_neighbours, len(centre))
+    distance, nearest = cKDTree(centre).query(centre, k=range(1, count + 1), workers=2)
     reach = 2 * radius[:, None] + 2.5 * SETTINGS.merged
     close = (distance < reach) & (np.abs(np.log(radius[nearest] / radius[:, None])) < 2 * SETTINGS.merged_radius)
     weight = close.astype(np.float64)[..., None]
@@ -41,15 +37,12 @@ def limbs(cloud: Cloud) -> list[npt.NDArray[np.int64]]:
     spread = np.sqrt(np.maximum(spread, 0))
     result = list[npt.NDArray[np.int64]]()
     line = spread[:, 1] < SETTINGS.linear * spread[:, 2]
-    for kind, direction in (
-        (line, axes[:, :, 2]),
-        (~line & (spread[:, 0] < SETTINGS.linear * spread[:, 1]), axes[:, :, 0]),
-    ):
+    sheet = ~line & (spread[:, 0] < SETTINGS.linear * spread[:, 1])
+    for kind, direction in ((line, axes[:, :, 2]), (sheet, axes[:, :, 0])):
         facing = np.abs(np.einsum("nki,ni->nk", direction[nearest], direction)) > np.cos(np.radians(SETTINGS.bend))
         i, k = np.nonzero(close & facing & kind[:, None] & kind[nearest])
         of_point = linked(np.stack([i, nearest[i, k]], 1), len(nearest))[name]
-        mine = [which[of_point == label] for label in np.flatnonzero(np.bincount(of_point) >= SETTINGS.limb_points)]
-        result += [*mine, *(in_line(cloud.points, mine) if kind is line else [])]
+        result += [which[of_point == label] for label in np.flatnonzero(np.bincount(of_point) >= SETTINGS.limb_points)]
     return sorted(result, key=len, reverse=True)
 
 
@@ -88,28 +81,3 @@ def inner_balls(cloud: Cloud, which: npt.NDArray[np.int64]) -> tuple[FloatArray,
     half = len(which)
     better = np.where(radius[:half] <= radius[half:], 0, half) + np.arange(half)
     return points[better] - normals[better] * radius[better, None], radius[better]
-
-
-def in_line(points: FloatArray, stretches: Sequence[npt.NDArray[np.int64]]) -> list[npt.NDArray[np.int64]]:
-    """Unions of limbs that continue each other: a rail or a shelf may meet a leg half-way up."""
-    if len(stretches) < 2:
-        return []
-    lines = [_line(points[stretch]) for stretch in stretches]
-    middle, along = (np.stack([line[k] for line in lines]) for k in (0, 1))
-    half = np.array([line[2] for line in lines])
-    away = middle[None] - middle[:, None]
-    ahead = np.einsum("ijc,ic->ij", away, along)
-    aside = np.linalg.norm(away - ahead[..., None] * along[:, None], axis=2)
-    straight = np.abs(along @ along.T) > np.cos(np.radians(SETTINGS.line_bend))
-    first, second = np.nonzero(np.triu(straight & (np.maximum(aside, aside.T) < SETTINGS.line_aside), 1))
-    close = np.abs(ahead[first, second]) - half[first] - half[second] < SETTINGS.line_gap
-    label = linked(np.stack([first[close], second[close]], 1), len(stretches))
-    groups = np.flatnonzero(np.bincount(label, minlength=1) > 1)
-    return [np.concatenate([stretches[k] for k in np.flatnonzero(label == group).tolist()]) for group in groups]
-
-
-def _line(points: FloatArray) -> tuple[FloatArray, FloatArray, float]:
-    """The middle of points, the direction in which they lie, and how far they reach."""
-    middle = points.mean(0)
-    along = np.linalg.svd(points - middle, full_matrices=False)[2][0]
-    return middle, along, float(np.abs((points - middle) @ along).max())

@@ -52,9 +52,6 @@ class Settings:
     limb_neighbours, linear, bend, limb_points
         Neighbouring centres from which a direction is estimated; standard deviation across a line of centres, as a
         share of that along it, at most; degrees between directions of neighbours in one limb; points of the smallest.
-    line_gap, line_aside, line_bend
-        Distance between the ends of two straight limbs, distance between the lines that they lie on, and degrees
-        between these, up to which they may be one.
     rods, rod_points
         Most rods, and points of the smallest.
     rod_trials, rod_walk, rod_parallel
@@ -102,9 +99,6 @@ class Settings:
     linear: float = 0.3
     bend: float = 25.0
     limb_points: int = 20
-    line_gap: float = 6.0
-    line_aside: float = 0.6
-    line_bend: float = 15.0
     rods: int = 60
     rod_points: int = 24
     rod_trials: int = 1200

@@ -508,7 +508,7 @@ def test_long_parts_span_and_short_ones_keep_their_size(end: float, expected: tu
     )
     layout = Layout(source.source)
     flat = {key: (0, 0) if element.kind == "interval" else (0,) for key, element in layout.elements.items()}
-    found = anchors_of(Model(Anchored(layout, flat)), None, AnchorSettings())
+    found = anchors_of(Model(Anchored(layout, flat)), AnchorSettings())
     assert found[0, "", 0] == expected
     assert found[1, "", 0] == (2, 2)
 

@@ -10,12 +10,14 @@ conditional modes (Besag 1986) from several starts.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from itertools import product
+from dataclasses import dataclass, replace
+from itertools import cycle, islice, product
 
 import numpy as np
+import torch
 
-from shapeprog.inference.fit.joints import Joints, depths, moved
+from shapeprog.geometry.primitive import SIZES
+from shapeprog.inference.ties.boxes import TOUCH, boxes_of, gaps, normals, touching, viewed
 from shapeprog.inference.ties.layout import ALIGNED, CENTRED, HIGH, LOW, MIDDLE, Anchors, Element
 from shapeprog.inference.ties.model import Model
 from shapeprog.language.placement import AXES
@@ -63,9 +65,6 @@ SHIFTS = np.array([0.0, 0.5, 1.0])
 GROWTH = 0.25
 """Share of itself by which the whole grows."""
 
-TOUCH = 0.1
-"""Largest gap between parts that touch, in cells."""
-
 STEP = 0.3
 """Cells between the first and last copy of a row up to which it does not run along an axis."""
 
@@ -77,39 +76,59 @@ ROUNDS = 8
 
 
 class Motion:
-    """How the primitives of a program move with its numbers, about where they are.
+    """How the boxes of the primitives of a program move with its numbers, about where they are.
 
     Parameters
     ----------
     model
         The program with all faces measured from the low side.
-    joints
-        Where its parts touch.
 
     Attributes
     ----------
-    ends, slopes
-        Low and high ends (2, 3, N) of the primitives from the low sides of the whole, and their slopes (2, 3, N, P).
+    boxes, slopes
+        The boxes (N,), and the slopes (N, 4, 3, P) of their centres and edges.
+    ends, end_slopes
+        Low and high ends (2, 3, N) of the boxes from the low sides of the whole, and their slopes (2, 3, N, P).
     first, second
-        Primitives (C,) that touch.
-    leaning, gaps, gap_slopes
-        Which of these pairs lean (L,), the gaps of these (L,), negative where they overlap, and their slopes (L, P).
+        Boxes (C,) that touch.
+    upright, leaning
+        Which of these pairs stand upright, and which lean (L,).
+    normals, apart
+        Directions (L, 15, 3) along which those that lean may be separated, and their gaps (L,).
     """
 
-    def __init__(self, model: Model, joints: Joints | None) -> None:
+    def __init__(self, model: Model) -> None:
         self.model, self.layout = model, model.anchored.layout
-        ends, self.slopes = model.ends(model.numbers)
-        self.ends: FloatArray = ends + np.array(self.layout.extents)[:, None] / 2
-        self.first = self.second = self.leaning = np.zeros(0, np.int64)
-        self.gaps, self.gap_slopes = np.zeros(0), np.zeros((0, len(model.numbers)))
-        if joints is not None and len(joints.first):
-            self.first, self.second = joints.first.numpy(), joints.second.numpy()
-            scene, slopes = model.poses(model.numbers)
-            turned = ((scene.rotation - scene.rotation.round()).abs().amax((1, 2)) > ALIGNED).numpy()
-            self.leaning = np.flatnonzero(turned[self.first] | turned[self.second])
-            depth = depths(scene, slopes, moved(scene, joints))
-            self.gaps = depth.residual.numpy()[self.leaning]
-            self.gap_slopes = depth.slopes.nan_to_num(0).numpy()[self.leaning]
+        scene, rows = model.poses(model.numbers)
+        size, centre, rotation = np.split(rows.numpy(), [SIZES, SIZES + 3], 1)
+        steps = STEP * torch.eye(SIZES, dtype=scene.size.dtype)
+        wider = np.stack(
+            [(replace(scene, size=scene.size + step).bounds - scene.bounds).numpy() / STEP for step in steps]
+        )
+        edges = np.einsum("niap,na->naip", rotation.reshape(-1, 3, 3, rotation.shape[2]), scene.bounds.numpy())
+        edges += np.einsum("nia,sna,nsp->naip", scene.rotation.numpy(), wider, size)
+        self.boxes = boxes_of(scene)
+        slopes = np.concatenate([centre[:, None], edges], 1)
+        self.slopes = viewed(slopes.swapaxes(2, 3)).swapaxes(2, 3)
+        reach, reach_slopes = (
+            np.abs(self.boxes.edges).sum(1),
+            (np.sign(self.boxes.edges)[..., None] * self.slopes[:, 1:]).sum(1),
+        )
+        middle = self.boxes.centre + np.array(self.layout.extents) / 2
+        self.ends: FloatArray = np.stack([middle - reach, middle + reach]).swapaxes(1, 2)
+        self.end_slopes = np.stack([self.slopes[:, 0] - reach_slopes, self.slopes[:, 0] + reach_slopes]).swapaxes(1, 2)
+        self.first, self.second = touching(self.boxes)
+        turned = ((scene.rotation - scene.rotation.round()).abs().amax((1, 2)) > ALIGNED).numpy()
+        self.leaning = np.flatnonzero(turned[self.first] | turned[self.second])
+        first, second = self.first[self.leaning], self.second[self.leaning]
+        self.upright = np.setdiff1d(np.arange(len(self.first)), self.leaning)
+        self.normals, self.apart = normals(self.boxes, first, second), gaps(self.boxes, first, second)
+
+    def projections(self, vectors: FloatArray) -> FloatArray:
+        """Centres and edges (N, 4, 3, ...) of boxes as distances of centres and edges (L, 15, 7, ...) along normals."""
+        first, second = (vectors[slots[self.leaning]] for slots in (self.first, self.second))
+        moves = np.concatenate([second[:, :1] - first[:, :1], first[:, 1:], second[:, 1:]], 1)
+        return np.einsum("lki,lvi...->lkv...", self.normals, moves, optimize=True)
 
     def by_element(self, elements: list[Element], slopes: FloatArray) -> FloatArray:
         """Slopes (..., P) by the numbers as those by the low and high coordinate of elements (..., K, 2)."""
@@ -155,11 +174,17 @@ class AxisAnchors:
         for k, (element, choices) in enumerate(zip(self.elements, self.choices, strict=True)):
             self.costs[k, : len(choices)] = [self._unary(element, anchors) for anchors in choices]
             self.shifts[k, : len(choices)] = [(SHIFTS[ends[0]], SHIFTS[ends[-1]]) for ends in choices]
-        slopes = motion.by_element(self.elements, motion.slopes[:, axis])  # (2, N, K, 2)
+        slopes = motion.by_element(self.elements, motion.end_slopes[:, axis])  # (2, N, K, 2)
         self.slopes = slopes.reshape(*slopes.shape[:2], -1).swapaxes(1, 2)  # (2, 2 K, N)
-        self.gap_slopes = motion.by_element(self.elements, motion.gap_slopes).reshape(-1, 2 * count).T  # (2 K, L)
         # Mirror images move with the high side of the whole while all coordinates stay.
-        self.base, self.gap_base = motion.slopes[:, axis, :, axis] + 0.5, motion.gap_slopes[:, axis]
+        self.base, growth = motion.end_slopes[:, axis, :, axis] + 0.5, GROWTH * extent
+        boxes = np.concatenate([motion.boxes.centre[:, None], motion.boxes.edges], 1)
+        base = motion.projections(boxes + growth * motion.slopes[..., axis])  # (L, 15, 7)
+        by_element = growth * motion.projections(motion.by_element(self.elements, motion.slopes))  # (L, 15, 7, K, 2)
+        forms = np.concatenate([base[..., None], by_element.reshape(*base.shape, 2 * count)], -1)
+        forms *= np.where(base < 0, -1, 1)[..., None]  # only their absolute values count
+        _, first, self.times = np.unique(forms.round(4), axis=0, return_index=True, return_counts=True)  # copies
+        self.forms, self.limits = forms[first].reshape(-1, 1 + 2 * count), np.maximum(motion.apart[first], 0) + TOUCH
         low, high = motion.ends[:, axis]
         self.share, self.long = motion.ends[:, axis] / extent, high - low >= settings.spanning * extent
         reach, near = settings.reach * extent, (1 - settings.beyond) * extent / 2
@@ -220,20 +245,20 @@ class AxisAnchors:
 
     def _descent(self, state: Array) -> tuple[float, Array]:
         """The cost and state (K,) from which no change of an element, or of two that touch, is cheaper."""
-        total = float(self._costs(state[None])[0])
-        for _ in range(ROUNDS):
-            before = total
-            if state.tobytes() in self._passed:  # the descent from another start came through here
-                break
-            self._passed.add(state.tobytes())
-            for group in (*([k] for k in range(len(state))), *self.together):
-                options = np.array([*product(*(range(len(self.choices[k])) for k in group))])
-                trials = np.repeat(state[None], len(options), 0)
-                trials[:, group] = options
-                costs = self._costs(trials)
-                if costs.min() < total - 1e-9:
-                    state, total = trials[costs.argmin()], float(costs.min())
-            if total >= before - 1e-9:
+        total, groups = float(self._costs(state[None])[0]), [*([k] for k in range(len(state))), *self.together]
+        unchanged = 0
+        for group in islice(cycle(groups), ROUNDS * len(groups)):
+            options = np.array([*product(*(range(len(self.choices[k])) for k in group))])
+            trials = np.repeat(state[None], len(options), 0)
+            trials[:, group] = options
+            costs = self._costs(trials)
+            unchanged += 1
+            if costs.min() < total - 1e-9:
+                state, total, unchanged = trials[costs.argmin()], float(costs.min()), 1
+                if state.tobytes() in self._passed:  # the descent from another start came through here
+                    break
+                self._passed.add(state.tobytes())
+            if unchanged == len(groups):
                 break
         return total, state
 
@@ -261,16 +286,18 @@ class AxisAnchors:
         growth = GROWTH * self.extent
         below, above = motion.ends[:, self.axis]
         grown = self._overlaps(below + growth * low, above + growth * high)
-        separated = grown < np.minimum(self.overlap, 0) - TOUCH
-        gaps = motion.gaps + growth * (self.gap_base + flat @ self.gap_slopes)
-        separated[:, motion.leaning] |= gaps > np.maximum(motion.gaps, 0) + TOUCH
-        per_copy += s.separated * separated.sum(1)
+        per_copy += s.separated * (grown < np.minimum(self.overlap, 0) - TOUCH)[:, motion.upright].sum(1)
+        if len(self.limits):
+            along = self.forms @ np.concatenate([np.ones((1, len(states))), flat.T])
+            along = np.abs(along).reshape(len(self.limits), -1, 7, len(states))
+            gaps = (along[:, :, 0] - along[:, :, 1:].sum(2)).max(1)
+            per_copy += s.separated * self.times @ (gaps > self.limits[:, None])
         return cost + per_copy / max(1.0, low.shape[1] / len(elements))
 
 
-def anchors_of(model: Model, joints: Joints | None, settings: AnchorSettings) -> dict[tuple[int, str, int], Anchors]:
-    """The anchors of all elements of a program, given with all faces measured from the low side and its joints."""
-    motion = Motion(model, joints)
+def anchors_of(model: Model, settings: AnchorSettings) -> dict[tuple[int, str, int], Anchors]:
+    """The anchors of all elements of a program, given with all faces measured from the low side."""
+    motion = Motion(model)
     result: dict[tuple[int, str, int], Anchors] = {}
     for axis in range(3):
         solver = AxisAnchors(motion, axis, settings)

@@ -41,6 +41,11 @@ class Solution:
     factors: FloatArray
     free: list[int]
 
+    def values(self, numbers: FloatArray) -> FloatArray:
+        """The free numbers (Z,) that give these numbers (P,)."""
+        values, *_ = np.linalg.lstsq(self.factors, numbers)
+        return np.asarray(values, np.float64)
+
 
 def solved(slots: list[Slot], rows: FloatArray) -> Solution:
     """The free numbers for which the text is short.

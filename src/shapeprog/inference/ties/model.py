@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import torch
 
@@ -92,17 +90,6 @@ class Model:
         poses = self.tunable.poses(self.values(numbers))
         return Poses(poses.scene, poses.slopes @ torch.from_numpy(self.jacobian))
 
-    def ends(self, numbers: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Low and high ends (2, 3, N) of the primitives along x, y, z, from the middle of the grid, and their slopes
-        (2, 3, N, P)."""
-        poses = self.poses(numbers)
-        value, slope = ends_of(poses.scene)
-        rows = torch.einsum("enr,nrf->enf", slope, poses.slopes).numpy()
-        ends = value.numpy()
-        low, high = [-ends[5], ends[1], ends[0]], [-ends[2], ends[4], ends[3]]
-        low_rows, high_rows = [-rows[5], rows[1], rows[0]], [-rows[2], rows[4], rows[3]]
-        return np.array([low, high]), np.array([low_rows, high_rows])
-
 
 class Misfit:
     """How far the surface of a model is from that of a target, about its numbers.
@@ -164,16 +151,3 @@ class Misfit:
                 break
             numbers = onwards
         return numbers
-
-
-def ends_of(scene: Scene) -> tuple[torch.Tensor, torch.Tensor]:
-    """Low and high ends of primitives along the axes (6, N), and their slopes (6, N, 16) by sizes, centre, rotation."""
-    leaves = [tensor.clone().requires_grad_() for tensor in (scene.size, scene.centre, scene.rotation)]
-    reach = replace(scene, size=leaves[0], rotation=leaves[2]).reach
-    ends = torch.cat([leaves[1] - reach, leaves[1] + reach], -1).T
-    slopes = []
-    for end in ends:
-        parts = torch.autograd.grad(end.sum(), leaves, retain_graph=True, allow_unused=True)
-        filled = [torch.zeros_like(leaf) if part is None else part for part, leaf in zip(parts, leaves, strict=True)]
-        slopes.append(torch.cat([part.flatten(1) for part in filled], 1))
-    return ends.detach(), torch.stack(slopes)

@@ -99,18 +99,21 @@ def _expressions(
 ) -> tuple[dict[str, Value], dict[str, Value]]:
     """The numbers and sums that several numbers of a program share, by provisional name, and all of its numbers."""
     slots, factors, free = anchored.slots, solution.factors, solution.free
+    alike: dict[bytes, list[int]] = {}  # numbers that follow from the free ones in the same way
+    for p in range(3, len(slots)):
+        alike.setdefault(factors[p].round(6).tobytes(), []).append(p)
+    rows = factors[[members[0] for members in alike.values()]]
+    single = np.array([len(members) == 1 for members in alike.values()])
+    at_free = solution.values(numbers)
     terms: list[Value] = [0.0] * len(free)
     shared: dict[str, Value] = {}
     for z in sorted(range(len(free)), key=lambda z: (slots[free[z]].line, free[z])):
         k = free[z]
-        terms[z] = to_float32(round(float(numbers[k]), DEGREES if slots[k].kind == "angle" else CELLS) + 0.0)
+        terms[z] = to_float32(round(float(at_free[z]), DEGREES if slots[k].kind == "angle" else CELLS) + 0.0)
         if k < 3:
             terms[z] = Name("diameter" if k < 2 and np.array_equal(factors[0], factors[1]) else SIZES[k])
-        elif (factors[3:, z] != 0).sum() > 1:
+        elif (used := rows[:, z] != 0).sum() > 1 or (used & ~single & ((rows != 0).sum(1) == 1)).any():
             shared[anchored.name(k)], terms[z] = terms[z], Name(anchored.name(k))
-    alike: dict[bytes, list[int]] = {}  # numbers that follow from the free ones in the same way
-    for p in range(3, len(slots)):
-        alike.setdefault(factors[p].round(6).tobytes(), []).append(p)
     table: dict[str, Value] = {}
     for members in alike.values():
         row, name = factors[members[0]], anchored.name(members[0])

@@ -22,6 +22,7 @@ from shapeprog.inference.fit.joints import Joints, find_joints
 from shapeprog.inference.surface.evidence import Evidence
 from shapeprog.inference.ties.anchored import Anchored
 from shapeprog.inference.ties.anchors import AnchorSettings, anchors_of
+from shapeprog.inference.ties.carrying import carried
 from shapeprog.inference.ties.closeness import Closeness
 from shapeprog.inference.ties.expressions import solved
 from shapeprog.inference.ties.layout import LOW, Anchors, Layout
@@ -133,7 +134,7 @@ class _Ties:
         self.trust = Trust()
         scene = flat.scene(flat.numbers)
         self.joints = _joints(scene, seed)
-        self.anchored = Anchored(layout, anchors_of(flat, self.joints, AnchorSettings()))
+        self.anchored = Anchored(layout, anchors_of(flat, AnchorSettings()))
         self.model = Model(self.anchored)
         lines = layout.lines_of(held)
         fixed = np.array([slot.line in lines for slot in self.anchored.slots])
@@ -158,7 +159,7 @@ class _Ties:
             if step and len(rows) == before:
                 break
             numbers = self.misfit.refitted(optimum, self._free(rows), self.joints)
-        solution = solved(self.anchored.slots, rows)
+        solution = carried(solved(self.anchored.slots, rows), self.model, numbers)
         return evaluated(written(self.anchored, solution, numbers, group=not self.fixed.any()))
 
     def _imposed(

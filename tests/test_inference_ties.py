@@ -501,6 +501,15 @@ def test_faces_are_measured_from_the_side_that_keeps_them_in_contact():
     assert growth == [0, 0, 0, 0, 24, 24]
 
 
+def test_parts_move_with_a_shared_number_of_those_that_they_touch():
+    text = tied_text("width, depth, height = 12, 8, 24\nseat(top=10, height=1)\n"
+                     "for _ in mirror(x=0):\n    leg(left=0, width=1, depth=1, top=10)\n"
+                     "panel(rear=2, depth=1, width=2, top=6, height=4.5)\n")  # fmt: skip
+    assert "top=seat_drop - 4" in text
+    for factor in (0.7, 1.4):
+        assert pieces(*union_mesh(unroll(sp.set(sp.parse(text), seat_drop=10 * factor)))) == 1
+
+
 @pytest.mark.parametrize(("end", "expected"), [(0.3, (0, 0)), (14, (0, 2)), (23.5, (0, 2))])
 def test_long_parts_span_and_short_ones_keep_their_size(end: float, expected: tuple[int, int]):
     source = placed(

@@ -43,7 +43,8 @@ def carried(solution: Solution, model: Model, numbers: FloatArray) -> Solution:
     contacts, slots = _Contacts(model, numbers), model.slots
     factors, values = solution.factors.copy(), solution.values(numbers)
     for z, k in enumerate(solution.free):
-        if slots[k].kind in ("extent", "angle") or (factors[:, z] != 0).sum() < 2:
+        alone = np.count_nonzero(factors[k]) == 1  # not measured from another one
+        if slots[k].kind in ("extent", "angle") or (factors[:, z] != 0).sum() < 2 or not alone:
             continue
         cost, lost = contacts.cost(factors[:, z], values[z])
         for _ in range(OPERATIONS):

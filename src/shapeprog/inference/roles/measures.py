@@ -186,19 +186,27 @@ class Parts:
     @cached_property
     def stacked(self) -> Mask:
         """Whether an equal part is right above or below each, with a gap of at most half their height."""
-        gap = self.bottom - self.top[:, None]
-        close = (self.kind == self.kind[:, None]) & (gap > 0.02 * self.up) & (gap <= self.up / 2)
-        close &= (np.abs(self.low - self.low[:, None])[..., DEPTH:] <= self.near).all(-1)
-        return close.any(0) | close.any(1)
+        depth, side = np.round(self.low[:, DEPTH:] / self.near).T
+        order = np.lexsort((self.bottom, side, depth, self.kind))
+        one, two = order[:-1], order[1:]
+        gap = self.bottom[two] - self.top[one]
+        close = (self.kind[one] == self.kind[two]) & (gap > 0.02 * self.up[one]) & (gap <= self.up[one] / 2)
+        close &= (np.abs(self.low[one] - self.low[two])[:, DEPTH:] <= self.near).all(-1)
+        result = np.zeros(self.count, bool)
+        result[one[close]] = result[two[close]] = True
+        return result
 
     @cached_property
     def attached(self) -> Mask:
         """Whether each is small and right in front of a larger one."""
-        area, middle = self.up * self.side, (self.low + self.high)[:, None] / 2
-        before = ((self.low <= middle) & (middle <= self.high))[..., [UP, SIDE]].all(-1)
-        before &= np.abs(self.low[:, DEPTH] - self.high[:, None, DEPTH]) <= self.near
-        before &= area[:, None] <= area / 4
-        return before.any(1) & (area <= 0.012 * self.size[UP] * self.size[SIDE]) & (self.depth <= self.size[DEPTH] / 4)
+        area = self.up * self.side
+        result: Mask = (area <= 0.012 * self.size[UP] * self.size[SIDE]) & (self.depth <= self.size[DEPTH] / 4)
+        small, large = np.flatnonzero(result), np.flatnonzero(~result)
+        middle = (self.low + self.high)[small, None] / 2
+        before = ((self.low[large] <= middle) & (middle <= self.high[large]))[..., [UP, SIDE]].all(-1)
+        before &= np.abs(self.low[large, DEPTH] - self.high[small, None, DEPTH]) <= self.near
+        result[small] = (before & (area[small, None] <= area[large] / 4)).any(1)
+        return result
 
 
 def turned(vectors: FloatArray, turns: int) -> FloatArray:

@@ -122,7 +122,8 @@ def _divided(loop: Group, numbers: dict[str, float]) -> Group:
             return loop
         clearances = {word: place, first: keywords.get(first, 0.0)}
     else:  # the inner side is in the middle, or the size is a number
-        sides = sorted({*words[:2]} & keywords.keys(), key=lambda side: value_at(keywords[side], numbers))  # type: ignore[arg-type]
+        sides = [side for side in words[:2] if side in keywords]
+        sides.sort(key=lambda side: value_at(keywords[side], numbers))  # type: ignore[arg-type]
         if others or axis == 2 or place != 0 or word != words.offset or not sides:
             return loop
         count, clearances = 2.0, dict.fromkeys(words[:2], keywords[sides[0]])

@@ -143,6 +143,14 @@ for i in mirror(side):
         box(at=(-9, 4.5, 10), size=(3, 1.1, 0.9))  # leg
 """
 
+SPLAYED = """
+box(at=(-4, -4, -12), size=(8, 8, 24))  # body
+for i in mirror(side):
+    for j in mirror(depth):
+        bar(start=(-6.5, 3.5, 11.5), end=(-4, 3.5, 6.5), section=(0.6, 0.6))  # leg
+box(at=(1, -4.6, -10), size=(0.2, 0.6, 20))  # rail
+"""
+
 DESK = """
 box(at=(11, -12, -12), size=(1, 24, 24))  # top
 for i in mirror(side):
@@ -179,10 +187,11 @@ for i in translate(4, by=(0, 0, 3)):
 
 WHOLE = [
     CHAIR, STOOL_BACK, UPHOLSTERED, TABLE, BOOKCASE, CABINET, WARDROBE, BED, SOFA, SLATTED, TALL, SIDEBOARD, DESK,
-    PLATE, CHEST, DOORS
+    PLATE, CHEST, DOORS, SPLAYED
 ]  # fmt: skip
 NAMES = ["chair", "swivel chair", "upholstered chair", "table", "bookcase", "cabinet", "wardrobe", "bed", "sofa"]
 NAMES += ["slatted bench", "tall cabinet", "sideboard", "desk", "chair on a plate", "chest of drawers", "doors"]
+NAMES += ["sideboard on splayed legs"]
 
 
 def wanted(text: str) -> list[str]:

@@ -200,7 +200,8 @@ class Parts:
     def attached(self) -> Mask:
         """Whether each is small and right in front of a larger one."""
         area = self.up * self.side
-        result: Mask = (area <= 0.012 * self.size[UP] * self.size[SIDE]) & (self.depth <= self.size[DEPTH] / 4)
+        result: Mask = (area <= 0.012 * self.size[UP] * self.size[SIDE]) & (self.long <= self.size.max() / 2)
+        result &= self.depth <= self.size[DEPTH] / 4
         small, large = np.flatnonzero(result), np.flatnonzero(~result)
         middle = (self.low + self.high)[small, None] / 2
         before = ((self.low[large] <= middle) & (middle <= self.high[large]))[..., [UP, SIDE]].all(-1)

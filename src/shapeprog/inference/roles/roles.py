@@ -102,7 +102,7 @@ CASE: tuple[Rule, ...] = (
     ("brace", lambda p: p.slender & ~p.grounded & (p.rise > 0.35) & (p.rise < 0.97)),
     ("pedestal", lambda p: p.upright & p.central & (p.equal == 1)),
     ("post", lambda p: p.upright & p.walled & (p.top >= p.floor + 0.6 * p.size[UP])),
-    ("leg", lambda p: p.grounded & (p.upright | p.stubby)),
+    ("leg", lambda p: p.grounded & ((p.slender & ~p.level) | p.stubby)),
     ("post", lambda p: p.upright),
     ("base", lambda p: p.level & p.grounded),
     ("slat", lambda p: p.plank & (p.equal >= 5)),

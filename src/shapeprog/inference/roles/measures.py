@@ -163,7 +163,8 @@ class Parts:
         self.central: Mask = (np.abs(self.rear) <= 0.15) & (self.aside <= 0.15)
         self.behind: Mask = (self.rear > 0.1) & (self.aside < 0.3)
         self.outermost: Mask = self.aside + self.span / 2 >= 0.4
-        self.in_front: Mask = self.low[:, DEPTH] <= self.low[:, DEPTH].min() + 3 * self.near
+        front = min(3 * self.near, self.size[DEPTH] / 3)
+        self.in_front: Mask = self.low[:, DEPTH] <= self.low[:, DEPTH].min() + front
         self.padded = (self.wide & self.below & ~self.grounded & (self.top >= bottom - 1.5 * self.near)).any()
         self.on_pedestal = (self.below & self.central & self.upright).any()
 
@@ -179,6 +180,7 @@ class Parts:
         self.cased = np.bool_(sides.sum() > 1 or (self.bulky | self.solid).any())
         large = (self.up >= 0.12 * self.size[UP]) & (self.side >= 0.12 * self.size[SIDE]) & self.cased
         wide = large | (self.upright & (self.side >= self.size[SIDE] / 2))
+        wide |= self.level & (self.up >= self.size[UP] / 2)
         self.front: Mask = self.facing_front | (self.board & (self.depth == self.thin) & wide)
         highest = np.where(self.in_front, 0.2, 0.3) * self.size[UP]
         self.plinth: Mask = self.front & self.grounded & (self.up <= highest) & (self.rear < 0)

@@ -91,7 +91,7 @@ def test_no_more_blocks_than_allowed_and_more_are_no_worse(most):
 def test_a_passed_deadline_still_gives_a_structure_and_says_so():
     found = search_structure(cells(TABLE), Settings(), deadline=Deadline(0.0))
     assert len(found.blocks)
-    assert "0 of 400 rounds, at the time limit" in found.reason
+    assert "0 of 600 rounds, at the time limit" in found.reason
     told = []
     done = search_structure(cells(TABLE), Settings(rounds=2), progress=lambda what, share: told.append((what, share)))
     assert "all 2 rounds" in done.reason

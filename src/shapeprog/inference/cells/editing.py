@@ -8,12 +8,11 @@ import numpy as np
 import numpy.typing as npt
 
 from shapeprog.geometry.cells import pack, words_of
-from shapeprog.inference.cells.block_layout import WIDTH
+from shapeprog.inference.cells.block_layout import BACK, DISC, EXTENT, FIRST, FORM, RADIUS, TILT, WIDTH
 from shapeprog.inference.cells.descent_kernels import MOST_MOVES, descend, statements
-from shapeprog.inference.cells.drawing import Rows, Whole, cells_shared, draw_all, draw_each, low_corners
+from shapeprog.inference.cells.drawing import Rows, Whole, cells_shared, draw_all, draw_each
 from shapeprog.inference.cells.families import families
 from shapeprog.inference.cells.fold_kernels import VOLUMES
-from shapeprog.inference.cells.form_kernels import guess
 from shapeprog.inference.cells.proposal_kernels import propose
 from shapeprog.inference.cells.raster_kernels import ROWS
 from shapeprog.inference.cells.settings import Settings
@@ -137,10 +136,8 @@ def _union(rows: Rows, left_out: int) -> Rows:
     return np.asarray(before | np.bitwise_or.reduce(rows[left_out + 1 :], axis=0))
 
 
-def propose_form(
-    form: int, covered: Rows, waste: float, box: FloatArray, target: Target, random: np.random.Generator
-) -> tuple[float, FloatArray]:
-    """The best of several guesses of one form on uncovered cells, improved by descent: its gain and the block.
+def propose_form(form: int, covered: Rows, waste: float, box: FloatArray, target: Target) -> tuple[float, FloatArray]:
+    """A disc or a sheared back in place of a box, improved by descent: its gain on uncovered cells, and the block.
 
     Parameters
     ----------
@@ -149,19 +146,34 @@ def propose_form(
     waste
         Weight of an empty cell against an occupied one.
     box
-        The box proposed for the same cells, from which some guesses start.
+        The box that was proposed for these cells; without cells there is nothing in its place.
     """
+    if not box[EXTENT]:
+        return 0.0, box
     gained, wasted = target.occupied & ~covered, ~target.occupied & ~covered
-    cells = low_corners(gained)
-    if len(cells) < 4:
-        return 0.0, np.zeros(WIDTH)
-    rough: FloatArray = np.empty((30, WIDTH))
-    rough = rough[: guess(form, cells, box, int(random.integers(2**31)), rough)]
-    if not len(rough):
-        return 0.0, np.zeros(WIDTH)
+    rough = _discs(box) if form == DISC else _backs(box)
     best = rough[int(_nets(rough, gained, wasted, waste).argmax())]
     block, _value = improve_block(best, target.occupied, covered, target.settings.price, 2)
     return float(_nets(block[None], gained, wasted, waste)[0] - target.statement * statements(block)), block
+
+
+def _discs(box: FloatArray) -> FloatArray:
+    """The upright cylinder (1, 16) in the middle of a box, as wide as that on average."""
+    disc, across = box.copy(), box[EXTENT + 1 : EXTENT + 3]
+    disc[FORM], disc[RADIUS], disc[RADIUS + 1] = DISC, max(1, np.rint(across.sum() / 4)), 0
+    disc[FIRST + 1 : FIRST + 3] = np.rint(box[FIRST + 1 : FIRST + 3] + across / 2)
+    return disc[None]
+
+
+def _backs(box: FloatArray) -> FloatArray:
+    """A box sheared by up to five cells (P, 16): as deep as it is, and so much thinner that it stays within."""
+    tilts = np.delete(np.arange(-5, 6), 5)
+    deep = np.repeat(box[None], len(tilts), 0)
+    deep[:, FORM], deep[:, TILT] = BACK, tilts
+    thin = deep.copy()
+    thin[:, EXTENT + 1] -= np.abs(tilts)
+    thin[:, FIRST + 1] -= np.minimum(tilts, 0)
+    return np.concatenate([deep, thin[thin[:, EXTENT + 1] > 0]])
 
 
 def _nets(blocks: FloatArray, gained: Rows, wasted: Rows, waste: float) -> FloatArray:

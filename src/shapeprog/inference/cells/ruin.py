@@ -120,7 +120,7 @@ def recreate(
             picks[0] = 0  # the single box
             gain, block = best_box(covered, waste, picks, target)
         if random.random() < forms:
-            form_gain, form_block = propose_form(int(random.integers(1, 3)), covered, waste, block, target, random)
+            form_gain, form_block = propose_form(int(random.integers(1, 3)), covered, waste, block, target)
             if form_gain > gain or (form_gain > 0 and random.random() < 0.3):
                 gain, block = form_gain, form_block
         if gain <= 0:

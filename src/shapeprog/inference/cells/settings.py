@@ -46,13 +46,13 @@ class Settings:
 
     blocks: int = 10
     price: float = 0.001
-    rounds: int = 400
+    rounds: int = 600
     chunk: int = 20
     families: int = 200
     forms: float = 0.3
     heat: float = 0.004
     recall: float = 0.5
-    patience: int = 120
+    patience: int = 180
     starts: tuple[float, ...] = (0.9, 2.0, 5.0)
     planes: int = 3
     copies: int = 8

@@ -199,7 +199,8 @@ def called(pattern: Pattern, arguments: Mapping[str, float], loops: Sequence[Loo
         if isinstance(default, float) and abs(arguments[name] - default) <= EXACT:
             rounded[name] = default
         else:
-            rounded[name] = given[name] = to_float32(round(arguments[name], CELLS) + 0.0)
+            # Halves of even hundredths are hundredths, to which the text is rounded.
+            rounded[name] = given[name] = to_float32(2 * round(arguments[name] / 2, CELLS) + 0.0)
     call = within(loops, Call(pattern.function.name, tuple(given.items())))
     try:
         nodes = tuple(nest((*loops, *chain)) for chain in Program(pattern.drawn(rounded)).chains)

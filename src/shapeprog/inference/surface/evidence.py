@@ -56,17 +56,6 @@ NEIGHBOURS = 16
 LOOKING, FREE = 128, 64
 """Cells along each side of the grid for visibility, and of the grid of free space."""
 
-DIRECTIONS = 32
-"""Directions of the rays; half of them, and their opposites, where both ways must be clear."""
-
-LEAST_LEVEL, LEAST_ALONG = 0.35, 0.45
-"""Shares of the plan that level surfaces cover, and of the surface that faces along an axis; below both, a target does
-not look like furniture.  That holds for mugs, bottles, cars and figures, and for 2 % of furniture (val), all of it wire
-or shells."""
-
-LEVEL, ALONG = math.cos(math.radians(15)), math.cos(math.radians(10))
-"""Cosines from which a surface is level, or faces along an axis."""
-
 Flags = npt.NDArray[np.bool_]
 
 
@@ -220,7 +209,7 @@ def visible(points: FloatArray, normals: FloatArray, barrier: Flags) -> Flags:
     scale = len(barrier) / RESOLUTION
     offset = normals / np.maximum(np.abs(normals).max(1, keepdims=True), 1e-9)
     starts = (points + HALF) * scale + 1.5 * offset  # out of the cells that the surface itself touches
-    return looking(barrier, starts, directions(DIRECTIONS), 1, through=False)
+    return looking(barrier, starts, directions(), 1, through=False)
 
 
 def outward(normals: FloatArray, front: Flags, back: Flags) -> tuple[FloatArray, Flags]:
@@ -254,13 +243,13 @@ def free_cells(barrier: Flags, surface: FloatArray, *, through: bool) -> Flags:
     starts = np.argwhere(np.ones_like(barrier)) + 0.5
     within = ((starts >= low) & (starts <= high)).all(1).reshape(barrier.shape)
     free: Flags = ~(barrier | within) & (not through)
-    steps, minimum = (directions(DIRECTIONS)[::2], 4) if through else (directions(DIRECTIONS), 2)
+    steps, minimum = (directions()[::2], 4) if through else (directions(), 2)
     free[within] = looking(barrier, starts[within.reshape(-1)], steps, minimum, through=through)
     return free
 
 
-def directions(count: int) -> FloatArray:
-    """Directions (count, 3) spread evenly over the sphere on a spiral, the largest coordinate 1 or -1."""
+def directions(count: int = 32) -> FloatArray:
+    """Directions (count, 3) spread evenly over the sphere on a spiral (Vogel 1979), the largest coordinate 1 or -1."""
     height = 1 - (2 * np.arange(count) + 1) / count
     turn = np.arange(count) * math.pi * (3 - math.sqrt(5))
     around = np.sqrt(1 - height**2)
@@ -299,10 +288,11 @@ def doubt_of_furniture(evidence: Evidence) -> str:
     low, extents = points.min(0), np.maximum(np.ptp(points, axis=0), 1e-9)
     place = (points - low) / extents
     plan = np.minimum((place[:, 1:] * RESOLUTION).astype(int), RESOLUTION - 1) @ [RESOLUTION, 1]
-    level = (normals[:, UP] > LEVEL) & (place[:, UP] > 0.1)
+    level = (normals[:, UP] > math.cos(math.radians(15))) & (place[:, UP] > 0.1)
     covered = len(np.unique(plan[level])) / len(np.unique(plan))
-    along = float((normals.max(1) > ALONG).mean())
-    if covered >= LEAST_LEVEL or along >= LEAST_ALONG:
+    along = float((normals.max(1) > math.cos(math.radians(10))).mean())
+    # Less is true of mugs, bottles, cars and figures, and of 2 % of furniture (val), all of it wire or shells.
+    if covered >= 0.35 or along >= 0.45:
         return ""
     return (
         f"This does not look like furniture: {along:.0%} of its surface faces along an axis, and level surfaces cover "

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, fields
 from typing import TypeVar
 
+import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from shapeprog.geometry.primitives import primitives
@@ -54,8 +55,7 @@ class Batch:
     @property
     def kinds(self) -> list[int]:
         """Kinds of primitive in use."""
-        kinds: list[int] = torch.unique(self.kind[self.mask]).tolist()
-        return kinds
+        return np.flatnonzero(np.bincount(self.kind[self.mask].cpu().numpy())).tolist()
 
     @property
     def bounds(self) -> Float[Tensor, "*batch N 3"]:

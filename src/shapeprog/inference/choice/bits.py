@@ -46,9 +46,9 @@ def pack(flags: Flags) -> Bits:
     return np.packbits(padded, axis=1, bitorder="little").view(np.uint64)
 
 
-def explains(scene: Batch, points: FloatArray, normals: FloatArray, evidence: Evidence) -> Bits:
-    """Which points (P, 3) each candidate (B, N) explains, as rows of bits (B, W)."""
-    binned, rows = sorted_by_cell(points, COARSE), _no_bits(scene, points)
+def explains(scene: Batch, binned: BinnedPoints, normals: FloatArray, evidence: Evidence) -> Bits:
+    """Which points each candidate (B, N) explains, as rows of bits (B, W)."""
+    rows = _no_bits(scene, binned)
     data = (
         table_of(scene), scene.mask.shape[1], binned.points, normals[binned.order], binned.order, binned.starts,
         binned.cells, evidence.tolerance, evidence.agreement, rows,
@@ -57,9 +57,9 @@ def explains(scene: Batch, points: FloatArray, normals: FloatArray, evidence: Ev
     return rows
 
 
-def holds(scene: Batch, points: FloatArray, depth: float) -> Bits:
-    """Which points (P, 3) lie deeper than ``depth`` inside each candidate (B, N), as rows of bits (B, W)."""
-    binned, rows = sorted_by_cell(points, COARSE), _no_bits(scene, points)
+def holds(scene: Batch, binned: BinnedPoints, depth: float) -> Bits:
+    """Which points lie deeper than ``depth`` inside each candidate (B, N), as rows of bits (B, W)."""
+    rows = _no_bits(scene, binned)
     data = (
         table_of(scene), scene.mask.shape[1], binned.points, binned.order, binned.starts, binned.cells, depth, rows
     )  # fmt: skip
@@ -67,8 +67,8 @@ def holds(scene: Batch, points: FloatArray, depth: float) -> Bits:
     return rows
 
 
-def _no_bits(scene: Batch, points: FloatArray) -> Bits:
-    return np.zeros((len(scene), -(-len(points) // WORD)), np.uint64)
+def _no_bits(scene: Batch, binned: BinnedPoints) -> Bits:
+    return np.zeros((len(scene), -(-len(binned.order) // WORD)), np.uint64)
 
 
 def nearby(points: FloatArray) -> npt.NDArray[np.int64]:
@@ -81,7 +81,7 @@ def nearby(points: FloatArray) -> npt.NDArray[np.int64]:
     return np.sum(shifted, axis=0)
 
 
-def sorted_by_cell(points: FloatArray, cells: int) -> BinnedPoints:
+def sorted_by_cell(points: FloatArray, cells: int = COARSE) -> BinnedPoints:
     """Points (P, 3) in the order of the cells of a grid."""
     index = np.clip(((points + HALF) * (cells / RESOLUTION)).astype(np.int64), 0, cells - 1)
     key = (index[:, 0] * cells + index[:, 1]) * cells + index[:, 2]

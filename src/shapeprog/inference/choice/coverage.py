@@ -147,9 +147,10 @@ class Coverage:
     def __init__(self, evidence: Evidence, prices: Prices | None = None, seed: int = 0) -> None:
         self.evidence, self.prices, self.seed = evidence, prices or Prices(), seed
         order = np.lexsort((nearby(evidence.points), -evidence.weights))  # points of a word weigh nearly the same
-        self._points, self._normals = evidence.points[order], evidence.normals[order]
-        self._free, volume = free_points(evidence, seed)
-        free = np.full(len(self._free), -self.prices.free * volume / max(evidence.area, 1e-9))
+        self._points, self._normals = sorted_by_cell(evidence.points[order]), evidence.normals[order]
+        points, volume = free_points(evidence, seed)
+        self._free = sorted_by_cell(points)
+        free = np.full(len(points), -self.prices.free * volume / max(evidence.area, 1e-9))
         parts = np.full(len(evidence.parts), self.prices.part / max(1.0, len(evidence.parts) / SETTINGS.parts))
         self._weights = np.concatenate([by_word(evidence.weights[order]), by_word(free), by_word(parts)])
         self._surface = sorted_by_cell(evidence.surface, FINE)
@@ -164,11 +165,11 @@ class Coverage:
         if new := [candidate for candidate in dict.fromkeys(candidates) if candidate not in self._rows]:
             self._add(new, scene if len(new) == len(candidates) else unroll(new).detach())
         mine, count = [self._rows[candidate] for candidate in candidates], len(candidates)
-        words = -(-len(self._points) // WORD)
+        words = -(-len(self._normals) // WORD)
         covered = np.array([row.covered for row in mine], np.uint64).reshape(count, len(self._weights))
         interior = np.array([row.interior for row in mine], np.uint64).reshape(count, words)
         samples = np.array([row.samples for row in mine]).reshape(-1, 3)
-        hidden = holds(scene, samples, 0.0)
+        hidden = holds(scene, sorted_by_cell(samples), 0.0)
         exposed = np.array([2**row.sampled - 1 for row in mine], np.uint64) & ~hidden.diagonal()
         return CoverageTable(
             np.concatenate([covered, hidden], 1), self._weights, words, interior, exposed,

@@ -81,8 +81,7 @@ def adjust(
     narrow = EXPLAINED * evidence.tolerance
     wide = max(1.2, narrow)  # in cells, at first
     with one_tensor_thread(kernels=1):
-        poses = tunable.poses(values)
-        joints = find_joints(poses.scene, _floor(evidence), generator)
+        joints = find_joints(tunable.scene(values), _floor(evidence), generator)
         for step in range(steps):
             if deadline.passed(f"the adjustment after {step} of {steps} steps"):
                 break
@@ -90,7 +89,7 @@ def adjust(
             if done == 1 and not held.any():
                 held = angles
                 values = torch.where(held, tunable.rounded(values * (values.abs() >= 0.7)), values)  # upright below
-                poses = tunable.poses(values)
+            poses = tunable.poses(values)
             joints = moved(poses.scene, joints)
             pairs = target.pairs(poses.scene, generator)
             systems = [
@@ -98,7 +97,6 @@ def adjust(
                 of_joints(poses, joints, closing=done == 1),
             ]
             values = (values + _move(systems, tunable, values, held)).clamp(low, high)
-            poses = tunable.poses(values)
             if progress:
                 progress("adjusting", (step + 1) / steps)
     return tunable.settled(values)

@@ -46,11 +46,13 @@ class Support:
     def cover(self) -> npt.NDArray[np.int64]:
         """The filled boxes that a greedy selection takes, best first."""
         remaining, selected = np.ones(self.explained.shape[1], np.bool_), list[int]()
+        counts = self.explained.sum(1)
         while len(selected) < min(SETTINGS.cover_boxes, len(self.fill)):
-            gain = np.where(self.filled, self.explained[:, remaining].sum(1) - self.price, 0)
+            gain = np.where(self.filled, counts - self.price, 0)
             best = int(gain.argmax())
             if gain[best] < SETTINGS.cover_gain:
                 break
             selected.append(best)
+            counts -= self.explained[:, remaining & self.explained[best]].sum(1)
             remaining &= ~self.explained[best]
         return np.array(selected, np.int64)

@@ -171,8 +171,11 @@ def test_small_angles_become_none_and_numbers_are_tidy(chair):
         assert values == pytest.approx(np.round(values, 2), abs=1e-5)
 
 
-def test_the_slopes_of_poses_are_those_of_the_renderer():
-    tunable = Tunable(parse(EVERYTHING))
+@pytest.mark.parametrize(
+    "text", [EVERYTHING, "rod(start=(0, 0, 0), end=(5, 0, 0), radius=.5)\n"], ids=["all", "upright"]
+)
+def test_the_slopes_of_poses_are_those_of_the_renderer(text):
+    tunable = Tunable(parse(text))
 
     def rows(values):
         scene = tunable.scene(values)

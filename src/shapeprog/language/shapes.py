@@ -121,13 +121,14 @@ def rounded_box(at: Vector, size: Vector, edge: Scalar) -> Solids:
 def align(direction: Vector) -> Float[Tensor, "*batch 3 3"]:
     """A rotation whose first column points along ``direction``; up for a zero vector.
 
-    The other two columns come from the grid axis that is farthest from the direction, so the gradient is finite.
+    The other two columns come from the grid axis that is farthest from the direction, so the gradient is finite; near
+    an axis of the grid it is the same one, so differences are those of one frame.
     """
     length = safe_norm((direction**2).sum(-1, keepdim=True))
     up = torch.zeros_like(direction)
     up[..., 0] = 1
     first = torch.where(length > 1e-9, direction / length, up)
-    helper = unit(first.detach().abs().argmin(-1), direction)
+    helper = unit(first.detach().abs().clamp(min=1e-3).argmin(-1), direction)
     second = torch.linalg.cross(first, helper)
     second = second / safe_norm((second**2).sum(-1, keepdim=True))
     return torch.stack([first, second, torch.linalg.cross(first, second)], -1)

@@ -52,7 +52,7 @@ class AnchorSettings:
     resized: float = 2.0
     rigid: float = 5.0
     middle: float = 2.0
-    farther: float = 1.0
+    farther: float = 3.0
     reach: float = 0.02
     beyond: float = 0.3
     below: float = 0.1

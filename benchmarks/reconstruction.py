@@ -45,7 +45,7 @@ def measure(task: Task) -> list[dict[str, Any]]:
     from shapeprog.data.shape import Shape
     from shapeprog.evaluation.metrics import evaluate_program
     from shapeprog.inference import greedy_boxes, infer
-    from shapeprog.inference.cells.reconstruct import REACH
+    from shapeprog.inference.cells.refinement import REACH, refined
     from shapeprog.inference.fit.adjustment import adjust
     from shapeprog.inference.infer import prepare_kernels
     from shapeprog.inference.surface.evidence import evidence_of
@@ -68,8 +68,8 @@ def measure(task: Task) -> list[dict[str, Any]]:
         keep(GREEDY, boxes, boxes, time.monotonic() - started)
     if REFINED in methods and shape.points is not None:
         started = time.monotonic()
-        refined = adjust(boxes, evidence_of(shape), reach=REACH, seed=seed)
-        keep(REFINED, refined, boxes, time.monotonic() - started)
+        fine = refined(boxes, torch.from_numpy(np.asarray(shape.points)), seed=seed)
+        keep(REFINED, fine, boxes, time.monotonic() - started)
     for method, statements in ((SEARCH, "paper"), (EVERY, "all")):
         if method not in methods:
             continue

@@ -12,14 +12,13 @@ from shapeprog.errors import InputError
 from shapeprog.geometry.cells import voxels as voxels_of
 from shapeprog.geometry.surface import sample_surface
 from shapeprog.inference import Settings, infer, refine
-from shapeprog.inference.cells.reconstruct import REACH
+from shapeprog.inference.cells.refinement import REACH, refined
 from shapeprog.inference.fit.adjustment import adjust
 from shapeprog.inference.fit.tunable import THINNEST
 from shapeprog.inference.surface.evidence import evidence_of_program
 from shapeprog.language.parser import parse
 from shapeprog.language.tensors import encode
 from shapeprog.language.unroll import unroll
-from shapeprog.liang2022.refinement import refined
 
 TABLE = """
 top_rectangle(at=(4.2, 0.3, -0.2), thickness=2.3, half=(8.8, 11.3))

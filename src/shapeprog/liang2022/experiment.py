@@ -19,11 +19,11 @@ from shapeprog.data.synthetic.shapes import shapes_of
 from shapeprog.errors import InputError, did_you_mean
 from shapeprog.files import make_folder
 from shapeprog.inference import greedy_boxes
+from shapeprog.inference.cells.refinement import refined
 from shapeprog.liang2022.adapt import AdaptTask
 from shapeprog.liang2022.evaluate import decode_all, measure
 from shapeprog.liang2022.loop import append_line, read_log, train
 from shapeprog.liang2022.prior import programs
-from shapeprog.liang2022.refinement import refined
 from shapeprog.liang2022.settings import BEST, LOG, STATE, AdaptSettings, Decoder
 from shapeprog.liang2022.weights import load_generator
 

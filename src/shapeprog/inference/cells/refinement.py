@@ -1,4 +1,4 @@
-"""Refinement at test time: all continuous parameters of a program, by gradient of chamfer through the renderer.
+"""Refinement: all continuous parameters of a program, by gradient of a chamfer distance through the renderer.
 
 One direction is exact: target points to the surface of the union by signed distance; points sampled on the visible
 surface have their nearest target points.
@@ -17,13 +17,22 @@ from shapeprog.geometry.arrays import one_tensor_thread
 from shapeprog.geometry.distance import signed_distance
 from shapeprog.geometry.nearest import squared_distance
 from shapeprog.geometry.surface import sample_surface
-from shapeprog.inference.cells.reconstruct import REACH
+from shapeprog.inference.budget import NEVER, Deadline
 from shapeprog.inference.fit.tunable import Tunable
 from shapeprog.language.program import Program
 
+REACH = 1.49
+"""Largest change of a parameter from a whole number, in cells: rounding and one step lead back."""
+
 
 def refined(
-    program: Program, target: Float[Tensor, "P 3"], *, steps: int = 50, rate: float = 0.12, seed: int = 0
+    program: Program,
+    target: Float[Tensor, "P 3"],
+    *,
+    steps: int = 50,
+    rate: float = 0.12,
+    seed: int = 0,
+    deadline: Deadline = NEVER,
 ) -> Program:
     """The same program with continuous parameters, each within ``REACH`` of that of ``program``.
 
@@ -37,6 +46,8 @@ def refined(
         First step size of Adam in cells; it falls to a tenth by a cosine.
     seed
         Of the points that each step draws.
+    deadline
+        When no further step starts.
 
     Raises
     ------
@@ -56,6 +67,8 @@ def refined(
     generator = torch.Generator().manual_seed(seed)
     with one_tensor_thread(kernels=1):
         for step in range(steps):
+            if deadline.passed(f"the refinement after {step} of {steps} steps"):
+                break
             scene = tunable.scene(moved)
             if not bool(scene.mask.any()):
                 break

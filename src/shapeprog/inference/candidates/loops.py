@@ -180,15 +180,22 @@ def images(nodes: Sequence[Node], surface: FloatArray) -> list[Node]:
         turn = np.angle(around * around.mean(1, keepdims=True).conj())
         index = np.flatnonzero(plain & ((np.abs(turn) < np.pi / count).mean(1) >= SETTINGS.sector))
         index = np.setdiff1d(index, four) if count == 4 else index  # two mirrors are easier to read
-        for copy, every in ((1, 6), *((copy, 1) for copy in (*range(1, count), 0.5))):  # few points settle most
-            turned = around[index, ::every] * np.exp(2j * np.pi * copy / count)
-            image = np.stack([points[index, ::every, 0], turned.real + axis[0], turned.imag + axis[1]], -1)
-            there = kept(index, image)
-            index = np.setdiff1d(index, there) if copy == 0.5 else there  # there are no copies on a round surface
+        step = 2 * np.pi / count
+        index = kept(index, _turned(points[index, ::6], axis, step))  # few points settle most candidates
+        for copy in range(1, count):
+            index = kept(index, _turned(points[index], axis, copy * step))
+        between = kept(index, _turned(points[index], axis, step / 2))
+        index = np.setdiff1d(index, between)  # there are no copies on a round surface
         values = (count, 1) if not axis.any() else (count, 360 / count, *axis)
         loop = Loop("rotate" if not axis.any() else "rotate_about", loop_values(*values), ())
         result += [replace(loop, body=(nodes[k],)) for k in index.tolist()]
     return result
+
+
+def _turned(points: FloatArray, axis: FloatArray, angle: float) -> FloatArray:
+    """Points (C, P, 3) turned by an angle about the vertical axis at a depth and a side (2,)."""
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    return np.concatenate([points[..., :1], (points[..., 1:] - axis) @ turn.T + axis], -1)
 
 
 def _axes(scene: Scene) -> FloatArray:

@@ -16,22 +16,12 @@ from torch import Tensor
 from shapeprog.data.shape import Shape
 from shapeprog.geometry.arrays import one_tensor_thread
 from shapeprog.inference.budget import NEVER, Deadline, Progress
-from shapeprog.inference.fit.joints import NEARLY, Joints, find_joints, joining, moved, needs
+from shapeprog.inference.fit.joints import Joints, find_joints, joining, moved, needs
 from shapeprog.inference.fit.residuals import Pairs, Target, pull
+from shapeprog.inference.fit.settings import FIT
 from shapeprog.inference.fit.tunable import Poses, Tunable
 from shapeprog.inference.surface.evidence import TOLERANCE, Evidence, evidence_of
 from shapeprog.language.program import Program
-
-STEPS, LAST = 12, 5
-"""Steps, of which the last ones fix rounded angles and close the joints that are still open."""
-
-EXPLAINED = 2.0
-"""Width of the weights of residuals at the end, in tolerances of the evidence."""
-
-GENTLE = {"length": 3e-5, "angle": 3e-5}
-PLACE = 1e-6
-"""Weights, against that of the whole target, of a squared move in cells from the start: of lengths and angles, which
-nothing else may hold, and of places."""
 
 
 def refine(program: Program, shape: Shape, *, seed: int = 0) -> Program:
@@ -53,7 +43,7 @@ def adjust(
     program: Program,
     evidence: Evidence,
     *,
-    steps: int = STEPS,
+    steps: int = FIT.steps,
     reach: float = math.inf,
     seed: int = 0,
     deadline: Deadline = NEVER,
@@ -64,7 +54,7 @@ def adjust(
     Parameters
     ----------
     steps
-        Steps of Gauss and Newton, at least ``LAST`` of them with fixed angles.
+        Steps of Gauss and Newton, at least ``FIT.last`` of them with fixed angles.
     reach
         Largest change of a number.
     seed
@@ -78,14 +68,14 @@ def adjust(
     values, low, high = tunable.values, (tunable.values - reach).maximum(tunable.low), tunable.values + reach
     held = torch.zeros(len(tunable.values), dtype=torch.bool)
     generator, target, angles = torch.Generator().manual_seed(seed), Target(evidence), tunable.are("angle")
-    narrow = EXPLAINED * evidence.tolerance
+    narrow = FIT.explained * evidence.tolerance
     wide = max(1.2, narrow)  # in cells, at first
     with one_tensor_thread(kernels=1):
-        joints = find_joints(tunable.scene(values), _floor(evidence), generator)
+        joints = find_joints(tunable.scene(values), _floor(evidence))
         for step in range(steps):
             if deadline.passed(f"the adjustment after {step} of {steps} steps"):
                 break
-            done = min(step / max(steps - LAST, 1), 1.0)
+            done = min(step / max(steps - FIT.last, 1), 1.0)
             if done == 1 and not held.any():
                 held = angles
                 values = torch.where(held, tunable.rounded(values * (values.abs() >= 0.7)), values)  # upright below
@@ -128,7 +118,7 @@ def of_joints(poses: Poses, joints: Joints, *, closing: bool) -> System:
     are put on it.
     """
     gaps = needs(poses.scene, poses.slopes, joints)
-    weight = 0.003 * (NEARLY**2 / (NEARLY**2 + gaps.residual**2)) ** 2
+    weight = 0.003 * (FIT.nearly**2 / (FIT.nearly**2 + gaps.residual**2)) ** 2
     if closing:
         count = len(joints.first)
         needed = joining(joints.first, joints.second, gaps.residual[:count], len(poses.scene.mask), 1.0)
@@ -143,7 +133,8 @@ def _move(
 ) -> Float[Tensor, " F"]:
     """The step to the minimum of the sum of squares, with the prior of every number at its start; some are held."""
     slope, curvature = (sum(parts) for parts in zip(*systems, strict=True))
-    gentle = torch.tensor([GENTLE.get(kind, PLACE) for kind in tunable.kinds]).double() * tunable.scale**2
+    measures = tunable.are("length") | tunable.are("angle")
+    gentle = torch.where(measures, FIT.measure_prior, FIT.place_prior).double() * tunable.scale**2
     slope = slope + gentle * (values - tunable.values)
     curvature = curvature + torch.diag(gentle)
     free = (~held).nonzero()[:, 0]

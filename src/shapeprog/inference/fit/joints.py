@@ -14,15 +14,12 @@ from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
 from shapeprog.geometry.batch import Batch
-from shapeprog.geometry.distance import each_distance, projected, signed_distance
+from shapeprog.geometry.distance import projected, signed_distance
 from shapeprog.geometry.primitives import primitives
 from shapeprog.geometry.scene import Scene
-from shapeprog.geometry.surface import sample_surface
 from shapeprog.inference.fit.residuals import rows_of
+from shapeprog.inference.fit.settings import FIT
 from shapeprog.inference.fit.tunable import ROW
-
-NEARLY, TOUCHING = 0.3, 0.05
-"""Gaps in cells up to which parts nearly touch, and touch."""
 
 
 class Joints(NamedTuple):
@@ -54,13 +51,13 @@ class Needs(NamedTuple):
     slopes: Float[Tensor, "R F"]
 
 
-def find_joints(scene: Scene, floor: float, generator: torch.Generator) -> Joints:
+def find_joints(scene: Scene, floor: float) -> Joints:
     """The joints of a scene: of parts that touch, and of those that nearly touch where nothing else joins them."""
     count = len(scene.mask)
-    first, second, points, gap = gaps(scene, generator)
-    selected = (joining(first, second, gap, count, NEARLY) | (gap <= TOUCHING)).nonzero()[:, 0]
+    first, second, points, gap = gaps(scene)
+    selected = (joining(first, second, gap, count, FIT.nearly) | (gap <= FIT.touching)).nonzero()[:, 0]
     lowest = _lowest(scene, torch.arange(count))[:, 0]
-    standing = ((lowest - floor).abs() <= NEARLY).nonzero()[:, 0]
+    standing = ((lowest - floor).abs() <= FIT.nearly).nonzero()[:, 0]
     inner = _inner(scene, first[selected], points[selected])
     return Joints(first[selected], second[selected], inner, standing, floor)
 
@@ -75,14 +72,15 @@ class Gaps(NamedTuple):
     width: Float[Tensor, " C"]
 
 
-def gaps(scene: Scene, generator: torch.Generator) -> Gaps:
+def gaps(scene: Scene) -> Gaps:
     """The gaps of a scene, those between parts that overlap below zero; the smaller part of each pair comes first."""
-    nearest, distance = _samples(scene, generator)  # a face may have no sample: primitives two cells apart may touch
-    first, second = (torch.minimum(distance, distance.T) < 2.0).triu(1).nonzero(as_tuple=True)
+    low, high = scene.centre - scene.reach, scene.centre + scene.reach
+    start, end = torch.maximum(low[:, None], low), torch.minimum(high[:, None], high)  # of what both boxes contain
+    first, second = ((start - end).amax(-1) < 1.0).triu(1).nonzero(as_tuple=True)
     area = scene.bounds.prod(-1)
     swap = area[first] > area[second]
     first, second = torch.where(swap, second, first), torch.where(swap, first, second)
-    points = between(scene, first, second, nearest[first, second], 24)
+    points = between(scene, first, second, ((start + end) / 2)[first, second], 24)
     width = signed_distance(rows_of(scene, second)[0], points[:, None])[:, 0].detach()
     width = width + signed_distance(rows_of(scene, first)[0], points[:, None])[:, 0].detach().clamp(min=0)
     return Gaps(first, second, points, width)
@@ -150,16 +148,6 @@ def between(
     slots = torch.stack([first, second], 1)
     pairs = (tensor[slots] for tensor in (scene.kind, scene.size, scene.centre, scene.rotation, scene.mask))
     return projected(Batch(*pairs), points, rounds)
-
-
-def _samples(scene: Scene, generator: torch.Generator) -> tuple[Float[Tensor, "N N 3"], Float[Tensor, "N N"]]:
-    """Mean of the samples of each primitive that are nearest to each other primitive, and their distance."""
-    single = Batch(*(tensor[:, None] for tensor in (scene.kind, scene.size, scene.centre, scene.rotation, scene.mask)))
-    samples = sample_surface(single, 64, generator).points
-    away = each_distance(scene, samples.flatten(0, 1)).unflatten(0, samples.shape[:2])
-    distance, nearest = away.topk(4, 1, largest=False)
-    midpoints = samples[torch.arange(len(samples))[:, None, None], nearest].mean(1)
-    return midpoints, distance[:, 0]
 
 
 def _slopes_of(values: Float[Tensor, " R"], leaves: Sequence[Tensor]) -> Float[Tensor, "R S"]:

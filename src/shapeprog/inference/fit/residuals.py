@@ -23,21 +23,10 @@ from shapeprog.geometry.scene import Scene
 from shapeprog.geometry.surface import SurfaceSample, sample_surface
 from shapeprog.inference.choice.bits import nearby
 from shapeprog.inference.fit import residual_kernels as kernels
+from shapeprog.inference.fit.settings import FIT
 from shapeprog.inference.fit.tunable import ROW
 from shapeprog.inference.surface.evidence import Evidence
 from shapeprog.space import Array, FloatArray
-
-POINTS, SAMPLES = 1_200, 1_200
-"""Points of the target, and samples of the surface of the program, that one step uses."""
-
-NEAR = 6
-"""Samples among which the partner of a point is found, and points among which that of a sample is."""
-
-TURNED = 0.5
-"""How far away, in cells, a sample of right place counts whose normal is at a right angle to that of the point."""
-
-SAME = 0.5
-"""Least cosine between normals on one face."""
 
 
 class Pairs(NamedTuple):
@@ -96,38 +85,40 @@ class Target:
         Plain distances of points to the union have little weight: they alone determine how far a part reaches along a
         sheet that has no edges.
         """
-        sample = sample_surface(scene, SAMPLES, generator)
+        sample = sample_surface(scene, FIT.samples, generator)
         samples, facing = sample.points, sample.normals
-        spacing = 1.5 * math.sqrt(self.evidence.area / min(SAMPLES, len(self._points)))
-        jitter = torch.rand(POINTS, generator=generator, dtype=torch.float64).numpy()
-        thresholds = (np.arange(POINTS) + jitter) * (self._shares[-1] / POINTS)  # stratified: evenly over the surface
+        spacing = 1.5 * math.sqrt(self.evidence.area / min(FIT.samples, len(self._points)))
+        jitter = torch.rand(FIT.points, generator=generator, dtype=torch.float64).numpy()
+        stratum = self._shares[-1] / FIT.points  # evenly over the surface
+        thresholds = (np.arange(FIT.points) + jitter) * stratum
         selected = self._order[np.searchsorted(self._shares, thresholds).clip(0, len(self._points) - 1)]
         points, normals, sides = self._points[selected], self._normals[selected], self._sides[selected]
         tree = cKDTree(_joint(samples.numpy(), facing.numpy()))
-        candidates = tree.query(_joint(points.numpy(), normals.numpy()), NEAR)[1]
+        candidates = tree.query(_joint(points.numpy(), normals.numpy()), FIT.partners)[1]
         behind = candidates.copy()
         unsure = ~sides.numpy()
-        behind[unsure] = tree.query(_joint(points.numpy()[unsure], -normals.numpy()[unsure]), NEAR)[1]
+        behind[unsure] = tree.query(_joint(points.numpy()[unsure], -normals.numpy()[unsure]), FIT.partners)[1]
         candidates = np.concatenate([candidates, behind], 1)
         offset, best = self._closest(np.broadcast_to(selected[:, None], candidates.shape), candidates, sample, spacing)
         partner = np.take_along_axis(candidates, best, 1)[:, 0]
-        back = self._owner[self._tree.query(_joint(samples.numpy(), facing.numpy()), NEAR)[1]]
+        back = self._owner[self._tree.query(_joint(samples.numpy(), facing.numpy()), FIT.partners)[1]]
         rows = np.broadcast_to(np.arange(len(back))[:, None], back.shape)
         back_offset, best = self._closest(back, rows, sample, spacing)
         back_partner = np.take_along_axis(back, best, 1)[:, 0]
         union = nearest_primitive(scene, points)[0]
         along = torch.cat([(normals * facing[partner]).sum(1), (self._normals[back_partner] * facing).sum(1)])
-        either = ~torch.cat([sides, self._sides[back_partner]]) & (along.abs() >= SAME)
-        zeros, ones = torch.zeros(POINTS, dtype=torch.float64), torch.ones(POINTS, dtype=torch.float64)
+        either = ~torch.cat([sides, self._sides[back_partner]]) & (along.abs() >= FIT.same)
+        zeros, ones = torch.zeros(FIT.points, dtype=torch.float64), torch.ones(FIT.points, dtype=torch.float64)
+        back_weights = torch.full((FIT.samples,), 0.5 / FIT.samples).double()
         return Pairs(
             torch.cat([points, self._points[back_partner], points]),
             torch.cat([samples[partner], samples, points]),
             torch.cat([facing[partner], facing, normals]),
             torch.cat([sample.slot[partner], sample.slot, union]),
             torch.cat([offset, back_offset, zeros]),
-            torch.cat([ones / POINTS, torch.full((SAMPLES,), 0.5 / SAMPLES).double(), 0.03 * ones / POINTS]),
-            torch.cat([either, torch.zeros(POINTS).bool()]),
-            torch.cat([torch.zeros(POINTS + SAMPLES), ones]).bool(),
+            torch.cat([ones / FIT.points, back_weights, 0.03 * ones / FIT.points]),
+            torch.cat([either, torch.zeros(FIT.points).bool()]),
+            torch.cat([torch.zeros(FIT.points + FIT.samples), ones]).bool(),
         )
 
     def _closest(
@@ -139,7 +130,7 @@ class Target:
         points = (tensor.numpy() for tensor in (self._points, self._normals, self._sides))
         samples = (sample.points.numpy(), sample.normals.numpy())
         at, candidates = np.ascontiguousarray(at), np.ascontiguousarray(candidates)
-        kernels.closest(*points, at, *samples, candidates, spacing, TURNED, 1e9, offset, best)
+        kernels.closest(*points, at, *samples, candidates, spacing, FIT.turned, 1e9, offset, best)
         return torch.from_numpy(offset), best[:, None]
 
 
@@ -150,7 +141,7 @@ def pull(scene: Scene, pairs: Pairs, width: float) -> Pull:
     value, by_row, slope = (result[:, 0] for result in distance_and_slopes(single, pairs.points[:, None]))
     cosine = (slope * pairs.normals).sum(1)
     plane = ((pairs.points - pairs.samples) * pairs.normals).sum(1)
-    same = (cosine >= SAME) | pairs.anywhere
+    same = (cosine >= FIT.same) | pairs.anywhere
     residual = torch.where(same, value, plane)
     # The opposite side of a part explains the point: a sheet is evidence for one side of a board, not for both.
     explained = pairs.either & ~same & (value.abs() < plane.abs() / 2)
@@ -177,4 +168,4 @@ def rows_of(scene: Scene, slots: Int[Tensor, " R"]) -> tuple[Batch, list[Tensor]
 
 def _joint(points: FloatArray, normals: FloatArray) -> FloatArray:
     """Points and normals (P, 6), in which distances combine those of positions and of directions."""
-    return np.concatenate([points, TURNED / math.sqrt(2) * normals], 1)
+    return np.concatenate([points, FIT.turned / math.sqrt(2) * normals], 1)

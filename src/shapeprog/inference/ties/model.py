@@ -6,9 +6,10 @@ import numpy as np
 import torch
 
 from shapeprog.geometry.scene import Scene
-from shapeprog.inference.fit.adjustment import EXPLAINED, of_target
+from shapeprog.inference.fit.adjustment import of_target
 from shapeprog.inference.fit.joints import Joints, moved, needs
 from shapeprog.inference.fit.residuals import Target
+from shapeprog.inference.fit.settings import FIT
 from shapeprog.inference.fit.tunable import THINNEST, Poses, Tunable
 from shapeprog.inference.surface.evidence import Evidence
 from shapeprog.inference.ties.anchored import Anchored
@@ -108,7 +109,7 @@ class Misfit:
 
     def __init__(self, model: Model, evidence: Evidence, seed: int, minimum: FloatArray) -> None:
         self.model, self.target = model, Target(evidence)
-        self.width = EXPLAINED * evidence.tolerance
+        self.width = FIT.explained * evidence.tolerance
         self.generator = torch.Generator().manual_seed(seed)
         self.start = model.numbers
         scale = np.array([model.tunable.scale.numpy() @ np.abs(model.jacobian[:, k]) for k in range(len(model.slots))])

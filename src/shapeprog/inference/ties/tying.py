@@ -16,10 +16,9 @@ import torch
 
 from shapeprog.errors import ShapeProgError
 from shapeprog.geometry.arrays import one_tensor_thread
-from shapeprog.geometry.scene import Scene
 from shapeprog.inference.budget import Progress
 from shapeprog.inference.choice.connecting import afloat
-from shapeprog.inference.fit.joints import Joints, find_joints
+from shapeprog.inference.fit.joints import find_joints
 from shapeprog.inference.surface.evidence import Evidence
 from shapeprog.inference.ties.anchored import Anchored
 from shapeprog.inference.ties.anchors import AnchorSettings, anchors_of
@@ -134,7 +133,7 @@ class _Ties:
         flat = Model(Anchored(layout, _from_low(layout)))
         self.trust = Trust()
         scene = flat.scene(flat.numbers)
-        self.joints = _joints(scene, seed)
+        self.joints = find_joints(scene, NOWHERE)
         self.anchored = Anchored(layout, anchors_of(flat, AnchorSettings()))
         self.model = Model(self.anchored)
         lines = layout.lines_of(held)
@@ -142,10 +141,8 @@ class _Ties:
         self.misfit = Misfit(self.model, evidence, seed, np.where(fixed, np.inf, KNOWN if known else 0.0))
         self.fixed = fixed
         parts = [k for k, line in enumerate(layout.lines) if isinstance(line, Part)]
-        self.touching: set[tuple[int, int]] = set()
-        if self.joints is not None:
-            pairs = scene.block[torch.stack([self.joints.first, self.joints.second], 1)].tolist()
-            self.touching = {(parts[min(pair)], parts[max(pair)]) for pair in pairs}
+        pairs = scene.block[torch.stack([self.joints.first, self.joints.second], 1)].tolist()
+        self.touching = {(parts[min(pair)], parts[max(pair)]) for pair in pairs}
 
     def tied(self, price: float) -> Program:
         """The program tied at a price of a number, in the unit of the misfit."""
@@ -180,10 +177,3 @@ class _Ties:
 
 def _from_low(layout: Layout) -> dict[tuple[int, str, int], Anchors]:
     return {key: (LOW, LOW) if element.kind == "interval" else (LOW,) for key, element in layout.elements.items()}
-
-
-def _joints(scene: Scene, seed: int) -> Joints | None:
-    try:
-        return find_joints(scene, NOWHERE, torch.Generator().manual_seed(seed))
-    except ShapeProgError:  # a part without a surface touches nothing
-        return None

@@ -179,7 +179,7 @@ def images(nodes: Sequence[Node], surface: FloatArray) -> list[Node]:
         around = (points[..., DEPTH] - axis[0]) + 1j * (points[..., SIDE] - axis[1])
         turn = np.angle(around * around.mean(1, keepdims=True).conj())
         index = np.flatnonzero(plain & ((np.abs(turn) < np.pi / count).mean(1) >= SETTINGS.sector))
-        index = np.setdiff1d(index, four) if count == 4 else index  # two mirrors are easier to read
+        index = np.setdiff1d(index, [*side, *depth]) if count == 4 else index  # mirrors follow changes of the width
         step = 2 * np.pi / count
         index = kept(index, _turned(points[index, ::6], axis, step))  # few points settle most candidates
         for copy in range(1, count):

@@ -15,10 +15,11 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from shapeprog.geometry.distance import signed_distance
+from shapeprog.geometry.batch import Batch
+from shapeprog.geometry.distance import distance_and_slopes, signed_distance
 from shapeprog.inference.candidates.drawings import drawings, is_unhinted, starts
 from shapeprog.inference.candidates.settings import SETTINGS
-from shapeprog.inference.fit.tunable import THINNEST, least
+from shapeprog.inference.fit.tunable import ROW, THINNEST, least
 from shapeprog.inference.pieces.cover_kernels import near_boxes
 from shapeprog.inference.pieces.pieces import Pieces
 from shapeprog.language.hints import Box
@@ -86,8 +87,8 @@ def _minimum(misfit: FloatArray, owner: Array, count: int) -> FloatArray:
 def fitted(draws: Sequence[Draw], target: Target) -> list[Draw]:
     """Statements fitted to their points by Gauss-Newton steps with a prior on their numbers, in one batch.
 
-    Residuals are distances of the points to the surface.  Each residual has a separate copy of the numbers of its
-    statement, so one backward pass gives all derivatives.
+    Residuals are distances of the points to the surface.  Each number that places a primitive has a separate copy of
+    the numbers of its statement, so one backward pass gives all derivatives.
     """
     if not draws:
         return []
@@ -98,16 +99,22 @@ def fitted(draws: Sequence[Draw], target: Target) -> list[Draw]:
         values[row, : statement.size] = torch.tensor(draw.values)
         free[row, : statement.size] = torch.tensor([not quantity.discrete for quantity in statement.quantities])
         low[row, : statement.size] = torch.tensor([least(quantity) for quantity in statement.quantities])
-    ids = torch.tensor([statement.id for statement in declared])[:, None, None, None].expand(-1, points, 1, 1)
-    plan = Plan(Code(ids, values[:, None, None, None].expand(-1, points, 1, 1, -1)))
+    ids = torch.tensor([statement.id for statement in declared])[:, None, None]
+    solids = unroll(Code(ids, values[:, None, None])).mask.shape[1]
+    copies = len(draws), solids * ROW
+    plan = Plan(Code(ids[:, None].expand(*copies, 1, 1), values[:, None, None, None].expand(*copies, 1, 1, -1)))
     start, prior = values, torch.where(free > 0, SETTINGS.prior * points, 1.0)
-    shifted = target.shifted[:, :, None]
+    shifted = target.shifted.reshape(-1, 1, 3)
     for _ in range(SETTINGS.steps):
-        moving = values[:, None, None, None].expand(-1, points, 1, 1, -1).clone().requires_grad_()
-        off = signed_distance(plan.scene(moving), shifted)[..., 0] - SETTINGS.offset
-        (slopes,) = torch.autograd.grad(off.sum(), moving)
-        slopes = slopes[:, :, 0, 0].nan_to_num(0) * free[:, None]
-        residual = off.detach().nan_to_num(0)
+        moving = values[:, None, None, None].expand(*copies, 1, 1, -1).clone().requires_grad_()
+        scene = plan.scene(moving)
+        placed = torch.cat([scene.size, scene.centre, scene.rotation.flatten(-2)], -1).flatten(2)
+        (by_number,) = torch.autograd.grad(placed.diagonal(dim1=1, dim2=2).sum(), moving)
+        fields = (scene.kind, scene.size, scene.centre, scene.rotation, scene.mask)
+        single = Batch(*(field[:, 0].detach().repeat_interleave(points, 0) for field in fields))
+        distance, by_row, _ = distance_and_slopes(single, shifted)
+        slopes = by_row.reshape(len(draws), points, -1) @ by_number[:, :, 0, 0].nan_to_num(0) * free[:, None]
+        residual = (distance.reshape(-1, points) - SETTINGS.offset).nan_to_num(0)
         weighted = ((SETTINGS.width**2 / (SETTINGS.width**2 + residual**2)) ** 2)[..., None] * slopes
         slope = (weighted * residual[..., None]).sum(1) + prior * (values - start)
         move = torch.linalg.solve(weighted.mT @ slopes + torch.diag_embed(prior), slope)

@@ -227,7 +227,7 @@ def test_a_block_is_written_by_the_plainest_statement_that_draws_it():
         ("translate(2, by=(0, 2, 1)) mirror(side)", "box(at=(0, 3, -9), size=(1, 2, 3))", None),
     ],
 )  # fmt: skip
-def test_what_is_mirrored_is_drawn_on_the_right_and_at_the_rear(loops, left, right):
+def test_what_is_mirrored_is_drawn_on_the_left_and_at_the_rear(loops, left, right):
     heads = loops.replace(") mirror", ");mirror").split(";")
     text = "".join(f"{'    ' * depth}for {'ij'[depth]} in {head}:\n" for depth, head in enumerate(heads))
     text += "    " * len(heads)

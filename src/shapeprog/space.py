@@ -3,8 +3,9 @@
 Grid frame
     A cube of 32 x 32 x 32 cells.  Coordinates are in cells with the origin at the centre of the
     cube, so cell ``k`` of an axis covers ``[k - 16, k - 15)`` and its centre is ``k - 15.5``.
-    Axis 0 is up, axis 1 is depth (positive = rear), axis 2 is left-right.  A shape is placed with
-    the centre of its bounding box at the origin and its longest side 24 cells long.
+    Axis 0 is up, axis 1 is depth (positive = rear), axis 2 is left-right (positive =
+    left, seen from the front).  A shape is placed with the centre of its bounding box at the
+    origin and its longest side 24 cells long.
 
 World frame
     Whatever the input file uses.  A :class:`Frame` leads from one to the other and back.

@@ -2,7 +2,8 @@
 
 Pieces of the target become single blocks, and copies among them loops.  A first choice is fitted briefly, then competes
 with its neighbours and with boxes around unexplained points.  The result is connected, fitted, restored where fitting
-did harm, and connected again.  Then all parts get roles.  No statement is treated by name.
+did harm, and connected again.  Then all parts get roles.  Pieces become candidates by the hints of statements, not by
+their names.
 """
 
 from __future__ import annotations
@@ -138,7 +139,8 @@ def _chosen(
 def _unharmed(adjusted: Program, start: Program, coverage: Coverage) -> Program:
     """The adjusted program; blocks whose adjustment costs more than .005 of the target are restored.
 
-    A loop is removed where that costs less than .001, the error of the coverage.
+    A block loses a loop, or nested loops become one row, where the text becomes cheaper and that costs less than .001,
+    the error of the coverage.
     """
     count = len(start.body)
     shortened = [(index, node) for index, block in enumerate(adjusted.body) for node in shorter(block)]

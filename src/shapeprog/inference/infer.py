@@ -2,9 +2,9 @@
 
 A mesh or a point cloud is searched on its surface (:func:`~shapeprog.inference.assembly.assemble`).  Voxels, shapes
 with ``statements="paper"``, and shapes whose surface gives no program are searched on cells
-(:func:`~shapeprog.inference.cells.reconstruct.reconstruct`).  Unless ``statements="paper"``, parts are then placed from
-the sides of the whole, numbers are tied, and calls of library functions are written.  Lengths get a unit and are
-rounded.
+(:func:`~shapeprog.inference.cells.reconstruct.reconstruct`).  Unless ``statements="paper"``, blocks near calls of
+library functions are moved onto them, parts are placed from the sides of the whole, numbers are tied, and calls are
+written.  Lengths get a unit and are rounded.
 """
 
 from __future__ import annotations
@@ -64,7 +64,8 @@ class Result:
         of ``program``: with ``statements="paper"``, and of voxels where that is the shorter description.
     scores
         ``blocks``, ``statements``, ``primitives``; ``numbers``, those that are free; ``explained``, the share of the
-        surface, of meshes and point clouds; ``iou`` at 32^3 of voxels and of programs with a ``snapped`` form.
+        surface, of meshes and point clouds, before calls, ties and rounding; ``iou`` at 32^3 of voxels and of programs
+        with a ``snapped`` form.
     reason
         Why the search stopped, what the time budget cut short, and what to try next.
     cut
@@ -111,6 +112,8 @@ def infer(
 ) -> Result:
     """A short program of at most ``blocks`` blocks that rebuilds a shape.
 
+    A block is a drawing statement with the loops around it.
+
     The result is the same for the same seed unless the time budget ends a step early, which ``cut`` and ``reason``
     report.
 
@@ -124,9 +127,10 @@ def infer(
         Seconds after which no further step of search or fitting starts.  Choice and ties are not
         interrupted.
     seed
-        Of the searches.  Samples of surfaces are the same for all seeds.
+        Of the searches.  Samples of meshes and point clouds are the same for all seeds.
     settings
-        Settings of the search on cells; the search on the surface does not use them.
+        Settings of the search on cells; the search on the surface does not use them.  ``blocks`` and ``detail``
+        overrule theirs.
     statements
         All statements in force, or those of the paper alone.
     detail
@@ -139,7 +143,8 @@ def infer(
         Parts that are nearly a call of a function move to where the call draws them.
     unit
         Unit of the lengths of the program: ``mm``, ``cm``, ``m``, ``in`` or ``cells``; by default that of the file, and
-        cells for voxels.  The numbers are rounded as a person would, by which nothing moves farther than .015 cells.
+        cells for voxels.  The numbers are rounded as a person would, by which nothing moves farther than .015 cells;
+        those of more than 256 primitives are not.
     progress
         Called with the name of the current step and the share of it that is done.
 
@@ -166,7 +171,7 @@ def infer(
         assembly = assemble(target, coverage, blocks=blocks, seed=seed, deadline=refining, progress=progress)
         program, reason = assembly.program, assembly.reason
         scores["explained"] = assembly.explained
-    if not program.body:  # voxels, or no surface to speak of
+    if not program.body:  # voxels, the statements of the paper, or a surface that gave no program
         limits = settings or Settings()
         on_cells = reconstruct(
             target, evidence, settings=replace(limits, blocks=blocks, price=limits.price / detail), seed=seed,

@@ -52,8 +52,8 @@ def unit_of_result(shape: Shape, program: Program, name: str = "") -> Unit | Non
 def in_readable_unit(program: Program, unit: Unit | None) -> Program:
     """The program with its lengths in a unit, or in cells, rounded as a person would.
 
-    No number and no face moves by more than .015 cells; where parts would come apart, by less.  A program in this
-    unit is returned unchanged.
+    No number and no face moves by more than .015 cells; where parts would come apart, by less.  A program of
+    more than 256 primitives is not rounded, and one in this unit is returned unchanged.
 
     Raises
     ------

@@ -104,7 +104,7 @@ def simplest(node: Node) -> Node:
 
 
 def canonical_side(node: Node) -> Node:
-    """The same block, where parts mirrored about the middle of the shape are drawn on the right and at the rear.
+    """The same block, where parts mirrored about the middle of the shape are drawn on the left and at the rear.
 
     The block is unchanged if its statement cannot draw the mirror image, or if it has loops other than mirrors.
     """

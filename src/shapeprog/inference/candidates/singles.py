@@ -2,7 +2,8 @@
 
 Every statement with a hint is tried on every piece; statements without a hint are tried on the most important pieces,
 with many starts.  The best are fitted to the points of the piece.  Of those with nearly equal misfit, the one with the
-fewest numbers is a candidate, so that copies have the same statement, and the best one.
+fewest numbers is a candidate, so that copies have the same statement, and the best one where
+its misfit is clearly less.
 """
 
 from __future__ import annotations

@@ -62,7 +62,7 @@ def _name(block: FloatArray, role: str) -> str:
 
 
 def tidy(block: FloatArray) -> FloatArray:
-    """The same cells with loops that run upwards, to the rear and to the right, the longer one inside.
+    """The same cells with loops that run upwards, to the rear and to the left, the longer one inside.
 
     A sheared box without shear becomes a box, which may then take any name.
     """

@@ -52,7 +52,9 @@ def reconstruct(
     refining: Deadline = NEVER,
     progress: Progress | None = None,
 ) -> Reconstruction:
-    """The program of at most ``settings.blocks`` blocks whose cells are those of a shape; the same for the same seed.
+    """The program of at most ``settings.blocks`` blocks whose cells are near those of a shape.
+
+    It is the same for the same seed.
 
     Parameters
     ----------

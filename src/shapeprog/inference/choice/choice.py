@@ -73,10 +73,10 @@ def choose(
     )  # fmt: skip
     penalties = (*SETTINGS.interior, 0.0) if interior.any() else (0.0,)
     searches = len(penalties) * SETTINGS.restarts + 1
-    best, draws = _no_sets(blocks), iter(range(searches * seed, searches * (seed + 1)))
+    best, seeds = _no_sets(blocks), iter(range(searches * seed, searches * (seed + 1)))
 
     def searched(penalty: float, initial: Array, best_sets: BestSets) -> BestSets:
-        search(*data, penalty, rounds // searches, SETTINGS.blink, next(draws), initial, *best_sets)
+        search(*data, penalty, rounds // searches, SETTINGS.blink, next(seeds), initial, *best_sets)
         return best_sets
 
     for _ in range(SETTINGS.restarts):
@@ -112,7 +112,8 @@ def _union(rows: Bits, indices: Sequence[int] | Array) -> Bits:
 
 
 def missed(table: CoverageTable, indices: tuple[int, ...]) -> Array:
-    """The candidates that are not selected, ordered by how much of the unexplained points they would explain."""
+    """The candidates that are not selected, ordered by how much of the unexplained points they would explain, less
+    their prices."""
     rows = table.rows[:, : table.evidence]
     done = _union(rows, indices) | _union(table.interior, indices)
     gains = np.bitwise_count(rows & ~done) @ table.weights[: table.evidence] - table.prices

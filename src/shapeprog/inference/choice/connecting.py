@@ -25,7 +25,10 @@ from shapeprog.language.unroll import unroll
 
 
 def connected(program: Program, coverage: Coverage) -> Program:
-    """The program with floating parts extended to others where the loss of value is small; each node is one block."""
+    """The program with floating parts extended to others, or removed, where the loss of value is small.
+
+    Each node is one block.
+    """
     while (better := _better_connected(program, coverage)) is not None:
         program = better
     return program

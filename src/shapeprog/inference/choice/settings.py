@@ -12,7 +12,7 @@ class Settings:
     Parameters
     ----------
     rounds, restarts
-        Rounds of ruin and recreate, and independent searches, of which the best set counts.
+        Rounds of ruin and recreate of all searches together, and independent searches, of which the best set counts.
     earlier
         Price of the last candidate above that of the first: of nearly equal sets, all seeds prefer the same.
     blink

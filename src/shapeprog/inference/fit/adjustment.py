@@ -54,7 +54,7 @@ def adjust(
     Parameters
     ----------
     steps
-        Steps of Gauss and Newton, at least ``FIT.last`` of them with fixed angles.
+        Steps of Gauss and Newton; in the last ``FIT.last`` of them angles are fixed.
     reach
         Largest change of a number.
     seed
@@ -78,7 +78,8 @@ def adjust(
             done = min(step / max(steps - FIT.last, 1), 1.0)
             if done == 1 and not held.any():
                 held = angles
-                values = torch.where(held, tunable.rounded(values * (values.abs() >= 0.7)), values)  # upright below
+                upright = values.abs() < 0.7  # degrees
+                values = torch.where(held, tunable.rounded(values * ~upright), values)
             poses = tunable.poses(values)
             joints = moved(poses.scene, joints)
             pairs = target.pairs(poses.scene, generator)

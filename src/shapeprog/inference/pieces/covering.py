@@ -15,7 +15,7 @@ from shapeprog.space import FloatArray
 class Support:
     """Points of a surface that boxes explain.
 
-    Parameters
+    Attributes
     ----------
     explained
         Whether each box explains each tested point (B, N).
@@ -23,8 +23,10 @@ class Support:
         Share of the surface of each box (B,) near which there are points.
     filled
         Whether that share is large enough (B,) for a solid.
+    price
+        Price of the surface of each box without points (B,), in points.
     value
-        Number of points that each box explains, minus the price (B,) of its surface without points.
+        Number of points that each box explains, minus its price (B,).
     """
 
     def __init__(self, cloud: Cloud, boxes: Boxes) -> None:

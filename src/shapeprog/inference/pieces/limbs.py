@@ -18,7 +18,7 @@ from shapeprog.space import FloatArray
 
 
 def limbs(cloud: Cloud) -> list[npt.NDArray[np.int64]]:
-    """The points of each limb, as indices of the evidence, largest first."""
+    """The points of each limb, as indices of the cloud, largest first."""
     step = -(-len(cloud.points) // SETTINGS.ball_points)
     which: npt.NDArray[np.int64] = np.arange(0, len(cloud.points), step, dtype=np.int64)
     centre, radius = inner_balls(cloud, which)

@@ -77,13 +77,13 @@ class Evidence:
         ``reach`` and has a matching normal.
     surface_outward
         Whether a normal is known to point outwards (Q,), as it bounds a solid: a surface of a program that faces the
-        other way has no support there.
+        other way pays three quarters of the price there.
     area
-        Area in cells of the surface that the points represent, in proportion to their weights.
+        Area in square cells of the surface that the points represent, in proportion to their weights.
     free
         Cells (R, R, R) of the cube of the grid that are known to be free; other space may be free or not.
     parts
-        Low and high corners (K, 2, 3) of the boxes of components of simple form, the largest ones; none of scans.
+        Low and high corners (K, 2, 3) of the boxes of components of simple form, the 64 largest at most; none of scans.
     """
 
     points: FloatArray
@@ -266,7 +266,7 @@ def looking(barrier: Flags, starts: FloatArray, steps: FloatArray, minimum: int,
 
 
 def local_planes(points: FloatArray) -> tuple[FloatArray, float, float]:
-    """Normals (P, 3) of the planes through the neighbours of each point, noise about them, and area of each point.
+    """Normals (P, 3) of the planes through the neighbours of each point, their noise, and the typical area per point.
 
     The noise is a low quantile of the distances: planes do not fit at edges and in thin parts.
     """

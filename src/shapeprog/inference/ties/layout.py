@@ -1,4 +1,4 @@
-"""A placed program taken apart into coordinates, and put together again with every face measured from an anchor.
+"""A placed program taken apart into coordinates; :mod:`~shapeprog.inference.ties.anchored` puts it together again.
 
 The horizontal and vertical position of every part is given by *elements*: an interval (a box), the axis of a round
 part with its radius, or a single coordinate (an end of a rod, the plane of a mirror, the last copy of a row).  Each
@@ -141,8 +141,6 @@ class Layout:
             numbers = {next(counter) for _ in Source((line,)).walk()}
             result |= numbers if index in top else set()
         return result
-
-    # ---- reading ------------------------------------------------------------------------------------------------
 
     def _elements(self, index: int, line: Part | Group) -> Iterator[Element]:
         keywords = dict(line.keywords)

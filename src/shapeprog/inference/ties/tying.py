@@ -47,14 +47,14 @@ FAR = 2.0
 """Farthest that relations may move a number at once, in cells."""
 
 KNOWN_PRICE = 1.2e-3
-"""The same in a program that somebody wrote; chosen on planted programs."""
+"""Price of a free number in a program that somebody wrote; chosen on planted programs."""
 
 KNOWN = 0.1
 """Weight of a squared move of a number that somebody wrote."""
 
 LOST, CHEAPER, ATTEMPTS = 0.03, 3.0, 3
 """Largest decrease of closeness when numbers are tied; beyond that, or where parts are separated, the price of a number
-is divided by this factor, in so many attempts."""
+is divided by this factor, in so many attempts.  The last attempt is kept in any case."""
 
 APART = 0.005
 """Gap in cells from which parts are separated."""

@@ -42,13 +42,11 @@ COLUMNS = (
 def measure(task: Task) -> list[dict[str, Any]]:
     """Rows of one shape for all methods that were asked for."""
     from shapeprog.data import read_pack
-    from shapeprog.data.shape import Shape
     from shapeprog.evaluation.metrics import evaluate_program
     from shapeprog.inference import greedy_boxes, infer
-    from shapeprog.inference.cells.refinement import REACH, refined
-    from shapeprog.inference.fit.adjustment import adjust
+    from shapeprog.inference.cells.refinement import refined
     from shapeprog.inference.infer import prepare_kernels
-    from shapeprog.inference.surface.evidence import evidence_of
+    from shapeprog.inference.surface.evidence import points_of_cells
 
     torch.set_num_threads(1)
     prepare_kernels(cells=True)
@@ -77,8 +75,7 @@ def measure(task: Task) -> list[dict[str, Any]]:
         result = infer(shape, blocks=blocks, seed=seed, budget=math.inf, statements=statements, ties=False)
         keep(method, result.program, result.snapped, result.seconds, time.thread_time() - before)
         if method == SEARCH and ALONE in methods and shape.points is not None:  # the same structure
-            cells = evidence_of(Shape(shape.name, shape.voxels))
-            alone = adjust(result.snapped, cells, reach=REACH, seed=seed)
+            alone = refined(result.snapped, torch.from_numpy(points_of_cells(shape.voxels)), seed=seed)
             keep(ALONE, alone, result.snapped, result.seconds)
     return rows
 

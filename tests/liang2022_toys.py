@@ -19,7 +19,7 @@ from torch import Tensor, nn
 
 from shapeprog.data.packs import write_pack
 from shapeprog.data.shape import Shape
-from shapeprog.liang2022.adapt import points_of_cells
+from shapeprog.inference.surface.evidence import points_of_cells
 from shapeprog.liang2022.fast import Fast, FastSettings
 from shapeprog.liang2022.generator import Generator
 from shapeprog.liang2022.loop import Record, train

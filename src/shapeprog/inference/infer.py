@@ -174,8 +174,8 @@ def infer(
     if not program.body:  # voxels, the statements of the paper, or a surface that gave no program
         limits = settings or Settings()
         on_cells = reconstruct(
-            target, evidence, settings=replace(limits, blocks=blocks, price=limits.price / detail), seed=seed,
-            searching=searching, refining=refining, progress=progress,
+            target, evidence, settings=replace(limits, blocks=blocks, price=limits.price / detail),
+            tied=statements == "all", seed=seed, searching=searching, refining=refining, progress=progress,
         )  # fmt: skip
         program, snapped, reason = on_cells.program, on_cells.snapped, on_cells.reason
     if statements == "all":

@@ -25,7 +25,6 @@ from pathlib import Path
 from typing import TypeAlias
 
 import numpy as np
-import numpy.typing as npt
 import torch
 from jaxtyping import Float, UInt8
 from torch import Tensor, nn
@@ -33,7 +32,7 @@ from torch import Tensor, nn
 from shapeprog.data.packs import read_pack
 from shapeprog.errors import ShapeProgError
 from shapeprog.geometry.surface import face_areas
-from shapeprog.inference.surface.evidence import exposed_sides
+from shapeprog.inference.surface.evidence import points_of_cells
 from shapeprog.language import Code, Draw, Program, encode, unroll
 from shapeprog.language.statement import EMPTY
 from shapeprog.liang2022.decode import Decoded, decode
@@ -44,10 +43,6 @@ from shapeprog.liang2022.pretrain import teacher_forcing
 from shapeprog.liang2022.prior import PRIORS, scramble
 from shapeprog.liang2022.settings import METHODS, NEURAL, AdaptSettings
 from shapeprog.liang2022.weights import load_executor, load_generator
-from shapeprog.space import HALF, SPAN
-
-INSET = 0.65
-"""Mean depth in cells of a surface below the faces of the cells that it touches; tuned on val."""
 
 REHEARSAL_CANVASES = 3  # canvases of each synthetic shape that a step rehearses
 RLOO_SAMPLES = 4  # programs sampled for each shape by the leave-one-out estimator
@@ -78,25 +73,6 @@ class TargetStream:
             cells.append(shape.voxels.astype(np.uint8))
             points.append(np.resize(rng.permutation(cloud)[: self._points], (self._points, 3)))
         return torch.from_numpy(np.stack(cells)), torch.from_numpy(np.stack(points).astype(np.float32))
-
-
-def points_of_cells(voxels: npt.NDArray[np.bool_], count: int = 5000, *, seed: int = 0) -> npt.NDArray[np.float32]:
-    """Points (count, 3) on the estimated surface of a shape with these touched cells, in the grid frame.
-
-    Uniform on the exposed faces of the cells, moved inwards by ``INSET``; a face at the end of the longest side
-    is exact, since that side is 24 cells long by definition, and stays.
-    """
-    occupied, random, rows = np.argwhere(voxels), np.random.default_rng(seed), np.arange(count)
-    low, high = occupied.min(0), occupied.max(0) + 1
-    faces = np.argwhere(exposed_sides(voxels))
-    along, above, *cell = faces[random.integers(len(faces), size=count)].T
-    cells, full = np.stack(cell, 1), high - low == SPAN
-    ends = full[along] & (cells[rows, along] == np.where(above, high[along] - 1, low[along]))
-    inwards = np.where(ends, 0.0, INSET)
-    points = cells + random.random((count, 3))
-    points[rows, along] = cells[rows, along] + np.where(above, 1 - inwards, inwards)
-    points = np.clip(points, np.where(full, low, low + INSET), np.where(full, high, high - INSET))
-    return (points - HALF).astype(np.float32)
 
 
 class AdaptTask:

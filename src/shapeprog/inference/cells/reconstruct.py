@@ -18,7 +18,7 @@ from shapeprog.inference.cells.settings import Settings
 from shapeprog.inference.cells.structure import search_structure
 from shapeprog.inference.choice.coverage import Prices
 from shapeprog.inference.fit.adjustment import adjust
-from shapeprog.inference.surface.evidence import Evidence
+from shapeprog.inference.surface.evidence import Evidence, points_of_cells
 from shapeprog.language.program import Program
 from shapeprog.language.unroll import unroll
 
@@ -47,6 +47,7 @@ def reconstruct(
     evidence: Evidence,
     *,
     settings: Settings,
+    tied: bool = False,
     seed: int = 0,
     searching: Deadline = NEVER,
     refining: Deadline = NEVER,
@@ -60,6 +61,8 @@ def reconstruct(
     ----------
     shape, evidence
         A shape, whose cells are searched, and its surface, to which the numbers are fitted.
+    tied
+        Whether the numbers will be tied: those of voxels are then fitted to faces, which ties can keep.
     searching, refining
         When no further round of the search, and no further step of fitting, starts.
     progress
@@ -67,9 +70,10 @@ def reconstruct(
     """
     structure = search_structure(shape.voxels, settings, seed=seed, deadline=searching, progress=progress)
     snapped = to_program(structure.blocks)
-    if shape.points is not None and shape.faces is None:
+    if shape.faces is None and not (tied and shape.points is None):
         # Normals of few points are unreliable: on benches of val this halves the chamfer distance.
-        program = refined(snapped, torch.from_numpy(np.asarray(shape.points)), seed=seed, deadline=refining)
+        points = points_of_cells(shape.voxels) if shape.points is None else np.asarray(shape.points)
+        program = refined(snapped, torch.from_numpy(points), seed=seed, deadline=refining)
     else:
         program = adjust(snapped, evidence, reach=REACH, seed=seed, deadline=refining, progress=progress)
     reason = f"The search ended after {structure.reason}"

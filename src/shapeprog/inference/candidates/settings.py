@@ -64,7 +64,7 @@ class Settings:
     """
 
     equal_points: int = 64
-    equal_distance: float = 0.02
+    equal_distance: float = 0.1
     starts: int = 192
     wall: float = 0.3
     counts: int = 6

@@ -147,7 +147,7 @@ def inferred(task: Task, shape: Any) -> tuple[Any, Any]:
     if task.method == "tied":
         evidence = evidence_of(shape, task.seed)
         tied = tie(parse(task.program), evidence, price=task.price, seed=task.seed)
-        return merged(tied.program), None
+        return merged(tied), None
     statements: Literal["all", "paper"] = "paper" if task.method == "paper" else "all"
     ties = task.method != "untied"
     result = infer(shape, blocks=task.blocks, seed=task.seed, statements=statements, ties=ties)

@@ -121,6 +121,7 @@ def of_furniture(task: Task) -> dict[str, Any]:
     from shapeprog.data.synthetic.furniture import furniture
     from shapeprog.inference.surface.evidence import evidence_of_program
     from shapeprog.inference.ties.tying import tie
+    from shapeprog.language.free import free_numbers
     from shapeprog.language.printer import format_program
 
     planted = furniture(task.number, task.seed)
@@ -129,7 +130,7 @@ def of_furniture(task: Task) -> dict[str, Any]:
     started = time.process_time()
     tied = tie(noisy, evidence, known=task.set == "alone", seed=task.seed)
     seconds = time.process_time() - started
-    drawn, plain, ways = redrawn(task.number, task.seed), plain_slopes(planted), slopes(tied.program, planted)
+    drawn, plain, ways = redrawn(task.number, task.seed), plain_slopes(planted), slopes(tied, planted)
     written = relations_written(len(plain))
     off = np.abs(written @ drawn.T)
     holding = np.abs(written @ ways).max(1, initial=0) < 1e-3
@@ -140,13 +141,13 @@ def of_furniture(task: Task) -> dict[str, Any]:
     varying = int((spread > VARYING).sum())
     wanted, found = rank(meaning[designed]), rank(relations @ plain, 0.05)
     kept, likely = rank(meaning[designed & holding]), rank(meaning[(designed | happening) & holding])
-    ties, mixed = kinds_tied(tied.program)
+    ties, mixed = kinds_tied(tied)
     return {
         "planted": wanted, "found": found, "kept": kept, "recall": kept / max(wanted, 1),
         "chance": (likely - kept) / max(found, 1),
         "false": max(min(found - kept, varying) - (likely - kept), 0) / max(found, 1),
-        "names_shared": ties, "mixed": mixed / max(ties, 1), "free": tied.free, "seconds": seconds,
-        "planted_text": format_program(planted), "text": format_program(tied.program),
+        "names_shared": ties, "mixed": mixed / max(ties, 1), "free": free_numbers(tied), "seconds": seconds,
+        "planted_text": format_program(planted), "text": format_program(tied),
     }  # fmt: skip
 
 
@@ -336,7 +337,7 @@ def of_group(task: Task) -> dict[str, Any]:
     started = time.process_time()
     if task.set == "rows":
         noisy = with_noise(planted, np.random.default_rng((task.seed, task.number, 1)))
-        found = tie(noisy, evidence_of_program(planted, task.seed), seed=task.seed).program
+        found = tie(noisy, evidence_of_program(planted, task.seed), seed=task.seed)
     else:
         each = parts(planted)
         first = np.cumsum([0, *(len(part.vertices) for part in each)])

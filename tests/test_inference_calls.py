@@ -178,7 +178,7 @@ def test_ties_leave_what_a_call_draws_to_its_function() -> None:
     body = parse("body(box(at=(-6, -2, -8.1), size=(12, 8, 16.2)))\n").body
     program, drawn = written(PULL_OUT, Program((*body, *call(PULL_OUT, DRAWER).body)))
     assert drawn == {1, 2}
-    tied = tie(program, evidence_of_program(program), held=drawn).program
+    tied = tie(program, evidence_of_program(program), held=drawn)
     assert calls_in(PULL_OUT, tied) == ["pull_out"]
 
 

@@ -21,6 +21,7 @@ from shapeprog.inference.choice.coverage import Coverage, CoverageTable, Prices,
 from shapeprog.inference.choice.coverage_kernels import LIFT, TURNED
 from shapeprog.inference.surface import evidence as seen
 from shapeprog.inference.surface.evidence import Evidence, evidence_of
+from shapeprog.inference.surface.settings import SURFACE
 from shapeprog.language.parser import parse
 from shapeprog.language.program import Program
 from shapeprog.language.unroll import unroll
@@ -357,9 +358,9 @@ def test_the_tolerance_of_a_scan_follows_its_noise(deviation):
     points = sample_surface(shape.vertices, shape.faces, 5000, 1).astype(np.float64)
     noisy = points + np.random.default_rng(2).normal(0, deviation, points.shape)
     made = evidence_of(Shape("scan", shape.voxels, noisy.astype(np.float32), kind="points"))
-    assert made.tolerance == pytest.approx(max(seen.TOLERANCE, 2 * deviation), rel=0.25)
+    assert made.tolerance == pytest.approx(max(SURFACE.tolerance, 2 * deviation), rel=0.25)
     clean = evidence_of(Shape("scan", shape.voxels, points.astype(np.float32), kind="points"))
-    assert clean.tolerance == seen.TOLERANCE
+    assert clean.tolerance == SURFACE.tolerance
     assert clean.area == pytest.approx(evidence_of(shape).area, rel=0.2)
 
 

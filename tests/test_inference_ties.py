@@ -20,7 +20,7 @@ from shapeprog.inference.fit.joints import Joints
 from shapeprog.inference.surface.evidence import evidence_of_program
 from shapeprog.inference.ties import naming, tying
 from shapeprog.inference.ties.anchored import Anchored
-from shapeprog.inference.ties.anchors import AnchorSettings, anchors_of
+from shapeprog.inference.ties.anchors import anchors_of
 from shapeprog.inference.ties.closeness import Closeness
 from shapeprog.inference.ties.expressions import solved
 from shapeprog.inference.ties.groups import grouped
@@ -29,6 +29,7 @@ from shapeprog.inference.ties.leaning import between_ends
 from shapeprog.inference.ties.model import Model
 from shapeprog.inference.ties.pricing import worthwhile
 from shapeprog.inference.ties.relations import Relation
+from shapeprog.inference.ties.settings import TIES
 from shapeprog.inference.ties.tying import tie
 from shapeprog.language.ast import Assignment, Comment, Fault, Group, Line, Part, values
 from shapeprog.language.convert import placed
@@ -54,7 +55,7 @@ for i in mirror(side):
 
 def tied_table(*, known: bool = False) -> Program:
     program = sp.parse(TABLE)
-    return tie(program, evidence_of_program(program), known=known).program
+    return tie(program, evidence_of_program(program), known=known)
 
 
 def test_a_table_is_written_with_few_names_and_draws_nearly_the_same():
@@ -102,12 +103,12 @@ drawer(box(at=(3, -7, -5.96), size=(2, 13, 12)))
 
 def test_what_is_off_the_middle_by_hundredths_is_symmetric_however_it_is_edited():
     program = sp.parse(BENCH.format(rear=6.92))
-    tied = tie(program, evidence_of_program(program)).program
+    tied = tie(program, evidence_of_program(program))
     assert edit_scores(tied).symmetry == 1
     assert (unroll(tied).centre[-2:, 2].abs() < 1e-4).all()
     assert rear_ends(tied)[0] == pytest.approx(rear_ends(tied)[1], abs=1e-4)
     askew = sp.parse(BENCH.format(rear=5.5))
-    one, other = rear_ends(tie(askew, evidence_of_program(askew)).program)
+    one, other = rear_ends(tie(askew, evidence_of_program(askew)))
     assert other - one == pytest.approx(1.5, abs=0.2)
 
 
@@ -140,12 +141,12 @@ def test_no_minus_zero_is_written():
     program = sp.parse(
         TABLE + "for i in translate(2, by=(-3, -0.0, 0)):\n    shelf(box(at=(1, -6, -9), size=(0.5, 12, 18)))\n"
     )
-    assert "-0.0" not in format_program(tie(program, evidence_of_program(program)).program)
+    assert "-0.0" not in format_program(tie(program, evidence_of_program(program)))
 
 
 def test_tying_again_changes_no_number_of_the_table():
     tied = tied_table()
-    again = tie(tied, evidence_of_program(tied)).program
+    again = tie(tied, evidence_of_program(tied))
     assert free_numbers(again) <= free_numbers(tied)
     assert (unroll(again).centre - unroll(tied).centre).abs().max() < 0.03
 
@@ -154,12 +155,12 @@ def test_a_program_without_relations_keeps_its_numbers():
     program = sp.parse(
         "box(at=(-3.1, 1.7, 2.9), size=(7.3, 4.9, 3.1))\nbox(at=(5.3, -6.1, -8.7), size=(2.2, 1.1, 5.9))\n"
     )
-    tied = tie(program, evidence_of_program(program)).program
+    tied = tie(program, evidence_of_program(program))
     torch.testing.assert_close(unroll(tied).centre, unroll(program).centre, atol=0.1, rtol=0)
 
 
 def test_what_draws_nothing_is_left_alone():
-    assert tie(Program(), evidence_of_program(sp.parse(TABLE))).program == Program()
+    assert tie(Program(), evidence_of_program(sp.parse(TABLE))) == Program()
 
 
 def test_a_relation_is_worth_having_where_its_price_is_below_that_of_a_number():
@@ -202,12 +203,12 @@ for i in translate(3, by=({step}, 0, 0)):
 
 def test_a_row_stays_between_what_it_lies_between():
     even = sp.parse(CASE.format(step=5.75, first=-6.25))
-    tied = tie(even, evidence_of_program(even)).program
+    tied = tie(even, evidence_of_program(even))
     tall = unroll(sp.set(tied, height=30))
     boards = sorted((tall.centre[2:, 0] - tall.size[2:, 0] + 12).tolist())  # base, shelves and top from the floor
     np.testing.assert_allclose(boards, [0, 5.75, 14.5, 23.25, 29], atol=0.05)
     uneven = sp.parse(CASE.format(step=5, first=-5))
-    tied = tie(uneven, evidence_of_program(uneven)).program
+    tied = tie(uneven, evidence_of_program(uneven))
     boards = sorted((unroll(tied).centre[2:, 0] - unroll(tied).size[2:, 0]).tolist())
     np.testing.assert_allclose(boards, [-12, -5, 0, 5, 11], atol=0.1)
 
@@ -292,7 +293,7 @@ def test_upright_boards_stay_boards():
 
 def test_a_rail_stays_on_a_back_that_leans_when_the_chair_grows():
     program = sp.parse(LEANING)
-    tied = tie(program, evidence_of_program(program)).program
+    tied = tie(program, evidence_of_program(program))
     for height in (16, 24):
         scene = unroll(sp.set(tied, height=height))
         assert pieces(*union_mesh(scene)) == 1
@@ -310,7 +311,7 @@ for i in mirror(side):
 for i in mirror(depth):
     apron(box(at=(3, 6.6, -10.8), size=(2, 0.6, 21.6)))
 """)
-    tied = tie(program, evidence_of_program(program)).program
+    tied = tie(program, evidence_of_program(program))
     for width in (16, 36):
         assert pieces(*union_mesh(unroll(sp.set(tied, width=width)))) == 1
     scores = edit_scores(tied)
@@ -333,7 +334,7 @@ rail(board(at=(10.28, 5.61, -5.4), size=(1.61, 0.54, 10.89), tilt=9.5))
 for i in translate(6, by=(0, 0, 1.23)):
     slat(rod(start=(-0.52, 3.99, -3.06), end=(11.12, 5.96, -3.27), radius=0.14))
 """)
-    tied = tie(program, evidence_of_program(program)).program
+    tied = tie(program, evidence_of_program(program))
     points = unroll(tied).sample(2000, torch.Generator().manual_seed(0))
     assert unroll(program).distance(points).abs().max() < 1
 
@@ -350,7 +351,7 @@ def test_numbers_that_somebody_wrote_are_known_even_where_they_are_hidden():
     text = "box(at=(0, -4, -4), size=(8, 8, 8))\nrod(start=(-9, 0, 0), end=(7.7, 0, 0), radius=1)\n"
     program = sp.parse(text)
     ends = {
-        known: next(node for node in tie(program, evidence_of_program(program), known=known).program.walk()
+        known: next(node for node in tie(program, evidence_of_program(program), known=known).walk()
                     if node.name == "rod").values[3]
         for known in (False, True)
     }  # fmt: skip
@@ -381,7 +382,7 @@ def test_a_part_with_hidden_ends_stays_between_the_faces_that_it_meets():
         "    box(at=(-4, -4.07, 4), size=(1, 10.06, 2))\n"
         "box(at=(10, -6, -6), size=(2, 12, 12))\n"
     )
-    tied = sp.inline(tie(program, evidence_of_program(program)).program)
+    tied = sp.inline(tie(program, evidence_of_program(program)))
     box = next(node for node in tied.walk() if node.name == "box" and not node.role)
     np.testing.assert_allclose([box.values[1], box.values[1] + box.values[4]], [-4, 6], atol=0.05)
 
@@ -394,7 +395,7 @@ def test_the_height_of_a_round_leg_is_called_so_and_no_name_ends_in_two_without_
         "        leg(cylinder(at=(-12, 6, 8), height=14, radius=1))\n"
         "        post(cylinder(at=(2, 6, 8), height=8, radius=0.5))\n"
     )
-    tied = tie(program, evidence_of_program(program)).program
+    tied = tie(program, evidence_of_program(program))
     found = {each.name: each.value for each in sp.names(tied)}
     assert found.get("leg_height", found.get("post_height")) in (pytest.approx(14, abs=0.1), pytest.approx(8, abs=0.1))
     assert not any(name.endswith("breadth") for name in found)
@@ -411,7 +412,7 @@ def test_an_overhang_that_is_the_same_on_all_sides_is_one_number():
     free = {}
     for overhang in (0.54, 1.54):  # beside .52 at the sides
         program = sp.parse(text.format(depth=8 - 1.5 - overhang))
-        free[overhang] = tie(program, evidence_of_program(program)).free
+        free[overhang] = free_numbers(tie(program, evidence_of_program(program)))
     assert free[0.54] == free[1.54] - 1
 
 
@@ -445,13 +446,13 @@ def test_ties_cost_little_of_the_surface_whatever_a_number_is_worth(price: float
     )
     evidence = evidence_of_program(program)
     closeness = Closeness(evidence, 0)
-    tied = tie(program, evidence, price=price).program
+    tied = tie(program, evidence, price=price)
     assert closeness.of(unroll(program)) - closeness.of(unroll(tied)) <= 0.03
 
 
 def test_copies_that_are_off_their_line_by_hundredths_lie_in_it():
     program = sp.parse("for i in translate(3, by=(4, 0.02, 0)):\n    shelf(box(at=(-4.5, -6, -8), size=(1, 12, 16)))")
-    tied = tie(program, evidence_of_program(program)).program
+    tied = tie(program, evidence_of_program(program))
     assert len(set(unroll(tied).centre[:, 1].tolist())) == 1
 
 
@@ -463,7 +464,7 @@ top(box(at=(5, -8, -12), size=(1, 16, 24)))
 for i in mirror(side):
     leg(box(at=(-6, -7.5, 10), size=(11, 1.52, 1.53)))
 """)
-    tied = tie(program, evidence_of_program(program), held={2}).program
+    tied = tie(program, evidence_of_program(program), held={2})
     sizes = {tuple(np.round(node.values[4:6], 2)) for node in tied.flat().walk() if getattr(node, "role", "") == "leg"}
     assert (1.52, 1.53) in sizes
 
@@ -484,7 +485,7 @@ door(left=3, width=2.5, front=0, depth=0.5, bottom=8.97, height=4)
 
 def tied_text(text: str) -> str:
     program = sp.parse(text)
-    return format_program(tie(program, evidence_of_program(program)).program)
+    return format_program(tie(program, evidence_of_program(program)))
 
 
 def test_faces_are_measured_from_the_side_that_keeps_them_in_contact():
@@ -517,7 +518,7 @@ def test_long_parts_span_and_short_ones_keep_their_size(end: float, expected: tu
     )
     layout = Layout(source.source)
     flat = {key: (0, 0) if element.kind == "interval" else (0,) for key, element in layout.elements.items()}
-    found = anchors_of(Model(Anchored(layout, flat)), AnchorSettings())
+    found = anchors_of(Model(Anchored(layout, flat)))
     assert found[0, "", 0] == expected
     assert found[1, "", 0] == (2, 2)
 
@@ -726,8 +727,8 @@ def test_a_program_that_cannot_be_drawn_is_tied_for_less(monkeypatch):
         return tied_at(ties, price)
 
     monkeypatch.setattr(tying._Ties, "tied", tied)
-    assert tie(program, evidence_of_program(program)).free < 20
-    assert prices[1] == prices[0] / tying.CHEAPER
+    assert free_numbers(tie(program, evidence_of_program(program))) < 20
+    assert prices[1] == prices[0] / TIES.cheaper
 
 
 def test_what_lies_between_equal_clearances_is_written_with_one_number():
@@ -739,6 +740,6 @@ def test_steps_that_would_be_shorter_as_a_row_are_tied():
     text = "top(box(at=(10, -8, -12), size=(1, 16, 24)))\nfor i in translate(2, by=(-2.4, -5.2, 0.44)):\n"
     program = sp.parse(f"{text}    stretcher(box(at=(5, 2, -10), size=(2, 2, 20)))\n")
     assert source_of(placed(program)).lines[-1].kind == "row"
-    tied = tie(program, evidence_of_program(program)).program
+    tied = tie(program, evidence_of_program(program))
     assert tied.source.lines[-1].kind == "row"
     assert float((unroll(tied).centre - unroll(program).centre).abs().max()) < 0.5

@@ -50,7 +50,7 @@ def tidy_command(
         cure = "tidy is for programs of plain numbers; edit this one by hand"
         raise InputError(f"{program} has groups or functions already, which tidy would write out", cure)
     wanted = terminal.asked_unit(given.unit, frame, program, unit, file_unit)
-    result = tie(given, evidence_of_program(given, seed), price=price, known=True, seed=seed).program
+    result = tie(given, evidence_of_program(given, seed), price=price, known=True, seed=seed)
     for each in libraries:
         result = with_library(result, each)
     result = in_readable_unit(result, wanted)

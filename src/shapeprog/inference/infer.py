@@ -186,7 +186,7 @@ def infer(
         if libraries:
             program, held = with_calls(program, libraries, coverage)
         if ties:
-            program = tie(program, evidence, held=held, progress=progress).program
+            program = tie(program, evidence, held=held, progress=progress)
         if integral is not None and description_length(plain, target.voxels, integral) < description_length(
             program, target.voxels
         ):

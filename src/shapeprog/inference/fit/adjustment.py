@@ -20,7 +20,8 @@ from shapeprog.inference.fit.joints import Joints, find_joints, joining, moved, 
 from shapeprog.inference.fit.residuals import Pairs, Target, pull
 from shapeprog.inference.fit.settings import FIT
 from shapeprog.inference.fit.tunable import Poses, Tunable
-from shapeprog.inference.surface.evidence import TOLERANCE, Evidence, evidence_of
+from shapeprog.inference.surface.evidence import Evidence, evidence_of
+from shapeprog.inference.surface.settings import SURFACE
 from shapeprog.language.program import Program
 
 
@@ -147,5 +148,5 @@ def _move(
 
 def _floor(evidence: Evidence) -> float:
     """Height of the lowest point; of scans, whose lowest points are noise, a tolerance above it."""
-    above = evidence.tolerance if evidence.tolerance > TOLERANCE else 0.0
+    above = evidence.tolerance if evidence.tolerance > SURFACE.tolerance else 0.0
     return float(evidence.surface[:, 0].min()) + above

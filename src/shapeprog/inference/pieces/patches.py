@@ -11,7 +11,8 @@ from scipy.ndimage import label as label_regions
 from shapeprog.inference.pieces.oriented import Boxes, bounds, boxes_around, join, principal_axes
 from shapeprog.inference.pieces.patch_kernels import grow_patches
 from shapeprog.inference.pieces.settings import SETTINGS
-from shapeprog.inference.surface.cloud import NOISY, Cloud, tolerance
+from shapeprog.inference.surface.cloud import Cloud, tolerance
+from shapeprog.inference.surface.settings import SURFACE
 from shapeprog.space import Array, FloatArray
 
 
@@ -19,7 +20,7 @@ def planar_patches(cloud: Cloud) -> Boxes:
     """The planar patches of a surface and the bars that they consist of, largest first."""
     order = np.argsort(flatness(cloud), kind="stable")
     label = np.empty(len(cloud.points), np.int64)
-    angle = np.cos(np.radians(25 if cloud.noise > NOISY else 15))
+    angle = np.cos(np.radians(25 if cloud.noise > SURFACE.noisy else 15))
     count = grow_patches(
         cloud.points, cloud.normals, cloud.neighbours, order, angle, tolerance(cloud), SETTINGS.patch_points, label
     )

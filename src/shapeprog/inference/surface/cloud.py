@@ -14,16 +14,8 @@ import numpy.typing as npt
 from scipy.spatial import cKDTree
 
 from shapeprog.data.shape import Shape
+from shapeprog.inference.surface.settings import SURFACE
 from shapeprog.space import Array, FloatArray
-
-NEAREST, AROUND = 12, 20
-"""Neighbours of a point, and those from which a normal is estimated."""
-
-NOISY = 0.05
-"""Noise in cells above which points are projected onto planes, and normals are less reliable."""
-
-CLOSEST = 1e-3
-"""Least spacing in cells: points may coincide."""
 
 
 class Cloud(NamedTuple):
@@ -46,7 +38,7 @@ def cloud_of(points: Array, normals: Array | None = None) -> Cloud:
     these planes.
     """
     cloud = _cloud(points, normals)
-    return _cloud(projected(cloud.points), None) if normals is None and cloud.noise > NOISY else cloud
+    return _cloud(projected(cloud.points), None) if normals is None and cloud.noise > SURFACE.noisy else cloud
 
 
 def projected(points: FloatArray) -> FloatArray:
@@ -54,7 +46,7 @@ def projected(points: FloatArray) -> FloatArray:
     for _ in range(2):
         distance, neighbours = cKDTree(points).query(points, k=min(24, len(points)))
         normals, _ = planes(points, neighbours)
-        weight = np.exp(-((distance / np.maximum(distance[:, -1:] / 2, CLOSEST)) ** 2))[..., None]
+        weight = np.exp(-((distance / np.maximum(distance[:, -1:] / 2, SURFACE.closest)) ** 2))[..., None]
         middle = (points[neighbours] * weight).sum(1) / weight.sum(1)
         points = points - ((points - middle) * normals).sum(1)[:, None] * normals
     return points
@@ -62,16 +54,16 @@ def projected(points: FloatArray) -> FloatArray:
 
 def _cloud(points: Array, normals: Array | None) -> Cloud:
     points = np.ascontiguousarray(points, np.float64)
-    around = (AROUND if normals is None else NEAREST) + 1
+    around = (SURFACE.around if normals is None else SURFACE.nearest) + 1
     distance, neighbours = cKDTree(points).query(points, k=range(1, min(around, len(points)) + 1), workers=2)
-    spacing = max(float(np.median(distance[:, -1])) * (np.pi / neighbours.shape[1]) ** 0.5, CLOSEST)
+    spacing = max(float(np.median(distance[:, -1])) * (np.pi / neighbours.shape[1]) ** 0.5, SURFACE.closest)
     if normals is None:
         facing, squared = planes(points, neighbours)
         noise = float(np.sqrt(np.median(squared) / neighbours.shape[1]))
     else:
         facing = np.ascontiguousarray(normals, np.float64)
         noise = roughness(points, facing, neighbours)
-    return Cloud(points, facing, np.ascontiguousarray(neighbours[:, 1 : NEAREST + 1], np.int32), spacing, noise)
+    return Cloud(points, facing, np.ascontiguousarray(neighbours[:, 1 : SURFACE.nearest + 1], np.int32), spacing, noise)
 
 
 def planes(points: FloatArray, neighbours: npt.NDArray[np.int64]) -> tuple[FloatArray, FloatArray]:

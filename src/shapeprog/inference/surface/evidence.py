@@ -26,35 +26,10 @@ from shapeprog.geometry.mesh import union_mesh
 from shapeprog.inference.surface.cloud import planes, points_of_scan
 from shapeprog.inference.surface.components import Components, components, simple_parts, solid_sides
 from shapeprog.inference.surface.evidence_kernels import look_out
+from shapeprog.inference.surface.settings import SURFACE
 from shapeprog.language.program import Program
 from shapeprog.language.unroll import unroll
 from shapeprog.space import HALF, RESOLUTION, SPAN, UP, FloatArray
-
-POINTS, SURFACE = 6_000, 40_000
-"""Points to be explained, and points of the same surface that support the surface of a program."""
-
-TOLERANCE, CELL_TOLERANCE = 0.008 * SPAN, 0.65
-"""Largest distance between a clean point, or one of a cell, and a surface that explains it; the first is .8 % of the
-longest side."""
-
-AGREEMENT, SCANNED = 0.5, 0.6
-"""Least cosine between normals that agree; and for scans, where noise could be mistaken for a surface otherwise.
-
-The bound is wide, to separate the two sides of a part only: near an edge of a thin part the nearest surface is often
-another one, and a slope in cells is a staircase.
-"""
-
-INSET = 0.45
-"""Depth in cells of the surface of a program below the faces of the cells that it should touch; tuned on val.
-
-The surface is anywhere within the cells that it touches.  Near their middles, errors of fits change no cell.
-"""
-
-NEIGHBOURS = 16
-"""Points of a scan to which a plane is fitted."""
-
-LOOKING, FREE = 128, 64
-"""Cells along each side of the grid for visibility, and of the grid of free space."""
 
 Flags = npt.NDArray[np.bool_]
 
@@ -107,7 +82,7 @@ def evidence_of(shape: Shape, seed: int = 0) -> Evidence:
         mesh = components(shape.vertices, shape.faces)
         if len(mesh.area):
             return _of_mesh(mesh, seed)
-    if shape.points is not None and len(shape.points) > NEIGHBOURS:
+    if shape.points is not None and len(shape.points) > SURFACE.planes:
         return _of_points(points_of_scan(shape), shape.voxels, seed)
     return _of_cells(shape.voxels)
 
@@ -121,46 +96,50 @@ def evidence_of_program(program: Program, seed: int = 0) -> Evidence:
 
 
 def _of_mesh(mesh: Components, seed: int) -> Evidence:
-    samples, face = sample_with_faces(mesh.vertices, mesh.faces, SURFACE, seed)
+    samples, face = sample_with_faces(mesh.vertices, mesh.faces, SURFACE.surface, seed)
     surface, corners = samples.astype(np.float64), mesh.vertices[mesh.faces]
     across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])[face]
     sides = solid_sides(mesh)
     side = sides[face]
     normals = np.where(side < 0, -1, 1)[:, None] * across / np.linalg.norm(across, axis=1, keepdims=True)
-    barrier = touched(corners, LOOKING)
-    points = surface[:POINTS]
-    front, back = (visible(points, sign * normals[:POINTS], barrier) for sign in (1, -1))
+    barrier = touched(corners, SURFACE.looking)
+    points = surface[: SURFACE.points]
+    front, back = (visible(points, sign * normals[: SURFACE.points], barrier) for sign in (1, -1))
     weights = np.where(front | back, 1.0, 0.1)  # what cannot be seen from outside counts little
-    facing, oriented = outward(normals[:POINTS], front, back)
+    facing, oriented = outward(normals[: SURFACE.points], front, back)
     area = float(mesh.area.sum())
-    coarse: Flags = np.any(barrier.reshape((FREE, LOOKING // FREE) * 3), (1, 3, 5))
+    coarse: Flags = np.any(barrier.reshape((SURFACE.free, SURFACE.looking // SURFACE.free) * 3), (1, 3, 5))
     return Evidence(
-        points, facing, weights / weights.sum(), oriented, TOLERANCE, AGREEMENT, surface, normals, side != 0,
-        _reach(TOLERANCE, area), area * float(weights.mean()), free_cells(coarse, surface, through=False),
-        simple_parts(mesh, sides, face[:POINTS][front | back])[:64],
+        points, facing, weights / weights.sum(), oriented, SURFACE.tolerance, SURFACE.agreement,
+        surface, normals, side != 0, _reach(SURFACE.tolerance, area), area * float(weights.mean()),
+        free_cells(coarse, surface, through=False), simple_parts(mesh, sides, face[:SURFACE.points][front | back])[:64],
     )  # fmt: skip
 
 
 def _of_points(surface: FloatArray, voxels: Flags, seed: int) -> Evidence:
     """The evidence of a scan: noise is the distance from local planes; area follows from distances between points."""
     normals, noise, point_area = local_planes(surface)
-    selected = np.sort(np.random.default_rng(seed).permutation(len(surface))[:POINTS])
+    selected = np.sort(np.random.default_rng(seed).permutation(len(surface))[: SURFACE.points])
     # With more noise, the position of the surface is too uncertain for a wider tolerance.
-    tolerance, area = min(max(TOLERANCE, 2 * noise), 0.75), point_area * len(surface)
+    tolerance, area = min(max(SURFACE.tolerance, 2 * noise), 0.75), point_area * len(surface)
     reach = _reach(tolerance, area, len(surface))
-    fine = voxels.repeat(FREE // RESOLUTION, 0).repeat(FREE // RESOLUTION, 1).repeat(FREE // RESOLUTION, 2)
+    fine = (
+        voxels.repeat(SURFACE.free // RESOLUTION, 0)
+        .repeat(SURFACE.free // RESOLUTION, 1)
+        .repeat(SURFACE.free // RESOLUTION, 2)
+    )
     free = free_cells(fine, surface, through=True)
     weights, points = np.full(len(selected), 1 / len(selected)), surface[selected]
-    above = 1.5 * RESOLUTION / FREE * normals[selected]
+    above = 1.5 * RESOLUTION / SURFACE.free * normals[selected]
     facing, oriented = outward(normals[selected], *(_within(free, points + sign * above) for sign in (1, -1)))
     return Evidence(
-        points, facing, weights, oriented, tolerance, SCANNED, surface, normals,
+        points, facing, weights, oriented, tolerance, SURFACE.scanned, surface, normals,
         np.zeros(len(surface), np.bool_), reach, area, free, np.zeros((0, 2, 3)),
     )  # fmt: skip
 
 
 def _of_cells(voxels: Flags) -> Evidence:
-    """The evidence of cells: one point for each exposed face, at the depth ``INSET``.
+    """The evidence of cells: one point for each exposed face, at the depth ``inset``.
 
     Parts that are one cell thick have .7 of that thickness: their two sides do not cross.
     """
@@ -171,34 +150,33 @@ def _of_cells(voxels: Flags) -> Evidence:
     coordinate = cells[np.arange(len(faces)), axis]
     exact = (high - low == SPAN) & (coordinate == np.where(sign < 0, low, high - 1))
     single = (sides[:, 0] & sides[:, 1])[(axis, *cells.T)]
-    inset = np.where(exact, 0.0, np.where(single, 0.15, INSET))
+    inset = np.where(exact, 0.0, np.where(single, 0.15, SURFACE.inset))
     normals = sign[:, None] * np.eye(3)[axis]
     surface = cells + 0.5 - HALF + (0.5 - inset)[:, None] * normals
     count = len(surface)
     return Evidence(
-        surface, normals, np.full(count, 1 / count), np.ones(count, np.bool_), CELL_TOLERANCE, AGREEMENT,
-        surface, normals, np.zeros(count, np.bool_), _reach(CELL_TOLERANCE, count, count), float(count), ~voxels,
-        np.zeros((0, 2, 3)),
+        surface, normals, np.full(count, 1 / count), np.ones(count, np.bool_),
+        SURFACE.cell_tolerance, SURFACE.agreement, surface, normals, np.zeros(count, np.bool_),
+        _reach(SURFACE.cell_tolerance, count, count), float(count), ~voxels, np.zeros((0, 2, 3)),
     )  # fmt: skip
 
 
 def points_of_cells(voxels: npt.NDArray[np.bool_], count: int = 5000, *, seed: int = 0) -> npt.NDArray[np.float32]:
     """Points (count, 3) on the estimated surface of a shape with these touched cells, in the grid frame.
 
-    Uniform on the exposed faces of the cells, moved inwards by .65 cells (tuned on val); a face at the end of the
+    Uniform on the exposed faces of the cells, moved inwards by ``depth``; a face at the end of the
     longest side is exact, since that side is 24 cells long by definition, and stays.
     """
-    depth = 0.65
     occupied, random, rows = np.argwhere(voxels), np.random.default_rng(seed), np.arange(count)
     low, high = occupied.min(0), occupied.max(0) + 1
     faces = np.argwhere(exposed_sides(voxels))
     along, above, *cell = faces[random.integers(len(faces), size=count)].T
     cells, full = np.stack(cell, 1), high - low == SPAN
     ends = full[along] & (cells[rows, along] == np.where(above, high[along] - 1, low[along]))
-    inwards = np.where(ends, 0.0, depth)
+    inwards = np.where(ends, 0.0, SURFACE.depth)
     points = cells + random.random((count, 3))
     points[rows, along] = cells[rows, along] + np.where(above, 1 - inwards, inwards)
-    points = np.clip(points, np.where(full, low, low + depth), np.where(full, high, high - depth))
+    points = np.clip(points, np.where(full, low, low + SURFACE.depth), np.where(full, high, high - SURFACE.depth))
     return (points - HALF).astype(np.float32)
 
 
@@ -208,7 +186,7 @@ def exposed_sides(voxels: Flags) -> Flags:
     return np.array([[voxels & ~np.roll(padded, by, axis)[inner] for by in (1, -1)] for axis in range(3)])
 
 
-def _reach(tolerance: float, area: float, count: int = SURFACE) -> float:
+def _reach(tolerance: float, area: float, count: int = SURFACE.surface) -> float:
     """The larger of one and a half tolerances, and the radius of a disc that contains four points on average."""
     return max(1.5 * tolerance, math.sqrt(4 * area / (math.pi * max(count, 1))))
 
@@ -292,10 +270,10 @@ def local_planes(points: FloatArray) -> tuple[FloatArray, float, float]:
     """
     from scipy.spatial import cKDTree
 
-    distance, neighbours = cKDTree(points).query(points, k=NEIGHBOURS)
+    distance, neighbours = cKDTree(points).query(points, k=SURFACE.planes)
     normals, squared = planes(points, neighbours)
-    noise = float(np.quantile(np.sqrt(squared / (NEIGHBOURS - 3)), 0.25))
-    area = float(np.median(distance[:, -1]) ** 2 * math.pi / (NEIGHBOURS - 1))
+    noise = float(np.quantile(np.sqrt(squared / (SURFACE.planes - 3)), 0.25))
+    area = float(np.median(distance[:, -1]) ** 2 * math.pi / (SURFACE.planes - 1))
     return normals, noise, area
 
 

@@ -10,63 +10,22 @@ conditional modes (Besag 1986) from several starts.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import cycle, islice, product
 
 import numpy as np
 import torch
 
 from shapeprog.geometry.primitive import SIZES
-from shapeprog.inference.ties.boxes import TOUCH, boxes_of, gaps, normals, touching, viewed
-from shapeprog.inference.ties.layout import ALIGNED, CENTRED, HIGH, LOW, MIDDLE, Anchors, Element
+from shapeprog.inference.ties.boxes import boxes_of, gaps, normals, touching, viewed
+from shapeprog.inference.ties.layout import ALIGNED, HIGH, LOW, MIDDLE, Anchors, Element
 from shapeprog.inference.ties.model import Model
+from shapeprog.inference.ties.settings import TIES
 from shapeprog.language.placement import AXES
 from shapeprog.space import Array, FloatArray
 
-
-@dataclass(frozen=True)
-class AnchorSettings:
-    """Costs of anchors; chosen on validation shapes.
-
-    Parameters
-    ----------
-    separated
-        A pair of parts that touch and would be separated.
-    side, reaching
-        A copy of a part near a side of the whole that does not move with it; and of one that reaches the side.
-    resized, rigid
-        A part shorter than ``spanning`` of the whole that changes its size, times how much shorter it is; and a copy of
-        one that is longer and keeps it.
-    middle
-        An end measured from the middle, where the middle of the part is not that of the whole.
-    farther
-        An end measured from the farther of two sides, times the difference of the distances as a share of the whole.
-    reach, beyond, below, spanning
-        Shares of the whole: up to this a face reaches a side; parts wholly beyond this share of the half are near that
-        side, and those whose top is so far below that of the whole are near the top; from this on they span.
-    """
-
-    separated: float = 5.0
-    side: float = 2.0
-    reaching: float = 8.0
-    resized: float = 2.0
-    rigid: float = 5.0
-    middle: float = 2.0
-    farther: float = 3.0
-    reach: float = 0.02
-    beyond: float = 0.3
-    below: float = 0.1
-    spanning: float = 0.6
-
-
 SHIFTS = np.array([0.0, 0.5, 1.0])
 """By how much of what the whole grows an anchor moves, seen from the low side."""
-
-GROWTH = 0.25
-"""Share of itself by which the whole grows."""
-
-STEP = 0.3
-"""Cells between the first and last copy of a row up to which it does not run along an axis."""
 
 MOST = 6
 """Most choices of an element."""
@@ -101,9 +60,9 @@ class Motion:
         self.model, self.layout = model, model.anchored.layout
         scene, rows = model.poses(model.numbers)
         size, centre, rotation = np.split(rows.numpy(), [SIZES, SIZES + 3], 1)
-        steps = STEP * torch.eye(SIZES, dtype=scene.size.dtype)
+        steps = 0.3 * torch.eye(SIZES, dtype=scene.size.dtype)
         wider = np.stack(
-            [(replace(scene, size=scene.size + step).bounds - scene.bounds).numpy() / STEP for step in steps]
+            [(replace(scene, size=scene.size + step).bounds - scene.bounds).numpy() / 0.3 for step in steps]
         )
         edges = np.einsum("niap,na->naip", rotation.reshape(-1, 3, 3, rotation.shape[2]), scene.bounds.numpy())
         edges += np.einsum("nia,sna,nsp->naip", scene.rotation.numpy(), wider, size)
@@ -153,12 +112,10 @@ class AxisAnchors:
         How the primitives move.
     axis
         Which axis.
-    settings
-        The costs.
     """
 
-    def __init__(self, motion: Motion, axis: int, settings: AnchorSettings) -> None:
-        self.motion, self.axis, self.settings = motion, axis, settings
+    def __init__(self, motion: Motion, axis: int) -> None:
+        self.motion, self.axis = motion, axis
         self.extent = extent = motion.layout.extents[axis]
         self.elements = [element for element in motion.layout.elements.values() if element.axis == axis]
         index = {(element.line, element.key): k for k, element in enumerate(self.elements)}
@@ -177,21 +134,24 @@ class AxisAnchors:
         slopes = motion.by_element(self.elements, motion.end_slopes[:, axis])  # (2, N, K, 2)
         self.slopes = slopes.reshape(*slopes.shape[:2], -1).swapaxes(1, 2)  # (2, 2 K, N)
         # Mirror images move with the high side of the whole while all coordinates stay.
-        self.base, growth = motion.end_slopes[:, axis, :, axis] + 0.5, GROWTH * extent
+        self.base, growth = motion.end_slopes[:, axis, :, axis] + 0.5, TIES.growth * extent
         boxes = np.concatenate([motion.boxes.centre[:, None], motion.boxes.edges], 1)
         base = motion.projections(boxes + growth * motion.slopes[..., axis])  # (L, 15, 7)
         by_element = growth * motion.projections(motion.by_element(self.elements, motion.slopes))  # (L, 15, 7, K, 2)
         forms = np.concatenate([base[..., None], by_element.reshape(*base.shape, 2 * count)], -1)
         forms *= np.where(base < 0, -1, 1)[..., None]  # only their absolute values count
         _, first, self.times = np.unique(forms.round(4), axis=0, return_index=True, return_counts=True)  # copies
-        self.forms, self.limits = forms[first].reshape(-1, 1 + 2 * count), np.maximum(motion.apart[first], 0) + TOUCH
+        self.forms, self.limits = (
+            forms[first].reshape(-1, 1 + 2 * count),
+            np.maximum(motion.apart[first], 0) + TIES.touch,
+        )
         low, high = motion.ends[:, axis]
-        self.share, self.long = motion.ends[:, axis] / extent, high - low >= settings.spanning * extent
-        reach, near = settings.reach * extent, (1 - settings.beyond) * extent / 2
+        self.share, self.long = motion.ends[:, axis] / extent, high - low >= TIES.spanning * extent
+        reach, near = TIES.reach * extent, (1 - TIES.beyond) * extent / 2
         self.reaches = np.stack([low <= low.min() + reach, high >= high.max() - reach])
         beyond = np.stack([high <= near, low >= extent - near])
         if axis == 2:
-            beyond = np.stack([self.reaches[0], high >= high.max() - settings.below * extent])
+            beyond = np.stack([self.reaches[0], high >= high.max() - TIES.below * extent])
         self.near = self.reaches | beyond
         self.overlap, self._passed = self._overlaps(low, high), set[bytes]()
         moves = (np.abs(slopes).max((0, 3)) > 0).astype(int)  # (N, K)
@@ -200,7 +160,7 @@ class AxisAnchors:
         self.together = [(int(a), int(b)) for a, b in np.argwhere(np.triu(shared + shared.T, 1) > 0)]
 
     def _choices(self, element: Element) -> Sequence[Anchors]:
-        centred = abs(element.middle - self.extent / 2) < CENTRED * self.extent and self.axis < 2
+        centred = abs(element.middle - self.extent / 2) < TIES.off_middle * self.extent and self.axis < 2
         if element.kind != "interval":
             if self.axis == 2 and element.key != "plane":
                 return [(LOW,), (HIGH,)]
@@ -212,26 +172,26 @@ class AxisAnchors:
 
     def _add_span(self, start: int, end: int) -> None:
         """Both ends of a rod; if they are at equal distances from the middle they stay so."""
-        ends, wide = [self.elements[k].low for k in (start, end)], self.settings.spanning * self.extent
+        ends, wide = [self.elements[k].low for k in (start, end)], TIES.spanning * self.extent
         length = abs(ends[0] - ends[1])
-        self.spans.append((start, end, self.settings.resized * max(0.0, 1 - length / wide)))
-        if self.axis < 2 and abs(sum(ends) - self.extent) < 2 * CENTRED * self.extent:
+        self.spans.append((start, end, TIES.resized * max(0.0, 1 - length / wide)))
+        if self.axis < 2 and abs(sum(ends) - self.extent) < 2 * TIES.off_middle * self.extent:
             outer = (LOW, HIGH) if ends[0] < ends[1] else (HIGH, LOW)
             anchors = (MIDDLE, MIDDLE) if length < wide else outer
             self.choices[start], self.choices[end] = [anchors[:1]], [anchors[1:]]
 
     def _unary(self, element: Element, anchors: Anchors) -> float:
-        s, extent = self.settings, self.extent
-        cost, centred = 0.0, abs(element.middle - extent / 2) <= CENTRED * extent and len(set(anchors)) == 1
+        extent = self.extent
+        cost, centred = 0.0, abs(element.middle - extent / 2) <= TIES.off_middle * extent and len(set(anchors)) == 1
         ends = (element.low, element.high) if len(anchors) > 1 else (element.middle,)
         for end, anchor in zip(ends, anchors, strict=True):
             if anchor == MIDDLE:
-                cost += s.middle * (not centred)
+                cost += TIES.middle * (not centred)
             elif self.axis < 2 or element.key == "last":  # heights are measured from the floor as well as from the top
                 distance = end if anchor == LOW else extent - end
-                cost += s.farther * max(0.0, 2 * distance / extent - 1)
+                cost += TIES.farther * max(0.0, 2 * distance / extent - 1)
         if len(set(anchors)) > 1:
-            cost += s.resized * max(0.0, 1 - (element.high - element.low) / extent / s.spanning)
+            cost += TIES.resized * max(0.0, 1 - (element.high - element.low) / extent / TIES.spanning)
         return cost
 
     def solved(self) -> list[Anchors]:
@@ -269,7 +229,7 @@ class AxisAnchors:
 
     def _costs(self, states: Array) -> FloatArray:
         """The costs (S,) of choices of anchors (S, K)."""
-        s, elements, motion = self.settings, np.arange(states.shape[1]), self.motion
+        elements, motion = np.arange(states.shape[1]), self.motion
         shifts, cost = self.shifts[elements, states], self.costs[elements, states].sum(1)  # (S, K, 2), (S,)
         for start, end, penalty in self.spans:
             cost += penalty * (states[:, start] != states[:, end])
@@ -281,30 +241,30 @@ class AxisAnchors:
         stays = np.abs(low - np.clip(low, -0.13, np.maximum(self.share[0], 0) + 0.13)) > 1e-9
         lags = np.abs(high - np.clip(high, np.minimum(self.share[1], 1) - 0.13, 1.13)) > 1e-9
         rigid = self.long & (high - low < self.share[1] - self.share[0] - 0.5)
-        weights = np.where(self.reaches, s.reaching, s.side) * self.near
-        per_copy = stays @ weights[0] + lags @ weights[1] + s.rigid * rigid.sum(1)
-        growth = GROWTH * self.extent
+        weights = np.where(self.reaches, TIES.reaching, TIES.side) * self.near
+        per_copy = stays @ weights[0] + lags @ weights[1] + TIES.rigid * rigid.sum(1)
+        growth = TIES.growth * self.extent
         below, above = motion.ends[:, self.axis]
         grown = self._overlaps(below + growth * low, above + growth * high)
-        per_copy += s.separated * (grown < np.minimum(self.overlap, 0) - TOUCH)[:, motion.upright].sum(1)
+        per_copy += TIES.separated * (grown < np.minimum(self.overlap, 0) - TIES.touch)[:, motion.upright].sum(1)
         if len(self.limits):
             along = self.forms @ np.concatenate([np.ones((1, len(states))), flat.T])
             along = np.abs(along).reshape(len(self.limits), -1, 7, len(states))
             gaps = (along[:, :, 0] - along[:, :, 1:].sum(2)).max(1)
-            per_copy += s.separated * self.times @ (gaps > self.limits[:, None])
+            per_copy += TIES.separated * self.times @ (gaps > self.limits[:, None])
         return cost + per_copy / max(1.0, low.shape[1] / len(elements))
 
 
-def anchors_of(model: Model, settings: AnchorSettings) -> dict[tuple[int, str, int], Anchors]:
+def anchors_of(model: Model) -> dict[tuple[int, str, int], Anchors]:
     """The anchors of all elements of a program, given with all faces measured from the low side."""
     motion = Motion(model)
     result: dict[tuple[int, str, int], Anchors] = {}
     for axis in range(3):
-        solver = AxisAnchors(motion, axis, settings)
+        solver = AxisAnchors(motion, axis)
         for element, anchors in zip(solver.elements, solver.solved(), strict=True):
             result[element.line, element.key, axis] = anchors
         for last, first in solver.rows.items():
             copy, original = solver.elements[last], solver.elements[first]
-            if abs(copy.low - original.low) < STEP:  # a row that does not run along this axis
+            if abs(copy.low - original.low) < TIES.still:  # a row that does not run along this axis
                 result[copy.line, copy.key, axis] = result[original.line, original.key, axis][:1]
     return result

@@ -10,10 +10,8 @@ from typing import NamedTuple
 import numpy as np
 
 from shapeprog.geometry.scene import Scene
+from shapeprog.inference.ties.settings import TIES
 from shapeprog.space import Array, FloatArray
-
-TOUCH = 0.12
-"""Largest gap between parts that touch, in cells."""
 
 
 class Boxes(NamedTuple):
@@ -58,6 +56,6 @@ def touching(boxes: Boxes) -> tuple[Array, Array]:
     """Pairs (C,) of boxes that touch."""
     reach = np.abs(boxes.edges).sum(1)
     apart = np.abs(boxes.centre[:, None] - boxes.centre) - reach[:, None] - reach
-    first, second = np.nonzero(np.triu(apart.max(2) < TOUCH, 1))
-    touch = gaps(boxes, first, second) < TOUCH
+    first, second = np.nonzero(np.triu(apart.max(2) < TIES.touch, 1))
+    touch = gaps(boxes, first, second) < TIES.touch
     return first[touch], second[touch]

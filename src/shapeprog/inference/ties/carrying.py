@@ -13,21 +13,13 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from shapeprog.inference.ties.boxes import TOUCH, boxes_of, gaps, touching
+from shapeprog.inference.ties.boxes import boxes_of, gaps, touching
 from shapeprog.inference.ties.expressions import Solution
 from shapeprog.inference.ties.layout import HIGH, Slot
 from shapeprog.inference.ties.model import Model
+from shapeprog.inference.ties.settings import TIES
 from shapeprog.language.ast import Part
 from shapeprog.space import Array, FloatArray
-
-FACTORS = (0.7, 1.4)
-"""What a name is multiplied by."""
-
-OPERATIONS = 2
-"""Most numbers that are measured from one."""
-
-INVALID = 3.0
-"""Cost of a part without length, as so many pieces."""
 
 
 def carried(solution: Solution, model: Model, numbers: FloatArray) -> Solution:
@@ -47,7 +39,7 @@ def carried(solution: Solution, model: Model, numbers: FloatArray) -> Solution:
         if slots[k].kind in ("extent", "angle") or (factors[:, z] != 0).sum() < 2 or not alone:
             continue
         cost, lost = contacts.cost(factors[:, z], values[z])
-        for _ in range(OPERATIONS):
+        for _ in range(TIES.operations):
             if not cost:
                 break
             best = None
@@ -101,14 +93,14 @@ class _Contacts:
         """How many pieces more there are when a number of this value changes, counted up to the least so far, and the
         lines that lose contacts."""
         total, lost = 0.0, set[int]()
-        for factor in FACTORS:
+        for factor in TIES.changes:
             if total >= least:
                 break
             scene = self.model.scene(self.numbers + (factor - 1) * value * along)
             invalid = (scene.bounds <= 0).any(1).numpy()
-            kept = gaps(boxes_of(scene), self.first, self.second) < TOUCH
+            kept = gaps(boxes_of(scene), self.first, self.second) < TIES.touch
             pieces = self._pieces(kept, len(invalid)) - self.pieces
-            total += pieces + INVALID * invalid.any()
+            total += pieces + TIES.invalid * invalid.any()
             if pieces:
                 lost |= {*self.first[~kept].tolist(), *self.second[~kept].tolist()}
             lost |= {*np.flatnonzero(invalid).tolist()}

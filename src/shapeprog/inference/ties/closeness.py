@@ -14,12 +14,7 @@ from shapeprog.geometry.distance import signed_distance
 from shapeprog.geometry.scene import Scene
 from shapeprog.geometry.surface import sample_surface
 from shapeprog.inference.surface.evidence import Evidence
-
-POINTS, SAMPLES = 4_000, 4_000
-"""Points of the target, and samples of the surface of the program."""
-
-REACH = 0.01
-"""Share of the diagonal of the target's box within which surfaces are near, as in the evaluation."""
+from shapeprog.inference.ties.settings import TIES
 
 
 class Closeness:
@@ -35,14 +30,14 @@ class Closeness:
 
     def __init__(self, evidence: Evidence, seed: int) -> None:
         surface = evidence.surface
-        self.seed, self.reach = seed, REACH * float(np.linalg.norm(np.ptp(surface, 0)))
-        indices = np.random.default_rng(seed).integers(0, len(surface), POINTS)
+        self.seed, self.reach = seed, TIES.near * float(np.linalg.norm(np.ptp(surface, 0)))
+        indices = np.random.default_rng(seed).integers(0, len(surface), TIES.points)
         self._points, self._tree = torch.from_numpy(surface[indices]), cKDTree(surface)
 
     def of(self, scene: Scene) -> float:
         """The F-score of the two surfaces."""
         recall = float((signed_distance(scene, self._points).abs() <= self.reach).double().mean())
-        sample = sample_surface(scene, SAMPLES, torch.Generator().manual_seed(self.seed))
+        sample = sample_surface(scene, TIES.points, torch.Generator().manual_seed(self.seed))
         away = self._tree.query(sample.points.numpy(), distance_upper_bound=self.reach)[0]
         precision = float(np.isfinite(away).mean())
         return 2 * precision * recall / (precision + recall) if precision + recall else 0.0

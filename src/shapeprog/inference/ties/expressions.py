@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from shapeprog.inference.ties.layout import Slot
+from shapeprog.inference.ties.settings import TIES
 from shapeprog.space import FloatArray
 
 ELIMINATED = {"clearance": 0, "offset": 0, "edge": 1, "radius": 2, "size": 3, "length": 3, "angle": 3, "extent": 9}
@@ -18,12 +19,6 @@ ELIMINATED = {"clearance": 0, "offset": 0, "edge": 1, "radius": 2, "size": 3, "l
 
 NOTHING = 1e-7
 """Factors up to this are zero."""
-
-NEGATIVE = 1.5
-"""Cost of a size that is a difference: it can become negative when a name is changed."""
-
-REPEATED = 0.3
-"""Cost of a sum for every use after the first: it can be named."""
 
 
 @dataclass(frozen=True)
@@ -114,7 +109,7 @@ def _cost(factors: FloatArray, sizes: np.ndarray) -> float:
     """Number of operators of all different sums, and the cost of their repetitions."""
     used = factors != 0
     operators = np.maximum(used.sum(1) - 1, 0) + (used & (np.abs(np.abs(factors) - 1) > NOTHING)).sum(1)
-    operators = operators + 0.5 * (factors < 0).sum(1) + NEGATIVE * (sizes & (factors < 0).any(1))
+    operators = operators + 0.5 * (factors < 0).sum(1) + TIES.negative * (sizes & (factors < 0).any(1))
     composite = np.flatnonzero(operators)
     _, first = np.unique(factors[composite].round(6), axis=0, return_index=True)
-    return float(operators[composite[first]].sum() + REPEATED * (len(composite) - len(first)))
+    return float(operators[composite[first]].sum() + TIES.repeated * (len(composite) - len(first)))

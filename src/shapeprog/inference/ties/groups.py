@@ -8,6 +8,7 @@ from dataclasses import replace
 from itertools import combinations
 
 from shapeprog.inference.ties.naming import interval
+from shapeprog.inference.ties.settings import TIES
 from shapeprog.language.ast import Argument, Group, Keywords, Line, Part, Point, Source, changed_lines, values
 from shapeprog.language.convert.loops import with_joined_mirrors
 from shapeprog.language.convert.parts import ordered
@@ -17,14 +18,9 @@ from shapeprog.language.parameters import to_float32
 from shapeprog.language.placement import AXES, BOX, SIZES, axis_of
 
 BOXES = ("box", "cushion")
-GAP, LEAST = 0.25, 2.0
-"""Neighbours divide a box if the gap between them is at most this share of their size, which is this many cells."""
 
 STILL = 1e-6
 """Cells from which the last copy of a row is elsewhere than the first."""
-
-CENTRED = 0.1
-"""Cells by which the clearances of a part in the middle differ at most."""
 
 Side = tuple[str, str]
 """A keyword of a side, and the text of its value."""
@@ -133,13 +129,13 @@ def _divided(loop: Group, numbers: dict[str, float]) -> Group:
     follows = any(SIZES[axis] in names_in(value) for line in parts for value in values(line))
     if (
         not isinstance(count, float | int)
-        or (length < LEAST and not others)
+        or (length < TIES.divided and not others)
         or (others and (follows or not all(sized)))
     ):
         return loop
     occupied = sum(value_at(clearance, numbers) for clearance in clearances.values())  # type: ignore[arg-type]
     gap = to_float32(round((whole - occupied - count * length) / (count - 1), 2))
-    if not 0 <= gap <= GAP * length:
+    if not 0 <= gap <= TIES.gap * length:
         return loop
     mine = [(side, clearances[side]) for side in words[:2] if clearances[side] != 0]
     shared = [pair for pair in part.keywords if pair[0] in BOX and pair[0] not in words and not others]
@@ -154,7 +150,7 @@ def _in_division(part: Part, first: Part, axis: int, numbers: dict[str, float]) 
     words = AXES[axis]
     (low, size), (start, whole) = (interval(each, axis, numbers) for each in (part, first))
     remaining = [(word, value) for word, value in part.keywords if word not in words or word == words.size]
-    centred = abs(2 * (low - start) + size - whole) < CENTRED
+    centred = abs(2 * (low - start) + size - whole) < TIES.uneven
     place = (words.offset, 0.0) if centred else (words.low, to_float32(round(low - start, 2)))
     return replace(part, keywords=ordered((place, *remaining)))
 

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from itertools import count
 from typing import Literal
 
+from shapeprog.inference.ties.settings import TIES
 from shapeprog.language.ast import Argument, Group, Part, Point, Source
 from shapeprog.language.placement import AXES, POINTS, ROUND, SIZES
 
@@ -24,15 +25,6 @@ Anchors = tuple[int, ...]
 
 ElementKind = Literal["interval", "round", "coordinate"]
 Kind = Literal["extent", "clearance", "offset", "size", "radius", "edge", "angle", "length"]
-
-CENTRED = 0.02
-"""Share of the whole by which the middle of a part may miss that of the whole."""
-
-FILLS = 0.9
-"""Share of the whole from which a round part fills it."""
-
-STRAIGHT = 2.0
-"""Degrees by which a bar may be turned about itself whose sides follow those of the whole."""
 
 ANGLES = ("tilt", "turn", "step")
 ALIGNED = 1e-5
@@ -172,11 +164,11 @@ class Layout:
     def _across(self, index: int, keywords: dict[str, Argument]) -> Iterator[Element]:
         """The sizes of a bar across its direction, where it lies in the middle of the whole."""
         for axis, size in enumerate(SIZES):
-            if size in keywords and axis < 2 and abs(float(keywords.get("turn", 0))) < STRAIGHT:  # type: ignore[arg-type]
+            if size in keywords and axis < 2 and abs(float(keywords.get("turn", 0))) < TIES.degrees:  # type: ignore[arg-type]
                 start = self._coordinate(axis, keywords["start"], None)
                 end = self._coordinate(axis, keywords["end"], [start] * 3)
                 middle, half = self.extents[axis] / 2, float(keywords[size]) / 2  # type: ignore[arg-type]
-                if max(abs(start - middle), abs(end - middle)) < CENTRED * self.extents[axis]:
+                if max(abs(start - middle), abs(end - middle)) < TIES.off_middle * self.extents[axis]:
                     yield Element(index, "across", axis, "interval", middle - half, middle + half)
 
     def first(self, loop: int) -> tuple[int, str]:
@@ -187,12 +179,12 @@ class Layout:
     def fills(self, line: Part) -> bool:
         """Whether a cylinder is as wide as the whole nearly, which then has one diameter."""
         width, depth, _ = self.extents
-        if line.kind != "cylinder" or abs(width - depth) > CENTRED * width:
+        if line.kind != "cylinder" or abs(width - depth) > TIES.off_middle * width:
             return False
         radius, keywords = self.radius(line), dict(line.keywords)
         spans = [self._interval(axis, keywords, 2 * radius) for axis in range(2)]
         middles = [abs((low + high) / 2 - width / 2) for low, high in spans]
-        return 2 * radius > FILLS * width and max(middles) < CENTRED * width
+        return 2 * radius > TIES.fills * width and max(middles) < TIES.off_middle * width
 
     def radius(self, line: Part) -> float:
         """The radius of an upright round part, the larger of two."""

@@ -9,14 +9,9 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+from shapeprog.inference.ties.settings import TIES
 from shapeprog.language.parameters import to_float32
 from shapeprog.language.program import Draw, Loop, Node, Program
-
-LEAST = 1.0
-"""Degrees by which a board must lean."""
-
-CENTRED, WIDE = 0.5, 12.0
-"""Cells by which a board may be off the middle, or else how wide it may be: a bar has no left and right side."""
 
 
 def between_ends(program: Program) -> Program:
@@ -27,10 +22,10 @@ def between_ends(program: Program) -> Program:
 def _between_ends(node: Node) -> Node:
     if isinstance(node, Loop):
         return replace(node, body=tuple(_between_ends(inner) for inner in node.body))
-    if node.name != "board" or abs(node.values[-1]) < LEAST:
+    if node.name != "board" or abs(node.values[-1]) < TIES.leaning:
         return node
     up, depth, side, high, deep, wide, tilt = node.values
-    if abs(side + wide / 2) > CENTRED and wide > WIDE:
+    if abs(side + wide / 2) > TIES.board_off and wide > TIES.board_wide:
         return node
     sin, cos = math.sin(math.radians(tilt)), math.cos(math.radians(tilt))
     upwards, backwards = (cos, sin), (-sin, cos)

@@ -13,22 +13,11 @@ from shapeprog.inference.fit.settings import FIT
 from shapeprog.inference.fit.tunable import THINNEST, Poses, Tunable
 from shapeprog.inference.surface.evidence import Evidence
 from shapeprog.inference.ties.anchored import Anchored
+from shapeprog.inference.ties.settings import TIES
 from shapeprog.language.evaluate import expanded, symbolic
 from shapeprog.language.expression import Linear
 from shapeprog.language.program import Program
 from shapeprog.space import FloatArray
-
-DRAWS = 2
-"""Times that pairs of points are drawn for one curvature."""
-
-STEPS = 4
-"""Steps of Gauss and Newton of a refit."""
-
-TOGETHER = 0.03
-"""Weight of a squared gap between parts that touched."""
-
-FARTHEST = 0.5
-"""Farthest that one step moves a number, in cells."""
 
 PRIOR = {
     "clearance": 1e-4,
@@ -119,7 +108,7 @@ class Misfit:
         self.prior: FloatArray = np.where(angles, prior * self.scale**2, prior)
 
     def at(
-        self, numbers: FloatArray, draws: int = DRAWS, joints: Joints | None = None
+        self, numbers: FloatArray, draws: int = TIES.draws, joints: Joints | None = None
     ) -> tuple[FloatArray, FloatArray]:
         """Half the slope (P,) and half the curvature (P, P) of the mean squared distance, with the prior and joints."""
         count = len(numbers)
@@ -131,7 +120,7 @@ class Misfit:
             curvature += part_curvature.numpy() / draws
         if joints is not None and len(joints.first):
             gaps = needs(poses.scene, poses.slopes, moved(poses.scene, joints))
-            wide = TOGETHER * gaps.slopes
+            wide = TIES.together * gaps.slopes
             slope += (wide.T @ gaps.residual).numpy()
             curvature += (wide.T @ gaps.slopes).numpy()
         slope += self.prior * (numbers - self.start)
@@ -142,9 +131,9 @@ class Misfit:
         are kept together."""
         if not free.shape[1]:
             return numbers
-        farthest = FARTHEST / np.maximum(self.scale, 1.0)
+        farthest = TIES.farthest / np.maximum(self.scale, 1.0)
         low = np.minimum(self.model.low, numbers)
-        for _ in range(STEPS):
+        for _ in range(TIES.steps):
             slope, curvature = self.at(numbers, 1, joints)
             move = free @ -np.linalg.solve(free.T @ curvature @ free, free.T @ slope)
             onwards = numbers + move / float(np.max(np.abs(move) / farthest, initial=1.0))

@@ -7,13 +7,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
+from shapeprog.inference.ties.settings import TIES
 from shapeprog.language.ast import Group, Line, Part, Point, Source
 from shapeprog.language.expression import Name, Value, names_in, value_at
 from shapeprog.language.placement import AXES, BOX, RESERVED, SIZES, axis_of
 from shapeprog.language.statement import language
-
-THIN = 0.6
-"""A side of a part is its thickness if it is at most this share of the next longer one."""
 
 FLAT = ("seat", "top", "shelf", "mattress", "cushion", "pillow")
 """Parts whose height is called thickness: the height of a seat is that of its top above the floor."""
@@ -157,4 +155,4 @@ def _quantity(use: Use, numbers: dict[str, float]) -> str:
     ]  # fmt: skip
     flat = axis == 2 and _role(part) in FLAT
     least, second, _ = sorted(lengths)
-    return "thickness" if flat or lengths[axis] <= least <= THIN * second else SIZES[axis]
+    return "thickness" if flat or lengths[axis] <= least <= TIES.thin * second else SIZES[axis]

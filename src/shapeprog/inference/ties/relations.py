@@ -8,7 +8,6 @@ half a size, and an angle the negative of another.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from itertools import combinations
 from typing import NamedTuple
 
@@ -16,53 +15,9 @@ import numpy as np
 
 from shapeprog.inference.ties.anchored import Anchored
 from shapeprog.inference.ties.layout import HIGH, LOW, MIDDLE, Element, Slot
+from shapeprog.inference.ties.settings import TIES
 from shapeprog.language.ast import Part
 from shapeprog.space import FloatArray
-
-WITHIN, ASKEW = 0.3, 1.0
-"""Cells by which a relation may be off, and by which equal clearances on both sides may."""
-
-DEGREES = 2.0
-"""The same for angles, in degrees."""
-
-FLOOR = 0.02
-"""Share of the height of the whole up to which a part touches the floor."""
-
-ALIKE, ROUNDING = 0.25, 0.05
-"""Tolerance of equal sizes: a share of the larger, plus so many cells."""
-
-THIN = 3.0
-"""Cells below which sizes along different axes may be the two sides of one section."""
-
-
-@dataclass(frozen=True)
-class Trust:
-    """Price of the number that a relation saves, as a multiple of the usual price.
-
-    Parameters
-    ----------
-    floor
-        A part that ends just above the floor.
-    centred
-        Equal clearances on the left and right.
-    contact
-        Faces that meet; equal clearances in front and at the rear.
-    straight
-        Ends of a rod at equal distances, or on the middle line of a part that it touches; a row along one axis.
-    equal
-        Zeros; equal sections, equal sizes of parts of one role, and equal clearances, of a part at a corner or of parts
-        at one side or at opposite sides.
-    """
-
-    floor: float = 6.0
-    centred: float = 4.0
-    contact: float = 2.0
-    straight: float = 1.5
-    equal: float = 1.0
-
-    def symmetric(self, axis: int) -> float:
-        """That of equal clearances on both sides along a horizontal axis."""
-        return self.centred if axis == 0 else self.contact
 
 
 class Relation(NamedTuple):
@@ -85,7 +40,7 @@ class Reading(NamedTuple):
 
     row: FloatArray
     trust: float
-    limit: float = WITHIN
+    limit: float = TIES.within
 
 
 class Face(NamedTuple):
@@ -135,7 +90,7 @@ def _is_mirrored(anchored: Anchored, element: Element) -> bool:
         return False
     layout, axis = anchored.layout, element.axis
     planes = (layout.elements.get((loop, "plane", axis)) for loop in layout.loops_around[element.line])
-    return any(plane is not None and abs(plane.low - layout.extents[axis] / 2) < WITHIN for plane in planes)
+    return any(plane is not None and abs(plane.low - layout.extents[axis] / 2) < TIES.within for plane in planes)
 
 
 def _image(face: Face) -> Face:
@@ -145,7 +100,7 @@ def _image(face: Face) -> Face:
     return face._replace(anchor=2 - face.anchor, row=row, facing=-face.facing)
 
 
-def relations(anchored: Anchored, numbers: FloatArray, touching: set[tuple[int, int]], trust: Trust) -> list[Relation]:
+def relations(anchored: Anchored, numbers: FloatArray, touching: set[tuple[int, int]]) -> list[Relation]:
     """Distinct relations that nearly hold, with the highest trust of any of their readings.
 
     Parameters
@@ -154,7 +109,7 @@ def relations(anchored: Anchored, numbers: FloatArray, touching: set[tuple[int, 
         Pairs of lines, the smaller first, whose parts touch.
     """
     best: dict[bytes, Relation] = {}
-    for row, weight, limit in _readings(anchored, numbers, touching, trust):
+    for row, weight, limit in _readings(anchored, numbers, touching):
         used = np.flatnonzero(row)
         if not len(used):
             continue
@@ -168,42 +123,46 @@ def relations(anchored: Anchored, numbers: FloatArray, touching: set[tuple[int, 
     return list(best.values())
 
 
-def _readings(
-    anchored: Anchored, numbers: FloatArray, touching: set[tuple[int, int]], trust: Trust
-) -> Iterator[Reading]:
+def _readings(anchored: Anchored, numbers: FloatArray, touching: set[tuple[int, int]]) -> Iterator[Reading]:
     """Relations that the slots and faces of a program may have."""
     slots, count = anchored.slots, len(anchored.slots)
     eye = np.eye(count)
-    upright = [abs(_angle(anchored, line)) < DEGREES for line in range(len(anchored.layout.lines))]
+    upright = [abs(_angle(anchored, line)) < TIES.degrees for line in range(len(anchored.layout.lines))]
     for k, slot in enumerate(slots):
         if slot.kind == "clearance":
-            floor = FLOOR * numbers[2]
+            floor = TIES.at_floor * numbers[2]
             stands = slot.axis == 2 and slot.anchor == LOW and numbers[k] < floor
-            yield Reading(eye[k], trust.floor, max(WITHIN, floor)) if stands else Reading(eye[k], trust.equal)
+            yield Reading(eye[k], TIES.floor, max(TIES.within, floor)) if stands else Reading(eye[k], TIES.equal)
         elif slot.kind == "offset":
-            yield Reading(eye[k], trust.symmetric(slot.axis), ASKEW)
+            yield Reading(eye[k], TIES.symmetric(slot.axis), TIES.askew)
         elif slot.kind == "angle" and not slot.word.startswith("step"):
-            yield Reading(eye[k], trust.equal, DEGREES)
+            yield Reading(eye[k], TIES.equal, TIES.degrees)
     all_faces = faces(anchored)
     for axis in range(3):
         axis_faces = [face for face in all_faces if face.element.axis == axis]
         for face, partner in combinations(axis_faces, 2):
-            yield from _pair(anchored, face, partner, touching, trust, upright)
+            yield from _pair(anchored, face, partner, touching, upright)
     lengths = [k for k, slot in enumerate(slots) if slot.kind in ("size", "radius", "edge", "angle", "length")]
     for a, b in combinations(lengths, 2):
         if _comparable(anchored, slots[a], slots[b], numbers[a], numbers[b]):
             angles = slots[a].kind == "angle"
-            yield Reading(eye[a] - eye[b], trust.equal, DEGREES if angles else WITHIN)
+            yield Reading(eye[a] - eye[b], TIES.equal, TIES.degrees if angles else TIES.within)
             if angles:
-                yield Reading(eye[a] + eye[b], trust.equal / 2, DEGREES)
-    across = [k for k, slot in enumerate(slots) if slot.kind == "clearance" and slot.axis < 2 and numbers[k] > WITHIN]
+                yield Reading(eye[a] + eye[b], TIES.equal / 2, TIES.degrees)
+    across = [
+        k for k, slot in enumerate(slots) if slot.kind == "clearance" and slot.axis < 2 and numbers[k] > TIES.within
+    ]
     for a, b in combinations(across, 2):
-        if slots[a].axis != slots[b].axis and slots[a].line == slots[b].line and max(numbers[a], numbers[b]) < THIN:
-            yield Reading(eye[a] - eye[b], trust.equal)
+        if (
+            slots[a].axis != slots[b].axis
+            and slots[a].line == slots[b].line
+            and max(numbers[a], numbers[b]) < TIES.section
+        ):
+            yield Reading(eye[a] - eye[b], TIES.equal)
 
 
 def _pair(
-    anchored: Anchored, face: Face, partner: Face, touching: set[tuple[int, int]], trust: Trust, upright: list[bool]
+    anchored: Anchored, face: Face, partner: Face, touching: set[tuple[int, int]], upright: list[bool]
 ) -> Iterator[Reading]:
     """Relations of two faces of one axis."""
     first, second, axis = face.element, partner.element, face.element.axis
@@ -219,31 +178,31 @@ def _pair(
     if len(anchors) > 1:
         if anchors == {LOW, HIGH} and single and axis < 2 and not any(middles):
             if same:
-                yield Reading(image, trust.symmetric(axis), ASKEW)
+                yield Reading(image, TIES.symmetric(axis), TIES.askew)
             else:
-                yield Reading(image, trust.contact if "last" in keys else trust.equal)
+                yield Reading(image, TIES.contact if "last" in keys else TIES.equal)
     elif any(middles):
         if touches and axis < 2 and any(points) and not single and not keys & {"last", "plane", "centre"}:
-            yield Reading(row, trust.straight)
+            yield Reading(row, TIES.straight)
     elif same:
         if first.key and second.key:  # both ends of a rod
-            yield Reading(row, trust.straight)
+            yield Reading(row, TIES.straight)
             if face.anchor == MIDDLE:
-                yield Reading(image, trust.symmetric(axis), ASKEW)
+                yield Reading(image, TIES.symmetric(axis), TIES.askew)
     elif keys & {"last", "plane", "centre"}:
         if "last" in keys and touches and (face.single or partner.single):
-            yield Reading(row, trust.contact)
+            yield Reading(row, TIES.contact)
         elif single:
-            yield Reading(row, trust.straight if lines[0] == lines[1] else trust.equal)
+            yield Reading(row, TIES.straight if lines[0] == lines[1] else TIES.equal)
     else:
         if face.anchor == MIDDLE and face.facing == -partner.facing and single:
-            yield Reading(image, trust.equal)
+            yield Reading(image, TIES.equal)
         if axis > 0 and not (upright[first.line] and upright[second.line]):
             return
         if touches and (face.facing * partner.facing == -1 or all(points) or bool(face.facing) != bool(partner.facing)):
-            yield Reading(row, trust.contact)
+            yield Reading(row, TIES.contact)
         elif face.facing == partner.facing and (single or touches):
-            yield Reading(row, trust.equal if single else trust.equal / 2)
+            yield Reading(row, TIES.equal if single else TIES.equal / 2)
 
 
 def _comparable(anchored: Anchored, slot: Slot, partner: Slot, a: float, b: float) -> bool:
@@ -252,19 +211,19 @@ def _comparable(anchored: Anchored, slot: Slot, partner: Slot, a: float, b: floa
         return False
     if slot.kind == "angle":
         return slot.word == partner.word
-    if abs(a - b) > ALIKE * max(a, b) + ROUNDING:
+    if abs(a - b) > TIES.alike * max(a, b) + TIES.rounding:
         return False
     if slot.kind != "size":
         return True
     same = slot.line == partner.line or _role(anchored, slot.line) == _role(anchored, partner.line)
     sections = same or (_is_section(anchored, slot) and _is_section(anchored, partner))
-    return (sections and max(a, b) < THIN) or (same and slot.axis == partner.axis)
+    return (sections and max(a, b) < TIES.section) or (same and slot.axis == partner.axis)
 
 
 def _is_section(anchored: Anchored, slot: Slot) -> bool:
     """Whether a size is that of a cross-section: not the longest of its part."""
     box = [anchored.layout.elements.get((slot.line, "", axis)) for axis in range(3)]
-    return any(element is None or element.high - element.low > slot.value + ROUNDING for element in box)
+    return any(element is None or element.high - element.low > slot.value + TIES.rounding for element in box)
 
 
 def _role(anchored: Anchored, line: int) -> str:

@@ -27,12 +27,6 @@ from shapeprog.space import Array, FloatArray
 SHIFTS = np.array([0.0, 0.5, 1.0])
 """By how much of what the whole grows an anchor moves, seen from the low side."""
 
-MOST = 6
-"""Most choices of an element."""
-
-ROUNDS = 8
-"""Most passes over all elements."""
-
 
 class Motion:
     """How the boxes of the primitives of a program move with its numbers, about where they are.
@@ -126,8 +120,9 @@ class AxisAnchors:
             if key in ("end", "through") and (line, "start") in index:
                 self._add_span(index[line, "start"], end)
         count = len(self.elements)
-        self.costs = np.full((count, MOST), np.inf)
-        self.shifts = np.zeros((count, MOST, 2))  # how low and high coordinates move with each choice
+        most = max(map(len, self.choices), default=1)
+        self.costs = np.full((count, most), np.inf)
+        self.shifts = np.zeros((count, most, 2))  # how low and high coordinates move with each choice
         for k, (element, choices) in enumerate(zip(self.elements, self.choices, strict=True)):
             self.costs[k, : len(choices)] = [self._unary(element, anchors) for anchors in choices]
             self.shifts[k, : len(choices)] = [(SHIFTS[ends[0]], SHIFTS[ends[-1]]) for ends in choices]
@@ -207,7 +202,7 @@ class AxisAnchors:
         """The cost and state (K,) from which no change of an element, or of two that touch, is cheaper."""
         total, groups = float(self._costs(state[None])[0]), [*([k] for k in range(len(state))), *self.together]
         unchanged = 0
-        for group in islice(cycle(groups), ROUNDS * len(groups)):
+        for group in islice(cycle(groups), 8 * len(groups)):
             options = np.array([*product(*(range(len(self.choices[k])) for k in group))])
             trials = np.repeat(state[None], len(options), 0)
             trials[:, group] = options

@@ -17,11 +17,6 @@ from shapeprog.language.merging import merged_lines
 from shapeprog.language.parameters import to_float32
 from shapeprog.language.placement import AXES, BOX, SIZES, axis_of
 
-BOXES = ("box", "cushion")
-
-STILL = 1e-6
-"""Cells from which the last copy of a row is elsewhere than the first."""
-
 Side = tuple[str, str]
 """A keyword of a side, and the text of its value."""
 
@@ -64,7 +59,7 @@ def _straight(row: Group, numbers: dict[str, float]) -> Group:
         axis = axis_of(word)
         (low, size), whole = interval(first, axis, numbers), numbers[SIZES[axis]]
         place = dict(zip(AXES[axis], (low, whole - low - size, size, low + (size - whole) / 2), strict=True))[word]
-        return abs(place - value_at(value, numbers)) > STILL
+        return abs(place - value_at(value, numbers)) > 1e-6
 
     pairs = tuple((word, value) for word, value in last.keywords if moves(word, value))
     return replace(row, keywords=(("last", Point(pairs or last.keywords)),))
@@ -156,7 +151,7 @@ def _in_division(part: Part, first: Part, axis: int, numbers: dict[str, float]) 
 
 
 def _is_upright(part: Part) -> bool:
-    return part.kind in BOXES and not {"tilt", "lean"} & dict(part.keywords).keys()
+    return part.kind in ("box", "cushion") and not {"tilt", "lean"} & dict(part.keywords).keys()
 
 
 def _solids(line: Line) -> Iterator[Part]:

@@ -31,9 +31,6 @@ PRIOR = {
 }
 """Weights of a squared move from the start, by kind: numbers that nothing determines do not change."""
 
-HELD = 1e6
-"""Weight of a squared move of a number that does not move."""
-
 
 class Model:
     """A placed program as a function of its numbers (P,), those of :class:`Anchored`.
@@ -103,7 +100,7 @@ class Misfit:
         self.start = model.numbers
         scale = np.array([model.tunable.scale.numpy() @ np.abs(model.jacobian[:, k]) for k in range(len(model.slots))])
         self.scale = np.clip(scale, 1e-3, None)
-        prior = np.maximum([PRIOR[slot.kind] for slot in model.slots], np.minimum(minimum, HELD))
+        prior = np.maximum([PRIOR[slot.kind] for slot in model.slots], np.minimum(minimum, 1e6))
         angles = np.array([slot.kind == "angle" for slot in model.slots])
         self.prior: FloatArray = np.where(angles, prior * self.scale**2, prior)
 

@@ -13,10 +13,6 @@ from shapeprog.inference.ties.relations import Relation
 from shapeprog.library.independence import beside
 from shapeprog.space import FloatArray
 
-HELD = 1e-9
-"""Share of its freedom below which a relation holds already: for numbers that nothing determines, rounding alone
-leaves more, so independence is tested on the rows themselves."""
-
 
 def worthwhile(
     candidates: list[Relation],
@@ -54,7 +50,9 @@ def worthwhile(
             axes = np.vstack([axes, new])
     spread, off = np.einsum("kv,vw,kw->k", rows, free, rows, optimize=True), rows @ numbers
     benefit = price * np.array([np.inf] * len(fixed) + [relation.trust for relation in candidates])
-    minimum = HELD * spread
+    # Below this share of its freedom a relation holds already: for numbers that nothing determines, rounding alone
+    # leaves more, so independence is tested on the rows themselves.
+    minimum = 1e-9 * spread
     while True:
         gain = np.where(spread > minimum, benefit - off**2 / np.maximum(spread, minimum), -np.inf)
         best = int(np.argmax(gain))

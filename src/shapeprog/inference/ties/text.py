@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from shapeprog.inference.fit.tunable import CELLS, DEGREES
 from shapeprog.inference.ties.anchored import Anchored
 from shapeprog.inference.ties.expressions import Solution
 from shapeprog.inference.ties.groups import grouped
@@ -40,14 +41,8 @@ from shapeprog.language.parameters import to_float32
 from shapeprog.language.placement import AXES, ROUND, SIZES
 from shapeprog.space import FloatArray
 
-DEGREES, CELLS = 1, 2
-"""Decimals of angles and lengths."""
-
 START: dict[str, Value] = {"x": 0.0, "y": 0.0, "bottom": 0.0}
 """Where a point is for which nothing is given."""
-
-WIDE = 118
-"""Letters of a line that names numbers, about."""
 
 
 def written(anchored: Anchored, solution: Solution, numbers: FloatArray, *, group: bool = True) -> Source:
@@ -142,7 +137,7 @@ def _assignments(named: list[tuple[str, Value]]) -> Iterator[Assignment]:
     """Names and their values on as many lines as it takes."""
     line: list[tuple[str, Value]] = []
     for pair in named:
-        if line and sum(len(f"{name}{value}") + 4 for name, value in [*line, pair]) > WIDE:
+        if line and sum(len(f"{name}{value}") + 4 for name, value in [*line, pair]) > 118:
             yield Assignment(tuple(line))
             line = []
         line.append(pair)

@@ -39,9 +39,6 @@ from shapeprog.language.program import Program
 from shapeprog.language.unroll import unroll
 from shapeprog.space import FloatArray
 
-NOWHERE = -1e6
-"""A floor that no part touches: parts on the floor have a clearance of zero."""
-
 
 def tie(
     program: Program,
@@ -102,7 +99,7 @@ class _Ties:
     def __init__(self, layout: Layout, evidence: Evidence, seed: int, *, known: bool, held: Collection[int]) -> None:
         flat = Model(Anchored(layout, _from_low(layout)))
         scene = flat.scene(flat.numbers)
-        self.joints = find_joints(scene, NOWHERE)
+        self.joints = find_joints(scene, floor=-1e6)  # that no part touches: on the floor, clearances are zero
         self.anchored = Anchored(layout, anchors_of(flat))
         self.model = Model(self.anchored)
         lines = layout.lines_of(held)

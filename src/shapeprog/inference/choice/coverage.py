@@ -140,15 +140,15 @@ class Coverage:
 
     Parameters
     ----------
-    evidence, prices, seed
-        The surface, the prices, and the seed of the samples of surfaces and of free space.
+    evidence, prices
+        The surface and the prices.
     """
 
-    def __init__(self, evidence: Evidence, prices: Prices | None = None, seed: int = 0) -> None:
-        self.evidence, self.prices, self.seed = evidence, prices or Prices(), seed
+    def __init__(self, evidence: Evidence, prices: Prices | None = None) -> None:
+        self.evidence, self.prices = evidence, prices or Prices()
         order = np.lexsort((nearby(evidence.points), -evidence.weights))  # points of a word weigh nearly the same
         self._points, self._normals = sorted_by_cell(evidence.points[order]), evidence.normals[order]
-        points, volume = free_points(evidence, seed)
+        points, volume = free_points(evidence)
         self._free = sorted_by_cell(points)
         free = np.full(len(points), -self.prices.free * volume / max(evidence.area, 1e-9))
         parts = np.full(len(evidence.parts), self.prices.part / max(1.0, len(evidence.parts) / SETTINGS.parts))
@@ -183,7 +183,7 @@ class Coverage:
         explained = explains(scene, self._points, self._normals, evidence) & ~interior
         free, parts = holds(scene, self._free, evidence.tolerance), pack(parts_drawn(scene, evidence))
         covered = np.concatenate([explained, free, parts], 1)
-        points, owners, areas = unsupported(scene, evidence, self._surface, self.seed)
+        points, owners, areas = unsupported(scene, evidence, self._surface)
         starts = np.searchsorted(owners, np.arange(len(candidates) + 1))
         for k, program in enumerate(candidates):
             mine = np.arange(starts[k], starts[k + 1])
@@ -221,13 +221,13 @@ def parts_drawn(scene: Scene, evidence: Evidence) -> npt.NDArray[np.bool_]:
     return result
 
 
-def free_points(evidence: Evidence, seed: int) -> tuple[FloatArray, float]:
+def free_points(evidence: Evidence) -> tuple[FloatArray, float]:
     """Points (F, 3) drawn evenly in the free cells within the box of the surface, and the volume of each."""
     side = RESOLUTION / len(evidence.free)
     low, high = ((end + HALF) / side for end in (evidence.surface.min(0), evidence.surface.max(0)))
     cells = np.argwhere(evidence.free)
     cells = cells[((cells + 0.5 >= low) & (cells + 0.5 <= high)).all(1)]
-    random = np.random.default_rng(seed)
+    random = np.random.default_rng(0)
     count = min(SETTINGS.free_points, len(cells))
     selected = cells[np.sort(random.choice(len(cells), count, replace=False))] if count else cells
     points = (selected + random.random((count, 3))) * side - HALF
@@ -235,7 +235,7 @@ def free_points(evidence: Evidence, seed: int) -> tuple[FloatArray, float]:
 
 
 def unsupported(
-    scene: Scene, evidence: Evidence, binned: BinnedPoints, seed: int
+    scene: Scene, evidence: Evidence, binned: BinnedPoints
 ) -> tuple[FloatArray, npt.NDArray[np.int64], FloatArray]:
     """Samples of the surfaces of candidates (B, N) that the target, whose surface is ``binned``, does not support.
 
@@ -252,7 +252,7 @@ def unsupported(
     ))  # fmt: skip
     if not len(row):
         return np.zeros((0, 3)), np.zeros(0, np.int64), np.zeros(0)
-    sample = sample_surface(single, SETTINGS.batch, torch.Generator().manual_seed(seed))
+    sample = sample_surface(single, SETTINGS.batch, torch.Generator().manual_seed(0))
     points, normals = (part.double().reshape(-1, 3).numpy() for part in (sample.points, sample.normals))
     share = shares(points, normals, evidence, binned)
     bare = share > 0

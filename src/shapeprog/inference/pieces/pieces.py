@@ -66,8 +66,8 @@ class Pieces(NamedTuple):
     cloud: Cloud
 
 
-def find_pieces(shape: Shape, seed: int = 0) -> Pieces:
-    """Pieces of a mesh or a point cloud; the same for the same seed.
+def find_pieces(shape: Shape) -> Pieces:
+    """Pieces of a mesh or a point cloud.
 
     Pieces of a greedy selection are first, then components, then groups, rods and limbs, then slabs and sheets; within
     each class, pieces that explain more points are first.
@@ -75,31 +75,31 @@ def find_pieces(shape: Shape, seed: int = 0) -> Pieces:
     if shape.vertices is not None and shape.faces is not None and len(shape.faces):
         mesh = components(shape.vertices, shape.faces)
         if len(mesh.area):
-            return _of_mesh(mesh, seed)
+            return _of_mesh(mesh)
     points = points_of_scan(shape)
     cloud = cloud_of(points)
-    return _ranked(cloud, _of_points(cloud, seed, limbs(cloud) if is_clean(points) else []), join([]))
+    return _ranked(cloud, _of_points(cloud, limbs(cloud) if is_clean(points) else []), join([]))
 
 
-def _of_mesh(mesh: Components, seed: int) -> Pieces:
+def _of_mesh(mesh: Components) -> Pieces:
     """Pieces of a mesh: from its components, and from sampled points, with at least some on each large component."""
     count = min(len(mesh.area), SETTINGS.components)
     corner = mesh.corner[: mesh.corner_start[count]]
     boxes = boxes_around(mesh.vertices[corner], mesh.corner_start[: count + 1])
-    samples = [sample_with_faces(mesh.vertices, mesh.faces, SETTINGS.points, seed)]
+    samples = [sample_with_faces(mesh.vertices, mesh.faces, SETTINGS.points, 0)]
     counts = np.bincount(mesh.component_of(samples[0][1]), minlength=count)
     for component in np.flatnonzero(counts[:count] < SETTINGS.component_points):
         first, last = mesh.face_start[component : component + 2]
-        points, face = sample_with_faces(mesh.vertices, mesh.faces[first:last], SETTINGS.component_points, seed)
+        points, face = sample_with_faces(mesh.vertices, mesh.faces[first:last], SETTINGS.component_points, 0)
         samples.append((points, face + first))
     points, face = (np.concatenate(column) for column in zip(*samples, strict=True))
     corners = mesh.vertices[mesh.faces[face]]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     cloud = cloud_of(points, normals / np.linalg.norm(normals, axis=1, keepdims=True))
-    return _ranked(cloud, [(Source.GROUP, groups(boxes)), *_of_points(cloud, seed, [])], boxes)
+    return _ranked(cloud, [(Source.GROUP, groups(boxes)), *_of_points(cloud, [])], boxes)
 
 
-def _of_points(cloud: Cloud, seed: int, along: Sequence[npt.NDArray[np.int64]]) -> list[tuple[Source, Boxes]]:
+def _of_points(cloud: Cloud, along: Sequence[npt.NDArray[np.int64]]) -> list[tuple[Source, Boxes]]:
     """Pieces from points with normals, by source, and groups of those that explain the points together.
 
     ``along`` has the indices of the points of each limb.
@@ -115,7 +115,7 @@ def _of_points(cloud: Cloud, seed: int, along: Sequence[npt.NDArray[np.int64]]) 
     along = along[: SETTINGS.limbs]
     members = cloud.points[np.concatenate(along)] if along else np.zeros((0, 3))
     sources = [
-        (Source.ROD, rods(cloud, seed)),
+        (Source.ROD, rods(cloud)),
         (Source.LIMB, boxes_around(members, bounds(along))),
         (Source.SLAB, between.take(selected)),
         (Source.SHEET, sheets(patches, SETTINGS.sheets)),

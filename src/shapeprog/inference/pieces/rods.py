@@ -14,10 +14,10 @@ from shapeprog.inference.surface.settings import SURFACE
 from shapeprog.space import Array, FloatArray
 
 
-def rods(cloud: Cloud, seed: int = 0) -> Boxes:
+def rods(cloud: Cloud) -> Boxes:
     """Boxes around round rods, best first; the first axis is that of the rod."""
     off, facing = tolerance(cloud), 0.85 if cloud.noise > SURFACE.noisy else 0.94
-    centre, axis, radius = through_pairs(cloud, off, seed)
+    centre, axis, radius = through_pairs(cloud, off)
     counts = np.zeros((len(radius), 4))
     count_rods(cloud.points, cloud.normals, centre, _frames(axis), radius, off, facing, counts)
     support, start, end, share = counts.T
@@ -48,14 +48,14 @@ def rods(cloud: Cloud, seed: int = 0) -> Boxes:
     return join(result)
 
 
-def through_pairs(cloud: Cloud, off: float, seed: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+def through_pairs(cloud: Cloud, off: float) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Points on the axes (T, 3), axes (T, 3) and radii (T,) of cylinders through pairs of points that are near.
 
     The axis is normal to both normals, and passes through their intersection (as in Schnabel, Wahl and Klein 2007).
     ``off`` is how far a point may be from the cylinder.
     """
     points, normals, neighbours = cloud.points, cloud.normals, cloud.neighbours
-    draws = np.random.default_rng(seed).integers(1 << 32, size=(SETTINGS.rod_trials, SETTINGS.rod_walk))
+    draws = np.random.default_rng(0).integers(1 << 32, size=(SETTINGS.rod_trials, SETTINGS.rod_walk))
     first = second = draws[:, 0] % len(points)
     cosine = np.ones(SETTINGS.rod_trials)
     for draw in draws[:, 1:].T:  # walk until the normals differ

@@ -7,10 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 import torch
+from jaxtyping import Float
+from torch import Tensor
 
 from shapeprog.data.shape import Shape
 from shapeprog.data.touched import occupied
 from shapeprog.geometry.cells import iou, pack
+from shapeprog.geometry.distance import nearest_primitive
 from shapeprog.inference.budget import NEVER, Deadline, Progress
 from shapeprog.inference.cells.blocks import to_program
 from shapeprog.inference.cells.refinement import REACH, refined
@@ -62,7 +65,8 @@ def reconstruct(
     shape, evidence
         A shape, whose cells are searched, and its surface, to which the numbers are fitted.
     tied
-        Whether the numbers will be tied: those of voxels are then fitted to faces, which ties can keep.
+        Whether the numbers will be tied: they are then fitted to the faces of the surface, which ties can keep; else by
+        the chamfer distance, which is that of the paper.
     searching, refining
         When no further round of the search, and no further step of fitting, starts.
     progress
@@ -70,12 +74,10 @@ def reconstruct(
     """
     structure = search_structure(shape.voxels, settings, seed=seed, deadline=searching, progress=progress)
     snapped = to_program(structure.blocks)
-    if shape.faces is None and not (tied and shape.points is None):
-        # Normals of few points are unreliable: on benches of val this halves the chamfer distance.
-        points = points_of_cells(shape.voxels) if shape.points is None else np.asarray(shape.points)
-        program = refined(snapped, torch.from_numpy(points), seed=seed, deadline=refining)
-    else:
+    if tied:
         program = adjust(snapped, evidence, reach=REACH, seed=seed, deadline=refining, progress=progress)
+    else:
+        program = refined(snapped, outer_points(shape, snapped), seed=seed, deadline=refining)
     reason = f"The search ended after {structure.reason}"
     if searching.cut:
         reason += "."
@@ -90,3 +92,16 @@ def reconstruct(
 def description_length(program: Program, voxels: npt.NDArray[np.bool_], snapped: Program | None = None) -> float:
     """Description length of cells (32, 32, 32) by a program: 1 - IoU, plus the price of its text."""
     return 1 - float(iou(occupied(program, unroll(program), snapped), pack(voxels))) + Prices().of(program)
+
+
+def outer_points(shape: Shape, snapped: Program) -> Float[Tensor, "P 3"]:
+    """Points that the surface of the program should meet.
+
+    Points deeper than 2.5 cells inside the snapped solid lie on inner faces of the mesh, such as the back of a drawer.
+    The surface of a union cannot reach them; in the loss they would pull its outer faces inwards.
+    """
+    if shape.points is None:
+        return torch.from_numpy(points_of_cells(shape.voxels))
+    points = torch.from_numpy(np.asarray(shape.points, np.float32))
+    outer = points[nearest_primitive(unroll(snapped), points)[1] > -2.5] if snapped.size else points
+    return outer if len(outer) else points

@@ -8,7 +8,6 @@ import torch
 
 from shapeprog.data.random import outside_published
 from shapeprog.data.shape import Shape
-from shapeprog.errors import InputError
 from shapeprog.geometry.cells import voxels as voxels_of
 from shapeprog.geometry.surface import sample_surface
 from shapeprog.inference import Settings, infer, refine
@@ -70,13 +69,6 @@ def test_refinement_moves_no_number_farther_than_its_reach():
     assert 0.19 < float((numbers(fitted) - numbers(start)).abs().max()) <= 0.2 + 1e-6
     by_chamfer = refined(start, points(planted) + 3.0, steps=30, rate=0.3)
     assert float((numbers(by_chamfer) - numbers(start)).abs().max()) <= REACH + 1e-6
-
-
-def test_refinement_needs_finite_points():
-    with pytest.raises(InputError, match="finite"):
-        refined(parse(TABLE), torch.full((4, 3), torch.nan))
-    with pytest.raises(InputError):
-        refined(parse(TABLE), torch.zeros(0, 3))
 
 
 def snapped_from(program, snapped):

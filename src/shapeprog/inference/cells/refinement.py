@@ -12,7 +12,6 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from shapeprog.errors import InputError
 from shapeprog.geometry.arrays import one_tensor_thread
 from shapeprog.geometry.distance import signed_distance
 from shapeprog.geometry.nearest import squared_distance
@@ -39,7 +38,7 @@ def refined(
     Parameters
     ----------
     target
-        Points on the surface of the target, in the grid frame.
+        Points on the surface of the target, in the grid frame, finite; at least one.
     steps
         Gradient steps, of 1,000 target points and 1,000 points of the program each.
     rate
@@ -48,15 +47,8 @@ def refined(
         Of the points that each step draws.
     deadline
         When no further step starts.
-
-    Raises
-    ------
-    InputError
-        If the points are not finite, or there are none.
     """
     points = target.double()
-    if not len(points) or not bool(points.isfinite().all()):
-        raise InputError("refinement needs finite target points", "load the target with shapeprog.load_shape")
     if not program.size:
         return program
     tunable = Tunable(program)

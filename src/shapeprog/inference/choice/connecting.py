@@ -46,7 +46,8 @@ def _better_connected(program: Program, coverage: Coverage) -> Program | None:
     table = coverage.table([Program((node,)) for node in nodes])
     start, *values = (value(table, tuple(index[node] for node in option.body)) for option in every)
     order = np.argsort(np.negative(values), kind="stable")[: SETTINGS.ways].tolist()
-    likely = (every[1 + number] for number in order if values[number] >= start - SETTINGS.floating)
+    limits = [SETTINGS.floating if option.blocks == program.blocks else SETTINGS.removed for option in every[1:]]
+    likely = (every[1 + number] for number in order if values[number] >= start - limits[number])
     return next((option for option in likely if sum(map(sum, _loose_parts(option))) < count), None)
 
 

@@ -19,9 +19,9 @@ class Settings:
         Probability with which a round overlooks a candidate.
     interior
         Initial penalties of points in interiors, as multiples of their weights.
-    floating, ways
-        Largest loss of value by connecting or removing a part, as a share of the target; most ways to connect a part
-        that are tested, the most valuable first.
+    floating, removed, ways
+        Largest loss of value by connecting a part, and by removing it, as shares of the target: four legs may explain
+        no more than .01; most ways to connect a part that are tested, the most valuable first.
     lines
         Shares of a face within which lines test which parts an extension reaches: boards may meet at their rims.
     flush
@@ -45,6 +45,7 @@ class Settings:
     blink: float = 0.05
     interior: tuple[float, ...] = (8.0, 1.0)
     floating: float = 0.02
+    removed: float = 0.005
     ways: int = 24
     lines: tuple[float, ...] = (0.8, 0.98)
     flush: float = 1e-4

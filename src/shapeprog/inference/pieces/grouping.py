@@ -7,6 +7,7 @@ from itertools import combinations
 import numpy as np
 import numpy.typing as npt
 
+from shapeprog.geometry.separation import OrientedBoxes, touching
 from shapeprog.inference.pieces.oriented import Boxes, bounds, boxes_around
 from shapeprog.inference.pieces.settings import SETTINGS
 
@@ -20,7 +21,7 @@ def groups(boxes: Boxes) -> Boxes:
     first = boxes.take(np.arange(min(len(boxes.half), SETTINGS.grouped)))
     if len(first.half) < 2:
         return boxes.take(np.zeros(0, np.int64))
-    adjacent = touching(first, SETTINGS.group_gap)
+    adjacent = near(first, SETTINGS.group_gap)
     at = np.einsum("jkc,icd->ijkd", first.corners(), first.rotation)
     at -= np.einsum("ic,icd->id", first.centre, first.rotation)[:, None, None]
     within = np.abs(at).max(2) <= first.half[:, None] + SETTINGS.group_gap
@@ -46,18 +47,10 @@ def grown(adjacent: npt.NDArray[np.bool_], fits: npt.NDArray[np.bool_]) -> npt.N
         reached = onwards
 
 
-def touching(boxes: Boxes, gap: float) -> npt.NDArray[np.bool_]:
-    """Which boxes (N, N) are within about ``gap`` of each other: they have no separating axis (Gottschalk 1996)."""
-    half = boxes.half + gap / 2
-    count = len(half)
-    offset = boxes.centre[None] - boxes.centre[:, None]
-    axes = np.broadcast_to(boxes.rotation[:, None], (count, count, 3, 3)).transpose(0, 1, 3, 2)
-    other_axes = axes.transpose(1, 0, 2, 3)
-    edges = np.cross(axes[:, :, :, None], other_axes[:, :, None]).reshape(count, count, 9, 3)
-    touch = np.ones((count, count), np.bool_)
-    for directions in (axes, other_axes, edges):
-        distance = np.abs(np.einsum("ijad,ijd->ija", directions, offset))
-        reach = np.abs(np.einsum("ijad,idk,ik->ijak", directions, boxes.rotation, half)).sum(3)
-        reach += np.abs(np.einsum("ijad,jdk,jk->ijak", directions, boxes.rotation, half)).sum(3)
-        touch &= (distance <= reach + 1e-9).all(2)
-    return touch
+def near(boxes: Boxes, gap: float) -> npt.NDArray[np.bool_]:
+    """Which boxes (N, N) are within about ``gap`` of each other: they touch when both are larger by half of it."""
+    edges = np.swapaxes(boxes.rotation, 1, 2) * (boxes.half + gap / 2)[..., None]
+    first, second = touching(OrientedBoxes(boxes.centre, edges), 1e-9)
+    result = np.eye(len(boxes.half), dtype=np.bool_)
+    result[first, second] = result[second, first] = True
+    return result

@@ -17,7 +17,8 @@ import numpy as np
 import torch
 
 from shapeprog.geometry.primitive import SIZES
-from shapeprog.inference.ties.boxes import boxes_of, gaps, normals, touching, viewed
+from shapeprog.geometry.separation import gaps, normals, touching
+from shapeprog.inference.ties.boxes import boxes_of, viewed
 from shapeprog.inference.ties.layout import ALIGNED, HIGH, LOW, MIDDLE, Anchors, Element
 from shapeprog.inference.ties.model import Model
 from shapeprog.inference.ties.settings import TIES
@@ -70,7 +71,7 @@ class Motion:
         middle = self.boxes.centre + np.array(self.layout.extents) / 2
         self.ends: FloatArray = np.stack([middle - reach, middle + reach]).swapaxes(1, 2)
         self.end_slopes = np.stack([self.slopes[:, 0] - reach_slopes, self.slopes[:, 0] + reach_slopes]).swapaxes(1, 2)
-        self.first, self.second = touching(self.boxes)
+        self.first, self.second = touching(self.boxes, TIES.touch)
         turned = ((scene.rotation - scene.rotation.round()).abs().amax((1, 2)) > ALIGNED).numpy()
         self.leaning = np.flatnonzero(turned[self.first] | turned[self.second])
         first, second = self.first[self.leaning], self.second[self.leaning]

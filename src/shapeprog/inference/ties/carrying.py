@@ -13,7 +13,8 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from shapeprog.inference.ties.boxes import boxes_of, gaps, touching
+from shapeprog.geometry.separation import gaps, touching
+from shapeprog.inference.ties.boxes import boxes_of
 from shapeprog.inference.ties.expressions import Solution
 from shapeprog.inference.ties.layout import HIGH, Slot
 from shapeprog.inference.ties.model import Model
@@ -86,7 +87,7 @@ class _Contacts:
         count = len(scene.mask)
         parts = [k for k, line in enumerate(model.anchored.layout.lines) if isinstance(line, Part)]
         self._line = [parts[block] for block in scene.block.tolist()]
-        self.first, self.second = touching(boxes_of(scene))
+        self.first, self.second = touching(boxes_of(scene), TIES.touch)
         self.pieces = self._pieces(np.ones(len(self.first), bool), count)
 
     def cost(self, along: FloatArray, value: float, least: float = np.inf) -> tuple[float, set[int]]:

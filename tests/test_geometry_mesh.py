@@ -10,7 +10,7 @@ import shapeprog as sp
 from shapeprog.data.random import random_program
 from shapeprog.errors import ShapeProgError
 from shapeprog.geometry.contacts import TOUCHING, contact_groups
-from shapeprog.geometry.mesh import gaps, part_meshes, union_mesh
+from shapeprog.geometry.mesh import gaps, part_meshes, pieces, pieces_of_parts, union_mesh
 from shapeprog.geometry.primitives import primitives
 
 
@@ -126,3 +126,13 @@ def test_a_bent_rod_touches_with_both_ends_and_not_with_what_it_spans():
     centres += [[-5.0, -3.5, 0], [5.0, -3.5, 0], [0.0, -2.5, 0]]
     scene = make_scene(["arc", "cuboid", "cuboid", "cuboid"], sizes, centres, lead=(1,))
     assert contact_groups(scene) == [2]
+
+
+def test_parts_that_meet_along_an_edge_alone_are_separate_pieces():
+    face = "box(at=(-12, 0, 0), size=(2, 2, 2))\nbox(at=(-10, 0, 0), size=(2, 2, 2))\n"
+    edge = "box(at=(-8, 2, 0), size=(2, 2, 2))\n"
+    inside = "box(at=(-11.5, 0.5, 0.5), size=(1, 1, 1))\n"
+    scene = sp.unroll(sp.parse(face + edge + inside))
+    assert pieces_of_parts(scene).tolist() == [0, 0, 1, 0]
+    assert contact_groups(sp.unroll([sp.parse(face + edge + inside)])) == [1]
+    assert pieces(*union_mesh(scene)) == 2

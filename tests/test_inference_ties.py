@@ -28,7 +28,7 @@ from shapeprog.inference.ties.layout import Layout, Slot
 from shapeprog.inference.ties.leaning import between_ends
 from shapeprog.inference.ties.model import Model
 from shapeprog.inference.ties.pricing import worthwhile
-from shapeprog.inference.ties.relations import Relation
+from shapeprog.inference.ties.relations import Meeting, Relation
 from shapeprog.inference.ties.settings import TIES
 from shapeprog.inference.ties.tying import tie
 from shapeprog.language.ast import Assignment, Comment, Fault, Group, Line, Part, values
@@ -181,6 +181,17 @@ def test_no_relation_moves_a_number_below_its_least():
         [same], np.array([1.0, 1.2]), np.eye(2), 1.0, fixed=np.zeros((0, 2)), low=np.array([0.9, 1.15])
     )
     assert not len(rows)
+
+
+def test_parts_that_meet_along_one_axis_do_not_along_another():
+    meetings = [frozenset({Meeting(0, 1, axis)}) for axis in (0, 2)]
+    first, second = (Relation(np.eye(2)[k], 1.0, meeting) for k, meeting in enumerate(meetings))
+    other = Relation(np.eye(2)[1], 1.0, frozenset({Meeting(1, 2, 2)}))
+    start, low, none = np.array([0.01, 0.02]), np.full(2, -np.inf), np.zeros((0, 2))
+    rows, _ = worthwhile([first, second], start, np.eye(2), 1.0, fixed=none, low=low)
+    assert rows.tolist() == [[1, 0]]  # else they would touch along an edge
+    rows, _ = worthwhile([first, other], start, np.eye(2), 1.0, fixed=none, low=low)
+    assert len(rows) == 2
 
 
 def joint_of(scene) -> Joints:
@@ -509,6 +520,14 @@ def test_parts_move_with_a_shared_number_of_those_that_they_touch():
     assert "top=seat_drop - 4" in text
     for factor in (0.7, 1.4):
         assert pieces(*union_mesh(unroll(sp.set(sp.parse(text), seat_drop=10 * factor)))) == 1
+
+
+@pytest.mark.parametrize("lap", [0.02, 0.1])
+def test_ties_separate_no_parts(lap: float):
+    # Two boards overlap by less than ties may move them: at flush faces they would touch along an edge.
+    text = f"box(at=(-12, 0, -8), size=(12, 1, 16))\nbox(at=({-lap}, 0.98, -8), size=({12 + lap}, 1, 16))\n"
+    tied = tie(program := sp.parse(text), evidence_of_program(program))
+    assert pieces(*union_mesh(unroll(tied))) == 1
 
 
 @pytest.mark.parametrize(("end", "expected"), [(0.3, (0, 0)), (14, (0, 2)), (23.5, (0, 2))])

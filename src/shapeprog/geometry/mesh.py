@@ -118,8 +118,31 @@ def union_mesh(scene: Batch) -> Triangles:
 
     A ``ShapeProgError`` if the scene holds no solid part or more than ``MOST_JOINED``, or a batch is given.
     """
-    from manifold3d import Manifold, OpType
+    union = _union(list(_solids(scene).values())).to_mesh()
+    if not len(union.tri_verts):
+        raise ShapeProgError("the union of the parts is empty", "a part may be too thin; give it some thickness")
+    return union.vert_properties[:, :3].astype(np.float64), np.asarray(union.tri_verts, np.int64)
 
+
+def pieces_of_parts(scene: Batch) -> npt.NDArray[np.int64]:
+    """The connected solid of the union to which each primitive (N,) of one scene belongs, 0 for the largest surface.
+
+    Parts that meet only along an edge or in a point are not connected.  A part without a volume, or hidden inside
+    others, is counted with the largest.  Raises what :func:`union_mesh` does.
+    """
+    solids = _solids(scene)
+    slots = {solid.original_id(): slot for slot, solid in solids.items()}
+    pieces = [piece for piece in _union(list(solids.values())).decompose() if piece.volume() > 0]
+    label = np.zeros(len(scene.mask), np.int64)
+    for number, piece in enumerate(sorted(pieces, key=lambda piece: -piece.surface_area())):
+        mesh = piece.to_mesh()
+        drawn = np.asarray(mesh.run_original_id)[np.diff(mesh.run_index) > 0]
+        label[[slots[original] for original in drawn.tolist()]] = number
+    return label
+
+
+def _solids(scene: Batch) -> dict[int, Any]:
+    """The parts of a scene by slot, as solids whose vertices are rounded to whole multiples of ``STEP``."""
     parts = part_meshes(scene)
     if not parts:
         raise ShapeProgError("the scene holds no solid part", "draw something that has a thickness")
@@ -128,11 +151,13 @@ def union_mesh(scene: Batch) -> Triangles:
             f"{len(parts)} parts are too many to join into one solid: at most {MOST_JOINED}",
             "lower the counts, or export the parts as they are, as .ply",
         )
-    solids = [manifold(np.round(part.vertices / STEP) * STEP, part.faces) for part in parts]
-    union = Manifold.batch_boolean(solids, OpType.Add).to_mesh()
-    if not len(union.tri_verts):
-        raise ShapeProgError("the union of the parts is empty", "a part may be too thin; give it some thickness")
-    return union.vert_properties[:, :3].astype(np.float64), np.asarray(union.tri_verts, np.int64)
+    return {p.slot: manifold(np.round(p.vertices / STEP) * STEP, p.faces).as_original() for p in parts}
+
+
+def _union(solids: Sequence[Any]) -> Any:
+    from manifold3d import Manifold, OpType
+
+    return Manifold.batch_boolean(solids, OpType.Add)
 
 
 def manifold(vertices: Array, faces: Array) -> Any:

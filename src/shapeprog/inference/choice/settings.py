@@ -24,8 +24,6 @@ class Settings:
         no more than .01; most ways to connect a part that are tested, the most valuable first.
     lines
         Shares of a face within which lines test which parts an extension reaches: boards may meet at their rims.
-    flush
-        Largest gap between touching parts: coincident faces touch.
     batch, least_samples, most_samples
         Samples of one batch on a primitive; smallest and largest number for a candidate without loops, else one per
         cell.
@@ -48,7 +46,6 @@ class Settings:
     removed: float = 0.005
     ways: int = 24
     lines: tuple[float, ...] = (0.8, 0.98)
-    flush: float = 1e-4
     batch: int = 16
     least_samples: int = 64
     most_samples: int = 256

@@ -10,8 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from shapeprog.inference.fit.tunable import DEGREES
 from shapeprog.inference.ties.layout import Slot
 from shapeprog.inference.ties.settings import TIES
+from shapeprog.language.parameters import to_float32
 from shapeprog.space import FloatArray
 
 ELIMINATED = {"clearance": 0, "offset": 0, "edge": 1, "radius": 2, "size": 3, "length": 3, "angle": 3, "extent": 9}
@@ -40,6 +42,12 @@ class Solution:
         """The free numbers (Z,) that give these numbers (P,)."""
         values, *_ = np.linalg.lstsq(self.factors, numbers)
         return np.asarray(values, np.float64)
+
+    def rounded(self, slots: list[Slot], numbers: FloatArray, decimals: int) -> FloatArray:
+        """The free numbers (Z,) that give these numbers (P,), with so many decimals, angles with one."""
+        pairs = zip(self.free, self.values(numbers).tolist(), strict=True)
+        digits = ((DEGREES if slots[k].kind == "angle" else decimals, value) for k, value in pairs)
+        return np.array([to_float32(round(value, count)) for count, value in digits])
 
 
 def solved(slots: list[Slot], rows: FloatArray) -> Solution:

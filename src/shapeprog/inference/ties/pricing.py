@@ -2,16 +2,21 @@
 
 Near its optimum the misfit of a program is quadratic.  With H its curvature and p the numbers, imposing c p = 0 costs
 (c p)^2 / (c H^-1 c'), so thousands of relations are priced without a refit; the cheapest is imposed, H^-1 and p follow
-by one elimination, and so on.
+by one elimination, and so on.  Parts that meet along two axes would touch along an edge alone, so a relation by which
+they would is not imposed.
 """
 
 from __future__ import annotations
 
 import numpy as np
+import numpy.typing as npt
 
 from shapeprog.inference.ties.relations import Relation
 from shapeprog.library.independence import beside
 from shapeprog.space import FloatArray
+
+HOLDS = 1e-6
+"""Deviation up to which a relation holds."""
 
 
 def worthwhile(
@@ -45,6 +50,8 @@ def worthwhile(
         return fixed, numbers
     low, start = np.minimum(low, numbers), numbers
     axes: FloatArray = np.zeros((0, len(numbers)))
+    meeting = [(k, *pair) for k, relation in enumerate(candidates, len(fixed)) for pair in relation.meetings]
+    edges = 0
     for row in fixed:
         if (new := beside(row, axes)) is not None:
             axes = np.vstack([axes, new])
@@ -60,15 +67,25 @@ def worthwhile(
             return np.array(imposed).reshape(-1, len(numbers)), numbers
         along = free @ rows[best]
         moved = numbers - along * off[best] / spread[best]
+        across = rows @ along
+        off_then, spread_then = off - across * off[best] / spread[best], spread - across**2 / spread[best]
+        edges_then = _edges(meeting, (spread_then <= minimum) & (np.abs(off_then) < HOLDS))
         if best >= len(fixed):
             new = beside(rows[best], axes)
-            if new is None or (moved < low).any() or (np.abs(moved - start) > far).any():
+            if new is None or (moved < low).any() or (np.abs(moved - start) > far).any() or edges_then > edges:
                 spread[best] = 0.0
                 continue
             imposed.append(rows[best])
             axes = np.vstack([axes, new])
-        across, numbers = rows @ along, moved
         free = free - np.outer(along, along) / spread[best]
-        off = off - across * off[best] / spread[best]
-        spread = spread - across**2 / spread[best]
+        numbers, off, spread, edges = moved, off_then, spread_then, edges_then
         spread[best] = 0.0
+
+
+def _edges(meetings: list[tuple[int, int, int, int]], holds: npt.NDArray[np.bool_]) -> int:
+    """How many pairs of lines meet along more than one axis, by relations that hold."""
+    axes: dict[tuple[int, int], set[int]] = {}
+    for index, first, second, axis in meetings:
+        if holds[index]:
+            axes.setdefault((first, second), set()).add(axis)
+    return sum(len(along) > 1 for along in axes.values())

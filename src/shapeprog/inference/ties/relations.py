@@ -20,11 +20,30 @@ from shapeprog.language.ast import Part
 from shapeprog.space import FloatArray
 
 
+class Meeting(NamedTuple):
+    """Two lines whose parts meet face to face along an axis."""
+
+    first: int
+    second: int
+    axis: int
+
+
 class Relation(NamedTuple):
-    """That factors (P,) times the numbers of a program sum to zero, and the price of the number it saves."""
+    """That factors (P,) times the numbers of a program sum to zero.
+
+    Parameters
+    ----------
+    row
+        The factors (P,).
+    trust
+        Price of the number that it saves, as a multiple of the usual one.
+    meetings
+        The lines that meet where it holds.
+    """
 
     row: FloatArray
     trust: float
+    meetings: frozenset[Meeting] = frozenset()
 
 
 class Reading(NamedTuple):
@@ -36,11 +55,14 @@ class Reading(NamedTuple):
         As of :class:`Relation`.
     limit
         Largest deviation, in cells or degrees.
+    meeting
+        The lines that meet where it holds.
     """
 
     row: FloatArray
     trust: float
     limit: float = TIES.within
+    meeting: Meeting | None = None
 
 
 class Face(NamedTuple):
@@ -109,7 +131,7 @@ def relations(anchored: Anchored, numbers: FloatArray, touching: set[tuple[int, 
         Pairs of lines, the smaller first, whose parts touch.
     """
     best: dict[bytes, Relation] = {}
-    for row, weight, limit in _readings(anchored, numbers, touching):
+    for row, trust, limit, meeting in _readings(anchored, numbers, touching):
         used = np.flatnonzero(row)
         if not len(used):
             continue
@@ -118,8 +140,8 @@ def relations(anchored: Anchored, numbers: FloatArray, touching: set[tuple[int, 
         if off > limit:
             continue
         key = np.round(row, 6).tobytes()
-        if key not in best or best[key].trust < weight:
-            best[key] = Relation(row, weight)
+        known = best.get(key, Relation(row, trust))
+        best[key] = Relation(row, max(trust, known.trust), known.meetings | ({meeting} if meeting else frozenset()))
     return list(best.values())
 
 
@@ -200,7 +222,8 @@ def _pair(
         if axis > 0 and not (upright[first.line] and upright[second.line]):
             return
         if touches and (face.facing * partner.facing == -1 or all(points) or bool(face.facing) != bool(partner.facing)):
-            yield Reading(row, TIES.contact)
+            meeting = Meeting(lines[0], lines[1], axis) if face.facing * partner.facing == -1 else None
+            yield Reading(row, TIES.contact, meeting=meeting)
         elif face.facing == partner.facing and (single or touches):
             yield Reading(row, TIES.equal if single else TIES.equal / 2)
 

@@ -17,9 +17,10 @@ class TieSettings:
         Weight of a squared move of a number that somebody wrote.
     far, rounds
         Farthest that relations may move a number at once; most rounds of the search for them: first contacts, then all.
-    lost, cheaper, attempts, apart
-        Largest decrease of closeness when numbers are tied; beyond that, or where parts are separated by a gap of
-        ``apart``, the price of a number is divided by ``cheaper``, in so many attempts.  The last one is kept anyway.
+    lost, cheaper, attempts
+        Largest decrease of closeness when numbers are tied; beyond that, the price of a number is divided by
+        ``cheaper``, in so many attempts; in as many, lines that are separated by ties are untied.  The last one is kept
+        anyway.
     floor, centred, contact, straight, equal
         Price of the number that a relation saves, as a multiple of the usual price.  ``floor``: a part that ends just
         above the floor.  ``centred``: equal clearances on the left and right.  ``contact``: faces that meet; equal
@@ -80,7 +81,6 @@ class TieSettings:
     lost: float = 0.03
     cheaper: float = 3.0
     attempts: int = 3
-    apart: float = 0.005
     floor: float = 6.0
     centred: float = 4.0
     contact: float = 2.0

@@ -8,7 +8,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from shapeprog.inference.fit.tunable import CELLS, DEGREES
 from shapeprog.inference.ties.anchored import Anchored
 from shapeprog.inference.ties.expressions import Solution
 from shapeprog.inference.ties.groups import grouped
@@ -45,7 +44,7 @@ START: dict[str, Value] = {"x": 0.0, "y": 0.0, "bottom": 0.0}
 """Where a point is for which nothing is given."""
 
 
-def written(anchored: Anchored, solution: Solution, numbers: FloatArray, *, group: bool = True) -> Source:
+def written(anchored: Anchored, solution: Solution, free: FloatArray, *, group: bool = True) -> Source:
     """The program with names for its shared numbers and expressions for those that follow.
 
     Parameters
@@ -54,13 +53,13 @@ def written(anchored: Anchored, solution: Solution, numbers: FloatArray, *, grou
         The program.
     solution
         Which of its numbers are free, and how others follow.
-    numbers
-        Where the numbers are (P,).
+    free
+        The values of the free numbers (Z,).
     group
         Whether lines are grouped where that is shorter.
     """
-    shared, table = _expressions(anchored, solution, numbers)
-    extents: dict[str, Value] = {size: to_float32(round(float(numbers[k]), CELLS)) for k, size in enumerate(SIZES)}
+    shared, table = _expressions(anchored, solution, free)
+    extents: dict[str, Value] = dict(zip(SIZES, (solution.factors[:3] @ free).tolist(), strict=True))
     header = [Assignment(tuple(extents.items()))]
     if np.array_equal(solution.factors[0], solution.factors[1]):
         diameter, round_extents = Name("diameter"), {**extents, **dict.fromkeys(SIZES[:2], Name("diameter"))}
@@ -90,7 +89,7 @@ def written(anchored: Anchored, solution: Solution, numbers: FloatArray, *, grou
 
 
 def _expressions(
-    anchored: Anchored, solution: Solution, numbers: FloatArray
+    anchored: Anchored, solution: Solution, at_free: FloatArray
 ) -> tuple[dict[str, Value], dict[str, Value]]:
     """The numbers and sums that several numbers of a program share, by provisional name, and all of its numbers."""
     slots, factors, free = anchored.slots, solution.factors, solution.free
@@ -99,12 +98,11 @@ def _expressions(
         alike.setdefault(factors[p].round(6).tobytes(), []).append(p)
     rows = factors[[members[0] for members in alike.values()]]
     single = np.array([len(members) == 1 for members in alike.values()])
-    at_free = solution.values(numbers)
     terms: list[Value] = [0.0] * len(free)
     shared: dict[str, Value] = {}
     for z in sorted(range(len(free)), key=lambda z: (slots[free[z]].line, free[z])):
         k = free[z]
-        terms[z] = to_float32(round(float(at_free[z]), DEGREES if slots[k].kind == "angle" else CELLS) + 0.0)
+        terms[z] = float(at_free[z]) + 0.0
         if k < 3:
             terms[z] = Name("diameter" if k < 2 and np.array_equal(factors[0], factors[1]) else SIZES[k])
         elif (used := rows[:, z] != 0).sum() > 1 or (used & ~single & ((rows != 0).sum(1) == 1)).any():

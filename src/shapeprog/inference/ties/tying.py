@@ -11,19 +11,21 @@ from __future__ import annotations
 from collections.abc import Collection
 
 import numpy as np
+import numpy.typing as npt
 import torch
 
 from shapeprog.errors import ShapeProgError
 from shapeprog.geometry.arrays import one_tensor_thread
+from shapeprog.geometry.mesh import pieces_of_parts
 from shapeprog.inference.budget import Progress
-from shapeprog.inference.choice.connecting import afloat
 from shapeprog.inference.fit.joints import find_joints
+from shapeprog.inference.fit.tunable import CELLS
 from shapeprog.inference.surface.evidence import Evidence
 from shapeprog.inference.ties.anchored import Anchored
 from shapeprog.inference.ties.anchors import anchors_of
 from shapeprog.inference.ties.carrying import carried
 from shapeprog.inference.ties.closeness import Closeness
-from shapeprog.inference.ties.expressions import solved
+from shapeprog.inference.ties.expressions import Solution, solved
 from shapeprog.inference.ties.layout import LOW, Anchors, Layout
 from shapeprog.inference.ties.leaning import between_ends
 from shapeprog.inference.ties.model import Misfit, Model
@@ -77,16 +79,14 @@ def tie(
         ties = _Ties(Layout(source), evidence, seed, known=known, held=held)
         price *= TIES.known_price if known else TIES.price
         closeness = None if known else Closeness(evidence, seed)
-        before, floating = (closeness.of(unroll(plain)), afloat(plain, TIES.apart)) if closeness else (0.0, 0)
+        before = closeness.of(unroll(plain)) if closeness else 0.0
         tied = evaluated(source)
         for attempt in range(TIES.attempts):
             try:
                 tied = ties.tied(price / TIES.cheaper**attempt)
             except Fault:  # relations left a part without length
                 continue
-            if closeness is None:
-                break
-            if before - closeness.of(unroll(tied)) <= TIES.lost and afloat(tied, TIES.apart) <= floating:
+            if closeness is None or before - closeness.of(unroll(tied)) <= TIES.lost:
                 break
         if progress:
             progress("tying numbers", 1.0)
@@ -105,26 +105,47 @@ class _Ties:
         lines = layout.lines_of(held)
         fixed = np.array([slot.line in lines for slot in self.anchored.slots])
         self.misfit = Misfit(self.model, evidence, seed, np.where(fixed, np.inf, TIES.known if known else 0.0))
-        self.fixed = fixed
-        parts = [k for k, line in enumerate(layout.lines) if isinstance(line, Part)]
+        self.fixed, self.decimals = fixed, CELLS if known else CELLS + 1  # what is inferred is rounded again
+        self.parts = parts = [k for k, line in enumerate(layout.lines) if isinstance(line, Part)]
         pairs = scene.block[torch.stack([self.joints.first, self.joints.second], 1)].tolist()
         self.touching = {(parts[min(pair)], parts[max(pair)]) for pair in pairs}
+        self.loose = self._loose(self.model.numbers)
 
     def tied(self, price: float) -> Program:
-        """The program tied at a price of a number, in the unit of the misfit."""
+        """The program tied at a price of a number, in the unit of the misfit.
+
+        Lines that ties separate from the others stay untied, and if this is not enough, those that they touched.
+        """
+        slots, untied = self.anchored.slots, set[int]()
+        for _ in range(TIES.attempts):
+            solution, numbers = self._solved(price, self.fixed | np.array([slot.line in untied for slot in slots]))
+            free = solution.rounded(slots, numbers, self.decimals)
+            loose = self._loose(solution.factors @ free) - self.loose
+            if not loose:
+                break
+            touched = {line for pair in self.touching if not loose.isdisjoint(pair) for line in pair}
+            untied |= touched if loose <= untied else loose
+        return evaluated(written(self.anchored, solution, free, group=not self.fixed.any()))
+
+    def _loose(self, numbers: FloatArray) -> set[int]:
+        """The lines with parts outside the largest connected solid."""
+        scene = self.model.scene(numbers)
+        return {self.parts[block] for block in scene.block[pieces_of_parts(scene) > 0].tolist()}
+
+    def _solved(self, price: float, fixed: npt.NDArray[np.bool_]) -> tuple[Solution, FloatArray]:
+        """The free numbers at a price of a number, and all numbers (P,); some (P,) are in no relation."""
         numbers, rows = self.model.numbers, self.anchored.fixed()
         for step in range(TIES.rounds):
             offered = relations(self.anchored, numbers, self.touching)
-            offered = [relation for relation in offered if not (relation.row != 0)[self.fixed].any()]
+            offered = [relation for relation in offered if not (relation.row != 0)[fixed].any()]
             if step == 0:
-                offered = [relation for relation in offered if relation.trust == TIES.contact]
+                offered = [relation for relation in offered if relation.trust in (TIES.contact, TIES.floor)]
             before = len(rows)
             rows, optimum = self._imposed(offered, numbers, rows, price)
             if step and len(rows) == before:
                 break
             numbers = self.misfit.refitted(optimum, self._free(rows), self.joints)
-        solution = carried(solved(self.anchored.slots, rows), self.model, numbers)
-        return evaluated(written(self.anchored, solution, numbers, group=not self.fixed.any()))
+        return carried(solved(self.anchored.slots, rows), self.model, numbers), numbers
 
     def _imposed(
         self, offered: Collection[Relation], numbers: FloatArray, rows: FloatArray, price: float

@@ -204,3 +204,11 @@ def test_files_keep_programs_as_they_are_written_and_their_frame(tmp_path: Path,
     sp.save(*sp.load_with_frame(tmp_path / f"chair{suffix}")[:1], tmp_path / "again.shape", frame)
     assert (tmp_path / "again.shape").read_text().count("# placed:") == 1
     assert sp.load(tmp_path / "again.shape") == program
+
+
+def test_a_sum_starts_with_what_is_added() -> None:
+    depth, rear = Name("depth"), Name("rear")
+    assert str(combined(4.0, [(depth, -1.0)])) == "4 - depth"
+    assert str(combined(4.0, [(depth, -1.0), (rear, 2.0)])) == "-depth + 2 * rear + 4"
+    assert str(combined(-4.0, [(depth, -1.0)])) == "-depth - 4"
+    assert combined(4.0, [(2.0, -1.0)]) == 2.0

@@ -256,15 +256,15 @@ class Linear:
 
 def combined(constant: float, terms: Sequence[tuple[Value, float]]) -> Value:
     """The sum of ``constant`` and of each value times its factor, as a person writes it: ``depth / 2 - thick``."""
+    constant += sum(value * factor for value, factor in terms if not isinstance(value, Expression))
+    named = [(value, factor) for value, factor in terms if isinstance(value, Expression) and factor]
     total: Value | None = None
-    for value, factor in terms:
-        if not isinstance(value, Expression):
-            constant += value * factor
-        elif factor:
-            size = _scaled(value, factor if total is None else abs(factor))
-            total = size if total is None else total - size if factor < 0 else total + size
-    if total is None:
-        return to_float32(constant)
+    if not named or (constant > 0 and all(factor < 0 for _, factor in named)):  # 4 - depth rather than -depth + 4
+        total, constant = to_float32(constant), 0.0
+    for value, factor in named:
+        size = _scaled(value, factor if total is None else abs(factor))
+        total = size if total is None else total - size if factor < 0 else total + size
+    assert total is not None
     return total if not constant else total - -constant if constant < 0 else total + constant
 
 

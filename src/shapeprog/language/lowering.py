@@ -14,7 +14,17 @@ from shapeprog.errors import ShapeProgError
 from shapeprog.language.ast import Argument, Call, Draw, Fault, Group, Line, Loop, Part, Point, Source
 from shapeprog.language.expression import Expression, ExpressionError, Value, text_of, value_at
 from shapeprog.language.parameters import to_float32
-from shapeprog.language.placement import AXES, LEAST_ALONG, MOST_SOLIDS, POINTS, ROUND, SIZES, is_sized
+from shapeprog.language.placement import (
+    AXES,
+    LEAST_ALONG,
+    MOST_SOLIDS,
+    POINTS,
+    ROUND,
+    SIZES,
+    coordinate_of,
+    interval_of,
+    is_sized,
+)
 from shapeprog.language.program import DEEPEST
 
 TOO_LARGE = 1e12  # magnitude from which numbers of placed text are refused
@@ -283,41 +293,27 @@ class Lowering(ABC):
 
     def _interval(self, axis: int, part: Placed, diameter: Any = None) -> tuple[Any, Any]:
         """Where a part lies along one axis of a box; ``diameter`` is the size of a round solid, if it is known."""
-        words, (start, end) = AXES[axis], part.box[axis]
-        values = {word: self._number(part, word) for word in part.keywords if word in words}
-        size = values.get(words.size, diameter)
-        if size is None:
-            start, end = start + values.get(words.low, 0.0), end - values.get(words.high, 0.0)
-            if self.exact and not self._length(end - start) > SMALLEST:
-                full = part.box[axis][1] - part.box[axis][0]
-                hint = f"{POSITIVE}; the {words.size} around it is {full:g}"
-                raise Fault(part.line, f"{words.size} is {end - start:g}", hint, [*values][-1] if values else "")
-            return start, end
-        self._positive(part, words.size, size)
-        if words.low in values:
-            start = start + values[words.low]
-        elif words.high in values:
-            start = end - values[words.high] - size
-        elif words.offset in values or axis < 2:
-            start = (start + end - size) / 2 + values.get(words.offset, 0.0)
-        return start, start + size
+        words = AXES[axis]
+        given = {word: self._number(part, word) for word in part.keywords if word in words}
+        if diameter is not None:
+            given.setdefault(words.size, diameter)
+        start, end = interval_of(axis, given, *part.box[axis])
+        if words.size in given:
+            self._positive(part, words.size, given[words.size])
+        elif self.exact and not self._length(end - start) > SMALLEST:
+            full = part.box[axis][1] - part.box[axis][0]
+            hint = f"{POSITIVE}; the {words.size} around it is {full:g}"
+            raise Fault(part.line, f"{words.size} is {end - start:g}", hint, [*given][-1] if given else "")
+        return start, end
 
     def _place(self, part: Placed, key: str, point: Argument, start: Vector | None = None) -> Vector:
         """A point in a box; an axis without a keyword is that of ``start``, or the middle of the bottom."""
         assert isinstance(point, Point)
-        prefix, result = f"{key}." if key else "", []
-        values = {word: self.at(part.line, prefix + word, value, part.scope) for word, value in point.keywords}
-        for axis, words in enumerate(AXES):
-            low, high = part.box[axis]
-            if words.low in values:
-                result.append(low + values[words.low])
-            elif words.high in values:
-                result.append(high - values[words.high])
-            elif words.offset in values:
-                result.append((low + high) / 2 + values[words.offset])
-            else:
-                result.append(start[axis] if start else low if axis == 2 else (low + high) / 2)
-        return tuple(result)
+        prefix = f"{key}." if key else ""
+        given = {word: self.at(part.line, prefix + word, value, part.scope) for word, value in point.keywords}
+        return tuple(
+            coordinate_of(axis, given, *sides, start[axis] if start else None) for axis, sides in enumerate(part.box)
+        )
 
     def _radii(self, part: Placed) -> tuple[Any, ...]:
         """The radius of a round solid, or its two radii; none if it has none."""

@@ -6,8 +6,8 @@ The grid has the axes up, depth and *left*: ``up = z + floor``, ``depth = y``, `
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from typing import NamedTuple
+from collections.abc import Iterable, Mapping
+from typing import Any, NamedTuple
 
 
 class AxisWords(NamedTuple):
@@ -100,3 +100,41 @@ def is_sized(keywords: Iterable[str], axis: int) -> bool:
     """Whether keywords determine the size along an axis."""
     words, (low, high, size, _) = set(keywords), AXES[axis]
     return size in words or {low, high} <= words
+
+
+def interval_of(axis: int, given: Mapping[str, Any], low: Any, high: Any) -> tuple[Any, Any]:
+    """Where a part lies along an axis of a box, from one coordinate to another.
+
+    Parameters
+    ----------
+    axis
+        0 left-right, 1 front-rear, 2 vertical.
+    given
+        The values of its keywords: numbers, tensors or linear forms.
+    low, high
+        The sides of the box.
+    """
+    words = AXES[axis]
+    if words.size not in given:
+        return low + given.get(words.low, 0.0), high - given.get(words.high, 0.0)
+    size = given[words.size]
+    if words.low in given:
+        low = low + given[words.low]
+    elif words.high in given:
+        low = high - given[words.high] - size
+    elif words.offset in given or axis < 2:
+        low = (low + high - size) / 2 + given.get(words.offset, 0.0)
+    return low, low + size
+
+
+def coordinate_of(axis: int, given: Mapping[str, Any], low: Any, high: Any, default: Any = None) -> Any:
+    """The coordinate of a point along an axis of a box; without a keyword the default, by default the middle of the
+    bottom."""
+    words = AXES[axis]
+    if words.low in given:
+        return low + given[words.low]
+    if words.high in given:
+        return high - given[words.high]
+    if words.offset in given:
+        return (low + high) / 2 + given[words.offset]
+    return default if default is not None else low if axis == 2 else (low + high) / 2

@@ -7,11 +7,24 @@ from dataclasses import replace
 
 import numpy as np
 
-from shapeprog.inference.ties.layout import ALIGNED, ANGLES, HIGH, LOW, MIDDLE, Anchors, Element, Kind, Layout, Slot
+from shapeprog.inference.ties.layout import (
+    ALIGNED,
+    ANGLES,
+    HIGH,
+    LOW,
+    MIDDLE,
+    Anchors,
+    Element,
+    Kind,
+    Layout,
+    Slot,
+    interval,
+    point,
+)
 from shapeprog.language.ast import Argument, Assignment, Group, Keywords, Line, Part, Point, body_of
 from shapeprog.language.evaluate import placed_source
 from shapeprog.language.expression import Binary, Linear, Name, Value
-from shapeprog.language.placement import AXES, POINTS, ROUND, SIZES
+from shapeprog.language.placement import AXES, POINTS, SIZES
 from shapeprog.space import FloatArray
 
 
@@ -28,72 +41,80 @@ class Anchored:
     Attributes
     ----------
     slots
-        The numbers, the three sizes of the whole first.
+        The numbers (P,), the three sizes of the whole first.
+    index
+        The number of every line and keyword.
+    names, forms
+        The names of the numbers, and each of them as a linear form.
+    lines
+        The parts and loops with names, as ``layout.lines``.
     source
-        The program, its numbers named by :meth:`name`.
+        The program.
     """
 
     def __init__(self, layout: Layout, anchors: dict[tuple[int, str, int], Anchors]) -> None:
         self.layout, self.anchors = layout, anchors
         self.slots = [Slot(-1, word, "extent", axis, LOW, layout.extents[axis]) for axis, word in enumerate(SIZES)]
         self.index: dict[tuple[int, str], int] = {}
-        self._ends: dict[tuple[int, str, int], tuple[Linear, Linear]] = {}
-        self._counter = iter(range(len(layout.lines)))
-        body = self._body(layout.source.lines)
-        sizes = Assignment(tuple((self.name(axis), layout.extents[axis]) for axis in range(3)))
-        assigned = tuple((self.name(index), slot.value) for index, slot in enumerate(self.slots))[3:]
-        self.lines: tuple[Line, ...] = (sizes, *([Assignment(assigned)] if assigned else []), *body)
-        self.source = replace(placed_source(self.lines), scale=layout.source.scale, unit=layout.source.unit)
+        self.names = [*SIZES]
+        self.lines: list[Part | Group] = []
+        self.body = self._named(layout.source.lines)
+        self.forms = {name: Linear.of(name) for name in self.names}
+        numbers = tuple(zip(self.names, (slot.value for slot in self.slots), strict=True))
+        self.source = replace(
+            placed_source((Assignment(numbers[:3]), Assignment(numbers[3:]), *self.body)),
+            scale=layout.source.scale,
+            unit=layout.source.unit,
+        )
+
+    def row(self, form: Linear) -> FloatArray:
+        """The factors (P,) of a linear form."""
+        factors = dict(form.factors)
+        return np.array([factors.get(name, 0.0) for name in self.names])
 
     def fixed(self) -> FloatArray:
         """Relations (M, P) that always hold: the width and the depth of a round part that fills the whole are equal."""
-        rows = []
-        for index, line in enumerate(self.layout.lines):
-            if isinstance(line, Part) and self.layout.fills(line):
-                words = [word for words in AXES[:2] for word in words[:2] if (index, word) in self.index]
-                pairs = [(0, 1), *((self.index[index, words[0]], self.index[index, word]) for word in words[1:])]
-                rows += [np.eye(len(self.slots))[a] - np.eye(len(self.slots))[b] for a, b in pairs]
-        distinct = {row.tobytes(): row for row in rows}
-        return np.array([*distinct.values()]).reshape(-1, len(self.slots))
+        pairs = [(0, 1)] if self.layout.filling else []
+        for line in self.layout.filling:
+            words = [word for words in AXES[:2] for word in words[:2] if (line, word) in self.index]
+            pairs += [(self.index[line, words[0]], self.index[line, word]) for word in words[1:]]
+        unit = np.eye(len(self.slots))
+        return np.array([unit[a] - unit[b] for a, b in pairs]).reshape(-1, len(self.slots))
 
     def ends(self) -> Iterator[tuple[Element, FloatArray, FloatArray]]:
-        """Every element, and how its low and high coordinate from the low side of the whole follow from the numbers
-        (P,)."""
-        index = {self.name(slot): slot for slot in range(len(self.slots))}
-        for key, forms in self._ends.items():
-            rows = np.zeros((2, len(self.slots)))
-            for row, form in zip(rows, forms, strict=True):
-                for name, factor in form.factors:
-                    row[index[name]] = factor
-            yield self.layout.elements[key], rows[0], rows[1]
+        """Every element that is measured by numbers, and how its low and high coordinate from the low side of the whole
+        follow from them (P,)."""
+        numbers = {name: slot.value for name, slot in zip(self.names, self.slots, strict=True)}
+        for (index, key, axis), element in self.layout.elements.items():
+            line = self.lines[index]
+            if key == "across" and self.anchors[index, key, axis] != (LOW, HIGH):
+                continue
+            if isinstance(line, Part) and key in ("", "across"):
+                at = replace(line, keywords=tuple(pair for pair in line.keywords if pair[0] not in POINTS))
+                low, high = interval(at, axis, numbers, self.forms)
+            else:
+                argument = dict(line.keywords)[key] if isinstance(line, Part) or key == "last" else Point(line.keywords)  # type: ignore[arg-type]
+                low = high = point(argument, axis, self.forms)
+            rows = [self.row(end) for end in (low, high)]
+            if rows[0][3:].any():
+                yield element, rows[0], rows[1]
 
-    def name(self, slot: int) -> str:
-        """The name of a number."""
-        return SIZES[slot] if slot < 3 else f"n{slot}"
-
-    def _slot(self, line: int, word: str, kind: Kind, axis: int, anchor: int, value: float) -> Name:
-        self.index[line, word] = len(self.slots)
-        self.slots.append(Slot(line, word, kind, axis, anchor, value))
-        return Name(self.name(len(self.slots) - 1))
-
-    def _body(self, lines: Sequence[Line]) -> list[Line]:
+    def _named(self, lines: Sequence[Line]) -> tuple[Line, ...]:
+        """Lines of the layout with a name for every number, measured from the anchors."""
         result: list[Line] = []
         for line in lines:
             if isinstance(line, Part | Group):
-                index = next(self._counter)
+                index = len(self.lines)
                 new = self._part(index, line) if isinstance(line, Part) else self._group(index, line)
-                result.append(replace(new, body=tuple(self._body(body_of(line)))) if isinstance(new, Group) else new)
-        return result
+                self.lines.append(new)
+                result.append(replace(new, body=self._named(body_of(line))) if isinstance(new, Group) else new)
+        return tuple(result)
 
     def _part(self, index: int, line: Part) -> Part:
         keywords: list[tuple[str, Argument]] = []
-        arguments, fills = dict(line.keywords), self.layout.fills(line)
-        plain = [
-            (word, self._plain(index, word, argument)) for word, argument in line.keywords
-            if not fills and word in ("radius", "edge", "tilt", "lean", "turn")
-        ]  # fmt: skip
-        if line.kind in ROUND and "radius" not in arguments and not fills:
-            plain.append(("radius", self._plain(index, "radius", self.layout.radius(line))))
+        arguments = dict(line.keywords)
+        further = () if index in self.layout.filling else ("radius", "edge", "tilt", "lean", "turn")
+        plain = [(word, self._plain(index, word, argument)) for word, argument in line.keywords if word in further]
         if "start" in arguments:
             keywords += [(word, self._point(index, word)) for word in POINTS if word in arguments]
             sizes = [(word, axis) for axis, word in enumerate(SIZES) if word in arguments]
@@ -103,88 +124,69 @@ class Anchored:
                 keywords += self._placed(self.layout.elements[index, "", axis])
         return replace(line, keywords=(*keywords, *plain))
 
+    def _group(self, index: int, line: Group) -> Group:
+        arguments = dict(line.keywords)
+        if line.kind == "translate":
+            return replace(line, kind="row", keywords=(("last", self._point(index, "last")),))
+        keywords: Keywords = self._point(index, "plane" if line.kind == "mirror" else "centre").keywords
+        if "step" in arguments:
+            keywords = (*keywords, ("step", self._plain(index, "step", arguments["step"])))
+        return replace(line, keywords=keywords)
+
+    def _placed(self, element: Element) -> Iterator[tuple[str, Argument]]:
+        """The keywords of an element: clearances, size and offset, by its anchors."""
+        line, axis, words = element.line, element.axis, AXES[element.axis]
+        anchors = self.anchors[line, element.key, axis]
+        if len(set(anchors)) == 1:
+            yield self._distance(element, anchors[0])
+            if element.kind != "round":
+                yield words.size, self._slot(line, words.size, "size", axis, LOW, element.high - element.low)
+            return
+        extent = self.layout.extents[axis]
+        for word, anchor, distance in zip(words, anchors, (element.low, extent - element.high), strict=False):
+            if anchor == MIDDLE:  # half of the whole, and as much more or less
+                value = self._slot(line, word, "offset", axis, anchor, distance - extent / 2)
+                yield word, Binary("+", Binary("/", Name(SIZES[axis]), 2.0), value)
+            else:
+                yield word, self._slot(line, word, "clearance", axis, anchor, distance)
+
+    def _point(self, index: int, key: str) -> Point:
+        pairs: list[tuple[str, Value]] = []
+        for axis, words in enumerate(AXES):
+            element = self.layout.elements.get((index, key, axis))
+            if element is not None:
+                (anchor,), off = self.anchors[index, key, axis], element.middle - self.layout.extents[axis] / 2
+                if key not in ("plane", "centre") or anchor != MIDDLE or abs(off) >= ALIGNED:
+                    pairs.append(self._distance(element, anchor))
+                elif key == "plane":
+                    pairs.append((words.offset, 0.0))
+        return Point(tuple(pairs))
+
     def _across(self, index: int, word: str, axis: int, size: float) -> Value:
         """A size of a bar: a number, or the extent of the whole less two equal clearances."""
         if self.anchors.get((index, "across", axis)) != (LOW, HIGH):
             return self._slot(index, word, "size", axis, LOW, size)
         value = self._slot(index, AXES[axis].low, "clearance", axis, LOW, (self.layout.extents[axis] - size) / 2)
-        self._ends[index, "across", axis] = self._from(axis, LOW, value), self._from(axis, HIGH, value)
         return Binary("-", Name(SIZES[axis]), Binary("*", 2.0, value))
 
-    def _from(self, axis: int, anchor: int, value: Name) -> Linear:
-        """The coordinate that a number measures from an anchor."""
-        extent, number = Linear.of(SIZES[axis]), Linear.of(value.name)
-        return (number, extent / 2 + number, extent - number)[anchor]
+    def _distance(self, element: Element, anchor: int) -> tuple[str, Name]:
+        """The keyword and the number of a distance from an anchor."""
+        axis, extent = element.axis, self.layout.extents[element.axis]
+        word = (AXES[axis].low, AXES[axis].offset, AXES[axis].high)[anchor]
+        value = (element.low, element.middle - extent / 2, extent - element.high)[anchor]
+        key = f"{element.key}.{word}" if element.key else word
+        return word, self._slot(element.line, key, "offset" if anchor == MIDDLE else "clearance", axis, anchor, value)
 
     def _plain(self, index: int, word: str, argument: Argument) -> Argument:
+        """A number, or a pair of radii, that is not measured from a side."""
         kind: Kind = "angle" if word in ANGLES else "length" if word == "lean" else word  # type: ignore[assignment]
         if isinstance(argument, tuple):
             first, second = (self._slot(index, f"{word}.{end}", kind, -1, LOW, float(argument[end])) for end in (0, 1))  # type: ignore[arg-type]
             return first, second
         return self._slot(index, word, kind, -1, LOW, float(argument))  # type: ignore[arg-type]
 
-    def _group(self, index: int, line: Group) -> Group:
-        arguments = dict(line.keywords)
-        if line.kind == "translate":
-            return replace(line, kind="row", keywords=(("last", self._point(index, "last")),))
-        key = "plane" if line.kind == "mirror" else "centre"
-        keywords: Keywords = self._point(index, key).keywords
-        if "step" in arguments:
-            keywords = (*keywords, ("step", self._plain(index, "step", arguments["step"])))
-        return replace(line, keywords=keywords)
-
-    def _point(self, index: int, key: str) -> Point:
-        pairs: list[tuple[str, Value]] = []
-        for axis, words in enumerate(AXES):
-            element = self.layout.elements.get((index, key, axis))
-            if element is None:
-                continue
-            (anchor,), extent = self.anchors[index, key, axis], self.layout.extents[axis]
-            word = (words.low, words.offset, words.high)[anchor]
-            distance = (element.low, element.middle - extent / 2, extent - element.high)[anchor]
-            if key in ("plane", "centre") and anchor == MIDDLE and abs(distance) < ALIGNED:
-                pairs += [(word, 0.0)] if key == "plane" else []
-                continue
-            value = self._slot(
-                index, f"{key}.{word}", "offset" if anchor == MIDDLE else "clearance", axis, anchor, distance
-            )
-            self._ends[index, key, axis] = (self._from(axis, anchor, value),) * 2
-            pairs.append((word, value))
-        return Point(tuple(pairs))
-
-    def _placed(self, element: Element) -> Iterator[tuple[str, Argument]]:
-        """The keywords of an element: clearances, size and offset, by its anchors."""
-        line, axis, words = element.line, element.axis, AXES[element.axis]
-        extent, anchors = self.layout.extents[axis], self.anchors[line, element.key, axis]
-        word = (words.low, words.offset, words.high)
-
-        def measured(anchor: int, word: str, distance: float) -> tuple[Name, Linear]:
-            value = self._slot(line, word, "offset" if anchor == MIDDLE else "clearance", axis, anchor, distance)
-            return value, self._from(axis, anchor, value)
-
-        if len(set(anchors)) == 1:
-            anchor = anchors[0]
-            distance = (element.low, element.middle - extent / 2, extent - element.high)[anchor]
-            value, at = measured(anchor, word[anchor], distance)
-            yield word[anchor], value
-            if element.kind == "round":
-                slot = self.index.get((line, "radius"), self.index.get((line, "radius.0"), 0))
-                size = 2 * Linear.of(self.name(slot))
-            else:
-                given = self._slot(line, words.size, "size", axis, LOW, element.high - element.low)
-                yield words.size, given
-                size = Linear.of(given.name)
-            low = (at, at - size / 2, at - size)[anchor]
-            self._ends[line, element.key, axis] = low, low + size
-            return
-        ends = []
-        for end, distance in enumerate((element.low, extent - element.high)):
-            if anchors[end] == MIDDLE:  # half of the whole, and as much more or less
-                value, at = measured(MIDDLE, words[end], distance - extent / 2)
-                yield words[end], Binary("+", Binary("/", Name(SIZES[axis]), 2.0), value)
-                ends.append(Linear.of(SIZES[axis]) - at if end else at)
-            else:
-                value, at = measured(anchors[end], words[end], distance)
-                yield words[end], value
-                ends.append(at)
-        self._ends[line, element.key, axis] = ends[0], ends[1]
+    def _slot(self, line: int, word: str, kind: Kind, axis: int, anchor: int, value: float) -> Name:
+        self.index[line, word] = len(self.slots)
+        self.names.append(f"n{len(self.slots)}")
+        self.slots.append(Slot(line, word, kind, axis, anchor, value))
+        return Name(self.names[-1])

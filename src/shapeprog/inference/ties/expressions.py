@@ -1,7 +1,7 @@
 """The numbers of a program as expressions of few free ones.
 
-Relations are solved by Gauss-Jordan elimination.  Which numbers stay free is then improved by pivoting, as in the
-simplex method, until no exchange of a free number for another makes the text shorter.
+The numbers that follow from others are chosen greedily.  Which stay free is improved by pivoting, as in the simplex
+method, until no exchange of a free number for another makes the text shorter.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from shapeprog.inference.fit.tunable import DEGREES
 from shapeprog.inference.ties.layout import Slot
 from shapeprog.inference.ties.settings import TIES
 from shapeprog.language.parameters import to_float32
+from shapeprog.library.independence import independent
 from shapeprog.space import FloatArray
 
 ELIMINATED = {"clearance": 0, "offset": 0, "edge": 1, "radius": 2, "size": 3, "length": 3, "angle": 3, "extent": 9}
@@ -65,25 +66,12 @@ def solved(slots: list[Slot], rows: FloatArray) -> Solution:
         slot = slots[k]
         return ELIMINATED[slot.kind], not slot.word.startswith(("last", "end", "through")), -slot.line, -k
 
-    columns = sorted(range(len(slots)), key=order)
-    matrix, pivots = rows[:, columns].copy(), list[int]()
-    for column in range(len(columns)):
-        row = len(pivots)
-        if row == len(matrix):
-            break
-        best = row + int(np.abs(matrix[row:, column]).argmax())
-        if abs(matrix[best, column]) < NOTHING:
-            continue
-        matrix[[row, best]] = matrix[[best, row]]
-        matrix[row] /= matrix[row, column]
-        mask = np.arange(len(matrix)) != row
-        matrix[mask] -= np.outer(matrix[mask, column], matrix[row])
-        pivots.append(column)
-    free_columns = [column for column in range(len(columns)) if column not in set(pivots)]
-    factors = np.zeros((len(slots), len(free_columns)))
-    factors[[columns[c] for c in free_columns], np.arange(len(free_columns))] = 1
-    factors[[columns[c] for c in pivots]] = -matrix[: len(pivots), free_columns]
-    return _shortened(slots, factors, [columns[c] for c in free_columns])
+    dependent = independent(rows.T, sorted(range(len(slots)), key=order))
+    free = sorted({*range(len(slots))} - {*dependent}, key=order)
+    factors = np.zeros((len(slots), len(free)))
+    factors[free, np.arange(len(free))] = 1
+    factors[dependent] = -np.linalg.solve(rows[:, dependent], rows[:, free])
+    return _shortened(slots, factors, free)
 
 
 def _shortened(slots: list[Slot], factors: FloatArray, free: list[int]) -> Solution:

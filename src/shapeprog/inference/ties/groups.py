@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import combinations
 
-from shapeprog.inference.ties.naming import interval
+from shapeprog.inference.ties.layout import interval
 from shapeprog.inference.ties.settings import TIES
 from shapeprog.language.ast import Argument, Group, Keywords, Line, Part, Point, Source, changed_lines, values
 from shapeprog.language.convert.loops import with_joined_mirrors
@@ -57,8 +57,8 @@ def _straight(row: Group, numbers: dict[str, float]) -> Group:
 
     def moves(word: str, value: Value) -> bool:
         axis = axis_of(word)
-        (low, size), whole = interval(first, axis, numbers), numbers[SIZES[axis]]
-        place = dict(zip(AXES[axis], (low, whole - low - size, size, low + (size - whole) / 2), strict=True))[word]
+        (low, high), whole = interval(first, axis, numbers), numbers[SIZES[axis]]
+        place = dict(zip(AXES[axis], (low, whole - high, high - low, (low + high - whole) / 2), strict=True))[word]
         return abs(place - value_at(value, numbers)) > 1e-6
 
     pairs = tuple((word, value) for word, value in last.keywords if moves(word, value))
@@ -120,7 +120,8 @@ def _divided(loop: Group, numbers: dict[str, float]) -> Group:
         count, clearances = 2.0, dict.fromkeys(words[:2], keywords[sides[0]])
         if not isinstance(size, float) and [*names_in(keywords[sides[-1]])] != [SIZES[axis]]:  # type: ignore[arg-type]
             return loop
-    length, sized = interval(part, axis, numbers)[1], (words.size in dict(other.keywords) for other in others)
+    low, high = interval(part, axis, numbers)
+    length, sized = high - low, (words.size in dict(other.keywords) for other in others)
     follows = any(SIZES[axis] in names_in(value) for line in parts for value in values(line))
     if (
         not isinstance(count, float | int)
@@ -143,9 +144,9 @@ def _divided(loop: Group, numbers: dict[str, float]) -> Group:
 def _in_division(part: Part, first: Part, axis: int, numbers: dict[str, float]) -> Part:
     """A part of a row in the box of the first one, in the middle of it if it nearly is."""
     words = AXES[axis]
-    (low, size), (start, whole) = (interval(each, axis, numbers) for each in (part, first))
+    (low, high), (start, end) = (interval(each, axis, numbers) for each in (part, first))
     remaining = [(word, value) for word, value in part.keywords if word not in words or word == words.size]
-    centred = abs(2 * (low - start) + size - whole) < TIES.uneven
+    centred = abs(low + high - start - end) < TIES.uneven
     place = (words.offset, 0.0) if centred else (words.low, to_float32(round(low - start, 2)))
     return replace(part, keywords=ordered((place, *remaining)))
 

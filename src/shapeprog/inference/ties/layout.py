@@ -8,14 +8,14 @@ end of an element is measured from an anchor, the low side, the middle or the hi
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass
-from itertools import count
-from typing import Literal
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import Any, Literal
 
 from shapeprog.inference.ties.settings import TIES
-from shapeprog.language.ast import Argument, Group, Part, Point, Source
-from shapeprog.language.placement import AXES, POINTS, ROUND, SIZES
+from shapeprog.language.ast import Argument, Group, Line, Part, Point, Source, changed_lines
+from shapeprog.language.expression import value_at
+from shapeprog.language.placement import AXES, POINTS, ROUND, SIZES, coordinate_of, interval_of
 
 LOW, MIDDLE, HIGH = 0, 1, 2
 """Anchors."""
@@ -99,10 +99,16 @@ class Layout:
 
     Attributes
     ----------
+    source
+        The program; its upright round parts have a radius.
     lines
         The parts and loops, in the order of the text.
+    numbers
+        Width, depth and height of the whole, by name.
     extents
-        Width, depth and height of the whole.
+        The same as a tuple.
+    filling
+        The lines of cylinders that are nearly as wide as the whole, which then has one diameter.
     loops_around
         For every line the numbers of the loops around it.
     elements
@@ -110,12 +116,13 @@ class Layout:
     """
 
     def __init__(self, source: Source) -> None:
-        self.source = source
-        numbers = source.evaluated_numbers()
-        self.extents = tuple(float(numbers[size]) for size in SIZES)
-        self.lines = [line for line in source.walk() if isinstance(line, Part | Group)]
-        if any(isinstance(line, Part) and self.fills(line) for line in self.lines):
-            self.extents = (self.extents[0], self.extents[0], self.extents[2])
+        self.numbers: dict[str, float] = source.evaluated_numbers()
+        self.source = replace(source, lines=changed_lines(source.lines, self._with_radius))
+        self.lines = [line for line in self.source.walk() if isinstance(line, Part | Group)]
+        self.filling = {index for index, line in enumerate(self.lines) if isinstance(line, Part) and self._fills(line)}
+        if self.filling:
+            self.numbers["depth"] = self.numbers["width"]
+        self.extents = tuple(float(self.numbers[size]) for size in SIZES)
         self.loops_around: list[list[int]] = [[] for _ in self.lines]
         for index, loop in enumerate(self.lines):
             for inner in range(index + 1, index + sum(1 for _ in Source((loop,)).walk())):
@@ -127,116 +134,108 @@ class Layout:
 
     def lines_of(self, top: Collection[int]) -> set[int]:
         """The numbers of the lines at the top level with these indices, and of all lines inside of them."""
-        counter, result = count(), set[int]()
-        drawing = [line for line in self.source.lines if isinstance(line, Part | Group)]
-        for index, line in enumerate(drawing):
-            numbers = {next(counter) for _ in Source((line,)).walk()}
-            result |= numbers if index in top else set()
-        return result
-
-    def _elements(self, index: int, line: Part | Group) -> Iterator[Element]:
-        keywords = dict(line.keywords)
-        if isinstance(line, Group):
-            yield from self._loop_elements(index, line, keywords)
-            return
-        if "start" in keywords:
-            start = None
-            yield from self._across(index, keywords)
-            for word in POINTS:
-                if word in keywords:
-                    point = [self._coordinate(axis, keywords[word], start) for axis in range(3)]
-                    start = start or point
-                    for axis, value in enumerate(point):
-                        if word == "start" or abs(value - start[axis]) > ALIGNED:
-                            yield Element(index, word, axis, "coordinate", value, value)
-            return
-        diameter = None
-        if line.kind in ROUND and not self.fills(line):
-            diameter = 2 * self.radius(line)
-        for axis in range(3):
-            low, high = self._interval(axis, keywords, diameter if axis < 2 else None)
-            if axis < 2 and line.kind in ROUND and diameter is None:
-                radius = self.radius(line)
-                low, high = self.extents[0] / 2 - radius, self.extents[0] / 2 + radius
-            kind: ElementKind = "round" if diameter is not None and axis < 2 else "interval"
-            yield Element(index, "", axis, kind, low, high)
-
-    def _across(self, index: int, keywords: dict[str, Argument]) -> Iterator[Element]:
-        """The sizes of a bar across its direction, where it lies in the middle of the whole."""
-        for axis, size in enumerate(SIZES):
-            if size in keywords and axis < 2 and abs(float(keywords.get("turn", 0))) < TIES.degrees:  # type: ignore[arg-type]
-                start = self._coordinate(axis, keywords["start"], None)
-                end = self._coordinate(axis, keywords["end"], [start] * 3)
-                middle, half = self.extents[axis] / 2, float(keywords[size]) / 2  # type: ignore[arg-type]
-                if max(abs(start - middle), abs(end - middle)) < TIES.off_middle * self.extents[axis]:
-                    yield Element(index, "across", axis, "interval", middle - half, middle + half)
+        roots = [loops[0] if loops else index for index, loops in enumerate(self.loops_around)]
+        selected = {root for index, root in enumerate(dict.fromkeys(roots)) if index in top}
+        return {index for index, root in enumerate(roots) if root in selected}
 
     def first(self, loop: int) -> tuple[int, str]:
         """The first part inside of a loop, and the key of its elements: a row is measured by it."""
         index = next(k for k in range(loop, len(self.lines)) if isinstance(self.lines[k], Part))
         return index, "start" if "start" in dict(self.lines[index].keywords) else ""
 
-    def fills(self, line: Part) -> bool:
-        """Whether a cylinder is as wide as the whole nearly, which then has one diameter."""
-        width, depth, _ = self.extents
-        if line.kind != "cylinder" or abs(width - depth) > TIES.off_middle * width:
-            return False
-        radius, keywords = self.radius(line), dict(line.keywords)
-        spans = [self._interval(axis, keywords, 2 * radius) for axis in range(2)]
-        middles = [abs((low + high) / 2 - width / 2) for low, high in spans]
-        return 2 * radius > TIES.fills * width and max(middles) < TIES.off_middle * width
+    def _with_radius(self, line: Line) -> Line:
+        """An upright round part with a radius in place of a width or depth."""
+        arguments = dict(line.keywords) if isinstance(line, Part) else {}
+        if not isinstance(line, Part) or line.kind not in ROUND or {"radius", "start"} & arguments.keys():
+            return line
+        ends = (interval(line, axis, self.numbers) for axis in range(2))
+        keywords = tuple(pair for pair in line.keywords if pair[0] not in SIZES[:2])
+        return replace(line, keywords=(*keywords, ("radius", min(high - low for low, high in ends) / 2)))
 
-    def radius(self, line: Part) -> float:
-        """The radius of an upright round part, the larger of two."""
+    def _fills(self, part: Part) -> bool:
+        width, depth = self.numbers["width"], self.numbers["depth"]
+        if part.kind != "cylinder" or abs(width - depth) > TIES.off_middle * width:
+            return False
+        ends = [interval(part, axis, self.numbers) for axis in range(2)]
+        off = max(abs((low + high) / 2 - width / 2) for low, high in ends)
+        return ends[0][1] - ends[0][0] > TIES.fills * width and off < TIES.off_middle * width
+
+    def _elements(self, index: int, line: Part | Group) -> Iterator[Element]:
         keywords = dict(line.keywords)
-        if "radius" in keywords:
-            argument = keywords["radius"]
-            return max(map(float, argument)) if isinstance(argument, tuple) else float(argument)  # type: ignore[arg-type]
-        sizes = (self._interval(axis, keywords, None) for axis in range(2))
-        return min(high - low for low, high in sizes) / 2
+        if isinstance(line, Group):
+            yield from self._loop_elements(index, line, keywords)
+        elif "start" in keywords:
+            yield from self._across(index, line, keywords)
+            start = [point(keywords["start"], axis, self.numbers) for axis in range(3)]
+            for word in POINTS:
+                for axis in range(3) if word in keywords else ():
+                    value = point(keywords[word], axis, self.numbers, start[axis])
+                    if word == "start" or abs(value - start[axis]) > ALIGNED:
+                        yield Element(index, word, axis, "coordinate", value, value)
+        else:
+            for axis, extent in enumerate(self.extents):
+                low, high = interval(line, axis, self.numbers)
+                if index in self.filling and axis < 2:
+                    low, high = (extent - (high - low)) / 2, (extent + (high - low)) / 2
+                is_round = axis < 2 and line.kind in ROUND and index not in self.filling
+                yield Element(index, "", axis, "round" if is_round else "interval", low, high)
+
+    def _across(self, index: int, bar: Part, keywords: dict[str, Argument]) -> Iterator[Element]:
+        """The sizes of a bar across its direction, where it lies in the middle of the whole."""
+        if abs(float(keywords.get("turn", 0))) > TIES.degrees:  # type: ignore[arg-type]
+            return
+        for axis, size in enumerate(SIZES[:2]):
+            if size in keywords:
+                extent, half = self.extents[axis], float(keywords[size]) / 2  # type: ignore[arg-type]
+                start, _ = interval(bar, axis, self.numbers)
+                ends = start, point(keywords["end"], axis, self.numbers, start)
+                if max(abs(end - extent / 2) for end in ends) < TIES.off_middle * extent:
+                    yield Element(index, "across", axis, "interval", extent / 2 - half, extent / 2 + half)
 
     def _loop_elements(self, index: int, line: Group, keywords: dict[str, Argument]) -> Iterator[Element]:
         if line.kind == "translate":
-            number, key = self.first(index)
-            first = self.lines[number]
+            first = self.lines[self.first(index)[0]]
+            assert isinstance(first, Part)
             copies = max(1, round(float(line.count)) - 1)  # type: ignore[arg-type]
             for axis, word in enumerate("xyz"):
                 if step := float(keywords.get(word, 0)):  # type: ignore[arg-type]
-                    element = next(e for e in self._elements(number, first) if (e.key, e.axis) == (key, axis))
-                    low, high = element.low + copies * step, element.high + copies * step
-                    yield Element(index, "last", axis, "coordinate", low, high)
-        elif line.kind in ("mirror", "rotate"):
-            for axis, words in enumerate(AXES):
-                used = [word for word in words if word in keywords]
-                if used or (line.kind == "rotate" and axis < 2):
-                    value = self._coordinate(axis, Point(tuple((w, keywords[w]) for w in used)), None)  # type: ignore[misc]
-                    yield Element(
-                        index, "plane" if line.kind == "mirror" else "centre", axis, "coordinate", value, value
-                    )
+                    low, high = interval(first, axis, self.numbers)
+                    yield Element(index, "last", axis, "coordinate", low + copies * step, high + copies * step)
+            return
+        for axis, words in enumerate(AXES):
+            if not keywords.keys().isdisjoint(words) or (line.kind == "rotate" and axis < 2):
+                value = point(Point(line.keywords), axis, self.numbers)  # type: ignore[arg-type]
+                yield Element(index, "plane" if line.kind == "mirror" else "centre", axis, "coordinate", value, value)
 
-    def _interval(self, axis: int, keywords: dict[str, Argument], diameter: float | None) -> tuple[float, float]:
-        words, extent = AXES[axis], self.extents[axis]
-        lengths: dict[str, float] = {word: float(keywords[word]) for word in words if word in keywords}  # type: ignore[arg-type]
-        size = lengths.get(words.size, diameter)
-        if size is None:
-            return lengths.get(words.low, 0.0), extent - lengths.get(words.high, 0.0)
-        if words.low in lengths:
-            low = lengths[words.low]
-        elif words.high in lengths:
-            low = extent - lengths[words.high] - size
-        elif words.offset in lengths or axis < 2:
-            low = (extent - size) / 2 + lengths.get(words.offset, 0.0)
-        else:
-            low = 0.0
-        return low, low + size
 
-    def _coordinate(self, axis: int, point: Argument, start: Sequence[float] | None) -> float:
-        assert isinstance(point, Point)
-        words, extent, arguments = AXES[axis], self.extents[axis], dict(point.keywords)
-        if words.low in arguments:
-            return float(arguments[words.low])  # type: ignore[arg-type]
-        if words.high in arguments:
-            return extent - float(arguments[words.high])  # type: ignore[arg-type]
-        if words.offset in arguments:
-            return extent / 2 + float(arguments[words.offset])  # type: ignore[arg-type]
-        return start[axis] if start else 0.0 if axis == 2 else extent / 2
+def interval(
+    part: Part, axis: int, numbers: Mapping[str, float], forms: Mapping[str, Any] | None = None
+) -> tuple[Any, Any]:
+    """The low and high coordinate of a part from the low side of the whole; those of its start if it has one.
+
+    Parameters
+    ----------
+    part, axis
+        The part, and the axis along which it is measured.
+    numbers
+        The values of all names.
+    forms
+        What names stand for in the result, such as linear forms; by default their values.
+    """
+    keywords, values = dict(part.keywords), numbers if forms is None else forms
+    if "start" in keywords:
+        start = point(keywords["start"], axis, values)
+        return start, start
+    given = {word: value_at(keywords[word], values) for word in AXES[axis] if word in keywords}  # type: ignore[arg-type]
+    if "radius" in keywords and axis < 2:
+        radii = keywords["radius"] if isinstance(keywords["radius"], tuple) else (keywords["radius"],)
+        largest = max(radii, key=lambda radius: value_at(radius, numbers))
+        given[AXES[axis].size] = 2 * value_at(largest, values)  # type: ignore[arg-type]
+    return interval_of(axis, given, 0.0, values[SIZES[axis]])
+
+
+def point(argument: Argument, axis: int, values: Mapping[str, Any], default: Any = None) -> Any:
+    """The coordinate of a point from the low side of the whole, by the values of names."""
+    assert isinstance(argument, Point)
+    given = {word: value_at(value, values) for word, value in argument.keywords if word in AXES[axis]}
+    return coordinate_of(axis, given, 0.0, values[SIZES[axis]], default)

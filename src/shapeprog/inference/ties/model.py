@@ -47,20 +47,10 @@ class Model:
         self.anchored, self.slots = anchored, anchored.slots
         self.numbers: FloatArray = np.array([slot.value for slot in self.slots])
         self.tunable = Tunable(Program(expanded(anchored.source)))
-        names = {anchored.name(k): k for k in range(len(self.slots))}
-        forms = symbolic(anchored.source, {name: Linear.of(name) for name in names}, Linear.of("height") * -0.5)
-        nodes = list(Program(forms).walk())
-        self.jacobian: FloatArray = np.zeros((len(self.tunable.moving), len(self.slots)))
-        offset = np.zeros(len(self.tunable.moving))
-        for row, (n, slot) in enumerate(self.tunable.moving):
-            form = nodes[n].values[slot]
-            if isinstance(form, Linear):
-                offset[row] = form.constant
-                for name, factor in form.factors:
-                    self.jacobian[row, names[name]] = factor
-            else:
-                offset[row] = form
-        self._offset = offset
+        nodes = list(Program(symbolic(anchored.source, anchored.forms, anchored.forms["height"] * -0.5)).walk())
+        forms = [Linear() + nodes[n].values[slot] for n, slot in self.tunable.moving]
+        self.jacobian: FloatArray = np.array([anchored.row(form) for form in forms]).reshape(-1, len(self.slots))
+        self._offset = np.array([form.constant for form in forms])
         smallest = {"size": THINNEST, "radius": THINNEST / 2, "edge": 0.0}
         self.low: FloatArray = np.array([smallest.get(slot.kind, -np.inf) for slot in self.slots])
 

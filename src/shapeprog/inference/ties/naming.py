@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
+from shapeprog.inference.ties.layout import interval
 from shapeprog.inference.ties.settings import TIES
 from shapeprog.language.ast import Group, Line, Part, Point, Source
 from shapeprog.language.expression import Name, Value, names_in, value_at
@@ -80,23 +81,6 @@ def named(lines: Sequence[Line], wanted: Mapping[str, Value], numbers: dict[str,
     return result
 
 
-def interval(part: Part, axis: int, numbers: dict[str, float]) -> tuple[float, float]:
-    """The low end and the length of a part along an axis; those of its start if it lies between points."""
-    words, whole, arguments = AXES[axis], numbers[SIZES[axis]], dict(part.keywords)
-    if isinstance(start := arguments.get("start"), Point):
-        arguments = {**dict(start.keywords), words.size: 0.0}
-    elif "radius" in arguments and axis < 2:
-        radii = arguments["radius"] if isinstance(arguments["radius"], tuple) else (arguments["radius"],)
-        arguments[words.size] = 2 * max(value_at(radius, numbers) for radius in radii)  # type: ignore[arg-type]
-    given = {word: value_at(value, numbers) for word, value in arguments.items() if word in words}  # type: ignore[arg-type]
-    size = given.get(words.size, whole - given.get(words.low, 0.0) - given.get(words.high, 0.0))
-    if words.low in given or (axis == 2 and not {words.high, words.offset} & given.keys()):
-        return given.get(words.low, 0.0), size
-    if words.high in given:
-        return whole - given[words.high] - size, size
-    return (whole - size) / 2 + given.get(words.offset, 0.0), size
-
-
 def _uses(lines: Sequence[Line]) -> Iterator[tuple[Use, Value]]:
     """All numbers of parts and groups; those of a box are of all parts in it."""
     for line in Source(tuple(lines)).walk():
@@ -150,9 +134,14 @@ def _quantity(use: Use, numbers: dict[str, float]) -> str:
     arguments = dict(part.keywords)
     lengths: list[float] = [
         value_at(arguments[word], numbers) if word in arguments  # type: ignore[arg-type]
-        else float("inf") if "start" in arguments else interval(part, each, numbers)[1]
+        else float("inf") if "start" in arguments else _length(part, each, numbers)
         for each, word in enumerate(SIZES)
     ]  # fmt: skip
     flat = axis == 2 and _role(part) in FLAT
     least, second, _ = sorted(lengths)
     return "thickness" if flat or lengths[axis] <= least <= TIES.thin * second else SIZES[axis]
+
+
+def _length(part: Part, axis: int, numbers: dict[str, float]) -> float:
+    low, high = interval(part, axis, numbers)
+    return float(high - low)

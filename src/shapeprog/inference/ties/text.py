@@ -65,8 +65,7 @@ def written(anchored: Anchored, solution: Solution, free: FloatArray, *, group: 
         diameter, round_extents = Name("diameter"), {**extents, **dict.fromkeys(SIZES[:2], Name("diameter"))}
         header = [Assignment(((diameter.name, extents["width"]),)), Assignment(tuple(round_extents.items()))]
     known = Source((*header, Assignment(tuple(shared.items())))).evaluated_numbers()
-    drawing = [line for line in anchored.lines if not isinstance(line, Assignment)]
-    body = changed_lines(drawing, lambda line: _simplified(_changed(line, table)))
+    body = changed_lines(anchored.body, lambda line: _simplified(_changed(line, table)))
     body = grouped(body, known) if group else merged_lines(body)
     uses = Counter(name for line in Source(body).walk() for value in values(line) for name in names_in(value))
     uses += Counter(name for value in shared.values() for name in names_in(value))
@@ -92,7 +91,7 @@ def _expressions(
     anchored: Anchored, solution: Solution, at_free: FloatArray
 ) -> tuple[dict[str, Value], dict[str, Value]]:
     """The numbers and sums that several numbers of a program share, by provisional name, and all of its numbers."""
-    slots, factors, free = anchored.slots, solution.factors, solution.free
+    slots, names, factors, free = anchored.slots, anchored.names, solution.factors, solution.free
     alike: dict[bytes, list[int]] = {}  # numbers that follow from the free ones in the same way
     for p in range(3, len(slots)):
         alike.setdefault(factors[p].round(6).tobytes(), []).append(p)
@@ -106,14 +105,14 @@ def _expressions(
         if k < 3:
             terms[z] = Name("diameter" if k < 2 and np.array_equal(factors[0], factors[1]) else SIZES[k])
         elif (used := rows[:, z] != 0).sum() > 1 or (used & ~single & ((rows != 0).sum(1) == 1)).any():
-            shared[anchored.name(k)], terms[z] = terms[z], Name(anchored.name(k))
+            shared[names[k]], terms[z] = terms[z], Name(names[k])
     table: dict[str, Value] = {}
     for members in alike.values():
-        row, name = factors[members[0]], anchored.name(members[0])
+        row, name = factors[members[0]], names[members[0]]
         value = combined(0.0, sorted(((terms[z], float(row[z])) for z in np.flatnonzero(row)), key=lambda t: t[1] < 0))
         if len(members) > 1 and isinstance(value, Expression) and not isinstance(value, Name):
             shared[name], value = value, Name(name)
-        table |= dict.fromkeys(map(anchored.name, members), value)
+        table |= {names[k]: value for k in members}
     return shared, table
 
 

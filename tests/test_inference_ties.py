@@ -590,16 +590,6 @@ def grouped_text(text: str) -> str:
     return "\n".join(format_program(program).splitlines()[len(header) :])
 
 
-def test_a_row_of_two_with_equal_clearances_is_a_mirror():
-    head = "width, depth, height = 24, 12, 12\na = 1\n"
-    row = "for _ in row(2, last=at(rear=a)):\n    leg(left=0, width=2, front=a, depth=2)\n"
-    assert grouped_text(head + row) == "for _ in mirror(y=0):\n    leg(left=0, width=2, front=a, depth=2)"
-    both = row.replace("    leg", "    for _ in mirror(x=0):\n        leg")
-    assert grouped_text(head + both).startswith("for _ in mirror(x=0, y=0):")
-    leaning = row.replace("depth=2", "depth=2, tilt=5")
-    assert grouped_text(head + leaning).startswith("for _ in row(2")
-
-
 def test_neighbours_that_fill_a_box_are_its_division():
     head = "width, depth, height = 24, 12, 12\na = 1\n"
     row = "for _ in row(3, last=at(right=a)):\n    drawer(left=a, width=7, front=0, depth=1)\n"
@@ -612,17 +602,6 @@ def test_neighbours_that_fill_a_box_are_its_division():
         assert grouped_text(head + doors).startswith(
             "for _ in divide(2, x, gap=0.2, left=a, right=a, front=0, depth=1):\n    door()"
         )
-
-
-def test_the_handle_of_each_drawer_is_in_the_same_division():
-    head = "width, depth, height = 12, 12, 12\na = 1\n"
-    drawer, handle = "drawer(front=a, depth=a, height=2.7)", "handle(width=3, front=0, depth=a, {})"
-    row = f"for _ in row(4, last=at(top=0)):\n    {drawer}\n    {handle}\n"
-    middle, below = row.format("bottom=1.1, height=0.5"), row.format("bottom=0.3, height=0.5")
-    division = "for _ in divide(4, z, gap=0.4):\n    drawer(front=a, depth=a)\n    handle(width=3, front=0, depth=a, "
-    assert grouped_text(head + middle).startswith(division + "z=0, height=0.5)")
-    assert grouped_text(head + below).startswith(division + "bottom=0.3, height=0.5)")
-    assert grouped_text(head + row.format("bottom=1, height=height / 9")).startswith("for _ in row(4")
 
 
 def test_parts_with_equal_clearances_are_drawn_in_a_box_if_that_is_shorter():

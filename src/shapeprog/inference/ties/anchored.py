@@ -18,8 +18,7 @@ from shapeprog.inference.ties.layout import (
     Kind,
     Layout,
     Slot,
-    interval,
-    point,
+    ends_of,
 )
 from shapeprog.language.ast import Argument, Assignment, Group, Keywords, Line, Part, Point, body_of
 from shapeprog.language.evaluate import placed_source
@@ -86,15 +85,9 @@ class Anchored:
         follow from them (P,)."""
         numbers = {name: slot.value for name, slot in zip(self.names, self.slots, strict=True)}
         for (index, key, axis), element in self.layout.elements.items():
-            line = self.lines[index]
             if key == "across" and self.anchors[index, key, axis] != (LOW, HIGH):
                 continue
-            if isinstance(line, Part) and key in ("", "across"):
-                at = replace(line, keywords=tuple(pair for pair in line.keywords if pair[0] not in POINTS))
-                low, high = interval(at, axis, numbers, self.forms)
-            else:
-                argument = dict(line.keywords)[key] if isinstance(line, Part) or key == "last" else Point(line.keywords)  # type: ignore[arg-type]
-                low = high = point(argument, axis, self.forms)
+            low, high = ends_of(self.lines[index], key, axis, numbers, self.forms)
             rows = [self.row(end) for end in (low, high)]
             if rows[0][3:].any():
                 yield element, rows[0], rows[1]

@@ -8,6 +8,7 @@ reduction of a lattice basis.
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 from scipy.sparse import coo_array
@@ -16,7 +17,6 @@ from scipy.sparse.csgraph import connected_components
 from shapeprog.geometry.separation import gaps, touching
 from shapeprog.inference.ties.boxes import boxes_of
 from shapeprog.inference.ties.expressions import Solution
-from shapeprog.inference.ties.layout import HIGH, Slot
 from shapeprog.inference.ties.model import Model
 from shapeprog.inference.ties.settings import TIES
 from shapeprog.language.ast import Part
@@ -40,11 +40,9 @@ def carried(solution: Solution, model: Model, numbers: FloatArray) -> Solution:
         if slots[k].kind in ("extent", "angle") or (factors[:, z] != 0).sum() < 2 or not alone:
             continue
         cost, lost = contacts.cost(factors[:, z], values[z])
-        for _ in range(TIES.operations):
-            if not cost:
-                break
+        for _ in range(TIES.operations if cost else 0):
             best = None
-            for y, way in sorted(_carriable(factors, model, lost, z)):
+            for y, way in product(_carriable(factors, model, lost, z), (1.0, -1.0)):
                 less, separated = contacts.cost(factors[:, z] + way * factors[:, y], values[z], cost)
                 if less < cost:
                     best, cost, lost = (y, way), less, separated
@@ -56,57 +54,47 @@ def carried(solution: Solution, model: Model, numbers: FloatArray) -> Solution:
     return replace(solution, factors=factors)
 
 
-def _carriable(factors: FloatArray, model: Model, lost: set[int], z: int) -> set[tuple[int, float]]:
-    """Free numbers that move one of these lines as another one does, and by which factor."""
+def _carriable(factors: FloatArray, model: Model, lost: set[int], z: int) -> list[int]:
+    """Free numbers that alone move one of these lines along an axis along which another free number moves parts."""
     layout, slots = model.anchored.layout, model.slots
-    result, lines = set(), {around for line in lost for around in (line, *layout.loops_around[line])}
-    members = [slots[p] for p in np.flatnonzero(factors[:, z])]
-    ways = {(slot.axis, way) for slot in members for way in _ways(slot)}
+    lines = {around for line in lost for around in (line, *layout.loops_around[line])}
+    axes = {slots[p].axis for p in np.flatnonzero(factors[:, z])}
+    result = set()
     for p, slot in enumerate(slots):
         used = np.flatnonzero(factors[p])
-        if slot.line in lines and slot.kind in ("clearance", "offset", "size") and len(used) == 1 and used[0] != z:
+        if slot.line in lines and slot.axis in axes and slot.axis >= 0 and len(used) == 1 and used[0] != z:
             rows = factors[factors[:, used[0]] != 0]
-            if len(np.unique(rows.round(6), axis=0)) == 1:
-                result |= {(int(used[0]), a * b) for a in _ways(slot) for b in (1.0, -1.0) if (slot.axis, b) in ways}
-    return result
-
-
-def _ways(slot: Slot) -> tuple[float, ...]:
-    """In which direction a number moves a part."""
-    if slot.kind in ("clearance", "offset"):
-        return (-1.0,) if slot.anchor == HIGH else (1.0,)
-    return 1.0, -1.0
+            if (rows == rows[0]).all():
+                result.add(int(used[0]))
+    return sorted(result)
 
 
 class _Contacts:
-    """Which parts of a program touch, and which of them still do when its numbers change."""
+    """Which parts of a program touch, and how many of them come apart when its numbers change."""
 
     def __init__(self, model: Model, numbers: FloatArray) -> None:
         self.model, self.numbers = model, numbers
         scene = model.scene(numbers)
-        count = len(scene.mask)
-        parts = [k for k, line in enumerate(model.anchored.layout.lines) if isinstance(line, Part)]
-        self._line = [parts[block] for block in scene.block.tolist()]
+        parts = np.array([k for k, line in enumerate(model.anchored.layout.lines) if isinstance(line, Part)])
+        self.line = parts[scene.block.numpy()]
         self.first, self.second = touching(boxes_of(scene), TIES.touch)
-        self.pieces = self._pieces(np.ones(len(self.first), bool), count)
+        self.pieces = self._pieces(np.ones(len(self.first), bool))
 
     def cost(self, along: FloatArray, value: float, least: float = np.inf) -> tuple[float, set[int]]:
-        """How many pieces more there are when a number of this value changes, counted up to the least so far, and the
-        lines that lose contacts."""
-        total, lost = 0.0, set[int]()
+        """How many pieces more there are when a number of this value changes, and how many primitives without length,
+        counted up to the least so far; and the lines that lose contacts or length."""
+        total, lost = 0.0, np.zeros(len(self.line), bool)
         for factor in TIES.changes:
-            if total >= least:
-                break
-            scene = self.model.scene(self.numbers + (factor - 1) * value * along)
-            invalid = (scene.bounds <= 0).any(1).numpy()
-            kept = gaps(boxes_of(scene), self.first, self.second) < TIES.touch
-            pieces = self._pieces(kept, len(invalid)) - self.pieces
-            total += pieces + TIES.invalid * invalid.any()
-            if pieces:
-                lost |= {*self.first[~kept].tolist(), *self.second[~kept].tolist()}
-            lost |= {*np.flatnonzero(invalid).tolist()}
-        return total, {self._line[slot] for slot in lost}
+            if total < least:
+                scene = self.model.scene(self.numbers + (factor - 1) * value * along)
+                invalid = (scene.bounds <= 0).any(1).numpy()
+                kept = gaps(boxes_of(scene), self.first, self.second) < TIES.touch
+                total += self._pieces(kept) - self.pieces + invalid.sum()
+                lost |= invalid
+                lost[self.first[~kept]] = lost[self.second[~kept]] = True
+        return total, {*self.line[lost].tolist()}
 
-    def _pieces(self, kept: Array, count: int) -> int:
-        pairs = self.first[kept], self.second[kept]
+    def _pieces(self, kept: Array) -> int:
+        """The number of pieces that these contacts leave."""
+        count, pairs = len(self.line), (self.first[kept], self.second[kept])
         return int(connected_components(coo_array((np.ones(len(pairs[0])), pairs), (count, count)), directed=False)[0])

@@ -76,36 +76,28 @@ def solved(slots: list[Slot], rows: FloatArray) -> Solution:
 
 def _shortened(slots: list[Slot], factors: FloatArray, free: list[int]) -> Solution:
     """Exchange free numbers for others while the text gets shorter."""
-    factors = _clean(factors)
     sizes = np.array([slot.kind in ("size", "radius") for slot in slots])
-    fixed = np.array([slot.kind == "extent" for slot in slots])
-    best = _cost(factors, sizes)
     while True:
-        exchange = None
-        composite = (factors != 0).sum(1) > 1
-        for p, z in zip(*np.nonzero((np.abs(np.abs(factors) - 1) < NOTHING) & composite[:, None]), strict=True):
-            if fixed[free[z]]:
-                continue
-            new = factors - np.outer(factors[:, z], factors[p] / factors[p, z])
-            new[:, z] = factors[:, z] / factors[p, z]
-            new = _clean(new)
-            if (cost := _cost(new, sizes)) < best - NOTHING:
-                best, exchange = cost, (new, int(p), int(z))
+        factors = np.where(np.abs(factors) < NOTHING, 0.0, factors)
+        best, exchange = _cost(factors, sizes), None
+        single = np.abs(np.abs(factors) - 1) < NOTHING
+        for p, z in np.argwhere(single & ((factors != 0).sum(1) > 1)[:, None]).tolist():
+            column = factors[:, z] / factors[p, z]
+            new = factors - np.outer(column, factors[p])
+            new[:, z] = column
+            if slots[free[z]].kind != "extent" and (cost := _cost(new, sizes)) < best - NOTHING:
+                best, exchange = cost, (new, p, z)
         if exchange is None:
             return Solution(factors, free)
         factors, p, z = exchange
         free = [*free[:z], p, *free[z + 1 :]]
 
 
-def _clean(factors: FloatArray) -> FloatArray:
-    return np.where(np.abs(factors) < NOTHING, 0.0, factors)
-
-
 def _cost(factors: FloatArray, sizes: np.ndarray) -> float:
     """Number of operators of all different sums, and the cost of their repetitions."""
-    used = factors != 0
+    used, negative = np.abs(factors) > NOTHING, factors < -NOTHING
     operators = np.maximum(used.sum(1) - 1, 0) + (used & (np.abs(np.abs(factors) - 1) > NOTHING)).sum(1)
-    operators = operators + 0.5 * (factors < 0).sum(1) + TIES.negative * (sizes & (factors < 0).any(1))
+    operators = operators + 0.5 * negative.sum(1) + TIES.negative * (sizes & negative.any(1))  # sums rather
     composite = np.flatnonzero(operators)
     _, first = np.unique(factors[composite].round(6), axis=0, return_index=True)
     return float(operators[composite[first]].sum() + TIES.repeated * (len(composite) - len(first)))

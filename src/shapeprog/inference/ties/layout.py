@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 from shapeprog.inference.ties.settings import TIES
-from shapeprog.language.ast import Argument, Group, Line, Part, Point, Source, changed_lines
+from shapeprog.language.ast import Group, Keywords, Line, Part, Point, Source, changed_lines
 from shapeprog.language.expression import value_at
 from shapeprog.language.placement import AXES, POINTS, ROUND, SIZES, coordinate_of, interval_of
 
@@ -127,10 +127,11 @@ class Layout:
         for index, loop in enumerate(self.lines):
             for inner in range(index + 1, index + sum(1 for _ in Source((loop,)).walk())):
                 self.loops_around[inner].append(index)
-        self.elements: dict[tuple[int, str, int], Element] = {}
-        for index, line in enumerate(self.lines):
-            for element in self._elements(index, line):
-                self.elements[index, element.key, element.axis] = element
+        self.elements = {
+            (index, key, axis): Element(index, key, axis, kind, *self.ends(line, key, axis))
+            for index, line in enumerate(self.lines)
+            for key, axis, kind in self._keys(index, line)
+        }
 
     def lines_of(self, top: Collection[int]) -> set[int]:
         """The numbers of the lines at the top level with these indices, and of all lines inside of them."""
@@ -144,98 +145,99 @@ class Layout:
         return index, "start" if "start" in dict(self.lines[index].keywords) else ""
 
     def _with_radius(self, line: Line) -> Line:
-        """An upright round part with a radius in place of a width or depth."""
+        """An upright round part with a radius in place of a width or depth; in the middle if it fills the whole."""
         arguments = dict(line.keywords) if isinstance(line, Part) else {}
-        if not isinstance(line, Part) or line.kind not in ROUND or {"radius", "start"} & arguments.keys():
+        if not isinstance(line, Part) or line.kind not in ROUND or "start" in arguments:
             return line
         ends = (interval(line, axis, self.numbers) for axis in range(2))
-        keywords = tuple(pair for pair in line.keywords if pair[0] not in SIZES[:2])
-        return replace(line, keywords=(*keywords, ("radius", min(high - low for low, high in ends) / 2)))
+        radius = arguments.get("radius", min(high - low for low, high in ends) / 2)
+        left_out = {*SIZES[:2], "radius", *((*AXES[0], *AXES[1]) if self._fills(line) else ())}
+        keywords = tuple(pair for pair in line.keywords if pair[0] not in left_out)
+        return replace(line, keywords=(*keywords, ("radius", radius)))
 
     def _fills(self, part: Part) -> bool:
+        """Whether a cylinder is nearly as wide as the whole."""
         width, depth = self.numbers["width"], self.numbers["depth"]
-        if part.kind != "cylinder" or abs(width - depth) > TIES.off_middle * width:
-            return False
-        ends = [interval(part, axis, self.numbers) for axis in range(2)]
-        off = max(abs((low + high) / 2 - width / 2) for low, high in ends)
-        return ends[0][1] - ends[0][0] > TIES.fills * width and off < TIES.off_middle * width
+        (left, right), (front, rear) = (interval(part, axis, self.numbers) for axis in range(2))
+        off = max(abs(left + right - width) / 2, abs(front + rear - width) / 2, abs(width - depth))
+        large = min(right - left, rear - front) > TIES.fills * width
+        return part.kind == "cylinder" and large and off < TIES.off_middle * width
 
-    def _elements(self, index: int, line: Part | Group) -> Iterator[Element]:
+    def _keys(self, index: int, line: Part | Group) -> Iterator[tuple[str, int, ElementKind]]:
+        """The elements of a line: their keys, axes and kinds."""
         keywords = dict(line.keywords)
-        if isinstance(line, Group):
-            yield from self._loop_elements(index, line, keywords)
-        elif "start" in keywords:
-            yield from self._across(index, line, keywords)
-            start = [point(keywords["start"], axis, self.numbers) for axis in range(3)]
-            for word in POINTS:
-                for axis in range(3) if word in keywords else ():
-                    value = point(keywords[word], axis, self.numbers, start[axis])
-                    if word == "start" or abs(value - start[axis]) > ALIGNED:
-                        yield Element(index, word, axis, "coordinate", value, value)
-        else:
-            for axis, extent in enumerate(self.extents):
-                low, high = interval(line, axis, self.numbers)
-                if index in self.filling and axis < 2:
-                    low, high = (extent - (high - low)) / 2, (extent + (high - low)) / 2
-                is_round = axis < 2 and line.kind in ROUND and index not in self.filling
-                yield Element(index, "", axis, "round" if is_round else "interval", low, high)
-
-    def _across(self, index: int, bar: Part, keywords: dict[str, Argument]) -> Iterator[Element]:
-        """The sizes of a bar across its direction, where it lies in the middle of the whole."""
-        if abs(float(keywords.get("turn", 0))) > TIES.degrees:  # type: ignore[arg-type]
-            return
-        for axis, size in enumerate(SIZES[:2]):
-            if size in keywords:
-                extent, half = self.extents[axis], float(keywords[size]) / 2  # type: ignore[arg-type]
-                start, _ = interval(bar, axis, self.numbers)
-                ends = start, point(keywords["end"], axis, self.numbers, start)
-                if max(abs(end - extent / 2) for end in ends) < TIES.off_middle * extent:
-                    yield Element(index, "across", axis, "interval", extent / 2 - half, extent / 2 + half)
-
-    def _loop_elements(self, index: int, line: Group, keywords: dict[str, Argument]) -> Iterator[Element]:
-        if line.kind == "translate":
-            first = self.lines[self.first(index)[0]]
-            assert isinstance(first, Part)
-            copies = max(1, round(float(line.count)) - 1)  # type: ignore[arg-type]
-            for axis, word in enumerate("xyz"):
-                if step := float(keywords.get(word, 0)):  # type: ignore[arg-type]
-                    low, high = interval(first, axis, self.numbers)
-                    yield Element(index, "last", axis, "coordinate", low + copies * step, high + copies * step)
-            return
         for axis, words in enumerate(AXES):
-            if not keywords.keys().isdisjoint(words) or (line.kind == "rotate" and axis < 2):
-                value = point(Point(line.keywords), axis, self.numbers)  # type: ignore[arg-type]
-                yield Element(index, "plane" if line.kind == "mirror" else "centre", axis, "coordinate", value, value)
+            if isinstance(line, Group):
+                if line.kind == "translate" and keywords.get("xyz"[axis]):
+                    yield "last", axis, "coordinate"
+                elif line.kind != "translate" and not keywords.keys().isdisjoint(words):
+                    yield "plane" if line.kind == "mirror" else "centre", axis, "coordinate"
+                elif line.kind == "rotate" and axis < 2:
+                    yield "centre", axis, "coordinate"
+            elif "start" in keywords:
+                if self._is_across(line, axis):
+                    yield "across", axis, "interval"
+                start = self.ends(line, "start", axis)
+                for key in POINTS:
+                    if key == "start" or (key in keywords and abs(self.ends(line, key, axis)[0] - start[0]) > ALIGNED):
+                        yield key, axis, "coordinate"
+            else:
+                yield "", axis, "round" if axis < 2 and line.kind in ROUND and index not in self.filling else "interval"
+
+    def _is_across(self, bar: Part, axis: int) -> bool:
+        """Whether a bar has a size along an axis, across its direction, and lies in the middle of the whole."""
+        keywords, extent = dict(bar.keywords), self.extents[axis]
+        if SIZES[axis] not in keywords or axis == 2 or abs(float(keywords.get("turn", 0))) > TIES.degrees:  # type: ignore[arg-type]
+            return False
+        ends = (self.ends(bar, key, axis)[0] for key in ("start", "end"))
+        return max(abs(end - extent / 2) for end in ends) < TIES.off_middle * extent
+
+    def ends(self, line: Part | Group, key: str, axis: int) -> tuple[float, float]:
+        """The low and high coordinate of an element."""
+        if key != "last":
+            low, high = ends_of(line, key, axis, self.numbers)
+            return low, high
+        first = next(inner for inner in Source((line,)).walk() if isinstance(inner, Part))
+        copies = max(1, round(float(line.count)) - 1)  # type: ignore[arg-type, union-attr]
+        away = copies * float(dict(line.keywords)["xyz"[axis]])  # type: ignore[arg-type]
+        low, high = interval(first, axis, self.numbers)
+        return low + away, high + away
 
 
-def interval(
-    part: Part, axis: int, numbers: Mapping[str, float], forms: Mapping[str, Any] | None = None
+def ends_of(
+    line: Part | Group, key: str, axis: int, numbers: Mapping[str, float], forms: Mapping[str, Any] | None = None
 ) -> tuple[Any, Any]:
-    """The low and high coordinate of a part from the low side of the whole; those of its start if it has one.
+    """The low and high coordinate of an element from the low side of the whole.
 
     Parameters
     ----------
-    part, axis
-        The part, and the axis along which it is measured.
+    line, key, axis
+        As of :class:`Element`.
     numbers
         The values of all names.
     forms
         What names stand for in the result, such as linear forms; by default their values.
     """
-    keywords, values = dict(part.keywords), numbers if forms is None else forms
-    if "start" in keywords:
-        start = point(keywords["start"], axis, values)
-        return start, start
-    given = {word: value_at(keywords[word], values) for word in AXES[axis] if word in keywords}  # type: ignore[arg-type]
-    if "radius" in keywords and axis < 2:
-        radii = keywords["radius"] if isinstance(keywords["radius"], tuple) else (keywords["radius"],)
-        largest = max(radii, key=lambda radius: value_at(radius, numbers))
-        given[AXES[axis].size] = 2 * value_at(largest, values)  # type: ignore[arg-type]
-    return interval_of(axis, given, 0.0, values[SIZES[axis]])
+    keywords, values = dict(line.keywords), numbers if forms is None else forms
+    pairs: Keywords = line.keywords
+    if key in (*POINTS, "last"):
+        argument = keywords[key]
+        assert isinstance(argument, Point)
+        pairs = argument.keywords
+    given = {word: value_at(value, values) for word, value in pairs if word in AXES[axis]}  # type: ignore[arg-type]
+    sides = 0.0, values[SIZES[axis]]
+    if key in ("", "across"):
+        if "radius" in keywords and axis < 2:
+            radii = keywords["radius"] if isinstance(keywords["radius"], tuple) else (keywords["radius"],)
+            largest = max(radii, key=lambda radius: value_at(radius, numbers))
+            given[SIZES[axis]] = 2 * value_at(largest, values)  # type: ignore[arg-type]
+        return interval_of(axis, given, *sides)
+    start = ends_of(line, "start", axis, numbers, forms)[0] if key in ("through", "end") else None
+    coordinate = coordinate_of(axis, given, *sides, start)
+    return coordinate, coordinate
 
 
-def point(argument: Argument, axis: int, values: Mapping[str, Any], default: Any = None) -> Any:
-    """The coordinate of a point from the low side of the whole, by the values of names."""
-    assert isinstance(argument, Point)
-    given = {word: value_at(value, values) for word, value in argument.keywords if word in AXES[axis]}
-    return coordinate_of(axis, given, 0.0, values[SIZES[axis]], default)
+def interval(part: Part, axis: int, numbers: Mapping[str, float]) -> tuple[float, float]:
+    """The low and high coordinate of a part from the low side of the whole; those of its start if it has one."""
+    low, high = ends_of(part, "start" if "start" in dict(part.keywords) else "", axis, numbers)
+    return low, high

@@ -88,8 +88,7 @@ class Misfit:
         self.width = FIT.explained * evidence.tolerance
         self.generator = torch.Generator().manual_seed(seed)
         self.start = model.numbers
-        scale = np.array([model.tunable.scale.numpy() @ np.abs(model.jacobian[:, k]) for k in range(len(model.slots))])
-        self.scale = np.clip(scale, 1e-3, None)
+        self.scale: FloatArray = np.maximum(model.tunable.scale.numpy() @ np.abs(model.jacobian), 1e-3)
         prior = np.maximum([PRIOR[slot.kind] for slot in model.slots], np.minimum(minimum, 1e6))
         angles = np.array([slot.kind == "angle" for slot in model.slots])
         self.prior: FloatArray = np.where(angles, prior * self.scale**2, prior)
@@ -98,20 +97,15 @@ class Misfit:
         self, numbers: FloatArray, draws: int = TIES.draws, joints: Joints | None = None
     ) -> tuple[FloatArray, FloatArray]:
         """Half the slope (P,) and half the curvature (P, P) of the mean squared distance, with the prior and joints."""
-        count = len(numbers)
         poses = self.model.poses(numbers)
-        slope, curvature = np.zeros(count), np.zeros((count, count))
-        for _ in range(draws):
-            part_slope, part_curvature = of_target(poses, self.target.pairs(poses.scene, self.generator), self.width)
-            slope += part_slope.numpy() / draws
-            curvature += part_curvature.numpy() / draws
+        systems = [of_target(poses, self.target.pairs(poses.scene, self.generator), self.width) for _ in range(draws)]
+        slope, curvature = (sum(parts).numpy() / draws for parts in zip(*systems, strict=True))
         if joints is not None and len(joints.first):
             gaps = needs(poses.scene, poses.slopes, moved(poses.scene, joints))
             wide = TIES.together * gaps.slopes
-            slope += (wide.T @ gaps.residual).numpy()
-            curvature += (wide.T @ gaps.slopes).numpy()
-        slope += self.prior * (numbers - self.start)
-        return slope, curvature + np.diag(self.prior)
+            slope = slope + (wide.T @ gaps.residual).numpy()
+            curvature = curvature + (wide.T @ gaps.slopes).numpy()
+        return slope + self.prior * (numbers - self.start), curvature + np.diag(self.prior)
 
     def refitted(self, numbers: FloatArray, free: FloatArray, joints: Joints | None) -> FloatArray:
         """The numbers (P,) of the least misfit that differ from these along directions (P, Z) only; parts that touched

@@ -7,10 +7,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
-from shapeprog.inference.ties.layout import interval
+from shapeprog.inference.ties.layout import ends_of
 from shapeprog.inference.ties.settings import TIES
 from shapeprog.language.ast import Group, Line, Part, Point, Source
-from shapeprog.language.expression import Name, Value, names_in, value_at
+from shapeprog.language.expression import Name, Value, names_in
 from shapeprog.language.placement import AXES, BOX, RESERVED, SIZES, axis_of
 from shapeprog.language.statement import language
 
@@ -26,8 +26,6 @@ FURTHER = {
     "offset": ("inner", "outer"),
 }
 """The quantities that measure where a part is, with words for the less and the larger of two of them."""
-
-STATEMENTS = {"leaning_box": "box", "beam": "bar"}
 
 
 class Use(NamedTuple):
@@ -120,7 +118,7 @@ def _candidates(uses: Sequence[Use], numbers: dict[str, float]) -> tuple[list[st
 
 
 def _role(part: Part) -> str:
-    return part.role or STATEMENTS.get(part.kind, part.kind)
+    return part.role or part.kind
 
 
 def _quantity(use: Use, numbers: dict[str, float]) -> str:
@@ -131,17 +129,7 @@ def _quantity(use: Use, numbers: dict[str, float]) -> str:
     if use.word != SIZES[axis]:
         low = "bottom" if use.word == "bottom" else "drop"
         return "offset" if use.word == AXES[axis].offset else ("inset", "setback", low)[axis]
-    arguments = dict(part.keywords)
-    lengths: list[float] = [
-        value_at(arguments[word], numbers) if word in arguments  # type: ignore[arg-type]
-        else float("inf") if "start" in arguments else _length(part, each, numbers)
-        for each, word in enumerate(SIZES)
-    ]  # fmt: skip
+    lengths = [high - low for low, high in (ends_of(part, "", each, numbers) for each in range(3))]
     flat = axis == 2 and _role(part) in FLAT
     least, second, _ = sorted(lengths)
     return "thickness" if flat or lengths[axis] <= least <= TIES.thin * second else SIZES[axis]
-
-
-def _length(part: Part, axis: int, numbers: dict[str, float]) -> float:
-    low, high = interval(part, axis, numbers)
-    return float(high - low)

@@ -44,17 +44,13 @@ def worthwhile(
     far
         Farthest that relations together may move a number (V,): the quadratic model is valid near the optimum alone.
     """
-    imposed, free = list(fixed), np.linalg.inv(curvature)
-    rows = np.stack([*fixed, *(relation.row for relation in candidates)]) if len(fixed) or candidates else fixed
+    rows: FloatArray = np.array([*fixed, *(relation.row for relation in candidates)]).reshape(-1, len(numbers))
     if not len(rows):
         return fixed, numbers
-    low, start = np.minimum(low, numbers), numbers
-    axes: FloatArray = np.zeros((0, len(numbers)))
+    imposed, free, low, start = [*fixed], np.linalg.inv(curvature), np.minimum(low, numbers), numbers
+    axes: FloatArray = np.linalg.qr(fixed.T)[0].T
     meeting = [(k, *pair) for k, relation in enumerate(candidates, len(fixed)) for pair in relation.meetings]
     edges = 0
-    for row in fixed:
-        if (new := beside(row, axes)) is not None:
-            axes = np.vstack([axes, new])
     spread, off = np.einsum("kv,vw,kw->k", rows, free, rows, optimize=True), rows @ numbers
     benefit = price * np.array([np.inf] * len(fixed) + [relation.trust for relation in candidates])
     # Below this share of its freedom a relation holds already: for numbers that nothing determines, rounding alone

@@ -1,14 +1,14 @@
 """Relations that may hold between the numbers of a placed program: zero, equal, in contact, straight, symmetric.
 
 Only quantities of one kind are related: a clearance with a clearance of the same anchor, a size with a size, a radius
-with a radius.  Most relations are written with one name used twice; faces that meet may need a sum, an edge may be
-half a size, and an angle the negative of another.
+with a radius.  Most relations are written with one name used twice; faces that meet may need a sum, an
+angle the negative of another.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from itertools import combinations
+from itertools import chain, combinations
 from typing import NamedTuple
 
 import numpy as np
@@ -29,7 +29,7 @@ class Meeting(NamedTuple):
 
 
 class Relation(NamedTuple):
-    """That factors (P,) times the numbers of a program sum to zero.
+    """That factors times the numbers of a program sum to zero.
 
     Parameters
     ----------
@@ -39,30 +39,14 @@ class Relation(NamedTuple):
         Price of the number that it saves, as a multiple of the usual one.
     meetings
         The lines that meet where it holds.
+    limit
+        Largest deviation, in cells or degrees, with which it is considered.
     """
 
     row: FloatArray
     trust: float
     meetings: frozenset[Meeting] = frozenset()
-
-
-class Reading(NamedTuple):
-    """A relation that the text may have, and how well it must hold already.
-
-    Parameters
-    ----------
-    row, trust
-        As of :class:`Relation`.
-    limit
-        Largest deviation, in cells or degrees.
-    meeting
-        The lines that meet where it holds.
-    """
-
-    row: FloatArray
-    trust: float
     limit: float = TIES.within
-    meeting: Meeting | None = None
 
 
 class Face(NamedTuple):
@@ -72,18 +56,23 @@ class Face(NamedTuple):
     ----------
     element
         The element.
-    anchor
-        From where it is measured.
     row
         How its coordinate from the low side of the whole follows from the numbers (P,).
+    at
+        That coordinate.
     facing
         Whether it faces the low or the high side, -1 or 1; 0 for the middle.
     """
 
     element: Element
-    anchor: int
     row: FloatArray
+    at: float
     facing: int
+
+    @property
+    def anchor(self) -> int:
+        """From where it is measured: from the low side if it does not move when the whole grows, and so on."""
+        return round(2 * self.row[self.element.axis])
 
     @property
     def single(self) -> bool:
@@ -91,19 +80,94 @@ class Face(NamedTuple):
         return int((self.row[3:] != 0).sum()) == 1
 
 
-def faces(anchored: Anchored) -> list[Face]:
-    """All ends and middles of all elements, and those of their mirror images."""
-    result = list[Face]()
+def relations(anchored: Anchored, numbers: FloatArray, touching: set[tuple[int, int]]) -> list[Relation]:
+    """Distinct relations that nearly hold, each with its highest trust.
+
+    Parameters
+    ----------
+    anchored, numbers
+        The program, and where its numbers are (P,).
+    touching
+        Pairs of lines, the smaller first, whose parts touch.
+    """
+    best: dict[bytes, Relation] = {}
+    for relation in chain(_of_faces(anchored, numbers, touching), _of_numbers(anchored, numbers)):
+        used = np.flatnonzero(relation.row)
+        if not len(used):
+            continue
+        row = relation.row / relation.row[used[0]]
+        if abs(float(row @ numbers)) <= relation.limit * float(np.abs(row).max()):
+            key = np.round(row, 6).tobytes()
+            known = best.get(key, relation)
+            trust, meetings = max(relation.trust, known.trust), relation.meetings | known.meetings
+            best[key] = Relation(row, trust, meetings)
+    return list(best.values())
+
+
+def _of_numbers(anchored: Anchored, numbers: FloatArray) -> Iterator[Relation]:
+    """Zeros, equal lengths and angles, and equal clearances of a part along two axes."""
+    slots, eye = anchored.slots, np.eye(len(anchored.slots))
+    floor = TIES.at_floor * numbers[2]
+    for k, slot in enumerate(slots):
+        if slot.kind == "clearance":
+            if slot.axis == 2 and slot.anchor == LOW and numbers[k] < floor:
+                yield Relation(eye[k], TIES.floor, limit=max(TIES.within, floor))
+            else:
+                yield Relation(eye[k], TIES.equal)
+        elif slot.kind == "offset":
+            yield Relation(eye[k], TIES.symmetric(slot.axis), limit=TIES.askew)
+        elif slot.kind == "angle" and not slot.word.startswith("step"):
+            yield Relation(eye[k], TIES.equal, limit=TIES.degrees)
+    for (a, slot), (b, other) in combinations(enumerate(slots), 2):
+        larger = max(numbers[a], numbers[b])
+        if slot.kind == other.kind == "angle" and slot.word == other.word:
+            yield Relation(eye[a] - eye[b], TIES.equal, limit=TIES.degrees)
+            yield Relation(eye[a] + eye[b], TIES.equal / 2, limit=TIES.degrees)
+        elif slot.kind == other.kind == "clearance":
+            corner = slot.line == other.line and {slot.axis, other.axis} == {0, 1}
+            if corner and TIES.within < min(numbers[a], numbers[b]) and larger < TIES.section:
+                yield Relation(eye[a] - eye[b], TIES.equal)
+        elif slot.kind == other.kind and slot.kind in ("size", "radius", "edge", "length"):
+            near = abs(numbers[a] - numbers[b]) <= TIES.alike * larger + TIES.rounding
+            if near and (slot.kind != "size" or _comparable(anchored, slot, other, larger)):
+                yield Relation(eye[a] - eye[b], TIES.equal)
+
+
+def _comparable(anchored: Anchored, slot: Slot, other: Slot, larger: float) -> bool:
+    """Whether two sizes measure the same quantity of parts of one role, or of two sections."""
+    same = slot.line == other.line or _role(anchored, slot.line) == _role(anchored, other.line)
+    sections = same or (_is_section(anchored, slot) and _is_section(anchored, other))
+    return (sections and larger < TIES.section) or (same and slot.axis == other.axis)
+
+
+def _is_section(anchored: Anchored, slot: Slot) -> bool:
+    """Whether a size is that of a cross-section: not the longest of its part."""
+    box = [anchored.layout.elements.get((slot.line, "", axis)) for axis in range(3)]
+    return any(element is None or element.high - element.low > slot.value + TIES.rounding for element in box)
+
+
+def _role(anchored: Anchored, line: int) -> str:
+    node = anchored.lines[line]
+    return (node.role or node.kind) if isinstance(node, Part) else ""
+
+
+def _of_faces(anchored: Anchored, numbers: FloatArray, touching: set[tuple[int, int]]) -> Iterator[Relation]:
+    """Relations of pairs of faces of one axis, those of mirror images included."""
+    faces: list[list[Face]] = [[], [], []]
+    unit, images = np.eye(len(numbers)), list[Face]()
     for element, low, high in anchored.ends():
-        rows = [(low + high) / 2] if element.kind == "coordinate" else [low, (low + high) / 2, high]
-        facing = [0] if element.kind == "coordinate" else [-1, 0, 1]
-        result += [Face(element, _anchor(row, element), row, way) for row, way in zip(rows, facing, strict=True)]
-    return result + [_image(face) for face in result if _is_mirrored(anchored, face.element)]
-
-
-def _anchor(row: FloatArray, element: Element) -> int:
-    """The anchor of a coordinate: that of the low side moves with none of the whole, of the high side with all."""
-    return round(2 * row[element.axis])
+        rows = {0: low} if element.kind == "coordinate" else {-1: low, 0: (low + high) / 2, 1: high}
+        for facing, row in rows.items():
+            faces[element.axis].append(Face(element, row, float(row @ numbers), facing))
+            if _is_mirrored(anchored, element):
+                image = unit[element.axis] - row
+                images.append(Face(element, image, float(image @ numbers), -facing))
+    for axis, extent in enumerate(numbers[:3]):
+        every = faces[axis] + [image for image in images if image.element.axis == axis]
+        for face, other in combinations(every, 2):
+            off = min(abs(face.at - other.at), abs(face.at + other.at - extent))
+            if off <= 2 * TIES.askew:  # no relation allows more
+                yield from _pair(anchored, face, other, touching)
 
 
 def _is_mirrored(anchored: Anchored, element: Element) -> bool:
@@ -115,145 +179,44 @@ def _is_mirrored(anchored: Anchored, element: Element) -> bool:
     return any(plane is not None and abs(plane.low - layout.extents[axis] / 2) < TIES.within for plane in planes)
 
 
-def _image(face: Face) -> Face:
-    """The face of the mirror image of a part."""
-    row = -face.row
-    row[face.element.axis] += 1
-    return face._replace(anchor=2 - face.anchor, row=row, facing=-face.facing)
-
-
-def relations(anchored: Anchored, numbers: FloatArray, touching: set[tuple[int, int]]) -> list[Relation]:
-    """Distinct relations that nearly hold, with the highest trust of any of their readings.
-
-    Parameters
-    ----------
-    touching
-        Pairs of lines, the smaller first, whose parts touch.
-    """
-    best: dict[bytes, Relation] = {}
-    for row, trust, limit, meeting in _readings(anchored, numbers, touching):
-        used = np.flatnonzero(row)
-        if not len(used):
-            continue
-        row = row / row[used[0]]
-        off = abs(float(row @ numbers)) / float(np.abs(row).max())
-        if off > limit:
-            continue
-        key = np.round(row, 6).tobytes()
-        known = best.get(key, Relation(row, trust))
-        best[key] = Relation(row, max(trust, known.trust), known.meetings | ({meeting} if meeting else frozenset()))
-    return list(best.values())
-
-
-def _readings(anchored: Anchored, numbers: FloatArray, touching: set[tuple[int, int]]) -> Iterator[Reading]:
-    """Relations that the slots and faces of a program may have."""
-    slots, count = anchored.slots, len(anchored.slots)
-    eye = np.eye(count)
-    upright = [abs(_angle(anchored, line)) < TIES.degrees for line in range(len(anchored.layout.lines))]
-    for k, slot in enumerate(slots):
-        if slot.kind == "clearance":
-            floor = TIES.at_floor * numbers[2]
-            stands = slot.axis == 2 and slot.anchor == LOW and numbers[k] < floor
-            yield Reading(eye[k], TIES.floor, max(TIES.within, floor)) if stands else Reading(eye[k], TIES.equal)
-        elif slot.kind == "offset":
-            yield Reading(eye[k], TIES.symmetric(slot.axis), TIES.askew)
-        elif slot.kind == "angle" and not slot.word.startswith("step"):
-            yield Reading(eye[k], TIES.equal, TIES.degrees)
-    all_faces = faces(anchored)
-    for axis in range(3):
-        axis_faces = [face for face in all_faces if face.element.axis == axis]
-        for face, partner in combinations(axis_faces, 2):
-            yield from _pair(anchored, face, partner, touching, upright)
-    lengths = [k for k, slot in enumerate(slots) if slot.kind in ("size", "radius", "edge", "angle", "length")]
-    for a, b in combinations(lengths, 2):
-        if _comparable(anchored, slots[a], slots[b], numbers[a], numbers[b]):
-            angles = slots[a].kind == "angle"
-            yield Reading(eye[a] - eye[b], TIES.equal, TIES.degrees if angles else TIES.within)
-            if angles:
-                yield Reading(eye[a] + eye[b], TIES.equal / 2, TIES.degrees)
-    across = [
-        k for k, slot in enumerate(slots) if slot.kind == "clearance" and slot.axis < 2 and numbers[k] > TIES.within
-    ]
-    for a, b in combinations(across, 2):
-        if (
-            slots[a].axis != slots[b].axis
-            and slots[a].line == slots[b].line
-            and max(numbers[a], numbers[b]) < TIES.section
-        ):
-            yield Reading(eye[a] - eye[b], TIES.equal)
-
-
-def _pair(
-    anchored: Anchored, face: Face, partner: Face, touching: set[tuple[int, int]], upright: list[bool]
-) -> Iterator[Reading]:
+def _pair(anchored: Anchored, face: Face, other: Face, touching: set[tuple[int, int]]) -> Iterator[Relation]:
     """Relations of two faces of one axis."""
-    first, second, axis = face.element, partner.element, face.element.axis
-    keys, anchors = {first.key, second.key}, {face.anchor, partner.anchor}
-    same, single = first.line == second.line, face.single and partner.single
-    row, image = face.row - partner.row, face.row + partner.row
+    first, second, axis = face.element, other.element, face.element.axis
+    keys = {first.key, second.key}
+    same, single = first.line == second.line, face.single and other.single
+    row, image = face.row - other.row, face.row + other.row
     image[axis] -= 1  # zero where one is the mirror image of the other
-    points = [f.element.kind == "coordinate" for f in (face, partner)]
-    middles = [f.facing == 0 and f.element.kind == "interval" for f in (face, partner)]
+    points = [element.kind == "coordinate" for element in (first, second)]
+    middles = any(f.facing == 0 and f.element.kind == "interval" for f in (face, other))
     lines = sorted(anchored.layout.first(line)[0] if key == "last" else line
                    for line, key in ((first.line, first.key), (second.line, second.key)))  # fmt: skip
     touches = lines[0] != lines[1] and tuple(lines) in touching
-    if len(anchors) > 1:
-        if anchors == {LOW, HIGH} and single and axis < 2 and not any(middles):
-            if same:
-                yield Reading(image, TIES.symmetric(axis), TIES.askew)
-            else:
-                yield Reading(image, TIES.contact if "last" in keys else TIES.equal)
-    elif any(middles):
+    if face.anchor != other.anchor:
+        if {face.anchor, other.anchor} == {LOW, HIGH} and single and axis < 2 and not middles:
+            trust = TIES.contact if "last" in keys else TIES.equal
+            yield Relation(image, TIES.symmetric(axis), limit=TIES.askew) if same else Relation(image, trust)
+    elif middles:
         if touches and axis < 2 and any(points) and not single and not keys & {"last", "plane", "centre"}:
-            yield Reading(row, TIES.straight)
+            yield Relation(row, TIES.straight)
     elif same:
         if first.key and second.key:  # both ends of a rod
-            yield Reading(row, TIES.straight)
+            yield Relation(row, TIES.straight)
             if face.anchor == MIDDLE:
-                yield Reading(image, TIES.symmetric(axis), TIES.askew)
+                yield Relation(image, TIES.symmetric(axis), limit=TIES.askew)
     elif keys & {"last", "plane", "centre"}:
-        if "last" in keys and touches and (face.single or partner.single):
-            yield Reading(row, TIES.contact)
+        if "last" in keys and touches and (face.single or other.single):
+            yield Relation(row, TIES.contact)
         elif single:
-            yield Reading(row, TIES.straight if lines[0] == lines[1] else TIES.equal)
+            yield Relation(row, TIES.straight if lines[0] == lines[1] else TIES.equal)
     else:
-        if face.anchor == MIDDLE and face.facing == -partner.facing and single:
-            yield Reading(image, TIES.equal)
-        if axis > 0 and not (upright[first.line] and upright[second.line]):
+        if axis > 0 and any(_leans(anchored, line) for line in lines):
             return
-        if touches and (face.facing * partner.facing == -1 or all(points) or bool(face.facing) != bool(partner.facing)):
-            meeting = Meeting(lines[0], lines[1], axis) if face.facing * partner.facing == -1 else None
-            yield Reading(row, TIES.contact, meeting=meeting)
-        elif face.facing == partner.facing and (single or touches):
-            yield Reading(row, TIES.equal if single else TIES.equal / 2)
+        if touches and (face.facing * other.facing == -1 or all(points) or bool(face.facing) != bool(other.facing)):
+            meet = face.facing * other.facing == -1
+            yield Relation(row, TIES.contact, frozenset([Meeting(lines[0], lines[1], axis)] if meet else ()))
+        elif face.facing == other.facing and (single or touches):
+            yield Relation(row, TIES.equal if single else TIES.equal / 2)
 
 
-def _comparable(anchored: Anchored, slot: Slot, partner: Slot, a: float, b: float) -> bool:
-    """Whether two sizes, which are about equal, measure the same quantity of parts of one role, or of two sections."""
-    if slot.kind != partner.kind:
-        return False
-    if slot.kind == "angle":
-        return slot.word == partner.word
-    if abs(a - b) > TIES.alike * max(a, b) + TIES.rounding:
-        return False
-    if slot.kind != "size":
-        return True
-    same = slot.line == partner.line or _role(anchored, slot.line) == _role(anchored, partner.line)
-    sections = same or (_is_section(anchored, slot) and _is_section(anchored, partner))
-    return (sections and max(a, b) < TIES.section) or (same and slot.axis == partner.axis)
-
-
-def _is_section(anchored: Anchored, slot: Slot) -> bool:
-    """Whether a size is that of a cross-section: not the longest of its part."""
-    box = [anchored.layout.elements.get((slot.line, "", axis)) for axis in range(3)]
-    return any(element is None or element.high - element.low > slot.value + TIES.rounding for element in box)
-
-
-def _role(anchored: Anchored, line: int) -> str:
-    node = anchored.layout.lines[line]
-    return (node.role or node.kind) if isinstance(node, Part) else ""
-
-
-def _angle(anchored: Anchored, line: int) -> float:
-    node = anchored.layout.lines[line]
-    return float(dict(node.keywords).get("tilt", 0.0)) if isinstance(node, Part) else 0.0  # type: ignore[arg-type]
+def _leans(anchored: Anchored, line: int) -> bool:
+    return abs(float(dict(anchored.layout.lines[line].keywords).get("tilt", 0.0))) >= TIES.degrees  # type: ignore[arg-type]

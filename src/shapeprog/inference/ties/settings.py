@@ -51,9 +51,8 @@ class TieSettings:
         Share by which the whole grows; distance between the first and last copy of a row up to which it does not run
         along an axis; shares of the whole by which the middle of a part may miss its own, and from which a round part
         fills it.
-    changes, operations, invalid
-        What a name is multiplied by to see which parts it carries; most numbers that are measured from one; cost of a
-        part without length, in pieces that come apart.
+    changes, operations
+        What a name is multiplied by to see which parts it carries; most numbers that are measured from one.
     draws, steps, together, farthest
         Times that pairs of points are drawn for one curvature; steps of Gauss and Newton of a refit; weight of a
         squared gap between parts that touched; farthest that one step moves a number.
@@ -63,9 +62,9 @@ class TieSettings:
     negative, repeated
         Cost in operators of a size that is a difference, which may become negative when a name is changed; and of every
         use of a sum after the first, as it can be named.
-    gap, divided, uneven
+    gap, divided
         Neighbours divide a box if the gap between them is at most this share of their size, which is at least
-        ``divided``; by how much the clearances of a part in the middle differ at most.
+        ``divided``.
     leaning, board_off, board_wide
         Angle by which a board leans; by how much it may be off the middle, or else how wide it may be, to be written as
         a bar, which has no left and right side.
@@ -111,7 +110,6 @@ class TieSettings:
     fills: float = 0.9
     changes: tuple[float, ...] = (0.7, 1.4)
     operations: int = 2
-    invalid: float = 3.0
     draws: int = 2
     steps: int = 4
     together: float = 0.03
@@ -122,7 +120,6 @@ class TieSettings:
     repeated: float = 0.3
     gap: float = 0.25
     divided: float = 2.0
-    uneven: float = 0.1
     leaning: float = 1.0
     board_off: float = 0.5
     board_wide: float = 12.0

@@ -15,6 +15,7 @@ from shapeprog.inference.ties.naming import named
 from shapeprog.language.ast import (
     Argument,
     Assignment,
+    Group,
     Line,
     Part,
     Point,
@@ -40,9 +41,6 @@ from shapeprog.language.parameters import to_float32
 from shapeprog.language.placement import AXES, ROUND, SIZES
 from shapeprog.space import FloatArray
 
-START: dict[str, Value] = {"x": 0.0, "y": 0.0, "bottom": 0.0}
-"""Where a point is for which nothing is given."""
-
 
 def written(anchored: Anchored, solution: Solution, free: FloatArray, *, group: bool = True) -> Source:
     """The program with names for its shared numbers and expressions for those that follow.
@@ -65,7 +63,7 @@ def written(anchored: Anchored, solution: Solution, free: FloatArray, *, group: 
         diameter, round_extents = Name("diameter"), {**extents, **dict.fromkeys(SIZES[:2], Name("diameter"))}
         header = [Assignment(((diameter.name, extents["width"]),)), Assignment(tuple(round_extents.items()))]
     known = Source((*header, Assignment(tuple(shared.items())))).evaluated_numbers()
-    body = changed_lines(anchored.body, lambda line: _simplified(_changed(line, table)))
+    body = changed_lines(changed_lines(anchored.body, lambda line: _changed(line, table)), _simplified)
     body = grouped(body, known) if group else merged_lines(body)
     uses = Counter(name for line in Source(body).walk() for value in values(line) for name in names_in(value))
     uses += Counter(name for value in shared.values() for name in names_in(value))
@@ -144,9 +142,12 @@ def _assignments(named: list[tuple[str, Value]]) -> Iterator[Assignment]:
 
 def _simplified(line: Line) -> Line:
     """The line without redundant keywords."""
+    arguments = dict(line.keywords) if isinstance(line, Part | Group) else {}
+    if isinstance(line, Group) and "last" in arguments:
+        first = next(inner for inner in Source(line.body).walk() if isinstance(inner, Part))
+        return replace(line, keywords=(("last", _without(arguments["last"], _start(first))),))
     if not isinstance(line, Part):
         return line
-    arguments = dict(line.keywords)
     defaults = {"tilt", "lean", "turn"}  # what can be left out where it is zero
     for axis, words in enumerate(AXES):
         sized = words.size in arguments or (axis < 2 and line.kind in ROUND and "radius" in arguments)
@@ -154,12 +155,22 @@ def _simplified(line: Line) -> Line:
     keywords: list[tuple[str, Argument]] = []
     for word, argument in line.keywords:
         if isinstance(argument, Point):
-            start = arguments["start"]
-            before = dict(start.keywords) if isinstance(start, Point) and word != "start" else START
-            argument = Point(tuple(pair for pair in argument.keywords if before.get(pair[0]) != pair[1]))
+            argument = _without(argument, {"x": 0.0, "y": 0.0, "bottom": 0.0} if word == "start" else _start(line))
         if argument != 0 or word not in defaults:
             keywords.append((word, argument))
     radius = dict(keywords).get("radius")
     if line.kind == "taper" and isinstance(radius, tuple) and radius[0] == radius[1]:
         return replace(line, kind="rod", keywords=tuple((w, radius[0] if w == "radius" else v) for w, v in keywords))
     return replace(line, keywords=tuple(keywords))
+
+
+def _start(part: Part) -> dict[str, Argument]:
+    """The keywords of the point that a part starts from, or of its box."""
+    start = dict(part.keywords).get("start")
+    return dict(start.keywords if isinstance(start, Point) else part.keywords)
+
+
+def _without(point: Argument, known: Mapping[str, Argument]) -> Point:
+    """A point without keywords whose values are known; with all of them if none is left."""
+    assert isinstance(point, Point)
+    return Point(tuple(pair for pair in point.keywords if known.get(pair[0]) != pair[1]) or point.keywords)

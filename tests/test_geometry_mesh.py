@@ -9,6 +9,7 @@ from geometry_helpers import make_scene, random_scene
 import shapeprog as sp
 from shapeprog.data.random import random_program
 from shapeprog.errors import ShapeProgError
+from shapeprog.geometry import mesh
 from shapeprog.geometry.contacts import TOUCHING, contact_groups
 from shapeprog.geometry.mesh import gaps, part_meshes, pieces, pieces_of_parts, union_mesh
 from shapeprog.geometry.primitives import primitives
@@ -136,3 +137,11 @@ def test_parts_that_meet_along_an_edge_alone_are_separate_pieces():
     assert pieces_of_parts(scene).tolist() == [0, 0, 1, 0]
     assert contact_groups(sp.unroll([sp.parse(face + edge + inside)])) == [1]
     assert pieces(*union_mesh(scene)) == 2
+
+
+def test_parts_without_a_union_count_as_one_piece(monkeypatch):
+    apart = sp.unroll(sp.parse("box(at=(0, 0, 0), size=(1, 1, 1))\nbox(at=(3, 0, 0), size=(1, 1, 1))\n"))
+    assert pieces_of_parts(apart).tolist() == [0, 1]
+    monkeypatch.setattr(mesh, "MOST_JOINED", 1)
+    assert pieces_of_parts(apart).tolist() == [0, 0]
+    assert pieces_of_parts(sp.unroll(sp.Program())).tolist() == []

@@ -128,12 +128,15 @@ def pieces_of_parts(scene: Batch) -> npt.NDArray[np.int64]:
     """The connected solid of the union to which each primitive (N,) of one scene belongs, 0 for the largest surface.
 
     Parts that meet only along an edge or in a point are not connected.  A part without a volume, or hidden inside
-    others, is counted with the largest.  Raises what :func:`union_mesh` does.
+    others, is counted with the largest; so are all parts where :func:`union_mesh` raises an error.
     """
-    solids = _solids(scene)
+    label = np.zeros(len(scene.mask), np.int64)
+    try:
+        solids = _solids(scene)
+    except ShapeProgError:
+        return label
     slots = {solid.original_id(): slot for slot, solid in solids.items()}
     pieces = [piece for piece in _union(list(solids.values())).decompose() if piece.volume() > 0]
-    label = np.zeros(len(scene.mask), np.int64)
     for number, piece in enumerate(sorted(pieces, key=lambda piece: -piece.surface_area())):
         mesh = piece.to_mesh()
         drawn = np.asarray(mesh.run_original_id)[np.diff(mesh.run_index) > 0]
@@ -179,11 +182,8 @@ def pieces(vertices: Array, faces: Array) -> int:
     return sum(piece.volume() > 0 for piece in manifold(vertices, faces).decompose())
 
 
-def gaps(scene: Batch, within: float, group: npt.NDArray[np.int64] | None = None) -> dict[tuple[int, int], float]:
-    """The distance between primitives of one scene, for pairs of slots nearer than ``within``; 0 where they overlap.
-
-    Pairs of the same ``group`` (N,) are left out, if primitives have any.
-    """
+def gaps(scene: Batch, within: float) -> dict[tuple[int, int], float]:
+    """The distance between primitives of one scene, for pairs of slots nearer than ``within``; 0 where they overlap."""
     parts = part_meshes(scene)
     if len(parts) < 2:
         return {}
@@ -194,9 +194,6 @@ def gaps(scene: Batch, within: float, group: npt.NDArray[np.int64] | None = None
         np.maximum(low[:, None] - high, low - high[:, None]).clip(0), axis=-1
     )  # those of the boxes
     near, results = between <= within, {}
-    if group is not None:
-        label = group[[part.slot for part in parts]]
-        near &= label[:, None] != label
     for i, j in np.argwhere(np.triu(near, 1)).tolist():
         gap = between[i, j] if straight[i] and straight[j] else solid(i).min_gap(solid(j), 2 * within)
         if gap < within:

@@ -10,7 +10,6 @@ from functools import lru_cache
 
 import numpy as np
 
-from shapeprog.errors import ShapeProgError
 from shapeprog.geometry.contacts import contact_groups
 from shapeprog.geometry.mesh import pieces_of_parts
 from shapeprog.inference.candidates.drawings import redrawn, solid_boxes
@@ -67,11 +66,7 @@ def _loose_parts(program: Program) -> list[list[bool]]:
     """For every part of every block, whether it is outside the largest connected solid."""
     loose: list[list[bool]] = [[] for _ in range(program.blocks)]
     scene = unroll(program)
-    try:
-        pieces = pieces_of_parts(scene)
-    except ShapeProgError:  # no part has a volume, or there are too many
-        pieces = np.zeros(len(scene.mask), np.int64)
-    for block, piece in zip(scene.block.tolist(), pieces.tolist(), strict=True):
+    for block, piece in zip(scene.block.tolist(), pieces_of_parts(scene).tolist(), strict=True):
         loose[block].append(piece != 0)
     return loose
 

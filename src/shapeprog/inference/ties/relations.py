@@ -1,8 +1,8 @@
 """Relations that may hold between the numbers of a placed program: zero, equal, in contact, straight, symmetric.
 
 Only quantities of one kind are related: a clearance with a clearance of the same anchor, a size with a size, a radius
-with a radius.  Most relations are written with one name used twice; faces that meet may need a sum, an
-angle the negative of another.
+with a radius.  Most relations are written with one name used twice.  Faces that meet may need a sum, and an angle may
+be the negative of another.
 """
 
 from __future__ import annotations

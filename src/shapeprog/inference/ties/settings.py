@@ -16,11 +16,12 @@ class TieSettings:
     known
         Weight of a squared move of a number that somebody wrote.
     far, rounds
-        Farthest that relations may move a number at once; most rounds of the search for them: first contacts, then all.
+        Farthest that relations may move a number at once; most rounds of the search for them: first contacts and parts
+        on the floor, then all.
     lost, cheaper, attempts
         Largest decrease of closeness when numbers are tied; beyond that, the price of a number is divided by
-        ``cheaper``, in so many attempts; in as many, lines that are separated by ties are untied.  The last one is kept
-        anyway.
+        ``cheaper``.  At each price, lines that ties separate are untied.  Both are repeated at most ``attempts`` times;
+        the last result is kept anyway.
     floor, centred, contact, straight, equal
         Price of the number that a relation saves, as a multiple of the usual price.  ``floor``: a part that ends just
         above the floor.  ``centred``: equal clearances on the left and right.  ``contact``: faces that meet; equal

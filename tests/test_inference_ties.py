@@ -16,21 +16,16 @@ import shapeprog as sp
 from shapeprog.cli.app import app
 from shapeprog.evaluation.editing import edit_scores
 from shapeprog.geometry.mesh import pieces, union_mesh
-from shapeprog.inference.fit.joints import Joints
 from shapeprog.inference.surface.evidence import evidence_of_program
 from shapeprog.inference.ties import naming, tying
-from shapeprog.inference.ties.anchored import Anchored
 from shapeprog.inference.ties.anchors import anchors_of
-from shapeprog.inference.ties.closeness import Closeness
 from shapeprog.inference.ties.expressions import solved
 from shapeprog.inference.ties.groups import grouped
 from shapeprog.inference.ties.layout import Layout, Slot
-from shapeprog.inference.ties.leaning import between_ends
-from shapeprog.inference.ties.model import Model
-from shapeprog.inference.ties.pricing import worthwhile
-from shapeprog.inference.ties.relations import Meeting, Relation
+from shapeprog.inference.ties.model import Closeness, Model
+from shapeprog.inference.ties.relations import Meeting, Relation, worthwhile
 from shapeprog.inference.ties.settings import TIES
-from shapeprog.inference.ties.tying import tie
+from shapeprog.inference.ties.tying import between_ends, tie
 from shapeprog.language.ast import Assignment, Comment, Fault, Group, Line, Part, values
 from shapeprog.language.convert import placed
 from shapeprog.language.evaluate import evaluated
@@ -192,14 +187,6 @@ def test_parts_that_meet_along_one_axis_do_not_along_another():
     assert rows.tolist() == [[1, 0]]  # else they would touch along an edge
     rows, _ = worthwhile([first, other], start, np.eye(2), 1.0, fixed=none, low=low)
     assert len(rows) == 2
-
-
-def joint_of(scene) -> Joints:
-    """The joint of two boxes, at the place of the first that is nearest to the middle of the second."""
-    half = scene.size[:1, :3]
-    near = (scene.centre[1] - scene.centre[0]).clamp(-half[0], half[0]) / half[0]
-    one, two = torch.tensor([0]), torch.tensor([1])
-    return Joints(one, two, near[None], torch.zeros(0, dtype=torch.long), -1e6)
 
 
 CASE = """
@@ -535,9 +522,7 @@ def test_long_parts_span_and_short_ones_keep_their_size(end: float, expected: tu
     source = placed(
         sp.parse(f"width, depth, height = 24, 6, 4\nbox(left=0, right={24 - end - 0.5})\nbox(right=0, width=1)\n")
     )
-    layout = Layout(source.source)
-    flat = {key: (0, 0) if element.kind == "interval" else (0,) for key, element in layout.elements.items()}
-    found = anchors_of(Model(Anchored(layout, flat)))
+    found = anchors_of(Model(Layout(source.source)))
     assert found[0, "", 0] == expected
     assert found[1, "", 0] == (2, 2)
 

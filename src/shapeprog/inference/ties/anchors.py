@@ -18,9 +18,8 @@ import torch
 
 from shapeprog.geometry.primitive import SIZES
 from shapeprog.geometry.separation import gaps, normals, touching
-from shapeprog.inference.ties.boxes import boxes_of, viewed
-from shapeprog.inference.ties.layout import ALIGNED, HIGH, LOW, MIDDLE, Anchors, Element
-from shapeprog.inference.ties.model import Model
+from shapeprog.inference.ties.elements import ALIGNED, HIGH, LOW, MIDDLE, Anchors, Element, Key
+from shapeprog.inference.ties.model import Model, boxes_of, viewed
 from shapeprog.inference.ties.settings import TIES
 from shapeprog.language.placement import AXES
 from shapeprog.space import Array, FloatArray
@@ -52,7 +51,7 @@ class Motion:
     """
 
     def __init__(self, model: Model) -> None:
-        self.model, self.layout = model, model.anchored.layout
+        self.model, self.layout = model, model.layout
         scene, rows = model.poses(model.numbers)
         size, centre, rotation = np.split(rows.numpy(), [SIZES, SIZES + 3], 1)
         steps = 0.3 * torch.eye(SIZES, dtype=scene.size.dtype)
@@ -86,7 +85,7 @@ class Motion:
 
     def by_element(self, elements: list[Element], slopes: FloatArray) -> FloatArray:
         """Slopes (..., P) by the numbers as those by the low and high coordinate of elements (..., K, 2)."""
-        index, result = self.model.anchored.index, np.zeros((*slopes.shape[:-1], len(elements), 2))
+        index, result = self.model.layout.index, np.zeros((*slopes.shape[:-1], len(elements), 2))
         for k, element in enumerate(elements):
             words = AXES[element.axis]
             if element.kind == "interval":
@@ -251,10 +250,10 @@ class AxisAnchors:
         return cost + per_copy / max(1.0, low.shape[1] / len(elements))
 
 
-def anchors_of(model: Model) -> dict[tuple[int, str, int], Anchors]:
+def anchors_of(model: Model) -> dict[Key, Anchors]:
     """The anchors of all elements of a program, given with all faces measured from the low side."""
     motion = Motion(model)
-    result: dict[tuple[int, str, int], Anchors] = {}
+    result: dict[Key, Anchors] = {}
     for axis in range(3):
         solver = AxisAnchors(motion, axis)
         for element, anchors in zip(solver.elements, solver.solved(), strict=True):

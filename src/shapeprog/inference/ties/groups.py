@@ -10,7 +10,7 @@ from itertools import combinations
 import numpy as np
 
 from shapeprog.errors import ShapeProgError
-from shapeprog.inference.ties.layout import interval
+from shapeprog.inference.ties.elements import interval
 from shapeprog.inference.ties.settings import TIES
 from shapeprog.language.ast import (
     Argument,

@@ -1,18 +1,23 @@
-"""A placed program as a function of its numbers: its primitives, its misfit, and refits while relations hold."""
+"""A placed program as a function of its numbers: its primitives, its distance from the target, and refits while
+relations hold."""
 
 from __future__ import annotations
 
 import numpy as np
 import torch
+from scipy.spatial import cKDTree
 
+from shapeprog.geometry.distance import signed_distance
 from shapeprog.geometry.scene import Scene
+from shapeprog.geometry.separation import OrientedBoxes
+from shapeprog.geometry.surface import sample_surface
 from shapeprog.inference.fit.adjustment import of_target
 from shapeprog.inference.fit.joints import Joints, moved, needs
 from shapeprog.inference.fit.residuals import Target
 from shapeprog.inference.fit.settings import FIT
 from shapeprog.inference.fit.tunable import THINNEST, Poses, Tunable
 from shapeprog.inference.surface.evidence import Evidence
-from shapeprog.inference.ties.anchored import Anchored
+from shapeprog.inference.ties.layout import Layout
 from shapeprog.inference.ties.settings import TIES
 from shapeprog.language.evaluate import expanded, symbolic
 from shapeprog.language.expression import Linear
@@ -20,20 +25,14 @@ from shapeprog.language.program import Program
 from shapeprog.space import FloatArray
 
 PRIOR = {
-    "clearance": 1e-4,
-    "offset": 1e-4,
-    "size": 3e-4,
-    "radius": 3e-4,
-    "edge": 1e-3,
-    "length": 1e-4,
-    "angle": 1e-3,
+    "clearance": 1e-4, "offset": 1e-4, "length": 1e-4, "size": 3e-4, "radius": 3e-4, "edge": 1e-3, "angle": 1e-3,
     "extent": 1e-2,
-}
+}  # fmt: skip
 """Weights of a squared move from the start, by kind: numbers that nothing determines do not change."""
 
 
 class Model:
-    """A placed program as a function of its numbers (P,), those of :class:`Anchored`.
+    """A placed program as a function of its numbers (P,), those of its layout.
 
     Attributes
     ----------
@@ -43,13 +42,13 @@ class Model:
         Lower bounds (P,).
     """
 
-    def __init__(self, anchored: Anchored) -> None:
-        self.anchored, self.slots = anchored, anchored.slots
+    def __init__(self, layout: Layout) -> None:
+        self.layout, self.slots = layout, layout.slots
         self.numbers: FloatArray = np.array([slot.value for slot in self.slots])
-        self.tunable = Tunable(Program(expanded(anchored.source)))
-        nodes = list(Program(symbolic(anchored.source, anchored.forms, anchored.forms["height"] * -0.5)).walk())
+        self.tunable = Tunable(Program(expanded(layout.source)))
+        nodes = list(Program(symbolic(layout.source, layout.forms, layout.forms["height"] * -0.5)).walk())
         forms = [Linear() + nodes[n].values[slot] for n, slot in self.tunable.moving]
-        self.jacobian: FloatArray = np.array([anchored.row(form) for form in forms]).reshape(-1, len(self.slots))
+        self.jacobian: FloatArray = np.array([layout.row(form) for form in forms]).reshape(-1, len(self.slots))
         self._offset = np.array([form.constant for form in forms])
         smallest = {"size": THINNEST, "radius": THINNEST / 2, "edge": 0.0}
         self.low: FloatArray = np.array([smallest.get(slot.kind, -np.inf) for slot in self.slots])
@@ -73,52 +72,100 @@ class Misfit:
 
     Parameters
     ----------
-    model
-        The program.
-    evidence
-        The target.
+    model, evidence
+        The program and the target.
+    joints
+        Where its parts touch; a refit keeps them together.
+    minimum
+        Minimum weight (P,) of a squared move of every number.
     seed
         Of the pairs of points that are drawn.
-    minimum
-        Minimum weight (P,) of a squared move of every number; infinite for numbers that are held.
     """
 
-    def __init__(self, model: Model, evidence: Evidence, seed: int, minimum: FloatArray) -> None:
-        self.model, self.target = model, Target(evidence)
+    def __init__(self, model: Model, evidence: Evidence, joints: Joints, minimum: FloatArray, seed: int) -> None:
+        self.model, self.target, self.joints = model, Target(evidence), joints
         self.width = FIT.explained * evidence.tolerance
         self.generator = torch.Generator().manual_seed(seed)
-        self.start = model.numbers
-        self.scale: FloatArray = np.maximum(model.tunable.scale.numpy() @ np.abs(model.jacobian), 1e-3)
-        prior = np.maximum([PRIOR[slot.kind] for slot in model.slots], np.minimum(minimum, 1e6))
+        scale = np.maximum(model.tunable.scale.numpy() @ np.abs(model.jacobian), 1e-3)
+        self.reach: FloatArray = np.maximum(scale, 1.0)  # cells that the surface moves for one unit of every number
+        prior = np.maximum([PRIOR[slot.kind] for slot in model.slots], minimum)
         angles = np.array([slot.kind == "angle" for slot in model.slots])
-        self.prior: FloatArray = np.where(angles, prior * self.scale**2, prior)
+        self.prior: FloatArray = np.where(angles, prior * scale**2, prior)
 
-    def at(
-        self, numbers: FloatArray, draws: int = TIES.draws, joints: Joints | None = None
-    ) -> tuple[FloatArray, FloatArray]:
-        """Half the slope (P,) and half the curvature (P, P) of the mean squared distance, with the prior and joints."""
+    def at(self, numbers: FloatArray, draws: int, *, joined: bool = False) -> tuple[FloatArray, FloatArray]:
+        """Half the slope (P,) and half the curvature (P, P) of the mean squared distance, with the prior.
+
+        Parameters
+        ----------
+        numbers
+            Where the numbers are (P,).
+        draws
+            How often pairs of points are drawn.
+        joined
+            Whether gaps at joints count.
+        """
         poses = self.model.poses(numbers)
         systems = [of_target(poses, self.target.pairs(poses.scene, self.generator), self.width) for _ in range(draws)]
         slope, curvature = (sum(parts).numpy() / draws for parts in zip(*systems, strict=True))
-        if joints is not None and len(joints.first):
-            gaps = needs(poses.scene, poses.slopes, moved(poses.scene, joints))
+        if joined and len(self.joints.first):
+            gaps = needs(poses.scene, poses.slopes, moved(poses.scene, self.joints))
             wide = TIES.together * gaps.slopes
             slope = slope + (wide.T @ gaps.residual).numpy()
             curvature = curvature + (wide.T @ gaps.slopes).numpy()
-        return slope + self.prior * (numbers - self.start), curvature + np.diag(self.prior)
+        return slope + self.prior * (numbers - self.model.numbers), curvature + np.diag(self.prior)
 
-    def refitted(self, numbers: FloatArray, free: FloatArray, joints: Joints | None) -> FloatArray:
-        """The numbers (P,) of the least misfit that differ from these along directions (P, Z) only; parts that touched
-        are kept together."""
+    def refitted(self, numbers: FloatArray, rows: FloatArray) -> FloatArray:
+        """The numbers (P,) of the least misfit that differ from these only so that relations (M, P) hold as before."""
+        free = np.linalg.qr(rows.T, mode="complete")[0][:, len(rows) :]  # orthonormal directions
         if not free.shape[1]:
             return numbers
-        farthest = TIES.farthest / np.maximum(self.scale, 1.0)
-        low = np.minimum(self.model.low, numbers)
+        farthest, low = TIES.farthest / self.reach, np.minimum(self.model.low, numbers)
         for _ in range(TIES.steps):
-            slope, curvature = self.at(numbers, 1, joints)
+            slope, curvature = self.at(numbers, 1, joined=True)
             move = free @ -np.linalg.solve(free.T @ curvature @ free, free.T @ slope)
             onwards = numbers + move / float(np.max(np.abs(move) / farthest, initial=1.0))
             if (onwards < low).any():
                 break
             numbers = onwards
         return numbers
+
+
+class Closeness:
+    """How much of the surface of a program lies near that of a target, and the other way round.
+
+    The squared misfit assumes that points are assigned to the right parts.  For thin parts and sheets they may not be;
+    the misfit can then fall while a part leaves its surface.
+
+    Parameters
+    ----------
+    evidence
+        The target.
+    seed
+        Of the points that are compared, and of the samples of programs: always the same.
+    """
+
+    def __init__(self, evidence: Evidence, seed: int) -> None:
+        surface = evidence.surface
+        self.seed, self.reach = seed, TIES.near * float(np.linalg.norm(np.ptp(surface, 0)))
+        indices = np.random.default_rng(seed).integers(0, len(surface), TIES.points)
+        self._points, self._tree = torch.from_numpy(surface[indices]), cKDTree(surface)
+
+    def of(self, scene: Scene) -> float:
+        """The F-score of the two surfaces."""
+        recall = float((signed_distance(scene, self._points).abs() <= self.reach).double().mean())
+        sample = sample_surface(scene, TIES.points, torch.Generator().manual_seed(self.seed))
+        away = self._tree.query(sample.points.numpy(), distance_upper_bound=self.reach)[0]
+        precision = float(np.isfinite(away).mean())
+        return 2 * precision * recall / (precision + recall) if precision + recall else 0.0
+
+
+def boxes_of(scene: Scene) -> OrientedBoxes:
+    """The boxes around the primitives of a scene (N,), for a person in front of the whole."""
+    edges = scene.rotation.transpose(1, 2) * scene.bounds[..., None]
+    return OrientedBoxes(viewed(scene.centre.numpy()), viewed(edges.numpy()))
+
+
+def viewed(vectors: FloatArray) -> FloatArray:
+    """Vectors (..., 3) along the axes of the grid as those of a person in front: to the right, to the rear, upwards."""
+    result: FloatArray = vectors[..., ::-1] * [-1, 1, 1]
+    return result

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
-from shapeprog.inference.ties.layout import ends_of
+from shapeprog.inference.ties.elements import ends_of
 from shapeprog.inference.ties.settings import TIES
 from shapeprog.language.ast import Group, Line, Part, Point, Source
 from shapeprog.language.expression import Name, Value, names_in

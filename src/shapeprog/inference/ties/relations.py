@@ -1,8 +1,8 @@
-"""Relations that may hold between the numbers of a placed program: zero, equal, in contact, straight, symmetric.
+"""Relations between the numbers of a placed program: zero, equal, in contact, straight, symmetric.
 
 Only quantities of one kind are related: a clearance with a clearance of the same anchor, a size with a size, a radius
 with a radius.  Most relations are written with one name used twice.  Faces that meet may need a sum, and an angle may
-be the negative of another.
+be the negative of another.  Those whose price in fit is below that of the number they save are selected.
 """
 
 from __future__ import annotations
@@ -12,12 +12,17 @@ from itertools import chain, combinations
 from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
-from shapeprog.inference.ties.anchored import Anchored
-from shapeprog.inference.ties.layout import HIGH, LOW, MIDDLE, Element, Slot
+from shapeprog.inference.ties.elements import HIGH, LOW, MIDDLE, Element
+from shapeprog.inference.ties.layout import Layout, Slot
 from shapeprog.inference.ties.settings import TIES
 from shapeprog.language.ast import Part
+from shapeprog.library.independence import beside
 from shapeprog.space import FloatArray
+
+HOLDS = 1e-6
+"""Deviation up to which a relation holds."""
 
 
 class Meeting(NamedTuple):
@@ -49,25 +54,13 @@ class Relation(NamedTuple):
     limit: float = TIES.within
 
 
-class Face(NamedTuple):
-    """A low or high end of an element, or its middle.
-
-    Parameters
-    ----------
-    element
-        The element.
-    row
-        How its coordinate from the low side of the whole follows from the numbers (P,).
-    at
-        That coordinate.
-    facing
-        Whether it faces the low or the high side, -1 or 1; 0 for the middle.
-    """
+class _Face(NamedTuple):
+    """A low or high end of an element, or its middle."""
 
     element: Element
-    row: FloatArray
-    at: float
-    facing: int
+    row: FloatArray  # how its coordinate from the low side of the whole follows from the numbers (P,)
+    at: float  # that coordinate
+    facing: int  # whether it faces the low or the high side, -1 or 1; 0 for the middle
 
     @property
     def anchor(self) -> int:
@@ -77,21 +70,21 @@ class Face(NamedTuple):
     @property
     def single(self) -> bool:
         """Whether it is one number, the distance from its anchor."""
-        return int((self.row[3:] != 0).sum()) == 1
+        return np.count_nonzero(self.row[3:]) == 1
 
 
-def relations(anchored: Anchored, numbers: FloatArray, touching: set[tuple[int, int]]) -> list[Relation]:
+def relations(layout: Layout, numbers: FloatArray, touching: set[tuple[int, int]]) -> list[Relation]:
     """Distinct relations that nearly hold, each with its highest trust.
 
     Parameters
     ----------
-    anchored, numbers
+    layout, numbers
         The program, and where its numbers are (P,).
     touching
         Pairs of lines, the smaller first, whose parts touch.
     """
     best: dict[bytes, Relation] = {}
-    for relation in chain(_of_faces(anchored, numbers, touching), _of_numbers(anchored, numbers)):
+    for relation in chain(_of_faces(layout, numbers, touching), _of_numbers(layout, numbers)):
         used = np.flatnonzero(relation.row)
         if not len(used):
             continue
@@ -99,14 +92,86 @@ def relations(anchored: Anchored, numbers: FloatArray, touching: set[tuple[int, 
         if abs(float(row @ numbers)) <= relation.limit * float(np.abs(row).max()):
             key = np.round(row, 6).tobytes()
             known = best.get(key, relation)
-            trust, meetings = max(relation.trust, known.trust), relation.meetings | known.meetings
-            best[key] = Relation(row, trust, meetings)
+            best[key] = Relation(row, max(relation.trust, known.trust), relation.meetings | known.meetings)
     return list(best.values())
 
 
-def _of_numbers(anchored: Anchored, numbers: FloatArray) -> Iterator[Relation]:
+def worthwhile(
+    candidates: list[Relation],
+    numbers: FloatArray,
+    curvature: FloatArray,
+    price: float,
+    *,
+    fixed: FloatArray,
+    low: FloatArray,
+    far: FloatArray | float = np.inf,
+) -> tuple[FloatArray, FloatArray]:
+    """The selected relations (M, V), those that are fixed first; and the optimum (V,) where they hold.
+
+    Near its optimum the misfit of a program is quadratic.  With H its curvature and p the numbers, imposing c p = 0
+    costs (c p)^2 / (c H^-1 c'), so thousands of relations are priced without a refit; the cheapest is imposed, H^-1 and
+    p follow by one elimination, and so on.  Parts that meet along two axes would touch along an edge alone, so a
+    relation by which they would is not imposed.
+
+    Parameters
+    ----------
+    numbers, curvature
+        The optimum (V,), and half the curvature (V, V) of the misfit there.
+    price
+        Price of a number, in the unit of the misfit.
+    fixed
+        Relations (M, V) that hold in any case.
+    low
+        Lower bounds of the numbers (V,), which no relation may violate.
+    far
+        Farthest that relations together may move a number (V,): the quadratic model is valid near the optimum alone.
+    """
+    rows: FloatArray = np.array([*fixed, *(relation.row for relation in candidates)]).reshape(-1, len(numbers))
+    if not len(rows):
+        return fixed, numbers
+    imposed, free, low, start = [*fixed], np.linalg.inv(curvature), np.minimum(low, numbers), numbers
+    axes: FloatArray = np.linalg.qr(fixed.T)[0].T
+    meeting = [(k, *pair) for k, relation in enumerate(candidates, len(fixed)) for pair in relation.meetings]
+    edges = 0
+    spread, off = np.einsum("kv,vw,kw->k", rows, free, rows, optimize=True), rows @ numbers
+    benefit = price * np.array([np.inf] * len(fixed) + [relation.trust for relation in candidates])
+    # Below this share of its freedom a relation holds already: for numbers that nothing determines, rounding alone
+    # leaves more, so independence is tested on the rows themselves.
+    minimum = 1e-9 * spread
+    while True:
+        gain = np.where(spread > minimum, benefit - off**2 / np.maximum(spread, minimum), -np.inf)
+        best = int(np.argmax(gain))
+        if gain[best] <= 0:
+            return np.array(imposed).reshape(-1, len(numbers)), numbers
+        along = free @ rows[best]
+        moved = numbers - along * off[best] / spread[best]
+        across = rows @ along
+        off_then, spread_then = off - across * off[best] / spread[best], spread - across**2 / spread[best]
+        edges_then = _edges(meeting, (spread_then <= minimum) & (np.abs(off_then) < HOLDS))
+        if best >= len(fixed):
+            new = beside(rows[best], axes)
+            if new is None or (moved < low).any() or (np.abs(moved - start) > far).any() or edges_then > edges:
+                spread[best] = 0.0
+                continue
+            imposed.append(rows[best])
+            axes = np.vstack([axes, new])
+        free = free - np.outer(along, along) / spread[best]
+        numbers, off, spread, edges = moved, off_then, spread_then, edges_then
+        spread[best] = 0.0
+
+
+def _edges(meetings: list[tuple[int, int, int, int]], holds: npt.NDArray[np.bool_]) -> int:
+    """How many pairs of lines meet along more than one axis, by relations that hold."""
+    axes: dict[tuple[int, int], set[int]] = {}
+    for index, first, second, axis in meetings:
+        if holds[index]:
+            axes.setdefault((first, second), set()).add(axis)
+    return sum(len(along) > 1 for along in axes.values())
+
+
+def _of_numbers(layout: Layout, numbers: FloatArray) -> Iterator[Relation]:
     """Zeros, equal lengths and angles, and equal clearances of a part along two axes."""
-    slots, eye = anchored.slots, np.eye(len(anchored.slots))
+    slots, eye = layout.slots, np.eye(len(layout.slots))
     floor = TIES.at_floor * numbers[2]
     for k, slot in enumerate(slots):
         if slot.kind == "clearance":
@@ -119,67 +184,70 @@ def _of_numbers(anchored: Anchored, numbers: FloatArray) -> Iterator[Relation]:
         elif slot.kind == "angle" and not slot.word.startswith("step"):
             yield Relation(eye[k], TIES.equal, limit=TIES.degrees)
     for (a, slot), (b, other) in combinations(enumerate(slots), 2):
-        larger = max(numbers[a], numbers[b])
-        if slot.kind == other.kind == "angle" and slot.word == other.word:
-            yield Relation(eye[a] - eye[b], TIES.equal, limit=TIES.degrees)
+        if slot.kind != other.kind:
+            continue
+        larger, equal = max(numbers[a], numbers[b]), Relation(eye[a] - eye[b], TIES.equal)
+        if slot.kind == "angle" and slot.word == other.word:
+            yield equal._replace(limit=TIES.degrees)
             yield Relation(eye[a] + eye[b], TIES.equal / 2, limit=TIES.degrees)
-        elif slot.kind == other.kind == "clearance":
+        elif slot.kind == "clearance":
             corner = slot.line == other.line and {slot.axis, other.axis} == {0, 1}
             if corner and TIES.within < min(numbers[a], numbers[b]) and larger < TIES.section:
-                yield Relation(eye[a] - eye[b], TIES.equal)
-        elif slot.kind == other.kind and slot.kind in ("size", "radius", "edge", "length"):
+                yield equal
+        elif slot.kind in ("size", "radius", "edge", "length"):
             near = abs(numbers[a] - numbers[b]) <= TIES.alike * larger + TIES.rounding
-            if near and (slot.kind != "size" or _comparable(anchored, slot, other, larger)):
-                yield Relation(eye[a] - eye[b], TIES.equal)
+            if near and (slot.kind != "size" or _comparable(layout, slot, other, larger)):
+                yield equal
 
 
-def _comparable(anchored: Anchored, slot: Slot, other: Slot, larger: float) -> bool:
+def _comparable(layout: Layout, slot: Slot, other: Slot, larger: float) -> bool:
     """Whether two sizes measure the same quantity of parts of one role, or of two sections."""
-    same = slot.line == other.line or _role(anchored, slot.line) == _role(anchored, other.line)
-    sections = same or (_is_section(anchored, slot) and _is_section(anchored, other))
+    same = slot.line == other.line or _role(layout, slot.line) == _role(layout, other.line)
+    sections = same or (_is_section(layout, slot) and _is_section(layout, other))
     return (sections and larger < TIES.section) or (same and slot.axis == other.axis)
 
 
-def _is_section(anchored: Anchored, slot: Slot) -> bool:
+def _is_section(layout: Layout, slot: Slot) -> bool:
     """Whether a size is that of a cross-section: not the longest of its part."""
-    box = [anchored.layout.elements.get((slot.line, "", axis)) for axis in range(3)]
+    box = [layout.elements.get((slot.line, "", axis)) for axis in range(3)]
     return any(element is None or element.high - element.low > slot.value + TIES.rounding for element in box)
 
 
-def _role(anchored: Anchored, line: int) -> str:
-    node = anchored.lines[line]
-    return (node.role or node.kind) if isinstance(node, Part) else ""
+def _role(layout: Layout, line: int) -> str:
+    part = layout.lines[line]
+    assert isinstance(part, Part)  # groups have no sizes
+    return part.role or part.kind
 
 
-def _of_faces(anchored: Anchored, numbers: FloatArray, touching: set[tuple[int, int]]) -> Iterator[Relation]:
+def _of_faces(layout: Layout, numbers: FloatArray, touching: set[tuple[int, int]]) -> Iterator[Relation]:
     """Relations of pairs of faces of one axis, those of mirror images included."""
-    faces: list[list[Face]] = [[], [], []]
-    unit, images = np.eye(len(numbers)), list[Face]()
-    for element, low, high in anchored.ends():
+    unit = np.eye(len(numbers))
+    faces: list[_Face] = []
+    images: list[_Face] = []
+    for element, low, high in layout.ends():
         rows = {0: low} if element.kind == "coordinate" else {-1: low, 0: (low + high) / 2, 1: high}
         for facing, row in rows.items():
-            faces[element.axis].append(Face(element, row, float(row @ numbers), facing))
-            if _is_mirrored(anchored, element):
+            faces.append(_Face(element, row, float(row @ numbers), facing))
+            if _is_mirrored(layout, element):
                 image = unit[element.axis] - row
-                images.append(Face(element, image, float(image @ numbers), -facing))
+                images.append(_Face(element, image, float(image @ numbers), -facing))
     for axis, extent in enumerate(numbers[:3]):
-        every = faces[axis] + [image for image in images if image.element.axis == axis]
-        for face, other in combinations(every, 2):
+        for face, other in combinations([face for face in faces + images if face.element.axis == axis], 2):
             off = min(abs(face.at - other.at), abs(face.at + other.at - extent))
             if off <= 2 * TIES.askew:  # no relation allows more
-                yield from _pair(anchored, face, other, touching)
+                yield from _pair(layout, face, other, touching)
 
 
-def _is_mirrored(anchored: Anchored, element: Element) -> bool:
+def _is_mirrored(layout: Layout, element: Element) -> bool:
     """Whether a mirror about the middle of the whole copies a part along the axis of its element."""
     if element.key not in ("", "start", "through", "end"):
         return False
-    layout, axis = anchored.layout, element.axis
+    axis = element.axis
     planes = (layout.elements.get((loop, "plane", axis)) for loop in layout.loops_around[element.line])
     return any(plane is not None and abs(plane.low - layout.extents[axis] / 2) < TIES.within for plane in planes)
 
 
-def _pair(anchored: Anchored, face: Face, other: Face, touching: set[tuple[int, int]]) -> Iterator[Relation]:
+def _pair(layout: Layout, face: _Face, other: _Face, touching: set[tuple[int, int]]) -> Iterator[Relation]:
     """Relations of two faces of one axis."""
     first, second, axis = face.element, other.element, face.element.axis
     keys = {first.key, second.key}
@@ -188,8 +256,7 @@ def _pair(anchored: Anchored, face: Face, other: Face, touching: set[tuple[int, 
     image[axis] -= 1  # zero where one is the mirror image of the other
     points = [element.kind == "coordinate" for element in (first, second)]
     middles = any(f.facing == 0 and f.element.kind == "interval" for f in (face, other))
-    lines = sorted(anchored.layout.first(line)[0] if key == "last" else line
-                   for line, key in ((first.line, first.key), (second.line, second.key)))  # fmt: skip
+    lines = sorted(layout.first(each.line)[0] if each.key == "last" else each.line for each in (first, second))
     touches = lines[0] != lines[1] and tuple(lines) in touching
     if face.anchor != other.anchor:
         if {face.anchor, other.anchor} == {LOW, HIGH} and single and axis < 2 and not middles:
@@ -209,14 +276,14 @@ def _pair(anchored: Anchored, face: Face, other: Face, touching: set[tuple[int, 
         elif single:
             yield Relation(row, TIES.straight if lines[0] == lines[1] else TIES.equal)
     else:
-        if axis > 0 and any(_leans(anchored, line) for line in lines):
+        if axis > 0 and any(_leans(layout, line) for line in lines):
             return
-        if touches and (face.facing * other.facing == -1 or all(points) or bool(face.facing) != bool(other.facing)):
-            meet = face.facing * other.facing == -1
+        meet = face.facing * other.facing == -1
+        if touches and (meet or all(points) or bool(face.facing) != bool(other.facing)):
             yield Relation(row, TIES.contact, frozenset([Meeting(lines[0], lines[1], axis)] if meet else ()))
         elif face.facing == other.facing and (single or touches):
             yield Relation(row, TIES.equal if single else TIES.equal / 2)
 
 
-def _leans(anchored: Anchored, line: int) -> bool:
-    return abs(float(dict(anchored.layout.lines[line].keywords).get("tilt", 0.0))) >= TIES.degrees  # type: ignore[arg-type]
+def _leans(layout: Layout, line: int) -> bool:
+    return abs(float(dict(layout.lines[line].keywords).get("tilt", 0.0))) >= TIES.degrees  # type: ignore[arg-type]

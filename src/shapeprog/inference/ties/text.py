@@ -8,9 +8,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from shapeprog.inference.ties.anchored import Anchored
 from shapeprog.inference.ties.expressions import Solution
 from shapeprog.inference.ties.groups import grouped
+from shapeprog.inference.ties.layout import Layout
 from shapeprog.inference.ties.naming import named
 from shapeprog.language.ast import (
     Argument,
@@ -42,12 +42,12 @@ from shapeprog.language.placement import AXES, ROUND, SIZES
 from shapeprog.space import FloatArray
 
 
-def written(anchored: Anchored, solution: Solution, free: FloatArray, *, group: bool = True) -> Source:
+def written(layout: Layout, solution: Solution, free: FloatArray, *, group: bool = True) -> Source:
     """The program with names for its shared numbers and expressions for those that follow.
 
     Parameters
     ----------
-    anchored
+    layout
         The program.
     solution
         Which of its numbers are free, and how others follow.
@@ -56,14 +56,14 @@ def written(anchored: Anchored, solution: Solution, free: FloatArray, *, group: 
     group
         Whether lines are grouped where that is shorter.
     """
-    shared, table = _expressions(anchored, solution, free)
+    shared, table = _expressions(layout, solution, free)
     extents: dict[str, Value] = dict(zip(SIZES, (solution.factors[:3] @ free).tolist(), strict=True))
     header = [Assignment(tuple(extents.items()))]
     if np.array_equal(solution.factors[0], solution.factors[1]):
         diameter, round_extents = Name("diameter"), {**extents, **dict.fromkeys(SIZES[:2], Name("diameter"))}
         header = [Assignment(((diameter.name, extents["width"]),)), Assignment(tuple(round_extents.items()))]
     known = Source((*header, Assignment(tuple(shared.items())))).evaluated_numbers()
-    body = changed_lines(changed_lines(anchored.body, lambda line: _changed(line, table)), _simplified)
+    body = changed_lines(changed_lines(layout.body, lambda line: _changed(line, table)), _simplified)
     body = grouped(body, known) if group else merged_lines(body)
     uses = Counter(name for line in Source(body).walk() for value in values(line) for name in names_in(value))
     uses += Counter(name for value in shared.values() for name in names_in(value))
@@ -78,18 +78,16 @@ def written(anchored: Anchored, solution: Solution, free: FloatArray, *, group: 
     pairs = [(names[name], _with(value, final)) for name, value in shared.items()]
     for sums in (False, True):
         header += _assignments([pair for pair in pairs if isinstance(pair[1], Expression) == sums])
-    scale = anchored.source.scale
+    scale = layout.source.scale
     assert scale is not None
     floor = -float(known["height"]) * scale.cells_per_unit / 2
     result = placed_source((*header, *changed_lines(body, lambda line: _changed(line, final))))
-    return replace(result, scale=replace(scale, floor=floor), unit=anchored.source.unit)
+    return replace(result, scale=replace(scale, floor=floor), unit=layout.source.unit)
 
 
-def _expressions(
-    anchored: Anchored, solution: Solution, at_free: FloatArray
-) -> tuple[dict[str, Value], dict[str, Value]]:
+def _expressions(layout: Layout, solution: Solution, at_free: FloatArray) -> tuple[dict[str, Value], dict[str, Value]]:
     """The numbers and sums that several numbers of a program share, by provisional name, and all of its numbers."""
-    slots, names, factors, free = anchored.slots, anchored.names, solution.factors, solution.free
+    slots, names, factors, free = layout.slots, layout.names, solution.factors, solution.free
     alike: dict[bytes, list[int]] = {}  # numbers that follow from the free ones in the same way
     for p in range(3, len(slots)):
         alike.setdefault(factors[p].round(6).tobytes(), []).append(p)

@@ -8,10 +8,11 @@ then named.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection
+from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 import torch
 
 from shapeprog.errors import ShapeProgError
@@ -21,25 +22,21 @@ from shapeprog.inference.budget import Progress
 from shapeprog.inference.fit.joints import find_joints
 from shapeprog.inference.fit.tunable import CELLS
 from shapeprog.inference.surface.evidence import Evidence
-from shapeprog.inference.ties.anchored import Anchored
 from shapeprog.inference.ties.anchors import anchors_of
-from shapeprog.inference.ties.carrying import carried
-from shapeprog.inference.ties.closeness import Closeness
-from shapeprog.inference.ties.expressions import Solution, solved
-from shapeprog.inference.ties.layout import LOW, Anchors, Layout
-from shapeprog.inference.ties.leaning import between_ends
-from shapeprog.inference.ties.model import Misfit, Model
-from shapeprog.inference.ties.pricing import worthwhile
-from shapeprog.inference.ties.relations import Relation, relations
+from shapeprog.inference.ties.expressions import Solution, carried, solved
+from shapeprog.inference.ties.layout import Layout
+from shapeprog.inference.ties.model import Closeness, Misfit, Model
+from shapeprog.inference.ties.relations import relations, worthwhile
 from shapeprog.inference.ties.settings import TIES
 from shapeprog.inference.ties.text import written
-from shapeprog.language.ast import Fault, Part
+from shapeprog.language.ast import Fault, Part, Source
 from shapeprog.language.convert import placed
 from shapeprog.language.evaluate import evaluated
 from shapeprog.language.merging import merged
-from shapeprog.language.program import Program
+from shapeprog.language.parameters import to_float32
+from shapeprog.language.program import Draw, Loop, Node, Program
 from shapeprog.language.unroll import unroll
-from shapeprog.space import FloatArray
+from shapeprog.space import Array, FloatArray
 
 
 def tie(
@@ -76,7 +73,7 @@ def tie(
         except ShapeProgError:  # a statement without a placed form
             return program
         assert source is not None
-        ties = _Ties(Layout(source), evidence, seed, known=known, held=held)
+        ties = _Ties(source, evidence, seed, known=known, held=held)
         price *= TIES.known_price if known else TIES.price
         closeness = None if known else Closeness(evidence, seed)
         before = closeness.of(unroll(plain)) if closeness else 0.0
@@ -96,18 +93,19 @@ def tie(
 class _Ties:
     """Everything about a program that does not depend on the price of a number."""
 
-    def __init__(self, layout: Layout, evidence: Evidence, seed: int, *, known: bool, held: Collection[int]) -> None:
-        flat = Model(Anchored(layout, _from_low(layout)))
+    def __init__(self, source: Source, evidence: Evidence, seed: int, *, known: bool, held: Collection[int]) -> None:
+        flat = Model(Layout(source))
         scene = flat.scene(flat.numbers)
-        self.joints = find_joints(scene, floor=-1e6)  # that no part touches: on the floor, clearances are zero
-        self.anchored = Anchored(layout, anchors_of(flat))
-        self.model = Model(self.anchored)
+        joints = find_joints(scene, floor=-1e6)  # that no part touches: on the floor, clearances are zero
+        self.layout = layout = Layout(source, anchors_of(flat))
+        self.model = Model(layout)
         lines = layout.lines_of(held)
-        fixed = np.array([slot.line in lines for slot in self.anchored.slots])
-        self.misfit = Misfit(self.model, evidence, seed, np.where(fixed, np.inf, TIES.known if known else 0.0))
-        self.fixed, self.decimals = fixed, CELLS if known else CELLS + 1  # what is inferred is rounded again
+        self.fixed = np.array([slot.line in lines for slot in layout.slots])
+        minimum = np.where(self.fixed, 1e6, TIES.known if known else 0.0)
+        self.misfit = Misfit(self.model, evidence, joints, minimum, seed)
+        self.decimals = CELLS if known else CELLS + 1  # what is inferred is rounded again
         self.parts = parts = [k for k, line in enumerate(layout.lines) if isinstance(line, Part)]
-        pairs = scene.block[torch.stack([self.joints.first, self.joints.second], 1)].tolist()
+        pairs = scene.block[torch.stack([joints.first, joints.second], 1)].tolist()
         self.touching = {(parts[min(pair)], parts[max(pair)]) for pair in pairs}
         self.loose = self._loose(self.model.numbers)
 
@@ -116,7 +114,7 @@ class _Ties:
 
         Lines that ties separate from the others stay untied, and if this is not enough, those that they touched.
         """
-        slots, untied = self.anchored.slots, set[int]()
+        slots, untied = self.layout.slots, set[int]()
         for _ in range(TIES.attempts):
             solution, numbers = self._solved(price, self.fixed | np.array([slot.line in untied for slot in slots]))
             free = solution.rounded(slots, numbers, self.decimals)
@@ -125,42 +123,55 @@ class _Ties:
                 break
             touched = {line for pair in self.touching if not loose.isdisjoint(pair) for line in pair}
             untied |= touched if loose <= untied else loose
-        return evaluated(written(self.anchored, solution, free, group=not self.fixed.any()))
+        return evaluated(written(self.layout, solution, free, group=not self.fixed.any()))
 
     def _loose(self, numbers: FloatArray) -> set[int]:
         """The lines with parts outside the largest connected solid."""
         scene = self.model.scene(numbers)
         return {self.parts[block] for block in scene.block[pieces_of_parts(scene) > 0].tolist()}
 
-    def _solved(self, price: float, fixed: npt.NDArray[np.bool_]) -> tuple[Solution, FloatArray]:
+    def _solved(self, price: float, fixed: Array) -> tuple[Solution, FloatArray]:
         """The free numbers at a price of a number, and all numbers (P,); some (P,) are in no relation."""
-        numbers, rows = self.model.numbers, self.anchored.fixed()
+        numbers, rows = self.model.numbers, self.layout.fixed()
         for step in range(TIES.rounds):
-            offered = relations(self.anchored, numbers, self.touching)
-            offered = [relation for relation in offered if not (relation.row != 0)[fixed].any()]
+            offered = relations(self.layout, numbers, self.touching)
+            offered = [relation for relation in offered if not relation.row[fixed].any()]
             if step == 0:
                 offered = [relation for relation in offered if relation.trust in (TIES.contact, TIES.floor)]
             before = len(rows)
-            rows, optimum = self._imposed(offered, numbers, rows, price)
+            _, curvature = self.misfit.at(numbers, TIES.draws)
+            far = TIES.far / self.misfit.reach
+            rows, optimum = worthwhile(offered, numbers, curvature, price, fixed=rows, low=self.model.low, far=far)
             if step and len(rows) == before:
                 break
-            numbers = self.misfit.refitted(optimum, self._free(rows), self.joints)
-        return carried(solved(self.anchored.slots, rows), self.model, numbers), numbers
-
-    def _imposed(
-        self, offered: Collection[Relation], numbers: FloatArray, rows: FloatArray, price: float
-    ) -> tuple[FloatArray, FloatArray]:
-        curvature = self.misfit.at(numbers)[1]
-        far = TIES.far / np.maximum(self.misfit.scale, 1.0)
-        return worthwhile([*offered], numbers, curvature, price, fixed=rows, low=self.model.low, far=far)
-
-    def _free(self, rows: FloatArray) -> FloatArray:
-        """Orthonormal directions (P, Z) in which relations (M, P) hold."""
-        if not len(rows):
-            return np.eye(len(self.model.numbers))
-        axes, _ = np.linalg.qr(rows.T, mode="complete")
-        return axes[:, len(rows) :]
+            numbers = self.misfit.refitted(optimum, rows)
+        return carried(solved(self.layout.slots, rows), self.model, numbers), numbers
 
 
-def _from_low(layout: Layout) -> dict[tuple[int, str, int], Anchors]:
-    return {key: (LOW, LOW) if element.kind == "interval" else (LOW,) for key, element in layout.elements.items()}
+def between_ends(program: Program) -> Program:
+    """The same parts, boards that lean about the left-right axis as bars between the middles of their ends.
+
+    A board is given by its lower edge and its angle; its upper edge is not linear in these numbers, so nothing could be
+    tied to it.
+    """
+    return Program(tuple(_between_ends(node) for node in program.body))
+
+
+def _between_ends(node: Node) -> Node:
+    if isinstance(node, Loop):
+        return replace(node, body=tuple(_between_ends(inner) for inner in node.body))
+    if node.name != "board" or abs(node.values[-1]) < TIES.leaning:
+        return node
+    up, depth, side, high, deep, wide, tilt = node.values
+    middle = side + wide / 2
+    if abs(middle) > TIES.board_off and wide > TIES.board_wide:
+        return node
+    sin, cos = math.sin(math.radians(tilt)), math.cos(math.radians(tilt))
+    upwards, backwards = (cos, sin), (-sin, cos)
+    along, across, length, thick = (
+        (upwards, backwards, high, deep) if high >= deep else (backwards, upwards, deep, high)
+    )
+    start = [coordinate + way * thick / 2 for coordinate, way in zip((up, depth), across, strict=True)]
+    end = [coordinate + way * length for coordinate, way in zip(start, along, strict=True)]
+    values = (*start, middle, *end, middle, thick, wide, 0.0)
+    return Draw("bar", tuple(to_float32(value) for value in values), node.role)

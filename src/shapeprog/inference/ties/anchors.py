@@ -28,30 +28,12 @@ SHIFTS = np.array([0.0, 0.5, 1.0])
 """By how much of what the whole grows an anchor moves, seen from the low side."""
 
 
-class Motion:
-    """How the boxes of the primitives of a program move with its numbers, about where they are.
-
-    Parameters
-    ----------
-    model
-        The program with all faces measured from the low side.
-
-    Attributes
-    ----------
-    boxes, slopes
-        The boxes (N,), and the slopes (N, 4, 3, P) of their centres and edges.
-    ends, end_slopes
-        Low and high ends (2, 3, N) of the boxes from the low sides of the whole, and their slopes (2, 3, N, P).
-    first, second
-        Boxes (C,) that touch.
-    upright, leaning
-        Which of these pairs stand upright, and which lean (L,).
-    normals, apart
-        Directions (L, 15, 3) along which those that lean may be separated, and their gaps (L,).
-    """
+class _Motion:
+    """How the boxes of the N primitives of a program move with its numbers (P,), about where they are; all faces are
+    measured from the low side."""
 
     def __init__(self, model: Model) -> None:
-        self.model, self.layout = model, model.layout
+        self.layout = model.layout
         scene, rows = model.poses(model.numbers)
         size, centre, rotation = np.split(rows.numpy(), [SIZES, SIZES + 3], 1)
         steps = 0.3 * torch.eye(SIZES, dtype=scene.size.dtype)
@@ -60,22 +42,22 @@ class Motion:
         )
         edges = np.einsum("niap,na->naip", rotation.reshape(-1, 3, 3, rotation.shape[2]), scene.bounds.numpy())
         edges += np.einsum("nia,sna,nsp->naip", scene.rotation.numpy(), wider, size)
-        self.boxes = boxes_of(scene)
         slopes = np.concatenate([centre[:, None], edges], 1)
-        self.slopes = viewed(slopes.swapaxes(2, 3)).swapaxes(2, 3)
-        reach, reach_slopes = (
-            np.abs(self.boxes.edges).sum(1),
-            (np.sign(self.boxes.edges)[..., None] * self.slopes[:, 1:]).sum(1),
-        )
-        middle = self.boxes.centre + np.array(self.layout.extents) / 2
+        self.slopes = viewed(slopes.swapaxes(2, 3)).swapaxes(2, 3)  # of centres and edges (N, 4, 3, P)
+        boxes = boxes_of(scene)
+        self.vectors = np.concatenate([boxes.centre[:, None], boxes.edges], 1)  # centres and edges (N, 4, 3)
+        reach = np.abs(boxes.edges).sum(1)
+        reach_slopes = (np.sign(boxes.edges)[..., None] * self.slopes[:, 1:]).sum(1)
+        middle = boxes.centre + np.array(self.layout.extents) / 2
+        # Low and high ends of the boxes from the low sides of the whole (2, 3, N), and their slopes (2, 3, N, P)
         self.ends: FloatArray = np.stack([middle - reach, middle + reach]).swapaxes(1, 2)
         self.end_slopes = np.stack([self.slopes[:, 0] - reach_slopes, self.slopes[:, 0] + reach_slopes]).swapaxes(1, 2)
-        self.first, self.second = touching(self.boxes, TIES.touch)
+        self.first, self.second = touching(boxes, TIES.touch)  # pairs (C,)
         turned = ((scene.rotation - scene.rotation.round()).abs().amax((1, 2)) > ALIGNED).numpy()
-        self.leaning = np.flatnonzero(turned[self.first] | turned[self.second])
-        first, second = self.first[self.leaning], self.second[self.leaning]
-        self.upright = np.setdiff1d(np.arange(len(self.first)), self.leaning)
-        self.normals, self.apart = normals(self.boxes, first, second), gaps(self.boxes, first, second)
+        self.leaning = turned[self.first] | turned[self.second]  # which of these, L pairs
+        pairs = self.first[self.leaning], self.second[self.leaning]
+        # Directions (L, 15, 3) along which these may be separated, and their gaps (L,)
+        self.normals, self.apart = normals(boxes, *pairs), gaps(boxes, *pairs)
 
     def projections(self, vectors: FloatArray) -> FloatArray:
         """Centres and edges (N, 4, 3, ...) of boxes as distances of centres and edges (L, 15, 7, ...) along normals."""
@@ -85,7 +67,7 @@ class Motion:
 
     def by_element(self, elements: list[Element], slopes: FloatArray) -> FloatArray:
         """Slopes (..., P) by the numbers as those by the low and high coordinate of elements (..., K, 2)."""
-        index, result = self.model.layout.index, np.zeros((*slopes.shape[:-1], len(elements), 2))
+        index, result = self.layout.index, np.zeros((*slopes.shape[:-1], len(elements), 2))
         for k, element in enumerate(elements):
             words = AXES[element.axis]
             if element.kind == "interval":
@@ -97,18 +79,10 @@ class Motion:
         return result
 
 
-class AxisAnchors:
-    """The anchors of all elements of one axis.
+class _AxisAnchors:
+    """The anchors of the K elements of one axis."""
 
-    Parameters
-    ----------
-    motion
-        How the primitives move.
-    axis
-        Which axis.
-    """
-
-    def __init__(self, motion: Motion, axis: int) -> None:
+    def __init__(self, motion: _Motion, axis: int) -> None:
         self.motion, self.axis = motion, axis
         self.extent = extent = motion.layout.extents[axis]
         self.elements = [element for element in motion.layout.elements.values() if element.axis == axis]
@@ -130,16 +104,10 @@ class AxisAnchors:
         self.slopes = slopes.reshape(*slopes.shape[:2], -1).swapaxes(1, 2)  # (2, 2 K, N)
         # Mirror images move with the high side of the whole while all coordinates stay.
         self.base, growth = motion.end_slopes[:, axis, :, axis] + 0.5, TIES.growth * extent
-        boxes = np.concatenate([motion.boxes.centre[:, None], motion.boxes.edges], 1)
-        base = motion.projections(boxes + growth * motion.slopes[..., axis])  # (L, 15, 7)
+        base = motion.projections(motion.vectors + growth * motion.slopes[..., axis])  # (L, 15, 7)
         by_element = growth * motion.projections(motion.by_element(self.elements, motion.slopes))  # (L, 15, 7, K, 2)
         forms = np.concatenate([base[..., None], by_element.reshape(*base.shape, 2 * count)], -1)
-        forms *= np.where(base < 0, -1, 1)[..., None]  # only their absolute values count
-        _, first, self.times = np.unique(forms.round(4), axis=0, return_index=True, return_counts=True)  # copies
-        self.forms, self.limits = (
-            forms[first].reshape(-1, 1 + 2 * count),
-            np.maximum(motion.apart[first], 0) + TIES.touch,
-        )
+        self.forms, self.limits = forms.reshape(-1, 1 + 2 * count), np.maximum(motion.apart, 0) + TIES.touch
         low, high = motion.ends[:, axis]
         self.share, self.long = motion.ends[:, axis] / extent, high - low >= TIES.spanning * extent
         reach, near = TIES.reach * extent, (1 - TIES.beyond) * extent / 2
@@ -148,7 +116,7 @@ class AxisAnchors:
         if axis == 2:
             beyond = np.stack([self.reaches[0], high >= high.max() - TIES.below * extent])
         self.near = self.reaches | beyond
-        self.overlap, self._passed = self._overlaps(low, high), set[bytes]()
+        self.overlap = self._overlaps(low, high)
         moves = (np.abs(slopes).max((0, 3)) > 0).astype(int)  # (N, K)
         shared = moves.T @ moves + moves[motion.first].T @ moves[motion.second]
         # Elements of parts that touch are often better changed together.
@@ -210,9 +178,6 @@ class AxisAnchors:
             unchanged += 1
             if costs.min() < total - 1e-9:
                 state, total, unchanged = trials[costs.argmin()], float(costs.min()), 1
-                if state.tobytes() in self._passed:  # the descent from another start came through here
-                    break
-                self._passed.add(state.tobytes())
             if unchanged == len(groups):
                 break
         return total, state
@@ -241,21 +206,20 @@ class AxisAnchors:
         growth = TIES.growth * self.extent
         below, above = motion.ends[:, self.axis]
         grown = self._overlaps(below + growth * low, above + growth * high)
-        per_copy += TIES.separated * (grown < np.minimum(self.overlap, 0) - TIES.touch)[:, motion.upright].sum(1)
-        if len(self.limits):
-            along = self.forms @ np.concatenate([np.ones((1, len(states))), flat.T])
-            along = np.abs(along).reshape(len(self.limits), -1, 7, len(states))
-            gaps = (along[:, :, 0] - along[:, :, 1:].sum(2)).max(1)
-            per_copy += TIES.separated * self.times @ (gaps > self.limits[:, None])
+        per_copy += TIES.separated * (grown < np.minimum(self.overlap, 0) - TIES.touch)[:, ~motion.leaning].sum(1)
+        along = np.abs(self.forms @ np.concatenate([np.ones((1, len(states))), flat.T]))
+        along = along.reshape(len(self.limits), 15, 7, len(states))
+        apart = (along[:, :, 0] - along[:, :, 1:].sum(2)).max(1)
+        per_copy += TIES.separated * (apart > self.limits[:, None]).sum(0)
         return cost + per_copy / max(1.0, low.shape[1] / len(elements))
 
 
 def anchors_of(model: Model) -> dict[Key, Anchors]:
     """The anchors of all elements of a program, given with all faces measured from the low side."""
-    motion = Motion(model)
+    motion = _Motion(model)
     result: dict[Key, Anchors] = {}
     for axis in range(3):
-        solver = AxisAnchors(motion, axis)
+        solver = _AxisAnchors(motion, axis)
         for element, anchors in zip(solver.elements, solver.solved(), strict=True):
             result[element.line, element.key, axis] = anchors
         for last, first in solver.rows.items():

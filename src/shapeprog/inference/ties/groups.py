@@ -1,9 +1,9 @@
-"""Lines of a tied program written shorter: neighbours that fill a box as its division, and parts with equal clearances
-inside of a new box."""
+"""Lines of a tied program written shorter: without redundant keywords, neighbours that fill a box as its division, and
+parts with equal clearances inside of a new box."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import combinations
 
@@ -12,26 +12,52 @@ import numpy as np
 from shapeprog.errors import ShapeProgError
 from shapeprog.inference.ties.elements import interval
 from shapeprog.inference.ties.settings import TIES
-from shapeprog.language.ast import (
-    Argument,
-    Assignment,
-    Group,
-    Keywords,
-    Line,
-    Part,
-    Point,
-    Source,
-    changed_lines,
-)
+from shapeprog.language.ast import Argument, Assignment, Group, Keywords, Line, Part, Point, Source, changed_lines
 from shapeprog.language.convert.forms import cost
 from shapeprog.language.convert.parts import ordered
 from shapeprog.language.evaluate import placed_source, symbolic
 from shapeprog.language.expression import Expression, names_in, value_at
 from shapeprog.language.merging import merged_lines
 from shapeprog.language.parameters import to_float32
-from shapeprog.language.placement import AXES, BOX, SIZES, axis_of
+from shapeprog.language.placement import AXES, BOX, ROUND, SIZES, axis_of
 from shapeprog.language.program import Program
 from shapeprog.space import FloatArray
+
+
+def simplified(line: Line) -> Line:
+    """The line without redundant keywords."""
+    arguments = dict(line.keywords) if isinstance(line, Part | Group) else {}
+    if isinstance(line, Group) and "last" in arguments:
+        first = next(inner for inner in Source(line.body).walk() if isinstance(inner, Part))
+        return replace(line, keywords=(("last", _without(arguments["last"], _start(first))),))
+    if not isinstance(line, Part):
+        return line
+    defaults = {"tilt", "lean", "turn"}  # what can be left out where it is zero
+    for axis, words in enumerate(AXES):
+        sized = words.size in arguments or (axis < 2 and line.kind in ROUND and "radius" in arguments)
+        defaults |= {words.low if axis == 2 else words.offset} if sized else {words.low, words.high, words.offset}
+    keywords: list[tuple[str, Argument]] = []
+    for word, argument in line.keywords:
+        if isinstance(argument, Point):
+            argument = _without(argument, {"x": 0.0, "y": 0.0, "bottom": 0.0} if word == "start" else _start(line))
+        if argument != 0 or word not in defaults:
+            keywords.append((word, argument))
+    radius = dict(keywords).get("radius")
+    if line.kind == "taper" and isinstance(radius, tuple) and radius[0] == radius[1]:
+        return replace(line, kind="rod", keywords=tuple((w, radius[0] if w == "radius" else v) for w, v in keywords))
+    return replace(line, keywords=tuple(keywords))
+
+
+def _start(part: Part) -> dict[str, Argument]:
+    """The keywords of the point that a part starts from, or of its box."""
+    start = dict(part.keywords).get("start")
+    return dict(start.keywords if isinstance(start, Point) else part.keywords)
+
+
+def _without(point: Argument, known: Mapping[str, Argument]) -> Point:
+    """A point without keywords whose values are known; with all of them if none is left."""
+    assert isinstance(point, Point)
+    return Point(tuple(pair for pair in point.keywords if known.get(pair[0]) != pair[1]) or point.keywords)
 
 
 def grouped(lines: Sequence[Line], numbers: dict[str, float]) -> tuple[Line, ...]:

@@ -9,36 +9,15 @@ from dataclasses import replace
 import numpy as np
 
 from shapeprog.inference.ties.expressions import Solution
-from shapeprog.inference.ties.groups import grouped
+from shapeprog.inference.ties.groups import grouped, simplified
 from shapeprog.inference.ties.layout import Layout
 from shapeprog.inference.ties.naming import named
-from shapeprog.language.ast import (
-    Argument,
-    Assignment,
-    Group,
-    Line,
-    Part,
-    Point,
-    Source,
-    changed_lines,
-    changed_values,
-    values,
-)
+from shapeprog.language.ast import Assignment, Line, Source, changed_lines, changed_values, values
 from shapeprog.language.evaluate import placed_source
-from shapeprog.language.expression import (
-    Binary,
-    Expression,
-    Linear,
-    Name,
-    Value,
-    combined,
-    names_in,
-    replaced,
-    value_at,
-)
+from shapeprog.language.expression import Expression, Linear, Name, Value, combined, names_in, replaced, value_at
 from shapeprog.language.merging import merged_lines
 from shapeprog.language.parameters import to_float32
-from shapeprog.language.placement import AXES, ROUND, SIZES
+from shapeprog.language.placement import SIZES
 from shapeprog.space import FloatArray
 
 
@@ -57,13 +36,14 @@ def written(layout: Layout, solution: Solution, free: FloatArray, *, group: bool
         Whether lines are grouped where that is shorter.
     """
     shared, table = _expressions(layout, solution, free)
-    extents: dict[str, Value] = dict(zip(SIZES, (solution.factors[:3] @ free).tolist(), strict=True))
-    header = [Assignment(tuple(extents.items()))]
+    header: list[Assignment] = []
+    extents: list[Value] = (solution.factors[:3] @ free).tolist()
     if np.array_equal(solution.factors[0], solution.factors[1]):
-        diameter, round_extents = Name("diameter"), {**extents, **dict.fromkeys(SIZES[:2], Name("diameter"))}
-        header = [Assignment(((diameter.name, extents["width"]),)), Assignment(tuple(round_extents.items()))]
+        header.append(Assignment((("diameter", extents[0]),)))
+        extents[:2] = [Name("diameter")] * 2
+    header.append(Assignment(tuple(zip(SIZES, extents, strict=True))))
     known = Source((*header, Assignment(tuple(shared.items())))).evaluated_numbers()
-    body = changed_lines(changed_lines(layout.body, lambda line: _changed(line, table)), _simplified)
+    body = changed_lines(_changed(layout.body, table), simplified)
     body = grouped(body, known) if group else merged_lines(body)
     uses = Counter(name for line in Source(body).walk() for value in values(line) for name in names_in(value))
     uses += Counter(name for value in shared.values() for name in names_in(value))
@@ -72,7 +52,7 @@ def written(layout: Layout, solution: Solution, free: FloatArray, *, group: bool
         if uses[name] < 2:
             once[name] = _with(value, once)
     shared = {name: _with(value, once) for name, value in shared.items() if name not in once}
-    body = changed_lines(body, lambda line: _changed(line, once))
+    body = _changed(body, once)
     names = named(body, shared, known)
     final: dict[str, Value] = {provisional: Name(name) for provisional, name in names.items()}
     pairs = [(names[name], _with(value, final)) for name, value in shared.items()]
@@ -81,7 +61,7 @@ def written(layout: Layout, solution: Solution, free: FloatArray, *, group: bool
     scale = layout.source.scale
     assert scale is not None
     floor = -float(known["height"]) * scale.cells_per_unit / 2
-    result = placed_source((*header, *changed_lines(body, lambda line: _changed(line, final))))
+    result = placed_source((*header, *_changed(body, final)))
     return replace(result, scale=replace(scale, floor=floor), unit=layout.source.unit)
 
 
@@ -115,15 +95,16 @@ def _expressions(layout: Layout, solution: Solution, at_free: FloatArray) -> tup
 def _with(value: Value, table: Mapping[str, Value]) -> Value:
     """A number or an expression with names replaced; a sum has each name and number once."""
     new = replaced(value, lambda each: table.get(each.name, each) if isinstance(each, Name) else each)
-    if not isinstance(new, Binary):
+    if not isinstance(new, Expression):
         return new
     form = value_at(new, {name: Linear.of(name) for name in names_in(new)})
     terms = sorted(form.factors, key=lambda term: term[1] < 0)
     return combined(to_float32(form.constant), [(Name(name), factor) for name, factor in terms])
 
 
-def _changed(line: Line, table: Mapping[str, Value]) -> Line:
-    return changed_values(line, lambda value: _with(value, table))
+def _changed(lines: tuple[Line, ...], table: Mapping[str, Value]) -> tuple[Line, ...]:
+    """Lines with names replaced."""
+    return changed_lines(lines, lambda line: changed_values(line, lambda value: _with(value, table)))
 
 
 def _assignments(named: list[tuple[str, Value]]) -> Iterator[Assignment]:
@@ -136,39 +117,3 @@ def _assignments(named: list[tuple[str, Value]]) -> Iterator[Assignment]:
         line.append(pair)
     if line:
         yield Assignment(tuple(line))
-
-
-def _simplified(line: Line) -> Line:
-    """The line without redundant keywords."""
-    arguments = dict(line.keywords) if isinstance(line, Part | Group) else {}
-    if isinstance(line, Group) and "last" in arguments:
-        first = next(inner for inner in Source(line.body).walk() if isinstance(inner, Part))
-        return replace(line, keywords=(("last", _without(arguments["last"], _start(first))),))
-    if not isinstance(line, Part):
-        return line
-    defaults = {"tilt", "lean", "turn"}  # what can be left out where it is zero
-    for axis, words in enumerate(AXES):
-        sized = words.size in arguments or (axis < 2 and line.kind in ROUND and "radius" in arguments)
-        defaults |= {words.low if axis == 2 else words.offset} if sized else {words.low, words.high, words.offset}
-    keywords: list[tuple[str, Argument]] = []
-    for word, argument in line.keywords:
-        if isinstance(argument, Point):
-            argument = _without(argument, {"x": 0.0, "y": 0.0, "bottom": 0.0} if word == "start" else _start(line))
-        if argument != 0 or word not in defaults:
-            keywords.append((word, argument))
-    radius = dict(keywords).get("radius")
-    if line.kind == "taper" and isinstance(radius, tuple) and radius[0] == radius[1]:
-        return replace(line, kind="rod", keywords=tuple((w, radius[0] if w == "radius" else v) for w, v in keywords))
-    return replace(line, keywords=tuple(keywords))
-
-
-def _start(part: Part) -> dict[str, Argument]:
-    """The keywords of the point that a part starts from, or of its box."""
-    start = dict(part.keywords).get("start")
-    return dict(start.keywords if isinstance(start, Point) else part.keywords)
-
-
-def _without(point: Argument, known: Mapping[str, Argument]) -> Point:
-    """A point without keywords whose values are known; with all of them if none is left."""
-    assert isinstance(point, Point)
-    return Point(tuple(pair for pair in point.keywords if known.get(pair[0]) != pair[1]) or point.keywords)

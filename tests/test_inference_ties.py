@@ -23,7 +23,7 @@ from shapeprog.inference.ties.expressions import solved
 from shapeprog.inference.ties.groups import grouped
 from shapeprog.inference.ties.layout import Layout, Slot
 from shapeprog.inference.ties.model import Closeness, Model
-from shapeprog.inference.ties.relations import Meeting, Relation, worthwhile
+from shapeprog.inference.ties.relations import Relation, worthwhile
 from shapeprog.inference.ties.settings import TIES
 from shapeprog.inference.ties.tying import between_ends, tie
 from shapeprog.language.ast import Assignment, Comment, Fault, Group, Line, Part, values
@@ -179,9 +179,9 @@ def test_no_relation_moves_a_number_below_its_least():
 
 
 def test_parts_that_meet_along_one_axis_do_not_along_another():
-    meetings = [frozenset({Meeting(0, 1, axis)}) for axis in (0, 2)]
+    meetings = [frozenset({(0, 1, axis)}) for axis in (0, 2)]
     first, second = (Relation(np.eye(2)[k], 1.0, meeting) for k, meeting in enumerate(meetings))
-    other = Relation(np.eye(2)[1], 1.0, frozenset({Meeting(1, 2, 2)}))
+    other = Relation(np.eye(2)[1], 1.0, frozenset({(1, 2, 2)}))
     start, low, none = np.array([0.01, 0.02]), np.full(2, -np.inf), np.zeros((0, 2))
     rows, _ = worthwhile([first, second], start, np.eye(2), 1.0, fixed=none, low=low)
     assert rows.tolist() == [[1, 0]]  # else they would touch along an edge

@@ -24,9 +24,6 @@ from shapeprog.inference.ties.settings import TIES
 from shapeprog.language.placement import AXES
 from shapeprog.space import Array, FloatArray
 
-SHIFTS = np.array([0.0, 0.5, 1.0])
-"""By how much of what the whole grows an anchor moves, seen from the low side."""
-
 
 class _Motion:
     """How the boxes of the N primitives of a program move with its numbers (P,), about where they are; all faces are
@@ -96,10 +93,10 @@ class _AxisAnchors:
         count = len(self.elements)
         most = max(map(len, self.choices), default=1)
         self.costs = np.full((count, most), np.inf)
-        self.shifts = np.zeros((count, most, 2))  # how low and high coordinates move with each choice
+        self.shifts = np.zeros((count, most, 2))  # share of the growth of the whole by which low and high ends move
         for k, (element, choices) in enumerate(zip(self.elements, self.choices, strict=True)):
             self.costs[k, : len(choices)] = [self._unary(element, anchors) for anchors in choices]
-            self.shifts[k, : len(choices)] = [(SHIFTS[ends[0]], SHIFTS[ends[-1]]) for ends in choices]
+            self.shifts[k, : len(choices)] = [(ends[0] / HIGH, ends[-1] / HIGH) for ends in choices]
         slopes = motion.by_element(self.elements, motion.end_slopes[:, axis])  # (2, N, K, 2)
         self.slopes = slopes.reshape(*slopes.shape[:2], -1).swapaxes(1, 2)  # (2, 2 K, N)
         # Mirror images move with the high side of the whole while all coordinates stay.

@@ -15,17 +15,14 @@ from shapeprog.language.ast import Group, Keywords, Part, Point
 from shapeprog.language.expression import value_at
 from shapeprog.language.placement import AXES, POINTS, SIZES, coordinate_of, interval_of
 
-LOW, MIDDLE, HIGH = 0, 1, 2
-"""Anchors."""
+LOW, MIDDLE, HIGH = 0, 1, 2  # anchors
+ALIGNED = 1e-5  # cells by which coordinates may differ that are the same
 
 Anchors = tuple[int, ...]
 """The anchors of both ends of an interval, or of a single coordinate."""
 
 Key = tuple[int, str, int]
 """Line, key and axis of an element."""
-
-ALIGNED = 1e-5
-"""Cells by which coordinates may differ that are the same."""
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,6 @@ from shapeprog.inference.fit.tunable import DEGREES
 from shapeprog.inference.ties.layout import Slot
 from shapeprog.inference.ties.model import Model, boxes_of
 from shapeprog.inference.ties.settings import TIES
-from shapeprog.language.ast import Part
 from shapeprog.language.parameters import to_float32
 from shapeprog.library.independence import independent
 from shapeprog.space import Array, FloatArray
@@ -30,8 +29,7 @@ from shapeprog.space import Array, FloatArray
 ELIMINATED = {"clearance": 0, "offset": 0, "edge": 1, "radius": 2, "size": 3, "length": 3, "angle": 3, "extent": 9}
 """Which kinds of numbers rather follow from others: small ones first."""
 
-NOTHING = 1e-7
-"""Factors up to this are zero."""
+NOTHING = 1e-7  # factors up to this are zero
 
 
 @dataclass(frozen=True)
@@ -165,8 +163,7 @@ class _Contacts:
     def __init__(self, model: Model, numbers: FloatArray) -> None:
         self.model, self.numbers = model, numbers
         scene = model.scene(numbers)
-        parts = np.array([k for k, line in enumerate(model.layout.lines) if isinstance(line, Part)])
-        self.line = parts[scene.block.numpy()]
+        self.line = np.array(model.layout.parts)[scene.block.numpy()]
         self.first, self.second = touching(boxes_of(scene), TIES.touch)
         self.pieces = self._pieces(np.ones(len(self.first), bool))
 

@@ -123,11 +123,15 @@ def _divided(loop: Group, numbers: dict[str, float]) -> Group:
 
 def _in_boxes(lines: tuple[Line, ...], numbers: dict[str, float]) -> tuple[Line, ...]:
     """Parts and loops with equal clearances moved into boxes, while that saves words."""
+
+    def place(side: tuple[str, Argument]) -> int:
+        return BOX.index(side[0])
+
     while True:
         sides = {line: _sides(line) for line in lines if not isinstance(line, Group) or line.kind != "inside"}
         frames = {one & other for one, other in combinations(sides.values(), 2)} - {frozenset()}
         best, saved = lines, 0
-        for frame in sorted((tuple(sorted(frame, key=_order)) for frame in frames), key=str):
+        for frame in sorted((tuple(sorted(frame, key=place)) for frame in frames), key=str):
             inner = {line: _inside(line, frame) for line in sides}
             members = [
                 line for line in sides
@@ -141,10 +145,6 @@ def _in_boxes(lines: tuple[Line, ...], numbers: dict[str, float]) -> tuple[Line,
         if not saved:
             return lines
         lines = best
-
-
-def _order(side: tuple[str, Argument]) -> int:
-    return BOX.index(side[0])
 
 
 def _sides(line: Line) -> frozenset[tuple[str, Argument]]:
@@ -183,15 +183,12 @@ def _same(line: Line, other: Line, numbers: dict[str, float]) -> bool:
     """Whether two lines draw the same statements whatever the numbers are: tried with irregular ones."""
     random = np.random.default_rng(0)
     changed = {name: value * random.uniform(0.9, 1.1) for name, value in numbers.items()}
-    one, two = (_drawn(each, numbers, changed) for each in (line, other))
-    return one is not None and two is not None and one.shape == two.shape and np.allclose(one, two)
-
-
-def _drawn(line: Line, numbers: dict[str, float], changed: dict[str, float]) -> FloatArray | None:
-    """The values of all statements in cells that a line draws with changed numbers; none if it cannot be drawn."""
-    source = placed_source((Assignment(tuple(numbers.items())), line))
-    try:
-        nodes = Program(symbolic(source, changed)).walk()
-    except ShapeProgError:
-        return None
-    return np.array([float(value) for node in nodes for value in node.values])
+    drawn: list[FloatArray] = []  # the values of all statements in cells
+    for each in (line, other):
+        source = placed_source((Assignment(tuple(numbers.items())), each))
+        try:
+            nodes = Program(symbolic(source, changed)).walk()
+        except ShapeProgError:
+            return False
+        drawn.append(np.array([float(value) for node in nodes for value in node.values]))
+    return drawn[0].shape == drawn[1].shape and np.allclose(drawn[0], drawn[1])

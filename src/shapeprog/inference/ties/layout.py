@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -68,8 +68,10 @@ class Layout:
         Width, depth and height of the whole, by name and in this order.
     filling
         The lines of cylinders that are nearly as wide as the whole, which then has one diameter.
-    loops_around
-        For every line the numbers of the loops around it.
+    parts, loops_around
+        The numbers of the lines that are parts, and for every line those of the loops around it.
+    top
+        For every line the index of the one at the top level that it is inside of.
     elements
         All elements, by line, key and axis.
     slots, names
@@ -88,7 +90,9 @@ class Layout:
         self.sizes: dict[str, float] = source.evaluated_numbers()
         tree = changed_lines([line for line in source.lines if isinstance(line, Part | Group)], self._with_radius)
         self.lines = [line for line in Source(tree).walk() if isinstance(line, Part | Group)]
-        self.filling = {index for index, line in enumerate(self.lines) if isinstance(line, Part) and self._fills(line)}
+        self.top = [index for index, line in enumerate(tree) for _ in Source((line,)).walk()]
+        self.parts = [index for index, line in enumerate(self.lines) if isinstance(line, Part)]
+        self.filling = {index for index in self.parts if self._fills(self.lines[index])}  # type: ignore[arg-type]
         if self.filling:
             self.sizes["depth"] = self.sizes["width"]
         self.extents = tuple(float(self.sizes[size]) for size in SIZES)
@@ -115,15 +119,9 @@ class Layout:
             unit=source.unit,
         )
 
-    def lines_of(self, top: Collection[int]) -> set[int]:
-        """The numbers of the lines at the top level with these indices, and of all lines inside of them."""
-        roots = [loops[0] if loops else index for index, loops in enumerate(self.loops_around)]
-        selected = {root for index, root in enumerate(dict.fromkeys(roots)) if index in top}
-        return {index for index, root in enumerate(roots) if root in selected}
-
     def first(self, loop: int) -> tuple[int, str]:
         """The first part inside of a loop, and the key of its elements: a row is measured by it."""
-        index = next(k for k in range(loop, len(self.lines)) if isinstance(self.lines[k], Part))
+        index = next(index for index in self.parts if index > loop)
         return index, "start" if "start" in dict(self.lines[index].keywords) else ""
 
     def row(self, form: Linear) -> FloatArray:

@@ -7,6 +7,7 @@ be the negative of another.  Those whose price in fit is below that of the numbe
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
 from itertools import chain, combinations
 from typing import NamedTuple
@@ -21,16 +22,7 @@ from shapeprog.language.ast import Part
 from shapeprog.library.independence import beside
 from shapeprog.space import FloatArray
 
-HOLDS = 1e-6
-"""Deviation up to which a relation holds."""
-
-
-class Meeting(NamedTuple):
-    """Two lines whose parts meet face to face along an axis."""
-
-    first: int
-    second: int
-    axis: int
+HOLDS = 1e-6  # deviation up to which a relation holds
 
 
 class Relation(NamedTuple):
@@ -43,14 +35,14 @@ class Relation(NamedTuple):
     trust
         Price of the number that it saves, as a multiple of the usual one.
     meetings
-        The lines that meet where it holds.
+        Pairs of lines whose parts meet face to face where it holds, each with the axis.
     limit
         Largest deviation, in cells or degrees, with which it is considered.
     """
 
     row: FloatArray
     trust: float
-    meetings: frozenset[Meeting] = frozenset()
+    meetings: frozenset[tuple[int, int, int]] = frozenset()
     limit: float = TIES.within
 
 
@@ -162,11 +154,8 @@ def worthwhile(
 
 def _edges(meetings: list[tuple[int, int, int, int]], holds: npt.NDArray[np.bool_]) -> int:
     """How many pairs of lines meet along more than one axis, by relations that hold."""
-    axes: dict[tuple[int, int], set[int]] = {}
-    for index, first, second, axis in meetings:
-        if holds[index]:
-            axes.setdefault((first, second), set()).add(axis)
-    return sum(len(along) > 1 for along in axes.values())
+    met = {(first, second, axis) for index, first, second, axis in meetings if holds[index]}
+    return sum(count > 1 for count in Counter((first, second) for first, second, _ in met).values())
 
 
 def _of_numbers(layout: Layout, numbers: FloatArray) -> Iterator[Relation]:
@@ -280,7 +269,7 @@ def _pair(layout: Layout, face: _Face, other: _Face, touching: set[tuple[int, in
             return
         meet = face.facing * other.facing == -1
         if touches and (meet or all(points) or bool(face.facing) != bool(other.facing)):
-            yield Relation(row, TIES.contact, frozenset([Meeting(lines[0], lines[1], axis)] if meet else ()))
+            yield Relation(row, TIES.contact, frozenset([(lines[0], lines[1], axis)] if meet else ()))
         elif face.facing == other.facing and (single or touches):
             yield Relation(row, TIES.equal if single else TIES.equal / 2)
 

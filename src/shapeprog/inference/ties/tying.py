@@ -29,7 +29,7 @@ from shapeprog.inference.ties.model import Closeness, Misfit, Model
 from shapeprog.inference.ties.relations import relations, worthwhile
 from shapeprog.inference.ties.settings import TIES
 from shapeprog.inference.ties.text import written
-from shapeprog.language.ast import Fault, Part, Source
+from shapeprog.language.ast import Fault, Source
 from shapeprog.language.convert import placed
 from shapeprog.language.evaluate import evaluated
 from shapeprog.language.merging import merged
@@ -99,13 +99,11 @@ class _Ties:
         joints = find_joints(scene, floor=-1e6)  # that no part touches: on the floor, clearances are zero
         self.layout = layout = Layout(source, anchors_of(flat))
         self.model = Model(layout)
-        lines = layout.lines_of(held)
-        self.fixed = np.array([slot.line in lines for slot in layout.slots])
+        self.fixed = np.array([slot.line >= 0 and layout.top[slot.line] in held for slot in layout.slots])
         minimum = np.where(self.fixed, 1e6, TIES.known if known else 0.0)
         self.misfit = Misfit(self.model, evidence, joints, minimum, seed)
         self.decimals = CELLS if known else CELLS + 1  # what is inferred is rounded again
-        self.parts = parts = [k for k, line in enumerate(layout.lines) if isinstance(line, Part)]
-        pairs = scene.block[torch.stack([joints.first, joints.second], 1)].tolist()
+        parts, pairs = layout.parts, scene.block[torch.stack([joints.first, joints.second], 1)].tolist()
         self.touching = {(parts[min(pair)], parts[max(pair)]) for pair in pairs}
         self.loose = self._loose(self.model.numbers)
 
@@ -128,7 +126,7 @@ class _Ties:
     def _loose(self, numbers: FloatArray) -> set[int]:
         """The lines with parts outside the largest connected solid."""
         scene = self.model.scene(numbers)
-        return {self.parts[block] for block in scene.block[pieces_of_parts(scene) > 0].tolist()}
+        return {self.layout.parts[block] for block in scene.block[pieces_of_parts(scene) > 0].tolist()}
 
     def _solved(self, price: float, fixed: Array) -> tuple[Solution, FloatArray]:
         """The free numbers at a price of a number, and all numbers (P,); some (P,) are in no relation."""

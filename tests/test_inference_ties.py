@@ -22,7 +22,7 @@ from shapeprog.inference.ties.anchors import anchors_of
 from shapeprog.inference.ties.expressions import solved
 from shapeprog.inference.ties.groups import grouped
 from shapeprog.inference.ties.layout import Layout, Slot
-from shapeprog.inference.ties.model import Closeness, Model
+from shapeprog.inference.ties.model import Model, closeness
 from shapeprog.inference.ties.relations import Relation, worthwhile
 from shapeprog.inference.ties.settings import TIES
 from shapeprog.inference.ties.tying import between_ends, tie
@@ -416,10 +416,9 @@ def test_an_overhang_that_is_the_same_on_all_sides_is_one_number():
 
 def test_surfaces_are_close_to_themselves_and_the_less_the_more_of_them_is_elsewhere():
     program = sp.parse("box(at=(-6, -6, -6), size=(12, 12, 12))")
-    closeness = Closeness(evidence_of_program(program), 0)
-    found = [
-        closeness.of(unroll(sp.parse(f"box(at=(-6, -6, -6), size=({height}, 12, 12))"))) for height in (12, 10, 6, 0.4)
-    ]
+    evidence = evidence_of_program(program)
+    boxes = (sp.parse(f"box(at=(-6, -6, -6), size=({height}, 12, 12))") for height in (12, 10, 6, 0.4))
+    found = [closeness(unroll(box), evidence, 0) for box in boxes]
     assert found[0] == pytest.approx(1, abs=1e-3)
     assert found == sorted(found, reverse=True)
     side, base = (
@@ -428,7 +427,7 @@ def test_surfaces_are_close_to_themselves_and_the_less_the_more_of_them_is_elsew
     )  # of a box that is 2 lower the top is nowhere, and a sixth of the target's sides and its top
     precision, recall = (4 * side + base) / (4 * side + 2 * base), (4 * side + base) / (6 * base)
     assert found[1] == pytest.approx(2 * precision * recall / (precision + recall), abs=0.03)
-    assert closeness.of(unroll(sp.parse("box(at=(8, 8, 8), size=(1, 1, 1))"))) == 0
+    assert closeness(unroll(sp.parse("box(at=(8, 8, 8), size=(1, 1, 1))")), evidence, 0) == 0
 
 
 @pytest.mark.parametrize("price", [1.0, 1000.0])
@@ -443,9 +442,8 @@ def test_ties_cost_little_of_the_surface_whatever_a_number_is_worth(price: float
         """)
     )
     evidence = evidence_of_program(program)
-    closeness = Closeness(evidence, 0)
     tied = tie(program, evidence, price=price)
-    assert closeness.of(unroll(program)) - closeness.of(unroll(tied)) <= 0.03
+    assert closeness(unroll(program), evidence, 0) - closeness(unroll(tied), evidence, 0) <= 0.03
 
 
 def test_copies_that_are_off_their_line_by_hundredths_lie_in_it():

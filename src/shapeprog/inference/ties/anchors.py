@@ -108,11 +108,11 @@ class _AxisAnchors:
         low, high = motion.ends[:, axis]
         self.share, self.long = motion.ends[:, axis] / extent, high - low >= TIES.spanning * extent
         reach, near = TIES.reach * extent, (1 - TIES.beyond) * extent / 2
-        self.reaches = np.stack([low <= low.min() + reach, high >= high.max() - reach])
+        reaches = np.stack([low <= low.min() + reach, high >= high.max() - reach])
         beyond = np.stack([high <= near, low >= extent - near])
         if axis == 2:
-            beyond = np.stack([self.reaches[0], high >= high.max() - TIES.below * extent])
-        self.near = self.reaches | beyond
+            beyond = np.stack([reaches[0], high >= high.max() - TIES.below * extent])
+        self.weights = np.where(reaches, TIES.reaching, TIES.side) * (reaches | beyond)  # of faces that do not move
         self.overlap = self._overlaps(low, high)
         moves = (np.abs(slopes).max((0, 3)) > 0).astype(int)  # (N, K)
         shared = moves.T @ moves + moves[motion.first].T @ moves[motion.second]
@@ -158,8 +158,8 @@ class _AxisAnchors:
         """The anchors of every element."""
         starts = [self.costs.argmin(1)]
         for side in (LOW, HIGH):  # all faces measured from one side
-            one_sided = ([set(choice) == {side} for choice in choices] for choices in self.choices)
-            starts.append(np.array([flags.index(True) if any(flags) else 0 for flags in one_sided], np.int64))
+            one_sided = [[set(anchors) == {side} for anchors in choices] for choices in self.choices]
+            starts.append(np.array([int(np.argmax(flags)) for flags in one_sided], np.int64))  # else the first
         best = min((self._descent(start) for start in starts), key=lambda result: round(result[0], 6))
         return [choices[k] for choices, k in zip(self.choices, best[1], strict=True)]
 
@@ -198,8 +198,7 @@ class _AxisAnchors:
         stays = np.abs(low - np.clip(low, -0.13, np.maximum(self.share[0], 0) + 0.13)) > 1e-9
         lags = np.abs(high - np.clip(high, np.minimum(self.share[1], 1) - 0.13, 1.13)) > 1e-9
         rigid = self.long & (high - low < self.share[1] - self.share[0] - 0.5)
-        weights = np.where(self.reaches, TIES.reaching, TIES.side) * self.near
-        per_copy = stays @ weights[0] + lags @ weights[1] + TIES.rigid * rigid.sum(1)
+        per_copy = stays @ self.weights[0] + lags @ self.weights[1] + TIES.rigid * rigid.sum(1)
         growth = TIES.growth * self.extent
         below, above = motion.ends[:, self.axis]
         grown = self._overlaps(below + growth * low, above + growth * high)

@@ -10,7 +10,7 @@ import numpy as np
 
 from shapeprog.inference.ties.elements import ALIGNED, HIGH, LOW, MIDDLE, Anchors, Element, Key, ends_of, interval
 from shapeprog.inference.ties.settings import TIES
-from shapeprog.language.ast import Argument, Assignment, Group, Keywords, Line, Part, Point, Source, changed_lines
+from shapeprog.language.ast import Argument, Assignment, Group, Line, Part, Point, Source, changed_lines
 from shapeprog.language.evaluate import placed_source
 from shapeprog.language.expression import Binary, Linear, Name, Value
 from shapeprog.language.placement import AXES, POINTS, ROUND, SIZES
@@ -223,13 +223,11 @@ class Layout:
         return replace(line, keywords=(*keywords, *plain))
 
     def _group(self, index: int, line: Group) -> Group:
-        arguments = dict(line.keywords)
         if line.kind == "translate":
             return replace(line, kind="row", keywords=(("last", self._point(index, "last")),))
-        keywords: Keywords = self._point(index, "plane" if line.kind == "mirror" else "centre").keywords
-        if "step" in arguments:
-            keywords = (*keywords, ("step", self._plain(index, "step", arguments["step"])))
-        return replace(line, keywords=keywords)
+        place = self._point(index, "plane" if line.kind == "mirror" else "centre").keywords
+        step = [(word, self._plain(index, word, argument)) for word, argument in line.keywords if word == "step"]
+        return replace(line, keywords=(*place, *step))
 
     def _placed(self, element: Element) -> Iterator[tuple[str, Argument]]:
         """The keywords of an element: clearances, size and offset, by its anchors."""

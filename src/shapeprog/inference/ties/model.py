@@ -130,33 +130,20 @@ class Misfit:
         return numbers
 
 
-class Closeness:
-    """How much of the surface of a program lies near that of a target, and the other way round.
+def closeness(scene: Scene, evidence: Evidence, seed: int) -> float:
+    """The F-score of the surfaces of a scene and of a target: how much of each lies near the other.
 
     The squared misfit assumes that points are assigned to the right parts.  For thin parts and sheets they may not be;
-    the misfit can then fall while a part leaves its surface.
-
-    Parameters
-    ----------
-    evidence
-        The target.
-    seed
-        Of the points that are compared, and of the samples of programs: always the same.
+    the misfit can then fall while a part leaves its surface.  The points of both are the same for the same seed.
     """
-
-    def __init__(self, evidence: Evidence, seed: int) -> None:
-        surface = evidence.surface
-        self.seed, self.reach = seed, TIES.near * float(np.linalg.norm(np.ptp(surface, 0)))
-        indices = np.random.default_rng(seed).integers(0, len(surface), TIES.points)
-        self._points, self._tree = torch.from_numpy(surface[indices]), cKDTree(surface)
-
-    def of(self, scene: Scene) -> float:
-        """The F-score of the two surfaces."""
-        recall = float((signed_distance(scene, self._points).abs() <= self.reach).double().mean())
-        sample = sample_surface(scene, TIES.points, torch.Generator().manual_seed(self.seed))
-        away = self._tree.query(sample.points.numpy(), distance_upper_bound=self.reach)[0]
-        precision = float(np.isfinite(away).mean())
-        return 2 * precision * recall / (precision + recall) if precision + recall else 0.0
+    surface = evidence.surface
+    reach = TIES.near * float(np.linalg.norm(np.ptp(surface, 0)))
+    points = torch.from_numpy(surface[np.random.default_rng(seed).integers(0, len(surface), TIES.points)])
+    recall = float((signed_distance(scene, points).abs() <= reach).double().mean())
+    sample = sample_surface(scene, TIES.points, torch.Generator().manual_seed(seed))
+    away = cKDTree(surface).query(sample.points.numpy(), distance_upper_bound=reach)[0]
+    precision = float(np.isfinite(away).mean())
+    return 2 * precision * recall / (precision + recall) if precision + recall else 0.0
 
 
 def boxes_of(scene: Scene) -> OrientedBoxes:

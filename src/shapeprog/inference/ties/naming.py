@@ -48,11 +48,9 @@ def named(lines: Sequence[Line], wanted: Mapping[str, Value], numbers: dict[str,
     numbers
         What all names evaluate to.
     """
-    alone: dict[str, list[Use]] = {name: [] for name in wanted}
-    in_sums: dict[str, list[Use]] = {name: [] for name in wanted}
-    for use, value in (every := [*_uses(lines)]):
-        for name in {*names_in(value)} & wanted.keys():
-            (alone if isinstance(value, Name) else in_sums)[name].append(use)
+    every = [*_uses(lines)]
+    alone = {name: [use for use, value in every if value == Name(name)] for name in wanted}
+    in_sums = {name: [use for use, value in every if name in names_in(value)] for name in wanted}  # used if not alone
     for name, value in reversed([*wanted.items()]):
         for inner in {*names_in(value)} & wanted.keys():
             in_sums[inner] += alone[name] or in_sums[name]

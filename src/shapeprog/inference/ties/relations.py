@@ -191,7 +191,10 @@ def _of_numbers(layout: Layout, numbers: FloatArray) -> Iterator[Relation]:
 
 def _comparable(layout: Layout, slot: Slot, other: Slot, larger: float) -> bool:
     """Whether two sizes measure the same quantity of parts of one role, or of two sections."""
-    same = slot.line == other.line or _role(layout, slot.line) == _role(layout, other.line)
+    one, two = layout.lines[slot.line], layout.lines[other.line]
+    assert isinstance(one, Part)  # loops have no sizes
+    assert isinstance(two, Part)
+    same = (one.role or one.kind) == (two.role or two.kind)
     sections = same or (_is_section(layout, slot) and _is_section(layout, other))
     return (sections and larger < TIES.section) or (same and slot.axis == other.axis)
 
@@ -200,12 +203,6 @@ def _is_section(layout: Layout, slot: Slot) -> bool:
     """Whether a size is that of a cross-section: not the longest of its part."""
     box = [layout.elements.get((slot.line, "", axis)) for axis in range(3)]
     return any(element is None or element.high - element.low > slot.value + TIES.rounding for element in box)
-
-
-def _role(layout: Layout, line: int) -> str:
-    part = layout.lines[line]
-    assert isinstance(part, Part)  # groups have no sizes
-    return part.role or part.kind
 
 
 def _of_faces(layout: Layout, numbers: FloatArray, touching: set[tuple[int, int]]) -> Iterator[Relation]:

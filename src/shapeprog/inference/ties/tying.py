@@ -25,7 +25,7 @@ from shapeprog.inference.surface.evidence import Evidence
 from shapeprog.inference.ties.anchors import anchors_of
 from shapeprog.inference.ties.expressions import Solution, carried, solved
 from shapeprog.inference.ties.layout import Layout
-from shapeprog.inference.ties.model import Closeness, Misfit, Model
+from shapeprog.inference.ties.model import Misfit, Model, closeness
 from shapeprog.inference.ties.relations import relations, worthwhile
 from shapeprog.inference.ties.settings import TIES
 from shapeprog.inference.ties.text import written
@@ -75,15 +75,14 @@ def tie(
         assert source is not None
         ties = _Ties(source, evidence, seed, known=known, held=held)
         price *= TIES.known_price if known else TIES.price
-        closeness = None if known else Closeness(evidence, seed)
-        before = closeness.of(unroll(plain)) if closeness else 0.0
+        before = 0.0 if known else closeness(unroll(plain), evidence, seed)
         tied = evaluated(source)
         for attempt in range(TIES.attempts):
             try:
                 tied = ties.tied(price / TIES.cheaper**attempt)
             except Fault:  # relations left a part without length
                 continue
-            if closeness is None or before - closeness.of(unroll(tied)) <= TIES.lost:
+            if known or before - closeness(unroll(tied), evidence, seed) <= TIES.lost:
                 break
         if progress:
             progress("tying numbers", 1.0)

@@ -88,8 +88,3 @@ def ends_of(
     start = ends_of(line, "start", axis, numbers, forms)[0] if key in ("through", "end") else None
     coordinate = coordinate_of(axis, given, *sides, start)
     return coordinate, coordinate
-
-
-def interval(part: Part, axis: int, numbers: Mapping[str, float]) -> tuple[float, float]:
-    """The low and high coordinate of a part from the low side of the whole; those of its start if it has one."""
-    return ends_of(part, "start" if "start" in dict(part.keywords) else "", axis, numbers)

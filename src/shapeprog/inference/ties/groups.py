@@ -10,7 +10,7 @@ from itertools import combinations
 import numpy as np
 
 from shapeprog.errors import ShapeProgError
-from shapeprog.inference.ties.elements import interval
+from shapeprog.inference.ties.elements import ends_of
 from shapeprog.inference.ties.settings import TIES
 from shapeprog.language.ast import Argument, Assignment, Group, Keywords, Line, Part, Point, Source, changed_lines
 from shapeprog.language.convert.forms import cost
@@ -105,7 +105,7 @@ def _divided(loop: Group, numbers: dict[str, float]) -> Group:
             return loop
         count, clearances = 2.0, dict.fromkeys(words[:2], given[0])
         sized = isinstance(size, float) or [*names_in(given[-1])] == [SIZES[axis]]  # type: ignore[arg-type]
-    low, high = interval(part, axis, numbers)
+    low, high = ends_of(part, "", axis, numbers)
     if not sized or not isinstance(count, float | int) or high - low < TIES.divided:
         return loop
     occupied = sum(value_at(clearance, numbers) for clearance in clearances.values()) + count * (high - low)  # type: ignore[arg-type]

@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from shapeprog.inference.ties.elements import ALIGNED, HIGH, LOW, MIDDLE, Anchors, Element, Key, ends_of, interval
+from shapeprog.inference.ties.elements import ALIGNED, HIGH, LOW, MIDDLE, Anchors, Element, Key, ends_of
 from shapeprog.inference.ties.settings import TIES
 from shapeprog.language.ast import Argument, Assignment, Group, Line, Part, Point, Source, changed_lines
 from shapeprog.language.evaluate import placed_source
@@ -153,7 +153,7 @@ class Layout:
         arguments = dict(line.keywords) if isinstance(line, Part) else {}
         if not isinstance(line, Part) or line.kind not in ROUND or "start" in arguments:
             return line
-        ends = (interval(line, axis, self.sizes) for axis in range(2))
+        ends = (ends_of(line, "", axis, self.sizes) for axis in range(2))
         radius = arguments.get("radius", min(high - low for low, high in ends) / 2)
         left_out = {*SIZES[:2], "radius", *((*AXES[0], *AXES[1]) if self._fills(line) else ())}
         keywords = tuple(pair for pair in line.keywords if pair[0] not in left_out)
@@ -161,11 +161,12 @@ class Layout:
 
     def _fills(self, part: Part) -> bool:
         """Whether a cylinder is nearly as wide as the whole."""
+        if part.kind != "cylinder":
+            return False
         width, depth = self.sizes["width"], self.sizes["depth"]
-        (left, right), (front, rear) = (interval(part, axis, self.sizes) for axis in range(2))
+        (left, right), (front, rear) = (ends_of(part, "", axis, self.sizes) for axis in range(2))
         off = max(abs(left + right - width) / 2, abs(front + rear - width) / 2, abs(width - depth))
-        large = min(right - left, rear - front) > TIES.fills * width
-        return part.kind == "cylinder" and large and off < TIES.off_middle * width
+        return min(right - left, rear - front) > TIES.fills * width and off < TIES.off_middle * width
 
     def _elements(self, index: int) -> Iterator[Element]:
         """The elements of a line."""
@@ -185,9 +186,9 @@ class Layout:
                         yield Element(index, key, axis, "coordinate", *ends)
             elif line.kind == "translate":
                 if step := keywords.get("xyz"[axis]):
-                    first = next(inner for inner in Source((line,)).walk() if isinstance(inner, Part))
+                    first, key = self.first(index)
                     away = max(1, round(float(line.count)) - 1) * float(step)  # type: ignore[arg-type]
-                    low, high = interval(first, axis, self.sizes)
+                    low, high = ends_of(self.lines[first], key, axis, self.sizes)
                     yield Element(index, "last", axis, "coordinate", low + away, high + away)
             elif not keywords.keys().isdisjoint(words) or (line.kind == "rotate" and axis < 2):
                 key = "plane" if line.kind == "mirror" else "centre"

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection
-from dataclasses import replace
 
 import numpy as np
 import torch
@@ -29,12 +28,12 @@ from shapeprog.inference.ties.model import Misfit, Model, closeness
 from shapeprog.inference.ties.relations import relations, worthwhile
 from shapeprog.inference.ties.settings import TIES
 from shapeprog.inference.ties.text import written
-from shapeprog.language.ast import Fault, Source
+from shapeprog.language.ast import Draw, Fault, Line, Source, changed_lines
 from shapeprog.language.convert import placed
 from shapeprog.language.evaluate import evaluated
 from shapeprog.language.merging import merged
 from shapeprog.language.parameters import to_float32
-from shapeprog.language.program import Draw, Loop, Node, Program
+from shapeprog.language.program import Program
 from shapeprog.language.unroll import unroll
 from shapeprog.space import Array, FloatArray
 
@@ -151,24 +150,20 @@ def between_ends(program: Program) -> Program:
     A board is given by its lower edge and its angle; its upper edge is not linear in these numbers, so nothing could be
     tied to it.
     """
-    return Program(tuple(_between_ends(node) for node in program.body))
+    return Program(changed_lines(program.body, _between_ends))  # type: ignore[arg-type]
 
 
-def _between_ends(node: Node) -> Node:
-    if isinstance(node, Loop):
-        return replace(node, body=tuple(_between_ends(inner) for inner in node.body))
-    if node.name != "board" or abs(node.values[-1]) < TIES.leaning:
+def _between_ends(node: Line) -> Line:
+    if not isinstance(node, Draw) or node.name != "board" or abs(node.values[-1]) < TIES.leaning:
         return node
-    up, depth, side, high, deep, wide, tilt = node.values
+    *corner, side, high, deep, wide, tilt = node.values
     middle = side + wide / 2
     if abs(middle) > TIES.board_off and wide > TIES.board_wide:
         return node
     sin, cos = math.sin(math.radians(tilt)), math.cos(math.radians(tilt))
-    upwards, backwards = (cos, sin), (-sin, cos)
-    along, across, length, thick = (
-        (upwards, backwards, high, deep) if high >= deep else (backwards, upwards, deep, high)
-    )
-    start = [coordinate + way * thick / 2 for coordinate, way in zip((up, depth), across, strict=True)]
-    end = [coordinate + way * length for coordinate, way in zip(start, along, strict=True)]
-    values = (*start, middle, *end, middle, thick, wide, 0.0)
+    along, across = np.array([cos, sin]), np.array([-sin, cos])  # up and depth
+    if high < deep:
+        along, across, high, deep = across, along, deep, high
+    start = corner + across * deep / 2
+    values = (*start, middle, *(start + along * high), middle, deep, wide, 0.0)
     return Draw("bar", tuple(to_float32(value) for value in values), node.role)

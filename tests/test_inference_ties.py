@@ -17,7 +17,7 @@ from shapeprog.cli.app import app
 from shapeprog.evaluation.editing import edit_scores
 from shapeprog.geometry.mesh import pieces, union_mesh
 from shapeprog.inference.surface.evidence import evidence_of_program
-from shapeprog.inference.ties import naming, tying
+from shapeprog.inference.ties import tying
 from shapeprog.inference.ties.anchors import anchors_of
 from shapeprog.inference.ties.expressions import solved
 from shapeprog.inference.ties.groups import grouped
@@ -25,6 +25,7 @@ from shapeprog.inference.ties.layout import Layout, Slot
 from shapeprog.inference.ties.model import Model, closeness
 from shapeprog.inference.ties.relations import Relation, worthwhile
 from shapeprog.inference.ties.settings import TIES
+from shapeprog.inference.ties.text import named
 from shapeprog.inference.ties.tying import between_ends, tie
 from shapeprog.language.ast import Assignment, Comment, Fault, Group, Line, Part, values
 from shapeprog.language.convert import placed
@@ -665,7 +666,7 @@ for _ in divide(3, x, rear=0, depth=j):
     door()
 """)
     known = WHOLE | {"a": 1, "b": 1.5, "c": 0.8, "d": 0.4, "e": 9, "f": 2, "g": 3, "h": 4, "i": 5, "j": 0.6}
-    names = naming.named(lines, {name: known[name] for name in "abcdefghij"}, known)
+    names = named(lines, {name: known[name] for name in "abcdefghij"}, known)
     assert names == {
         "a": "leg_inset",  # left-right and front-rear
         "b": "leg_width",  # of a square section
@@ -683,7 +684,7 @@ for _ in divide(3, x, rear=0, depth=j):
 def test_of_two_clearances_of_several_roles_the_larger_is_the_inner_one():
     lines = parsed("leg(left=a, width=2)\nseat(left=a, right=b)\nshelf(left=b, right=c)\ntop(left=c, width=5)\n")
     known = WHOLE | {"a": 2, "b": 3, "c": 1}
-    assert naming.named(lines, {name: known[name] for name in "abc"}, known) == {
+    assert named(lines, {name: known[name] for name in "abc"}, known) == {
         "a": "inset",
         "b": "inner_inset",
         "c": "outer_inset",

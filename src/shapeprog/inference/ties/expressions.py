@@ -60,15 +60,8 @@ class Solution:
 
 
 def solved(slots: list[Slot], rows: FloatArray) -> Solution:
-    """The free numbers for which the text is short.
-
-    Parameters
-    ----------
-    slots
-        The numbers (P,).
-    rows
-        Relations (M, P): independent rows whose products with the numbers are zero.
-    """
+    """The free ones of numbers (P,) for which the text is short, where relations (M, P) hold: the products of these
+    independent rows with the numbers are zero."""
 
     def order(k: int) -> tuple[int, bool, int, int]:
         slot = slots[k]
@@ -112,15 +105,8 @@ def _cost(factors: FloatArray, sizes: Array) -> float:
 
 
 def carried(solution: Solution, model: Model, numbers: FloatArray) -> Solution:
-    """The same numbers as expressions of other free ones, so that fewer parts are separated when a shared one changes.
-
-    Parameters
-    ----------
-    solution
-        Free numbers, and how all numbers follow from them.
-    model, numbers
-        The program, and where its numbers are (P,).
-    """
+    """The numbers (P,) of a program as expressions of other free ones, so that fewer parts are separated when a shared
+    one changes."""
     contacts, slots = _Contacts(model, numbers), model.slots
     factors, values = solution.factors.copy(), solution.values(numbers)
     for z, k in enumerate(solution.free):

@@ -61,15 +61,7 @@ def _without(point: Argument, known: Mapping[str, Argument]) -> Point:
 
 
 def grouped(lines: Sequence[Line], numbers: dict[str, float]) -> tuple[Line, ...]:
-    """The lines of a placed program in fewer words.
-
-    Parameters
-    ----------
-    lines
-        Lines that draw; no groups but loops.
-    numbers
-        The values of all names.
-    """
+    """Lines that draw, without groups but loops, in fewer words, for these values of all names."""
     single: list[Line] = []  # mirrors around one line each
     for line in lines:
         if isinstance(line, Group) and line.kind == "mirror":
@@ -150,18 +142,14 @@ def _in_boxes(lines: tuple[Line, ...], numbers: dict[str, float]) -> tuple[Line,
 def _sides(line: Line) -> frozenset[tuple[str, Argument]]:
     """The named clearances of the parts in a line, with their keywords."""
     words = {word for words in AXES for word in words[:2]}
-    parts = (inner for inner in Source((line,)).walk() if isinstance(inner, Part) or _divides(inner))
-    pairs = (pair for part in parts for pair in part.keywords)  # type: ignore[union-attr]
+    drawn = (inner for inner in Source((line,)).walk() if isinstance(inner, Part | Group))
+    pairs = (pair for inner in drawn if isinstance(inner, Part) or inner.kind == "divide" for pair in inner.keywords)
     return frozenset(pair for pair in pairs if pair[0] in words and isinstance(pair[1], Expression))
-
-
-def _divides(line: Line) -> bool:
-    return isinstance(line, Group) and line.kind == "divide"
 
 
 def _inside(line: Line, frame: Keywords) -> Line:
     """The line in a box with these clearances, which its parts then do not have."""
-    if isinstance(line, Group) and not _divides(line):
+    if isinstance(line, Group) and line.kind != "divide":
         return replace(line, body=tuple(_inside(inner, frame) for inner in line.body))
     assert isinstance(line, Part | Group)
     arguments, keywords = dict(line.keywords), list[tuple[str, Argument]]()

@@ -32,10 +32,8 @@ class Slot:
     ----------
     line, word
         Number of the line, and keyword; that of a point begins with ``start.`` or such.
-    kind
-        The quantity that it measures.
-    axis
-        0, 1 or 2 along an axis, else -1.
+    kind, axis
+        The quantity that it measures, along an axis 0, 1 or 2, else -1.
     anchor
         From where a clearance or offset is measured.
     value

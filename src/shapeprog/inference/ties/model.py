@@ -93,17 +93,8 @@ class Misfit:
         self.prior: FloatArray = np.where(angles, prior * scale**2, prior)
 
     def at(self, numbers: FloatArray, draws: int, *, joined: bool = False) -> tuple[FloatArray, FloatArray]:
-        """Half the slope (P,) and half the curvature (P, P) of the mean squared distance, with the prior.
-
-        Parameters
-        ----------
-        numbers
-            Where the numbers are (P,).
-        draws
-            How often pairs of points are drawn.
-        joined
-            Whether gaps at joints count.
-        """
+        """Half the slope (P,) and half the curvature (P, P) of the mean squared distance where the numbers are these
+        (P,), with the prior, and with gaps at joints if joined; pairs of points are drawn so many times."""
         poses = self.model.poses(numbers)
         systems = [of_target(poses, self.target.pairs(poses.scene, self.generator), self.width) for _ in range(draws)]
         slope, curvature = (sum(parts).numpy() / draws for parts in zip(*systems, strict=True))
@@ -117,8 +108,6 @@ class Misfit:
     def refitted(self, numbers: FloatArray, rows: FloatArray) -> FloatArray:
         """The numbers (P,) of the least misfit that differ from these only so that relations (M, P) hold as before."""
         free = np.linalg.qr(rows.T, mode="complete")[0][:, len(rows) :]  # orthonormal directions
-        if not free.shape[1]:
-            return numbers
         farthest, low = TIES.farthest / self.reach, np.minimum(self.model.low, numbers)
         for _ in range(TIES.steps):
             slope, curvature = self.at(numbers, 1, joined=True)

@@ -28,13 +28,9 @@ FLAT = ("seat", "top", "shelf", "mattress", "cushion", "pillow")
 """Parts whose height is called thickness: the height of a seat is that of its top above the floor."""
 
 FURTHER = {
-    "inset": ("outer", "inner"),
-    "setback": ("outer", "inner"),
-    "clearance": ("outer", "inner"),
-    "drop": ("upper", "lower"),
-    "bottom": ("lower", "upper"),
-    "offset": ("inner", "outer"),
-}
+    "inset": ("outer", "inner"), "setback": ("outer", "inner"), "clearance": ("outer", "inner"),
+    "drop": ("upper", "lower"), "bottom": ("lower", "upper"), "offset": ("inner", "outer"),
+}  # fmt: skip
 """The quantities that measure where a part is, with words for the less and the larger of two of them."""
 
 
@@ -43,12 +39,10 @@ def written(layout: Layout, solution: Solution, free: FloatArray, *, group: bool
 
     Parameters
     ----------
-    layout
-        The program.
-    solution
-        Which of its numbers are free, and how others follow.
+    layout, solution
+        The program, and how its numbers follow from free ones.
     free
-        The values of the free numbers (Z,).
+        The values of these (Z,).
     group
         Whether lines are grouped where that is shorter.
     """

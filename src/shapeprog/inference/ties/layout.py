@@ -11,7 +11,6 @@ import numpy as np
 from shapeprog.inference.ties.elements import ALIGNED, HIGH, LOW, MIDDLE, Anchors, Element, Key, ends_of
 from shapeprog.inference.ties.settings import TIES
 from shapeprog.language.ast import Argument, Assignment, Group, Line, Part, Point, Source, changed_lines
-from shapeprog.language.evaluate import placed_source
 from shapeprog.language.expression import Binary, Linear, Name, Value
 from shapeprog.language.placement import AXES, POINTS, ROUND, SIZES
 from shapeprog.space import FloatArray
@@ -60,28 +59,24 @@ class Layout:
 
     Attributes
     ----------
-    lines
-        Its parts and loops, in the order of the text; its upright round parts have a radius.
     sizes, extents
         Width, depth and height of the whole, by name and in this order.
+    lines, parts
+        Its parts and loops, in the order of the text, and the numbers of those that are parts; upright round parts have
+        a radius.
+    top, loops_around
+        For every line the index at the top level of the line that it is inside of, and the numbers of the loops around
+        it.
     filling
         The lines of cylinders that are nearly as wide as the whole, which then has one diameter.
-    parts, loops_around
-        The numbers of the lines that are parts, and for every line those of the loops around it.
-    top
-        For every line the index of the one at the top level that it is inside of.
     elements
         All elements, by line, key and axis.
-    slots, names
-        The numbers (P,), the three sizes of the whole first, and their names.
+    slots, names, forms
+        The numbers (P,), the three sizes of the whole first, their names, and linear forms by these names.
     index
         The number of every line and keyword.
-    forms
-        The numbers as linear forms, by name.
-    named, body
-        The parts and loops with names, as ``lines`` and as lines of a program.
-    source
-        The program with names.
+    named, body, source
+        The parts and loops with names, as ``lines``; as lines of a program; and this program.
     """
 
     def __init__(self, source: Source, anchors: Mapping[Key, Anchors] | None = None) -> None:
@@ -111,11 +106,8 @@ class Layout:
         self.forms = {name: Linear.of(name) for name in self.names}
         self._numbers = {name: slot.value for name, slot in zip(self.names, self.slots, strict=True)}
         pairs = tuple(self._numbers.items())
-        self.source = replace(
-            placed_source((Assignment(pairs[:3]), Assignment(pairs[3:]), *self.body)),
-            scale=source.scale,
-            unit=source.unit,
-        )
+        lines = Assignment(pairs[:3]), Assignment(pairs[3:]), *self.body
+        self.source = Source(lines, source.unit, source.scale)
 
     def first(self, loop: int) -> tuple[int, str]:
         """The first part inside of a loop, and the key of its elements: a row is measured by it."""

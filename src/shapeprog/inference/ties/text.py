@@ -16,7 +16,6 @@ from shapeprog.inference.ties.groups import grouped, simplified
 from shapeprog.inference.ties.layout import Layout
 from shapeprog.inference.ties.settings import TIES
 from shapeprog.language.ast import Assignment, Group, Line, Part, Point, Source, changed_lines, changed_values, values
-from shapeprog.language.evaluate import placed_source
 from shapeprog.language.expression import Expression, Linear, Name, Value, combined, names_in, replaced, value_at
 from shapeprog.language.merging import merged_lines
 from shapeprog.language.parameters import to_float32
@@ -72,8 +71,7 @@ def written(layout: Layout, solution: Solution, free: FloatArray, *, group: bool
     scale = layout.source.scale
     assert scale is not None
     floor = -float(known["height"]) * scale.cells_per_unit / 2
-    result = placed_source((*header, *_changed(body, final)))
-    return replace(result, scale=replace(scale, floor=floor), unit=layout.source.unit)
+    return Source((*header, *_changed(body, final)), layout.source.unit, replace(scale, floor=floor))
 
 
 def _expressions(layout: Layout, solution: Solution, at_free: FloatArray) -> tuple[dict[str, Value], dict[str, Value]]:

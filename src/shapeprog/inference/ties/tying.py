@@ -63,19 +63,18 @@ def tie(
     held
         Indices of the nodes of its body whose numbers stay fixed: calls of functions draw them.
     """
-    plain = Program(program.body) if known or held else between_ends(Program(program.body))
+    plain = Program(program.body) if known or held else between_ends(program)
     if not plain.size:
         return program
     with one_tensor_thread(kernels=1):
         try:
-            source = placed(plain if held else merged(plain), merge=not held, rows=False).source
+            tied = placed(plain if held else merged(plain), merge=not held, rows=False)
         except ShapeProgError:  # a statement without a placed form
             return program
-        assert source is not None
-        ties = _Ties(source, evidence, seed, known=known, held=held)
+        assert tied.source is not None
+        ties = _Ties(tied.source, evidence, seed, known=known, held=held)
         price *= TIES.known_price if known else TIES.price
         before = 0.0 if known else closeness(unroll(plain), evidence, seed)
-        tied = evaluated(source)
         for attempt in range(TIES.attempts):
             try:
                 tied = ties.tied(price / TIES.cheaper**attempt)

@@ -118,29 +118,35 @@ def union_mesh(scene: Batch) -> Triangles:
 
     A ``ShapeProgError`` if the scene holds no solid part or more than ``MOST_JOINED``, or a batch is given.
     """
-    union = _union(list(_solids(scene).values())).to_mesh()
+    from manifold3d import Manifold, OpType
+
+    union = Manifold.batch_boolean(list(_solids(scene).values()), OpType.Add).to_mesh()
     if not len(union.tri_verts):
         raise ShapeProgError("the union of the parts is empty", "a part may be too thin; give it some thickness")
     return union.vert_properties[:, :3].astype(np.float64), np.asarray(union.tri_verts, np.int64)
 
 
 def pieces_of_parts(scene: Batch) -> npt.NDArray[np.int64]:
-    """The connected solid of the union to which each primitive (N,) of one scene belongs, 0 for the largest surface.
+    """The connected solid of the union to which each primitive (N,) of one scene belongs, 0 for that with most surface.
 
-    Parts that meet only along an edge or in a point are not connected.  A part without a volume, or hidden inside
-    others, is counted with the largest; so are all parts where :func:`union_mesh` raises an error.
+    Two parts are connected if their union is one solid: parts that meet only along an edge or in a point are not.  A
+    part without a volume counts as one of the largest solid; so do all parts where :func:`union_mesh` raises an error.
     """
     label = np.zeros(len(scene.mask), np.int64)
     try:
         solids = _solids(scene)
     except ShapeProgError:
         return label
-    slots = {solid.original_id(): slot for slot, solid in solids.items()}
-    pieces = [piece for piece in _union(list(solids.values())).decompose() if piece.volume() > 0]
-    for number, piece in enumerate(sorted(pieces, key=lambda piece: -piece.surface_area())):
-        mesh = piece.to_mesh()
-        drawn = np.asarray(mesh.run_original_id)[np.diff(mesh.run_index) > 0]
-        label[[slots[original] for original in drawn.tolist()]] = number
+    shapes = list(solids.values())
+    box = np.array([shape.bounding_box() for shape in shapes]).reshape(-1, 2, 3)
+    overlap = np.minimum(box[:, None, 1], box[:, 1]) - np.maximum(box[:, None, 0], box[:, 0])
+    near = np.argwhere(np.triu((overlap >= 0).all(-1), 1))
+    piece = np.arange(len(shapes))  # pairs with the most overlap first: most of the others need no union then
+    for first, second in near[np.argsort(-overlap[tuple(near.T)].prod(-1), kind="stable")].tolist():
+        if piece[first] != piece[second] and _count(shapes[first] + shapes[second]) == 1:
+            piece[piece == piece[second]] = piece[first]
+    order = np.argsort(-np.bincount(piece, [shape.surface_area() for shape in shapes]), kind="stable")
+    label[list(solids)] = np.argsort(order)[piece]
     return label
 
 
@@ -154,13 +160,7 @@ def _solids(scene: Batch) -> dict[int, Any]:
             f"{len(parts)} parts are too many to join into one solid: at most {MOST_JOINED}",
             "lower the counts, or export the parts as they are, as .ply",
         )
-    return {p.slot: manifold(np.round(p.vertices / STEP) * STEP, p.faces).as_original() for p in parts}
-
-
-def _union(solids: Sequence[Any]) -> Any:
-    from manifold3d import Manifold, OpType
-
-    return Manifold.batch_boolean(solids, OpType.Add)
+    return {p.slot: manifold(np.round(p.vertices / STEP) * STEP, p.faces) for p in parts}
 
 
 def manifold(vertices: Array, faces: Array) -> Any:
@@ -179,7 +179,11 @@ def joined(meshes: Sequence[tuple[Array, Array]]) -> Triangles:
 
 def pieces(vertices: Array, faces: Array) -> int:
     """How many connected solids a watertight mesh, such as a union, is; a cavity within one is no piece."""
-    return sum(piece.volume() > 0 for piece in manifold(vertices, faces).decompose())
+    return _count(manifold(vertices, faces))
+
+
+def _count(solid: Any) -> int:
+    return sum(piece.volume() > 0 for piece in solid.decompose())
 
 
 def gaps(scene: Batch, within: float) -> dict[tuple[int, int], float]:

@@ -19,8 +19,7 @@ from shapeprog.formats.parts import parts, solid
 from shapeprog.geometry.batch import Solids
 from shapeprog.inference.assembly import Assembly, assemble
 from shapeprog.inference.candidates.drawings import canonical_side, simplest
-from shapeprog.inference.candidates.loops import images, repeated
-from shapeprog.inference.candidates.profiles import distinct, profiles
+from shapeprog.inference.candidates.loops import distinct, images, profiles, repeated
 from shapeprog.inference.choice.coverage import Coverage
 from shapeprog.inference.surface.evidence import evidence_of, evidence_of_program
 from shapeprog.language import Draw, Language, Loop, Program, language, standard, statement, using

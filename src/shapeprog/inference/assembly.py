@@ -16,10 +16,8 @@ import numpy as np
 from shapeprog.data.shape import Shape
 from shapeprog.inference.budget import NEVER, Deadline, Progress
 from shapeprog.inference.candidates.drawings import canonical_side, simplest
-from shapeprog.inference.candidates.loops import images, repeated, rows
-from shapeprog.inference.candidates.neighbours import neighbours, shorter
-from shapeprog.inference.candidates.profiles import distinct
-from shapeprog.inference.candidates.residual import residual_candidates
+from shapeprog.inference.candidates.loops import distinct, images, repeated, rows
+from shapeprog.inference.candidates.neighbours import neighbours, residual_candidates, shorter
 from shapeprog.inference.candidates.singles import single_candidates
 from shapeprog.inference.choice.choice import Choice, choose, explained, missed, value
 from shapeprog.inference.choice.connecting import connected

@@ -3,6 +3,7 @@
 The first selection is from candidates for single pieces.  A complete program allows further changes: a block ends where
 the next begins, two halves of a board are merged, a missing mirror image is added, and a run gets one more copy.  All
 changes apply to loops and to boxes around drawings; the hints of the statements give the drawing of a changed box.
+Further candidates are boxes around the points that the program does not explain.
 """
 
 from __future__ import annotations
@@ -11,13 +12,21 @@ import itertools
 from collections.abc import Iterator, Sequence
 
 import numpy as np
+import torch
+from scipy.spatial import cKDTree
 
+from shapeprog.geometry.distance import signed_distance
 from shapeprog.inference.candidates.drawings import drawings, hinted, redrawn, solid_boxes
-from shapeprog.inference.candidates.loops import mirrors, repeated, rows
+from shapeprog.inference.candidates.loops import images, mirrors, repeated, rows
 from shapeprog.inference.candidates.settings import SETTINGS
+from shapeprog.inference.fit.tunable import THINNEST
+from shapeprog.inference.pieces.oriented import bounds, boxes_around
+from shapeprog.inference.surface.components import linked
+from shapeprog.inference.surface.evidence import Evidence
 from shapeprog.language.hints import STRAIGHT, Box
 from shapeprog.language.program import Chain, Draw, Loop, Node, Program, nest
 from shapeprog.language.statement import language
+from shapeprog.language.unroll import unroll
 from shapeprog.space import DEPTH, SIDE, FloatArray
 
 CORNERS = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
@@ -189,3 +198,26 @@ def _crossed(starts: FloatArray, along: FloatArray, parts: Box) -> FloatArray:
     first, second = (-half - at) / step, (half - at) / step
     enters, leaves = np.minimum(first, second).max(-1), np.maximum(first, second).min(-1)
     return np.unique(np.minimum(enters + SETTINGS.into, leaves)[enters < leaves].round(2))
+
+
+def residual_candidates(program: Program, evidence: Evidence) -> list[Node]:
+    """Drawings of the boxes around clusters of visible points far from a program, and their mirror images."""
+    tensor = torch.from_numpy(evidence.points)
+    far = signed_distance(unroll(program), tensor).abs().numpy() > SETTINGS.far * evidence.tolerance
+    points = evidence.points[far & (evidence.weights > evidence.weights.max() / 2)]
+    if len(points) < SETTINGS.cluster_points:
+        return []
+    reach = SETTINGS.cluster_reach * (evidence.area / len(evidence.points)) ** 0.5
+    pairs = cKDTree(points).query_pairs(reach, output_type="ndarray")
+    cluster = linked(pairs, len(points))
+    size = np.bincount(cluster)
+    largest = np.argsort(-size, kind="stable")[: SETTINGS.clusters]
+    members = [np.flatnonzero(cluster == label) for label in largest[size[largest] >= SETTINGS.cluster_points]]
+    if not members:
+        return []
+    around = boxes_around(points[np.concatenate(members)], bounds(members))
+    half = np.maximum(around.half, THINNEST / 2)
+    nodes = [
+        drawing for box in zip(around.centre, around.rotation, half, strict=True) for drawing in drawings(Box(*box))
+    ]
+    return [*nodes, *images(nodes, evidence.surface)]

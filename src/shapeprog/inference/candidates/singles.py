@@ -20,7 +20,7 @@ from shapeprog.geometry.batch import Batch
 from shapeprog.geometry.distance import distance_and_slopes, signed_distance
 from shapeprog.inference.candidates.drawings import drawings, is_unhinted, starts
 from shapeprog.inference.candidates.settings import SETTINGS
-from shapeprog.inference.fit.tunable import ROW, THINNEST, least
+from shapeprog.inference.fit.tunable import STEP, THINNEST, least
 from shapeprog.inference.pieces.cover_kernels import near_boxes
 from shapeprog.inference.pieces.pieces import Pieces
 from shapeprog.language.hints import Box
@@ -88,40 +88,37 @@ def _minimum(misfit: FloatArray, owner: Array, count: int) -> FloatArray:
 def fitted(draws: Sequence[Draw], target: Target) -> list[Draw]:
     """Statements fitted to their points by Gauss-Newton steps with a prior on their numbers, in one batch.
 
-    Residuals are distances of the points to the surface.  Each number that places a primitive has a separate copy of
-    the numbers of its statement, so one backward pass gives all derivatives.
+    Residuals are distances of the points to the surface; poses are differentiated by central differences.
     """
     if not draws:
         return []
-    declared = [language()[draw.name] for draw in draws]
-    longest, points = max(statement.size for statement in declared), target.points.shape[1]
-    values, free, low = (torch.zeros(len(draws), longest, dtype=torch.float64) for _ in range(3))
-    for row, (draw, statement) in enumerate(zip(draws, declared, strict=True)):
-        values[row, : statement.size] = torch.tensor(draw.values)
-        free[row, : statement.size] = torch.tensor([not quantity.discrete for quantity in statement.quantities])
-        low[row, : statement.size] = torch.tensor([least(quantity) for quantity in statement.quantities])
-    ids = torch.tensor([statement.id for statement in declared])[:, None, None]
-    solids = unroll(Code(ids, values[:, None, None])).mask.shape[1]
-    copies = len(draws), solids * ROW
-    plan = Plan(Code(ids[:, None].expand(*copies, 1, 1), values[:, None, None, None].expand(*copies, 1, 1, -1)))
-    start, prior = values, torch.where(free > 0, SETTINGS.prior * points, 1.0)
+    code = encode([Program((draw,)) for draw in draws], dtype=torch.float64)
+    ids, start = code.ids[:, :, :1], code.parameters[:, 0, 0]  # a drawing is the first step of its block
+    values, slots, points = start, start.shape[1], target.points.shape[1]
+    free, low = torch.zeros(start.shape, dtype=torch.bool), torch.zeros_like(start)
+    for row, draw in enumerate(draws):
+        for slot, quantity in enumerate(language()[draw.name].quantities):
+            free[row, slot], low[row, slot] = not quantity.discrete, least(quantity)
+    away = STEP * torch.eye(slots, dtype=torch.float64)
+    away = torch.cat([torch.zeros_like(away[:1]), away, -away])[:, None]
+    plan = Plan(Code(*(part.expand(len(away), *part.shape) for part in (ids, code.parameters[:, :, :1]))))
+    prior = torch.where(free, SETTINGS.prior * points, 1.0)
     shifted = target.shifted.reshape(-1, 1, 3)
     for _ in range(SETTINGS.steps):
-        moving = values[:, None, None, None].expand(*copies, 1, 1, -1).clone().requires_grad_()
-        scene = plan.scene(moving)
+        scene = plan.scene((values + away * free)[:, :, None, None])
         placed = torch.cat([scene.size, scene.centre, scene.rotation.flatten(-2)], -1).flatten(2)
-        (by_number,) = torch.autograd.grad(placed.diagonal(dim1=1, dim2=2).sum(), moving)
+        by_number = ((placed[1 : slots + 1] - placed[slots + 1 :]) / (2 * STEP)).permute(1, 2, 0)
         fields = (scene.kind, scene.size, scene.centre, scene.rotation, scene.mask)
-        single = Batch(*(field[:, 0].detach().repeat_interleave(points, 0) for field in fields))
+        single = Batch(*(field[0].repeat_interleave(points, 0) for field in fields))
         distance, by_row, _ = distance_and_slopes(single, shifted)
-        slopes = by_row.reshape(len(draws), points, -1) @ by_number[:, :, 0, 0].nan_to_num(0) * free[:, None]
+        slopes = by_row.reshape(len(draws), points, -1) @ by_number
         residual = (distance.reshape(-1, points) - SETTINGS.offset).nan_to_num(0)
         weighted = ((SETTINGS.width**2 / (SETTINGS.width**2 + residual**2)) ** 2)[..., None] * slopes
         slope = (weighted * residual[..., None]).sum(1) + prior * (values - start)
         move = torch.linalg.solve(weighted.mT @ slopes + torch.diag_embed(prior), slope)
         values = torch.maximum(values - move.clamp(-SETTINGS.farthest, SETTINGS.farthest), low)
-    rows = zip(declared, values.float().tolist(), strict=True)
-    return [Draw(statement.name, tuple(row[: statement.size])) for statement, row in rows]
+    rows = zip(draws, values.float().tolist(), strict=True)
+    return [Draw(draw.name, tuple(row[: len(draw.values)])) for draw, row in rows]
 
 
 def misfits(draws: Sequence[Draw], target: Target) -> FloatArray:

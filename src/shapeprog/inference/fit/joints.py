@@ -6,11 +6,12 @@ them is narrowest, found by projecting onto the one and the other in turn.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import torch
 from jaxtyping import Bool, Float, Int
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import minimum_spanning_tree
 from torch import Tensor
 
 from shapeprog.geometry.batch import Batch
@@ -19,7 +20,6 @@ from shapeprog.geometry.primitives import primitives
 from shapeprog.geometry.scene import Scene
 from shapeprog.inference.fit.residuals import rows_of
 from shapeprog.inference.fit.settings import FIT
-from shapeprog.inference.fit.tunable import ROW
 
 
 class Joints(NamedTuple):
@@ -81,64 +81,44 @@ def gaps(scene: Scene) -> Gaps:
     swap = area[first] > area[second]
     first, second = torch.where(swap, second, first), torch.where(swap, first, second)
     points = between(scene, first, second, ((start + end) / 2)[first, second], 24)
-    width = signed_distance(rows_of(scene, second)[0], points[:, None])[:, 0].detach()
-    width = width + signed_distance(rows_of(scene, first)[0], points[:, None])[:, 0].detach().clamp(min=0)
-    return Gaps(first, second, points, width)
+    inner, outer = (signed_distance(rows_of(scene, slots)[0], points[:, None])[:, 0] for slots in (second, first))
+    return Gaps(first, second, points, (inner + outer.clamp(min=0)).detach())
 
 
 def joining(
     first: Int[Tensor, " C"], second: Int[Tensor, " C"], gap: Float[Tensor, " C"], count: int, widest: float
 ) -> Bool[Tensor, " C"]:
-    """Which pairs it takes to join all of so many primitives that gaps up to the widest divide: the
-    narrowest (Kruskal 1956)."""
-    needed, group = torch.zeros(len(gap), dtype=torch.bool), list(range(count))
-    for pair in torch.argsort(gap, stable=True).tolist():
-        target, source = group[int(first[pair])], group[int(second[pair])]
-        if gap[pair] <= widest and target != source:
-            needed[pair] = True
-            group = [target if label == source else label for label in group]
-    return needed
+    """Which pairs it takes to join all of so many primitives that gaps up to the widest divide: those of a minimum
+    spanning tree."""
+    weights = 1 + gap.numpy() - gap.numpy().min(initial=0)  # zero would be no pair
+    pairs = first.numpy(), second.numpy()
+    tree = minimum_spanning_tree(coo_array((weights, pairs), shape=(count, count)))
+    return (gap <= widest) & torch.from_numpy(tree.toarray()[pairs] > 0)
 
 
 def moved(scene: Scene, joints: Joints) -> Joints:
     """The same joints after their parts have moved: the points deepest in both parts, or nearest to both."""
     if not len(joints.first):
         return joints
-    points = between(scene, joints.first, joints.second, positions_of(scene, joints), 6)
-    inner = _inner(scene, joints.first, points)
-    return joints._replace(normalized=inner)
-
-
-def positions_of(scene: Scene, joints: Joints) -> Float[Tensor, "C 3"]:
-    """Positions of joints when their first parts are as in the scene."""
-    local = scene.bounds[joints.first] * joints.normalized
-    positions: Tensor = scene.centre[joints.first] + (scene.rotation[joints.first] @ local[..., None])[..., 0]
-    return positions
+    points = _placed(rows_of(scene, joints.first)[0], joints.normalized).detach()
+    points = between(scene, joints.first, joints.second, points, 6)
+    return joints._replace(normalized=_inner(scene, joints.first, points))
 
 
 def needs(scene: Scene, slopes: Float[Tensor, "N 16 F"], joints: Joints) -> Needs:
     """Gap of every joint, zero if it is closed, and height above the floor of every part that should touch it."""
-    reach = depths(scene, slopes, joints)
-    gap = reach.residual + 0.02  # into the other part, by more than rounding takes away
-    joined = torch.where((gap >= 0)[:, None], reach.slopes, 0.0)  # on an axis the slope of a depth is no number
-    stand, feet = rows_of(scene, joints.standing)
+    first, by_first = rows_of(scene, joints.first)
+    second, by_second = rows_of(scene, joints.second)
+    gap = signed_distance(second, _placed(first, joints.normalized)[:, None])[:, 0]
+    gap = gap + 0.02  # into the other part, by more than rounding takes away
+    on_first, on_second = torch.autograd.grad(gap.sum(), [by_first, by_second])
+    joined = _by_number(on_first, slopes[joints.first]) + _by_number(on_second, slopes[joints.second])
+    joined = torch.where((gap >= 0)[:, None], joined, 0.0)  # on an axis the slope of a depth is no number
+    feet, by_feet = rows_of(scene, joints.standing)
     low = _inner(scene, joints.standing, _lowest(scene, joints.standing))
-    height = stand.centre[:, 0, 0] + (stand.rotation[:, 0, 0] * stand.bounds[:, 0] * low).sum(-1) - joints.floor
-    standing = _by_number(_slopes_of(height, feet), slopes[joints.standing])
-    return Needs(torch.cat([gap.clamp(min=0), height.detach()]), torch.cat([joined, standing]))
-
-
-def depths(scene: Scene, slopes: Float[Tensor, "N 16 F"], joints: Joints) -> Needs:
-    """Signed distance from the point of every joint to the second part, negative inside it."""
-    first, first_leaves = rows_of(scene, joints.first)
-    second, second_leaves = rows_of(scene, joints.second)
-    points = first.centre[:, 0] + (first.rotation[:, 0] @ (first.bounds[:, 0] * joints.normalized)[..., None])[..., 0]
-    far = signed_distance(second, points[:, None])[:, 0]
-    by_row = _slopes_of(far, [*first_leaves, *second_leaves])
-    by_first, by_second = by_row[:, :ROW], by_row[:, ROW:]
-    return Needs(
-        far.detach(), _by_number(by_first, slopes[joints.first]) + _by_number(by_second, slopes[joints.second])
-    )
+    height = _placed(feet, low)[:, 0] - joints.floor
+    standing = _by_number(torch.autograd.grad(height.sum(), by_feet)[0], slopes[joints.standing])
+    return Needs(torch.cat([gap.clamp(min=0), height]).detach(), torch.cat([joined, standing]))
 
 
 def between(
@@ -150,19 +130,16 @@ def between(
     return projected(Batch(*pairs), points, rounds)
 
 
-def _slopes_of(values: Float[Tensor, " R"], leaves: Sequence[Tensor]) -> Float[Tensor, "R S"]:
-    """Derivatives of values by the rows of leaves, one after another."""
-    gradients = torch.autograd.grad(values.sum(), leaves, allow_unused=True)
-    rows = [
-        torch.zeros_like(leaf) if gradient is None else gradient
-        for gradient, leaf in zip(gradients, leaves, strict=True)
-    ]
-    return torch.cat([row.flatten(1) for row in rows], 1)
-
-
 def _by_number(rows: Float[Tensor, "R 16"], slopes: Float[Tensor, "R 16 F"]) -> Float[Tensor, "R F"]:
     product: Tensor = (rows[:, None] @ slopes)[:, 0]
     return product
+
+
+def _placed(parts: Batch, normalized: Float[Tensor, "C 3"]) -> Float[Tensor, "C 3"]:
+    """Points given in the boxes of primitives (C, 1), in units of the half extents."""
+    local = (parts.bounds[:, 0] * normalized)[..., None]
+    points: Tensor = parts.centre[:, 0] + (parts.rotation[:, 0] @ local)[..., 0]
+    return points
 
 
 def _inner(scene: Scene, slots: Int[Tensor, " C"], points: Float[Tensor, "C 3"]) -> Float[Tensor, "C 3"]:

@@ -19,14 +19,17 @@ from torch import Tensor
 
 from shapeprog.geometry.batch import Batch
 from shapeprog.geometry.distance import distance_and_slopes, nearest_primitive
+from shapeprog.geometry.primitive import SIZES
 from shapeprog.geometry.scene import Scene
 from shapeprog.geometry.surface import SurfaceSample, sample_surface
 from shapeprog.inference.choice.bits import nearby
-from shapeprog.inference.fit import residual_kernels as kernels
 from shapeprog.inference.fit.settings import FIT
 from shapeprog.inference.fit.tunable import ROW
 from shapeprog.inference.surface.evidence import Evidence
-from shapeprog.space import Array, FloatArray
+from shapeprog.space import FloatArray
+
+NEVER = 1e9
+"""Penalty of a pair whose normals are known to face opposite ways."""
 
 
 class Pairs(NamedTuple):
@@ -75,8 +78,8 @@ class Target:
         self._order = np.argsort(nearby(evidence.points), kind="stable")
         self._shares = np.cumsum(evidence.weights[self._order])
         unsure = np.flatnonzero(~sides)
-        self._owner: Array = np.concatenate([np.arange(len(sides)), unsure])
-        both = _joint(evidence.points, normals), _joint(evidence.points[unsure], -normals[unsure])
+        self._owner = torch.from_numpy(np.concatenate([np.arange(len(sides)), unsure]))
+        both = _joint(self._points, self._normals), _joint(self._points[unsure], -self._normals[unsure])
         self._tree = cKDTree(np.concatenate(both), 24, balanced_tree=False)  # faster than by default
 
     def pairs(self, scene: Scene, generator: torch.Generator) -> Pairs:
@@ -87,24 +90,23 @@ class Target:
         """
         sample = sample_surface(scene, FIT.samples, generator)
         samples, facing = sample.points, sample.normals
-        spacing = 1.5 * math.sqrt(self.evidence.area / min(FIT.samples, len(self._points)))
         jitter = torch.rand(FIT.points, generator=generator, dtype=torch.float64).numpy()
         stratum = self._shares[-1] / FIT.points  # evenly over the surface
         thresholds = (np.arange(FIT.points) + jitter) * stratum
-        selected = self._order[np.searchsorted(self._shares, thresholds).clip(0, len(self._points) - 1)]
+        place = np.searchsorted(self._shares, thresholds).clip(0, len(self._points) - 1)
+        selected = torch.from_numpy(self._order[place])
         points, normals, sides = self._points[selected], self._normals[selected], self._sides[selected]
-        tree = cKDTree(_joint(samples.numpy(), facing.numpy()))
-        candidates = tree.query(_joint(points.numpy(), normals.numpy()), FIT.partners)[1]
-        behind = candidates.copy()
-        unsure = ~sides.numpy()
-        behind[unsure] = tree.query(_joint(points.numpy()[unsure], -normals.numpy()[unsure]), FIT.partners)[1]
-        candidates = np.concatenate([candidates, behind], 1)
-        offset, best = self._closest(np.broadcast_to(selected[:, None], candidates.shape), candidates, sample, spacing)
-        partner = np.take_along_axis(candidates, best, 1)[:, 0]
-        back = self._owner[self._tree.query(_joint(samples.numpy(), facing.numpy()), FIT.partners)[1]]
-        rows = np.broadcast_to(np.arange(len(back))[:, None], back.shape)
-        back_offset, best = self._closest(back, rows, sample, spacing)
-        back_partner = np.take_along_axis(back, best, 1)[:, 0]
+        tree = cKDTree(_joint(samples, facing))
+        candidates = _nearest(tree, points, normals)
+        if len(unsure := (~sides).nonzero()[:, 0]):
+            behind = candidates.clone()
+            behind[unsure] = _nearest(tree, points[unsure], -normals[unsure])
+            candidates = torch.cat([candidates, behind], 1)
+        best, offset = self._closest(selected[:, None], candidates, sample)
+        partner = candidates.gather(1, best)[:, 0]
+        back = self._owner[_nearest(self._tree, samples, facing)]
+        best, back_offset = self._closest(back, torch.arange(len(back))[:, None], sample)
+        back_partner = back.gather(1, best)[:, 0]
         union = nearest_primitive(scene, points)[0]
         along = torch.cat([(normals * facing[partner]).sum(1), (self._normals[back_partner] * facing).sum(1)])
         either = ~torch.cat([sides, self._sides[back_partner]]) & (along.abs() >= FIT.same)
@@ -122,16 +124,20 @@ class Target:
         )
 
     def _closest(
-        self, at: Array, candidates: Array, sample: SurfaceSample, spacing: float
-    ) -> tuple[Float[Tensor, " R"], Array]:
-        """The best (R, 1) of several pairs (R, k) of points and samples, and its squared penalty besides the distance
-        along the normal."""
-        offset, best = np.empty(len(at)), np.empty(len(at), np.int64)
-        points = (tensor.numpy() for tensor in (self._points, self._normals, self._sides))
-        samples = (sample.points.numpy(), sample.normals.numpy())
-        at, candidates = np.ascontiguousarray(at), np.ascontiguousarray(candidates)
-        kernels.closest(*points, at, *samples, candidates, spacing, FIT.turned, 1e9, offset, best)
-        return torch.from_numpy(offset), best[:, None]
+        self, at: Int[Tensor, "R k"], candidates: Int[Tensor, "R k"], sample: SurfaceSample
+    ) -> tuple[Int[Tensor, "R 1"], Float[Tensor, " R"]]:
+        """Which (R, 1) of several pairs (R, k) of points and samples is the best, and its squared penalty besides the
+        distance along the normal."""
+        facing, normals = sample.normals[candidates], self._normals[at]
+        away = self._points[at] - sample.points[candidates]
+        plane, cosine = (away * facing).sum(-1), (normals * facing).sum(-1)
+        spacing = 1.5 * math.sqrt(self.evidence.area / min(FIT.samples, len(self._points)))
+        along = ((away**2).sum(-1) - plane**2).clamp(min=0).sqrt() - spacing
+        turned = torch.where(self._sides[at] & (cosine < 0), NEVER, 1 - cosine**2).clamp(min=0)
+        known = (normals**2).sum(-1) > 0.25
+        against = along.clamp(min=0) ** 2 + FIT.turned**2 * torch.where(known, turned, 0.0)
+        best = (plane**2 + against).argmin(1, keepdim=True)
+        return best, against.gather(1, best)[:, 0]
 
 
 def pull(scene: Scene, pairs: Pairs, width: float) -> Pull:
@@ -152,20 +158,29 @@ def pull(scene: Scene, pairs: Pairs, width: float) -> Pull:
     weight = torch.where(explained, 0.0, pairs.weights * robust)
     count = len(scene.mask)
     result = Pull(by_row.new_zeros(count, ROW), by_row.new_zeros(count, ROW, ROW))
-    rows = (tensor.contiguous().numpy() for tensor in (by_row, weight, residual, pairs.slots))
-    kernels.gathered(*rows, *(tensor.numpy() for tensor in result))
+    order = torch.argsort(pairs.slots)
+    counts = torch.bincount(pairs.slots, minlength=count).tolist()
+    weighted = (weight[:, None] * by_row)[order].split(counts)
+    for slot, (left, right, off) in enumerate(
+        zip(weighted, by_row[order].split(counts), residual[order].split(counts), strict=True)
+    ):
+        result.slope[slot], result.curvature[slot] = off @ left, left.T @ right
     return result
 
 
-def rows_of(scene: Scene, slots: Int[Tensor, " R"]) -> tuple[Batch, list[Tensor]]:
-    """The primitives in some slots as a batch (R, 1), and its sizes, centres and rotations to differentiate by."""
-    size, centre, rotation = (
-        tensor[slots][:, None].clone().requires_grad_() for tensor in (scene.size, scene.centre, scene.rotation)
-    )
-    single = Batch(scene.kind[slots][:, None], size, centre, rotation, scene.mask[slots][:, None])
-    return single, [size, centre, rotation]
+def rows_of(scene: Scene, slots: Int[Tensor, " R"]) -> tuple[Batch, Float[Tensor, "R 16"]]:
+    """The primitives in some slots as a batch (R, 1), and the sizes, centres and rotations to differentiate it by."""
+    rows = torch.cat([scene.size, scene.centre, scene.rotation.flatten(-2)], -1)[slots].requires_grad_()
+    size, centre, rotation = rows[:, None].split([SIZES, 3, 9], -1)
+    kind, mask = scene.kind[slots][:, None], scene.mask[slots][:, None]
+    return Batch(kind, size, centre, rotation.unflatten(-1, (3, 3)), mask), rows
 
 
-def _joint(points: FloatArray, normals: FloatArray) -> FloatArray:
+def _joint(points: Float[Tensor, "P 3"], normals: Float[Tensor, "P 3"]) -> FloatArray:
     """Points and normals (P, 6), in which distances combine those of positions and of directions."""
-    return np.concatenate([points, FIT.turned / math.sqrt(2) * normals], 1)
+    return torch.cat([points, FIT.turned / math.sqrt(2) * normals], 1).numpy()
+
+
+def _nearest(tree: cKDTree, points: Float[Tensor, "P 3"], normals: Float[Tensor, "P 3"]) -> Int[Tensor, "P k"]:
+    """The nearest members of a tree to points with normals."""
+    return torch.from_numpy(tree.query(_joint(points, normals), FIT.partners)[1])

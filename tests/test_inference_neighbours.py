@@ -38,8 +38,8 @@ def best(start: str, target: str) -> Program:
     """What is chosen of a program's own blocks and their neighbours."""
     program = parse(start)
     near: list[Node] = [*program.body, *neighbours(program)]
-    found = choose(Coverage(evidence(target)).table([Program((node,)) for node in near]), 10)
-    return Program(tuple(near[place] for place in found.best.chosen))
+    chosen = choose(Coverage(evidence(target)).table([Program((node,)) for node in near]), 10)
+    return Program(tuple(near[index] for index in chosen))
 
 
 def same(found: Program, wanted: str) -> bool:

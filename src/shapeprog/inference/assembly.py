@@ -19,7 +19,7 @@ from shapeprog.inference.candidates.drawings import canonical_side, simplest
 from shapeprog.inference.candidates.loops import distinct, images, repeated, rows
 from shapeprog.inference.candidates.neighbours import neighbours, residual_candidates, shorter
 from shapeprog.inference.candidates.singles import single_candidates
-from shapeprog.inference.choice.choice import Choice, choose, explained, missed, value
+from shapeprog.inference.choice.choice import choose, explained, missed, value
 from shapeprog.inference.choice.connecting import connected
 from shapeprog.inference.choice.coverage import Coverage, CoverageTable
 from shapeprog.inference.fit.adjustment import adjust, tidy
@@ -88,15 +88,17 @@ def assemble(
     if not candidates or evidence.area <= 0:
         return Assembly(Program(), 0.0, "")
     report(0.7)
-    choice, candidates = _chosen(candidates, coverage, blocks, seed, deadline)
+    chosen, others = _chosen(candidates, coverage, blocks, seed, deadline)
     report(1.0)
-    start = connected(Program(tuple(candidates[index] for index in choice.best.chosen)), coverage)
+    start = connected(Program(tuple(chosen)), coverage)
     adjusted = adjust(start, evidence, deadline=deadline, progress=progress)
     program = connected(_unharmed(adjusted, start, coverage), coverage)
     program = tidy(Program(tuple(canonical_side(simplest(node)) for node in program.body)))
     program = in_order(with_roles(program))
-    share = explained(_table(program.body, coverage), range(len(program.body)))
-    return Assembly(program, share, _reason(len(program.body), share, choice, candidates, blocks))
+    count = len(program.body)
+    table = _table([*program.body, *others[:1]], coverage)
+    share, more = (explained(table, range(number)) for number in (count, len(table.prices)))
+    return Assembly(program, share, _reason(count, blocks, share, more - share, others))
 
 
 def _candidates(shape: Shape) -> list[Node]:
@@ -113,25 +115,31 @@ def _candidates(shape: Shape) -> list[Node]:
 
 def _chosen(
     candidates: list[Node], coverage: Coverage, blocks: int, seed: int, deadline: Deadline
-) -> tuple[Choice, list[Node]]:
+) -> tuple[list[Node], list[Node]]:
     """A choice among a first one, one with a wide tolerance, their adjusted forms and neighbours, boxes around
-    unexplained points, and candidates passed over; and these candidates.
+    unexplained points, and candidates passed over; and the others, those that would explain most of the rest first.
     """
     evidence = coverage.evidence
-    table = _table(candidates, coverage)
-    choice = choose(table, blocks, seed=seed)
-    first = tuple(candidates[index] for index in choice.best.chosen)
+    first, others = _choice(candidates, coverage, blocks, seed)
     if not first or deadline.passed("another choice among neighbours"):
-        return choice, candidates
+        return first, others
     wide = replace(evidence, tolerance=1.5 * evidence.tolerance, reach=1.5 * evidence.reach)
-    loose = choose(_table(candidates, Coverage(wide, coverage.prices)), blocks, seed=seed)
-    pool = list(first)
-    for nodes in dict.fromkeys([first, tuple(candidates[index] for index in loose.best.chosen)]):
-        adjusted = adjust(Program(nodes), evidence, steps=8, deadline=deadline)
+    loose, _ = _choice(candidates, Coverage(wide, coverage.prices), blocks, seed)
+    pool = first.copy()
+    for nodes in [first, loose] if loose != first else [first]:
+        adjusted = adjust(Program(tuple(nodes)), evidence, steps=8, deadline=deadline)
         pool += [*nodes, *adjusted.body, *neighbours(adjusted), *residual_candidates(adjusted, evidence)]
-    remaining = [candidates[index] for index in missed(table, choice.best.chosen)[:200]]
-    pool = list(dict.fromkeys([*pool, *remaining]))  # the first choice first: the search starts there
-    return choose(_table(pool, coverage), blocks, start=range(len(first)), seed=seed), pool
+    pool = list(dict.fromkeys([*pool, *others[:200]]))  # the first choice first: the search starts there
+    return _choice(pool, coverage, blocks, seed, range(len(first)))
+
+
+def _choice(
+    nodes: list[Node], coverage: Coverage, blocks: int, seed: int, start: Sequence[int] = ()
+) -> tuple[list[Node], list[Node]]:
+    """The most valuable blocks, and the others, those that would explain most of the rest first."""
+    table = _table(nodes, coverage)
+    chosen = choose(table, blocks, start=start, seed=seed)
+    return [nodes[index] for index in chosen], [nodes[index] for index in missed(table, chosen)]
 
 
 def _unharmed(adjusted: Program, start: Program, coverage: Coverage) -> Program:
@@ -161,17 +169,12 @@ def _table(nodes: Sequence[Node], coverage: Coverage) -> CoverageTable:
     return coverage.table([Program((node,)) for node in nodes])
 
 
-def _reason(used: int, share: float, choice: Choice, candidates: Sequence[Node], allowed: int) -> str:
-    """Why the program has so many blocks, which explain this share, and not more."""
+def _reason(used: int, allowed: int, share: float, gain: float, others: Sequence[Node]) -> str:
+    """Why the program has so many blocks, which explain this share, and not also the first of the others."""
     text = f"{used} drawing statement{'s cover' if used != 1 else ' covers'} {share:.0%} of the surface"
     if used >= allowed:
         return f"{text}; this is the maximum, raise --blocks for more."
-    more = next((option for option in choice.options if len(option.chosen) == used + 1), None)
-    if more is None or more.explained - share < LEAST_GAIN:
+    if gain < LEAST_GAIN:
         return f"{text}; no other candidate would cover more."
-
-    many, few = (
-        numbers(Program(tuple(candidates[index] for index in option.chosen))) for option in (more, choice.best)
-    )
-    gain, price = more.explained - share, f"with {many - few} more numbers" if many > few else "without more numbers"
-    return f"{text}; one more would cover another {gain:.1%} {price}: raise --detail to add it."
+    more = numbers(Program(tuple(others[:1])))
+    return f"{text}; one more would cover another {gain:.1%} with {more} more numbers: raise --detail to add it."

@@ -10,7 +10,6 @@ explains nothing.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -22,38 +21,10 @@ from shapeprog.inference.choice.settings import SETTINGS
 from shapeprog.space import Array, FloatArray
 
 
-class Option(NamedTuple):
-    """The best set of one size: indices of candidates, value, and share of the target explained."""
-
-    chosen: tuple[int, ...]
-    value: float
-    explained: float
-
-
-class BestSets(NamedTuple):
-    """The best value for each number of blocks (M + 1,), and its candidates (M + 1, M)."""
-
-    values: FloatArray
-    sets: npt.NDArray[np.int64]
-
-    @property
-    def set(self) -> npt.NDArray[np.int64]:
-        """The best of all; empty if there is none."""
-        size = int(np.argmax(self.values))
-        return self.sets[size, :size].copy()
-
-
-class Choice(NamedTuple):
-    """The best option, and the best for each number of blocks: the trade-off between size and share explained."""
-
-    best: Option
-    options: tuple[Option, ...]
-
-
 def choose(
     table: CoverageTable, blocks: int, *, start: Sequence[int] = (), rounds: int = SETTINGS.rounds, seed: int = 0
-) -> Choice:
-    """The most valuable at most ``blocks`` of the candidates: greedily, then by ruin and recreate.
+) -> tuple[int, ...]:
+    """Indices of the most valuable at most ``blocks`` candidates: greedily, then by ruin and recreate.
 
     A solid whose interior holds visible points is a local optimum: the greedy step selects it first, and an exchange
     of a few candidates cannot leave it.  So all points in interiors have a penalty at first.  It falls while the search
@@ -73,24 +44,21 @@ def choose(
     )  # fmt: skip
     penalties = (*SETTINGS.interior, 0.0) if interior.any() else (0.0,)
     searches = len(penalties) * SETTINGS.restarts + 1
-    best, seeds = _no_sets(blocks), iter(range(searches * seed, searches * (seed + 1)))
+    best, seeds = _no_set(blocks), iter(range(searches * seed, searches * (seed + 1)))
 
-    def searched(penalty: float, initial: Array, best_sets: BestSets) -> BestSets:
-        search(*data, penalty, rounds // searches, SETTINGS.blink, next(seeds), initial, *best_sets)
-        return best_sets
+    def searched(penalty: float, initial: Array, found: tuple[FloatArray, Array]) -> Array:
+        search(*data, penalty, rounds // searches, SETTINGS.blink, next(seeds), initial, *found)
+        return found[1][found[1] >= 0]
 
     for _ in range(SETTINGS.restarts):
-        initial = _no_sets(blocks).set
+        initial = np.zeros(0, np.int64)
         for penalty in penalties:
-            initial = searched(penalty, initial, _no_sets(blocks) if penalty else best).set
-    best = searched(0.0, np.searchsorted(index, np.array(start, np.int64)), best)
-    sets = [tuple(index[np.sort(best.sets[size, :size])].tolist()) for size in np.flatnonzero(np.isfinite(best.values))]
-    options = [Option(chosen, value(table, chosen), explained(table, chosen)) for chosen in sets]
-    return Choice(max(options, key=lambda option: option.value), tuple(options))
+            initial = searched(penalty, initial, _no_set(blocks) if penalty else best)
+    return tuple(np.sort(index[searched(0.0, np.searchsorted(index, np.array(start, np.int64)), best)]).tolist())
 
 
-def _no_sets(blocks: int) -> BestSets:
-    return BestSets(np.full(blocks + 1, -np.inf), np.full((blocks + 1, blocks), -1, np.int64))
+def _no_set(blocks: int) -> tuple[FloatArray, Array]:
+    return np.full(1, -np.inf), np.full(blocks, -1, np.int64)
 
 
 def _words(rows: Bits) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:

@@ -53,13 +53,13 @@ def include(rows, interior, cover, under, candidate):
 
 @kernel(
     "void(u8[:, ::1], u8[:, ::1], u8[:, ::1], f8[::1], i8[::1], u8[::1], i8[::1], i8[::1], i8[::1], u8[::1], f8[::1],"
-    " f8[::1], f8[::1], f8, i8, f8, i8, i8[::1], f8[::1], i8[:, ::1])"
+    " f8[::1], f8[::1], f8, i8, f8, i8, i8[::1], f8[::1], i8[::1])"
 )
 def search(
     rows, interior, hidden, weights, words, bits, begins, inner, starts, exposed, sample_price, prices, gains,
-    penalty, rounds, blink, seed, initial_set, values, sets,
+    penalty, rounds, blink, seed, initial_set, best_value, best_set,
 ):  # fmt: skip
-    """Ruin and recreate: drop some of the selected, refill greedily, accept a set that is no worse; best of each size.
+    """Ruin and recreate: drop some of the selected, refill greedily, accept a set that is no worse.
 
     The greedy step is lazy (Minoux 1978): a gain computed earlier in the round bounds the present one, nearly, as gains
     rise only where a selected candidate hides samples or fills free space.  With probability ``blink`` it overlooks a
@@ -83,15 +83,15 @@ def search(
         Number of rounds; see above; seed of the random numbers.
     initial_set
         Initial candidates (S,).
-    values, sets
-        Input and output: the best value for each number of blocks (M + 1,) and its candidates (M + 1, M), initially
-        those of another search, or minus infinity and -1.
+    best_value, best_set
+        Input and output: the best value (1,) and its candidates (M,), -1 beyond the last, initially those of another
+        search, or minus infinity and -1.
     """
-    max_size, total = sets.shape[1], len(exposed)
+    max_size, total = len(best_set), len(exposed)
     cover, under = np.empty(rows.shape[1], np.uint64), np.empty(interior.shape[1], np.uint64)
     incumbent, selected = np.empty(max_size, np.int64), np.empty(max_size, np.int64)
     bound = np.empty(total)
-    size, best_value, draws = len(initial_set), 0.0, 0
+    size, accepted, draws = len(initial_set), 0.0, 0
     copy(initial_set, size, incumbent)
     for turn in range(rounds + 1):
         share = RUIN_LEAST + (RUIN_MOST - RUIN_LEAST) * uniform(seed, draws)
@@ -114,9 +114,10 @@ def search(
                     penalty, cover, under, selected, count, best_candidate,
                 )  # fmt: skip
             else:
-                if value > values[count]:
-                    values[count] = value
-                    copy(selected, count, sets[count])
+                if value > best_value[0]:
+                    best_value[0] = value
+                    best_set[:] = -1
+                    copy(selected, count, best_set)
                 if count == min(max_size, total):
                     break
                 first = int(np.argmax(bound))  # the largest bound first: with its gain, most others are no better
@@ -144,6 +145,6 @@ def search(
             include(rows, interior, cover, under, best_candidate)
             selected[count] = best_candidate
             count += 1
-        if value >= best_value - THRESHOLD * (1.0 - turn / (rounds + 1.0)):
-            best_value, size = value, count
+        if value >= accepted - THRESHOLD * (1.0 - turn / (rounds + 1.0)):
+            accepted, size = value, count
             copy(selected, count, incumbent)

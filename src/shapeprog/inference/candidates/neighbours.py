@@ -20,7 +20,7 @@ from shapeprog.inference.candidates.drawings import drawings, hinted, redrawn, s
 from shapeprog.inference.candidates.loops import images, mirrors, repeated, rows
 from shapeprog.inference.candidates.settings import SETTINGS
 from shapeprog.inference.fit.tunable import THINNEST
-from shapeprog.inference.pieces.oriented import bounds, boxes_around
+from shapeprog.inference.pieces.oriented import boxes_around
 from shapeprog.inference.surface.components import linked
 from shapeprog.inference.surface.evidence import Evidence
 from shapeprog.language.hints import STRAIGHT, Box
@@ -212,10 +212,7 @@ def residual_candidates(program: Program, evidence: Evidence) -> list[Node]:
     cluster = linked(pairs, len(points))
     size = np.bincount(cluster)
     largest = np.argsort(-size, kind="stable")[: SETTINGS.clusters]
-    members = [np.flatnonzero(cluster == label) for label in largest[size[largest] >= SETTINGS.cluster_points]]
-    if not members:
-        return []
-    around = boxes_around(points[np.concatenate(members)], bounds(members))
+    around = boxes_around([points[cluster == label] for label in largest[size[largest] >= SETTINGS.cluster_points]])
     half = np.maximum(around.half, THINNEST / 2)
     nodes = [
         drawing for box in zip(around.centre, around.rotation, half, strict=True) for drawing in drawings(Box(*box))

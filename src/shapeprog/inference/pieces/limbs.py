@@ -8,25 +8,24 @@ direction, their points are one limb; where a leg meets a seat, the direction en
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 from scipy.spatial import cKDTree
 
+from shapeprog.inference.pieces.oriented import Boxes, boxes_around
 from shapeprog.inference.pieces.settings import SETTINGS
 from shapeprog.inference.surface.cloud import Cloud
-from shapeprog.inference.surface.components import linked
+from shapeprog.inference.surface.components import IntArray, linked
 from shapeprog.space import FloatArray
 
 
-def limbs(cloud: Cloud) -> list[npt.NDArray[np.int64]]:
-    """The points of each limb, as indices of the cloud, largest first."""
-    step = -(-len(cloud.points) // SETTINGS.ball_points)
-    which: npt.NDArray[np.int64] = np.arange(0, len(cloud.points), step, dtype=np.int64)
-    centre, radius = inner_balls(cloud, which)
+def limbs(cloud: Cloud) -> Boxes:
+    """Boxes around the limbs with the most points."""
+    which: IntArray = np.arange(0, len(cloud.points), -(-len(cloud.points) // SETTINGS.ball_points))
+    centre, radius = _inner_balls(cloud, which)
     fine = (radius > 0) & (radius < SETTINGS.ball_radius)
     which, centre, radius = which[fine], centre[fine], radius[fine]
     if not len(which):
-        return []
-    name, centre, radius = merged(centre, radius)
+        return boxes_around([])
+    name, centre, radius = _merged(centre, radius)
     count = min(SETTINGS.limb_neighbours, len(centre))
     distance, nearest = cKDTree(centre).query(centre, k=range(1, count + 1), workers=2)
     reach = 2 * radius[:, None] + 2.5 * SETTINGS.merged
@@ -35,29 +34,27 @@ def limbs(cloud: Cloud) -> list[npt.NDArray[np.int64]]:
     off = (centre[nearest] - (centre[nearest] * weight).sum(1, keepdims=True) / weight.sum(1, keepdims=True)) * weight
     spread, axes = np.linalg.eigh(off.transpose(0, 2, 1) @ off)
     spread = np.sqrt(np.maximum(spread, 0))
-    result = list[npt.NDArray[np.int64]]()
     line = spread[:, 1] < SETTINGS.linear * spread[:, 2]
     sheet = ~line & (spread[:, 0] < SETTINGS.linear * spread[:, 1])
+    found: list[IntArray] = []
     for kind, direction in ((line, axes[:, :, 2]), (sheet, axes[:, :, 0])):
         facing = np.abs(np.einsum("nki,ni->nk", direction[nearest], direction)) > np.cos(np.radians(SETTINGS.bend))
         i, k = np.nonzero(close & facing & kind[:, None] & kind[nearest])
         of_point = linked(np.stack([i, nearest[i, k]], 1), len(nearest))[name]
-        result += [which[of_point == label] for label in np.flatnonzero(np.bincount(of_point) >= SETTINGS.limb_points)]
-    return sorted(result, key=len, reverse=True)
+        found += [which[of_point == label] for label in np.flatnonzero(np.bincount(of_point) >= SETTINGS.limb_points)]
+    return boxes_around([cloud.points[limb] for limb in sorted(found, key=len, reverse=True)[: SETTINGS.limbs]])
 
 
-def merged(centre: FloatArray, radius: FloatArray) -> tuple[npt.NDArray[np.int64], FloatArray, FloatArray]:
+def _merged(centre: FloatArray, radius: FloatArray) -> tuple[IntArray, FloatArray, FloatArray]:
     """Balls with about the same centre and radius merged: the new index of each, new centres and radii."""
-    cell = np.concatenate(
-        [np.round(centre / SETTINGS.merged), np.round(np.log(radius) / SETTINGS.merged_radius)[:, None]], 1
-    ).astype(np.int64)
-    _, name, count = np.unique(cell, axis=0, return_inverse=True, return_counts=True)
+    cells = np.column_stack([centre / SETTINGS.merged, np.log(radius) / SETTINGS.merged_radius])
+    _, name, count = np.unique(np.round(cells).astype(np.int64), axis=0, return_inverse=True, return_counts=True)
     name = name.reshape(-1)
     mean = [np.bincount(name, column) / count for column in (*centre.T, radius)]
     return name, np.stack(mean[:3], 1), mean[3]
 
 
-def inner_balls(cloud: Cloud, which: npt.NDArray[np.int64]) -> tuple[FloatArray, FloatArray]:
+def _inner_balls(cloud: Cloud, which: IntArray) -> tuple[FloatArray, FloatArray]:
     """Centres (N, 3) and radii (N,) of the largest empty balls that touch the surface at some of its points.
 
     Of the two balls at a point the smaller one counts: normals may have either sign, and furniture is thin.

@@ -1,22 +1,26 @@
-"""Oriented boxes around many sets of points at once."""
+"""Oriented boxes, around many sets of points at once and around boxes that touch."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence, Sized
-from functools import cache
+from collections.abc import Sequence
+from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
+from shapeprog.geometry.separation import OrientedBoxes, touching
 from shapeprog.inference.pieces.oriented_kernels import COMPACT, FLAT, MANY, ROD, box_each
 from shapeprog.inference.pieces.settings import SETTINGS
+from shapeprog.inference.surface.cloud import spiral
+from shapeprog.inference.surface.components import IntArray
 from shapeprog.space import Array, FloatArray
 
-_LINES = np.array(
-    [[1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 0], [1, -1, 0], [1, 0, 1], [1, 0, -1], [0, 1, 1], [0, 1, -1]]
-)
+LINES = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 0], [1, -1, 0], [1, 0, 1], [1, 0, -1], [0, 1, 1], [0, 1, -1]])
 """Directions along which boxes are compared."""
+
+SPHERE = spiral((np.arange(MANY // 2) + 0.5) / (MANY // 2))[:, [1, 2, 0]].copy()
+"""Evenly spread unit vectors, one of each opposite pair, that define the outermost points."""
 
 
 class Boxes(NamedTuple):
@@ -26,7 +30,7 @@ class Boxes(NamedTuple):
     rotation: FloatArray
     half: FloatArray
 
-    def take(self, which: Array) -> Boxes:
+    def take(self, which: Array | slice) -> Boxes:
         """Some of them, by index or mask."""
         return Boxes(self.centre[which], self.rotation[which], self.half[which])
 
@@ -41,71 +45,89 @@ class Boxes(NamedTuple):
         return 8 * (a * b + b * c + c * a)
 
 
-def join(parts: list[Boxes]) -> Boxes:
+def join(parts: Sequence[Boxes]) -> Boxes:
     """All boxes of a list, in its order."""
     empty = Boxes(np.zeros((0, 3)), np.zeros((0, 3, 3)), np.zeros((0, 3)))
     return Boxes(*(np.concatenate(column) for column in zip(empty, *parts, strict=True)))
 
 
-def boxes_around(points: Array, start: Array, frames: FloatArray | None = None, floor: float = SETTINGS.thin) -> Boxes:
-    """A small box around each run of points, along the world's axes or turned about one of them where that is small.
+def boxes_around(sets: Sequence[Array], frames: FloatArray | None = None, floor: float = SETTINGS.thin) -> Boxes:
+    """A small box around each set of points, along the world's axes or turned about one of them where that is small.
 
     Parameters
     ----------
-    points
-        Points (P, 3), in cells.
-    start
-        Bounds (G + 1,) of the runs, none of them empty.
+    sets
+        Points (P, 3) of each of G sets, none of them empty.
     frames
         Frames (G, 3, 3) about whose last axis the boxes are turned instead.
     floor
         Shorter sides count as so long in the selection of directions.
     """
-    points, start = np.ascontiguousarray(points, np.float64), np.ascontiguousarray(start, np.int64)
-    runs = len(start) - 1
-    boxes = Boxes(np.zeros((runs, 3)), np.zeros((runs, 3, 3)), np.zeros((runs, 3)))
-    if not runs:
+    boxes = Boxes(np.zeros((len(sets), 3)), np.zeros((len(sets), 3, 3)), np.zeros((len(sets), 3)))
+    if not sets:
         return boxes
+    kind = np.full(len(sets), FLAT)
     if frames is None:
-        spread, frames = principal_axes(points, start)
+        spread, frames = principal_axes(sets)
         rod = (spread[:, 0] > SETTINGS.slender * spread[:, 1]) & (spread[:, 2] > SETTINGS.even * spread[:, 1])
         kind = np.where(rod, ROD, COMPACT)
-    else:
-        kind = np.full(runs, FLAT)
-    box_each(points, start, sphere(), np.ascontiguousarray(frames), kind, floor, *boxes)
+    box_each(*_joined(sets), SPHERE, np.ascontiguousarray(frames), kind, floor, *boxes)
     return boxes
 
 
-def bounds(runs: Sequence[Sized]) -> npt.NDArray[np.int64]:
-    """Start of each run in their concatenation, and the end of the last (G + 1,)."""
-    return np.cumsum([0, *(len(run) for run in runs)], dtype=np.int64)
+def _joined(sets: Sequence[Array]) -> tuple[FloatArray, IntArray]:
+    """The points of all sets (P, 3), and the first of each set with the end of the last (G + 1,)."""
+    return np.concatenate(sets, dtype=np.float64), np.cumsum([0, *map(len, sets)], dtype=np.int64)
 
 
-def distinct(boxes: Boxes, step: float) -> npt.NDArray[np.int64]:
-    """Which boxes are the first of their kind: their positions and sizes differ by more than about ``step``."""
-    reach = boxes.rotation * boxes.half[:, None]
-    extent = np.abs(np.einsum("di,nij->ndj", _LINES, reach)).sum(2)
-    key = np.round(np.concatenate([boxes.centre, extent, 2 * np.sort(boxes.half, 1)], 1) / step).astype(np.int64)
-    return np.sort(np.unique(key, axis=0, return_index=True)[1])
-
-
-def principal_axes(points: FloatArray, start: Array) -> tuple[FloatArray, FloatArray]:
-    """Variances (G, 3), largest first, and their directions (G, 3, 3), as columns of proper rotations, of each run."""
-    count = np.diff(start)
-    mean = np.add.reduceat(points, start[:-1]) / count[:, None]
-    off = points - np.repeat(mean, count, axis=0)
-    moments = np.add.reduceat(off[:, :, None] * off[:, None], start[:-1]) / count[:, None, None]
+def principal_axes(sets: Sequence[Array]) -> tuple[FloatArray, FloatArray]:
+    """Variances (G, 3) of each set of points, largest first, and their directions (G, 3, 3), a proper rotation each."""
+    points, start = _joined(sets)
+    count, first = np.diff(start), start[:-1]
+    off = points - np.repeat(np.add.reduceat(points, first) / count[:, None], count, axis=0)
+    moments = np.add.reduceat(off[:, :, None] * off[:, None], first) / count[:, None, None]
     spread, axes = np.linalg.eigh(moments)
     axes = np.ascontiguousarray(axes[:, :, ::-1])
     axes[np.linalg.det(axes) < 0, :, 2] *= -1
     return spread[:, ::-1], axes
 
 
-@cache
-def sphere() -> FloatArray:
-    """Evenly spread unit vectors, one of each opposite pair: the upper half of a spiral (Vogel 1979)."""
-    count = MANY // 2
-    height = (np.arange(count) + 0.5) / count
-    turn = np.arange(count) * np.pi * (3 - 5**0.5)
-    around = np.sqrt(1 - height**2)
-    return np.stack([around * np.cos(turn), around * np.sin(turn), height], 1)
+def distinct(boxes: Boxes) -> IntArray:
+    """The boxes that are first of their kind: positions and sizes differ by more than about ``SETTINGS.same``."""
+    extent = np.abs(np.einsum("di,nij->ndj", LINES, boxes.rotation * boxes.half[:, None])).sum(2)
+    measures = np.concatenate([boxes.centre, extent, 2 * np.sort(boxes.half, 1)], 1)
+    return np.sort(np.unique(np.round(measures / SETTINGS.same).astype(np.int64), axis=0, return_index=True)[1])
+
+
+def groups(boxes: Boxes) -> Boxes:
+    """Boxes around those of the first ``SETTINGS.grouped`` boxes that touch: the frame of a back, the boards of a seat.
+
+    From each box, neighbours are added that do not exceed the extent of the first along some of its axes: one such axis
+    yields frames and panels, two yield rods and stacks, and none yields all that touch.
+    """
+    boxes = boxes.take(slice(SETTINGS.grouped))
+    # Boxes touch when both are larger by half of the gap.
+    edges = np.swapaxes(boxes.rotation, 1, 2) * (boxes.half + SETTINGS.group_gap / 2)[..., None]
+    first, second = touching(OrientedBoxes(boxes.centre, edges), 1e-9)
+    adjacent = np.eye(len(edges), dtype=np.float32)  # products of floats are faster than those of flags
+    adjacent[first, second] = adjacent[second, first] = 1
+    corners = boxes.corners()
+    at = np.einsum("jkc,icd->ijkd", corners, boxes.rotation)
+    at -= np.einsum("ic,icd->id", boxes.centre, boxes.rotation)[:, None, None]
+    within = np.abs(at).max(2) <= boxes.half[:, None] + SETTINGS.group_gap
+    unique: dict[bytes, FloatArray] = {}
+    for held in (held for count in (1, 2, 0) for held in combinations(range(3), count)):
+        for row in _reachable(adjacent, within[:, :, held].all(2)):
+            if row.sum() > 1:
+                unique.setdefault(row.tobytes(), corners[row].reshape(-1, 3))
+    return boxes_around(list(unique.values()))
+
+
+def _reachable(adjacent: npt.NDArray[np.float32], fits: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
+    """For each start (a row) the boxes reachable over adjacent boxes (N, N) that fit it (N, N)."""
+    reached = np.eye(len(fits), dtype=np.bool_)
+    while True:
+        onwards = reached | ((reached.astype(np.float32) @ adjacent > 0) & fits)
+        if np.array_equal(onwards, reached):
+            return reached
+        reached = onwards

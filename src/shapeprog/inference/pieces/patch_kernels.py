@@ -7,9 +7,9 @@ import numpy as np
 from shapeprog.kernels.compile import kernel
 
 
-@kernel("i8(f8[:, ::1], f8[:, ::1], i4[:, ::1], i8[::1], f8, f8, i8, i8[::1])")
+@kernel("void(f8[:, ::1], f8[:, ::1], i4[:, ::1], i8[::1], f8, f8, i8, i8[::1])")
 def grow_patches(points, normals, neighbours, order, cosine, tolerance, min_size, label):
-    """Label points by the planar patch they belong to, -1 for none; the number of patches is returned.
+    """Label points by the planar patch they belong to.
 
     A patch grows from a seed to neighbours that lie in its plane and face its way, while the plane follows its points.
 
@@ -26,14 +26,13 @@ def grow_patches(points, normals, neighbours, order, cosine, tolerance, min_size
     min_size
         Points of the smallest patch.
     label
-        Output (N,).
+        Output (N,), initially -1, and afterwards for points of no patch.
     """
-    label[:] = -2
     stack = np.empty(len(points), np.int64)
     mean, total, normal = np.empty(3), np.empty(3), np.empty(3)
     patches = 0
     for seed in order:
-        if label[seed] != -2:
+        if label[seed] >= 0:
             continue
         for axis in range(3):
             normal[axis] = total[axis] = normals[seed, axis]
@@ -66,10 +65,6 @@ def grow_patches(points, normals, neighbours, order, cosine, tolerance, min_size
                     normal[axis] = total[axis] / np.sqrt(length)
         if size < min_size:
             for k in range(size):
-                label[stack[k]] = -2
-            label[seed] = -1
+                label[stack[k]] = -1
         else:
             patches += 1
-    for k in range(len(label)):
-        label[k] = max(label[k], -1)
-    return patches

@@ -1,4 +1,7 @@
-"""Planar patches of points with normals, as rectangles: boxes without thickness, whose last axis is the normal."""
+"""Planar patches of points with normals, and the boards and bars between patches that face each other.
+
+A patch is a rectangle: a box without thickness, whose last axis is the normal.
+"""
 
 from __future__ import annotations
 
@@ -6,47 +9,34 @@ from collections.abc import Iterator
 
 import numpy as np
 import numpy.typing as npt
+from scipy.ndimage import find_objects
 from scipy.ndimage import label as label_regions
 
-from shapeprog.inference.pieces.oriented import Boxes, bounds, boxes_around, join, principal_axes
+from shapeprog.inference.pieces.oriented import Boxes, boxes_around, join, principal_axes
 from shapeprog.inference.pieces.patch_kernels import grow_patches
 from shapeprog.inference.pieces.settings import SETTINGS
-from shapeprog.inference.surface.cloud import Cloud, tolerance
+from shapeprog.inference.surface.cloud import Cloud
 from shapeprog.inference.surface.settings import SURFACE
-from shapeprog.space import Array, FloatArray
+from shapeprog.space import FloatArray
 
 
 def planar_patches(cloud: Cloud) -> Boxes:
     """The planar patches of a surface and the bars that they consist of, largest first."""
-    order = np.argsort(flatness(cloud), kind="stable")
-    label = np.empty(len(cloud.points), np.int64)
-    angle = np.cos(np.radians(25 if cloud.noise > SURFACE.noisy else 15))
-    count = grow_patches(
-        cloud.points, cloud.normals, cloud.neighbours, order, angle, tolerance(cloud), SETTINGS.patch_points, label
-    )
-    sizes = np.bincount(label[label >= 0], minlength=count)
-    largest = np.argsort(-sizes, kind="stable")[: SETTINGS.patches]
-    sequence = np.argsort(label, kind="stable")
-    first = np.searchsorted(label[sequence], np.arange(count + 1))
-    members = [sequence[first[k] : first[k + 1]] for k in largest]
-    patches = rectangles(cloud, members)
-    return join([patches, *bars(cloud, members, patches)])
-
-
-def flatness(cloud: Cloud) -> FloatArray:
-    """Mean deviation of the normals around each point (N,)."""
+    # Mean deviation of the normals around each point: seeds are the flattest first.
     facing = np.abs(np.einsum("nki,ni->nk", cloud.normals[cloud.neighbours], cloud.normals))
-    return np.round(1 - facing.mean(1), 6)
-
-
-def rectangles(cloud: Cloud, members: list[npt.NDArray[np.int64]]) -> Boxes:
-    """The rectangle around each planar set of points, along the world's axes where these are near."""
-    if not members:
+    order = np.argsort(np.round(1 - facing.mean(1), 6), kind="stable")
+    label = np.full(len(cloud.points), -1)
+    cosine = np.cos(np.radians(25 if cloud.noise > SURFACE.noisy else 15))
+    grow_patches(
+        cloud.points, cloud.normals, cloud.neighbours, order, cosine, cloud.tolerance, SETTINGS.patch_points, label
+    )
+    largest = np.argsort(-np.bincount(label[label >= 0]), kind="stable")[: SETTINGS.patches]
+    sets = [cloud.points[label == patch] for patch in largest]
+    if not sets:
         return join([])
-    start, points = bounds(members), cloud.points[np.concatenate(members)]
-    normal = principal_axes(points, start)[1][:, :, 2]
-    boxes = boxes_around(points, start, upright(normal), 2 * cloud.spacing)
-    return boxes._replace(half=(boxes.half + cloud.spacing / 4) * [1, 1, 0])
+    boxes = boxes_around(sets, upright(principal_axes(sets)[1][:, :, 2]), 2 * cloud.spacing)
+    patches = boxes._replace(half=(boxes.half + cloud.spacing / 4) * [1, 1, 0])
+    return join([patches, *_bars(sets, patches, 1.8 * cloud.spacing)])
 
 
 def upright(normal: FloatArray) -> FloatArray:
@@ -61,47 +51,67 @@ def upright(normal: FloatArray) -> FloatArray:
     return np.stack([across, np.cross(normal, across), normal], 2)
 
 
-def bars(cloud: Cloud, members: list[npt.NDArray[np.int64]], patches: Boxes) -> Iterator[Boxes]:
-    """The rectangles of the bars in patches with a low fill, such as frames."""
-    side = 1.8 * cloud.spacing
-    for indices, middle, axes, reach in zip(members, *patches, strict=True):
-        flat = (cloud.points[indices] - middle) @ axes[:, :2] + reach[:2]
-        shape = np.maximum(np.ceil(2 * reach[:2] / side).astype(int), 1)
+def _bars(sets: list[FloatArray], patches: Boxes, side: float) -> Iterator[Boxes]:
+    """The rectangles of the bars in patches with a low fill, such as frames, on a grid of cells of about ``side``."""
+    for points, middle, axes, half in zip(sets, *patches, strict=True):
+        extent = 2 * half[:2]
+        shape = np.maximum(np.ceil(extent / side).astype(int), 1)
         grid = np.zeros(shape, np.bool_)
-        at = np.minimum((flat / (2 * reach[:2]) * shape).astype(int), shape - 1)
-        grid[at[:, 0], at[:, 1]] = True
+        at = ((points - middle) @ axes[:, :2] + half[:2]) / extent * shape
+        grid[tuple(np.minimum(at.astype(int), shape - 1).T)] = True
         if grid.mean() > SETTINGS.full or shape.max() < 6:
             continue
-        for low, high in bars_of(grid):
-            ends = np.stack([low, high]) / shape * 2 * reach[:2] - reach[:2]
-            centre, half = middle + axes[:, :2] @ ends.mean(0), np.append((ends[1] - ends[0]) / 2, 0)
-            yield Boxes(centre[None], axes[None], half[None])
+        for corners in _bars_of(grid):
+            ends = np.array(corners) / shape * 2 * half[:2] - half[:2]
+            centre, half_bar = middle + axes[:, :2] @ ends.mean(0), np.append((ends[1] - ends[0]) / 2, 0)
+            yield Boxes(centre[None], axes[None], half_bar[None])
 
 
-def bars_of(grid: npt.NDArray[np.bool_]) -> list[tuple[Array, Array]]:
+def _bars_of(grid: npt.NDArray[np.bool_]) -> list[tuple[tuple[int, int], tuple[int, int]]]:
     """Rectangles of cells, low and high corners, formed by long runs along either axis of a grid."""
-    corners: dict[tuple[int, ...], None] = {}
+    corners: dict[tuple[tuple[int, int], tuple[int, int]], None] = {}
     for axis in range(2):
-        length = run_lengths(grid if axis else grid.T)
-        length = length if axis else length.T
+        runs, _ = label_regions(grid, np.swapaxes([[0, 0, 0], [1, 1, 1], [0, 0, 0]], axis, 1))
+        length = np.bincount(runs.reshape(-1))[runs] * grid
         for share in SETTINGS.bar_runs:
-            min_length = max(share * grid.shape[axis], 3)
-            regions, count = label_regions(length >= min_length)
-            for k in range(1, count + 1):
-                cells = np.argwhere(regions == k)
-                low, high = cells.min(0), cells.max(0) + 1
-                if len(cells) >= SETTINGS.bar_full * np.prod(high - low):
-                    corners[(*low.tolist(), *high.tolist())] = None
-    return [(np.array(key[:2]), np.array(key[2:])) for key in corners]
+            regions, _ = label_regions(length >= max(share * grid.shape[axis], 3))
+            for number, place in enumerate(find_objects(regions), 1):
+                rows, columns = place
+                region = regions[place] == number
+                if region.sum() >= SETTINGS.bar_full * region.size:
+                    corners[(rows.start, columns.start), (rows.stop, columns.stop)] = None
+    return list(corners)
 
 
-def run_lengths(grid: npt.NDArray[np.bool_]) -> npt.NDArray[np.int64]:
-    """For each cell the length of the run of set cells along the last axis that it is in, 0 where it is not set."""
-    padded = np.pad(grid, ((0, 0), (1, 1))).astype(np.int8)
-    change = np.diff(padded, axis=1)
-    row, first = np.nonzero(change == 1)
-    last = np.nonzero(change == -1)[1]
-    length = np.zeros(grid.shape, np.int64)
-    for i, a, b in zip(row, first, last, strict=True):
-        length[i, a:b] = b - a
-    return length
+def slabs(patches: Boxes) -> Boxes:
+    """Boxes between pairs of patches: intersection and bounds of both rectangles, and each of them."""
+    normal = patches.rotation[:, :, 2]
+    distance = np.einsum("ijk,ik->ij", patches.centre[None] - patches.centre[:, None], normal)
+    parallel = np.abs(normal @ normal.T) > np.cos(np.radians(SETTINGS.parallel))
+    area = patches.half[:, :2].prod(1)
+    larger = area[:, None] >= area
+    thick = np.abs(distance)
+    i, j = np.nonzero(parallel & larger & (thick >= SETTINGS.thickness[0]) & (thick <= SETTINGS.thickness[1]))
+    i, j = i[i != j], j[i != j]
+    corner = patches.corners()[j] - patches.centre[i][:, None]
+    flat = np.einsum("nck,nka->nca", corner, patches.rotation[i][:, :, :2])
+    low, high = flat.min(1), flat.max(1)
+    half = patches.half[i, :2]
+    inner = np.maximum(low, -half), np.minimum(high, half)
+    shared = np.maximum(inner[1] - inner[0], 0).prod(1)
+    keep = shared >= SETTINGS.shared * np.minimum(4 * half.prod(1), (high - low).prod(1))
+    spans = np.array([inner, (np.minimum(low, -half), np.maximum(high, half)), (-half, half), (low, high)])
+    low, high = np.concatenate(spans[:, :, keep], 1)
+    i, depth = np.tile(i[keep], len(spans)), np.tile(distance[i, j][keep], len(spans))
+    frame, deep = patches.rotation[i], depth[:, None]
+    centre = patches.centre[i] + np.einsum("nij,nj->ni", frame, np.concatenate([(low + high) / 2, deep / 2], 1))
+    boxes = Boxes(centre, frame, np.concatenate([(high - low) / 2, np.abs(deep) / 2], 1))
+    sides = np.sort(boxes.half, 1)
+    return boxes.take((boxes.half > 0).all(1) & (boxes.half[:, 2] <= SETTINGS.stretch * sides[:, 1]))
+
+
+def sheets(patches: Boxes) -> Boxes:
+    """Thin boxes about the largest patches."""
+    largest = np.argsort(-np.round(patches.half[:, :2].prod(1), 6), kind="stable")[: SETTINGS.sheets]
+    boxes = patches.take(largest)
+    return boxes._replace(half=np.maximum(boxes.half, [0, 0, SETTINGS.thickness[0] / 2]))

@@ -1,69 +1,76 @@
 """Proposals: oriented boxes that may be parts of a target, and the points of its surface.
 
-========= ==========================================================================================
-source    box around
-========= ==========================================================================================
-component a connected component of the mesh
-group     boxes that touch, such as the frame of a back
-rod       points on a cylinder
-limb      points of clean scans whose inner balls run on in one direction
-slab      the space between two planar patches that face each other
-sheet     one planar patch of unknown thickness
-========= ==========================================================================================
-
-They overlap, and most are wrong: the selection of candidates decides.
+Boxes of several sources overlap, and most are wrong: the selection of candidates decides.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from enum import Enum
+from enum import IntEnum
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from shapeprog.data.sampling import sample_with_faces
 from shapeprog.data.shape import Shape
-from shapeprog.inference.pieces.covering import Support
-from shapeprog.inference.pieces.grouping import groups
+from shapeprog.inference.pieces.cover_kernels import near_boxes
 from shapeprog.inference.pieces.limbs import limbs
-from shapeprog.inference.pieces.oriented import Boxes, bounds, boxes_around, distinct, join
-from shapeprog.inference.pieces.patches import planar_patches
+from shapeprog.inference.pieces.oriented import Boxes, boxes_around, distinct, groups, join
+from shapeprog.inference.pieces.patches import planar_patches, sheets, slabs
 from shapeprog.inference.pieces.rods import rods
 from shapeprog.inference.pieces.settings import SETTINGS
-from shapeprog.inference.pieces.slabs import sheets, slabs
 from shapeprog.inference.surface.cloud import Cloud, cloud_of, is_clean, points_of_scan
-from shapeprog.inference.surface.components import Components, components
+from shapeprog.inference.surface.components import Components, IntArray, components, face_normals
 
 
-class Source(Enum):
-    """Source of a piece."""
+class Source(IntEnum):
+    """What a piece is the box around."""
 
-    COMPONENT = 0
-    GROUP = 1
-    ROD = 2
-    LIMB = 3
-    SLAB = 4
-    SHEET = 5
+    COMPONENT = 0  # a connected component of the mesh
+    GROUP = 1  # boxes that touch, such as the frame of a back
+    ROD = 2  # points on a cylinder
+    LIMB = 3  # points of clean scans whose inner balls run on in one direction
+    SLAB = 4  # the space between two planar patches that face each other
+    SHEET = 5  # one planar patch of unknown thickness
 
 
 class Pieces(NamedTuple):
-    """Boxes in cells, the most important first, and the points of the surface.
-
-    Parameters
-    ----------
-    boxes
-        Centres, axes and half extents.
-    source
-        Source of each piece (N,), as values of :class:`Source`.
-    cloud
-        The surface as points with normals.
-    """
+    """Boxes in cells, the most important first, the :class:`Source` of each (N,), and the points of the surface."""
 
     boxes: Boxes
-    source: npt.NDArray[np.int64]
+    source: IntArray
     cloud: Cloud
+
+
+class Support:
+    """Points of a surface that boxes explain: ``explained`` (B, N), whether each box explains each tested point.
+
+    ``filled`` (B,) is whether points lie near enough of the surface of each box for a solid; ``price`` (B,) is that of
+    its surface without points, in points.
+    """
+
+    def __init__(self, cloud: Cloud, boxes: Boxes) -> None:
+        every = -(-len(cloud.points) // SETTINGS.cover_points)
+        points, fill = np.ascontiguousarray(cloud.points[::every]), np.zeros(len(boxes.half))
+        self.explained = np.zeros((len(fill), len(points)), np.bool_)
+        distance = max(SETTINGS.cover_distance, 2 * cloud.noise)
+        near_boxes(points, *map(np.ascontiguousarray, boxes), distance, self.explained, fill)
+        self.filled = fill >= SETTINGS.cover_filled
+        self.price = SETTINGS.cover_price * boxes.area() * (1 - fill) / (cloud.spacing**2 * every)
+
+    def cover(self) -> IntArray:
+        """The filled boxes that a greedy selection takes, best first."""
+        counts, selected = self.explained.sum(1), list[int]()
+        remaining = np.ones(self.explained.shape[1], np.bool_)
+        for _ in range(min(SETTINGS.cover_boxes, len(counts))):
+            gain = np.where(self.filled, counts - self.price, 0)
+            best = int(gain.argmax())
+            if gain[best] < SETTINGS.cover_gain:
+                break
+            selected.append(best)
+            counts -= self.explained[:, remaining & self.explained[best]].sum(1)
+            remaining &= ~self.explained[best]
+        return np.array(selected, np.int64)
 
 
 def find_pieces(shape: Shape) -> Pieces:
@@ -78,65 +85,56 @@ def find_pieces(shape: Shape) -> Pieces:
             return _of_mesh(mesh)
     points = points_of_scan(shape)
     cloud = cloud_of(points)
-    return _ranked(cloud, _of_points(cloud, limbs(cloud) if is_clean(points) else []), join([]))
+    return _ranked(cloud, _of_points(cloud, limbs(cloud) if is_clean(points) else join([])))
 
 
 def _of_mesh(mesh: Components) -> Pieces:
     """Pieces of a mesh: from its components, and from sampled points, with at least some on each large component."""
-    count = min(len(mesh.area), SETTINGS.components)
-    corner = mesh.corner[: mesh.corner_start[count]]
-    boxes = boxes_around(mesh.vertices[corner], mesh.corner_start[: count + 1])
+    runs = list(pairwise(mesh.start[: SETTINGS.components + 1]))
+    boxes = boxes_around([mesh.vertices[np.unique(mesh.faces[first:last])] for first, last in runs])
     samples = [sample_with_faces(mesh.vertices, mesh.faces, SETTINGS.points, 0)]
-    counts = np.bincount(mesh.component_of(samples[0][1]), minlength=count)
-    for component in np.flatnonzero(counts[:count] < SETTINGS.component_points):
-        first, last = mesh.face_start[component : component + 2]
-        points, face = sample_with_faces(mesh.vertices, mesh.faces[first:last], SETTINGS.component_points, 0)
-        samples.append((points, face + first))
+    counts = np.bincount(mesh.component_of(samples[0][1]), minlength=len(runs))
+    for (first, last), count in zip(runs, counts, strict=False):
+        if count < SETTINGS.component_points:
+            points, face = sample_with_faces(mesh.vertices, mesh.faces[first:last], SETTINGS.component_points, 0)
+            samples.append((points, face + first))
     points, face = (np.concatenate(column) for column in zip(*samples, strict=True))
-    corners = mesh.vertices[mesh.faces[face]]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals = face_normals(mesh.vertices[mesh.faces[face]])
     cloud = cloud_of(points, normals / np.linalg.norm(normals, axis=1, keepdims=True))
-    return _ranked(cloud, [(Source.GROUP, groups(boxes)), *_of_points(cloud, [])], boxes)
+    parts = [(Source.COMPONENT, boxes), (Source.GROUP, groups(boxes)), *_of_points(cloud, join([]))]
+    return _ranked(cloud, parts)
 
 
-def _of_points(cloud: Cloud, along: Sequence[npt.NDArray[np.int64]]) -> list[tuple[Source, Boxes]]:
-    """Pieces from points with normals, by source, and groups of those that explain the points together.
-
-    ``along`` has the indices of the points of each limb.
-    """
+def _of_points(cloud: Cloud, along: Boxes) -> list[tuple[Source, Boxes]]:
+    """Pieces from points with normals and limbs, by source, and groups of those that explain the points together."""
     if len(cloud.points) < SETTINGS.least_points:
-        return [(Source.GROUP, boxes_around(cloud.points, np.array([0, len(cloud.points)])))]
+        return [(Source.GROUP, boxes_around([cloud.points]))]
     patches = planar_patches(cloud)
     between = slabs(patches)
-    between = between.take(distinct(between, SETTINGS.same))
+    between = between.take(distinct(between))
     support = Support(cloud, between)
     selected = np.flatnonzero(support.filled)
     selected = selected[np.argsort(-support.explained[selected].sum(1), kind="stable")[: SETTINGS.slabs]]
-    along = along[: SETTINGS.limbs]
-    members = cloud.points[np.concatenate(along)] if along else np.zeros((0, 3))
-    sources = [
+    parts = [
         (Source.ROD, rods(cloud)),
-        (Source.LIMB, boxes_around(members, bounds(along))),
+        (Source.LIMB, along),
         (Source.SLAB, between.take(selected)),
-        (Source.SHEET, sheets(patches, SETTINGS.sheets)),
+        (Source.SHEET, sheets(patches)),
     ]
-    boxes = join([part for _, part in sources])
-    return [*sources, (Source.GROUP, groups(boxes.take(Support(cloud, boxes).cover())))]
+    boxes = join([part for _, part in parts])
+    return [*parts, (Source.GROUP, groups(boxes.take(Support(cloud, boxes).cover())))]
 
 
-def _ranked(cloud: Cloud, listed: list[tuple[Source, Boxes]], component_boxes: Boxes) -> Pieces:
-    """All pieces, each once, the most important first."""
-    count = len(component_boxes.half)
-    listed = [(Source.COMPONENT, component_boxes), *listed]
-    boxes = join([boxes for _, boxes in listed])
-    source = np.concatenate([np.full(len(boxes.half), source.value) for source, boxes in listed])
-    unique = distinct(boxes, SETTINGS.same)
-    unique = np.concatenate([np.arange(count), unique[unique >= count]])
+def _ranked(cloud: Cloud, parts: list[tuple[Source, Boxes]]) -> Pieces:
+    """All pieces, each once but for components, the most important first."""
+    boxes = join([part for _, part in parts])
+    source = np.repeat([source for source, _ in parts], [len(part.half) for _, part in parts])
+    unique = np.union1d(np.flatnonzero(source == Source.COMPONENT), distinct(boxes))
     boxes, source = boxes.take(unique), source[unique]
     support = Support(cloud, boxes)
-    first = np.full(len(unique), len(unique))
-    cover = support.cover()
+    cover, first = support.cover(), np.full(len(unique), len(unique))
     first[cover] = np.arange(len(cover))
-    turn = np.searchsorted([Source.COMPONENT.value, Source.LIMB.value], source)
-    order = np.lexsort((-np.round(support.value, 6), turn, first))[: SETTINGS.pieces]
+    turn = np.searchsorted([Source.COMPONENT, Source.LIMB], source)
+    value = support.explained.sum(1) - support.price
+    order = np.lexsort((-np.round(value, 6), turn, first))[: SETTINGS.pieces]
     return Pieces(boxes.take(order), source[order], cloud)

@@ -9,14 +9,14 @@ from shapeprog.inference.pieces.oriented import Boxes, join
 from shapeprog.inference.pieces.patches import upright
 from shapeprog.inference.pieces.rod_kernels import count_rods, mark_rod
 from shapeprog.inference.pieces.settings import SETTINGS
-from shapeprog.inference.surface.cloud import Cloud, tolerance
+from shapeprog.inference.surface.cloud import Cloud
 from shapeprog.inference.surface.settings import SURFACE
 from shapeprog.space import Array, FloatArray
 
 
 def rods(cloud: Cloud) -> Boxes:
     """Boxes around round rods, best first; the first axis is that of the rod."""
-    off, facing = tolerance(cloud), 0.85 if cloud.noise > SURFACE.noisy else 0.94
+    off, facing = cloud.tolerance, 0.85 if cloud.noise > SURFACE.noisy else 0.94
     centre, axis, radius = through_pairs(cloud, off)
     counts = np.zeros((len(radius), 4))
     count_rods(cloud.points, cloud.normals, centre, _frames(axis), radius, off, facing, counts)

@@ -30,6 +30,11 @@ class Cloud(NamedTuple):
     spacing: float
     noise: float
 
+    @property
+    def tolerance(self) -> float:
+        """Distance in cells within which a point is on a plane or a cylinder."""
+        return float(np.clip(2.5 * self.noise, 0.06, 0.4))
+
 
 def cloud_of(points: Array, normals: Array | None = None) -> Cloud:
     """The cloud of points in cells, at least one.
@@ -53,17 +58,20 @@ def projected(points: FloatArray) -> FloatArray:
 
 
 def _cloud(points: Array, normals: Array | None) -> Cloud:
+    """The cloud of points as they are: noise is their distance from planes, or from those of similar normals."""
     points = np.ascontiguousarray(points, np.float64)
     around = (SURFACE.around if normals is None else SURFACE.nearest) + 1
     distance, neighbours = cKDTree(points).query(points, k=range(1, min(around, len(points)) + 1), workers=2)
     spacing = max(float(np.median(distance[:, -1])) * (np.pi / neighbours.shape[1]) ** 0.5, SURFACE.closest)
+    nearest = neighbours[:, 1 : SURFACE.nearest + 1]
     if normals is None:
-        facing, squared = planes(points, neighbours)
-        noise = float(np.sqrt(np.median(squared) / neighbours.shape[1]))
+        normals, squared = planes(points, neighbours)
+        noise = np.sqrt(np.median(squared) / neighbours.shape[1])
     else:
-        facing = np.ascontiguousarray(normals, np.float64)
-        noise = roughness(points, facing, neighbours)
-    return Cloud(points, facing, np.ascontiguousarray(neighbours[:, 1 : SURFACE.nearest + 1], np.int32), spacing, noise)
+        parallel = np.abs(np.einsum("nki,ni->nk", normals[nearest], normals)) > 0.98
+        off = np.abs(np.einsum("nki,ni->nk", points[nearest] - points[:, None], normals))[parallel]
+        noise = np.median(off) if len(off) else 0.0
+    return Cloud(points, normals, np.ascontiguousarray(nearest, np.int32), spacing, float(noise))
 
 
 def planes(points: FloatArray, neighbours: npt.NDArray[np.int64]) -> tuple[FloatArray, FloatArray]:
@@ -72,18 +80,6 @@ def planes(points: FloatArray, neighbours: npt.NDArray[np.int64]) -> tuple[Float
     off -= off.mean(1, keepdims=True)
     squared, axes = np.linalg.eigh(off.transpose(0, 2, 1) @ off)
     return np.ascontiguousarray(axes[:, :, 0]), np.maximum(squared[:, 0], 0)
-
-
-def roughness(points: FloatArray, normals: FloatArray, neighbours: npt.NDArray[np.int64]) -> float:
-    """Median distance of neighbours with similar normals from the plane of a point."""
-    parallel = np.abs(np.einsum("nki,ni->nk", normals[neighbours[:, 1:]], normals)) > 0.98
-    off = np.abs(np.einsum("nki,ni->nk", points[neighbours[:, 1:]] - points[:, None], normals))[parallel]
-    return float(np.median(off)) if len(off) else 0.0
-
-
-def tolerance(cloud: Cloud) -> float:
-    """Distance in cells within which a point is on a plane or a cylinder."""
-    return float(np.clip(2.5 * cloud.noise, 0.06, 0.4))
 
 
 def points_of_scan(shape: Shape) -> FloatArray:
@@ -100,3 +96,10 @@ def is_clean(points: FloatArray) -> bool:
         return False
     _, squared = planes(points, cKDTree(points).query(points, k=8)[1])
     return bool(np.quantile(np.sqrt(squared / 5), 0.1) < 0.02)
+
+
+def spiral(height: FloatArray) -> FloatArray:
+    """Unit vectors (N, 3) whose first coordinates are evenly spaced heights (N,), spread evenly (Vogel 1979)."""
+    turn = np.arange(len(height)) * np.pi * (3 - 5**0.5)
+    around = np.sqrt(1 - height**2)
+    return np.stack([height, around * np.cos(turn), around * np.sin(turn)], 1)

@@ -11,24 +11,24 @@ from scipy.sparse.csgraph import connected_components
 
 from shapeprog.space import Array, FloatArray
 
+IntArray = npt.NDArray[np.int64]
+
 
 class Components(NamedTuple):
     """Components by falling area, and the welded mesh that contains them.
 
-    ``vertices`` (V, 3); ``faces`` (F, 3), each once, those of one component after another, ``face_start`` (G + 1,);
-    ``corner`` (C,) the vertices of each component in the order of the file, ``corner_start`` (G + 1,); ``area`` (G,).
+    ``vertices`` (V, 3) in the order of the file; ``faces`` (F, 3), each once, those of one component after another;
+    ``start`` (G + 1,), the first face of each component and the end of the last; ``area`` (G,).
     """
 
     vertices: FloatArray
-    faces: npt.NDArray[np.int64]
-    face_start: npt.NDArray[np.int64]
-    corner: npt.NDArray[np.int64]
-    corner_start: npt.NDArray[np.int64]
+    faces: IntArray
+    start: IntArray
     area: FloatArray
 
-    def component_of(self, face: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
+    def component_of(self, face: IntArray) -> IntArray:
         """The indices of the components that contain some faces."""
-        return np.searchsorted(self.face_start, face, side="right") - 1
+        return np.searchsorted(self.start, face, side="right") - 1
 
 
 def components(vertices: Array, faces: Array) -> Components:
@@ -36,34 +36,20 @@ def components(vertices: Array, faces: Array) -> Components:
 
     Closed surfaces that share vertices or edges only, such as a door and its case, are separate components.
     """
-    welded, listed = weld(np.asarray(vertices, np.float64), np.asarray(faces, np.int64))
-    listed, area = unique_faces(welded, listed)
-    welded, listed = separated(welded, listed)
-    label = linked(np.concatenate([listed[:, :2], listed[:, 1:]]), len(welded))
-    count, of_face = int(label.max(initial=-1)) + 1, label[listed[:, 0]]
-    total = np.bincount(of_face, area, minlength=count)
-    used = np.flatnonzero(total > 0)
-    order = used[np.argsort(-np.round(total[used], 6), kind="stable")]
-    rank = np.full(count, count)
-    rank[order] = np.arange(len(order))
-    sequence = np.argsort(rank[of_face], kind="stable")
-    corner = np.argsort(rank[label], kind="stable")
-    bounds = np.arange(len(order) + 1)
-    return Components(
-        welded,
-        listed[sequence],
-        np.searchsorted(rank[of_face][sequence], bounds),
-        corner[: np.searchsorted(rank[label][corner], len(order))],
-        np.searchsorted(rank[label][corner], bounds),
-        np.asarray(total[order], np.float64),
-    )
+    welded, listed = _weld(np.asarray(vertices, np.float64), np.asarray(faces, np.int64))
+    listed, area = _unique_faces(welded, listed)
+    welded, listed = _separated(welded, listed)
+    label = linked(np.concatenate([listed[:, :2], listed[:, 1:]]), len(welded))[listed[:, 0]]
+    total = np.bincount(label, area)
+    order = np.argsort(-np.round(total, 6), kind="stable")
+    rank = np.argsort(order)[label]
+    sequence = np.argsort(rank, kind="stable")
+    start = np.searchsorted(rank[sequence], np.arange(len(order) + 1))
+    return Components(welded, listed[sequence], start, np.asarray(total[order], np.float64))
 
 
-def weld(vertices: FloatArray, faces: npt.NDArray[np.int64]) -> tuple[FloatArray, npt.NDArray[np.int64]]:
-    """Vertices with coinciding ones merged, in the order of first use by faces, and the faces.
-
-    Vertices coincide if they round to the same multiple of 2^-12 cells, a hundred-thousandth of the longest side.
-    """
+def _weld(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArray]:
+    """The mesh with vertices merged that round to the same multiple of 2^-12 cells, 10^-5 of the longest side."""
     used = np.zeros(len(vertices), np.bool_)
     used[faces.reshape(-1)] = True
     cell = np.round(vertices[used] * 2**12 + 0.3).astype(np.int64)  # round numbers are well inside their cell
@@ -71,90 +57,89 @@ def weld(vertices: FloatArray, faces: npt.NDArray[np.int64]) -> tuple[FloatArray
     size = cell.max(0) + 1
     key = (cell[:, 0] * size[1] + cell[:, 1]) * size[2] + cell[:, 2]
     _, unique, name = np.unique(key, return_index=True, return_inverse=True)
-    corners = name[np.cumsum(used)[faces.reshape(-1)] - 1]
-    first = np.empty(len(unique), np.int64)
-    first[corners[::-1]] = np.arange(len(corners))[::-1]  # the last value, of the first corner, stays
-    order = np.argsort(first, kind="stable")
-    rank = np.empty(len(unique), np.int64)
-    rank[order] = np.arange(len(unique))
-    return vertices[used][unique][order], rank[corners].reshape(-1, 3)
+    corner = name[np.cumsum(used)[faces.reshape(-1)] - 1]
+    first, rank = _in_order(corner)
+    return vertices[used][unique][corner[first]], rank.reshape(-1, 3)
 
 
-def unique_faces(vertices: FloatArray, faces: npt.NDArray[np.int64]) -> tuple[npt.NDArray[np.int64], FloatArray]:
+def _in_order(keys: IntArray) -> tuple[IntArray, IntArray]:
+    """The position of the first of each kind of key, ascending, and the kind (N,) of each key in this order."""
+    _, first, name = np.unique(keys, return_index=True, return_inverse=True)
+    order = np.argsort(first)
+    return first[order], np.argsort(order)[name]
+
+
+def _unique_faces(vertices: FloatArray, faces: IntArray) -> tuple[IntArray, FloatArray]:
     """The faces with an area, without duplicates of either winding, and their areas."""
     ordered, count = np.sort(faces, axis=1), len(vertices)
     _, pair = np.unique(ordered[:, 0] * count + ordered[:, 1], return_inverse=True)
     _, first = np.unique(pair * count + ordered[:, 2], return_index=True)
     faces = faces[np.sort(first)]
-    corners = vertices[faces]
-    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
+    area = np.linalg.norm(face_normals(vertices[faces]), axis=1) / 2
     return faces[area > 0], area[area > 0]
 
 
-def separated(vertices: FloatArray, faces: npt.NDArray[np.int64]) -> tuple[FloatArray, npt.NDArray[np.int64]]:
+def _separated(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArray]:
     """The mesh with separate vertices for each closed surface.
 
     Faces belong to one surface if edges that exactly two faces share link them.  It is closed if equally many of its
     faces run in both directions at each edge.
     """
-    edge = edges(faces, len(vertices))
+    edge, direction = _edges(faces, len(vertices))
     manifold = np.bincount(edge)[edge] == 2
     face = np.repeat(np.arange(len(faces)), 3)
     order = np.argsort(edge[manifold], kind="stable")
     surface = linked(face[manifold][order].reshape(-1, 2), len(faces))
-    direction = np.sign(faces[:, [1, 2, 0]] - faces).reshape(-1)
     own, name = np.unique(surface[face] * len(edge) + edge, return_inverse=True)
     closed = np.bincount(own // len(edge), np.bincount(name, direction) != 0) == 0
     surface = np.where(closed[surface], surface + 1, 0)
-    key = (faces + len(vertices) * surface[:, None]).reshape(-1)
-    _, first, name = np.unique(key, return_index=True, return_inverse=True)
-    rank = np.argsort(np.argsort(first))  # in the order of the file
-    return vertices[faces.reshape(-1)[np.sort(first)]], rank[name].reshape(-1, 3)
+    first, rank = _in_order((faces + len(vertices) * surface[:, None]).reshape(-1))
+    return vertices[faces.reshape(-1)[first]], rank.reshape(-1, 3)
 
 
-def edges(faces: npt.NDArray[np.int64], count: int) -> npt.NDArray[np.int64]:
-    """The index (3 F,) of each edge of the faces, equal for both directions, of ``count`` vertices."""
+def _edges(faces: IntArray, count: int) -> tuple[IntArray, IntArray]:
+    """The index of each edge (3 F,) of faces over ``count`` vertices, equal for both directions, and its direction."""
     start, end = faces.reshape(-1), faces[:, [1, 2, 0]].reshape(-1)
-    name: npt.NDArray[np.int64] = np.unique(
-        np.minimum(start, end) * count + np.maximum(start, end), return_inverse=True
-    )[1]
-    return name
+    _, edge = np.unique(np.minimum(start, end) * count + np.maximum(start, end), return_inverse=True)
+    return edge, np.sign(end - start)
 
 
-def solid_sides(mesh: Components) -> npt.NDArray[np.int64]:
+def face_normals(corners: FloatArray) -> FloatArray:
+    """The normals (F, 3) of triangles (F, 3, 3), twice as long as their areas."""
+    return np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+
+
+def solid_sides(mesh: Components) -> IntArray:
     """For each face (F,) of a component that bounds a solid, 1 if it faces outwards and -1 if inwards; 0 for others.
 
     At each edge of a closed surface, equally many faces run in both directions, and the signed volume is positive if
     the faces point outwards.  Some 2 % of the edges may be open.  The solid is at least .2 cells thick on average: the
     sign of the volume of a crumpled sheet is random.
     """
-    faces, counts = mesh.faces, np.diff(mesh.face_start)
+    counts, corners = np.diff(mesh.start), mesh.vertices[mesh.faces]
     component = np.repeat(np.arange(len(counts)), counts)
-    start, end = faces.reshape(-1), faces[:, [1, 2, 0]].reshape(-1)
-    edge = edges(faces, len(mesh.vertices))
-    uneven = np.bincount(edge, np.sign(end - start)) != 0
+    edge, direction = _edges(mesh.faces, len(mesh.vertices))
+    uneven = np.bincount(edge, direction) != 0
     gaps = np.bincount(np.repeat(component, 3), uneven[edge], minlength=len(counts)) / (3 * counts)
-    corners = mesh.vertices[faces]
-    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    volume = np.bincount(component, (corners[:, 0] * across).sum(1), minlength=len(counts)) / 6
+    volume = np.bincount(component, (corners[:, 0] * face_normals(corners)).sum(1), minlength=len(counts)) / 6
     solid = (gaps <= 0.02) & (2 * np.abs(volume) > 0.2 * mesh.area)
-    sides: npt.NDArray[np.int64] = np.where(solid, np.sign(volume), 0).astype(np.int64)[component]
+    sides: IntArray = np.where(solid, np.sign(volume), 0).astype(np.int64)[component]
     return sides
 
 
-def simple_parts(mesh: Components, sides: npt.NDArray[np.int64], seen: npt.NDArray[np.int64]) -> FloatArray:
+def simple_parts(mesh: Components, sides: IntArray, seen: IntArray) -> FloatArray:
     """Low and high corners (K, 2, 3) of the boxes of solid, visible components that fill most of their box.
 
     ``sides`` (F,) are those of :func:`solid_sides`; ``seen`` has the indices of visible faces.
     """
-    at, face, corner = mesh.vertices[mesh.corner], mesh.face_start[:-1], mesh.corner_start[:-1]
-    low, high = np.minimum.reduceat(at, corner), np.maximum.reduceat(at, corner)
-    volume = np.abs(np.add.reduceat(np.linalg.det(mesh.vertices[mesh.faces]), face)) / 6
-    simple = (sides[face] != 0) & (volume >= 0.5 * (high - low).prod(1))  # a ball fills .52 of its box
-    return np.stack([low, high], 1)[simple & np.isin(np.arange(len(face)), mesh.component_of(seen))]
+    corners, first = mesh.vertices[mesh.faces], mesh.start[:-1]
+    low, high = np.minimum.reduceat(corners.min(1), first), np.maximum.reduceat(corners.max(1), first)
+    volume = np.abs(np.add.reduceat(np.linalg.det(corners), first)) / 6
+    simple = (sides[first] != 0) & (volume >= 0.5 * (high - low).prod(1))  # a ball fills .52 of its box
+    return np.stack([low, high], 1)[simple & np.isin(np.arange(len(first)), mesh.component_of(seen))]
 
 
-def linked(pairs: Array, count: int) -> npt.NDArray[np.int64]:
+def linked(pairs: Array, count: int) -> IntArray:
     """The connected component (count,) of each of ``count`` items, from linked pairs (P, 2)."""
     graph = coo_matrix((np.ones(len(pairs), np.bool_), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
     return np.asarray(connected_components(graph, directed=False)[1], np.int64)

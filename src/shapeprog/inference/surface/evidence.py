@@ -1,13 +1,4 @@
-"""Evidence of a target: points of its surface that a program should explain, and space that it should leave free.
-
-=======  ============================================  ==========================================================
-target   points and normals                            space known to be free
-=======  ============================================  ==========================================================
-mesh     sampled by area; duplicate faces count once   cells that are visible from outside
-points   the points; normals of local planes           cells with clear rays in opposite directions
-cells    the exposed faces of the cells                the empty cells
-=======  ============================================  ==========================================================
-"""
+"""Evidence of a target: points of its surface that a program should explain, and space that it should leave free."""
 
 from __future__ import annotations
 
@@ -17,14 +8,15 @@ from functools import partial
 
 import numpy as np
 import numpy.typing as npt
+from scipy.spatial import cKDTree
 
 from shapeprog.data.sampling import sample_with_faces
 from shapeprog.data.shape import Shape
 from shapeprog.data.voxelise_kernels import mark_triangles
 from shapeprog.geometry.arrays import over_threads
 from shapeprog.geometry.mesh import union_mesh
-from shapeprog.inference.surface.cloud import planes, points_of_scan
-from shapeprog.inference.surface.components import Components, components, simple_parts, solid_sides
+from shapeprog.inference.surface.cloud import planes, points_of_scan, spiral
+from shapeprog.inference.surface.components import Components, components, face_normals, simple_parts, solid_sides
 from shapeprog.inference.surface.evidence_kernels import look_out
 from shapeprog.inference.surface.settings import SURFACE
 from shapeprog.language.program import Program
@@ -88,53 +80,50 @@ def evidence_of(shape: Shape, seed: int = 0) -> Evidence:
 
 
 def evidence_of_program(program: Program, seed: int = 0) -> Evidence:
-    """The evidence of the surface of a program, as for a mesh.
-
-    Raises ``ShapeProgError`` if the program has no volume.
-    """
+    """The evidence of the surface of a program, as for a mesh; a ``ShapeProgError`` if it has no volume."""
     return _of_mesh(components(*union_mesh(unroll(program))), seed)
 
 
 def _of_mesh(mesh: Components, seed: int) -> Evidence:
+    """The evidence of a mesh: samples by area; cells are free where they are visible from outside."""
     samples, face = sample_with_faces(mesh.vertices, mesh.faces, SURFACE.surface, seed)
     surface, corners = samples.astype(np.float64), mesh.vertices[mesh.faces]
-    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])[face]
-    sides = solid_sides(mesh)
-    side = sides[face]
-    normals = np.where(side < 0, -1, 1)[:, None] * across / np.linalg.norm(across, axis=1, keepdims=True)
-    barrier = touched(corners, SURFACE.looking)
-    points = surface[: SURFACE.points]
-    front, back = (visible(points, sign * normals[: SURFACE.points], barrier) for sign in (1, -1))
+    sides, across = solid_sides(mesh), face_normals(corners)[face]
+    normals = np.where(sides[face] < 0, -1, 1)[:, None] * across / np.linalg.norm(across, axis=1, keepdims=True)
+    barrier = np.zeros((SURFACE.looking,) * 3, np.bool_)
+    # The longest side ends on cell boundaries: rounding would leave holes in faces there, which show the inside.
+    mark_triangles(np.ascontiguousarray((corners + HALF) * (SURFACE.looking / RESOLUTION)), 0.5 + 1e-6, barrier)
+    points, facing = surface[: SURFACE.points], normals[: SURFACE.points]
+    front, back = (_visible(points, side, barrier) for side in (facing, -facing))
     weights = np.where(front | back, 1.0, 0.1)  # what cannot be seen from outside counts little
-    facing, oriented = outward(normals[: SURFACE.points], front, back)
+    facing, oriented = _turned_outward(facing, front, back)
     area = float(mesh.area.sum())
     coarse: Flags = np.any(barrier.reshape((SURFACE.free, SURFACE.looking // SURFACE.free) * 3), (1, 3, 5))
     return Evidence(
         points, facing, weights / weights.sum(), oriented, SURFACE.tolerance, SURFACE.agreement,
-        surface, normals, side != 0, _reach(SURFACE.tolerance, area), area * float(weights.mean()),
-        free_cells(coarse, surface, through=False), simple_parts(mesh, sides, face[:SURFACE.points][front | back])[:64],
+        surface, normals, sides[face] != 0, _reach(SURFACE.tolerance, area, SURFACE.surface),
+        area * float(weights.mean()), _free_cells(coarse, surface, through=False),
+        simple_parts(mesh, sides, face[: SURFACE.points][front | back])[:64],
     )  # fmt: skip
 
 
 def _of_points(surface: FloatArray, voxels: Flags, seed: int) -> Evidence:
-    """The evidence of a scan: noise is the distance from local planes; area follows from distances between points."""
-    normals, noise, point_area = local_planes(surface)
-    selected = np.sort(np.random.default_rng(seed).permutation(len(surface))[: SURFACE.points])
+    """The evidence of a scan: normals are those of local planes; cells with clear rays in both directions are free."""
+    distance, neighbours = cKDTree(surface).query(surface, k=SURFACE.planes)
+    normals, squared = planes(surface, neighbours)
+    # A low quantile: planes do not fit at edges and in thin parts.
+    noise = float(np.quantile(np.sqrt(squared / (SURFACE.planes - 3)), 0.25))
+    area = float(np.median(distance[:, -1]) ** 2 * math.pi / (SURFACE.planes - 1)) * len(surface)
     # With more noise, the position of the surface is too uncertain for a wider tolerance.
-    tolerance, area = min(max(SURFACE.tolerance, 2 * noise), 0.75), point_area * len(surface)
-    reach = _reach(tolerance, area, len(surface))
-    fine = (
-        voxels.repeat(SURFACE.free // RESOLUTION, 0)
-        .repeat(SURFACE.free // RESOLUTION, 1)
-        .repeat(SURFACE.free // RESOLUTION, 2)
-    )
-    free = free_cells(fine, surface, through=True)
-    weights, points = np.full(len(selected), 1 / len(selected)), surface[selected]
-    above = 1.5 * RESOLUTION / SURFACE.free * normals[selected]
-    facing, oriented = outward(normals[selected], *(_within(free, points + sign * above) for sign in (1, -1)))
+    tolerance = min(max(SURFACE.tolerance, 2 * noise), 0.75)
+    free = _free_cells(np.kron(voxels, np.ones((SURFACE.free // RESOLUTION,) * 3, np.bool_)), surface, through=True)
+    selected = np.sort(np.random.default_rng(seed).permutation(len(surface))[: SURFACE.points])
+    points, facing = surface[selected], normals[selected]
+    above = 1.5 * RESOLUTION / SURFACE.free * facing
+    facing, oriented = _turned_outward(facing, _within(free, points + above), _within(free, points - above))
     return Evidence(
-        points, facing, weights, oriented, tolerance, SURFACE.scanned, surface, normals,
-        np.zeros(len(surface), np.bool_), reach, area, free, np.zeros((0, 2, 3)),
+        points, facing, np.full(len(points), 1 / len(points)), oriented, tolerance, SURFACE.scanned, surface, normals,
+        np.zeros(len(surface), np.bool_), _reach(tolerance, area, len(surface)), area, free, np.zeros((0, 2, 3)),
     )  # fmt: skip
 
 
@@ -143,7 +132,7 @@ def _of_cells(voxels: Flags) -> Evidence:
 
     Parts that are one cell thick have .7 of that thickness: their two sides do not cross.
     """
-    sides, occupied = exposed_sides(voxels), np.argwhere(voxels)
+    sides, occupied = _exposed_sides(voxels), np.argwhere(voxels)
     faces = np.ascontiguousarray(np.argwhere(sides))  # kernels need contiguous arrays
     axis, sign, cells = faces[:, 0], 2 * faces[:, 1] - 1, faces[:, 2:]
     low, high = occupied.min(0)[axis], occupied.max(0)[axis] + 1
@@ -169,7 +158,7 @@ def points_of_cells(voxels: npt.NDArray[np.bool_], count: int = 5000, *, seed: i
     """
     occupied, random, rows = np.argwhere(voxels), np.random.default_rng(seed), np.arange(count)
     low, high = occupied.min(0), occupied.max(0) + 1
-    faces = np.argwhere(exposed_sides(voxels))
+    faces = np.argwhere(_exposed_sides(voxels))
     along, above, *cell = faces[random.integers(len(faces), size=count)].T
     cells, full = np.stack(cell, 1), high - low == SPAN
     ends = full[along] & (cells[rows, along] == np.where(above, high[along] - 1, low[along]))
@@ -180,37 +169,26 @@ def points_of_cells(voxels: npt.NDArray[np.bool_], count: int = 5000, *, seed: i
     return (points - HALF).astype(np.float32)
 
 
-def exposed_sides(voxels: Flags) -> Flags:
+def _exposed_sides(voxels: Flags) -> Flags:
     """Whether a cell is touched and its neighbour along an axis, below and above, is not: (3, 2, 32, 32, 32)."""
     padded, inner = np.pad(voxels, 1), np.s_[1:-1, 1:-1, 1:-1]
     return np.array([[voxels & ~np.roll(padded, by, axis)[inner] for by in (1, -1)] for axis in range(3)])
 
 
-def _reach(tolerance: float, area: float, count: int = SURFACE.surface) -> float:
+def _reach(tolerance: float, area: float, count: int) -> float:
     """The larger of one and a half tolerances, and the radius of a disc that contains four points on average."""
-    return max(1.5 * tolerance, math.sqrt(4 * area / (math.pi * max(count, 1))))
+    return max(1.5 * tolerance, math.sqrt(4 * area / (math.pi * count)))
 
 
-def touched(triangles: FloatArray, resolution: int) -> Flags:
-    """The cells (R, R, R) of the cube of the grid that triangles (F, 3, 3) touch."""
-    cells = np.zeros((resolution,) * 3, np.bool_)
-    # The longest side ends on cell boundaries: rounding would leave holes in faces there, which show the inside.
-    mark_triangles(np.ascontiguousarray((triangles + HALF) * (resolution / RESOLUTION)), 0.5 + 1e-6, cells)
-    return cells
-
-
-def visible(points: FloatArray, normals: FloatArray, barrier: Flags) -> Flags:
-    """Whether points (P,) of a surface are visible from outside, on the side of their normals.
-
-    ``barrier`` are the cells that the surface touches.
-    """
+def _visible(points: FloatArray, normals: FloatArray, barrier: Flags) -> Flags:
+    """Whether points (P,) of a surface are visible from outside, on the side of their normals."""
     scale = len(barrier) / RESOLUTION
     offset = normals / np.maximum(np.abs(normals).max(1, keepdims=True), 1e-9)
     starts = (points + HALF) * scale + 1.5 * offset  # out of the cells that the surface itself touches
     return looking(barrier, starts, directions(), 1, through=False)
 
 
-def outward(normals: FloatArray, front: Flags, back: Flags) -> tuple[FloatArray, Flags]:
+def _turned_outward(normals: FloatArray, front: Flags, back: Flags) -> tuple[FloatArray, Flags]:
     """Normals (P, 3) turned outwards, and whether their orientation is known (P,).
 
     It is known where only the front or only the back of a point is free.  It is known everywhere, thin parts included,
@@ -230,7 +208,7 @@ def _within(cells: Flags, points: FloatArray) -> Flags:
     return inside
 
 
-def free_cells(barrier: Flags, surface: FloatArray, *, through: bool) -> Flags:
+def _free_cells(barrier: Flags, surface: FloatArray, *, through: bool) -> Flags:
     """The cells (R, R, R) from which enough directions lead out of the grid; with ``through``, both ways.
 
     Cells outside the bounding box of the surface are free; with ``through``, for scans, they are not, as parts of the
@@ -246,12 +224,9 @@ def free_cells(barrier: Flags, surface: FloatArray, *, through: bool) -> Flags:
     return free
 
 
-def directions(count: int = 32) -> FloatArray:
-    """Directions (count, 3) spread evenly over the sphere on a spiral (Vogel 1979), the largest coordinate 1 or -1."""
-    height = 1 - (2 * np.arange(count) + 1) / count
-    turn = np.arange(count) * math.pi * (3 - math.sqrt(5))
-    around = np.sqrt(1 - height**2)
-    steps = np.stack([height, around * np.cos(turn), around * np.sin(turn)], 1)
+def directions() -> FloatArray:
+    """Directions (32, 3) spread evenly over the sphere, the largest coordinate 1 or -1."""
+    steps = spiral(1 - (2 * np.arange(32) + 1) / 32)
     return steps / np.abs(steps).max(1, keepdims=True)
 
 
@@ -261,20 +236,6 @@ def looking(barrier: Flags, starts: FloatArray, steps: FloatArray, minimum: int,
     data = barrier, np.ascontiguousarray(starts), np.ascontiguousarray(steps), minimum, through, result
     over_threads(partial(look_out, *data), len(starts), least=1024)
     return result
-
-
-def local_planes(points: FloatArray) -> tuple[FloatArray, float, float]:
-    """Normals (P, 3) of the planes through the neighbours of each point, their noise, and the typical area per point.
-
-    The noise is a low quantile of the distances: planes do not fit at edges and in thin parts.
-    """
-    from scipy.spatial import cKDTree
-
-    distance, neighbours = cKDTree(points).query(points, k=SURFACE.planes)
-    normals, squared = planes(points, neighbours)
-    noise = float(np.quantile(np.sqrt(squared / (SURFACE.planes - 3)), 0.25))
-    area = float(np.median(distance[:, -1]) ** 2 * math.pi / (SURFACE.planes - 1))
-    return normals, noise, area
 
 
 def doubt_of_furniture(evidence: Evidence) -> str:

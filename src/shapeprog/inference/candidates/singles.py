@@ -21,8 +21,8 @@ from shapeprog.geometry.distance import distance_and_slopes, signed_distance
 from shapeprog.inference.candidates.drawings import drawings, is_unhinted, starts
 from shapeprog.inference.candidates.settings import SETTINGS
 from shapeprog.inference.fit.tunable import STEP, THINNEST, least
-from shapeprog.inference.pieces.cover_kernels import near_boxes
 from shapeprog.inference.pieces.pieces import Pieces
+from shapeprog.inference.pieces.point_kernels import near_boxes
 from shapeprog.language.hints import Box
 from shapeprog.language.printer import numbers_written
 from shapeprog.language.program import Draw, Node, Program

@@ -13,7 +13,7 @@ from scipy.ndimage import find_objects
 from scipy.ndimage import label as label_regions
 
 from shapeprog.inference.pieces.oriented import Boxes, boxes_around, join, principal_axes
-from shapeprog.inference.pieces.patch_kernels import grow_patches
+from shapeprog.inference.pieces.point_kernels import grow_patches
 from shapeprog.inference.pieces.settings import SETTINGS
 from shapeprog.inference.surface.cloud import Cloud
 from shapeprog.inference.surface.settings import SURFACE

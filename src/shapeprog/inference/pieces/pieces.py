@@ -13,10 +13,10 @@ import numpy as np
 
 from shapeprog.data.sampling import sample_with_faces
 from shapeprog.data.shape import Shape
-from shapeprog.inference.pieces.cover_kernels import near_boxes
 from shapeprog.inference.pieces.limbs import limbs
 from shapeprog.inference.pieces.oriented import Boxes, boxes_around, distinct, groups, join
 from shapeprog.inference.pieces.patches import planar_patches, sheets, slabs
+from shapeprog.inference.pieces.point_kernels import near_boxes
 from shapeprog.inference.pieces.rods import rods
 from shapeprog.inference.pieces.settings import SETTINGS
 from shapeprog.inference.surface.cloud import Cloud, cloud_of, is_clean, points_of_scan

@@ -7,17 +7,17 @@ import numpy.typing as npt
 
 from shapeprog.inference.pieces.oriented import Boxes, join
 from shapeprog.inference.pieces.patches import upright
-from shapeprog.inference.pieces.rod_kernels import count_rods, mark_rod
+from shapeprog.inference.pieces.point_kernels import count_rods, mark_rod
 from shapeprog.inference.pieces.settings import SETTINGS
 from shapeprog.inference.surface.cloud import Cloud
 from shapeprog.inference.surface.settings import SURFACE
-from shapeprog.space import Array, FloatArray
+from shapeprog.space import FloatArray
 
 
 def rods(cloud: Cloud) -> Boxes:
     """Boxes around round rods, best first; the first axis is that of the rod."""
     off, facing = cloud.tolerance, 0.85 if cloud.noise > SURFACE.noisy else 0.94
-    centre, axis, radius = through_pairs(cloud, off)
+    centre, axis, radius = _through_pairs(cloud)
     counts = np.zeros((len(radius), 4))
     count_rods(cloud.points, cloud.normals, centre, _frames(axis), radius, off, facing, counts)
     support, start, end, share = counts.T
@@ -25,34 +25,36 @@ def rods(cloud: Cloud) -> Boxes:
     good = (support >= SETTINGS.rod_points) & (share >= SETTINGS.rod_round) & (length > 2 * radius)
     good &= support > SETTINGS.rod_dense * 2 * np.pi * radius * length * share / cloud.spacing**2
     centre = centre + axis * ((start + end) / 2)[:, None]
-    used = np.zeros(len(cloud.points), np.bool_)
-    result: list[Boxes] = []
+
+    def on_rod(middle: FloatArray, axis: FloatArray, radius: float, half: float) -> npt.NDArray[np.bool_]:
+        """Whether points (N,) lie on a cylinder and face across its axis."""
+        inside = np.zeros(len(cloud.points), np.bool_)
+        mark_rod(cloud.points, cloud.normals, middle, _frames(axis[None])[0], radius, half, off, facing, inside)
+        return inside
+
+    used, result = np.zeros(len(cloud.points), np.bool_), list[Boxes]()
     for k in np.flatnonzero(good)[np.argsort(-support[good], kind="stable")]:
         if len(result) == SETTINGS.rods:
             break
-        rod = centre[k], axis[k], float(radius[k]), float(length[k]) / 2
-        inside = on_rod(cloud, *rod, off, facing)
-        if len(inside) < SETTINGS.rod_points or used[inside].mean() > 0.5:
+        inside = on_rod(centre[k], axis[k], radius[k], length[k] / 2)
+        if inside.sum() < SETTINGS.rod_points or used[inside].mean() > 0.5:
             continue
         for _ in range(2):
-            middle, along, width, half = fitted(cloud, inside, rod[1])
-            inside = on_rod(cloud, middle, along, width, half + 0.5, off, facing)
-            if len(inside) < SETTINGS.rod_points:
+            middle, frame, width, half = _fitted(cloud.points[inside], cloud.normals[inside])
+            inside = on_rod(middle, frame[:, 2], width, half + 0.5)
+            if inside.sum() < SETTINGS.rod_points:
                 break
-            rod = middle, along, width, half
         else:
-            middle, along, width, half = fitted(cloud, inside, rod[1])
-            used[inside] = True
-            frame = upright(along[None])[0][:, [2, 0, 1]]
-            result.append(Boxes(middle[None], frame[None], np.array([[half, width, width]])))
+            middle, frame, width, half = _fitted(cloud.points[inside], cloud.normals[inside])
+            used |= inside
+            result.append(Boxes(middle[None], frame[:, [2, 0, 1]][None], np.array([[half, width, width]])))
     return join(result)
 
 
-def through_pairs(cloud: Cloud, off: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _through_pairs(cloud: Cloud) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Points on the axes (T, 3), axes (T, 3) and radii (T,) of cylinders through pairs of points that are near.
 
     The axis is normal to both normals, and passes through their intersection (as in Schnabel, Wahl and Klein 2007).
-    ``off`` is how far a point may be from the cylinder.
     """
     points, normals, neighbours = cloud.points, cloud.normals, cloud.neighbours
     draws = np.random.default_rng(0).integers(1 << 32, size=(SETTINGS.rod_trials, SETTINGS.rod_walk))
@@ -71,8 +73,8 @@ def through_pairs(cloud: Cloud, off: float) -> tuple[FloatArray, FloatArray, Flo
     along_p, along_q = np.einsum("ti,ti->t", away, p), np.einsum("ti,ti->t", away, q)
     s, t = (along_p - cosine * along_q) / (1 - cosine**2), (cosine * along_p - along_q) / (1 - cosine**2)
     radius = (np.abs(s) + np.abs(t)) / 2
-    good = np.abs(np.abs(s) - np.abs(t)) <= off + 0.1 * radius
-    good &= (radius <= SETTINGS.rod_radius) & (radius >= 0.5 * off)
+    good = np.abs(np.abs(s) - np.abs(t)) <= cloud.tolerance + 0.1 * radius
+    good &= (radius <= SETTINGS.rod_radius) & (radius >= 0.5 * cloud.tolerance)
     return (points[first] + s[:, None] * p)[good], axis[good], radius[good]
 
 
@@ -84,34 +86,17 @@ def _frames(axis: FloatArray) -> FloatArray:
     return np.ascontiguousarray(np.stack([np.cross(across, axis), across, axis], 2))
 
 
-def on_rod(
-    cloud: Cloud, middle: Array, axis: FloatArray, radius: float, half: float, off: float, facing: float
-) -> npt.NDArray[np.int64]:
-    """The points on a cylinder that face across its axis."""
-    inside = np.zeros(len(cloud.points), np.bool_)
-    mark_rod(
-        cloud.points, cloud.normals, np.ascontiguousarray(middle), _frames(axis[None])[0], radius, half, off, facing,
-        inside,
-    )  # fmt: skip
-    return np.flatnonzero(inside)
-
-
-def fitted(
-    cloud: Cloud, inside: npt.NDArray[np.int64], axis: FloatArray
-) -> tuple[FloatArray, FloatArray, float, float]:
-    """Middle, axis, radius and half length of the cylinder that fits points best.
+def _fitted(points: FloatArray, normals: FloatArray) -> tuple[FloatArray, FloatArray, float, float]:
+    """Middle, frame about the axis (3, 3), radius and half length of the cylinder that fits points (N, 3) best.
 
     The axis is the direction that the normals are least along; the circle is Kasa's (1976).
     """
-    normals, points = cloud.normals[inside], cloud.points[inside]
-    better = np.linalg.eigh(normals.T @ normals)[1][:, 0]
-    better *= np.sign(better @ axis)
-    frame = upright(better[None])[0]
-    better, across = frame[:, 2], frame[:, :2]
+    frame = upright(np.linalg.eigh(normals.T @ normals)[1][None, :, 0])[0]
+    axis, across = frame[:, 2], frame[:, :2]
     mean = points.mean(0)
     flat = (points - mean) @ across
     solved = np.linalg.lstsq(np.column_stack([2 * flat, np.ones(len(flat))]), (flat**2).sum(1), rcond=None)[0]
     radius = float(np.sqrt(max(solved[2] + solved[:2] @ solved[:2], 0.0)))
-    along = (points - mean) @ better
+    along = (points - mean) @ axis
     low, high = along.min(), along.max()
-    return mean + across @ solved[:2] + better * (low + high) / 2, better, radius, float(high - low) / 2
+    return mean + across @ solved[:2] + axis * (low + high) / 2, frame, radius, float(high - low) / 2

@@ -6,20 +6,11 @@ import numpy as np
 
 from shapeprog.kernels.compile import helper, kernel
 
-WORTH = 0.93
-"""Largest volume relative to that of a simpler orientation at which a less restricted orientation is selected."""
-
-SLACK = 1.05
-"""Largest volume relative to the smallest box at which the box along the principal axis of a rod is selected."""
-
-COMPACT, ROD, FLAT = 0, 1, 2
-"""Kinds of point sets."""
-
-SWEEPS = 6
-"""Largest number of rounds that turn a box about each of its axes to minimise its volume."""
-
-MANY = 160
-"""Number of points above which only the outermost ones determine the directions."""
+WORTH = 0.93  # largest volume relative to a simpler orientation at which a less restricted one is selected
+SLACK = 1.05  # largest volume relative to the smallest box at which the box along the axis of a rod is selected
+COMPACT, ROD, FLAT = 0, 1, 2  # kinds of point sets
+SWEEPS = 6  # rounds that turn a box about each of its axes to minimise its volume, at most
+MANY = 160  # points above which only the outermost ones determine the directions
 
 
 @helper
@@ -31,36 +22,35 @@ def copy(frame, result):
 
 
 @helper
-def extents(points, first, last, frame, low, high):
-    """Write how far the points ``first`` to ``last - 1`` reach along the columns of a frame."""
-    for axis in range(3):
-        low[axis], high[axis] = np.inf, -np.inf
-        for k in range(first, last):
-            at = points[k, 0] * frame[0, axis] + points[k, 1] * frame[1, axis] + points[k, 2] * frame[2, axis]
-            low[axis] = min(low[axis], at)
-            high[axis] = max(high[axis], at)
+def extent(points, frame, axis):
+    """How far points reach along a column of a frame, down and up."""
+    low, high = np.inf, -np.inf
+    for k in range(len(points)):
+        at = points[k, 0] * frame[0, axis] + points[k, 1] * frame[1, axis] + points[k, 2] * frame[2, axis]
+        low, high = min(low, at), max(high, at)
+    return low, high
 
 
 @helper
-def volume(points, count, frame, floor, low, high):
-    """The volume of the box of the first points along a frame, each side at least ``floor``."""
-    extents(points, 0, count, frame, low, high)
+def volume(points, frame, floor):
+    """The volume of the box of points along a frame, each side at least ``floor``."""
     product = 1.0
     for axis in range(3):
-        product *= max(high[axis] - low[axis], floor)
+        low, high = extent(points, frame, axis)
+        product *= max(high - low, floor)
     return product
 
 
 @helper
-def turn_about(points, count, frame, axis, floor, flat):
-    """Turn a frame about one of its columns so that the rectangle about the first points, seen along it, is smallest.
+def turn_about(points, frame, axis, floor, flat):
+    """Turn a frame about one of its columns so that the rectangle about the points, seen along it, is smallest.
 
     One of its sides lies on an edge of the convex hull (Freeman and Shapira 1975), along which it is wrapped (Jarvis
     1973).
     """
     first, second = (axis + 1) % 3, (axis + 2) % 3
     start = 0
-    for k in range(count):
+    for k in range(len(points)):
         for side in range(2):
             at = first if side == 0 else second
             flat[k, side] = points[k, 0] * frame[0, at] + points[k, 1] * frame[1, at] + points[k, 2] * frame[2, at]
@@ -69,10 +59,10 @@ def turn_about(points, count, frame, axis, floor, flat):
             start = k
     best, cosine, sine, corner = np.inf, 1.0, 0.0, start
     x, y = 1.0, 0.0  # the first candidate is the frame itself
-    for step in range(count + 1):
+    for step in range(len(points) + 1):
         low0, high0, low1, high1 = np.inf, -np.inf, np.inf, -np.inf
         after, u, v = -1, 0.0, 0.0
-        for k in range(count):
+        for k in range(len(points)):
             along, across = flat[k, 0] * x + flat[k, 1] * y, flat[k, 1] * x - flat[k, 0] * y
             low0, high0 = min(low0, along), max(high0, along)
             low1, high1 = min(low1, across), max(high1, across)
@@ -97,31 +87,28 @@ def turn_about(points, count, frame, axis, floor, flat):
 
 
 @helper
-def settle(points, count, frame, floor, flat, low, high):
+def settle(points, frame, floor, flat):
     """Turn a frame about its axes in turn while the box becomes smaller; its volume is returned."""
-    best = volume(points, count, frame, floor, low, high)
+    best = volume(points, frame, floor)
     for _ in range(SWEEPS):
         before = best
         for axis in range(3):
-            turn_about(points, count, frame, axis, floor, flat)
-        best = volume(points, count, frame, floor, low, high)
+            turn_about(points, frame, axis, floor, flat)
+        best = volume(points, frame, floor)
         if best > before * 0.999:
             break
     return best
 
 
 @helper
-def outermost(points, first, last, directions, selected):
-    """Copy the points that lie farthest out along some directions, or all of a few; their number is returned."""
-    if last - first <= MANY:
-        for k in range(first, last):
-            for axis in range(3):
-                selected[k - first, axis] = points[k, axis]
-        return last - first
-    for d in range(directions.shape[0]):
-        low, high = first, first
+def outermost(points, directions, selected):
+    """The points that lie farthest out along some directions, copied to ``selected``, or all of a few."""
+    if len(points) <= MANY:
+        return points
+    for d in range(len(directions)):
+        low, high = 0, 0
         minimum, maximum = np.inf, -np.inf
-        for k in range(first, last):
+        for k in range(len(points)):
             at = points[k, 0] * directions[d, 0] + points[k, 1] * directions[d, 1] + points[k, 2] * directions[d, 2]
             if at < minimum:
                 minimum, low = at, k
@@ -129,7 +116,7 @@ def outermost(points, first, last, directions, selected):
                 maximum, high = at, k
         for axis in range(3):
             selected[2 * d, axis], selected[2 * d + 1, axis] = points[low, axis], points[high, axis]
-    return 2 * directions.shape[0]
+    return selected[: 2 * len(directions)]
 
 
 @kernel("void(f8[:, ::1], i8[::1], f8[:, ::1], f8[:, :, ::1], i8[::1], f8, f8[:, ::1], f8[:, :, ::1], f8[:, ::1])")
@@ -150,36 +137,33 @@ def box_each(points, start, directions, frames, kind, floor, centre, rotation, h
     floor
         Smallest side: thinner boxes count as flat.
     centre, rotation, half
-        Output (G, 3), (G, 3, 3) with axes as columns, and (G, 3).
+        Output (G, 3), (G, 3, 3) with axes as columns, and (G, 3), initially zero.
     """
     selected, flat = np.empty((MANY, 3)), np.empty((MANY, 2))
-    low, high = np.empty(3), np.empty(3)
-    world, frame, trial = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
-    for row in range(3):
-        for column in range(3):
-            world[row, column] = 1.0 if row == column else 0.0
+    world, frame, trial = np.zeros((3, 3)), np.empty((3, 3)), np.empty((3, 3))
+    for axis in range(3):
+        world[axis, axis] = 1.0
     for g in range(len(start) - 1):
-        first, last = start[g], start[g + 1]
-        count = outermost(points, first, last, directions, selected)
+        own = points[start[g] : start[g + 1]]
+        outer = outermost(own, directions, selected)
         flattened = kind[g] == FLAT
-        start_frame = frames[g] if flattened else world
-        copy(start_frame, frame)
-        start_volume = volume(selected, count, frame, floor, low, high)
-        best = WORTH * start_volume
-        plain = True
+        simple = frames[g] if flattened else world
+        copy(simple, frame)
+        current = volume(outer, frame, floor)
+        best = WORTH * current
         for axis in range(2 if flattened else 0, 3):
-            copy(start_frame, trial)
-            turn_about(selected, count, trial, axis, floor, flat)
-            size = volume(selected, count, trial, floor, low, high)
+            copy(simple, trial)
+            turn_about(outer, trial, axis, floor, flat)
+            size = volume(outer, trial, floor)
             if size < best:
-                best, plain = size, False
+                best = current = size
                 copy(trial, frame)
         if not flattened:
-            best = WORTH * (start_volume if plain else best)
+            best = WORTH * current
             free = False
             for way in range(2):
                 copy(frame if way == 0 else frames[g], trial)
-                size = settle(selected, count, trial, floor, flat, low, high)
+                size = settle(outer, trial, floor, flat)
                 if size < best:
                     best, free = size, True
                     copy(trial, rotation[g])
@@ -187,13 +171,12 @@ def box_each(points, start, directions, frames, kind, floor, centre, rotation, h
                 copy(rotation[g], frame)
                 if kind[g] == ROD:
                     copy(frames[g], trial)
-                    turn_about(selected, count, trial, 0, floor, flat)
-                    if volume(selected, count, trial, floor, low, high) < SLACK * best:
+                    turn_about(outer, trial, 0, floor, flat)
+                    if volume(outer, trial, floor) < SLACK * best:
                         copy(trial, frame)
-        extents(points, first, last, frame, low, high)
-        for row in range(3):
-            centre[g, row] = 0.0
-            for axis in range(3):
-                rotation[g, row, axis] = frame[row, axis]
-                centre[g, row] += frame[row, axis] * (low[axis] + high[axis]) / 2
-            half[g, row] = (high[row] - low[row]) / 2
+        copy(frame, rotation[g])
+        for axis in range(3):
+            low, high = extent(own, frame, axis)
+            half[g, axis] = (high - low) / 2
+            for row in range(3):
+                centre[g, row] += frame[row, axis] * (low + high) / 2

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from scipy.ndimage import find_objects
 from scipy.ndimage import label as label_regions
 
-from shapeprog.inference.pieces.oriented import Boxes, boxes_around, join, principal_axes
+from shapeprog.inference.pieces.oriented import Boxes, boxes_around, distinct, join, principal_axes
 from shapeprog.inference.pieces.point_kernels import grow_patches
 from shapeprog.inference.pieces.settings import SETTINGS
 from shapeprog.inference.surface.cloud import Cloud
@@ -84,7 +84,7 @@ def _bars_of(grid: npt.NDArray[np.bool_]) -> list[tuple[tuple[int, int], tuple[i
 
 
 def slabs(patches: Boxes) -> Boxes:
-    """Boxes between pairs of patches: intersection and bounds of both rectangles, and each of them."""
+    """Distinct boxes between pairs of patches: intersection and bounds of both rectangles, and each of them."""
     normal = patches.rotation[:, :, 2]
     distance = np.einsum("ijk,ik->ij", patches.centre[None] - patches.centre[:, None], normal)
     parallel = np.abs(normal @ normal.T) > np.cos(np.radians(SETTINGS.parallel))
@@ -92,7 +92,6 @@ def slabs(patches: Boxes) -> Boxes:
     larger = area[:, None] >= area
     thick = np.abs(distance)
     i, j = np.nonzero(parallel & larger & (thick >= SETTINGS.thickness[0]) & (thick <= SETTINGS.thickness[1]))
-    i, j = i[i != j], j[i != j]
     corner = patches.corners()[j] - patches.centre[i][:, None]
     flat = np.einsum("nck,nka->nca", corner, patches.rotation[i][:, :, :2])
     low, high = flat.min(1), flat.max(1)
@@ -106,8 +105,9 @@ def slabs(patches: Boxes) -> Boxes:
     frame, deep = patches.rotation[i], depth[:, None]
     centre = patches.centre[i] + np.einsum("nij,nj->ni", frame, np.concatenate([(low + high) / 2, deep / 2], 1))
     boxes = Boxes(centre, frame, np.concatenate([(high - low) / 2, np.abs(deep) / 2], 1))
-    sides = np.sort(boxes.half, 1)
-    return boxes.take((boxes.half > 0).all(1) & (boxes.half[:, 2] <= SETTINGS.stretch * sides[:, 1]))
+    middle = np.sort(boxes.half, 1)[:, 1]
+    boxes = boxes.take((boxes.half > 0).all(1) & (boxes.half[:, 2] <= SETTINGS.stretch * middle))
+    return boxes.take(distinct(boxes))
 
 
 def sheets(patches: Boxes) -> Boxes:

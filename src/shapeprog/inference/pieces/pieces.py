@@ -111,7 +111,6 @@ def _of_points(cloud: Cloud, along: Boxes) -> list[tuple[Source, Boxes]]:
         return [(Source.GROUP, boxes_around([cloud.points]))]
     patches = planar_patches(cloud)
     between = slabs(patches)
-    between = between.take(distinct(between))
     support = Support(cloud, between)
     selected = np.flatnonzero(support.filled)
     selected = selected[np.argsort(-support.explained[selected].sum(1), kind="stable")[: SETTINGS.slabs]]

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from shapeprog.geometry.cells import voxels as voxels_of
-from shapeprog.inference.cells import box_kernels
-from shapeprog.inference.cells.families import MIRROR, families
-from shapeprog.inference.cells.fold_kernels import VOLUMES, mirrors, search_family
-from shapeprog.inference.cells.structure import greedy_boxes
+from shapeprog.inference.cells import proposal_kernels
+from shapeprog.inference.cells.block_kernels import COUNT1, COUNT2, EXTENT, FIRST, SHIFT1, SHIFT2, WIDTH
+from shapeprog.inference.cells.proposal_kernels import MIRROR, families, mirrors, search_family
+from shapeprog.inference.cells.search import greedy_boxes
 from shapeprog.language.unroll import unroll
 
 ANY = 1 << 20
@@ -20,7 +20,7 @@ ANY = 1 << 20
 def heaviest_box(weights, limit0, limit1, floor):
     """The compiled search, its sum and its box."""
     box = np.zeros(6, np.int64)
-    return box_kernels.heaviest_box(weights.reshape(-1), *weights.shape, limit0, limit1, floor, box), box
+    return proposal_kernels.heaviest_box(weights, limit0, limit1, floor, box), box
 
 
 def all_boxes(shape):
@@ -67,17 +67,16 @@ def test_folding_finds_what_searching_all_explicit_copies_finds():
     table = families(weights.shape, 2, 3)
     assert len(table) > 20
     for family in table:
-        volumes, found = np.zeros((VOLUMES, weights.size), np.float32), np.zeros(12, np.int64)
-        volumes[0] = weights.reshape(-1)
-        best = search_family(volumes, *weights.shape, family, 0.0, found)
+        found = np.zeros(WIDTH)
+        best = search_family(weights, family, 0.0, found)
         assert best == repeated_by_hand(weights, family), family
         if best > 0:
+            found = found.astype(int)
             covered = np.zeros(weights.shape, np.int64)
-            for i, j in itertools.product(range(found[6]), range(found[9])):
-                low = found[:3].copy()
-                low[found[7]] += i * found[8] if found[6] > 1 else 0
-                low[found[10]] += j * found[11] if found[9] > 1 else 0
-                covered[tuple(slice(a, a + n) for a, n in zip(low, found[3:6], strict=True))] += 1
+            for i, j in itertools.product(range(found[COUNT1]), range(found[COUNT2])):
+                low = found[FIRST:EXTENT] + i * found[SHIFT1 : SHIFT1 + 3] + j * found[SHIFT2 : SHIFT2 + 3]
+                size = found[EXTENT : EXTENT + 3]
+                covered[tuple(slice(a, a + n) for a, n in zip(low, size, strict=True))] += 1
             assert covered.max() == 1
             assert float(weights[covered == 1].sum()) == best
 

@@ -1,5 +1,5 @@
+from .cells.search import greedy_boxes
 from .cells.settings import Settings
-from .cells.structure import greedy_boxes
 from .fit.adjustment import refine
 from .infer import Result, infer
 

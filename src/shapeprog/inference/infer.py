@@ -173,11 +173,10 @@ def infer(
         scores["explained"] = assembly.explained
     if not program.body:  # voxels, the statements of the paper, or a surface that gave no program
         limits = settings or Settings()
-        on_cells = reconstruct(
+        program, snapped, reason = reconstruct(
             target, evidence, settings=replace(limits, blocks=blocks, price=limits.price / detail),
             tied=statements == "all", seed=seed, searching=searching, refining=refining, progress=progress,
         )  # fmt: skip
-        program, snapped, reason = on_cells.program, on_cells.snapped, on_cells.reason
     if statements == "all":
         integral, plain = snapped, program
         if snapped is not None:

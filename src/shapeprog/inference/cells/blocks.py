@@ -4,18 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from shapeprog.inference.cells.block_layout import (
-    BACK,
-    BOX,
-    COUNT1,
-    COUNT2,
-    DISC,
-    FIRST,
-    FORM,
-    SHIFT1,
-    SHIFT2,
-    TILT,
-)  # fmt: skip
+from shapeprog.inference.cells.block_kernels import BACK, BOX, COUNT1, COUNT2, DISC, FIRST, FORM, SHIFT1, SHIFT2, TILT
 from shapeprog.inference.roles.roles import roles_of_blocks
 from shapeprog.language.program import Chain, Draw, Loop, Program, nest
 from shapeprog.space import FloatArray

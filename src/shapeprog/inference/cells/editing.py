@@ -8,15 +8,26 @@ import numpy as np
 import numpy.typing as npt
 
 from shapeprog.geometry.cells import pack, words_of
-from shapeprog.inference.cells.block_layout import BACK, DISC, EXTENT, FIRST, FORM, RADIUS, TILT, WIDTH
-from shapeprog.inference.cells.descent_kernels import MOST_MOVES, descend, statements
-from shapeprog.inference.cells.drawing import Rows, Whole, cells_shared, draw_all, draw_each
-from shapeprog.inference.cells.families import families
-from shapeprog.inference.cells.fold_kernels import VOLUMES
-from shapeprog.inference.cells.proposal_kernels import propose
-from shapeprog.inference.cells.raster_kernels import ROWS
+from shapeprog.inference.cells.block_kernels import (
+    BACK,
+    DISC,
+    EXTENT,
+    FIRST,
+    FORM,
+    RADIUS,
+    TILT,
+    WIDTH,
+    Rows,
+    descend,
+    draw_all,
+    draw_each,
+    statements,
+)
+from shapeprog.inference.cells.proposal_kernels import families, propose
 from shapeprog.inference.cells.settings import Settings
-from shapeprog.space import RESOLUTION, FloatArray
+from shapeprog.space import FloatArray
+
+Whole = npt.NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -25,23 +36,21 @@ class Target:
 
     Parameters
     ----------
-    occupied
-        The solid as rows of bits (1024).
+    occupied, cells
+        The solid as rows of bits (1024), and the number of its cells.
     low, high
         Bounding box of its cells, in cells of the grid from 0.
     table
-        The ways of repeating a box.
-    cells
-        Number of occupied cells.
+        The ways of repeating a box: rows of ``families``.
     settings
         Limits and prices.
     """
 
     occupied: Rows
+    cells: int
     low: Whole
     high: Whole
     table: Whole
-    cells: int
     settings: Settings
 
     @classmethod
@@ -50,7 +59,7 @@ class Target:
         cells = np.argwhere(voxels)
         low, high = cells.min(0), cells.max(0) + 1
         table = families((high - low).tolist(), settings.planes, settings.copies)
-        return cls(words_of(pack(voxels)).reshape(-1), low, high, table, len(cells), settings)
+        return cls(words_of(pack(voxels)).reshape(-1), len(cells), low, high, table, settings)
 
     @property
     def statement(self) -> float:
@@ -60,36 +69,32 @@ class Target:
 
 def value_of(blocks: FloatArray, target: Target) -> float:
     """IoU minus price x statements."""
-    return iou(blocks, target) - target.settings.price * int(statements(blocks.T).sum())
+    return iou(draw_all(blocks), target) - target.settings.price * int(statements(blocks.T).sum())
 
 
-def iou(blocks: FloatArray, target: Target) -> float:
-    """IoU of the cells that blocks draw with those of the target."""
-    return _iou(draw_all(blocks), target)
-
-
-def _iou(rows: Rows, target: Target) -> float:
+def iou(rows: Rows, target: Target) -> float:
     """IoU of rows (1024) with the target."""
-    inter, beyond = cells_shared(rows[None], target.occupied, ~target.occupied)[0].tolist()
-    return float(inter / (target.cells + beyond))
+    return float(_shared(rows, target.occupied) / np.bitwise_count(rows | target.occupied).sum())
 
 
-def improve_block(block: FloatArray, occupied: Rows, covered: Rows, price: float, far: int) -> tuple[FloatArray, float]:
-    """A block after descent on IoU minus price x statements, the other blocks fixed, and the value reached.
+def _shared(rows: Rows, cells: Rows) -> Whole:
+    """Number of cells that sets of rows (P, 1024), or one (1024), share with another set (1024)."""
+    return np.asarray(np.bitwise_count(rows & cells).sum(-1, dtype=np.int64))
+
+
+def improve_block(block: FloatArray, covered: Rows, far: int, target: Target) -> FloatArray:
+    """A block after descent on IoU minus price x statements, the other blocks fixed.
 
     Parameters
     ----------
-    occupied, covered
-        The solid, and the cells of the other blocks, as rows (1024).
-    price
-        Price of a statement in IoU.
+    covered
+        The cells of the other blocks as rows (1024).
     far
         Largest step of one move in cells.
     """
-    better, rows, around = block.copy(), np.empty((3, ROWS), np.uint32), np.empty((MOST_MOVES, WIDTH))
-    words = rows.view(np.uint64)
-    value = descend(better, occupied.view(np.uint64), covered.view(np.uint64), price, far, rows, words, around)
-    return better, value
+    better = block.copy()
+    descend(better, target.occupied.view(np.uint64), covered.view(np.uint64), target.settings.price, far)
+    return better
 
 
 def polish(blocks: FloatArray, target: Target, far: int, sweeps: int) -> FloatArray:
@@ -102,27 +107,20 @@ def polish(blocks: FloatArray, target: Target, far: int, sweeps: int) -> FloatAr
     sweeps
         Most passes over all blocks.
     """
-    blocks = blocks.copy()
-    rows = draw_each(blocks)
+    blocks, rows = blocks.copy(), draw_each(blocks)
     settled = np.zeros(len(blocks), np.bool_)
     for _ in range(sweeps):
-        changed = False
         for k in range(len(blocks)):
             if settled[k]:
                 continue
-            better, _value = improve_block(blocks[k], target.occupied, _union(rows, k), target.settings.price, far)
-            settled[k] = True
+            better = improve_block(blocks[k], _union_without(rows, k), far, target)
             if not np.array_equal(better, blocks[k]):
-                changed = True
                 settled[:] = False
-                settled[k] = True
-                blocks[k] = better
-                rows[k] = draw_all(better[None])
-        if not changed:
-            break
-    k, current = 0, _iou(_union(rows, len(rows)), target)
+                blocks[k], rows[k] = better, draw_all(better[None])
+            settled[k] = True
+    k, current = 0, iou(np.bitwise_or.reduce(rows), target)
     while k < len(blocks):
-        without = _iou(_union(rows, k), target)
+        without = iou(_union_without(rows, k), target)
         if without >= current - target.settings.price * statements(blocks[k]):
             blocks, rows, current = np.delete(blocks, k, 0), np.delete(rows, k, 0), without
         else:
@@ -130,31 +128,49 @@ def polish(blocks: FloatArray, target: Target, far: int, sweeps: int) -> FloatAr
     return blocks
 
 
-def _union(rows: Rows, left_out: int) -> Rows:
+def _union_without(rows: Rows, k: int) -> Rows:
     """Rows of all blocks but one."""
-    before = np.bitwise_or.reduce(rows[:left_out], axis=0)
-    return np.asarray(before | np.bitwise_or.reduce(rows[left_out + 1 :], axis=0))
+    return np.asarray(np.bitwise_or.reduce(np.delete(rows, k, 0)))
 
 
-def propose_form(form: int, covered: Rows, waste: float, box: FloatArray, target: Target) -> tuple[float, FloatArray]:
-    """A disc or a sheared back in place of a box, improved by descent: its gain on uncovered cells, and the block.
+def best_box(covered: Rows, waste: float, table: Whole, target: Target) -> tuple[float, FloatArray]:
+    """The repeated box with the largest gain on uncovered cells, and its gain in cells; zero when none gains.
+
+    Parameters
+    ----------
+    waste
+        Weight of an empty cell against an occupied one.
+    table
+        The ways of repeating a box to try.
+    """
+    block = np.zeros(WIDTH)
+    gain = propose(target.occupied, covered, waste, target.low, target.high, table, target.statement, block)
+    return gain, block
+
+
+def best_block(blocks: FloatArray, covered: Rows, waste: float, target: Target) -> tuple[float, FloatArray]:
+    """The block with the largest gain on uncovered cells, and its gain in cells."""
+    rows = draw_each(blocks)
+    gained, wasted = _shared(rows, target.occupied & ~covered), _shared(rows, ~target.occupied & ~covered)
+    gains = gained - waste * wasted - target.statement * statements(blocks.T)
+    best = int(gains.argmax())
+    return float(gains[best]), blocks[best]
+
+
+def best_form(form: int, covered: Rows, waste: float, box: FloatArray, target: Target) -> tuple[float, FloatArray]:
+    """A disc or a sheared back in place of a box, improved by descent, and its gain in cells.
 
     Parameters
     ----------
     form
         ``DISC`` or ``BACK``.
-    waste
-        Weight of an empty cell against an occupied one.
     box
         The box that was proposed for these cells; without cells there is nothing in its place.
     """
     if not box[EXTENT]:
         return 0.0, box
-    gained, wasted = target.occupied & ~covered, ~target.occupied & ~covered
-    rough = _discs(box) if form == DISC else _backs(box)
-    best = rough[int(_nets(rough, gained, wasted, waste).argmax())]
-    block, _value = improve_block(best, target.occupied, covered, target.settings.price, 2)
-    return float(_nets(block[None], gained, wasted, waste)[0] - target.statement * statements(block)), block
+    _, rough = best_block(_discs(box) if form == DISC else _backs(box), covered, waste, target)
+    return best_block(improve_block(rough, covered, 2, target)[None], covered, waste, target)
 
 
 def _discs(box: FloatArray) -> FloatArray:
@@ -174,27 +190,3 @@ def _backs(box: FloatArray) -> FloatArray:
     thin[:, EXTENT + 1] -= np.abs(tilts)
     thin[:, FIRST + 1] -= np.minimum(tilts, 0)
     return np.concatenate([deep, thin[thin[:, EXTENT + 1] > 0]])
-
-
-def _nets(blocks: FloatArray, gained: Rows, wasted: Rows, waste: float) -> FloatArray:
-    """Cells of ``gained`` that each block covers, minus ``waste`` times those of ``wasted``."""
-    counts = cells_shared(draw_each(blocks), gained, wasted)
-    return counts[:, 0] - waste * counts[:, 1]
-
-
-def best_box(covered: Rows, waste: float, picks: Whole, target: Target) -> tuple[float, FloatArray]:
-    """The repeated box with the largest gain on uncovered cells, and its gain in cells; zero when none gains.
-
-    Parameters
-    ----------
-    waste
-        Weight of an empty cell against an occupied one.
-    picks
-        Indices of the families to try.
-    """
-    block, volumes = np.zeros(WIDTH), np.empty((VOLUMES, RESOLUTION**3), np.float32)
-    gain = propose(
-        target.occupied, covered, waste, target.low, target.high, target.table, picks, target.statement,
-        volumes, block,
-    )  # fmt: skip
-    return gain, block

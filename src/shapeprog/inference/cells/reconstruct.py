@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import numpy.typing as npt
 import torch
@@ -17,32 +15,13 @@ from shapeprog.geometry.distance import nearest_primitive
 from shapeprog.inference.budget import NEVER, Deadline, Progress
 from shapeprog.inference.cells.blocks import to_program
 from shapeprog.inference.cells.refinement import REACH, refined
+from shapeprog.inference.cells.search import search_structure
 from shapeprog.inference.cells.settings import Settings
-from shapeprog.inference.cells.structure import search_structure
 from shapeprog.inference.choice.coverage import Prices
 from shapeprog.inference.fit.adjustment import adjust
 from shapeprog.inference.surface.evidence import Evidence, points_of_cells
 from shapeprog.language.program import Program
 from shapeprog.language.unroll import unroll
-
-
-@dataclass(frozen=True)
-class Reconstruction:
-    """A program in the statements of the paper.
-
-    Parameters
-    ----------
-    program
-        With continuous numbers.
-    snapped
-        The same with whole numbers, each within one of the rounded number of ``program``.
-    reason
-        Why the search stopped, as a sentence.
-    """
-
-    program: Program
-    snapped: Program
-    reason: str
 
 
 def reconstruct(
@@ -55,10 +34,8 @@ def reconstruct(
     searching: Deadline = NEVER,
     refining: Deadline = NEVER,
     progress: Progress | None = None,
-) -> Reconstruction:
-    """The program of at most ``settings.blocks`` blocks whose cells are near those of a shape.
-
-    It is the same for the same seed.
+) -> tuple[Program, Program, str]:
+    """The program of at most ``settings.blocks`` blocks whose cells are near those of a shape; the same for one seed.
 
     Parameters
     ----------
@@ -71,14 +48,22 @@ def reconstruct(
         When no further round of the search, and no further step of fitting, starts.
     progress
         Called with the name of the current step and the completed share of it.
+
+    Returns
+    -------
+    program, snapped
+        In the statements of the paper: with continuous numbers, and with whole ones, each within one of the rounded
+        number of ``program``.
+    reason
+        Why the search stopped, as a sentence.
     """
-    structure = search_structure(shape.voxels, settings, seed=seed, deadline=searching, progress=progress)
-    snapped = to_program(structure.blocks)
+    found, stopped = search_structure(shape.voxels, settings, seed=seed, deadline=searching, progress=progress)
+    snapped = to_program(found)
     if tied:
         program = adjust(snapped, evidence, reach=REACH, seed=seed, deadline=refining, progress=progress)
     else:
         program = refined(snapped, outer_points(shape, snapped), seed=seed, deadline=refining)
-    reason = f"The search ended after {structure.reason}"
+    reason = f"The search ended after {stopped}"
     if searching.cut:
         reason += "."
     elif snapped.blocks >= settings.blocks:
@@ -86,7 +71,7 @@ def reconstruct(
     else:
         reason += f"; {snapped.blocks} of {settings.blocks} drawing statements are in use, another would improve the "
         reason += "fit too little."
-    return Reconstruction(program, snapped, reason)
+    return program, snapped, reason
 
 
 def description_length(program: Program, voxels: npt.NDArray[np.bool_], snapped: Program | None = None) -> float:

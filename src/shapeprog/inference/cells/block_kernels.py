@@ -1,0 +1,248 @@
+"""Blocks of the structure search: the row of numbers that stores one, the cells that it covers, and its descent.
+
+A block is a row of 16 whole numbers (as float64): a form, its own numbers, and the loops around it.
+
+=========  ============================================================================================
+slots      hold
+=========  ============================================================================================
+0          FORM: ``BOX``, ``DISC`` or ``BACK``
+1 to 7     FIRST and on, the numbers of the form in the order of its statement, in cells, others unused:
+           BOX   low corner (up, depth, side), extents (up, depth, side)
+           DISC  centre of the bottom (up, depth, side), thickness, radius
+           BACK  low corner, extents, tilt
+8          COUNT1: copies of the first translation loop, 1 for none
+9 to 11    SHIFT1: its step (up, depth, side)
+12         COUNT2: copies of the second translation loop, 1 for none
+13 to 15   SHIFT2: its step
+=========  ============================================================================================
+
+Its cells are rows of bits, one word for the 32 cells of a row.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from shapeprog.kernels.bits import ones, span
+from shapeprog.kernels.compile import helper, kernel
+from shapeprog.kernels.rows import REACH
+from shapeprog.space import FloatArray
+
+WIDTH = 16  # numbers of one block
+
+BOX, DISC, BACK = 0, 1, 2
+
+FORM, FIRST = 0, 1
+EXTENT = FIRST + 3  # extents of a box or back; thickness of a disc
+RADIUS = FIRST + 4  # of a disc
+TILT = FIRST + 6  # of a back
+COUNT1, SHIFT1, COUNT2, SHIFT2 = 8, 9, 12, 13
+
+ROWS = 1024
+"""Rows of the grid: row 32 i + j holds the cells at height i and depth j."""
+
+MOST_MOVES = 200
+"""An upper bound on the number of neighbours of a block."""
+
+MOST_COPIES = 64
+"""Largest number of copies of one block."""
+
+GAIN = 1e-9
+"""Smallest increase of the objective that is accepted, above rounding errors."""
+
+Rows = npt.NDArray[np.uint32]
+
+
+def draw_each(blocks: FloatArray) -> Rows:
+    """Rows (P, 1024) of each block on its own."""
+    rows = np.zeros((len(blocks), ROWS), np.uint32)
+    draw_blocks(blocks, rows)
+    return rows
+
+
+def draw_all(blocks: FloatArray) -> Rows:
+    """Rows (1024) of the union of blocks."""
+    rows = np.zeros((1, ROWS), np.uint32)
+    draw_blocks(blocks, rows)
+    return rows[0]
+
+
+@kernel("void(f8[:, ::1], u4[:, ::1])")
+def draw_blocks(blocks, rows):
+    """Set the cells of block k in row k of ``rows`` (P, 1024), or those of all blocks in its only row."""
+    step = 1 if len(rows) > 1 else 0
+    for k in range(len(blocks)):
+        draw_block(rows[k * step], blocks[k])
+
+
+@helper
+def draw_block(rows, block):
+    """Set the cells of all copies of a block, clipped to the grid."""
+    form, p0, p1, p2 = int(block[FORM]), int(block[FIRST]), int(block[FIRST + 1]), int(block[FIRST + 2])
+    p3, p4, p5, last = int(block[EXTENT]), int(block[EXTENT + 1]), int(block[EXTENT + 2]), int(block[TILT])
+    for i1 in range(int(block[COUNT1])):
+        for i2 in range(int(block[COUNT2])):
+            s0 = int(i1 * block[SHIFT1] + i2 * block[SHIFT2])
+            s1 = int(i1 * block[SHIFT1 + 1] + i2 * block[SHIFT2 + 1])
+            s2 = int(i1 * block[SHIFT1 + 2] + i2 * block[SHIFT2 + 2])
+            if form == DISC:
+                draw_disc(rows, p0 + s0, p1 + s1, p2 + s2, p3, p4)
+            else:
+                draw_back(rows, p0 + s0, p1 + s1, p2 + s2, p3, p4, p5, last if form == BACK else 0)
+
+
+@helper
+def draw_back(rows, a, b, c, ta, tb, tc, tilt):
+    """Set the cells of a box whose layers are shifted in depth by up to ``tilt``; an upright box has none."""
+    bits = span(c + 16, c + 16 + tc)
+    if bits == 0:
+        return
+    for i in range(max(-a - 16, 0), min(16 - a, ta)):
+        low = b + 16 if tilt == 0 else int(np.rint(b + tilt * i / ta)) + 16
+        for j in range(max(low, 0), min(low + tb, 32)):
+            rows[(a + i + 16) * 32 + j] |= bits
+
+
+@helper
+def draw_disc(rows, a, yc, zc, t, r):
+    """Set the cells of an upright cylinder: centres within ``REACH`` radii of its axis."""
+    if r <= 0:
+        return
+    limit = (REACH * r) ** 2
+    for j in range(max(0, yc + 16 - r - 1), min(32, yc + 16 + r + 1)):
+        square = limit - (j - 15.5 - yc) ** 2
+        if square < 0:
+            continue
+        reach = np.sqrt(square)
+        bits = span(int(np.ceil(zc + 15.5 - reach)), int(np.floor(zc + 15.5 + reach)) + 1)
+        for i in range(max(a + 16, 0), min(a + 16 + t, 32)):
+            rows[i * 32 + j] |= bits
+
+
+@helper
+def statements(block):
+    """Statements of a block: itself and its loops; from Python also for each column of a transposed array of blocks."""
+    return 1 + (block[COUNT1] > 1) + (block[COUNT2] > 1)
+
+
+@helper
+def valid(block):
+    """Whether the lengths are positive and no two neighbouring copies of a loop are drawn over each other."""
+    form = int(block[FORM])
+    if block[COUNT1] < 1 or block[COUNT2] < 1 or block[COUNT1] * block[COUNT2] > MOST_COPIES:
+        return False
+    for level in (COUNT1, COUNT2):
+        if block[level] > 1:
+            separate = False
+            for axis in range(3):
+                extent = 2 * block[RADIUS] if form == DISC and axis > 0 else block[EXTENT + axis]
+                separate = separate or abs(block[level + 1 + axis]) >= extent
+            if not separate:
+                return False
+    return block[EXTENT] >= 1 and block[EXTENT + 1] >= 1 and (form == DISC or block[EXTENT + 2] >= 1)
+
+
+@helper
+def layers(block):
+    """First layer of the grid that a block can touch, and the one after the last."""
+    start, end = block[FIRST], block[FIRST] + block[EXTENT]
+    for level in (COUNT1, COUNT2):
+        reach = (block[level] - 1) * block[level + 1]
+        start += min(reach, 0.0)
+        end += max(reach, 0.0)
+    return max(int(np.floor(start)) + 16, 0), min(int(np.ceil(end)) + 16, 32)
+
+
+@helper
+def put(out, n, block, slot, by, slot2, by2):
+    """Write the block with two of its numbers changed as neighbour n; returns the next n."""
+    out[n] = block
+    out[n, slot] += by
+    out[n, slot2] += by2
+    return n + 1
+
+
+@helper
+def moves(block, out, far):
+    """Neighbours of a block: faces, positions, ends, spacings and counts changed by up to ``far``; their number."""
+    n = 0
+    form = int(block[FORM])
+    for which in range(2 * far):
+        delta = (which // 2 + 1.0) * (1.0 if which % 2 else -1.0)
+        if form != DISC:
+            for axis in range(3):
+                corner, extent = FIRST + axis, EXTENT + axis
+                n = put(out, n, block, corner, delta, corner, 0.0)
+                n = put(out, n, block, extent, delta, extent, 0.0)
+                n = put(out, n, block, corner, delta, extent, -delta)
+                if which < 2:
+                    n = put(out, n, block, corner, -delta, extent, 2 * delta)
+            if form == BACK:
+                n = put(out, n, block, TILT, delta, TILT, 0.0)
+                n = put(out, n, block, TILT, delta, FIRST + 1, -delta)
+        else:
+            for slot in range(FIRST, RADIUS + 1):
+                n = put(out, n, block, slot, delta, slot, 0.0)
+            n = put(out, n, block, FIRST, delta, EXTENT, -delta)
+        for level in (COUNT1, COUNT2):
+            if block[level] > 1:
+                for axis in range(3):
+                    corner, step = FIRST + axis, level + 1 + axis
+                    if block[step] != 0 or which < 2:
+                        n = put(out, n, block, step, delta, step, 0.0)
+                        n = put(out, n, block, step, delta, corner, -delta)
+                        if block[level] > 2:
+                            n = put(out, n, block, step, delta, corner, -np.rint(delta * (block[level] - 1) / 2))
+                if which < 2:
+                    n = put(out, n, block, level, delta, level, 0.0)
+                    n = put(out, n, block, level, delta, level, 0.0)  # the same at the other end
+                    for axis in range(3):
+                        out[n - 1, FIRST + axis] -= delta * block[level + 1 + axis]
+    return n
+
+
+@kernel("void(f8[::1], u8[::1], u8[::1], f8, i8)")
+def descend(block, occupied, covered, price, far):
+    """Best-improvement descent of one block, in place.
+
+    Parameters
+    ----------
+    occupied, covered
+        The solid, and the cells of the other blocks, as words (512).
+    price, far
+        Price of a statement in IoU, and largest step of one move in cells.
+    """
+    rows, around = np.empty(ROWS, np.uint32), np.empty((MOST_MOVES, WIDTH))
+    words, gained, wasted = rows.view(np.uint64), occupied & ~covered, ~occupied & ~covered
+    inter = 0
+    union = 0
+    for i in range(len(occupied)):
+        inter += ones(occupied[i] & covered[i])
+        union += ones(occupied[i] | covered[i])
+    best = -np.inf
+    around[0] = block
+    number = 1  # the block alone first, its neighbours later
+    for step in range(61):
+        best_index = -1
+        for m in range(number):
+            if step > 0 and not valid(around[m]):
+                continue
+            first, last = layers(around[m])
+            first, last = 16 * first, 16 * last  # a layer has 16 words
+            for i in range(first, last):
+                words[i] = 0
+            draw_block(rows, around[m])
+            good = inter
+            bad = union
+            for i in range(first, last):
+                good += ones(words[i] & gained[i])
+                bad += ones(words[i] & wasted[i])
+            value = good / max(bad, 1) - price * statements(around[m])
+            if value > best + GAIN:
+                best = value
+                best_index = m
+        if best_index < 0:
+            break
+        block[:] = around[best_index]
+        number = moves(block, around, far)

@@ -44,7 +44,7 @@ def measure(task: Task) -> list[dict[str, Any]]:
     from shapeprog.data import read_pack
     from shapeprog.evaluation.metrics import evaluate_program
     from shapeprog.inference import greedy_boxes, infer
-    from shapeprog.inference.cells.refinement import refined
+    from shapeprog.inference.cells.reconstruct import refined
     from shapeprog.inference.infer import prepare_kernels
     from shapeprog.inference.surface.evidence import points_of_cells
 

@@ -11,7 +11,7 @@ from shapeprog.data.shape import Shape
 from shapeprog.geometry.cells import voxels as voxels_of
 from shapeprog.geometry.surface import sample_surface
 from shapeprog.inference import Settings, infer, refine
-from shapeprog.inference.cells.refinement import REACH, refined
+from shapeprog.inference.cells.reconstruct import REACH, refined
 from shapeprog.inference.fit.adjustment import adjust
 from shapeprog.inference.fit.tunable import THINNEST
 from shapeprog.inference.surface.evidence import evidence_of_program

@@ -19,7 +19,7 @@ from shapeprog.data.synthetic.shapes import shapes_of
 from shapeprog.errors import InputError, did_you_mean
 from shapeprog.files import make_folder
 from shapeprog.inference import greedy_boxes
-from shapeprog.inference.cells.refinement import refined
+from shapeprog.inference.cells.reconstruct import refined
 from shapeprog.liang2022.adapt import AdaptTask
 from shapeprog.liang2022.evaluate import decode_all, measure
 from shapeprog.liang2022.loop import append_line, read_log, train

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from shapeprog.inference.cells.block_kernels import BACK, BOX, COUNT1, COUNT2, DISC, FIRST, FORM, SHIFT1, SHIFT2, TILT
+from shapeprog.inference.cells.block_kernels import BACK, BOX, COUNT1, COUNT2, DISC, EXTENT, FIRST, FORM, TILT
 from shapeprog.inference.roles.roles import roles_of_blocks
-from shapeprog.language.program import Chain, Draw, Loop, Program, nest
+from shapeprog.language.program import Draw, Loop, Node, Program, nest
 from shapeprog.space import FloatArray
 
 FORMS = {BOX: "locker", BACK: "back", DISC: "support_cylinder"}
@@ -39,15 +39,8 @@ def to_program(blocks: FloatArray) -> Program:
         return Program()
     tidied = np.stack([tidy(block) for block in blocks])
     tidied = tidied[np.argsort([-_cells(block) for block in tidied], kind="stable")]
-    roles = roles_of_blocks(Program(tuple(_node(block, FORMS[int(block[FORM])]) for block in tidied)))
-    return Program(tuple(_node(block, _name(block, role)) for block, role in zip(tidied, roles, strict=True)))
-
-
-def _name(block: FloatArray, role: str) -> str:
-    """The statement of the paper that draws a block with a role."""
-    form = int(block[FORM])
-    table = {BOX: BOXES, DISC: DISCS}.get(form, {})
-    return table.get(role, FORMS[form])
+    roles = roles_of_blocks(Program(tuple(map(_node, tidied))))
+    return Program(tuple(map(_node, tidied, roles)))
 
 
 def tidy(block: FloatArray) -> FloatArray:
@@ -58,31 +51,32 @@ def tidy(block: FloatArray) -> FloatArray:
     block = block.copy()
     if int(block[FORM]) == BACK and block[TILT] == 0:
         block[FORM] = BOX
-    for count, shift in ((COUNT1, SHIFT1), (COUNT2, SHIFT2)):
-        step = block[shift : shift + 3]
+    for loop in (COUNT1, COUNT2):
+        step = block[loop + 1 : loop + 4]
         moving = np.flatnonzero(step)
-        if block[count] <= 1 or not len(moving):
-            block[count], block[shift : shift + 3] = 1, 0
+        if block[loop] <= 1 or not len(moving):
+            block[loop], step[:] = 1, 0
         elif step[moving[0]] < 0:
-            reach = (block[count] - 1) * step
-            block[FIRST : FIRST + 3] += reach
-            block[shift : shift + 3] = -step
+            block[FIRST : FIRST + 3] += (block[loop] - 1) * step
+            step *= -1
     block += 0.0  # turns -0.0 into 0.0, which prints better
     if block[COUNT1] > 1 and block[COUNT1] >= block[COUNT2] > 1:
-        block[COUNT1 : COUNT1 + 8] = np.concatenate([block[COUNT2 : COUNT2 + 4], block[COUNT1 : COUNT1 + 4]])
+        block[COUNT1:] = np.roll(block[COUNT1:], COUNT2 - COUNT1)
     return block
 
 
 def _cells(block: FloatArray) -> float:
-    values = block[FIRST : FIRST + 7]
-    copies = block[COUNT1] * block[COUNT2]
-    if int(block[FORM]) in (BOX, BACK):
-        return float(values[3:6].prod() * copies)
-    return float(3.14 * values[3] * values[4] ** 2 * copies)
+    """About how many cells a block covers."""
+    extents, copies = block[EXTENT : EXTENT + 3], block[COUNT1] * block[COUNT2]
+    if int(block[FORM]) == DISC:
+        return float(3.14 * extents[0] * extents[1] ** 2 * copies)
+    return float(extents.prod() * copies)
 
 
-def _node(block: FloatArray, name: str) -> Draw | Loop:
-    form, values = int(block[FORM]), block[FIRST : FIRST + 7]
+def _node(block: FloatArray, role: str = "") -> Node:
+    """The statement of the paper that draws a block with a role, and its loops."""
+    form, values = int(block[FORM]), block[FIRST:COUNT1]
+    name = {BOX: BOXES, DISC: DISCS}.get(form, {}).get(role, FORMS[form])
     low, (up, depth, side) = values[:3], values[3:6]
     middle = [low[0], low[1] + depth / 2, low[2] + side / 2, up, depth / 2]
     even, square = depth % 2 == side % 2 == 0, depth == side
@@ -99,13 +93,7 @@ def _node(block: FloatArray, name: str) -> Draw | Loop:
     else:
         name = CORNER.get(name, name)
         numbers = [*low, up, depth, side, *((0.0,) if name == "back" else ())]
-    chain: Chain = (*_loops(block), Draw(name, tuple(float(number) for number in numbers)))
-    return nest(chain)
-
-
-def _loops(block: FloatArray) -> list[Loop]:
-    loops = []
-    for count, shift in ((COUNT1, SHIFT1), (COUNT2, SHIFT2)):
-        if block[count] > 1:
-            loops.append(Loop("translate", (float(block[count]), *map(float, block[shift : shift + 3])), ()))
-    return loops
+    loops = (
+        Loop("translate", tuple(block[loop : loop + 4].tolist()), ()) for loop in (COUNT1, COUNT2) if block[loop] > 1
+    )
+    return nest((*loops, Draw(name, tuple(float(number) for number in numbers))))

@@ -321,6 +321,6 @@ def test_blocks_are_listed_from_the_main_surface_and_the_floor_up():
     ordered = in_order(Program(tuple(reversed(program.body))))
     assert sorted(map(repr, ordered.body)) == sorted(map(repr, program.body))
     assert [chain[-1].role or chain[-1].name for chain in ordered.chains] == [
-        "top", "leg", "apron", "brace", "stretcher", "shelf"
+        "top", "leg", "brace", "stretcher", "shelf", "apron"
     ]  # fmt: skip
     assert in_order(ordered) == ordered

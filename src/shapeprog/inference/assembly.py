@@ -9,7 +9,8 @@ their names.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -36,19 +37,9 @@ LEAST_GAIN = 0.0005
 """Share of the surface from which another block is mentioned."""
 
 
-@dataclass(frozen=True)
-class Assembly:
-    """A program from the surface.
-
-    Parameters
-    ----------
-    program
-        The blocks chosen, none where there is no surface to speak of.
-    explained
-        Share of the visible surface that they explain.
-    reason
-        Why there are no more of them.
-    """
+class Assembly(NamedTuple):
+    """A program, none where there is no surface to speak of; the share of the visible surface that it explains; and why
+    it has no more blocks."""
 
     program: Program
     explained: float
@@ -77,19 +68,14 @@ def assemble(
     deadline, progress
         As for :func:`shapeprog.inference.infer`.
     """
-
-    def report(share: float) -> None:
-        if progress:
-            progress("finding structure", share)
-
-    evidence = coverage.evidence
-    report(0.1)
+    evidence, report = coverage.evidence, progress or (lambda step, share: None)
+    report("finding structure", 0.1)
     candidates = _candidates(shape)
     if not candidates or evidence.area <= 0:
         return Assembly(Program(), 0.0, "")
-    report(0.7)
+    report("finding structure", 0.7)
     chosen, others = _chosen(candidates, coverage, blocks, seed, deadline)
-    report(1.0)
+    report("finding structure", 1.0)
     start = connected(Program(tuple(chosen)), coverage)
     adjusted = adjust(start, evidence, deadline=deadline, progress=progress)
     program = connected(_unharmed(adjusted, start, coverage), coverage)

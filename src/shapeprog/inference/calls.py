@@ -22,7 +22,7 @@ from shapeprog.inference.choice.coverage import Coverage
 from shapeprog.inference.fit.tunable import CELLS, least
 from shapeprog.language.ast import Call, Source
 from shapeprog.language.parameters import to_float32
-from shapeprog.language.program import Draw, Loop, Node, Program, nest
+from shapeprog.language.program import Loop, Node, Program, nest
 from shapeprog.language.statement import language
 from shapeprog.library.blocks import Kind, forms_of
 from shapeprog.library.matching import EXACT, Form, Pattern
@@ -78,7 +78,7 @@ def with_calls(program: Program, libraries: Sequence[Library], coverage: Coverag
         One node for each block, and the indices of those that calls draw.
     """
     nodes = list(program.flat().body)
-    options = _options(nodes)
+    options = _options(program)
     patterns = [pattern for library in libraries for pattern in library.patterns if pattern.shortens]
     candidates = [candidate for pattern in patterns for candidate in _candidates(pattern, options)]
     candidates.sort(key=lambda candidate: (-len(candidate.replaced), candidate.difference))
@@ -97,22 +97,17 @@ def with_calls(program: Program, libraries: Sequence[Library], coverage: Coverag
 
 def _with_one_role(candidate: Candidate, nodes: Sequence[Node]) -> Iterator[Node]:
     """The blocks of a call; those without a role in its function get the commonest role of the blocks it replaces."""
-    chains = candidate.program.chains
-    draws = [draw for *_, draw in chains if isinstance(draw, Draw)]
-    before = [
-        draw for place in candidate.replaced for draw in Program((nodes[place],)).walk() if isinstance(draw, Draw)
-    ]
+    draws, before = candidate.program.draws, Program(tuple(nodes[place] for place in candidate.replaced)).draws
     is_open = [not (draw.role or language().own_role(draw.name)) for draw in draws]
     words = Counter(draw.word for draw, open_role in zip(before, is_open, strict=True) if open_role)
-    for (*loops, _), draw, open_role in zip(chains, draws, is_open, strict=True):
+    for (*loops, _), draw, open_role in zip(candidate.program.chains, draws, is_open, strict=True):
         role = words.most_common(1)[0][0] if open_role else ""
         yield nest((*loops, replace(draw, role=role) if role and role != draw.name else draw))
 
 
-def _options(nodes: Sequence[Node]) -> Options:
+def _options(program: Program) -> Options:
     options: Options = {}
-    for index, node in enumerate(nodes):
-        (chain,) = Program((node,)).chains
+    for index, chain in enumerate(program.chains):
         for depth in range(len(chain)):
             around = tuple(node for node in chain[:depth] if isinstance(node, Loop))
             discrete = tuple(tuple(_numbers(loop, discrete=True)) for loop in around)

@@ -168,9 +168,9 @@ def infer(
     prices = {name: getattr(usual, name) / detail for name in ("statement", "loop", "number")}
     coverage = Coverage(evidence, replace(usual, **prices))
     if statements == "all" and target.points is not None:
-        assembly = assemble(target, coverage, blocks=blocks, seed=seed, deadline=refining, progress=progress)
-        program, reason = assembly.program, assembly.reason
-        scores["explained"] = assembly.explained
+        program, scores["explained"], reason = assemble(
+            target, coverage, blocks=blocks, seed=seed, deadline=refining, progress=progress
+        )
     if not program.body:  # voxels, the statements of the paper, or a surface that gave no program
         limits = settings or Settings()
         program, snapped, reason = reconstruct(

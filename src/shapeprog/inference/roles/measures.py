@@ -26,36 +26,6 @@ class Parts:
 
     The *main* surface is the seat, the table top or the mattress: the highest that covers at least half of what the
     widest level covers, or the whole where nothing does.  A body is the main surface only where nothing lies.
-
-    ======================================== =========================================================================
-    ``block``, ``count``                     the block that drew each part; how many parts there are
-    ``up``, ``depth``, ``side``              extents along the part's own axes that are nearest to these directions
-    ``thin``, ``middle``, ``long``           the same in order of size
-    ``face``, ``surface``                    area seen from above; all of it, as that of a box
-    ``rise``                                 sine of the slope of the longest axis
-    ``lying``, ``flat``, ``wide``            its upper face is the larger one; and it is a plate; and large
-    ``squat``                                a body that may be higher than it is wide, but not by much
-    ``slender``, ``upright``, ``level``      a stick; that stands; that lies
-    ``board``, ``plank``                     one extent is small against both others; such a stick that lies flat
-    ``facing_front``, ``facing_side``        a board by the way that it faces
-    ``front``, ``wall``                      the same, and slender boards that are wide or high against the whole
-    ``small``, ``stubby``                    against the whole: its length; its plan
-    ``bulky``, ``solid``                     it fills much of the whole; some of it, and is no board
-    ``kind``, ``equal``                      parts of one kind have about the same extents; how many there are of it
-    ``low``, ``high``, ``bottom``, ``top``   bounds (N, 3), and along up
-    ``main``, ``main_low``, ``main_high``    which parts are the main surface; its bounds (3,)
-    ``rear``, ``aside``                      from its middle to the rear, and to either side, .5 at its edges
-    ``run``, ``span``                        extents along depth and left-right, as shares of those of the main surface
-    ``grounded``, ``below``, ``alongside``   on the floor; under the main surface; at its height
-    ``rising``, ``above``                    it ends clearly above the main surface; it begins there
-    ``central``, ``behind``, ``outermost``   by place along depth and left-right
-    ``in_front``, ``lowest``                 at the front of the whole; the lowest plate, near the floor
-    ``plinth``                               a low board on the floor that faces the front
-    ``walled``, ``cased``                    of the whole: its sides reach the floor; it has some, or a body
-    ``on_pedestal``, ``padded``              of the whole: one column carries the main surface; something wide lies
-                                             right under it
-    ``size``, ``floor``, ``near``            of the whole: extents (3,), height of its lowest point, what counts as near
-    ======================================== =========================================================================
     """
 
     def __init__(self, scene: Scene, turns: int = 0) -> None:
@@ -63,14 +33,14 @@ class Parts:
         half = scene.bounds.double().numpy()
         centre, pose = turned(scene.centre.double().numpy()[mask], turns), scene.rotation.double().numpy()[mask]
         half, pose = half[mask], np.swapaxes(turned(np.swapaxes(pose, -1, -2), turns), -1, -2)
-        self.block = scene.block.numpy()[mask]
+        self.block = scene.block.numpy()[mask]  # the block that drew each part
         self.count = len(half)
         reach = (np.abs(pose) @ half[..., None])[..., 0]
-        self.low, self.high = centre - reach, centre + reach
+        self.low, self.high = centre - reach, centre + reach  # bounds (N, 3)
         self.bottom, self.top = self.low[:, UP], self.high[:, UP]
-        self.size = self.high.max(0) - self.low.min(0)
-        self.near = 0.04 * max(float(self.size.max()), 1e-6)  # a point has no size
-        self.floor = float(self.bottom.min())
+        self.size = self.high.max(0) - self.low.min(0)  # extents of the whole (3,)
+        self.near = 0.04 * max(float(self.size.max()), 1e-6)  # what counts as near; a point has no size
+        self.floor = float(self.bottom.min())  # height of the lowest point
         self._form(half, pose, (scene.kind == primitives.index(ARC)).numpy()[mask])
         self._main_surface()
         self._places()
@@ -84,14 +54,15 @@ class Parts:
         deep = np.abs(pose[:, DEPTH])
         deep[every, up] = -1
         depth = deep.argmax(1)
+        # Extents along the own axes that are nearest to these directions, and in order of size.
         self.up, self.depth, self.side = (2 * half[every, axis] for axis in (up, depth, 3 - up - depth))
         self.thin, self.middle, self.long = 2 * np.sort(half, 1).T
-        self.face = self.depth * self.side
-        self.surface = 2 * (self.up * self.depth + self.depth * self.side + self.side * self.up)
-        self.rise = steep[every, half.argmax(1)]
+        self.face = self.depth * self.side  # area seen from above
+        self.surface = 2 * (self.up * self.depth + self.depth * self.side + self.side * self.up)  # as that of a box
+        self.rise = steep[every, half.argmax(1)]  # sine of the slope of the longest axis
         straight, square = steep[every, up] >= 0.75, np.sqrt(self.face)
-        self.lying: Mask = (self.up <= 0.8 * square) & straight & ~bent
-        self.squat: Mask = (self.up <= 1.2 * square) & straight & ~bent
+        self.lying: Mask = (self.up <= 0.8 * square) & straight & ~bent  # the upper face is the larger one
+        self.squat: Mask = (self.up <= 1.2 * square) & straight & ~bent  # a body not much higher than wide
         self.flat: Mask = (self.up <= 0.25 * square) & ~bent
         self.slender: Mask = (self.middle <= 0.3 * self.long) | bent
         self.upright: Mask = self.slender & (self.rise >= 0.75)
@@ -108,10 +79,11 @@ class Parts:
         self.solid: Mask = (volume >= 0.1) & ~self.lying & ~self.board
         sizes = np.round(np.stack([self.up, self.depth, self.side], 1) / self.near).astype(np.int64)
         _, kind, copies = np.unique(sizes, axis=0, return_inverse=True, return_counts=True)
-        self.kind = kind.reshape(-1)
-        self.equal = copies[self.kind]
+        self.kind = kind.reshape(-1)  # the same for parts of about the same extents
+        self.equal = copies[self.kind]  # how many parts of its kind there are
 
     def _main_surface(self) -> None:
+        """Which parts are the main surface, and its bounds (3,)."""
         first, last = self.low.min(0), self.high.max(0)
         off = (self.low + self.high - first - last) / 2
         central = (off[:, DEPTH] <= 0.15 * self.size[DEPTH]) & (np.abs(off[:, SIDE]) <= self.size[SIDE] / 4)
@@ -150,21 +122,23 @@ class Parts:
         extent = np.maximum(self.main_high - self.main_low, self.near)
         away = ((self.low + self.high) - (self.main_low + self.main_high)) / 2 / extent
         share = (self.high - self.low) / extent
+        # From its middle to the rear, and to either side: .5 at its edges.
         self.rear, self.aside = away[:, DEPTH], np.abs(away[:, SIDE])
-        self.run, self.span = share[:, DEPTH], share[:, SIDE]
+        self.run, self.span = share[:, DEPTH], share[:, SIDE]  # extents as shares of those of the main surface
         bottom, top = float(self.main_low[UP]), float(self.main_high[UP])
         middle = (self.bottom + self.top) / 2
         self.grounded: Mask = self.bottom <= self.floor + 1.5 * self.near
         self.wide: Mask = self.lying & (self.face >= 0.3 * extent[DEPTH] * extent[SIDE])
         self.alongside: Mask = (middle >= bottom) & (self.top <= top + 2 * self.near)
         self.below: Mask = ~self.main & (middle < bottom)
-        self.rising: Mask = (self.top >= top + 2 * self.near) | (middle >= top)
-        self.above: Mask = self.bottom >= top - 2 * self.near
+        self.rising: Mask = (self.top >= top + 2 * self.near) | (middle >= top)  # it ends clearly above
+        self.above: Mask = self.bottom >= top - 2 * self.near  # it begins there
         self.central: Mask = (np.abs(self.rear) <= 0.15) & (self.aside <= 0.15)
         self.behind: Mask = (self.rear > 0.1) & (self.aside < 0.3)
         self.outermost: Mask = self.aside + self.span / 2 >= 0.4
         front = min(3 * self.near, self.size[DEPTH] / 3)
         self.in_front: Mask = self.low[:, DEPTH] <= self.low[:, DEPTH].min() + front
+        # Of the whole: something wide lies right under the main surface; one column carries it.
         self.padded = (self.wide & self.below & ~self.grounded & (self.top >= bottom - 1.5 * self.near)).any()
         self.on_pedestal = (self.below & self.central & self.upright).any()
 
@@ -172,10 +146,12 @@ class Parts:
         """The sides and fronts of a case."""
         plate = self.wide & self.flat & (self.bottom <= self.floor + 0.2 * self.size[UP])
         self.lowest: Mask = plate & (self.bottom <= self.bottom[plate].min(initial=np.inf) + self.near)
+        # Walls and fronts are boards by the way that they face, and slender ones that are wide or high in the whole.
         standing = self.board & self.upright
         wide = (self.side == self.thin) & (self.depth >= self.size[DEPTH] / 2)
         self.wall: Mask = self.facing_side | (standing & wide)
         sides = self.wall & self.outermost & (self.up >= self.size[UP] / 2)
+        # Of the whole: its sides reach the floor; it has sides, or a body.
         self.walled = (sides & self.grounded).sum() > 1
         self.cased = np.bool_(sides.sum() > 1 or (self.bulky | self.solid).any())
         large = (self.up >= 0.12 * self.size[UP]) & (self.side >= 0.12 * self.size[SIDE]) & self.cased

@@ -8,7 +8,7 @@ statement have one role: that of most of their surface, or one that covers all o
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -16,7 +16,7 @@ import numpy as np
 from shapeprog.geometry.scene import Scene
 from shapeprog.inference.candidates.drawings import simplest
 from shapeprog.inference.roles.measures import Mask, Parts
-from shapeprog.language.program import Draw, Loop, Node, Program, nest
+from shapeprog.language.program import Draw, Program, nest
 from shapeprog.language.statement import language
 from shapeprog.language.unroll import unroll
 from shapeprog.space import DEPTH, SIDE, UP
@@ -122,43 +122,38 @@ MIXED = ({"top", "base", "shelf"}, "shelf"), ({"door", "drawer", "panel", "side"
 
 
 def with_roles(program: Program) -> Program:
-    """The program with a role for every plain solid; existing roles, and statements of a role, are kept.
+    """The program with a role for every plain solid, one node for each block; existing roles are kept.
 
     A box that is a leg is written as the statement ``leg``.
     """
-    roles = iter(roles_of_blocks(program))
-    return Program(tuple(_named(node, roles) for node in program.body))
+    named = map(_named, program.draws, roles_of_blocks(program))
+    return Program(tuple(nest((*loops, draw)) for (*loops, _), draw in zip(program.chains, named, strict=True)))
 
 
 def named_anew(program: Program) -> Program:
     """The program with each block drawn by the plainest statement, with a role by its neighbours, and in order;
     existing roles are ignored."""
-    return in_order(with_roles(Program(tuple(_unnamed(simplest(nest(chain))) for chain in program.chains))))
-
-
-def _unnamed(node: Node) -> Node:
-    if isinstance(node, Loop):
-        return replace(node, body=tuple(map(_unnamed, node.body)))
-    return replace(node, role="")
+    plain = (replace(draw, role="") for draw in program.draws)
+    blocks = (nest((*loops, draw)) for (*loops, _), draw in zip(program.chains, plain, strict=True))
+    return in_order(with_roles(Program(tuple(map(simplest, blocks)))))
 
 
 def in_order(program: Program) -> Program:
-    """The program with its blocks as a person would list them: the main surface, then from the floor up.
+    """The program, of one node for each block, as a person would list it: the main surface, then from the floor up.
 
     At one height the larger come first.
     """
     scene = unroll(program)
     if not scene.mask.any():
         return program
-    parts, last = Parts(scene), 0
-    ranks: list[tuple[int, int, float]] = []
-    for node in program.body:
-        first, last = last, last + Program((node,)).blocks
-        mine = (parts.block >= first) & (parts.block < last)
+    parts = Parts(scene)
+
+    def rank(index: int) -> tuple[bool, int, float]:
+        mine = parts.block == index
         level = round(float((parts.bottom[mine] - parts.floor).min(initial=parts.size[UP])) / parts.near)
-        ranks.append((int(not parts.main[mine].any()), level, -float(parts.surface[mine].sum())))
-    order = sorted(range(len(ranks)), key=ranks.__getitem__)
-    return Program(tuple(program.body[index] for index in order))
+        return not parts.main[mine].any(), level, -float(parts.surface[mine].sum())
+
+    return Program(tuple(program.body[index] for index in sorted(range(len(program.body)), key=rank)))
 
 
 def roles_of_blocks(program: Program) -> list[str]:
@@ -183,16 +178,13 @@ def _common(share: dict[str, float]) -> str:
     return role
 
 
-def _named(node: Node, roles: Iterator[str]) -> Node:
-    """The node with the next roles, which are those of the drawing statements in it, in their order."""
-    if isinstance(node, Loop):
-        return replace(node, body=tuple(_named(inner, roles) for inner in node.body))
-    role = next(roles)
-    if node.role or role not in language().roles or language()[node.name].hint is None:
-        return node
-    if (node.name, role) == ("box", "leg"):
-        return Draw("leg", node.values)
-    return replace(node, role="" if role == node.name else role)
+def _named(draw: Draw, role: str) -> Draw:
+    """The drawing statement with a role, if it has none yet and can have one."""
+    if draw.role or role not in language().roles or language()[draw.name].hint is None:
+        return draw
+    if (draw.name, role) == ("box", "leg"):
+        return Draw("leg", draw.values)
+    return replace(draw, role="" if role == draw.name else role)
 
 
 def _facing(scene: Scene) -> Parts:

@@ -68,6 +68,11 @@ def draw_all(blocks: FloatArray) -> Rows:
     return rows[0]
 
 
+def cells_of(rows: Rows) -> npt.NDArray[np.bool_]:
+    """The cells (32, 32, 32) of rows (1024)."""
+    return np.unpackbits(rows.view(np.uint8), bitorder="little").view(np.bool_).reshape(32, 32, 32)
+
+
 @kernel("void(f8[:, ::1], u4[:, ::1])")
 def draw_blocks(blocks, rows):
     """Set the cells of block k in row k of ``rows`` (P, 1024), or those of all blocks in its only row."""

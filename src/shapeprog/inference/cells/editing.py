@@ -18,6 +18,7 @@ from shapeprog.inference.cells.block_kernels import (
     TILT,
     WIDTH,
     Rows,
+    cells_of,
     descend,
     draw_all,
     draw_each,
@@ -25,7 +26,7 @@ from shapeprog.inference.cells.block_kernels import (
 )
 from shapeprog.inference.cells.proposal_kernels import families, propose
 from shapeprog.inference.cells.settings import Settings
-from shapeprog.space import FloatArray
+from shapeprog.space import HALF, FloatArray
 
 Whole = npt.NDArray[np.int64]
 
@@ -143,8 +144,11 @@ def best_box(covered: Rows, waste: float, table: Whole, target: Target) -> tuple
     table
         The ways of repeating a box to try.
     """
-    block = np.zeros(WIDTH)
-    gain = propose(target.occupied, covered, waste, target.low, target.high, table, target.statement, block)
+    block, inside = np.zeros(WIDTH), tuple(map(slice, target.low, target.high))
+    occupied, done = cells_of(target.occupied)[inside], cells_of(covered)[inside]
+    weights = np.where(done, 0, np.where(occupied, 1, -waste)).astype(np.float32)
+    gain = propose(weights, table, target.statement, block)
+    block[FIRST:EXTENT] += target.low - HALF
     return gain, block
 
 

@@ -46,7 +46,7 @@ def families(size: Sequence[int], planes: int, max_copies: int) -> npt.NDArray[n
         Largest number of copies in an even row.
     """
     single: list[tuple[int, int, int, int]] = []
-    for axis, length in enumerate(map(int, size)):
+    for axis, length in enumerate(size):
         for plane in range(max(2, length // 2), min(2 * length - 1, 3 * length // 2 + 1)):
             single.append((axis, MIRROR, plane, 0))
         for count in range(3, max_copies + 1):
@@ -54,7 +54,7 @@ def families(size: Sequence[int], planes: int, max_copies: int) -> npt.NDArray[n
                 single.append((axis, PERIOD, count, step))
     none = (-1, 0, 0, 0)
     rows = [none + none, *(first + none for first in single)]
-    for axis, length in enumerate(map(int, size)):
+    for axis, length in enumerate(size):
         for number in range(planes):
             plane = length + (number + 1) // 2 * (1 if number % 2 else -1)
             if plane < 2 or plane > 2 * length - 2:
@@ -223,46 +223,25 @@ def search_family(weights, family, floor, block):
     return best
 
 
-@helper
-def weigh(occupied, covered, waste, low, high):
-    """Weights of the cells in the box [low, high): +1 for occupied, -waste for empty, 0 once covered."""
-    weights = np.zeros((high[0] - low[0], high[1] - low[1], high[2] - low[2]), np.float32)
-    for i in range(low[0], high[0]):
-        for j in range(low[1], high[1]):
-            full, done = occupied[i * 32 + j], covered[i * 32 + j]
-            for k in range(low[2], high[2]):
-                bit = np.uint32(1) << np.uint32(k)
-                if not done & bit:
-                    weights[i - low[0], j - low[1], k - low[2]] = 1.0 if full & bit else -waste
-    return weights
-
-
-@kernel("f8(u4[::1], u4[::1], f8, i8[::1], i8[::1], i8[:, ::1], f8, f8[::1])")
-def propose(occupied, covered, waste, low, high, table, price, block):
-    """Write the repeated box with the largest gain on uncovered cells; its gain, zero when no box gains.
+@kernel("f8(f4[:, :, ::1], i8[:, ::1], f8, f8[::1])")
+def propose(weights, table, price, block):
+    """Write the repeated box with the largest gain of weight; its gain, zero when no box gains.
 
     Parameters
     ----------
-    occupied, covered
-        The solid, and the cells of the blocks, as rows (1024).
-    waste
-        Weight of an empty cell against an occupied one.
-    low, high
-        Box of cells that contains every proposal.
+    weights
+        Weights of the cells of a volume (A, B, C), which contains every proposal.
     table
         Rows of ``families``: those to try.
     price
-        Cells that one statement has to gain.
+        Weight that one statement has to gain.
     block
-        Output (16), initially zeros.
+        Output (16), in the frame of the volume.
     """
-    weights = weigh(occupied, covered, waste, low, high)
     best = 0.0
     for family in table:
         cost = price * (1 + (family[0] >= 0) + (family[4] >= 0))
         value = search_family(weights, family, best + cost, block)
         if value > best + cost:
             best = value - cost
-    for axis in range(3):
-        block[FIRST + axis] += low[axis] - 16
     return best

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from shapeprog.inference.budget import NEVER, Deadline, Progress
-from shapeprog.inference.cells.block_kernels import GAIN, WIDTH, Rows, draw_all, draw_each
+from shapeprog.inference.cells.block_kernels import GAIN, WIDTH, cells_of, draw_all, draw_each
 from shapeprog.inference.cells.blocks import to_program
 from shapeprog.inference.cells.editing import (
     Target,
@@ -24,7 +24,7 @@ from shapeprog.inference.cells.editing import (
 )
 from shapeprog.inference.cells.settings import Settings
 from shapeprog.language.program import Program
-from shapeprog.space import RESOLUTION, FloatArray
+from shapeprog.space import HALF, RESOLUTION, FloatArray
 
 CLUSTER, MOST_DROPPED = 3, 6
 """Smallest and largest number of blocks that are removed together with their nearest neighbours."""
@@ -143,17 +143,12 @@ def ruin(blocks: FloatArray, most: int, random: np.random.Generator) -> tuple[Fl
 
 def ruin_cluster(blocks: FloatArray, random: np.random.Generator) -> tuple[FloatArray, int]:
     """The blocks without one and its nearest neighbours, and the number of new ones: stairs become one slope."""
-    centres = np.stack([_centre(rows) for rows in draw_each(blocks)])
+    filled = (np.unravel_index(np.flatnonzero(cells_of(rows)), (RESOLUTION,) * 3) for rows in draw_each(blocks))
+    cells = (np.stack(indices, 1) - HALF for indices in filled)
+    centres = np.stack([low.mean(0) if len(low) else np.zeros(3) for low in cells])
     around = np.linalg.norm(centres - random.choice(centres), axis=1)
     drops = int(random.integers(CLUSTER, min(len(blocks), MOST_DROPPED) + 1))
     return np.delete(blocks, np.argsort(around, kind="stable")[:drops], 0), drops
-
-
-def _centre(rows: Rows) -> FloatArray:
-    """Mean low corner of cells, in the frame of the grid."""
-    bits = np.unpackbits(rows.view(np.uint8), bitorder="little").view(np.bool_)
-    cells = np.stack(np.unravel_index(np.flatnonzero(bits), (RESOLUTION,) * 3), 1) - RESOLUTION // 2
-    return cells.mean(0) if len(cells) else np.zeros(3)
 
 
 def recreate(

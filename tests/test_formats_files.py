@@ -25,7 +25,7 @@ from shapeprog.data.loading import ARRAY_SUFFIXES
 from shapeprog.errors import InputError, OutputError, ProgramError
 from shapeprog.formats import FORMATS, Format, export, format_of, listed, load_with_frame, suffixes
 from shapeprog.formats.colours import colour
-from shapeprog.formats.frames import frame_comment, frame_of_grid, placement, scale_of
+from shapeprog.formats.frames import frame_comment, frame_of_grid, in_grid_of, placement, scale_of
 from shapeprog.formats.json_form import program_to_json, result_from_json
 from shapeprog.formats.parts import crease_normals, parts, solid
 from shapeprog.formats.shape import program_in, program_text
@@ -276,7 +276,7 @@ def test_what_is_saved_and_loaded_lies_at_the_same_place_in_the_world(
     assert source is not None
     assert source.scale is not None
     # inference has a grid of its own, in which the longest side of the whole need not be 24 cells
-    other = Scale(source.scale.cells_per_unit * grid, source.scale.floor + grid)
+    other = Scale(source.scale.cells_per_unit * grid, source.scale.floor + grid, grid / 3)
     program = evaluated(replace(source, scale=other))
     rotation = turned(seed) if axes is None else grid_axes(*axes).tolist()
     frame = Frame(scale, tuple(scale * value for value in middle), tuple(map(tuple, rotation)))
@@ -288,6 +288,8 @@ def test_what_is_saved_and_loaded_lies_at_the_same_place_in_the_world(
         there, back = frame.to_world(one.vertices), kept.to_world(two.vertices)
         np.testing.assert_allclose(back, there, rtol=0, atol=24e-6 * scale)
     assert program_text(read, kept).splitlines()[1:] == text.splitlines()[1:]
+    for one, two in zip(parts(program), parts(in_grid_of(read, kept, frame)), strict=True):
+        np.testing.assert_allclose(two.vertices, one.vertices, rtol=0, atol=24e-6)
 
 
 def both(text: str) -> tuple[Program, Frame | None]:

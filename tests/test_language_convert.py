@@ -9,9 +9,11 @@ import shapeprog as sp
 from shapeprog.data.random import random_program
 from shapeprog.data.synthetic.furniture import furniture
 from shapeprog.language.convert import in_cells, named_cells, placed, placed_again
+from shapeprog.language.dimensions import in_unit
 from shapeprog.language.free import numbers
 from shapeprog.language.printer import format_program, source_of
 from shapeprog.language.program import Program
+from shapeprog.language.unit import Unit
 
 BLOCK = "block(box(at=(-6, -5, -12), size=(12, 10, 24)))\n"
 
@@ -172,6 +174,29 @@ def test_names_of_a_placed_program_stay_in_cells_and_when_it_is_placed_again() -
 def test_a_program_without_sizes_gets_those_of_its_bounding_box_about_the_middle_of_the_grid() -> None:
     program = placed(sp.parse("leg(at=(-3, -4, 1), size=(5, 8, 2))"))
     assert format_program(program) == "width, depth, height = 6, 8, 6\nleg(left=0, width=2, top=1)\n"
+
+
+@pytest.mark.parametrize(
+    ("cells", "text"),
+    [
+        ("leg(at=(-3, -4, 1), size=(5, 8, 2))", "width, depth, height = 6, 8, 5\nleg(left=0, width=2)\n"),
+        ("leg(at=(0, 1, -2), size=(5, 3, 4))", "width, depth, height = 4, 3, 5\nleg()\n"),
+        (
+            "for i in mirror(depth):\n    leg(at=(0, 1, -2), size=(5, 3, 4))",
+            "width, depth, height = 4, 8, 5\nfor _ in mirror(y=0):\n    leg(front=0, depth=3)\n",
+        ),
+    ],
+)
+def test_a_tight_whole_ends_where_its_parts_end_unless_they_are_mirrored_about_the_middle(
+    cells: str, text: str
+) -> None:
+    given = sp.parse(cells)
+    result = placed(given, tight=True)
+    assert format_program(result) == text
+    assert same_surface(result, given), "it stays where it is in the grid"
+    in_metres = in_unit(result, Unit("m", 0.02))
+    assert same_surface(in_metres, given)
+    assert same_surface(sp.set(in_metres, height=0.2), sp.set(result, height=10)), "heights are measured from the floor"
 
 
 @pytest.mark.parametrize(

@@ -236,7 +236,7 @@ def _input_and_scores(
 
 def _as_inferred(shape: Shape, frame: Frame | None) -> Shape:
     """A shape as it was seen when it was inferred, perhaps with --up or --front."""
-    if frame is None or shape.vertices is None or frame.axes == shape.frame.axes:
+    if frame is None or shape.vertices is None:
         return shape
     seen = frame.to_grid(shape.frame.to_world(shape.vertices))
     return replace(shape, vertices=seen.astype(shape.vertices.dtype))

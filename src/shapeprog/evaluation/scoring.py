@@ -28,15 +28,16 @@ from shapeprog.evaluation.metrics import (
     world_scale,
 )
 from shapeprog.evaluation.parts import part_scores
-from shapeprog.formats.files import load, program_files
+from shapeprog.formats.files import load_with_frame, program_files
 from shapeprog.formats.format import suffixes
-from shapeprog.formats.json_form import read_result
+from shapeprog.formats.frames import in_grid_of
+from shapeprog.formats.json_form import Result, read_result
 from shapeprog.language.program import Program
 from shapeprog.language.unroll import unroll
-from shapeprog.space import Array
+from shapeprog.space import Array, Frame
 
-Prediction = tuple[Program, Program | None] | Shape
-"""A program with its whole-numbered form where the file holds one, or a shape."""
+Prediction = tuple[Program, Program | None, Frame | None] | Shape
+"""A program with its whole-numbered form and its frame where the file holds them, or a shape."""
 
 
 def predictions(path: Path) -> Iterator[tuple[Path, str, Prediction | ShapeProgError]]:
@@ -47,12 +48,11 @@ def predictions(path: Path) -> Iterator[tuple[Path, str, Prediction | ShapeProgE
     for file in files:
         try:
             with in_words(file, "a program"):
-                result = read_result(file) if file.suffix.lower() == ".json" else None
-                prediction = (load(file), None) if result is None else (result.program, result.snapped)
+                result = read_result(file) if file.suffix.lower() == ".json" else Result(*load_with_frame(file))
         except ShapeProgError as error:
             yield file, file.stem, error
         else:
-            yield file, file.stem, prediction
+            yield file, file.stem, (result.program, result.snapped, result.frame)
     if not files:
         for file, shape in load_all([path]):
             yield file, (file.stem if isinstance(shape, ShapeProgError) else shape.name), shape
@@ -74,6 +74,14 @@ def read_targets(
         else:
             shapes[shape.name] = shape
     return shapes, failures
+
+
+def aligned(prediction: Prediction, target: Shape) -> Prediction:
+    """A predicted program in the grid of its target; shapes are unchanged."""
+    if isinstance(prediction, Shape):
+        return prediction
+    program, snapped, frame = prediction
+    return in_grid_of(program, frame, target.frame), snapped, target.frame
 
 
 def measure(prediction: Prediction | ShapeProgError, target: Shape | None, points: int, seed: int) -> Metrics:

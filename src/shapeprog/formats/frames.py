@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import math
 import re
+from dataclasses import astuple, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -25,7 +26,9 @@ import numpy as np
 from shapeprog.errors import InputError
 from shapeprog.formats.format import CELLS, GRID, Y_UP, Z_UP, Format
 from shapeprog.language.ast import Scale
+from shapeprog.language.evaluate import evaluated
 from shapeprog.language.placement import LONGEST_SIDE
+from shapeprog.language.printer import source_of
 from shapeprog.language.program import Program
 from shapeprog.language.text import Text
 from shapeprog.language.unit import METRES, assumed_unit, metres
@@ -142,7 +145,7 @@ def _ground(program: Program) -> FloatArray:
     from shapeprog.language.convert import placed_if_possible
 
     if (scale := placed_if_possible(program).scale) is not None:
-        return np.array([scale.floor, 0.0, 0.0])
+        return np.array([scale.floor, scale.middle, 0.0])
     vertices = [part.vertices for part in parts(program)]
     if not vertices:
         return np.zeros(3)
@@ -154,14 +157,30 @@ def _ground(program: Program) -> FloatArray:
 def frame_of_text(frame: Frame, scale: Scale) -> Frame:
     """The map from x, y, z of a text to the world, given that from the grid."""
     axes = np.asarray(frame.axes) @ _GRID
-    origin = np.asarray(frame.centre) + frame.scale * scale.floor * axes[:, 2]
+    origin = np.asarray(frame.centre) + frame.scale * (axes @ [0.0, scale.middle, scale.floor])
     return _frame(frame.scale * scale.cells_per_unit, origin, axes)
 
 
 def frame_of_grid(text: Frame, scale: Scale) -> Frame:
     """The map from the grid to the world, given that from x, y, z of a text."""
     size, axes = text.scale / scale.cells_per_unit, np.asarray(text.axes)
-    return _frame(size, np.asarray(text.centre) - size * scale.floor * axes[:, 2], axes @ _GRID.T)
+    return _frame(size, np.asarray(text.centre) - size * (axes @ [0.0, scale.middle, scale.floor]), axes @ _GRID.T)
+
+
+def in_grid_of(program: Program, frame: Frame | None, other: Frame) -> Program:
+    """The same program in the grid of another frame, such as that of the shape that it was inferred from.
+
+    Unchanged if its frame is not known, its parts are not placed, or the frames differ by more than size and moves
+    upwards and in depth.
+    """
+    if frame is None or program.scale is None or not np.allclose(frame.axes, other.axes, atol=1e-6):
+        return program
+    up, depth, side = other.to_grid(frame.centre)
+    size = frame.scale / other.scale
+    if abs(side) > 1e-3 or not math.isfinite(size):
+        return program
+    scale, floor, middle = (size * value for value in astuple(program.scale))
+    return evaluated(replace(source_of(program), scale=Scale(scale, floor + up, middle + depth)))
 
 
 def scale_of(program: Program) -> Scale:

@@ -20,6 +20,8 @@ from reprlib import repr as shortened
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from shapeprog.errors import InputError, ShapeProgError
 from shapeprog.formats.frames import frame_of_text, scale_of
 from shapeprog.formats.shape import LARGEST_FILE, program_in, program_text, read_text
@@ -130,8 +132,8 @@ def _solids(program: Program, framed: bool) -> list[dict[str, Any]]:
     with exact_scene(program) as scene:
         blocks = scene.block.tolist()
         for slot, (bottom, front, right), (top, rear, left) in bounds(scene):  # the third axis points to the left
-            corners = (-left, front, bottom - scale.floor), (-right, rear, top - scale.floor)
-            low, high = ([float(f"{value / scale.cells_per_unit + 0.0:.6g}") for value in corner] for corner in corners)
+            corners = np.array([(-left, front, bottom), (-right, rear, top)]) - [0.0, scale.middle, scale.floor]
+            low, high = ([float(f"{value + 0.0:.6g}") for value in corner] for corner in corners / scale.cells_per_unit)
             row, kind = lines[blocks[slot]]
             solids.append({"line": row, "role": roles[blocks[slot]], "kind": kind, "low": low, "high": high})
     return solids

@@ -113,7 +113,7 @@ def world_of(source: Source, frame: Frame) -> FloatArray:
     scale = source.scale
     assert scale is not None
     k = scale.cells_per_unit
-    world = frame.matrix() @ np.array([[0, 0, k, scale.floor], [0, k, 0, 0], [-k, 0, 0, 0], [0, 0, 0, 1]])
+    world = frame.matrix() @ np.array([[0, 0, k, scale.floor], [0, k, 0, scale.middle], [-k, 0, 0, 0], [0, 0, 0, 1]])
     size = float(np.linalg.norm(world[:3, 0]))
     world[:3, :3] = np.round(world[:3, :3] / size, 9) * float(f"{size:.7g}")
     world[:3, 3] = np.where(np.abs(world[:3, 3]) < 1e-6 * size * LONGEST_SIDE / k, 0, world[:3, 3])

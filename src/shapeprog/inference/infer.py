@@ -185,7 +185,7 @@ def infer(
         if libraries:
             program, held = with_calls(program, libraries, coverage)
         if ties:
-            program = tie(program, evidence, held=held, progress=progress)
+            program = tie(program, evidence, tight=target.points is not None, held=held, progress=progress)
         if integral is not None and description_length(plain, target.voxels, integral) < description_length(
             program, target.voxels
         ):

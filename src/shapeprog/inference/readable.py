@@ -81,8 +81,7 @@ def _rounded(program: Program, tolerance: float) -> Program:
     per_cell = 1.0 if program.unit is None else program.unit.per_cell
     for step in (0.5, 1.0):  # shares of the tolerance: numbers that are nearly round go first
         for index, number in enumerate(lengths):
-            # Numbers change by at most 3 %, so that thin parts keep their thickness.
-            for tried in _rounder(number, min(step * tolerance * per_cell, 0.03 * abs(number))):
+            for tried in _rounder(number, step * tolerance * per_cell):
                 if tried == numbers[index]:
                     break
                 try:
@@ -98,7 +97,10 @@ def _rounded(program: Program, tolerance: float) -> Program:
 
 
 def _rounder(number: float, farthest: float) -> Iterator[float]:
-    """Numbers near one, those with the fewest decimals first."""
+    """Numbers near one, those with the fewest decimals first; zero, or at most 3 % off: thin parts stay as thick."""
+    if abs(number) <= farthest:
+        yield 0.0
+    farthest = min(farthest, 0.03 * abs(number))
     fewest, maximum = (-math.floor(math.log10(value)) for value in (abs(number), farthest))
     for digits in range(fewest - 1, maximum + 2):  # finer than one number alone needs
         nearest, step = round(number, digits), math.copysign(10.0**-digits, number - round(number, digits))

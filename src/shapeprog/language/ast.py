@@ -138,6 +138,7 @@ class Scale:
 
     cells_per_unit: float  # cells per unit of length; as read, the longest side of the whole is 24 cells
     floor: float  # height of the floor in the grid, in cells
+    middle: float = 0.0  # depth of the middle of the whole in the grid, in cells
 
 
 @dataclass(frozen=True)

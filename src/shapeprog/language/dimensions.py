@@ -133,7 +133,7 @@ def in_unit(program: Program, unit: Unit | None) -> Program:
             return number
         return to_float32(float(f"{number * factor**power:.{DIGITS}g}"))
 
-    return _scaled(Source(_Powers(source).changed(source.lines, change), unit, source.scale))
+    return _scaled(Source(_Powers(source).changed(source.lines, change), unit), source)
 
 
 def literal_lengths(program: Program) -> tuple[list[float], Callable[[Sequence[float]], Program]]:
@@ -154,7 +154,7 @@ def literal_lengths(program: Program) -> tuple[list[float], Callable[[Sequence[f
     def with_numbers(values: Sequence[float]) -> Program:
         new = iter(values)
         lines = powers.changed(source.lines, lambda old, power: next(new) if _is_length(old, power) else old)
-        return _scaled(replace(source, lines=lines))
+        return _scaled(replace(source, lines=lines), source)
 
     powers.changed(source.lines, noted)
     return numbers, with_numbers
@@ -164,11 +164,15 @@ def _is_length(number: float, power: float) -> bool:
     return power == 1 and number != 0
 
 
-def _scaled(source: Source) -> Program:
-    """The program of a syntax tree whose unit or sizes have changed: a cell is as large as its unit has it."""
+def _scaled(source: Source, before: Source) -> Program:
+    """The program of a syntax tree whose unit or sizes have changed, with its middle where it was before: a cell is as
+    large as its unit has it."""
     assert source.unit is not None
+    assert before.scale is not None
     cells = 1 / source.unit.per_cell
-    return evaluated(replace(source, scale=Scale(cells, -source.evaluated_numbers()["height"] * cells / 2)))
+    middle = before.scale.floor + before.evaluated_numbers()["height"] * before.scale.cells_per_unit / 2
+    floor = middle - source.evaluated_numbers()["height"] * cells / 2
+    return evaluated(replace(source, scale=Scale(cells, floor, before.scale.middle)))
 
 
 def lengths(program: Program) -> frozenset[str]:

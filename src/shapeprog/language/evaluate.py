@@ -84,15 +84,15 @@ def expanded(source: Source) -> tuple[Node, ...]:
     return tuple(_Evaluator(source, None).program())
 
 
-def symbolic(source: Source, values: Mapping[str, Any], floor: Any = None) -> tuple[Node, ...]:
+def symbolic(source: Source, values: Mapping[str, Any], origin: tuple[Any, float] | None = None) -> tuple[Node, ...]:
     """The statements and loops of a program for other values of the names that stand for plain numbers.
 
-    The values may be tensors or linear forms, as may the height of the floor in the grid, by default that of its scale;
-    results are neither rounded nor checked.
+    The values may be tensors or linear forms; results are neither rounded nor checked.  ``origin`` is the height of the
+    floor in the grid and the depth of the middle of the whole, by default those of its scale.
     """
     evaluator = _Evaluator(source, values)
-    if floor is not None:
-        evaluator.floor = floor
+    if origin is not None:
+        evaluator.floor, evaluator.middle = origin
     return tuple(evaluator.program())
 
 

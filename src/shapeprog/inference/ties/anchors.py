@@ -45,7 +45,9 @@ class _Motion:
         self.vectors = np.concatenate([boxes.centre[:, None], boxes.edges], 1)  # centres and edges (N, 4, 3)
         reach = np.abs(boxes.edges).sum(1)
         reach_slopes = (np.sign(boxes.edges)[..., None] * self.slopes[:, 1:]).sum(1)
-        middle = boxes.centre + np.array(self.layout.extents) / 2
+        scale, (width, depth, _) = self.layout.source.scale, self.layout.extents
+        assert scale is not None
+        middle = boxes.centre - [-width / 2, scale.middle - depth / 2, scale.floor]
         # Low and high ends of the boxes from the low sides of the whole (2, 3, N), and their slopes (2, 3, N, P)
         self.ends: FloatArray = np.stack([middle - reach, middle + reach]).swapaxes(1, 2)
         self.end_slopes = np.stack([self.slopes[:, 0] - reach_slopes, self.slopes[:, 0] + reach_slopes]).swapaxes(1, 2)

@@ -45,8 +45,10 @@ class Model:
     def __init__(self, layout: Layout) -> None:
         self.layout, self.slots = layout, layout.slots
         self.numbers: FloatArray = np.array([slot.value for slot in self.slots])
-        self.tunable = Tunable(Program(expanded(layout.source)))
-        nodes = list(Program(symbolic(layout.source, layout.forms, layout.forms["height"] * -0.5)).walk())
+        self.tunable, scale = Tunable(Program(expanded(layout.source))), layout.source.scale
+        assert scale is not None
+        floor = scale.floor + (layout.extents[2] - layout.forms["height"]) * 0.5  # the middle of the whole stays
+        nodes = list(Program(symbolic(layout.source, layout.forms, (floor, scale.middle))).walk())
         forms = [Linear() + nodes[n].values[slot] for n, slot in self.tunable.moving]
         self.jacobian: FloatArray = np.array([layout.row(form) for form in forms]).reshape(-1, len(self.slots))
         self._offset = np.array([form.constant for form in forms])

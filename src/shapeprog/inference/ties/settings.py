@@ -17,7 +17,8 @@ class TieSettings:
     rounds: int = 3  # most searches for relations: first contacts and parts on the floor, then all
     lost: float = 0.03  # largest decrease of closeness when numbers are tied
     cheaper: float = 3.0  # divides the price of a number where more is lost
-    attempts: int = 3  # most prices; and most times at one price that lines which ties separate are untied
+    attempts: int = 3  # most prices
+    untied: int = 6  # most times at one price that lines which ties separate are untied
 
     # Price of the number that a relation saves, as a multiple of the usual price
     floor: float = 6.0  # a part that ends just above the floor

@@ -70,7 +70,7 @@ def written(layout: Layout, solution: Solution, free: FloatArray, *, group: bool
         header += _assignments([pair for pair in pairs if isinstance(pair[1], Expression) == sums])
     scale = layout.source.scale
     assert scale is not None
-    floor = -float(known["height"]) * scale.cells_per_unit / 2
+    floor = scale.floor + (layout.extents[2] - float(known["height"])) * scale.cells_per_unit / 2
     return Source((*header, *_changed(body, final)), layout.source.unit, replace(scale, floor=floor))
 
 

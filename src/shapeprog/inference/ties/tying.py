@@ -44,6 +44,7 @@ def tie(
     *,
     price: float = 1.0,
     known: bool = False,
+    tight: bool = False,
     held: Collection[int] = (),
     seed: int = 0,
     progress: Progress | None = None,
@@ -60,6 +61,8 @@ def tie(
         Price of a free number, as a multiple of ``price``, or ``known_price`` if the numbers are known.
     known
         Whether somebody wrote the numbers: they are then known, and not only where the surface is.
+    tight
+        Whether the whole ends where the parts end, as of :func:`~shapeprog.language.convert.placed`.
     held
         Indices of the nodes of its body whose numbers stay fixed: calls of functions draw them.
     """
@@ -68,7 +71,7 @@ def tie(
         return program
     with one_tensor_thread(kernels=1):
         try:
-            tied = placed(plain if held else merged(plain), merge=not held, rows=False)
+            tied = placed(plain if held else merged(plain), merge=not held, rows=False, tight=tight)
         except ShapeProgError:  # a statement without a placed form
             return program
         assert tied.source is not None
@@ -110,7 +113,7 @@ class _Ties:
         Lines that ties separate from the others stay untied, and if this is not enough, those that they touched.
         """
         slots, untied = self.layout.slots, set[int]()
-        for _ in range(TIES.attempts):
+        for _ in range(TIES.untied):
             solution, numbers = self._solved(price, self.fixed | np.array([slot.line in untied for slot in slots]))
             free = solution.rounded(slots, numbers, self.decimals)
             loose = self._loose(solution.factors @ free) - self.loose

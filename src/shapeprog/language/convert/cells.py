@@ -34,7 +34,7 @@ def named_cells(program: Program) -> Source:
     source = source_of(in_unit(program, None))
     numbers = source.evaluated_numbers()
     names = {name: Linear.of(name) for name, value in source.numbers.items() if not isinstance(value, Expression)}
-    nodes = symbolic(source, names, source.evaluated_numbers(names)["height"] / -2.0)
+    nodes = symbolic(source, names, (source.evaluated_numbers(names)["height"] / -2.0, 0.0))
     lines = tuple(_written(_published(node, numbers)) for node in nodes)
     return Source((*assignments(source.lines, used_names(Source(lines).walk()) | {*SIZES}), *lines))
 

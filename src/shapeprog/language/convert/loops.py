@@ -70,7 +70,7 @@ class Loops(Parts):
             case "tilt_about":
                 return self._tilted(body, v)
             case "rotate_about":
-                point = self.point((-v[3], v[2], self.sizes[2] / -2.0)).keywords
+                point = self.point((self.shift[0] - v[3], self.shift[1] + v[2], self.sizes[2] / -2.0)).keywords
                 full = not (v[0].factors or v[1].factors) and abs(v[0].constant * v[1].constant - 360) < EVEN
                 keywords = point if full else (*point, ("step", self.written(v[1])))
                 return Converted((Group("rotate", keywords, body.lines, self.written(v[0])),))

@@ -9,6 +9,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
+import numpy as np
+
 from shapeprog.errors import ShapeProgError
 from shapeprog.geometry.arrays import array
 from shapeprog.language.ast import (
@@ -35,10 +37,10 @@ from shapeprog.language.tensors import encode
 from shapeprog.language.unit import Unit
 from shapeprog.language.unroll import on_numpy_if_shipped, unroll
 from shapeprog.lazy_torch import torch
-from shapeprog.space import DEPTH, SIDE, UP
+from shapeprog.space import DEPTH, SIDE, UP, FloatArray
 
 
-def placed(program: Program, *, merge: bool = True, rows: bool = True) -> Program:
+def placed(program: Program, *, merge: bool = True, rows: bool = True, tight: bool = False) -> Program:
     """The same shape with its parts placed from the sides of its bounding box about the middle of the grid.
 
     Parameters
@@ -49,6 +51,9 @@ def placed(program: Program, *, merge: bool = True, rows: bool = True) -> Progra
         Whether loops that repeat in the same way become one; otherwise lines keep their order.
     rows
         Whether loops with equal steps may be written as rows, where that is shorter.
+    tight
+        Whether the box ends where the parts end in height, and in depth unless they have an axis in the middle of the
+        grid; read without its frame, the text is then placed about the middle of that box.
 
     Raises
     ------
@@ -57,13 +62,17 @@ def placed(program: Program, *, merge: bool = True, rows: bool = True) -> Progra
     """
     if program.scale is not None:
         return program
-    sizes = [to_float32(float(f"{extent:.7g}")) or 1.0 for extent in _extents(program)]
+    low, high = _bounds(program)
+    middle = (low + high) / 2 * [tight, tight and not _has_axis(program), False]
+    reach = np.maximum(high - middle, middle - low)
+    sizes = [to_float32(float(f"{2 * reach[axis]:.7g}")) or 1.0 for axis in (SIDE, DEPTH, UP)]
     forms = [Linear(float(shortest(size))) for size in sizes]
     converter = Loops((forms[0], forms[1], forms[2]), {}, {})
     converter.rows = rows
+    converter.shift = Linear(), Linear(-float(middle[DEPTH])), Linear(-float(middle[UP]))
     body = with_joined_mirrors(converter.lines(program.body).lines)
     header = Assignment(tuple(zip(SIZES, sizes, strict=True)))
-    return _in_own_cells((header, *(merged_lines(body) if merge else body)))
+    return _in_own_cells((header, *(merged_lines(body) if merge else body)), float(middle[UP]), float(middle[DEPTH]))
 
 
 def placed_again(cells: Source, functions: Iterable[Function] = ()) -> Program:
@@ -126,15 +135,26 @@ def _drawing(lines: Iterable[Line]) -> Iterable[Draw | Loop | Call]:
     return (line for line in lines if isinstance(line, Draw | Loop | Call))
 
 
-def _in_own_cells(lines: tuple[Line, ...]) -> Program:
-    """The program of placed lines with lengths in cells."""
+def _in_own_cells(lines: tuple[Line, ...], up: float = 0.0, depth: float = 0.0) -> Program:
+    """The program of placed lines with lengths in cells, whose middle is at this height and depth in the grid."""
     source = Source(lines, Unit("", 1.0))
-    return evaluated(replace(source, scale=Scale(1.0, source.evaluated_numbers()["height"] / -2)))
+    return evaluated(replace(source, scale=Scale(1.0, up - source.evaluated_numbers()["height"] / 2, depth)))
 
 
-def _extents(program: Program) -> list[float]:
-    """Width, depth and height in cells of the smallest box about the middle of the grid that holds a program."""
+def _bounds(program: Program) -> tuple[FloatArray, FloatArray]:
+    """The low and high corner (3,) in cells of the box around the parts of a program; zeros if it has none."""
     with on_numpy_if_shipped(program):
         scene = unroll(encode(program, dtype=torch.float64))
-        reach = array(scene.reach + scene.centre.abs())[array(scene.mask)].max(0, initial=0.0)
-    return [float(2 * reach[axis]) for axis in (SIDE, DEPTH, UP)]
+        mask, centre, reach = array(scene.mask), array(scene.centre), array(scene.reach)
+    if not mask.any():
+        return np.zeros(3), np.zeros(3)
+    return (centre - reach)[mask].min(0), (centre + reach)[mask].max(0)
+
+
+def _has_axis(program: Program) -> bool:
+    """Whether parts are mirrored in depth, or turned, about the middle of the grid."""
+    loops = [(node.name, node.values) for node in program.walk() if isinstance(node, Loop)]
+    return any(
+        name == "rotate" or (name, *values[1:]) == ("mirror", DEPTH, 0) or (name == "rotate_about" and values[2] == 0)
+        for name, values in loops
+    )

@@ -9,7 +9,7 @@ import torch
 import shapeprog as sp
 from shapeprog.geometry.primitives import primitives
 from shapeprog.inference.roles import roles
-from shapeprog.inference.roles.roles import in_order, with_roles
+from shapeprog.inference.roles.roles import in_order, separated, with_roles
 from shapeprog.language.hints import Box, straight_bar, upright_box
 from shapeprog.language.program import Draw, Program
 from shapeprog.language.statement import language
@@ -266,6 +266,24 @@ for i in mirror(depth):
     box(at=(-10, 5, -12), size=(20, 0.4, 24))  # panel
 """
     assert words(with_roles(sp.parse(text))) == wanted(text)
+
+
+CASE = """
+for i in mirror(side):
+    box(at=(-12, -6, 9), size=(24, 12, 1))
+for i in translate(2, by=(23, 0, 0)):
+    box(at=(-12, -6, -9), size=(1, 12, 18))
+for i in translate(2, by=(6, 0, 0)):
+    box(at=(-6, -6, -9), size=(1, 12, 18))
+"""
+
+
+def test_a_row_of_two_parts_of_different_roles_is_separated_and_one_of_equal_shelves_is_not() -> None:
+    program = Program(sp.parse(CASE).body)
+    result = separated(program, 10)
+    assert [draw.word for draw in with_roles(result).draws] == ["side", "base", "top", "shelf"]
+    assert sp.unroll(result).centre.tolist() == sp.unroll(program).centre.tolist()
+    assert separated(program, 3) == program, "no more blocks than allowed"
 
 
 def test_a_ring_between_legs_is_no_shelf() -> None:

@@ -25,7 +25,7 @@ from shapeprog.inference.choice.connecting import connected
 from shapeprog.inference.choice.coverage import Coverage, CoverageTable
 from shapeprog.inference.fit.adjustment import adjust, tidy
 from shapeprog.inference.pieces.pieces import Source, find_pieces
-from shapeprog.inference.roles.roles import in_order, with_roles
+from shapeprog.inference.roles.roles import in_order, separated, with_roles
 from shapeprog.language.free import numbers
 from shapeprog.language.hints import STRAIGHT, Box
 from shapeprog.language.program import Node, Program
@@ -80,7 +80,7 @@ def assemble(
     adjusted = adjust(start, evidence, deadline=deadline, progress=progress)
     program = connected(_unharmed(adjusted, start, coverage), coverage)
     program = tidy(Program(tuple(canonical_side(simplest(node)) for node in program.body)))
-    program = in_order(with_roles(program))
+    program = in_order(with_roles(separated(program, blocks)))
     count = len(program.body)
     table = _table([*program.body, *others[:1]], coverage)
     share, more = (explained(table, range(number)) for number in (count, len(table.prices)))

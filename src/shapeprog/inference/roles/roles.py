@@ -3,20 +3,23 @@
 First the kind of the whole is determined.  A seat or a bed has a main surface with a part that rises behind it, a seat
 may have parts that rise on both sides instead; neither is between walls as high as the whole.  All else is a table or a
 case.  A chair may face any way.  Then the first rule of its list that fits a solid gives it a role.  Copies of one
-statement have one role: that of most of their surface, or one that covers all of theirs.
+statement have one role: that of most of their surface, or one that covers all of theirs.  A row of two parts of
+different roles becomes two statements.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from itertools import cycle
 
 import numpy as np
 
 from shapeprog.geometry.scene import Scene
 from shapeprog.inference.candidates.drawings import simplest
 from shapeprog.inference.roles.measures import Mask, Parts
-from shapeprog.language.program import Draw, Program, nest
+from shapeprog.language.parameters import to_float32
+from shapeprog.language.program import Draw, Node, Program, nest
 from shapeprog.language.statement import language
 from shapeprog.language.unroll import unroll
 from shapeprog.space import DEPTH, SIDE, UP
@@ -110,6 +113,7 @@ CASE: tuple[Rule, ...] = (
     ("apron", lambda p: p.level & (p.top >= p.floor + 0.8 * p.size[UP])),
     ("stretcher", lambda p: p.level),
     # All other parts.
+    ("drawer", lambda p: p.below & p.in_front & ~p.grounded & ~p.board & (p.equal > 1)),  # those that hang under a desk
     ("top", lambda p: p.lying & (p.top >= p.floor + p.size[UP] - p.near) & (p.up <= 0.3 * p.size[UP])),
     ("shelf", lambda p: p.lying & p.flat),
     ("drawer", lambda p: p.cased & p.in_front & ~p.grounded),
@@ -128,6 +132,28 @@ def with_roles(program: Program) -> Program:
     """
     named = map(_named, program.draws, roles_of_blocks(program))
     return Program(tuple(nest((*loops, draw)) for (*loops, _), draw in zip(program.chains, named, strict=True)))
+
+
+def separated(program: Program, most: int) -> Program:
+    """The program, of one node for each block, with rows of two copies of different roles, such as a door and a back,
+    as two blocks each, while there are at most so many."""
+    body = list(program.body)
+    for index in reversed(range(len(body))):
+        *outer, draw = Program((body[index],)).chains[0]
+        if len(body) < most and outer and outer[-1].name == "translate" and outer[-1].values[0] == 2:
+            pair = [nest((*outer[:-1], copy)) for copy in (draw, _shifted(draw, outer[-1].values[1:]))]
+            trial = [*body[:index], *pair, *body[index + 1 :]]
+            roles = roles_of_blocks(Program(tuple(trial)))
+            body = trial if roles[index] != roles[index + 1] else body
+    return Program(tuple(body))
+
+
+def _shifted(draw: Node, shift: Sequence[float]) -> Node:
+    """A drawing statement with its positions moved along up, depth and side."""
+    along = cycle(shift)
+    kinds = (quantity.kind for quantity in language()[draw.name].quantities)
+    values = (v + next(along) if kind == "position" else v for v, kind in zip(draw.values, kinds, strict=True))
+    return replace(draw, values=tuple(map(to_float32, values)))
 
 
 def named_anew(program: Program) -> Program:

@@ -46,9 +46,9 @@ def choose(
     searches = len(penalties) * SETTINGS.restarts + 1
     best, seeds = _no_set(blocks), iter(range(searches * seed, searches * (seed + 1)))
 
-    def searched(penalty: float, initial: Array, found: tuple[FloatArray, Array]) -> Array:
-        search(*data, penalty, rounds // searches, SETTINGS.blink, next(seeds), initial, *found)
-        return found[1][found[1] >= 0]
+    def searched(penalty: float, initial: Array, incumbent: tuple[FloatArray, Array]) -> Array:
+        search(*data, penalty, rounds // searches, SETTINGS.blink, next(seeds), initial, *incumbent)
+        return incumbent[1][incumbent[1] >= 0]
 
     for _ in range(SETTINGS.restarts):
         initial = np.zeros(0, np.int64)

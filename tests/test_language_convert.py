@@ -181,17 +181,18 @@ def test_a_program_without_sizes_gets_those_of_its_bounding_box_about_the_middle
     [
         ("leg(at=(-3, -4, 1), size=(5, 8, 2))", "width, depth, height = 6, 8, 5\nleg(left=0, width=2)\n"),
         ("leg(at=(0, 1, -2), size=(5, 3, 4))", "width, depth, height = 4, 3, 5\nleg()\n"),
+        ("leg(at=(-2.5, 1, -2), size=(5, 3, 4))", "width, depth, height = 4, 3, 5.5\nleg(bottom=0.5)\n"),
         (
             "for i in mirror(depth):\n    leg(at=(0, 1, -2), size=(5, 3, 4))",
             "width, depth, height = 4, 8, 5\nfor _ in mirror(y=0):\n    leg(front=0, depth=3)\n",
         ),
     ],
 )
-def test_a_tight_whole_ends_where_its_parts_end_unless_they_are_mirrored_about_the_middle(
+def test_the_whole_on_a_floor_ends_where_its_parts_end_unless_they_are_mirrored_about_the_middle(
     cells: str, text: str
 ) -> None:
     given = sp.parse(cells)
-    result = placed(given, tight=True)
+    result = placed(given, floor=-3)
     assert format_program(result) == text
     assert same_surface(result, given), "it stays where it is in the grid"
     in_metres = in_unit(result, Unit("m", 0.02))

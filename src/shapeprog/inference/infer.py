@@ -165,6 +165,7 @@ def infer(
     program, reason = Program(), ""
     snapped: Program | None = None
     evidence, usual = evidence_of(target), Prices()
+    floor = None if target.points is None or not len(evidence.surface) else float(evidence.surface[:, 0].min())
     prices = {name: getattr(usual, name) / detail for name in ("statement", "loop", "number")}
     coverage = Coverage(evidence, replace(usual, **prices))
     if statements == "all" and target.points is not None:
@@ -185,13 +186,13 @@ def infer(
         if libraries:
             program, held = with_calls(program, libraries, coverage)
         if ties:
-            program = tie(program, evidence, tight=target.points is not None, held=held, progress=progress)
+            program = tie(program, evidence, floor=floor, held=held, progress=progress)
         if integral is not None and description_length(plain, target.voxels, integral) < description_length(
             program, target.voxels
         ):
             program, snapped = plain, integral
     if snapped is None:
-        program = placed_if_possible(merged(program))
+        program = placed_if_possible(merged(program), floor)
         for library in libraries:
             program = with_library(program, library)
     program = in_readable_unit(program, unit_of_result(target, program, unit))

@@ -44,7 +44,7 @@ def tie(
     *,
     price: float = 1.0,
     known: bool = False,
-    tight: bool = False,
+    floor: float | None = None,
     held: Collection[int] = (),
     seed: int = 0,
     progress: Progress | None = None,
@@ -61,8 +61,8 @@ def tie(
         Price of a free number, as a multiple of ``price``, or ``known_price`` if the numbers are known.
     known
         Whether somebody wrote the numbers: they are then known, and not only where the surface is.
-    tight
-        Whether the whole ends where the parts end, as of :func:`~shapeprog.language.convert.placed`.
+    floor
+        Height of the floor in the grid, as of :func:`~shapeprog.language.convert.placed`.
     held
         Indices of the nodes of its body whose numbers stay fixed: calls of functions draw them.
     """
@@ -71,7 +71,7 @@ def tie(
         return program
     with one_tensor_thread(kernels=1):
         try:
-            tied = placed(plain if held else merged(plain), merge=not held, rows=False, tight=tight)
+            tied = placed(plain if held else merged(plain), merge=not held, rows=False, floor=floor)
         except ShapeProgError:  # a statement without a placed form
             return program
         assert tied.source is not None

@@ -39,8 +39,11 @@ from shapeprog.language.unroll import on_numpy_if_shipped, unroll
 from shapeprog.lazy_torch import torch
 from shapeprog.space import DEPTH, SIDE, UP, FloatArray
 
+EMPTY = 0.1
+"""Share of the height that may be empty below the parts, as the feet that no part stands for."""
 
-def placed(program: Program, *, merge: bool = True, rows: bool = True, tight: bool = False) -> Program:
+
+def placed(program: Program, *, merge: bool = True, rows: bool = True, floor: float | None = None) -> Program:
     """The same shape with its parts placed from the sides of its bounding box about the middle of the grid.
 
     Parameters
@@ -51,9 +54,10 @@ def placed(program: Program, *, merge: bool = True, rows: bool = True, tight: bo
         Whether loops that repeat in the same way become one; otherwise lines keep their order.
     rows
         Whether loops with equal steps may be written as rows, where that is shorter.
-    tight
-        Whether the box ends where the parts end in height, and in depth unless they have an axis in the middle of the
-        grid; read without its frame, the text is then placed about the middle of that box.
+    floor
+        Height of the floor in the grid, in cells.  If it is given, the box ends where the parts end in height, and in
+        depth unless they have an axis in the middle of the grid; it stands on the floor if at most a tenth of it is
+        empty below the parts.  Read without its frame, the text is placed about the middle of that box.
 
     Raises
     ------
@@ -63,6 +67,9 @@ def placed(program: Program, *, merge: bool = True, rows: bool = True, tight: bo
     if program.scale is not None:
         return program
     low, high = _bounds(program)
+    if floor is not None and 0 < low[UP] - floor <= EMPTY * (high[UP] - floor):
+        low[UP] = floor
+    tight = floor is not None
     middle = (low + high) / 2 * [tight, tight and not _has_axis(program), False]
     reach = np.maximum(high - middle, middle - low)
     sizes = [to_float32(float(f"{2 * reach[axis]:.7g}")) or 1.0 for axis in (SIDE, DEPTH, UP)]
@@ -100,10 +107,10 @@ def placed_again(cells: Source, functions: Iterable[Function] = ()) -> Program:
     return _in_own_cells((*header, *called, *body))
 
 
-def placed_if_possible(program: Program) -> Program:
+def placed_if_possible(program: Program, floor: float | None = None) -> Program:
     """The placed program, or the same one if something in it has no placed form."""
     try:
-        return placed(program)
+        return placed(program, floor=floor)
     except ShapeProgError:
         return program
 

@@ -176,7 +176,8 @@ def evaluate_command(
         target = next(iter(shapes.values())) if len(shapes) == len(listed) == 1 else shapes.get(name)
         if isinstance(prediction, tuple):
             terminal.warn(path, prediction[0])
-            prediction = prediction if target is None else scoring.aligned(prediction, target)
+            if target is not None:
+                prediction = scoring.aligned(prediction, target)
         try:
             rows.append(scoring.measure(prediction, target, points, seed))
             if isinstance(prediction, tuple) and target is not None and target.name in files:

@@ -67,10 +67,12 @@ def placed(program: Program, *, merge: bool = True, rows: bool = True, floor: fl
     if program.scale is not None:
         return program
     low, high = _bounds(program)
-    if floor is not None and 0 < low[UP] - floor <= EMPTY * (high[UP] - floor):
-        low[UP] = floor
-    tight = floor is not None
-    middle = (low + high) / 2 * [tight, tight and not _has_axis(program), False]
+    middle = np.zeros(3)
+    if floor is not None:
+        if 0 < low[UP] - floor <= EMPTY * (high[UP] - floor):
+            low[UP] = floor
+        axes = [UP] if _has_axis(program) else [UP, DEPTH]
+        middle[axes] = (low + high)[axes] / 2
     reach = np.maximum(high - middle, middle - low)
     sizes = [to_float32(float(f"{2 * reach[axis]:.7g}")) or 1.0 for axis in (SIDE, DEPTH, UP)]
     forms = [Linear(float(shortest(size))) for size in sizes]

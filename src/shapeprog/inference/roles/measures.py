@@ -6,8 +6,6 @@ for all of them at once.  Lengths and distances are compared with shares of the 
 
 from __future__ import annotations
 
-from functools import cached_property
-
 import numpy as np
 import numpy.typing as npt
 
@@ -72,15 +70,15 @@ class Parts:
         self.facing_front: Mask = self.board & ~self.slender & (self.depth == self.thin)
         self.facing_side: Mask = self.board & ~self.slender & (self.side == self.thin)
         self.small: Mask = self.long <= 0.12 * self.size.max()
+        self.tiny: Mask = self.up * self.side <= 0.012 * self.size[UP] * self.size[SIDE]  # seen from the front
+        self.tiny &= self.depth <= self.size[DEPTH] / 4
         stubby = (self.depth <= self.size[DEPTH] / 4) & (self.side <= self.size[SIDE] / 4)
         self.stubby: Mask = stubby & (self.up >= np.maximum(self.depth, self.side))
         volume = self.up * self.face / max(float(self.size.prod()), 1e-9)
         self.bulky: Mask = volume >= 0.3
-        self.solid: Mask = (volume >= 0.1) & ~self.lying & ~self.board
         sizes = np.round(np.stack([self.up, self.depth, self.side], 1) / self.near).astype(np.int64)
         _, kind, copies = np.unique(sizes, axis=0, return_inverse=True, return_counts=True)
-        self.kind = kind.reshape(-1)  # the same for parts of about the same extents
-        self.equal = copies[self.kind]  # how many parts of its kind there are
+        self.equal = copies[kind.reshape(-1)]  # how many parts have about the same extents
 
     def _main_surface(self) -> None:
         """Which parts are the main surface, and its bounds (3,)."""
@@ -101,21 +99,14 @@ class Parts:
         if fitting.any():
             able = fitting & (cover >= cover[fitting].max() / 2)
             level = (self.lying | fitting) & (np.abs(self.top - self.top[able].max()) <= self.near)
-            plates = level & self.flat
-            if self.face[plates].max(initial=0) >= self.face[level].max() / 2:
-                level = plates  # without the body that carries them
             self.main = level & (self.face >= 0.3 * self.face[level].max())  # with all slats of a seat
             self.main_low, self.main_high = self.low[self.main].min(0), self.high[self.main].max(0)
 
     def _cover(self) -> FloatArray:
         """How much is covered by what lies at about the height of each part."""
-        order = np.argsort(self.top, kind="stable")
-        height = self.top[order]
-        total = np.concatenate([[0], np.cumsum(np.where(self.lying, self.face, 0)[order])])
-        cover = np.zeros(self.count)
-        below, above = np.searchsorted(height, height - self.near), np.searchsorted(height, height + self.near, "right")
-        cover[order] = total[above] - total[below]
-        return cover
+        level = np.abs(self.top[:, None] - self.top) <= self.near
+        covered: FloatArray = level @ np.where(self.lying, self.face, 0)
+        return covered
 
     def _places(self) -> None:
         """Where the parts are from the main surface."""
@@ -136,11 +127,9 @@ class Parts:
         self.central: Mask = (np.abs(self.rear) <= 0.15) & (self.aside <= 0.15)
         self.behind: Mask = (self.rear > 0.1) & (self.aside < 0.3)
         self.outermost: Mask = self.aside + self.span / 2 >= 0.4
-        front = min(3 * self.near, self.size[DEPTH] / 3)
-        self.in_front: Mask = self.low[:, DEPTH] <= self.low[:, DEPTH].min() + front
-        # Of the whole: something wide lies right under the main surface; one column carries it.
+        self.in_front: Mask = self.low[:, DEPTH] <= self.low[:, DEPTH].min() + 3 * self.near
+        # Of the whole: something wide lies right under the main surface.
         self.padded = (self.wide & self.below & ~self.grounded & (self.top >= bottom - 1.5 * self.near)).any()
-        self.on_pedestal = (self.below & self.central & self.upright).any()
 
     def _case(self) -> None:
         """The sides and fronts of a case."""
@@ -153,39 +142,11 @@ class Parts:
         sides = self.wall & self.outermost & (self.up >= self.size[UP] / 2)
         # Of the whole: its sides reach the floor; it has sides, or a body.
         self.walled = (sides & self.grounded).sum() > 1
-        self.cased = np.bool_(sides.sum() > 1 or (self.bulky | self.solid).any())
-        large = (self.up >= 0.12 * self.size[UP]) & (self.side >= 0.12 * self.size[SIDE]) & self.cased
-        wide = large | (self.upright & (self.side >= self.size[SIDE] / 2))
-        wide |= self.level & (self.up >= self.size[UP] / 2)
-        self.front: Mask = self.facing_front | (self.board & (self.depth == self.thin) & wide)
+        self.cased = np.bool_(sides.sum() > 1 or self.bulky.any())
+        large = (self.up >= 0.1 * self.size[UP]) & (self.side >= 0.12 * self.size[SIDE]) & self.cased
+        self.front: Mask = self.facing_front | (self.board & (self.depth == self.thin) & large)
         highest = np.where(self.in_front, 0.2, 0.3) * self.size[UP]
         self.plinth: Mask = self.front & self.grounded & (self.up <= highest) & (self.rear < 0)
-
-    @cached_property
-    def stacked(self) -> Mask:
-        """Whether an equal part is right above or below each, with a gap of at most half their height."""
-        depth, side = np.round(self.low[:, DEPTH:] / self.near).T
-        order = np.lexsort((self.bottom, side, depth, self.kind))
-        one, two = order[:-1], order[1:]
-        gap = self.bottom[two] - self.top[one]
-        close = (self.kind[one] == self.kind[two]) & (gap > 0.02 * self.up[one]) & (gap <= self.up[one] / 2)
-        close &= (np.abs(self.low[one] - self.low[two])[:, DEPTH:] <= self.near).all(-1)
-        result = np.zeros(self.count, bool)
-        result[one[close]] = result[two[close]] = True
-        return result
-
-    @cached_property
-    def attached(self) -> Mask:
-        """Whether each is small and right in front of a larger one."""
-        area = self.up * self.side
-        result: Mask = (area <= 0.012 * self.size[UP] * self.size[SIDE]) & (self.long <= self.size.max() / 2)
-        result &= self.depth <= self.size[DEPTH] / 4
-        small, large = np.flatnonzero(result), np.flatnonzero(~result)
-        middle = (self.low + self.high)[small, None] / 2
-        before = ((self.low[large] <= middle) & (middle <= self.high[large]))[..., [UP, SIDE]].all(-1)
-        before &= np.abs(self.low[large, DEPTH] - self.high[small, None, DEPTH]) <= self.near
-        result[small] = (before & (area[small, None] <= area[large] / 4)).any(1)
-        return result
 
 
 def turned(vectors: FloatArray, turns: int) -> FloatArray:

@@ -37,13 +37,9 @@ SUPPORTING: tuple[Rule, ...] = (
     ("pedestal", lambda p: p.below & p.central & p.upright & (p.equal == 1)),
     ("foot", lambda p: p.below & p.grounded & ~p.level & p.small),
     ("leg", lambda p: p.below & p.upright),
-    ("base", lambda p: p.below & p.slender & (p.grounded | p.on_pedestal)),
-    ("slat", lambda p: p.below & p.plank & (p.equal >= 5)),
+    ("base", lambda p: p.below & p.slender & p.grounded),
     ("apron", lambda p: (p.below | p.alongside) & p.level & (p.top >= p.main_low[UP] - 1.5 * p.near)),
-    ("stretcher", lambda p: p.below & p.level),
-    ("leg", lambda p: p.below & p.facing_side & (p.aside > 0.25)),
-    ("panel", lambda p: p.below & (p.facing_side | p.facing_front)),
-    ("stretcher", lambda p: p.below & ~p.grounded & p.lying),
+    ("stretcher", lambda p: p.below & ~p.grounded & (p.level | p.lying)),
     ("leg", lambda p: p.below),
 )
 
@@ -63,10 +59,8 @@ SEATING: tuple[Rule, ...] = (
     # At the sides: arm rests and their posts.
     ("arm_post", lambda p: p.rising & (p.aside > 0.3) & (p.rear < 0.25) & p.upright),
     ("arm", lambda p: p.rising & (p.aside > 0.3) & ((p.rear < 0.25) | (p.run > 0.5))),
-    ("arm", lambda p: (p.top >= p.main_high[UP]) & ~p.slender & (p.aside > 0.4) & (p.run > 0.5)),
     ("slat", lambda p: p.rising & p.upright & (p.aside < 0.35) & (p.equal >= 3)),
     ("post", lambda p: p.rising & p.slender),
-    ("arm", lambda p: p.rising & p.facing_side),
     ("back", lambda p: p.rising),
     *SUPPORTING,
     ("block", anything),
@@ -77,7 +71,6 @@ BED: tuple[Rule, ...] = (
     ("footboard", lambda p: p.facing_front & (p.span >= 0.6) & (p.rear < -0.25)),
     ("footboard", lambda p: p.level & (p.up > 2 * p.depth) & (p.span >= 0.6) & (p.rear < -0.4)),
     ("mattress", lambda p: p.wide & ~p.below & (p.top <= p.main_high[UP] + 2 * p.near)),
-    ("base", lambda p: p.below & p.wide),
     ("pillow", lambda p: p.above & ~p.slender & (p.run <= 0.5)),
     ("side", lambda p: (p.aside > 0.3) & (p.run >= 0.5)),
     *SUPPORTING,
@@ -86,12 +79,11 @@ BED: tuple[Rule, ...] = (
 
 CASE: tuple[Rule, ...] = (
     # In front: a plinth, doors and drawers with their handles.
-    ("base", lambda p: p.plinth & ~p.stacked),
-    ("handle", lambda p: p.attached & p.cased & ~p.grounded),
+    ("base", lambda p: p.plinth),
+    ("handle", lambda p: p.tiny & p.in_front & p.cased & ~p.grounded),
     ("door", lambda p: p.front & p.in_front & p.cased & ((p.up >= p.side) | (p.up > 0.5 * p.size[UP]))),
-    ("drawer", lambda p: (p.front | p.stacked) & p.in_front & p.cased),
+    ("drawer", lambda p: p.front & p.in_front & p.cased),
     # Lying boards: the highest is the top, one on the ground the base.
-    ("rail", lambda p: p.plank & p.cased & (p.side < p.size[SIDE] / 3)),
     ("top", lambda p: (p.wide | p.main) & (p.top >= p.floor + p.size[UP] - p.near) & (p.up <= 0.3 * p.size[UP])),
     ("base", lambda p: p.wide & p.flat & (p.grounded | (p.cased & p.lowest))),
     ("base", lambda p: p.wide & p.grounded & (p.up <= 0.2 * p.size[UP])),
@@ -108,16 +100,13 @@ CASE: tuple[Rule, ...] = (
     ("leg", lambda p: p.grounded & ((p.slender & ~p.level) | p.stubby)),
     ("post", lambda p: p.upright),
     ("base", lambda p: p.level & p.grounded),
-    ("slat", lambda p: p.plank & (p.equal >= 5)),
     ("rail", lambda p: p.level & p.cased),
     ("apron", lambda p: p.level & (p.top >= p.floor + 0.8 * p.size[UP])),
     ("stretcher", lambda p: p.level),
     # All other parts.
-    ("drawer", lambda p: p.below & p.in_front & ~p.grounded & ~p.board & (p.equal > 1)),  # those that hang under a desk
     ("top", lambda p: p.lying & (p.top >= p.floor + p.size[UP] - p.near) & (p.up <= 0.3 * p.size[UP])),
     ("shelf", lambda p: p.lying & p.flat),
     ("drawer", lambda p: p.cased & p.in_front & ~p.grounded),
-    ("body", lambda p: p.solid),
     ("block", anything),
 )
 
@@ -230,15 +219,11 @@ def _leaned_on(p: Parts) -> float:
 
 def _kind(p: Parts) -> tuple[Rule, ...]:
     """The rules for the kind of the whole."""
-    walls = p.wall & p.outermost & (p.run >= 0.5) & (p.up >= 0.6 * p.size[UP])
-    walls &= p.top >= p.floor + 0.9 * p.size[UP]
-    open_above = not (p.main & p.flat).any() and not (p.wide & p.above).any()  # a deep seat between wings
-    if not p.main.any() or (walls.sum() > 1 and not open_above) or (p.rising & p.bulky).any():
+    walls = p.wall & p.outermost & (p.up >= 0.6 * p.size[UP]) & (p.top >= p.floor + 0.9 * p.size[UP])
+    if not p.main.any() or walls.sum() > 1 or (p.rising & p.bulky).any():
         return CASE
-    high, low_end, high_end = p.top >= p.main_high[UP] + 0.12 * p.size[UP], p.low[:, SIDE], p.high[:, SIDE]
-    left, right = p.main_low[SIDE], p.main_high[SIDE]
-    back = p.rising & (p.rear > 0.1) & (p.aside < 0.6)
-    if (back & high).any() and high_end[back].max() - low_end[back].min() >= 0.4 * (right - left):
+    high = p.rising & (p.top >= p.main_high[UP] + 0.12 * p.size[UP])
+    if (high & (p.rear > 0.1)).any():
         return SEATING if p.size[DEPTH] <= p.size[SIDE] or p.size[UP] >= 0.6 * p.size[DEPTH] else BED
-    arms = (low_end + high_end - left - right)[p.rising & (p.aside > 0.3) & high]
+    arms = (p.low + p.high - p.main_low - p.main_high)[high & (p.aside > 0.3), SIDE]
     return SEATING if (arms < 0).any() and (arms > 0).any() and not p.cased else CASE

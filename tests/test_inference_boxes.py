@@ -64,7 +64,7 @@ def test_no_box_beats_a_floor_that_is_too_high():
 
 def test_folding_finds_what_searching_all_explicit_copies_finds():
     weights = whole_weights((4, 3, 5), 3)
-    table = families(weights.shape, 2, 3)
+    table = families(weights.shape, 3)
     assert len(table) > 20
     for family in table:
         found = np.zeros(WIDTH)

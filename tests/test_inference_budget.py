@@ -19,7 +19,7 @@ from shapeprog.inference.budget import BUDGET
 from shapeprog.inference.infer import SEARCH_SHARE
 
 SHAPE = Shape("table", cells(TABLE))
-SETTINGS = Settings(rounds=6, chunk=2)
+SETTINGS = Settings(rounds=6)
 
 Clock = Callable[[Iterator[float]], None]
 

@@ -9,7 +9,7 @@ from shapeprog.data.random import outside_published
 from shapeprog.geometry.cells import voxels as voxels_of
 from shapeprog.inference.budget import Deadline
 from shapeprog.inference.cells import editing, search
-from shapeprog.inference.cells.block_kernels import WIDTH, draw_all, moves, statements, valid
+from shapeprog.inference.cells.block_kernels import MOST_MOVES, WIDTH, draw_all, moves, statements, valid
 from shapeprog.inference.cells.blocks import to_program
 from shapeprog.inference.cells.search import search_structure
 from shapeprog.inference.cells.settings import Settings
@@ -107,14 +107,6 @@ def test_the_search_stops_when_nothing_has_gained_for_long():
     assert iou_of(found, cells(TABLE)) == 1
 
 
-def test_a_block_of_the_pool_is_put_in_where_it_gains():
-    aim = editing.Target.of(cells(ROUND), Settings(recall=1.0))
-    whole, _ = search_structure(cells(ROUND), Settings())
-    for missing in range(len(whole)):
-        found = search.recreate(np.delete(whole, missing, 0), 1, aim, whole, 0.0, np.random.default_rng(0))
-        assert editing.value_of(found, aim) == pytest.approx(editing.value_of(whole, aim))
-
-
 def noisy_blocks(solid, seed, count=5):
     """Random small boxes near a solid, some of them repeated."""
     random = np.random.default_rng(seed)
@@ -127,32 +119,28 @@ def noisy_blocks(solid, seed, count=5):
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_descent_polish_and_rounds_never_lower_the_objective(seed):
+def test_descent_and_polish_never_lower_the_objective(seed):
     solid = cells(CHAIR)
     aim = target(solid)
     blocks = noisy_blocks(solid, seed)
     others = draw_all(blocks[1:])
-    better = editing.improve_block(blocks[0], others, 2, aim)
+    better = editing.improve_block(blocks[0], others, aim)
     before = iou_of(blocks, solid) - aim.settings.price * statements(blocks[0])
     after = iou_of(np.concatenate([better[None], blocks[1:]]), solid) - aim.settings.price * statements(better)
     assert after >= before
-    polished = editing.polish(blocks, aim, 1, 3)
+    polished = editing.polish(blocks, aim)
     start = editing.value_of(blocks, aim)
     assert editing.value_of(polished, aim) >= start
-    rebuilt, best = search.rebuild(polished, aim, blocks, 6, aim.settings.heat, np.random.default_rng(seed))
-    assert best == pytest.approx(editing.value_of(rebuilt, aim), abs=1e-12)
-    assert best >= editing.value_of(polished, aim)
-    assert len(rebuilt) <= 6
+    assert len(search.rebuilt(polished, aim, np.random.default_rng(seed))) <= 6
 
 
 def test_a_move_changes_a_block_and_none_of_its_copies_overlap():
     block = np.zeros(WIDTH)
     block[4:7], block[8], block[9:12], block[12] = 2, 3, (0, 0, 4), 1
-    out = np.zeros((200, WIDTH))
-    for far in (1, 2, 3):
-        count = moves(block, out, far)
-        assert count <= 200
-        assert not (out[:count] == block).all(1).any()
+    out = np.zeros((MOST_MOVES, WIDTH))
+    count = moves(block, out)
+    assert count <= MOST_MOVES
+    assert not (out[:count] == block).all(1).any()
     assert valid(block)
     block[11] = 1
     assert not valid(block)
@@ -163,7 +151,7 @@ def test_a_block_that_does_not_pay_is_dropped():
     aim = target(solid)
     found, _ = search_structure(solid, Settings(rounds=20))
     useless = np.concatenate([found, found[:1]])
-    assert len(editing.polish(useless, aim, 1, 2)) == len(found)
+    assert len(editing.polish(useless, aim)) == len(found)
 
 
 def test_full_grids_single_cells_and_flat_sheets_are_one_block():

@@ -42,7 +42,7 @@ COUNT1, SHIFT1, COUNT2, SHIFT2 = 8, 9, 12, 13
 ROWS = 1024
 """Rows of the grid: row 32 i + j holds the cells at height i and depth j."""
 
-MOST_MOVES = 200
+MOST_MOVES = 80
 """An upper bound on the number of neighbours of a block."""
 
 MOST_COPIES = 64
@@ -169,20 +169,18 @@ def put(out, n, block, slot, by, slot2, by2):
 
 
 @helper
-def moves(block, out, far):
-    """Neighbours of a block: faces, positions, ends, spacings and counts changed by up to ``far``; their number."""
+def moves(block, out):
+    """Neighbours of a block: faces, positions, ends, spacings and counts changed by one; their number."""
     n = 0
     form = int(block[FORM])
-    for which in range(2 * far):
-        delta = (which // 2 + 1.0) * (1.0 if which % 2 else -1.0)
+    for delta in (1.0, -1.0):
         if form != DISC:
             for axis in range(3):
                 corner, extent = FIRST + axis, EXTENT + axis
                 n = put(out, n, block, corner, delta, corner, 0.0)
                 n = put(out, n, block, extent, delta, extent, 0.0)
                 n = put(out, n, block, corner, delta, extent, -delta)
-                if which < 2:
-                    n = put(out, n, block, corner, -delta, extent, 2 * delta)
+                n = put(out, n, block, corner, -delta, extent, 2 * delta)
             if form == BACK:
                 n = put(out, n, block, TILT, delta, TILT, 0.0)
                 n = put(out, n, block, TILT, delta, FIRST + 1, -delta)
@@ -194,29 +192,27 @@ def moves(block, out, far):
             if block[level] > 1:
                 for axis in range(3):
                     corner, step = FIRST + axis, level + 1 + axis
-                    if block[step] != 0 or which < 2:
-                        n = put(out, n, block, step, delta, step, 0.0)
-                        n = put(out, n, block, step, delta, corner, -delta)
-                        if block[level] > 2:
-                            n = put(out, n, block, step, delta, corner, -np.rint(delta * (block[level] - 1) / 2))
-                if which < 2:
-                    n = put(out, n, block, level, delta, level, 0.0)
-                    n = put(out, n, block, level, delta, level, 0.0)  # the same at the other end
-                    for axis in range(3):
-                        out[n - 1, FIRST + axis] -= delta * block[level + 1 + axis]
+                    n = put(out, n, block, step, delta, step, 0.0)
+                    n = put(out, n, block, step, delta, corner, -delta)
+                    if block[level] > 2:
+                        n = put(out, n, block, step, delta, corner, -np.rint(delta * (block[level] - 1) / 2))
+                n = put(out, n, block, level, delta, level, 0.0)
+                n = put(out, n, block, level, delta, level, 0.0)  # the same at the other end
+                for axis in range(3):
+                    out[n - 1, FIRST + axis] -= delta * block[level + 1 + axis]
     return n
 
 
-@kernel("void(f8[::1], u8[::1], u8[::1], f8, i8)")
-def descend(block, occupied, covered, price, far):
+@kernel("void(f8[::1], u8[::1], u8[::1], f8)")
+def descend(block, occupied, covered, price):
     """Best-improvement descent of one block, in place.
 
     Parameters
     ----------
     occupied, covered
         The solid, and the cells of the other blocks, as words (512).
-    price, far
-        Price of a statement in IoU, and largest step of one move in cells.
+    price
+        Price of a statement in IoU.
     """
     rows, around = np.empty(ROWS, np.uint32), np.empty((MOST_MOVES, WIDTH))
     words, gained, wasted = rows.view(np.uint64), occupied & ~covered, ~occupied & ~covered
@@ -250,4 +246,4 @@ def descend(block, occupied, covered, price, far):
         if best_index < 0:
             break
         block[:] = around[best_index]
-        number = moves(block, around, far)
+        number = moves(block, around)

@@ -59,7 +59,7 @@ class Target:
         """The target for a solid of cells (32, 32, 32)."""
         cells = np.argwhere(voxels)
         low, high = cells.min(0), cells.max(0) + 1
-        table = families((high - low).tolist(), settings.planes, settings.copies)
+        table = families((high - low).tolist(), settings.copies)
         return cls(words_of(pack(voxels)).reshape(-1), len(cells), low, high, table, settings)
 
     @property
@@ -83,42 +83,25 @@ def _shared(rows: Rows, cells: Rows) -> Whole:
     return np.asarray(np.bitwise_count(rows & cells).sum(-1, dtype=np.int64))
 
 
-def improve_block(block: FloatArray, covered: Rows, far: int, target: Target) -> FloatArray:
-    """A block after descent on IoU minus price x statements, the other blocks fixed.
-
-    Parameters
-    ----------
-    covered
-        The cells of the other blocks as rows (1024).
-    far
-        Largest step of one move in cells.
-    """
+def improve_block(block: FloatArray, covered: Rows, target: Target) -> FloatArray:
+    """A block after descent on IoU minus price x statements, the other blocks fixed, whose cells are rows (1024)."""
     better = block.copy()
-    descend(better, target.occupied.view(np.uint64), covered.view(np.uint64), target.settings.price, far)
+    descend(better, target.occupied.view(np.uint64), covered.view(np.uint64), target.settings.price)
     return better
 
 
-def polish(blocks: FloatArray, target: Target, far: int, sweeps: int) -> FloatArray:
-    """Blocks after descent, one after another until nothing changes; a block that no longer pays is dropped.
-
-    Parameters
-    ----------
-    far
-        Largest step of one move in cells.
-    sweeps
-        Most passes over all blocks.
-    """
+def polish(blocks: FloatArray, target: Target) -> FloatArray:
+    """Blocks after descent, three times one after another; a block that no longer pays is dropped."""
     blocks, rows = blocks.copy(), draw_each(blocks)
     settled = np.zeros(len(blocks), np.bool_)
-    for _ in range(sweeps):
-        for k in range(len(blocks)):
-            if settled[k]:
-                continue
-            better = improve_block(blocks[k], _union_without(rows, k), far, target)
-            if not np.array_equal(better, blocks[k]):
-                settled[:] = False
-                blocks[k], rows[k] = better, draw_all(better[None])
-            settled[k] = True
+    for k in [*range(len(blocks))] * 3:
+        if settled[k]:
+            continue
+        better = improve_block(blocks[k], _union_without(rows, k), target)
+        if not np.array_equal(better, blocks[k]):
+            settled[:] = False
+            blocks[k], rows[k] = better, draw_all(better[None])
+        settled[k] = True
     k, current = 0, iou(np.bitwise_or.reduce(rows), target)
     while k < len(blocks):
         without = iou(_union_without(rows, k), target)
@@ -152,7 +135,13 @@ def best_box(covered: Rows, waste: float, table: Whole, target: Target) -> tuple
     return gain, block
 
 
-def best_block(blocks: FloatArray, covered: Rows, waste: float, target: Target) -> tuple[float, FloatArray]:
+def best_form(covered: Rows, waste: float, box: FloatArray, target: Target) -> tuple[float, FloatArray]:
+    """The disc or sheared back with the largest gain in place of a box, after descent, and its gain in cells."""
+    rough = _best(np.concatenate([_disc(box)[None], _backs(box)]), covered, waste, target)[1]
+    return _best(improve_block(rough, covered, target)[None], covered, waste, target)
+
+
+def _best(blocks: FloatArray, covered: Rows, waste: float, target: Target) -> tuple[float, FloatArray]:
     """The block with the largest gain on uncovered cells, and its gain in cells."""
     rows = draw_each(blocks)
     gained, wasted = _shared(rows, target.occupied & ~covered), _shared(rows, ~target.occupied & ~covered)
@@ -161,36 +150,16 @@ def best_block(blocks: FloatArray, covered: Rows, waste: float, target: Target) 
     return float(gains[best]), blocks[best]
 
 
-def best_form(form: int, covered: Rows, waste: float, box: FloatArray, target: Target) -> tuple[float, FloatArray]:
-    """A disc or a sheared back in place of a box, improved by descent, and its gain in cells.
-
-    Parameters
-    ----------
-    form
-        ``DISC`` or ``BACK``.
-    box
-        The box that was proposed for these cells; without cells there is nothing in its place.
-    """
-    if not box[EXTENT]:
-        return 0.0, box
-    _, rough = best_block(_discs(box) if form == DISC else _backs(box), covered, waste, target)
-    return best_block(improve_block(rough, covered, 2, target)[None], covered, waste, target)
-
-
-def _discs(box: FloatArray) -> FloatArray:
-    """The upright cylinder (1, 16) in the middle of a box, as wide as that on average."""
+def _disc(box: FloatArray) -> FloatArray:
+    """The upright cylinder (16) in the middle of a box, as wide as that on average."""
     disc, across = box.copy(), box[EXTENT + 1 : EXTENT + 3]
     disc[FORM], disc[RADIUS], disc[RADIUS + 1] = DISC, max(1, np.rint(across.sum() / 4)), 0
     disc[FIRST + 1 : FIRST + 3] = np.rint(box[FIRST + 1 : FIRST + 3] + across / 2)
-    return disc[None]
+    return disc
 
 
 def _backs(box: FloatArray) -> FloatArray:
-    """A box sheared by up to five cells (P, 16): as deep as it is, and so much thinner that it stays within."""
-    tilts = np.delete(np.arange(-5, 6), 5)
-    deep = np.repeat(box[None], len(tilts), 0)
-    deep[:, FORM], deep[:, TILT] = BACK, tilts
-    thin = deep.copy()
-    thin[:, EXTENT + 1] -= np.abs(tilts)
-    thin[:, FIRST + 1] -= np.minimum(tilts, 0)
-    return np.concatenate([deep, thin[thin[:, EXTENT + 1] > 0]])
+    """A box sheared by up to five cells to either side (10, 16)."""
+    backs = np.repeat(box[None], 10, 0)
+    backs[:, FORM], backs[:, TILT] = BACK, [-5, -4, -3, -2, -1, 1, 2, 3, 4, 5]
+    return backs

@@ -30,18 +30,17 @@ ANY = 1 << 20
 """A limit above the length of any side: no limit."""
 
 
-def families(size: Sequence[int], planes: int, max_copies: int) -> npt.NDArray[np.int64]:
+def families(size: Sequence[int], max_copies: int) -> npt.NDArray[np.int64]:
     """Rows (axis1, kind1, a1, b1, axis2, kind2, a2, b2) of ways to repeat a box in a volume of this size.
 
     Kind ``MIRROR`` pairs a box with its image in plane a (see ``mirrors``), ``PERIOD`` repeats it a times at distance
-    b; an axis of -1 means no repetition.  The first row is the single box.
+    b; an axis of -1 means no repetition.  The first row is the single box.  A second loop is a mirrored pair about the
+    middle.
 
     Parameters
     ----------
     size
         Cells along each axis.
-    planes
-        Mirror planes nearest the middle that may pair a second loop with a first.
     max_copies
         Largest number of copies in an even row.
     """
@@ -55,14 +54,10 @@ def families(size: Sequence[int], planes: int, max_copies: int) -> npt.NDArray[n
     none = (-1, 0, 0, 0)
     rows = [none + none, *(first + none for first in single)]
     for axis, length in enumerate(size):
-        for number in range(planes):
-            plane = length + (number + 1) // 2 * (1 if number % 2 else -1)
-            if plane < 2 or plane > 2 * length - 2:
-                continue
-            for first in single:
-                same = first[1] == MIRROR and first[0] > axis and first[2] == size[first[0]]  # found the other way
-                if first[0] != axis and not same:
-                    rows.append((*first, axis, MIRROR, plane, 0))
+        for first in single:
+            same = first[1] == MIRROR and first[0] > axis and first[2] == size[first[0]]  # found the other way
+            if length > 1 and first[0] != axis and not same:
+                rows.append((*first, axis, MIRROR, length, 0))
     return np.array(rows, np.int64)
 
 

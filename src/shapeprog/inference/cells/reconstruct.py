@@ -14,7 +14,7 @@ from shapeprog.data.shape import Shape
 from shapeprog.data.touched import occupied
 from shapeprog.geometry.arrays import one_tensor_thread
 from shapeprog.geometry.cells import iou, pack
-from shapeprog.geometry.distance import nearest_primitive, signed_distance
+from shapeprog.geometry.distance import signed_distance
 from shapeprog.geometry.nearest import squared_distance
 from shapeprog.geometry.surface import sample_surface
 from shapeprog.inference.budget import NEVER, Deadline, Progress
@@ -70,7 +70,8 @@ def reconstruct(
     if tied:
         program = adjust(snapped, evidence, reach=REACH, seed=seed, deadline=refining, progress=progress)
     else:
-        program = refined(snapped, outer_points(shape, snapped), seed=seed, deadline=refining)
+        points = points_of_cells(shape.voxels) if shape.points is None else evidence.points
+        program = refined(snapped, torch.from_numpy(points), seed=seed, deadline=refining)
     reason = f"The search ended after {stopped}"
     if searching.cut:
         reason += "."
@@ -85,19 +86,6 @@ def reconstruct(
 def description_length(program: Program, voxels: npt.NDArray[np.bool_], snapped: Program | None = None) -> float:
     """Description length of cells (32, 32, 32) by a program: 1 - IoU, plus the price of its text."""
     return 1 - float(iou(occupied(program, unroll(program), snapped), pack(voxels))) + Prices().of(program)
-
-
-def outer_points(shape: Shape, snapped: Program) -> Float[Tensor, "P 3"]:
-    """Points that the surface of the program should meet.
-
-    Points deeper than 2.5 cells inside the snapped solid lie on inner faces of the mesh, such as the back of a drawer.
-    The surface of a union cannot reach them; in the loss they would pull its outer faces inwards.
-    """
-    if shape.points is None:
-        return torch.from_numpy(points_of_cells(shape.voxels))
-    points = torch.from_numpy(np.asarray(shape.points, np.float32))
-    outer = points[nearest_primitive(unroll(snapped), points)[1] > -2.5] if snapped.size else points
-    return outer if len(outer) else points
 
 
 def refined(

@@ -17,7 +17,7 @@ ROOT = Path(__file__).parents[1]
 
 CHOSEN = [
     "tests/test_inference_blocks.py::test_a_block_covers_the_cells_that_its_program_draws",
-    "tests/test_inference_search.py::test_descent_polish_and_rounds_never_lower_the_objective",
+    "tests/test_inference_search.py::test_descent_and_polish_never_lower_the_objective",
     "tests/test_inference_choice.py::test_a_planted_table_is_chosen_exactly_among_hundreds",
     "tests/test_inference_boxes.py::test_the_heaviest_box_is_that_of_brute_force",
     "tests/test_data_voxelise.py::test_touched_cells_equal_the_clipping_twin",

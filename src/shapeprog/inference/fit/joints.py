@@ -54,35 +54,20 @@ class Needs(NamedTuple):
 def find_joints(scene: Scene, floor: float) -> Joints:
     """The joints of a scene: of parts that touch, and of those that nearly touch where nothing else joins them."""
     count = len(scene.mask)
-    first, second, points, gap = gaps(scene)
-    selected = (joining(first, second, gap, count, FIT.nearly) | (gap <= FIT.touching)).nonzero()[:, 0]
-    lowest = _lowest(scene, torch.arange(count))[:, 0]
-    standing = ((lowest - floor).abs() <= FIT.nearly).nonzero()[:, 0]
-    inner = _inner(scene, first[selected], points[selected])
-    return Joints(first[selected], second[selected], inner, standing, floor)
-
-
-class Gaps(NamedTuple):
-    """Pairs of primitives close to each other: slots (C,) of the two, the point (C, 3) where the gap is narrowest, and
-    the width of the gap (C,)."""
-
-    first: Int[Tensor, " C"]
-    second: Int[Tensor, " C"]
-    points: Float[Tensor, "C 3"]
-    width: Float[Tensor, " C"]
-
-
-def gaps(scene: Scene) -> Gaps:
-    """The gaps of a scene, those between parts that overlap below zero; the smaller part of each pair comes first."""
     low, high = scene.centre - scene.reach, scene.centre + scene.reach
     start, end = torch.maximum(low[:, None], low), torch.minimum(high[:, None], high)  # of what both boxes contain
     first, second = ((start - end).amax(-1) < 1.0).triu(1).nonzero(as_tuple=True)
     area = scene.bounds.prod(-1)
-    swap = area[first] > area[second]
+    swap = area[first] > area[second]  # the smaller part comes first
     first, second = torch.where(swap, second, first), torch.where(swap, first, second)
     points = between(scene, first, second, ((start + end) / 2)[first, second], 24)
     inner, outer = (signed_distance(rows_of(scene, slots)[0], points[:, None])[:, 0] for slots in (second, first))
-    return Gaps(first, second, points, (inner + outer.clamp(min=0)).detach())
+    gap = (inner + outer.clamp(min=0)).detach()
+    selected = (joining(first, second, gap, count, FIT.nearly) | (gap <= FIT.touching)).nonzero()[:, 0]
+    lowest = _lowest(scene, torch.arange(count))[:, 0]
+    standing = ((lowest - floor).abs() <= FIT.nearly).nonzero()[:, 0]
+    normalized = _inner(scene, first[selected], points[selected])
+    return Joints(first[selected], second[selected], normalized, standing, floor)
 
 
 def joining(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from itertools import count
 from typing import NamedTuple
 
@@ -15,7 +16,7 @@ from torch import Tensor
 from shapeprog.geometry.primitive import SIZES
 from shapeprog.geometry.scene import Scene
 from shapeprog.language.parameters import Kind, Quantity, to_float32
-from shapeprog.language.program import Draw, Loop, Node, Program
+from shapeprog.language.program import Loop, Node, Program
 from shapeprog.language.statement import language
 from shapeprog.language.tensors import Code, encode
 from shapeprog.language.unroll import Plan
@@ -74,21 +75,18 @@ class Tunable:
         nodes = list(program.walk())
         code = encode(program, dtype=torch.float64)
         self._start = code.parameters
-        moving = [(n, slot) for n, node in enumerate(nodes) for slot in _moving(node)]
-        number = {key: f for f, key in enumerate(moving)}
-        index = torch.full(code.parameters.shape, -1)
-        for block, chain in enumerate(_chains(program.body)):
-            for step, n in enumerate(chain):
-                for slot in range(len(nodes[n].values)):
-                    index[block, step, slot] = number.get((n, slot), -1)
-        self._index: Int[Tensor, "K J slots"] = index
-        self.moving, self.nodes = moving, nodes
-        quantities = [language()[nodes[n].name].quantities[slot] for n, slot in moving]
+        self.nodes, self.moving = nodes, [(n, slot) for n, node in enumerate(nodes) for slot in _moving(node)]
+        # The same program with the number of every value, from 1, in its place; 0 where it stays.
+        numbered = {(n, slot): 0.0 for n, node in enumerate(nodes) for slot in range(len(node.values))}
+        numbered |= {key: float(f) for f, key in enumerate(self.moving, 1)}
+        index = encode(Program(_rebuilt(program.body, count(), numbered)), dtype=torch.float64).parameters
+        self._index: Int[Tensor, "K J slots"] = index.long() - 1
+        quantities = [language()[nodes[n].name].quantities[slot] for n, slot in self.moving]
         self.kinds: list[Kind] = [quantity.kind for quantity in quantities]
-        self.values = torch.tensor([nodes[n].values[slot] for n, slot in moving], dtype=torch.float64)
+        self.values = torch.tensor([nodes[n].values[slot] for n, slot in self.moving], dtype=torch.float64)
         self.low = torch.tensor([least(quantity) for quantity in quantities], dtype=torch.float64)
         self._once = Plan(code)
-        repeated = (part.expand(2 * len(moving), *part.shape) for part in (code.ids, code.parameters))
+        repeated = (part.expand(2 * len(self.moving), *part.shape) for part in (code.ids, code.parameters))
         self._plan = Plan(Code(*repeated))
         self.scale = self._scales(nodes, self._once.scene(code.parameters))
 
@@ -112,13 +110,8 @@ class Tunable:
 
     def rounded(self, values: Float[Tensor, " F"]) -> Float[Tensor, " F"]:
         """The numbers with as many decimals as their kind keeps."""
-        return torch.tensor(
-            [
-                round(value, DEGREES if kind == "angle" else CELLS)
-                for value, kind in zip(values.tolist(), self.kinds, strict=True)
-            ],
-            dtype=torch.float64,
-        )
+        decimals = (DEGREES if kind == "angle" else CELLS for kind in self.kinds)
+        return torch.tensor(list(map(round, values.tolist(), decimals)), dtype=torch.float64)
 
     def are(self, kind: str) -> Bool[Tensor, " F"]:
         """Which numbers are of a kind."""
@@ -159,25 +152,13 @@ def _moving(node: Node) -> Iterator[int]:
             yield slot
 
 
-def _chains(body: Sequence[Node], first: int = 0, *outer: int) -> Iterator[tuple[int, ...]]:
-    """The blocks of a program as numbers of its nodes in the order of the text, loops first."""
-    for node in body:
-        if isinstance(node, Loop):
-            yield from _chains(node.body, first + 1, *outer, first)
-            first += Program(node.body).statements
-        else:
-            yield (*outer, first)
-        first += 1
-
-
 def _rebuilt(body: Sequence[Node], counter: Iterator[int], table: dict[tuple[int, int], float]) -> tuple[Node, ...]:
     """The nodes with the numbers of a table by node and slot."""
     nodes: list[Node] = []
     for node in body:
         n = next(counter)
         values = tuple(table.get((n, slot), value) for slot, value in enumerate(node.values))
-        if isinstance(node, Draw):
-            nodes.append(Draw(node.name, values, node.role))
-        else:
-            nodes.append(Loop(node.name, values, _rebuilt(node.body, counter, table)))
+        if isinstance(node, Loop):
+            node = replace(node, body=_rebuilt(node.body, counter, table))
+        nodes.append(replace(node, values=values))
     return tuple(nodes)

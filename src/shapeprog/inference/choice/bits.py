@@ -10,8 +10,7 @@ import numpy.typing as npt
 
 from shapeprog.geometry.arrays import over_threads, table_of
 from shapeprog.geometry.batch import Batch
-from shapeprog.inference.choice.coverage_kernels import explain, hold
-from shapeprog.inference.surface.evidence import Evidence
+from shapeprog.inference.choice.coverage_kernels import cover
 from shapeprog.space import HALF, RESOLUTION, FloatArray
 
 WORD = 64
@@ -25,9 +24,11 @@ Flags = npt.NDArray[np.bool_]
 
 
 class BinnedPoints(NamedTuple):
-    """Points sorted by the cells of a grid, see the kernels: original indices, and the first index of each cell."""
+    """Points and normals sorted by the cells of a grid, see the kernels: their indices before, and the first of each
+    cell."""
 
     points: FloatArray
+    normals: FloatArray
     order: npt.NDArray[np.int64]
     starts: npt.NDArray[np.int64]
     cells: int
@@ -46,29 +47,15 @@ def pack(flags: Flags) -> Bits:
     return np.packbits(padded, axis=1, bitorder="little").view(np.uint64)
 
 
-def explains(scene: Batch, binned: BinnedPoints, normals: FloatArray, evidence: Evidence) -> Bits:
-    """Which points each candidate (B, N) explains, as rows of bits (B, W)."""
-    rows = _no_bits(scene, binned)
-    data = (
-        table_of(scene), scene.mask.shape[1], binned.points, normals[binned.order], binned.order, binned.starts,
-        binned.cells, evidence.tolerance, evidence.agreement, rows,
-    )  # fmt: skip
-    over_threads(partial(explain, *data), len(rows))
-    return rows
+def covers(scene: Batch, binned: BinnedPoints, tolerance: float, agreement: float = 0.0) -> tuple[Bits, Bits]:
+    """Bits (B, W) of the points that each candidate (B, N) explains, and of those deeper inside it than a tolerance.
 
-
-def holds(scene: Batch, binned: BinnedPoints, depth: float) -> Bits:
-    """Which points lie deeper than ``depth`` inside each candidate (B, N), as rows of bits (B, W)."""
-    rows = _no_bits(scene, binned)
-    data = (
-        table_of(scene), scene.mask.shape[1], binned.points, binned.order, binned.starts, binned.cells, depth, rows
-    )  # fmt: skip
-    over_threads(partial(hold, *data), len(rows))
-    return rows
-
-
-def _no_bits(scene: Batch, binned: BinnedPoints) -> Bits:
-    return np.zeros((len(scene), -(-len(binned.order) // WORD)), np.uint64)
+    ``agreement`` is the least cosine between the normals of a point and of the surface that explains it.
+    """
+    explained, interior = np.zeros((2, len(scene), -(-len(binned.order) // WORD)), np.uint64)
+    data = (table_of(scene), scene.mask.shape[1], *binned, tolerance, agreement, explained, interior)
+    over_threads(partial(cover, *data), len(scene))
+    return explained, interior
 
 
 def nearby(points: FloatArray) -> npt.NDArray[np.int64]:
@@ -81,10 +68,12 @@ def nearby(points: FloatArray) -> npt.NDArray[np.int64]:
     return np.sum(shifted, axis=0)
 
 
-def sorted_by_cell(points: FloatArray, cells: int = COARSE) -> BinnedPoints:
-    """Points (P, 3) in the order of the cells of a grid."""
+def sorted_by_cell(points: FloatArray, normals: FloatArray | None = None, cells: int = COARSE) -> BinnedPoints:
+    """Points and normals (P, 3), zero if unknown, in the order of the cells of a grid."""
     index = np.clip(((points + HALF) * (cells / RESOLUTION)).astype(np.int64), 0, cells - 1)
     key = (index[:, 0] * cells + index[:, 1]) * cells + index[:, 2]
     order = np.argsort(key, kind="stable")
     starts = np.concatenate([[0], np.bincount(key, minlength=cells**3).cumsum()])
-    return BinnedPoints(np.ascontiguousarray(points[order]), order, starts, cells)
+    return BinnedPoints(
+        points[order], (np.zeros_like(points) if normals is None else normals)[order], order, starts, cells
+    )

@@ -32,8 +32,7 @@ from shapeprog.inference.choice.bits import (
     BinnedPoints,
     Bits,
     by_word,
-    explains,
-    holds,
+    covers,
     nearby,
     pack,
     sorted_by_cell,
@@ -147,13 +146,13 @@ class Coverage:
     def __init__(self, evidence: Evidence, prices: Prices | None = None) -> None:
         self.evidence, self.prices = evidence, prices or Prices()
         order = np.lexsort((nearby(evidence.points), -evidence.weights))  # points of a word weigh nearly the same
-        self._points, self._normals = sorted_by_cell(evidence.points[order]), evidence.normals[order]
+        self._points = sorted_by_cell(evidence.points[order], evidence.normals[order])
         points, volume = free_points(evidence)
         self._free = sorted_by_cell(points)
         free = np.full(len(points), -self.prices.free * volume / max(evidence.area, 1e-9))
         parts = np.full(len(evidence.parts), self.prices.part / max(1.0, len(evidence.parts) / SETTINGS.parts))
         self._weights = np.concatenate([by_word(evidence.weights[order]), by_word(free), by_word(parts)])
-        self._surface = sorted_by_cell(evidence.surface, FINE)
+        self._surface = sorted_by_cell(evidence.surface, evidence.surface_normals, FINE)
         self._rows: dict[Program, _Row] = {}
 
     def table(self, candidates: Sequence[Program]) -> CoverageTable:
@@ -165,11 +164,11 @@ class Coverage:
         if new := [candidate for candidate in dict.fromkeys(candidates) if candidate not in self._rows]:
             self._add(new, scene if len(new) == len(candidates) else unroll(new).detach())
         mine, count = [self._rows[candidate] for candidate in candidates], len(candidates)
-        words = -(-len(self._normals) // WORD)
+        words = -(-len(self._points.order) // WORD)
         covered = np.array([row.covered for row in mine], np.uint64).reshape(count, len(self._weights))
         interior = np.array([row.interior for row in mine], np.uint64).reshape(count, words)
         samples = np.array([row.samples for row in mine]).reshape(-1, 3)
-        hidden = holds(scene, sorted_by_cell(samples), 0.0)
+        _, hidden = covers(scene, sorted_by_cell(samples), 0.0)
         exposed = np.array([2**row.sampled - 1 for row in mine], np.uint64) & ~hidden.diagonal()
         return CoverageTable(
             np.concatenate([covered, hidden], 1), self._weights, words, interior, exposed,
@@ -179,10 +178,9 @@ class Coverage:
     def _add(self, candidates: Sequence[Program], scene: Scene) -> None:
         evidence, prices = self.evidence, self.prices
         price = np.array([prices.of(program) for program in candidates]) - prices.number * centred(scene, candidates)
-        interior = holds(scene, self._points, evidence.tolerance)
-        explained = explains(scene, self._points, self._normals, evidence) & ~interior
-        free, parts = holds(scene, self._free, evidence.tolerance), pack(parts_drawn(scene, evidence))
-        covered = np.concatenate([explained, free, parts], 1)
+        explained, interior = covers(scene, self._points, evidence.tolerance, evidence.agreement)
+        _, free = covers(scene, self._free, evidence.tolerance)
+        covered = np.concatenate([explained & ~interior, free, pack(parts_drawn(scene, evidence))], 1)
         points, owners, areas = unsupported(scene, evidence, self._surface)
         starts = np.searchsorted(owners, np.arange(len(candidates) + 1))
         for k, program in enumerate(candidates):
@@ -273,7 +271,7 @@ def shares(samples: FloatArray, normals: FloatArray, evidence: Evidence, binned:
     """
     share = np.zeros(len(samples))
     data = (
-        samples, normals, binned.points, evidence.surface_normals[binned.order],
+        samples, normals, binned.points, binned.normals,
         evidence.surface_outward[binned.order], binned.starts, binned.cells, evidence.reach, evidence.agreement,
         share,
     )  # fmt: skip

@@ -57,22 +57,31 @@ def put(rows, row, bit):
     rows[row, bit >> 6] |= np.uint64(1) << np.uint64(bit & 63)
 
 
-@kernel("void(f8[:, ::1], i8, f8[:, ::1], f8[:, ::1], i8[::1], i8[::1], i8, f8, f8, u8[:, ::1], i8, i8)")
-def explain(table, primitives, points, normals, bits, starts, cells, tolerance, agreement, rows, begin, end):
-    """Set the bits of the points within a tolerance of a surface whose normal fits theirs; zero normals fit all."""
+@kernel("void(f8[:, ::1], i8, f8[:, ::1], f8[:, ::1], i8[::1], i8[::1], i8, f8, f8, u8[:, ::1], u8[:, ::1], i8, i8)")
+def cover(
+    table, primitives, points, normals, bits, starts, cells, tolerance, agreement, explained, interior, begin, end
+):  # fmt: skip
+    """Set the bits of points deeper than a tolerance in a primitive, and of others within it of a fitting surface.
+
+    The normal of the surface fits if it agrees with that of the point; zero normals fit all.
+    """
     ends, box, part = np.empty(6, np.int64), np.empty(6), np.empty(7)
     for row in range(begin * primitives, end * primitives):
         if table[row, KIND] < 0:
             continue
+        candidate = row // primitives
         box_of(table, row, tolerance, cells, ends, box)
         for i in range(ends[0], ends[3] + 1):
             for j in range(ends[1], ends[4] + 1):
                 line = (i * cells + j) * cells
                 for item in range(starts[line + ends[2]], starts[line + ends[5] + 1]):
-                    if outside(points, item, box) or has(rows, row // primitives, bits[item]):
+                    if outside(points, item, box) or has(interior, candidate, bits[item]):
                         continue
                     a, b, c = local(table, row, points[item, 0], points[item, 1], points[item, 2])
-                    if abs(distance(table, row, a, b, c)) > tolerance:
+                    height = distance(table, row, a, b, c)
+                    if height < -tolerance:
+                        put(interior, candidate, bits[item])
+                    if abs(height) > tolerance or has(explained, candidate, bits[item]):
                         continue
                     x, y, z = normals[item, 0], normals[item, 1], normals[item, 2]
                     a, b, c = local(
@@ -81,26 +90,7 @@ def explain(table, primitives, points, normals, bits, starts, cells, tolerance, 
                     slopes(table, row, a, b, c, part)
                     u, v, w = turned(table, row, part[0], part[1], part[2])
                     if abs(u * x + v * y + w * z) >= agreement or x * x + y * y + z * z < 0.25:
-                        put(rows, row // primitives, bits[item])
-
-
-@kernel("void(f8[:, ::1], i8, f8[:, ::1], i8[::1], i8[::1], i8, f8, u8[:, ::1], i8, i8)")
-def hold(table, primitives, points, bits, starts, cells, depth, rows, begin, end):
-    """Set the bits of the points that lie deeper than ``depth`` inside a primitive."""
-    ends, box = np.empty(6, np.int64), np.empty(6)
-    for row in range(begin * primitives, end * primitives):
-        if table[row, KIND] < 0:
-            continue
-        box_of(table, row, -depth, cells, ends, box)
-        for i in range(ends[0], ends[3] + 1):
-            for j in range(ends[1], ends[4] + 1):
-                line = (i * cells + j) * cells
-                for item in range(starts[line + ends[2]], starts[line + ends[5] + 1]):
-                    if outside(points, item, box) or has(rows, row // primitives, bits[item]):
-                        continue
-                    a, b, c = local(table, row, points[item, 0], points[item, 1], points[item, 2])
-                    if distance(table, row, a, b, c) < -depth:
-                        put(rows, row // primitives, bits[item])
+                        put(explained, candidate, bits[item])
 
 
 @kernel("void(f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], b1[::1], i8[::1], i8, f8, f8, f8[::1], i8, i8)")

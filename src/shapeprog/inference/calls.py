@@ -7,13 +7,13 @@ where the call draws them if the program loses little value, as a call costs les
 
 from __future__ import annotations
 
+import itertools
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import block_diag
 
 from shapeprog.errors import ShapeProgError
 from shapeprog.inference.choice.choice import value
@@ -49,15 +49,16 @@ class Candidate(NamedTuple):
 
 
 class Option(NamedTuple):
-    """A block of a program inside of some of its loops: its index, these loops, the numbers (M,) of loops and block."""
+    """A block of a program inside of some of its loops: its index, these loops and their numbers, its numbers (M,)."""
 
     place: int
     around: tuple[Loop, ...]
+    outer: FloatArray
     values: FloatArray
 
 
-Options = dict[tuple[Kind, tuple[int, ...], tuple[tuple[float, ...], ...]], list[Option]]
-"""Blocks by kind, without role, by counts, and by the discrete numbers of the loops around."""
+Options = dict[tuple[Kind, tuple[int, ...], tuple[tuple[float | str, ...], ...]], list[Option]]
+"""Blocks by kind, without role, by counts, and by the names and discrete numbers of the loops around."""
 
 
 def with_calls(program: Program, libraries: Sequence[Library], coverage: Coverage) -> tuple[Program, frozenset[int]]:
@@ -110,17 +111,15 @@ def _options(program: Program) -> Options:
     for index, chain in enumerate(program.chains):
         for depth in range(len(chain)):
             around = tuple(node for node in chain[:depth] if isinstance(node, Loop))
-            discrete = tuple(tuple(_numbers(loop, discrete=True)) for loop in around)
-            outer = [number for loop in around for number in _numbers(loop, discrete=False)]
+            discrete, outer = list[tuple[float | str, ...]](), list[float]()
+            for loop in around:
+                is_discrete = [quantity.discrete for quantity in language()[loop.name].quantities]
+                discrete.append((loop.name, *itertools.compress(loop.values, is_discrete)))
+                outer += itertools.compress(loop.values, np.logical_not(is_discrete))
             for block in forms_of(chain[depth:]):
-                key = replace(block.kind, word=""), block.counts, discrete
-                options.setdefault(key, []).append(Option(index, around, np.array([*outer, *block.values])))
+                key = replace(block.kind, word=""), block.counts, tuple(discrete)
+                options.setdefault(key, []).append(Option(index, around, np.array(outer), block.values))
     return options
-
-
-def _numbers(loop: Loop, *, discrete: bool) -> list[float]:
-    quantities = language()[loop.name].quantities
-    return [number for number, quantity in zip(loop.values, quantities, strict=True) if quantity.discrete == discrete]
 
 
 def _candidates(pattern: Pattern, options: Options) -> list[Candidate]:
@@ -133,11 +132,9 @@ def _candidates(pattern: Pattern, options: Options) -> list[Candidate]:
             for forms in pattern.forms(counts) if pattern.blocks > 1 else ():
                 keys = ((replace(form.block.kind, word=""), form.block.counts, around) for form in forms)
                 for blocks in _assignments(forms, [options.get(key, []) for key in keys], start):
-                    solution, difference = _solved(forms, blocks, start)
-                    measures = solution[len(solution) - len(start) :].tolist()
-                    arguments = usual | dict(zip(pattern.measures, measures, strict=True))
-                    loops = _loops(blocks[0].around, solution.tolist())
-                    if (program := called(pattern, arguments, loops)) is not None:
+                    measures, difference = _solved(forms, blocks, start)
+                    arguments = usual | dict(zip(pattern.measures, measures.tolist(), strict=True))
+                    if (program := called(pattern, arguments, blocks[0].around)) is not None:
                         candidates.append(Candidate(program, tuple(block.place for block in blocks), difference))
     return sorted(candidates, key=lambda candidate: candidate.difference)[:OFFERED]
 
@@ -156,31 +153,16 @@ def _assignments(
 
 
 def _solved(forms: Sequence[Form], blocks: Sequence[Option], start: FloatArray) -> tuple[FloatArray, float]:
-    """The numbers of the loops around a call and its measures, by least squares; and the largest residual.
+    """The measures of a call by least squares, and the largest difference of its blocks and of the loops around them.
 
     Measures that the first forms do not determine keep their values of ``start``.
     """
-    outer = len(blocks[0].values) - len(forms[0].constants)
-    start = np.concatenate([np.zeros(outer), start])
-    used = forms[: len(blocks)]
-    factors = np.concatenate([block_diag(np.eye(outer), form.factors) for form in used])
-    constants = np.concatenate([[*np.zeros(outer), *form.constants] for form in used])
+    factors = np.concatenate([form.factors for form in forms[: len(blocks)]])
+    constants = np.concatenate([form.constants for form in forms[: len(blocks)]])
     away = np.concatenate([block.values for block in blocks]) - constants - factors @ start
     change = np.linalg.lstsq(factors, away, rcond=None)[0]
-    return start + change, float(np.abs(factors @ change - away).max())
-
-
-def _loops(around: Sequence[Loop], numbers: Sequence[float]) -> list[Loop]:
-    """Loops without bodies, with their continuous numbers replaced by these, rounded."""
-    remaining, loops = iter(numbers), []
-    for loop in around:
-        quantities = language()[loop.name].quantities
-        values = (
-            old if quantity.discrete else to_float32(round(next(remaining), CELLS) + 0.0)
-            for old, quantity in zip(loop.values, quantities, strict=True)
-        )
-        loops.append(replace(loop, values=tuple(values)))
-    return loops
+    outer = np.array([block.outer - blocks[0].outer for block in blocks])
+    return start + change, float(max(np.abs(factors @ change - away).max(), np.abs(outer).max(initial=0)))
 
 
 def called(pattern: Pattern, arguments: Mapping[str, float], loops: Sequence[Loop] = ()) -> Program | None:
@@ -188,24 +170,21 @@ def called(pattern: Pattern, arguments: Mapping[str, float], loops: Sequence[Loo
 
     Arguments are rounded, and left out where they equal their defaults.
     """
-    given: dict[str, float] = {}
     rounded: dict[str, float] = {}
     for name, default in pattern.defaults.items():
+        # Halves of even hundredths are hundredths, to which the text is rounded.
+        rounded[name] = to_float32(2 * round(arguments[name] / 2, CELLS) + 0.0)
         if isinstance(default, float) and abs(arguments[name] - default) <= EXACT:
             rounded[name] = default
-        else:
-            # Halves of even hundredths are hundredths, to which the text is rounded.
-            rounded[name] = given[name] = to_float32(2 * round(arguments[name] / 2, CELLS) + 0.0)
-    call = within(loops, Call(pattern.function.name, tuple(given.items())))
+    given = tuple((name, number) for name, number in rounded.items() if number != pattern.defaults[name])
     try:
-        nodes = tuple(nest((*loops, *chain)) for chain in Program(pattern.drawn(rounded)).chains)
-        solid = all(map(_is_solid, Program(nodes).walk()))
+        drawn = Program(tuple(nest((*loops, *chain)) for chain in Program(pattern.drawn(rounded)).chains))
     except ShapeProgError:  # a number out of the range of its parameter
         return None
-    return Program(nodes, Source((pattern.function, call))) if nodes and solid else None
-
-
-def _is_solid(node: Node) -> bool:
-    """Whether all numbers are at least the minimum of their quantity."""
-    quantities = language()[node.name].quantities
-    return all(number >= least(quantity) for number, quantity in zip(node.values, quantities, strict=True))
+    solid = all(
+        number >= least(quantity)
+        for node in drawn.walk()
+        for number, quantity in zip(node.values, language()[node.name].quantities, strict=True)
+    )
+    call = within(loops, Call(pattern.function.name, given))
+    return replace(drawn, source=Source((pattern.function, call))) if drawn.body and solid else None

@@ -17,6 +17,7 @@ from functools import cache
 from pathlib import Path
 from typing import Literal
 
+from shapeprog.data.loading import load
 from shapeprog.data.shape import Shape
 from shapeprog.data.touched import occupied
 from shapeprog.geometry.arrays import one_tensor_thread
@@ -31,6 +32,7 @@ from shapeprog.inference.readable import CELLS, in_readable_unit, unit_of_result
 from shapeprog.inference.roles.roles import named_anew
 from shapeprog.inference.surface.evidence import doubt_of_furniture, evidence_of
 from shapeprog.inference.ties.tying import tie
+from shapeprog.kernels.compile import modules_of, prepare
 from shapeprog.language.convert import placed_if_possible
 from shapeprog.language.free import numbers
 from shapeprog.language.merging import merged
@@ -157,13 +159,12 @@ def infer(
     """
     if unit not in ("", CELLS):
         metres(unit)
-    target = _load(shape)
+    target = shape if isinstance(shape, Shape) else load(shape)
     prepare_kernels(cells=statements == "paper" or target.points is None)
     started = time.monotonic()
     searching, refining = (Deadline(started + share * budget) for share in (SEARCH_SHARE, 1.0))
     scores: dict[str, float] = {}
-    program, reason = Program(), ""
-    snapped: Program | None = None
+    program, snapped, reason = Program(), None, ""
     evidence, usual = evidence_of(target), Prices()
     floor = None if target.points is None or not len(evidence.surface) else float(evidence.surface[:, 0].min())
     prices = {name: getattr(usual, name) / detail for name in ("statement", "loop", "number")}
@@ -179,9 +180,9 @@ def infer(
             tied=statements == "all", seed=seed, searching=searching, refining=refining, progress=progress,
         )  # fmt: skip
     if statements == "all":
-        integral, plain = snapped, program
-        if snapped is not None:
-            program, snapped = named_anew(program), None
+        integral, plain, snapped = snapped, program, None
+        if integral is not None:
+            program = named_anew(program)
         held: frozenset[int] = frozenset()
         if libraries:
             program, held = with_calls(program, libraries, coverage)
@@ -196,42 +197,22 @@ def infer(
         for library in libraries:
             program = with_library(program, library)
     program = in_readable_unit(program, unit_of_result(target, program, unit))
-    sentences = reason, doubt_of_furniture(evidence), target.note
-    reason = " ".join(sentence for sentence in sentences if sentence)
+    reason = " ".join(filter(None, (reason, doubt_of_furniture(evidence), target.note)))
     cut = tuple(deadline.cut for deadline in (searching, refining) if deadline.cut)
     if cut:
         reason += f" The time limit of {budget:g} s ended {' and '.join(cut)}: "
         reason += "with a larger --budget the result depends on the seed alone."
     if snapped is not None or target.points is None:
         scores["iou"] = float(iou(occupied(program, unroll(program), snapped), pack(target.voxels)))
-    scores |= {
-        "blocks": float(program.blocks),
-        "statements": float(program.statements),
-        "primitives": float(program.size),
-        "numbers": float(numbers(program)),
-    }
+    sizes = {"blocks": program.blocks, "statements": program.statements, "primitives": program.size}
+    scores |= {name: float(size) for name, size in (sizes | {"numbers": numbers(program)}).items()}
     return Result(program, snapped, scores, reason, cut, time.monotonic() - started)
 
 
 @cache
 def prepare_kernels(*, cells: bool = False) -> None:
-    """Compile, or load from the cache, all kernels that inference runs, so that no time budget pays for it.
+    """Compile, or load from the cache, the kernels of inference, with ``cells`` also those of the search on cells.
 
-    The first call on a machine takes some seconds, the first in a process a fraction of one.
-
-    Parameters
-    ----------
-    cells
-        Whether the search on cells runs too.
+    No time budget pays for it.  The first call on a machine takes seconds, the first in a process a fraction of one.
     """
-    from shapeprog.kernels.compile import modules_of, prepare
-
     prepare(modules_of(*SURFACE_KERNELS, *(CELL_KERNELS if cells else ())))
-
-
-def _load(shape: Shape | str | Path) -> Shape:
-    if isinstance(shape, Shape):
-        return shape
-    from shapeprog.data import load
-
-    return load(shape)

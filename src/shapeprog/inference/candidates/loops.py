@@ -152,25 +152,23 @@ def equal_steps(positions: FloatArray, half: FloatArray, least: int = 2) -> list
     step = steps[first, second]
     forwards = np.sign(np.where(np.abs(step) < SETTINGS.centred, 0, step)) @ [9, 3, 1] > 0
     onwards = (nearest(positions[second] + step * np.array([[[1]], [[2]]])) >= 0).any(0)
-    runs: dict[tuple[int, ...], None] = {}
-    for gaps in (0, 1):  # missing copies at once
-        run, last, end, going = [first, second], second.copy(), np.ones(len(second), np.int64), onwards.copy()
-        while going.any():
-            start, copy = positions[first[going]], len(run)
-            present = np.full(len(first), MISSING)
-            present[going] = nearest(start + copy * (positions[last[going]] - start) / end[going, None])
-            present[present == last] = MISSING
-            run.append(present)
-            last, end = np.where(present >= 0, present, last), np.where(present >= 0, copy, end)
-            going &= copy - end <= gaps
-        members = np.stack(run, 1)
-        number = (members >= 0).sum(1)
-        enough = number >= np.maximum(SETTINGS.least_present, SETTINGS.present * (end + 1))
-        kept = (number <= end) & enough if gaps else forwards
-        for k in np.flatnonzero(kept & (end + 1 >= least)):
-            row = members[k, : end[k] + 1]
-            runs[tuple((row if forwards[k] else row[::-1]).tolist())] = None
-    return [list(row) for row in runs]
+    run, last, end, going = [first, second], second.copy(), np.ones(len(second), np.int64), onwards
+    while going.any():
+        start, copy = positions[first[going]], len(run)
+        present = np.full(len(first), MISSING)
+        present[going] = nearest(start + copy * (positions[last[going]] - start) / end[going, None])
+        present[present == last] = MISSING
+        run.append(present)
+        last, end = np.where(present >= 0, present, last), np.where(present >= 0, copy, end)
+        going &= copy - end <= 1  # one copy may be missing at once
+    members = np.stack(run, 1)
+    number, plain = (members >= 0).sum(1), np.logical_and.accumulate(members >= 0, 1).sum(1)
+    enough = number >= np.maximum(SETTINGS.least_present, SETTINGS.present * (end + 1))
+    runs = [members[k, : plain[k]].tolist() for k in np.flatnonzero(forwards & (plain >= least))]
+    for k in np.flatnonzero((number <= end) & enough & (end + 1 >= least)):
+        row = members[k, : end[k] + 1]
+        runs.append((row if forwards[k] else row[::-1]).tolist())
+    return [list(members) for members in dict.fromkeys(map(tuple, runs))]
 
 
 def rows(blocks: Sequence[Sequence[Box]]) -> Iterator[Node]:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 import torch
@@ -103,17 +104,12 @@ def _mirrored(chain: Chain) -> Iterator[Node]:
 
 def _recounted(chain: Chain, box: Box) -> Iterator[Node]:
     """A run with one copy more or one less, at its end or at its beginning."""
-    for index, loop in enumerate(chain[:-1]):
-        if not isinstance(loop, Loop) or loop.name != "translate":
-            continue
-        ((first, second, *_),) = solid_boxes([nest((Loop(loop.name, (2.0, *loop.values[1:]), ()), chain[-1]))])
-        for more in (-1, 1):
-            if loop.count + more < 2:
-                continue
-            outer = (*chain[:index], Loop(loop.name, (loop.count + float(more), *loop.values[1:]), ()))
-            inner = chain[index + 1 :]
+    for (index, loop), more in itertools.product(enumerate(chain[:-1]), (-1, 1)):
+        if isinstance(loop, Loop) and loop.name == "translate" and loop.count + more >= 2:
+            count, step = float(loop.count + more), loop.values[1:]
+            outer, inner = (*chain[:index], replace(loop, values=(count, *step))), chain[index + 1 :]
             yield nest((*outer, *inner))
-            moved = box._replace(centre=box.centre - more * (second.centre - first.centre))
+            moved = box._replace(centre=box.centre - more * np.array(step))
             for drawing in hinted(language()[chain[-1].name], moved):
                 yield nest((*outer, *inner[:-1], drawing))
 
@@ -122,8 +118,7 @@ def _filled(chain: Chain) -> Iterator[Node]:
     """A board instead of a run."""
     for index in range(len(chain) - 1):
         (parts,) = solid_boxes([nest(chain[index:])])
-        around = _around(parts[0], parts)
-        for drawing in drawings(around):
+        for drawing in drawings(_around(parts[0], parts)):
             yield nest((*chain[:index], drawing))
 
 

@@ -17,7 +17,7 @@ from jaxtyping import Float
 from torch import Tensor
 
 from shapeprog.geometry.batch import Batch
-from shapeprog.geometry.distance import distance_and_slopes, signed_distance
+from shapeprog.geometry.distance import distance_and_slopes
 from shapeprog.inference.candidates.drawings import drawings, is_unhinted, starts
 from shapeprog.inference.candidates.settings import SETTINGS
 from shapeprog.inference.fit.tunable import STEP, THINNEST, least
@@ -33,7 +33,10 @@ from shapeprog.space import Array, FloatArray
 
 
 class Target(NamedTuple):
-    """Points on the surface close to the faces of each of B pieces, and their normals (B, P, 3)."""
+    """Points just above the surface close to the faces of each of B pieces, and its normals there (B, P, 3).
+
+    On the surface, the distance has no gradient.
+    """
 
     points: Float[Tensor, "B P 3"]
     normals: Float[Tensor, "B P 3"]
@@ -41,11 +44,6 @@ class Target(NamedTuple):
     def take(self, rows: Array) -> Target:
         """The target of some of the pieces."""
         return Target(self.points[rows], self.normals[rows])
-
-    @property
-    def shifted(self) -> Float[Tensor, "B P 3"]:
-        """The points shifted along their normals: the distance has no gradient on the surface."""
-        return self.points + SETTINGS.offset * self.normals
 
 
 def single_candidates(pieces: Pieces) -> list[Node]:
@@ -103,14 +101,13 @@ def fitted(draws: Sequence[Draw], target: Target) -> list[Draw]:
     away = torch.cat([torch.zeros_like(away[:1]), away, -away])[:, None]
     plan = Plan(Code(*(part.expand(len(away), *part.shape) for part in (ids, code.parameters[:, :, :1]))))
     prior = torch.where(free, SETTINGS.prior * points, 1.0)
-    shifted = target.shifted.reshape(-1, 1, 3)
     for _ in range(SETTINGS.steps):
         scene = plan.scene((values + away * free)[:, :, None, None])
         placed = torch.cat([scene.size, scene.centre, scene.rotation.flatten(-2)], -1).flatten(2)
         by_number = ((placed[1 : slots + 1] - placed[slots + 1 :]) / (2 * STEP)).permute(1, 2, 0)
         fields = (scene.kind, scene.size, scene.centre, scene.rotation, scene.mask)
         single = Batch(*(field[0].repeat_interleave(points, 0) for field in fields))
-        distance, by_row, _ = distance_and_slopes(single, shifted)
+        distance, by_row, _ = distance_and_slopes(single, target.points.reshape(-1, 1, 3))
         slopes = by_row.reshape(len(draws), points, -1) @ by_number
         residual = (distance.reshape(-1, points) - SETTINGS.offset).nan_to_num(0)
         weighted = ((SETTINGS.width**2 / (SETTINGS.width**2 + residual**2)) ** 2)[..., None] * slopes
@@ -125,12 +122,10 @@ def misfits(draws: Sequence[Draw], target: Target) -> FloatArray:
     """Misfit (B,) of each statement to its points: mean distance over ``SETTINGS.wrong`` plus 1 - the mean cosine."""
     if not draws:
         return np.zeros(0)
-    shifted = target.shifted.requires_grad_()
     scene = unroll(encode([Program((node,)) for node in draws], dtype=torch.float64))
-    distance = signed_distance(scene, shifted)
-    (slope,) = torch.autograd.grad(distance.sum(), shifted)
-    cosine = (slope * target.normals).sum(-1).abs().mean(1)
-    off = (distance.detach().abs() / SETTINGS.wrong).clamp(max=1).mean(1) + 1 - cosine
+    distance, _, slopes = distance_and_slopes(scene, target.points)
+    cosine = (slopes * target.normals).sum(-1).abs().mean(1)
+    off = (distance.abs() / SETTINGS.wrong).clamp(max=1).mean(1) + 1 - cosine
     return off.nan_to_num(np.inf).numpy()
 
 
@@ -145,4 +140,5 @@ def _target(pieces: Pieces) -> tuple[Target, Array]:
     share = np.arange(SETTINGS.points) / SETTINGS.points
     selected = np.array([members[(share * len(members)).astype(np.int64)] for members in inside], np.int64)
     selected = selected.reshape(-1, SETTINGS.points)
-    return Target(torch.from_numpy(points[selected]), torch.from_numpy(normals[selected])), indices
+    above = points[selected] + SETTINGS.offset * normals[selected]
+    return Target(torch.from_numpy(above), torch.from_numpy(normals[selected])), indices

@@ -46,7 +46,7 @@ from shapeprog.language.printer import numbers_written
 from shapeprog.language.program import Loop, Program
 from shapeprog.language.unroll import unroll
 from shapeprog.library.length import outside
-from shapeprog.space import DEPTH, HALF, RESOLUTION, SIDE, FloatArray
+from shapeprog.space import DEPTH, HALF, RESOLUTION, SIDE, Array, FloatArray
 
 AWAY = 4.0 * HALF
 """A coordinate outside all candidates, for unused samples of a word."""
@@ -123,17 +123,6 @@ class CoverageTable(NamedTuple):
     prices: FloatArray
 
 
-class _Row(NamedTuple):
-    """Coverage of a candidate: bits of points and free points, unsupported samples of its surface."""
-
-    covered: Bits
-    interior: Bits
-    samples: FloatArray
-    sampled: int
-    sample_price: float
-    price: float
-
-
 class Coverage:
     """Coverage of one surface by candidates, which are programs of one block; each is computed once.
 
@@ -153,7 +142,8 @@ class Coverage:
         parts = np.full(len(evidence.parts), self.prices.part / max(1.0, len(evidence.parts) / SETTINGS.parts))
         self._weights = np.concatenate([by_word(evidence.weights[order]), by_word(free), by_word(parts)])
         self._surface = sorted_by_cell(evidence.surface, evidence.surface_normals, FINE)
-        self._rows: dict[Program, _Row] = {}
+        self._index: dict[Program, int] = {}
+        self._rows: list[Array] = []
 
     def table(self, candidates: Sequence[Program]) -> CoverageTable:
         """The coverage of candidates.
@@ -161,35 +151,33 @@ class Coverage:
         A ``ShapeProgError`` if one draws more copies than :func:`shapeprog.language.unroll` takes.
         """
         scene = unroll(candidates).detach()
-        if new := [candidate for candidate in dict.fromkeys(candidates) if candidate not in self._rows]:
-            self._add(new, scene if len(new) == len(candidates) else unroll(new).detach())
-        mine, count = [self._rows[candidate] for candidate in candidates], len(candidates)
-        words = -(-len(self._points.order) // WORD)
-        covered = np.array([row.covered for row in mine], np.uint64).reshape(count, len(self._weights))
-        interior = np.array([row.interior for row in mine], np.uint64).reshape(count, words)
-        samples = np.array([row.samples for row in mine]).reshape(-1, 3)
-        _, hidden = covers(scene, sorted_by_cell(samples), 0.0)
-        exposed = np.array([2**row.sampled - 1 for row in mine], np.uint64) & ~hidden.diagonal()
-        return CoverageTable(
-            np.concatenate([covered, hidden], 1), self._weights, words, interior, exposed,
-            np.array([row.sample_price for row in mine]), np.array([row.price for row in mine]),
-        )  # fmt: skip
+        new = [candidate for candidate in dict.fromkeys(candidates) if candidate not in self._index]
+        if new or not self._rows:
+            rows = self._rows_of(new, scene if len(new) == len(candidates) else unroll(new).detach())
+            self._rows = list(map(np.concatenate, zip(self._rows, rows, strict=True))) if self._rows else rows
+            self._index |= {program: index for index, program in enumerate(new, len(self._index))}
+        selected = np.array([self._index[candidate] for candidate in candidates], np.int64)
+        covered, interior, samples, sampled, sample_price, price = (row[selected] for row in self._rows)
+        _, hidden = covers(scene, sorted_by_cell(samples.reshape(-1, 3)), 0.0)
+        exposed = np.array([2**number - 1 for number in sampled.tolist()], np.uint64) & ~hidden.diagonal()
+        bits, words = np.concatenate([covered, hidden], 1), interior.shape[1]
+        return CoverageTable(bits, self._weights, words, interior, exposed, sample_price, price)
 
-    def _add(self, candidates: Sequence[Program], scene: Scene) -> None:
+    def _rows_of(self, candidates: Sequence[Program], scene: Scene) -> list[Array]:
+        """Arrays with a row for each candidate: bits covered, bits of the interior, unsupported samples, their number,
+        the price of each, and that of the text."""
         evidence, prices = self.evidence, self.prices
         price = np.array([prices.of(program) for program in candidates]) - prices.number * centred(scene, candidates)
         explained, interior = covers(scene, self._points, evidence.tolerance, evidence.agreement)
         _, free = covers(scene, self._free, evidence.tolerance)
         covered = np.concatenate([explained & ~interior, free, pack(parts_drawn(scene, evidence))], 1)
         points, owners, areas = unsupported(scene, evidence, self._surface)
-        starts = np.searchsorted(owners, np.arange(len(candidates) + 1))
-        for k, program in enumerate(candidates):
-            mine = np.arange(starts[k], starts[k + 1])
-            samples, count = np.full((WORD, 3), AWAY), min(len(mine), WORD)
-            if count:
-                samples[:count] = points[mine[np.arange(count) * len(mine) // count]]
-            cost = prices.unsupported / evidence.area * areas[mine].sum() / max(count, 1)
-            self._rows[program] = _Row(covered[k], interior[k], samples, count, float(cost), float(price[k]))
+        number = np.bincount(owners, minlength=len(candidates))[:, None]
+        sampled, slot = np.minimum(number, WORD), np.arange(WORD)
+        index = np.cumsum(number)[:, None] - number + slot * number // np.maximum(sampled, 1)
+        samples = np.vstack([points, np.full((1, 3), AWAY)])[np.where(slot < sampled, index, -1)]
+        cost = np.bincount(owners, areas, len(candidates)) / np.maximum(sampled[:, 0], 1)
+        return [covered, interior, samples, sampled[:, 0], prices.unsupported / evidence.area * cost, price]
 
 
 def centred(scene: Scene, candidates: Sequence[Program]) -> npt.NDArray[np.int64]:

@@ -285,9 +285,29 @@ def test_a_board_without_a_role_is_a_bar_without_one():
     assert format_program(sp.parse(text)) == text
 
 
-def test_upright_boards_stay_boards():
-    upright = sp.parse("back(board(at=(1, 4, 2), size=(9, 0.8, 14), tilt=0.5))")
-    assert between_ends(upright) == upright
+def test_nearly_upright_boards_and_bars_are_boxes():
+    for part in ("board(at=(1, 4, 2), size=(9, 0.8, 14), tilt=0.5)", "bar(start=(1, 4, 2), end=(1.1, 4, 9), section=(1, 2))"):
+        upright = sp.parse(f"back({part})")
+        (box,) = between_ends(upright).walk()
+        assert isinstance(box, Draw)
+        assert (box.name, box.word) == ("box", "back")
+        points = unroll(upright).sample(500, torch.Generator().manual_seed(0))
+        assert unroll(between_ends(upright)).distance(points).abs().max() < 0.12
+
+
+def test_a_panel_that_leans_sideways_is_a_bar_upwards():
+    panel = sp.parse("side(bar(start=(4, -6, 5), end=(4, 6, 5), section=(8, 0.4), turn=10))")
+    (bar,) = between_ends(panel).walk()
+    assert isinstance(bar, Draw)
+    assert bar.values[-1] == 0
+    assert abs(bar.values[3] - bar.values[0]) > 7
+    points = unroll(panel).sample(500, torch.Generator().manual_seed(0))
+    assert unroll(between_ends(panel)).distance(points).abs().max() < 1e-4
+
+
+def test_a_board_that_leans_a_little_stays_a_board():
+    leaning = sp.parse("back(board(at=(1, 4, 2), size=(20, 0.8, 14), tilt=0.9))")
+    assert between_ends(leaning) == leaning
 
 
 def test_a_rail_stays_on_a_back_that_leans_when_the_chair_grows():

@@ -59,7 +59,11 @@ def tilted_board(box: Box) -> Iterator[list[float]]:
 
 def straight_bar(box: Box) -> Iterator[list[float]]:
     """Two ends, section and turn, of a box along its longest side."""
-    long = int(box.half.argmax())
+    yield bar_along(box, int(box.half.argmax()))
+
+
+def bar_along(box: Box, long: int) -> list[float]:
+    """Two ends, section and turn, of a box along one of its axes."""
     start, end = _ends(box, long)
     along = (end - start) / max(float(np.linalg.norm(end - start)), 1e-9)
     main = int(np.abs(along).argmax())
@@ -70,7 +74,7 @@ def straight_bar(box: Box) -> Iterator[list[float]]:
     far = sides[0] if nearest == sides[1] else sides[1]
     x, y = box.rotation[:, nearest] @ first, box.rotation[:, nearest] @ second
     turn = np.degrees(np.arctan2(y * np.sign(x), abs(x))) * (-1 if main == DEPTH else 1)
-    yield [*start, *end, 2 * box.half[nearest], 2 * box.half[far], float(turn)]
+    return [*start, *end, 2 * box.half[nearest], 2 * box.half[far], float(turn)]
 
 
 def upright_cylinder(box: Box) -> Iterator[list[float]]:

@@ -76,6 +76,7 @@ class TieSettings:
     repeated: float = 0.3  # operators that every use of a sum after the first is worth, as it can be named
     gap: float = 0.25  # neighbours divide a box if the gap between them is at most this share of their size
     divided: float = 2.0  # least size of such neighbours
+    upright: float = 0.12  # cells by which the ends of an upright part may be off its axis
     leaning: float = 1.0  # angle from which a board is written as a bar, which has no left and right side,
     board_off: float = 0.5  # if it is off the middle by no more than this
     board_wide: float = 12.0  # or is no wider than this

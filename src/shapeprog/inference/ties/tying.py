@@ -8,8 +8,7 @@ then named.
 
 from __future__ import annotations
 
-import math
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 
 import numpy as np
 import torch
@@ -18,6 +17,7 @@ from shapeprog.errors import ShapeProgError
 from shapeprog.geometry.arrays import one_tensor_thread
 from shapeprog.geometry.mesh import pieces_of_parts
 from shapeprog.inference.budget import Progress
+from shapeprog.inference.candidates.drawings import solid_boxes
 from shapeprog.inference.fit.joints import find_joints
 from shapeprog.inference.fit.tunable import CELLS
 from shapeprog.inference.surface.evidence import Evidence
@@ -31,11 +31,12 @@ from shapeprog.inference.ties.text import written
 from shapeprog.language.ast import Draw, Fault, Line, Source, changed_lines
 from shapeprog.language.convert import placed
 from shapeprog.language.evaluate import evaluated
+from shapeprog.language.hints import bar_along
 from shapeprog.language.merging import merged
 from shapeprog.language.parameters import to_float32
 from shapeprog.language.program import Program
 from shapeprog.language.unroll import unroll
-from shapeprog.space import Array, FloatArray
+from shapeprog.space import SIDE, UP, Array, FloatArray
 
 
 def tie(
@@ -147,25 +148,35 @@ class _Ties:
 
 
 def between_ends(program: Program) -> Program:
-    """The same parts, boards that lean about the left-right axis as bars between the middles of their ends.
+    """The same parts, nearly upright ones as boxes, and boards that lean as bars between the middles of their ends.
 
     A board is given by its lower edge and its angle; its upper edge is not linear in these numbers, so nothing could be
-    tied to it.
+    tied to it.  A panel that leans sideways is a bar upwards, without a turn about itself.
     """
     return Program(changed_lines(program.body, _between_ends))  # type: ignore[arg-type]
 
 
 def _between_ends(node: Line) -> Line:
-    if not isinstance(node, Draw) or node.name != "board" or abs(node.values[-1]) < TIES.leaning:
+    if not isinstance(node, Draw) or node.name not in ("board", "bar"):
         return node
-    *corner, side, high, deep, wide, tilt = node.values
-    middle = side + wide / 2
-    if abs(middle) > TIES.board_off and wide > TIES.board_wide:
+    ((box,),) = solid_boxes([node])
+    main = np.abs(box.rotation).argmax(0)  # the axes of the grid that its own run along most
+    off = box.half * np.linalg.norm(np.where(main == np.arange(3)[:, None], 0.0, box.rotation), axis=0)
+    if off.max() < TIES.upright and len({*main}) == 3:
+        half = box.half[np.argsort(main)]
+        return _drawn("box", [*(box.centre - half), *(2 * half)], node)
+    if abs(node.values[-1]) < TIES.leaning:
         return node
-    sin, cos = math.sin(math.radians(tilt)), math.cos(math.radians(tilt))
-    along, across = np.array([cos, sin]), np.array([-sin, cos])  # up and depth
-    if high < deep:
-        along, across, high, deep = across, along, deep, high
-    start = corner + across * deep / 2
-    values = (*start, middle, *(start + along * high), middle, deep, wide, 0.0)
-    return Draw("bar", tuple(to_float32(value) for value in values), node.role)
+    rising = int(np.abs(box.rotation[UP]).argmax())
+    if node.name == "bar":
+        values, flat = bar_along(box, rising), box.half[rising] == box.half.min()
+        return node if flat or abs(values[-1]) >= TIES.leaning else _drawn("bar", [*values[:-1], 0.0], node)
+    side = int(np.abs(box.rotation[SIDE]).argmax())
+    if abs(box.centre[SIDE]) > TIES.board_off and 2 * box.half[side] > TIES.board_wide:
+        return node
+    long = int(np.where(np.arange(3) == side, 0.0, box.half).argmax())
+    return _drawn("bar", [*bar_along(box, long)[:-1], 0.0], node)
+
+
+def _drawn(name: str, values: Sequence[float], node: Draw) -> Draw:
+    return Draw(name, tuple(map(to_float32, values)), node.role)

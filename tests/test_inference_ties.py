@@ -286,7 +286,10 @@ def test_a_board_without_a_role_is_a_bar_without_one():
 
 
 def test_nearly_upright_boards_and_bars_are_boxes():
-    for part in ("board(at=(1, 4, 2), size=(9, 0.8, 14), tilt=0.5)", "bar(start=(1, 4, 2), end=(1.1, 4, 9), section=(1, 2))"):
+    for part in (
+        "board(at=(1, 4, 2), size=(9, 0.8, 14), tilt=0.5)",
+        "bar(start=(1, 4, 2), end=(1.1, 4, 9), section=(1, 2))",
+    ):
         upright = sp.parse(f"back({part})")
         (box,) = between_ends(upright).walk()
         assert isinstance(box, Draw)

@@ -1,8 +1,8 @@
 """Relations between the numbers of a placed program: zero, equal, in contact, straight, symmetric.
 
 Only quantities of one kind are related: a clearance with a clearance of the same anchor, a size with a size, a radius
-with a radius.  Most relations are written with one name used twice.  Faces that meet may need a sum, and an angle may
-be the negative of another.  Those whose price in fit is below that of the number they save are selected.
+with a radius.  Most relations are written with one name used twice; faces that meet may need a sum.  Those whose price
+in fit is below that of the number they save are selected.
 """
 
 from __future__ import annotations
@@ -178,7 +178,6 @@ def _of_numbers(layout: Layout, numbers: FloatArray) -> Iterator[Relation]:
         larger, equal = max(numbers[a], numbers[b]), Relation(eye[a] - eye[b], TIES.equal)
         if slot.kind == "angle" and slot.word == other.word:
             yield equal._replace(limit=TIES.degrees)
-            yield Relation(eye[a] + eye[b], TIES.equal / 2, limit=TIES.degrees)
         elif slot.kind == "clearance":
             corner = slot.line == other.line and {slot.axis, other.axis} == {0, 1}
             if corner and TIES.within < min(numbers[a], numbers[b]) and larger < TIES.section:
@@ -262,14 +261,8 @@ def _pair(layout: Layout, face: _Face, other: _Face, touching: set[tuple[int, in
         elif single:
             yield Relation(row, TIES.straight if lines[0] == lines[1] else TIES.equal)
     else:
-        if axis > 0 and any(_leans(layout, line) for line in lines):
-            return
         meet = face.facing * other.facing == -1
         if touches and (meet or all(points) or bool(face.facing) != bool(other.facing)):
             yield Relation(row, TIES.contact, frozenset([(lines[0], lines[1], axis)] if meet else ()))
         elif face.facing == other.facing and (single or touches):
             yield Relation(row, TIES.equal if single else TIES.equal / 2)
-
-
-def _leans(layout: Layout, line: int) -> bool:
-    return abs(float(dict(layout.lines[line].keywords).get("tilt", 0.0))) >= TIES.degrees  # type: ignore[arg-type]

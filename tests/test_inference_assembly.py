@@ -54,7 +54,7 @@ def whole(text: str) -> Shape:
 
 def assembled(shape: Shape, **options) -> Assembly:
     """A program for a shape, from its own surface."""
-    return assemble(shape, Coverage(evidence_of(shape, options.get("seed", 0))), **options)
+    return assemble(Coverage(evidence_of(shape, options.get("seed", 0))), **options)
 
 
 def apart(text: str) -> Shape:

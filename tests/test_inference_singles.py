@@ -57,7 +57,9 @@ def test_a_statement_of_a_users_own_stands_for_the_legs_of_a_table(hinted: bool)
     with using(without_the_paper()) as own:
         example = LANGUAGE["cone_leg"]
         own.register(replace(example, hint=example.hint if hinted else None))
-        legs = [node for node in single_candidates(find_pieces(shape_of(TABLE))) if node.name == "cone_leg"]
+        legs = [
+            node for node in single_candidates(find_pieces(evidence_of(shape_of(TABLE)))) if node.name == "cone_leg"
+        ]
         right = [leg.values for leg in legs if np.allclose(leg.values[3:], (14, 0.6, 1.2), atol=0.3)]
         for depth, side in ((6.5, 9.5), (6.5, -9.5), (-6.5, 9.5), (-6.5, -9.5)):
             assert any(np.allclose(values[:3], (-7.75, depth, side), atol=0.2) for values in right)
@@ -67,7 +69,7 @@ def test_every_leg_of_a_planted_table_is_a_statement_of_a_users_own_without_a_hi
     with using(without_the_paper()) as own:
         own.register(replace(LANGUAGE["cone_leg"], hint=None))
         shape = shape_of(TABLE)
-        found = assemble(shape, Coverage(evidence_of(shape))).program
+        found = assemble(Coverage(evidence_of(shape))).program
         (legs,) = (chain for chain in found.chains if chain[-1].name == "cone_leg")
         assert [loop.name for loop in legs[:-1]] == ["mirror", "mirror"]
         assert found.blocks == 2

@@ -14,7 +14,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from shapeprog.data.shape import Shape
 from shapeprog.inference.budget import NEVER, Deadline, Progress
 from shapeprog.inference.candidates.drawings import canonical_side, simplest
 from shapeprog.inference.candidates.loops import distinct, images, repeated, rows
@@ -26,6 +25,7 @@ from shapeprog.inference.choice.coverage import Coverage, CoverageTable
 from shapeprog.inference.fit.adjustment import adjust, tidy
 from shapeprog.inference.pieces.pieces import Source, find_pieces
 from shapeprog.inference.roles.roles import in_order, separated, with_roles
+from shapeprog.inference.surface.evidence import Evidence
 from shapeprog.language.free import numbers
 from shapeprog.language.hints import STRAIGHT, Box
 from shapeprog.language.program import Node, Program
@@ -47,7 +47,6 @@ class Assembly(NamedTuple):
 
 
 def assemble(
-    shape: Shape,
     coverage: Coverage,
     *,
     blocks: int = 10,
@@ -55,12 +54,12 @@ def assemble(
     deadline: Deadline = NEVER,
     progress: Progress | None = None,
 ) -> Assembly:
-    """A program of at most ``blocks`` blocks for a shape; the same for the same seed.
+    """A program of at most ``blocks`` blocks for a target; the same for the same seed.
 
     Parameters
     ----------
-    shape, coverage
-        A mesh or a point cloud, and the coverage of its surface with the prices of text.
+    coverage
+        The coverage of the surface of a mesh or a point cloud, with the prices of text.
     blocks
         Most blocks of the program.
     seed
@@ -70,7 +69,7 @@ def assemble(
     """
     evidence, report = coverage.evidence, progress or (lambda step, share: None)
     report("finding structure", 0.1)
-    candidates = _candidates(shape)
+    candidates = _candidates(evidence)
     if not candidates or evidence.area <= 0:
         return Assembly(Program(), 0.0, "")
     report("finding structure", 0.7)
@@ -87,9 +86,9 @@ def assemble(
     return Assembly(program, share, _reason(count, blocks, share, more - share, others))
 
 
-def _candidates(shape: Shape) -> list[Node]:
-    """Single blocks for the pieces of a shape, the most important first, and loops over copies of them."""
-    pieces = find_pieces(shape)
+def _candidates(evidence: Evidence) -> list[Node]:
+    """Single blocks for the pieces of a target, the most important first, and loops over copies of them."""
+    pieces = find_pieces(evidence)
     singles = distinct(single_candidates(pieces))
     upright = (np.abs(pieces.boxes.rotation).max(1) >= STRAIGHT).all(1)
     components = pieces.boxes.take(upright & (pieces.source == Source.COMPONENT.value))

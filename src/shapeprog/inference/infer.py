@@ -171,7 +171,7 @@ def infer(
     coverage = Coverage(evidence, replace(usual, **prices))
     if statements == "all" and target.points is not None:
         program, scores["explained"], reason = assemble(
-            target, coverage, blocks=blocks, seed=seed, deadline=refining, progress=progress
+            coverage, blocks=blocks, seed=seed, deadline=refining, progress=progress
         )
     if not program.body:  # voxels, the statements of the paper, or a surface that gave no program
         limits = settings or Settings()

@@ -12,15 +12,15 @@ from typing import NamedTuple
 import numpy as np
 
 from shapeprog.data.sampling import sample_with_faces
-from shapeprog.data.shape import Shape
 from shapeprog.inference.pieces.limbs import limbs
 from shapeprog.inference.pieces.oriented import Boxes, boxes_around, distinct, groups, join
 from shapeprog.inference.pieces.patches import planar_patches, sheets, slabs
 from shapeprog.inference.pieces.point_kernels import near_boxes
 from shapeprog.inference.pieces.rods import rods
 from shapeprog.inference.pieces.settings import SETTINGS
-from shapeprog.inference.surface.cloud import Cloud, cloud_of, is_clean, points_of_scan
-from shapeprog.inference.surface.components import Components, IntArray, components, face_normals
+from shapeprog.inference.surface.cloud import Cloud, cloud_of, denoised, is_clean
+from shapeprog.inference.surface.components import Components, IntArray, face_normals
+from shapeprog.inference.surface.evidence import Evidence
 
 
 class Source(IntEnum):
@@ -73,19 +73,16 @@ class Support:
         return np.array(selected, np.int64)
 
 
-def find_pieces(shape: Shape) -> Pieces:
+def find_pieces(evidence: Evidence) -> Pieces:
     """Pieces of a mesh or a point cloud.
 
     Pieces of a greedy selection are first, then components, then groups, rods and limbs, then slabs and sheets; within
     each class, pieces that explain more points are first.
     """
-    if shape.vertices is not None and shape.faces is not None and len(shape.faces):
-        mesh = components(shape.vertices, shape.faces)
-        if len(mesh.area):
-            return _of_mesh(mesh)
-    points = points_of_scan(shape)
-    cloud = cloud_of(points)
-    return _ranked(cloud, _of_points(cloud, limbs(cloud) if is_clean(points) else join([])))
+    if evidence.mesh is not None:
+        return _of_mesh(evidence.mesh)
+    cloud = denoised(cloud_of(evidence.surface))
+    return _ranked(cloud, _of_points(cloud, limbs(cloud) if is_clean(evidence.surface) else join([])))
 
 
 def _of_mesh(mesh: Components) -> Pieces:

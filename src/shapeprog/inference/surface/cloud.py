@@ -39,26 +39,9 @@ class Cloud(NamedTuple):
 def cloud_of(points: Array, normals: Array | None = None) -> Cloud:
     """The cloud of points in cells, at least one.
 
-    Without normals, they are estimated from planes through nearest neighbours; noisy points are first projected onto
-    these planes.
+    Without normals, they are those of planes through nearest neighbours, and noise is the distance from these planes;
+    else it is that from the planes of neighbours with similar normals.
     """
-    cloud = _cloud(points, normals)
-    return _cloud(projected(cloud.points), None) if normals is None and cloud.noise > SURFACE.noisy else cloud
-
-
-def projected(points: FloatArray) -> FloatArray:
-    """Points (N, 3) projected repeatedly onto weighted planes through their neighbours (Alexa et al. 2003)."""
-    for _ in range(2):
-        distance, neighbours = cKDTree(points).query(points, k=min(24, len(points)))
-        normals, _ = planes(points, neighbours)
-        weight = np.exp(-((distance / np.maximum(distance[:, -1:] / 2, SURFACE.closest)) ** 2))[..., None]
-        middle = (points[neighbours] * weight).sum(1) / weight.sum(1)
-        points = points - ((points - middle) * normals).sum(1)[:, None] * normals
-    return points
-
-
-def _cloud(points: Array, normals: Array | None) -> Cloud:
-    """The cloud of points as they are: noise is their distance from planes, or from those of similar normals."""
     points = np.ascontiguousarray(points, np.float64)
     around = (SURFACE.around if normals is None else SURFACE.nearest) + 1
     distance, neighbours = cKDTree(points).query(points, k=range(1, min(around, len(points)) + 1), workers=2)
@@ -72,6 +55,22 @@ def _cloud(points: Array, normals: Array | None) -> Cloud:
         off = np.abs(np.einsum("nki,ni->nk", points[nearest] - points[:, None], normals))[parallel]
         noise = np.median(off) if len(off) else 0.0
     return Cloud(points, normals, np.ascontiguousarray(nearest, np.int32), spacing, float(noise))
+
+
+def denoised(cloud: Cloud) -> Cloud:
+    """A noisy cloud projected onto planes; others as they are."""
+    return cloud_of(projected(cloud.points)) if cloud.noise > SURFACE.noisy else cloud
+
+
+def projected(points: FloatArray) -> FloatArray:
+    """Points (N, 3) projected repeatedly onto weighted planes through their neighbours (Alexa et al. 2003)."""
+    for _ in range(2):
+        distance, neighbours = cKDTree(points).query(points, k=min(24, len(points)))
+        normals, _ = planes(points, neighbours)
+        weight = np.exp(-((distance / np.maximum(distance[:, -1:] / 2, SURFACE.closest)) ** 2))[..., None]
+        middle = (points[neighbours] * weight).sum(1) / weight.sum(1)
+        points = points - ((points - middle) * normals).sum(1)[:, None] * normals
+    return points
 
 
 def planes(points: FloatArray, neighbours: npt.NDArray[np.int64]) -> tuple[FloatArray, FloatArray]:

@@ -51,6 +51,8 @@ class Evidence:
         Cells (R, R, R) of the cube of the grid that are known to be free; other space may be free or not.
     parts
         Low and high corners (K, 2, 3) of the boxes of components of simple form, the 64 largest at most; none of scans.
+    mesh
+        The components of the target, if it is a mesh.
     """
 
     points: FloatArray
@@ -66,6 +68,7 @@ class Evidence:
     area: float
     free: Flags
     parts: FloatArray
+    mesh: Components | None = None
 
 
 def evidence_of(shape: Shape, seed: int = 0) -> Evidence:
@@ -103,7 +106,7 @@ def _of_mesh(mesh: Components, seed: int) -> Evidence:
         points, facing, weights / weights.sum(), oriented, SURFACE.tolerance, SURFACE.agreement,
         surface, normals, sides[face] != 0, _reach(SURFACE.tolerance, area, SURFACE.surface),
         area * float(weights.mean()), _free_cells(coarse, surface, through=False),
-        simple_parts(mesh, sides, face[: SURFACE.points][front | back])[:64],
+        simple_parts(mesh, sides, face[: SURFACE.points][front | back])[:64], mesh,
     )  # fmt: skip
 
 

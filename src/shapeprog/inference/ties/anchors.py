@@ -17,9 +17,9 @@ import numpy as np
 import torch
 
 from shapeprog.geometry.primitive import SIZES
-from shapeprog.geometry.separation import gaps, normals, touching
-from shapeprog.inference.ties.elements import ALIGNED, HIGH, LOW, MIDDLE, Anchors, Element, Key
-from shapeprog.inference.ties.model import Model, boxes_of, viewed
+from shapeprog.geometry.separation import touching
+from shapeprog.inference.ties.elements import HIGH, LOW, MIDDLE, Anchors, Element, Key
+from shapeprog.inference.ties.model import Model, boxes_of
 from shapeprog.inference.ties.settings import TIES
 from shapeprog.language.placement import AXES
 from shapeprog.space import Array, FloatArray
@@ -32,37 +32,24 @@ class _Motion:
     def __init__(self, model: Model) -> None:
         self.layout = model.layout
         scene, rows = model.poses(model.numbers)
-        size, centre, rotation = np.split(rows.numpy(), [SIZES, SIZES + 3], 1)
-        steps = 0.3 * torch.eye(SIZES, dtype=scene.size.dtype)
-        wider = np.stack(
-            [(replace(scene, size=scene.size + step).bounds - scene.bounds).numpy() / 0.3 for step in steps]
-        )
-        edges = np.einsum("niap,na->naip", rotation.reshape(-1, 3, 3, rotation.shape[2]), scene.bounds.numpy())
-        edges += np.einsum("nia,sna,nsp->naip", scene.rotation.numpy(), wider, size)
-        slopes = np.concatenate([centre[:, None], edges], 1)
-        self.slopes = viewed(slopes.swapaxes(2, 3)).swapaxes(2, 3)  # of centres and edges (N, 4, 3, P)
-        boxes = boxes_of(scene)
-        self.vectors = np.concatenate([boxes.centre[:, None], boxes.edges], 1)  # centres and edges (N, 4, 3)
-        reach = np.abs(boxes.edges).sum(1)
-        reach_slopes = (np.sign(boxes.edges)[..., None] * self.slopes[:, 1:]).sum(1)
+
+        def ends(change: torch.Tensor) -> FloatArray:
+            """The low and high ends (2, 3, N) of the boxes where sizes, centres and rotations change (N, 16)."""
+            size, centre, rotation = change.split([SIZES, 3, 9], 1)
+            boxes = boxes_of(replace(
+                scene, size=scene.size + size, centre=scene.centre + centre,
+                rotation=scene.rotation + rotation.reshape(-1, 3, 3),
+            ))  # fmt: skip
+            reach = np.abs(boxes.edges).sum(1)
+            return np.stack([boxes.centre - reach, boxes.centre + reach]).swapaxes(1, 2)
+
         scale, (width, depth, _) = self.layout.source.scale, self.layout.extents
         assert scale is not None
-        middle = boxes.centre - [-width / 2, scale.middle - depth / 2, scale.floor]
-        # Low and high ends of the boxes from the low sides of the whole (2, 3, N), and their slopes (2, 3, N, P)
-        self.ends: FloatArray = np.stack([middle - reach, middle + reach]).swapaxes(1, 2)
-        self.end_slopes = np.stack([self.slopes[:, 0] - reach_slopes, self.slopes[:, 0] + reach_slopes]).swapaxes(1, 2)
-        self.first, self.second = touching(boxes, TIES.touch)  # pairs (C,)
-        turned = ((scene.rotation - scene.rotation.round()).abs().amax((1, 2)) > ALIGNED).numpy()
-        self.leaning = turned[self.first] | turned[self.second]  # which of these, L pairs
-        pairs = self.first[self.leaning], self.second[self.leaning]
-        # Directions (L, 15, 3) along which these may be separated, and their gaps (L,)
-        self.normals, self.apart = normals(boxes, *pairs), gaps(boxes, *pairs)
-
-    def projections(self, vectors: FloatArray) -> FloatArray:
-        """Centres and edges (N, 4, 3, ...) of boxes as distances of centres and edges (L, 15, 7, ...) along normals."""
-        first, second = (vectors[slots[self.leaning]] for slots in (self.first, self.second))
-        moves = np.concatenate([second[:, :1] - first[:, :1], first[:, 1:], second[:, 1:]], 1)
-        return np.einsum("lki,lvi...->lkv...", self.normals, moves, optimize=True)
+        corner = np.array([-width / 2, scale.middle - depth / 2, scale.floor])[:, None]
+        self.ends = ends(0 * rows[..., 0]) - corner  # from the low sides of the whole
+        changes = (1e-3 * rows).unbind(-1)
+        self.end_slopes = np.stack([(ends(change) - ends(-change)) / 2e-3 for change in changes], -1)  # (2, 3, N, P)
+        self.first, self.second = touching(boxes_of(scene), TIES.touch)  # pairs (C,)
 
     def by_element(self, elements: list[Element], slopes: FloatArray) -> FloatArray:
         """Slopes (..., P) by the numbers as those by the low and high coordinate of elements (..., K, 2)."""
@@ -102,11 +89,7 @@ class _AxisAnchors:
         slopes = motion.by_element(self.elements, motion.end_slopes[:, axis])  # (2, N, K, 2)
         self.slopes = slopes.reshape(*slopes.shape[:2], -1).swapaxes(1, 2)  # (2, 2 K, N)
         # Mirror images move with the high side of the whole while all coordinates stay.
-        self.base, growth = motion.end_slopes[:, axis, :, axis] + 0.5, TIES.growth * extent
-        base = motion.projections(motion.vectors + growth * motion.slopes[..., axis])  # (L, 15, 7)
-        by_element = growth * motion.projections(motion.by_element(self.elements, motion.slopes))  # (L, 15, 7, K, 2)
-        forms = np.concatenate([base[..., None], by_element.reshape(*base.shape, 2 * count)], -1)
-        self.forms, self.limits = forms.reshape(-1, 1 + 2 * count), np.maximum(motion.apart, 0) + TIES.touch
+        self.base = motion.end_slopes[:, axis, :, axis] + 0.5
         low, high = motion.ends[:, axis]
         self.share, self.long = motion.ends[:, axis] / extent, high - low >= TIES.spanning * extent
         reach, near = TIES.reach * extent, (1 - TIES.beyond) * extent / 2
@@ -204,11 +187,7 @@ class _AxisAnchors:
         growth = TIES.growth * self.extent
         below, above = motion.ends[:, self.axis]
         grown = self._overlaps(below + growth * low, above + growth * high)
-        per_copy += TIES.separated * (grown < np.minimum(self.overlap, 0) - TIES.touch)[:, ~motion.leaning].sum(1)
-        along = np.abs(self.forms @ np.concatenate([np.ones((1, len(states))), flat.T]))
-        along = along.reshape(len(self.limits), 15, 7, len(states))
-        apart = (along[:, :, 0] - along[:, :, 1:].sum(2)).max(1)
-        per_copy += TIES.separated * (apart > self.limits[:, None]).sum(0)
+        per_copy += TIES.separated * (grown < np.minimum(self.overlap, 0) - TIES.touch).sum(1)
         return cost + per_copy / max(1.0, low.shape[1] / len(elements))
 
 

@@ -138,12 +138,6 @@ def closeness(scene: Scene, evidence: Evidence, seed: int) -> float:
 
 
 def boxes_of(scene: Scene) -> OrientedBoxes:
-    """The boxes around the primitives of a scene (N,), for a person in front of the whole."""
+    """The boxes around the primitives of a scene (N,), for a person in front: to the right, to the rear, upwards."""
     edges = scene.rotation.transpose(1, 2) * scene.bounds[..., None]
-    return OrientedBoxes(viewed(scene.centre.numpy()), viewed(edges.numpy()))
-
-
-def viewed(vectors: FloatArray) -> FloatArray:
-    """Vectors (..., 3) along the axes of the grid as those of a person in front: to the right, to the rear, upwards."""
-    result: FloatArray = vectors[..., ::-1] * [-1, 1, 1]
-    return result
+    return OrientedBoxes(*(vectors.numpy()[..., ::-1] * [-1, 1, 1] for vectors in (scene.centre, edges)))

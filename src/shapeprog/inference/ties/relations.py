@@ -96,6 +96,7 @@ def worthwhile(
     *,
     fixed: FloatArray,
     low: FloatArray,
+    lengths: FloatArray | None = None,
     far: FloatArray | float = np.inf,
 ) -> tuple[FloatArray, FloatArray]:
     """The selected relations (M, V), those that are fixed first; and the optimum (V,) where they hold.
@@ -113,15 +114,18 @@ def worthwhile(
         Price of a number, in the unit of the misfit.
     fixed
         Relations (M, V) that hold in any case.
-    low
-        Lower bounds of the numbers (V,), which no relation may violate.
+    low, lengths
+        Lower bounds (F,) of the products of these rows (F, V) with the numbers, by default of the numbers themselves;
+        no relation may violate them.
     far
         Farthest that relations together may move a number (V,): the quadratic model is valid near the optimum alone.
     """
     rows: FloatArray = np.array([*fixed, *(relation.row for relation in candidates)]).reshape(-1, len(numbers))
     if not len(rows):
         return fixed, numbers
-    imposed, free, low, start = [*fixed], np.linalg.inv(curvature), np.minimum(low, numbers), numbers
+    imposed, free, start = [*fixed], np.linalg.inv(curvature), numbers
+    lengths = np.eye(len(numbers)) if lengths is None else lengths
+    low = np.minimum(low, lengths @ numbers) - HOLDS
     axes: FloatArray = np.linalg.qr(fixed.T)[0].T
     meeting = [(k, *pair) for k, relation in enumerate(candidates, len(fixed)) for pair in relation.meetings]
     edges = 0
@@ -142,7 +146,12 @@ def worthwhile(
         edges_then = _edges(meeting, (spread_then <= minimum) & (np.abs(off_then) < HOLDS))
         if best >= len(fixed):
             new = beside(rows[best], axes)
-            if new is None or (moved < low).any() or (np.abs(moved - start) > far).any() or edges_then > edges:
+            if (
+                new is None
+                or (lengths @ moved < low).any()
+                or (np.abs(moved - start) > far).any()
+                or edges_then > edges
+            ):
                 spread[best] = 0.0
                 continue
             imposed.append(rows[best])

@@ -139,8 +139,10 @@ class _Ties:
                 offered = [relation for relation in offered if relation.trust in (TIES.contact, TIES.floor)]
             before = len(rows)
             _, curvature = self.misfit.at(numbers, TIES.draws)
-            far = TIES.far / self.misfit.reach
-            rows, optimum = worthwhile(offered, numbers, curvature, price, fixed=rows, low=self.model.low, far=far)
+            rows, optimum = worthwhile(
+                offered, numbers, curvature, price, fixed=rows, low=self.model.low, lengths=self.model.lengths,
+                far=TIES.far / self.misfit.reach,
+            )  # fmt: skip
             if step and len(rows) == before:
                 break
             numbers = self.misfit.refitted(optimum, rows)

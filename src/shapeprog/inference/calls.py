@@ -17,7 +17,7 @@ import numpy as np
 
 from shapeprog.errors import ShapeProgError
 from shapeprog.inference.choice.choice import value
-from shapeprog.inference.choice.connecting import afloat
+from shapeprog.inference.choice.connecting import floating
 from shapeprog.inference.choice.coverage import Coverage
 from shapeprog.inference.fit.tunable import CELLS, least
 from shapeprog.language.ast import Call, Source
@@ -84,14 +84,14 @@ def with_calls(program: Program, libraries: Sequence[Library], coverage: Coverag
     candidates = [candidate for pattern in patterns for candidate in _candidates(pattern, options)]
     candidates.sort(key=lambda candidate: (-len(candidate.replaced), candidate.difference))
     table = coverage.table([*(Program((node,)) for node in nodes), *(candidate.program for candidate in candidates)])
-    selected, drawn, loose = frozenset(range(len(nodes))), set[int](), afloat(Program(tuple(nodes)))
+    selected, drawn, loose = frozenset(range(len(nodes))), set[int](), len(floating(Program(tuple(nodes))))
     for index, candidate in enumerate(candidates, len(nodes)):
         trial = selected.difference(candidate.replaced) | {index}
         if not selected.issuperset(candidate.replaced) or value(table, (*trial,)) < value(table, (*selected,)) - LOSS:
             continue
         moved = dict(zip(candidate.replaced, _with_one_role(candidate, nodes), strict=True))
         together = [moved.get(place, node) for place, node in enumerate(nodes)]
-        if afloat(Program(tuple(together))) <= loose:
+        if len(floating(Program(tuple(together)))) <= loose:
             nodes, selected, drawn = together, trial, drawn.union(moved)
     return Program(tuple(nodes)), frozenset(drawn)
 

@@ -16,7 +16,7 @@ from torch import Tensor
 from shapeprog.data.shape import Shape
 from shapeprog.errors import ShapeProgError
 from shapeprog.geometry.scene import Scene
-from shapeprog.inference.choice.connecting import afloat
+from shapeprog.inference.choice.connecting import floating
 from shapeprog.language.dimensions import in_unit, literal_lengths
 from shapeprog.language.parameters import to_float32
 from shapeprog.language.program import Program
@@ -65,10 +65,10 @@ def in_readable_unit(program: Program, unit: Unit | None) -> Program:
     exact = in_unit(program, unit)
     if not 0 < exact.size <= 256:  # rounding takes long for more primitives
         return exact
-    floating = afloat(program)
+    loose = len(floating(program))
     for tolerance in TOLERANCES[unit is None :]:
         result = _rounded(exact, tolerance)
-        if afloat(result) <= floating:
+        if len(floating(result)) <= loose:
             return result
     return exact
 

@@ -11,6 +11,7 @@ import numpy as np
 import torch
 
 from shapeprog.geometry.distance import signed_distance
+from shapeprog.geometry.scene import Scene
 from shapeprog.geometry.surface import sample_surface
 from shapeprog.inference.candidates.settings import SETTINGS
 from shapeprog.language.hints import Box
@@ -30,13 +31,13 @@ def is_unhinted(declared: Statement) -> bool:
 
 def drawings(box: Box) -> list[Draw]:
     """The drawings of a box by all statements that have a hint."""
-    return [drawing for declared in language() if declared.hint is not None for drawing in hinted(declared, box)]
+    return [drawing for declared in language() for drawing in hinted(declared, box)]
 
 
 def hinted(declared: Statement, box: Box) -> list[Draw]:
     """The drawings of a box by the hint of a statement; empty without a hint."""
-    values = [] if declared.hint is None else [np.array(numbers, np.float32) for numbers in declared.hint(box)]
-    return [Draw(declared.name, tuple(numbers.tolist())) for numbers in values]
+    values = () if declared.hint is None else declared.hint(box)
+    return [Draw(declared.name, tuple(np.array(numbers, np.float32).tolist())) for numbers in values]
 
 
 def starts(declared: Statement, box: Box) -> list[Draw]:
@@ -76,9 +77,14 @@ def redrawn(drawing: Draw, box: Box) -> list[Draw]:
     return hinted(language()[drawing.name], box) or drawings(box)
 
 
+def scene_of(nodes: Sequence[Node]) -> Scene:
+    """The scenes (B, N) of blocks, each on its own, in double precision."""
+    return unroll(encode([Program((node,)) for node in nodes], dtype=torch.float64))
+
+
 def solid_boxes(nodes: Sequence[Node]) -> list[list[Box]]:
     """The boxes around all solids of each block."""
-    scene = unroll(encode([Program((node,)) for node in nodes], dtype=torch.float64))
+    scene = scene_of(nodes)
     centre, rotation, half = (tensor.numpy() for tensor in (scene.centre, scene.rotation, scene.bounds))
     return [
         [Box(centre[row, slot], rotation[row, slot], half[row, slot]) for slot in np.flatnonzero(mask)]
@@ -108,19 +114,19 @@ def canonical_side(node: Node) -> Node:
 
     The block is unchanged if its statement cannot draw the mirror image, or if it has loops other than mirrors.
     """
-    if Program((node,)).blocks != 1:
-        return node
-    *loops, drawing = Program((node,)).chains[0]
+    ((*loops, drawing),) = Program((node,)).chains
     assert isinstance(drawing, Draw)
     (boxes,) = solid_boxes([drawing])
-    signs = np.ones(3)
-    for loop in loops:
-        if loop.name == "mirror" and loop.values[2] == 0 and boxes and boxes[0].centre[int(loop.values[1])] < 0:
-            signs[int(loop.values[1])] = -1
-    if (signs > 0).all() or len(boxes) != 1 or any(loop.name != "mirror" for loop in loops):
+    if len(boxes) != 1 or any(loop.name != "mirror" for loop in loops):
         return node
-    turn = signs[:, None] * boxes[0].rotation * [1, 1, signs.prod()]  # a box is its own image along its last axis
-    image = Box(signs * boxes[0].centre, turn, boxes[0].half)
+    (box,), signs = boxes, np.ones(3)
+    for _, axis, offset in (loop.values for loop in loops):
+        if offset == 0 and box.centre[int(axis)] < 0:
+            signs[int(axis)] = -1
+    if (signs > 0).all():
+        return node
+    turn = signs[:, None] * box.rotation * [1, 1, signs.prod()]  # a box is its own image along its last axis
+    image = Box(signs * box.centre, turn, box.half)
     candidates = [replace(candidate, role=drawing.role) for candidate in hinted(language()[drawing.name], image)]
     match = next(_drawing_the_same(candidates, drawing, signs), None)
     return node if match is None else nest((*loops, match))
@@ -130,9 +136,7 @@ def _drawing_the_same(candidates: Sequence[Draw], node: Node, signs: FloatArray)
     """The candidates whose surface equals that of a node, or of its mirror image by these signs of the coordinates."""
     if not candidates:
         return
-    scene = unroll(encode(Program((node,)), dtype=torch.float64))
-    sample = sample_surface(scene, SETTINGS.equal_points, torch.Generator().manual_seed(0))
+    sample = sample_surface(scene_of([node]), SETTINGS.equal_points, torch.Generator().manual_seed(0))
     points = sample.points.double() * torch.from_numpy(signs)
-    candidate_scene = unroll(encode([Program((candidate,)) for candidate in candidates], dtype=torch.float64))
-    off = signed_distance(candidate_scene, points.expand(len(candidates), -1, -1)).abs().amax(-1).tolist()
+    off = signed_distance(scene_of(candidates), points.expand(len(candidates), -1, -1)).abs().amax(-1).tolist()
     yield from (candidate for candidate, far in zip(candidates, off, strict=True) if far < SETTINGS.equal_distance)

@@ -21,14 +21,12 @@ from scipy.spatial.distance import cdist
 from shapeprog.geometry.distance import signed_distance
 from shapeprog.geometry.scene import Scene
 from shapeprog.geometry.surface import sample_surface
-from shapeprog.inference.candidates.drawings import drawings
+from shapeprog.inference.candidates.drawings import drawings, scene_of
 from shapeprog.inference.candidates.settings import SETTINGS
 from shapeprog.inference.fit.tunable import THINNEST
 from shapeprog.language.hints import Box
 from shapeprog.language.parameters import to_float32
 from shapeprog.language.program import Loop, Node, Program, nest
-from shapeprog.language.tensors import encode
-from shapeprog.language.unroll import unroll
 from shapeprog.space import DEPTH, SIDE, FloatArray
 
 MISSING = -1
@@ -68,21 +66,17 @@ class Profiles(NamedTuple):
 
 def profiles(nodes: Sequence[Node]) -> Profiles:
     """The profiles of blocks, at least one."""
-    scene = unroll(encode([Program((node,)) for node in nodes], dtype=torch.float64))
+    scene = scene_of(nodes)
     there = scene.mask[..., None]
     low, high = ((scene.centre + sign * scene.reach).where(there, -sign * torch.inf) for sign in (-1, 1))
     ends = torch.stack([low.amin(1), high.amax(1)]).nan_to_num(posinf=0, neginf=0)
     middle, half = ends.mean(0), (ends[1] - ends[0]) / 2
     signs = torch.cartesian_prod(*[torch.tensor([-1.0, 0.0, 1.0], dtype=torch.float64)] * 3)
     distance = signed_distance(scene, middle[:, None] + signs * half[:, None]).nan_to_num(0, 0, 0)
-    kind = np.unique([_kind(node) for node in nodes], return_inverse=True)[1]
+    chains = (Program((node,)).walk() for node in nodes)
+    names = [str([(node.name, isinstance(node, Loop) and node.count) for node in chain]) for chain in chains]
+    kind = np.unique(names, return_inverse=True)[1]
     return Profiles(kind, middle.numpy(), half.numpy(), distance.numpy())
-
-
-def _kind(node: Node) -> str:
-    if isinstance(node, Loop):
-        return f"{node.name} {node.count} {' '.join(_kind(inner) for inner in node.body)}"
-    return node.name
 
 
 def distinct(nodes: Sequence[Node]) -> list[Node]:
@@ -99,6 +93,11 @@ def distinct(nodes: Sequence[Node]) -> list[Node]:
 def loop_values(*numbers: float) -> tuple[float, ...]:
     """Numbers of a loop as float32 holds them."""
     return tuple(to_float32(number) + 0.0 for number in numbers)
+
+
+def mirror(axis: int) -> Loop:
+    """A loop without a body that mirrors about the middle of the shape along an axis."""
+    return Loop("mirror", (2.0, float(axis), 0.0), ())
 
 
 def mirrors(node: Node, axis: int) -> bool:
@@ -133,8 +132,8 @@ def _translated(node: Node, count: int, step: FloatArray) -> Loop:
     return Loop("translate", loop_values(count, *step.tolist()), (node,))
 
 
-def equal_steps(positions: FloatArray, half: FloatArray, least: int = 2) -> list[list[int]]:
-    """Runs of at least so many positions (N, 3) at equal steps, as indices, upwards or to the rear or to the left.
+def equal_steps(positions: FloatArray, half: FloatArray) -> list[list[int]]:
+    """Runs of two or more positions (N, 3) at equal steps, as indices, upwards or to the rear or to the left.
 
     A copy may be missing, as ``MISSING``, if most are present: the copy that fills the gap has no support, which lowers
     its score.  ``half`` (3,) are the half extents of a copy.
@@ -164,8 +163,8 @@ def equal_steps(positions: FloatArray, half: FloatArray, least: int = 2) -> list
     members = np.stack(run, 1)
     number, plain = (members >= 0).sum(1), np.logical_and.accumulate(members >= 0, 1).sum(1)
     enough = number >= np.maximum(SETTINGS.least_present, SETTINGS.present * (end + 1))
-    runs = [members[k, : plain[k]].tolist() for k in np.flatnonzero(forwards & (plain >= least))]
-    for k in np.flatnonzero((number <= end) & enough & (end + 1 >= least)):
+    runs = [members[k, : plain[k]].tolist() for k in np.flatnonzero(forwards)]
+    for k in np.flatnonzero((number <= end) & enough):
         row = members[k, : end[k] + 1]
         runs.append((row if forwards[k] else row[::-1]).tolist())
     return [list(members) for members in dict.fromkeys(map(tuple, runs))]
@@ -191,8 +190,8 @@ def rows(blocks: Sequence[Sequence[Box]]) -> Iterator[Node]:
         existing.add(key)
         middle, size = np.median(centre[members], 0), np.maximum(np.median(half[members], 0), THINNEST / 2)
         positions = np.where(across, middle, centre[members])
-        run = max(equal_steps(positions, size * ~across, SETTINGS.least_row), key=len, default=[])
-        if 0 < len(run) <= SETTINGS.most_row:
+        run = max(equal_steps(positions, size * ~across), key=len, default=[])
+        if SETTINGS.least_row <= len(run) <= SETTINGS.most_row:
             start, end = positions[run[0]], positions[run[-1]]
             for drawing in drawings(Box(start, np.eye(3), size)):
                 yield _translated(drawing, len(run), (end - start) / (len(run) - 1))
@@ -206,7 +205,7 @@ def images(nodes: Sequence[Node], surface: FloatArray) -> list[Node]:
     """
     if not nodes:
         return []
-    scene = unroll(encode([Program((node,)) for node in nodes], dtype=torch.float64))
+    scene = scene_of(nodes)
     points = sample_surface(scene, SETTINGS.image_points, torch.Generator().manual_seed(0)).points.numpy()
     tree = cKDTree(surface)
 
@@ -225,7 +224,7 @@ def images(nodes: Sequence[Node], surface: FloatArray) -> list[Node]:
         return index[on(image) >= least[index]] if len(index) else index
 
     one_sided = (points.min(1) > 0) | (points.max(1) < 0)
-    left, front = (Loop("mirror", loop_values(2, axis, 0), ()) for axis in (SIDE, DEPTH))
+    left, front = mirror(SIDE), mirror(DEPTH)
     side, depth = (np.flatnonzero(one_sided[:, axis]) for axis in (SIDE, DEPTH))
     side, depth = kept(side, points[side] * [1, 1, -1]), kept(depth, points[depth] * [1, -1, 1])
     four = np.intersect1d(side, depth)

@@ -18,7 +18,7 @@ from scipy.spatial import cKDTree
 
 from shapeprog.geometry.distance import signed_distance
 from shapeprog.inference.candidates.drawings import drawings, hinted, redrawn, solid_boxes
-from shapeprog.inference.candidates.loops import images, mirrors, repeated, rows
+from shapeprog.inference.candidates.loops import images, mirror, mirrors, repeated, rows
 from shapeprog.inference.candidates.settings import SETTINGS
 from shapeprog.inference.fit.tunable import THINNEST
 from shapeprog.inference.pieces.oriented import boxes_around
@@ -96,10 +96,9 @@ def _mirrored(chain: Chain) -> Iterator[Node]:
     """A block mirrored about the middle planes of the shape; and the same for the body of its first loop."""
     for axis in (SIDE, DEPTH):
         if not any(mirrors(node, axis) for node in chain):
-            mirror = Loop("mirror", (2.0, float(axis), 0.0), ())
-            yield nest((mirror, *chain))
+            yield nest((mirror(axis), *chain))
             if len(chain) > 1:
-                yield nest((mirror, *chain[1:]))
+                yield nest((mirror(axis), *chain[1:]))
 
 
 def _recounted(chain: Chain, box: Box) -> Iterator[Node]:

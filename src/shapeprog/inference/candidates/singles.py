@@ -18,7 +18,7 @@ from torch import Tensor
 
 from shapeprog.geometry.batch import Batch
 from shapeprog.geometry.distance import distance_and_slopes
-from shapeprog.inference.candidates.drawings import drawings, is_unhinted, starts
+from shapeprog.inference.candidates.drawings import drawings, is_unhinted, scene_of, starts
 from shapeprog.inference.candidates.settings import SETTINGS
 from shapeprog.inference.fit.tunable import STEP, THINNEST, least
 from shapeprog.inference.pieces.pieces import Pieces
@@ -28,7 +28,7 @@ from shapeprog.language.printer import numbers_written
 from shapeprog.language.program import Draw, Node, Program
 from shapeprog.language.statement import language
 from shapeprog.language.tensors import Code, encode
-from shapeprog.language.unroll import Plan, unroll
+from shapeprog.language.unroll import Plan
 from shapeprog.space import Array, FloatArray
 
 
@@ -122,8 +122,7 @@ def misfits(draws: Sequence[Draw], target: Target) -> FloatArray:
     """Misfit (B,) of each statement to its points: mean distance over ``SETTINGS.wrong`` plus 1 - the mean cosine."""
     if not draws:
         return np.zeros(0)
-    scene = unroll(encode([Program((node,)) for node in draws], dtype=torch.float64))
-    distance, _, slopes = distance_and_slopes(scene, target.points)
+    distance, _, slopes = distance_and_slopes(scene_of(draws), target.points)
     cosine = (slopes * target.normals).sum(-1).abs().mean(1)
     off = (distance.abs() / SETTINGS.wrong).clamp(max=1).mean(1) + 1 - cosine
     return off.nan_to_num(np.inf).numpy()

@@ -56,11 +56,6 @@ def floating(program: Program) -> list[int]:
     return [block for block, parts in enumerate(_loose_parts(program)) if any(parts)]
 
 
-def afloat(program: Program) -> int:
-    """How many blocks are ``floating``."""
-    return len(floating(program))
-
-
 @lru_cache(maxsize=64)
 def _loose_parts(program: Program) -> list[list[bool]]:
     """For every part of every block, whether it is outside the largest connected solid."""

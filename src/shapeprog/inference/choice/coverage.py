@@ -198,8 +198,7 @@ def centred(scene: Scene, candidates: Sequence[Program]) -> npt.NDArray[np.int64
 
 def parts_drawn(scene: Scene, evidence: Evidence) -> npt.NDArray[np.bool_]:
     """Which parts of a mesh (B, K) each candidate draws: a primitive has the same box, up to the tolerance."""
-    reach = (scene.rotation.abs() @ scene.bounds[..., None])[..., 0]
-    low, high = ((scene.centre + sign * reach).numpy() for sign in (-1, 1))
+    low, high = ((scene.centre + sign * scene.reach).numpy() for sign in (-1, 1))
     result = np.zeros((len(low), len(evidence.parts)), np.bool_)
     for k, mask in enumerate(scene.mask.numpy().T):
         boxes = np.stack([low[mask, k], high[mask, k]], 1)[:, None]

@@ -135,19 +135,16 @@ def _unharmed(adjusted: Program, start: Program, coverage: Coverage) -> Program:
     """
     count = len(start.body)
     shortened = [(index, node) for index, block in enumerate(adjusted.body) for node in shorter(block)]
-    union = [*adjusted.body, *start.body, *(node for _, node in shortened)]
-    table = _table(union, coverage)
+    options = [*enumerate(adjusted.body), *enumerate(start.body), *shortened]
+    table = _table([node for _, node in options], coverage)
     selected = tuple(range(count))
-    for index in range(count):
-        trial = (*selected[:index], count + index, *selected[index + 1 :])
-        if value(table, trial) > value(table, selected) + 0.005:
+    for option, (index, _) in enumerate(options[count:], count):
+        trial = (*selected[:index], option, *selected[index + 1 :])
+        restored, cheaper = option < 2 * count, table.prices[option] < table.prices[selected[index]]
+        least = value(table, selected) + (0.005 if restored else -0.001)
+        if (restored or cheaper) and value(table, trial) > least:
             selected = trial
-    for place, (index, _) in enumerate(shortened, 2 * count):
-        trial = (*selected[:index], place, *selected[index + 1 :])
-        cheaper = table.prices[place] < table.prices[selected[index]]
-        if cheaper and value(table, trial) > value(table, selected) - 0.001:
-            selected = trial
-    return Program(tuple(union[index] for index in selected))
+    return Program(tuple(options[option][1] for option in selected))
 
 
 def _table(nodes: Sequence[Node], coverage: Coverage) -> CoverageTable:

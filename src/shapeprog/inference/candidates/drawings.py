@@ -72,11 +72,6 @@ def _options(parameter: Parameter, box: Box) -> FloatArray:
     return np.unique(np.array(list(rows)).clip(quantity.low, quantity.high).round(3), axis=0)
 
 
-def redrawn(drawing: Draw, box: Box) -> list[Draw]:
-    """The drawings of another box by the same statement; by all statements if its hint gives none."""
-    return hinted(language()[drawing.name], box) or drawings(box)
-
-
 def scene_of(nodes: Sequence[Node]) -> Scene:
     """The scenes (B, N) of blocks, each on its own, in double precision."""
     return unroll(encode([Program((node,)) for node in nodes], dtype=torch.float64))

@@ -34,22 +34,12 @@ MISSING = -1
 
 
 class Profiles(NamedTuple):
-    """Profiles of candidates: equal for copies by translation, whatever the order of the axes of their solids.
+    """Profiles of candidates: equal for copies by translation, whatever the order of the axes of their solids."""
 
-    Parameters
-    ----------
-    kind
-        A number for the statements and counts of each block (C,).
-    middle, half
-        Middle and half extents (C, 3) of the box around a candidate, along the axes of the grid.
-    distance
-        Signed distances (C, 27) of the surface from the middle, corners, edges and faces of that box.
-    """
-
-    kind: npt.NDArray[np.int64]
-    middle: FloatArray
-    half: FloatArray
-    distance: FloatArray
+    kind: npt.NDArray[np.int64]  # a number for the statements and counts of each block (C,)
+    middle: FloatArray  # middle (C, 3) of the box around each along the axes of the grid, in cells
+    half: FloatArray  # half extents (C, 3) of that box
+    distance: FloatArray  # signed distances (C, 27) of the surface from its middle, corners, edges and faces
 
     @property
     def size(self) -> FloatArray:

@@ -17,7 +17,7 @@ import torch
 from scipy.spatial import cKDTree
 
 from shapeprog.geometry.distance import signed_distance
-from shapeprog.inference.candidates.drawings import drawings, hinted, redrawn, solid_boxes
+from shapeprog.inference.candidates.drawings import drawings, hinted, solid_boxes
 from shapeprog.inference.candidates.loops import images, mirror, mirrors, repeated, rows
 from shapeprog.inference.candidates.settings import SETTINGS
 from shapeprog.inference.fit.tunable import THINNEST
@@ -25,7 +25,7 @@ from shapeprog.inference.pieces.oriented import boxes_around
 from shapeprog.inference.surface.components import linked
 from shapeprog.inference.surface.evidence import Evidence
 from shapeprog.language.hints import STRAIGHT, Box
-from shapeprog.language.program import Chain, Draw, Loop, Node, Program, nest
+from shapeprog.language.program import Chain, Loop, Node, Program, nest
 from shapeprog.language.statement import language
 from shapeprog.language.unroll import unroll
 from shapeprog.space import DEPTH, SIDE, FloatArray
@@ -38,7 +38,7 @@ def neighbours(program: Program) -> list[Node]:
     chains = program.chains
     if not chains:
         return []
-    draws = [drawing_of(chain) for chain in chains]
+    draws = [chain[-1] for chain in chains]
     boxes = [solids[0] if len(solids) == 1 else None for solids in solid_boxes(draws)]
     block_boxes = solid_boxes(program.body)
     result: list[Node] = [*repeated([*draws, *program.body]), *rows(block_boxes)]
@@ -47,17 +47,16 @@ def neighbours(program: Program) -> list[Node]:
         result += _mirrored(chain)
         if box is not None:
             parts = [part for k, solids in enumerate(block_boxes) if k != index for part in solids]
-            result += [with_drawing(chain, drawing) for drawing in drawings(box)]
+            result += [nest((*chain[:-1], drawing)) for drawing in drawings(box)]
             edited = list(met(box, parts))
             edited += [middle for candidate in [box, *edited] for middle in centred(candidate)]
-            redraws = (drawing for candidate in edited for drawing in redrawn(drawing_of(chain), candidate))
-            result += [with_drawing(chain, drawing) for drawing in redraws]
+            result += [node for candidate in edited for node in redrawn(chain, candidate)]
             result += _recounted(chain, box)
             result += _filled(chain)
     for (chain, box), (other, other_box) in itertools.combinations(zip(chains, boxes, strict=True), 2):
         if box is not None and other_box is not None and _loops(chain) == _loops(other):
             merged = (drawing for around in _merged(box, other_box) for drawing in drawings(around))
-            result += [with_drawing(chain, drawing) for drawing in merged]
+            result += [nest((*chain[:-1], drawing)) for drawing in merged]
     existing = set(program.body)
     return [node for node in dict.fromkeys(result) if node not in existing]
 
@@ -70,16 +69,10 @@ def shorter(node: Node) -> Iterator[Node]:
         yield from rows([[box] for box in solid_boxes([node])[0]])
 
 
-def drawing_of(chain: Chain) -> Draw:
-    """The drawing of a block inside its loops."""
-    drawing = chain[-1]
-    assert isinstance(drawing, Draw)
-    return drawing
-
-
-def with_drawing(chain: Chain, drawing: Draw) -> Node:
-    """A block with another drawing inside its loops."""
-    return nest((*chain[:-1], drawing))
+def redrawn(chain: Chain, box: Box) -> Iterator[Node]:
+    """A block whose statement draws another box inside its loops; by all statements if its hint gives none."""
+    for drawing in hinted(language()[chain[-1].name], box) or drawings(box):
+        yield nest((*chain[:-1], drawing))
 
 
 def _loops(chain: Chain) -> tuple[tuple[str, int], ...]:

@@ -20,7 +20,6 @@ COARSE, FINE = 16, 64
 """Cells along each side of the grids that bin points: for tests against primitives, and against other points."""
 
 Bits = npt.NDArray[np.uint64]
-Flags = npt.NDArray[np.bool_]
 
 
 class BinnedPoints(NamedTuple):
@@ -41,7 +40,7 @@ def by_word(values: FloatArray) -> FloatArray:
     return np.add.reduceat(values, WORD * np.arange(words)) / counts if words else np.zeros(0)
 
 
-def pack(flags: Flags) -> Bits:
+def pack(flags: npt.NDArray[np.bool_]) -> Bits:
     """Flags (B, N) as rows of words, the first of each in its lowest bit."""
     padded = np.pad(flags, ((0, 0), (0, -flags.shape[1] % WORD)))
     return np.packbits(padded, axis=1, bitorder="little").view(np.uint64)

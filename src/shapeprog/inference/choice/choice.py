@@ -42,19 +42,16 @@ def choose(
         rows, interior, hidden, table.weights, words, bits, begins, *_words(interior), table.exposed[index],
         table.sample_price[index], table.prices[index] + SETTINGS.earlier * index / len(table.prices), gains[index],
     )  # fmt: skip
-    penalties = (*SETTINGS.interior, 0.0) if interior.any() else (0.0,)
-    searches = len(penalties) * SETTINGS.restarts + 1
-    best, seeds = _no_set(blocks), iter(range(searches * seed, searches * (seed + 1)))
-
-    def searched(penalty: float, initial: Array, incumbent: tuple[FloatArray, Array]) -> Array:
-        search(*data, penalty, rounds // searches, SETTINGS.blink, next(seeds), initial, *incumbent)
-        return incumbent[1][incumbent[1] >= 0]
-
-    for _ in range(SETTINGS.restarts):
-        initial = np.zeros(0, np.int64)
-        for penalty in penalties:
-            initial = searched(penalty, initial, _no_set(blocks) if penalty else best)
-    return tuple(np.sort(index[searched(0.0, np.searchsorted(index, np.array(start, np.int64)), best)]).tolist())
+    levels = (*SETTINGS.interior, 0.0) if interior.any() else (0.0,)
+    penalties = [*(levels * SETTINGS.restarts), 0.0]
+    best, first = _no_set(blocks), np.searchsorted(index, np.array(start, np.int64))
+    for step, penalty in enumerate(penalties):
+        if step % len(levels) == 0:  # another search
+            selected = first if step == len(penalties) - 1 else first[:0]
+        incumbent, number = _no_set(blocks) if penalty else best, len(penalties) * seed + step
+        search(*data, penalty, rounds // len(penalties), SETTINGS.blink, number, selected, *incumbent)
+        selected = incumbent[1][incumbent[1] >= 0]
+    return tuple(np.sort(index[selected]).tolist())
 
 
 def _no_set(blocks: int) -> tuple[FloatArray, Array]:

@@ -41,16 +41,6 @@ def copy(values, count, result):
         result[k] = values[k]
 
 
-@helper
-def include(rows, interior, cover, under, candidate):
-    """Add the cover and the interior of one more candidate: no later candidate gains there."""
-    for word in range(len(cover)):
-        cover[word] |= rows[candidate, word]
-    for word in range(len(under)):
-        cover[word] |= interior[candidate, word]
-        under[word] |= interior[candidate, word]
-
-
 @kernel(
     "void(u8[:, ::1], u8[:, ::1], u8[:, ::1], f8[::1], i8[::1], u8[::1], i8[::1], i8[::1], i8[::1], u8[::1], f8[::1],"
     " f8[::1], f8[::1], f8, i8, f8, i8, i8[::1], f8[::1], i8[::1])"
@@ -142,7 +132,11 @@ def search(
                 bound[candidate] += sample_price[best_candidate] * ones(
                     exposed[best_candidate] & hidden[best_candidate, candidate]
                 )
-            include(rows, interior, cover, under, best_candidate)
+            for word in range(len(cover)):
+                cover[word] |= rows[best_candidate, word]
+            for word in range(len(under)):  # no later candidate gains there
+                cover[word] |= interior[best_candidate, word]
+                under[word] |= interior[best_candidate, word]
             selected[count] = best_candidate
             count += 1
         if value >= accepted - THRESHOLD * (1.0 - turn / (rounds + 1.0)):

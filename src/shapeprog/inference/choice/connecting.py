@@ -12,8 +12,8 @@ import numpy as np
 
 from shapeprog.geometry.contacts import contact_groups
 from shapeprog.geometry.mesh import pieces_of_parts
-from shapeprog.inference.candidates.drawings import redrawn, solid_boxes
-from shapeprog.inference.candidates.neighbours import drawing_of, met, with_drawing
+from shapeprog.inference.candidates.drawings import solid_boxes
+from shapeprog.inference.candidates.neighbours import met, redrawn
 from shapeprog.inference.choice.choice import value
 from shapeprog.inference.choice.coverage import Coverage
 from shapeprog.inference.choice.settings import SETTINGS
@@ -91,12 +91,7 @@ def _reaching(chain: Chain, original: Box, copies: list[Box], parts: list[Box]) 
     """A block, whose statement draws the ``original`` box, extended so that one of its copies reaches a part."""
     for copy in copies:
         for longer in met(copy, parts, SETTINGS.lines, longer=True):
-            for box in _as_copied(original, copy, longer):
-                yield from (with_drawing(chain, draw) for draw in redrawn(drawing_of(chain), box))
-
-
-def _as_copied(original: Box, copy: Box, longer: Box) -> Iterator[Box]:
-    """A box extended like one of its copies; at a mirrored copy the other end may be extended."""
-    along = (longer.centre - copy.centre) @ copy.rotation
-    for moved in (along, -along):
-        yield Box(original.centre + original.rotation @ moved, original.rotation, longer.half)
+            along = (longer.centre - copy.centre) @ copy.rotation
+            for moved in (along, -along):  # at a mirrored copy the other end may be extended
+                centre = original.centre + original.rotation @ moved
+                yield from redrawn(chain, Box(centre, original.rotation, longer.half))

@@ -95,32 +95,17 @@ class Prices:
 class CoverageTable(NamedTuple):
     """Coverage of candidates, as rows of bits; each candidate has one word at the end.
 
-    Parameters
-    ----------
-    rows
-        For each candidate (C, E + F + K + C) the points explained, the free points filled, the parts drawn, and the
-        hidden samples of every candidate.
-    weights
-        Value of a bit of each of the first E + F + K words, negative for free points.
-    evidence
-        E, the number of words for points to be explained.
-    interior
-        Points deeper inside each candidate than the tolerance (C, E): no other candidate explains them.
-    exposed
-        Unsupported samples of the surface of each candidate that it does not hide itself (C,).
-    sample_price
-        Price of each of these samples (C,).
-    prices
-        Price of the text of each candidate (C,).
+    ``rows`` (C, E + F + K + C) are the points that each candidate explains, the free points that it fills, the parts
+    that it draws, and the samples of every candidate that it hides.
     """
 
     rows: Bits
-    weights: FloatArray
-    evidence: int
-    interior: Bits
-    exposed: Bits
-    sample_price: FloatArray
-    prices: FloatArray
+    weights: FloatArray  # value of a bit of each of the first E + F + K words, negative for free points
+    evidence: int  # E, the number of words for points to be explained
+    interior: Bits  # points deeper inside each candidate than the tolerance (C, E): no other candidate explains them
+    exposed: Bits  # unsupported samples of the surface of each candidate that it does not hide itself (C,)
+    sample_price: FloatArray  # price of each of these samples (C,)
+    prices: FloatArray  # price of the text of each candidate (C,)
 
 
 class Coverage:

@@ -44,7 +44,6 @@ from shapeprog.library import Library, with_library
 SEARCH_SHARE = 0.65
 """Share of the time budget after which the search on cells hands over to fitting."""
 
-
 SURFACE_KERNELS = (
     "geometry/distance", "geometry/surface", "inference/choice/coverage", "inference/surface/", "inference/fit/",
     "inference/candidates/", "inference/pieces/", "inference/choice/choice",
@@ -112,9 +111,7 @@ def infer(
     unit: str = "",
     progress: Progress | None = None,
 ) -> Result:
-    """A short program of at most ``blocks`` blocks that rebuilds a shape.
-
-    A block is a drawing statement with the loops around it.
+    """A short program of at most ``blocks`` blocks, drawing statements with loops around them, that rebuilds a shape.
 
     The result is the same for the same seed unless the time budget ends a step early, which ``cut`` and ``reason``
     report.
@@ -126,8 +123,7 @@ def infer(
     blocks
         Most blocks of the program.
     budget
-        Seconds after which no further step of search or fitting starts.  Choice and ties are not
-        interrupted.
+        Seconds after which no further step of search or fitting starts.  Choice and ties are not interrupted.
     seed
         Of the searches.  Samples of meshes and point clouds are the same for all seeds.
     settings

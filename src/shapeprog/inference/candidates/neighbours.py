@@ -43,16 +43,14 @@ def neighbours(program: Program) -> list[Node]:
     block_boxes = solid_boxes(program.body)
     result: list[Node] = [*repeated([*draws, *program.body]), *rows(block_boxes)]
     for index, (chain, box) in enumerate(zip(chains, boxes, strict=True)):
-        result += _unlooped(chain)
-        result += _mirrored(chain)
+        result += [*_unlooped(chain), *_mirrored(chain)]
         if box is not None:
             parts = [part for k, solids in enumerate(block_boxes) if k != index for part in solids]
             result += [nest((*chain[:-1], drawing)) for drawing in drawings(box)]
             edited = list(met(box, parts))
             edited += [middle for candidate in [box, *edited] for middle in centred(candidate)]
             result += [node for candidate in edited for node in redrawn(chain, candidate)]
-            result += _recounted(chain, box)
-            result += _filled(chain)
+            result += [*_recounted(chain, box), *_filled(chain)]
     for (chain, box), (other, other_box) in itertools.combinations(zip(chains, boxes, strict=True), 2):
         if box is not None and other_box is not None and _loops(chain) == _loops(other):
             merged = (drawing for around in _merged(box, other_box) for drawing in drawings(around))
@@ -145,9 +143,8 @@ def met(
     around = Box(*map(np.array, zip(*parts, strict=True)))  # all of them as arrays
     for axis in range(3):
         corners = CORNERS * box.half * (np.arange(3) != axis)
-        starts = (
-            box.centre + np.concatenate([np.zeros((1, 3)), *(share * corners for share in within)]) @ box.rotation.T
-        )
+        offsets = np.concatenate([np.zeros((1, 3)), *(share * corners for share in within)])
+        starts = box.centre + offsets @ box.rotation.T
         minimum = box.half[axis] if longer else -np.inf
         for sign in (-1.0, 1.0):
             along = sign * box.rotation[:, axis]
@@ -195,13 +192,10 @@ def residual_candidates(program: Program, evidence: Evidence) -> list[Node]:
     if len(points) < SETTINGS.cluster_points:
         return []
     reach = SETTINGS.cluster_reach * (evidence.area / len(evidence.points)) ** 0.5
-    pairs = cKDTree(points).query_pairs(reach, output_type="ndarray")
-    cluster = linked(pairs, len(points))
+    cluster = linked(cKDTree(points).query_pairs(reach, output_type="ndarray"), len(points))
     size = np.bincount(cluster)
     largest = np.argsort(-size, kind="stable")[: SETTINGS.clusters]
     around = boxes_around([points[cluster == label] for label in largest[size[largest] >= SETTINGS.cluster_points]])
     half = np.maximum(around.half, THINNEST / 2)
-    nodes = [
-        drawing for box in zip(around.centre, around.rotation, half, strict=True) for drawing in drawings(Box(*box))
-    ]
+    nodes = [drawing for box in map(Box, around.centre, around.rotation, half) for drawing in drawings(box)]
     return [*nodes, *images(nodes, evidence.surface)]

@@ -23,10 +23,7 @@ from shapeprog.language.unroll import unroll
 
 
 def connected(program: Program, coverage: Coverage) -> Program:
-    """The program with floating parts extended to others, or removed, where the loss of value is small.
-
-    Each node is one block.
-    """
+    """A program of one block per node, with floating parts extended to others or removed where little value is lost."""
     while (better := _better_connected(program, coverage)) is not None:
         program = better
     return program

@@ -199,7 +199,7 @@ def free_points(evidence: Evidence) -> tuple[FloatArray, float]:
     cells = cells[((cells + 0.5 >= low) & (cells + 0.5 <= high)).all(1)]
     random = np.random.default_rng(0)
     count = min(SETTINGS.free_points, len(cells))
-    selected = cells[np.sort(random.choice(len(cells), count, replace=False))] if count else cells
+    selected = cells[np.sort(random.choice(len(cells), count, replace=False))]
     points = (selected + random.random((count, 3))) * side - HALF
     return points[np.argsort(nearby(points), kind="stable")], len(cells) * side**3 / max(count, 1)
 
@@ -228,11 +228,8 @@ def unsupported(
     bare = share > 0
     source = np.repeat(row.numpy(), SETTINGS.batch)[bare]
     lifted = points[bare] + SETTINGS.skin * evidence.tolerance * normals[bare]
-    return (
-        lifted,
-        source // max(scene.mask.shape[1], 1),
-        share[bare] * area.reshape(-1)[source] / (SETTINGS.batch * times[source]),
-    )
+    charged_area = share[bare] * area.reshape(-1)[source] / (SETTINGS.batch * times[source])
+    return lifted, source // scene.mask.shape[1], charged_area
 
 
 def shares(samples: FloatArray, normals: FloatArray, evidence: Evidence, binned: BinnedPoints) -> FloatArray:

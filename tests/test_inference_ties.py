@@ -184,7 +184,7 @@ def test_no_relation_takes_the_thickness_of_a_part_between_two_faces():
     together = Relation(np.array([1.0, -1.0]), 1.0)
     faces, between = np.array([1.0, 1.15]), np.array([[-1.0, 1.0]])
     rows, at = worthwhile(
-        [together], faces, np.eye(2), 1.0, fixed=np.zeros((0, 2)), low=np.array([0.1]), lengths=between
+        [together], faces, np.eye(2), 1.0, fixed=np.zeros((0, 2)), low=np.array([0.1]), bounded=between
     )
     assert not len(rows)
     np.testing.assert_allclose(at, faces)

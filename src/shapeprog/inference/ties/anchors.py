@@ -14,7 +14,8 @@ from dataclasses import replace
 from itertools import cycle, islice, product
 
 import numpy as np
-import torch
+from jaxtyping import Float
+from torch import Tensor
 
 from shapeprog.geometry.primitive import SIZES
 from shapeprog.geometry.separation import touching
@@ -33,7 +34,7 @@ class _Motion:
         self.layout = model.layout
         scene, rows = model.poses(model.numbers)
 
-        def ends(change: torch.Tensor) -> FloatArray:
+        def ends(change: Float[Tensor, "N 16"]) -> FloatArray:
             """The low and high ends (2, 3, N) of the boxes where sizes, centres and rotations change (N, 16)."""
             size, centre, rotation = change.split([SIZES, 3, 9], 1)
             boxes = boxes_of(replace(

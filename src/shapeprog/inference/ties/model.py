@@ -38,9 +38,9 @@ class Model:
     ----------
     numbers
         Where they are at the start (P,).
-    lengths, low
-        Rows (F, P) whose products with the numbers are those of the statements, up to constants, and lower bounds (F,)
-        of these products: no part may become thinner than ``THINNEST``.
+    jacobian, low
+        How the numbers of the statements follow from these (F, P), up to constants, and lower bounds (F,) of the
+        products of both: no part may become thinner than ``THINNEST``.
     """
 
     def __init__(self, layout: Layout) -> None:
@@ -51,13 +51,13 @@ class Model:
         floor = scale.floor + (layout.extents[2] - layout.forms["height"]) * 0.5  # the middle of the whole stays
         nodes = list(Program(symbolic(layout.source, layout.forms, (floor, scale.middle))).walk())
         forms = [Linear() + nodes[n].values[slot] for n, slot in self.tunable.moving]
-        self.lengths: FloatArray = np.array([layout.row(form) for form in forms]).reshape(-1, len(self.slots))
+        self.jacobian: FloatArray = np.array([layout.row(form) for form in forms]).reshape(-1, len(self.slots))
         self._offset = np.array([form.constant for form in forms])
         self.low: FloatArray = self.tunable.low.numpy() - self._offset
 
     def values(self, numbers: FloatArray) -> torch.Tensor:
         """The numbers of the statements in cells (F,)."""
-        return torch.from_numpy(self.lengths @ numbers + self._offset)
+        return torch.from_numpy(self.jacobian @ numbers + self._offset)
 
     def scene(self, numbers: FloatArray) -> Scene:
         """The primitives (N,)."""
@@ -66,7 +66,7 @@ class Model:
     def poses(self, numbers: FloatArray) -> Poses:
         """The primitives, and their slopes (N, 16, P) by the numbers."""
         poses = self.tunable.poses(self.values(numbers))
-        return Poses(poses.scene, poses.slopes @ torch.from_numpy(self.lengths))
+        return Poses(poses.scene, poses.slopes @ torch.from_numpy(self.jacobian))
 
 
 class Misfit:
@@ -88,7 +88,7 @@ class Misfit:
         self.model, self.target, self.joints = model, Target(evidence), joints
         self.width = FIT.explained * evidence.tolerance
         self.generator = torch.Generator().manual_seed(seed)
-        scale = np.maximum(model.tunable.scale.numpy() @ np.abs(model.lengths), 1e-3)
+        scale = np.maximum(model.tunable.scale.numpy() @ np.abs(model.jacobian), 1e-3)
         self.reach: FloatArray = np.maximum(scale, 1.0)  # cells that the surface moves for one unit of every number
         prior = np.maximum([PRIOR[slot.kind] for slot in model.slots], minimum)
         angles = np.array([slot.kind == "angle" for slot in model.slots])
@@ -110,13 +110,13 @@ class Misfit:
     def refitted(self, numbers: FloatArray, rows: FloatArray) -> FloatArray:
         """The numbers (P,) of the least misfit that differ from these only so that relations (M, P) hold as before."""
         free = np.linalg.qr(rows.T, mode="complete")[0][:, len(rows) :]  # orthonormal directions
-        farthest, lengths = TIES.farthest / self.reach, self.model.lengths
-        low = np.minimum(self.model.low, lengths @ numbers)
+        farthest, jacobian = TIES.farthest / self.reach, self.model.jacobian
+        low = np.minimum(self.model.low, jacobian @ numbers)
         for _ in range(TIES.steps):
             slope, curvature = self.at(numbers, 1, joined=True)
             move = free @ -np.linalg.solve(free.T @ curvature @ free, free.T @ slope)
             onwards = numbers + move / float(np.max(np.abs(move) / farthest, initial=1.0))
-            if not (lengths @ onwards >= low).all():  # also where a part without length has no slopes
+            if not (jacobian @ onwards >= low).all():  # also where a part without length has no slopes
                 break
             numbers = onwards
         return numbers

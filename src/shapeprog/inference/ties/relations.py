@@ -96,7 +96,7 @@ def worthwhile(
     *,
     fixed: FloatArray,
     low: FloatArray,
-    lengths: FloatArray | None = None,
+    bounded: FloatArray | None = None,
     far: FloatArray | float = np.inf,
 ) -> tuple[FloatArray, FloatArray]:
     """The selected relations (M, V), those that are fixed first; and the optimum (V,) where they hold.
@@ -114,7 +114,7 @@ def worthwhile(
         Price of a number, in the unit of the misfit.
     fixed
         Relations (M, V) that hold in any case.
-    low, lengths
+    low, bounded
         Lower bounds (F,) of the products of these rows (F, V) with the numbers, by default of the numbers themselves;
         no relation may violate them.
     far
@@ -124,8 +124,8 @@ def worthwhile(
     if not len(rows):
         return fixed, numbers
     imposed, free, start = [*fixed], np.linalg.inv(curvature), numbers
-    lengths = np.eye(len(numbers)) if lengths is None else lengths
-    low = np.minimum(low, lengths @ numbers) - HOLDS
+    bounded = np.eye(len(numbers)) if bounded is None else bounded
+    low = np.minimum(low, bounded @ numbers) - HOLDS
     axes: FloatArray = np.linalg.qr(fixed.T)[0].T
     meeting = [(k, *pair) for k, relation in enumerate(candidates, len(fixed)) for pair in relation.meetings]
     edges = 0
@@ -148,7 +148,7 @@ def worthwhile(
             new = beside(rows[best], axes)
             if (
                 new is None
-                or (lengths @ moved < low).any()
+                or (bounded @ moved < low).any()
                 or (np.abs(moved - start) > far).any()
                 or edges_then > edges
             ):

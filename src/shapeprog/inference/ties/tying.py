@@ -140,7 +140,7 @@ class _Ties:
             before = len(rows)
             _, curvature = self.misfit.at(numbers, TIES.draws)
             rows, optimum = worthwhile(
-                offered, numbers, curvature, price, fixed=rows, low=self.model.low, lengths=self.model.lengths,
+                offered, numbers, curvature, price, fixed=rows, low=self.model.low, bounded=self.model.jacobian,
                 far=TIES.far / self.misfit.reach,
             )  # fmt: skip
             if step and len(rows) == before:

@@ -18,6 +18,7 @@ from shapeprog.inference.fit.settings import FIT
 from shapeprog.inference.fit.tunable import Poses, Tunable
 from shapeprog.inference.surface.evidence import Evidence
 from shapeprog.inference.ties.layout import Layout
+from shapeprog.inference.ties.relations import HOLDS
 from shapeprog.inference.ties.settings import TIES
 from shapeprog.language.evaluate import expanded, symbolic
 from shapeprog.language.expression import Linear
@@ -25,7 +26,7 @@ from shapeprog.language.program import Program
 from shapeprog.space import FloatArray
 
 PRIOR = {
-    "clearance": 1e-4, "offset": 1e-4, "length": 1e-4, "size": 3e-4, "radius": 3e-4, "edge": 1e-3, "angle": 1e-3,
+    "clearance": 1e-4, "offset": 1e-4, "length": 1e-4, "size": 1e-3, "radius": 1e-3, "edge": 1e-3, "angle": 1e-3,
     "extent": 1e-2,
 }  # fmt: skip
 """Weights of a squared move from the start, by kind: numbers that nothing determines do not change."""
@@ -109,15 +110,18 @@ class Misfit:
 
     def refitted(self, numbers: FloatArray, rows: FloatArray) -> FloatArray:
         """The numbers (P,) of the least misfit that differ from these only so that relations (M, P) hold as before."""
-        free = np.linalg.qr(rows.T, mode="complete")[0][:, len(rows) :]  # orthonormal directions
         farthest, jacobian = TIES.farthest / self.reach, self.model.jacobian
-        low = np.minimum(self.model.low, jacobian @ numbers)
+        low = np.minimum(self.model.low, jacobian @ numbers) - HOLDS
         for _ in range(TIES.steps):
             slope, curvature = self.at(numbers, 1, joined=True)
-            move = free @ -np.linalg.solve(free.T @ curvature @ free, free.T @ slope)
-            onwards = numbers + move / float(np.max(np.abs(move) / farthest, initial=1.0))
-            if not (jacobian @ onwards >= low).all():  # also where a part without length has no slopes
-                break
+            while True:
+                free = np.linalg.qr(rows.T, mode="complete")[0][:, len(rows) :]  # orthonormal directions
+                move = free @ -np.linalg.solve(free.T @ curvature @ free, free.T @ slope)
+                onwards = numbers + move / float(np.max(np.abs(move) / farthest, initial=1.0))
+                thin = ~(jacobian @ onwards >= low)  # also where a part without length has no slopes
+                if not thin.any():
+                    break
+                rows = np.vstack([rows, jacobian[thin]])  # what would be too thin keeps its thickness
             numbers = onwards
         return numbers
 

@@ -8,6 +8,7 @@ then named.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Sequence
 
 import numpy as np
@@ -79,12 +80,16 @@ def tie(
         ties = _Ties(tied.source, evidence, seed, known=known, held=held)
         price *= TIES.known_price if known else TIES.price
         before = 0.0 if known else closeness(unroll(plain), evidence, seed)
+        least = math.inf
         for attempt in range(TIES.attempts):
             try:
-                tied = ties.tied(price / TIES.cheaper**attempt)
+                offered = ties.tied(price / TIES.cheaper**attempt)
             except Fault:  # relations left a part without length
                 continue
-            if known or before - closeness(unroll(tied), evidence, seed) <= TIES.lost:
+            lost = 0.0 if known else before - closeness(unroll(offered), evidence, seed)
+            if lost < least:
+                tied, least = offered, lost
+            if lost <= TIES.lost:
                 break
         if progress:
             progress("tying numbers", 1.0)

@@ -26,7 +26,7 @@ from shapeprog.language.program import Program
 from shapeprog.space import FloatArray
 
 PRIOR = {
-    "clearance": 1e-4, "offset": 1e-4, "length": 1e-4, "size": 1e-3, "radius": 1e-3, "edge": 1e-3, "angle": 1e-3,
+    "clearance": 2e-4, "offset": 2e-4, "length": 2e-4, "size": 1e-3, "radius": 1e-3, "edge": 1e-3, "angle": 1e-3,
     "extent": 1e-2,
 }  # fmt: skip
 """Weights of a squared move from the start, by kind: numbers that nothing determines do not change."""

@@ -116,18 +116,21 @@ def _merged(first: Box, second: Box) -> Iterator[Box]:
     """The box around two boxes that nearly touch, with the orientation of the larger."""
     if first.half.prod() < second.half.prod():
         first, second = second, first
-    inner = np.abs((second.centre - first.centre) @ first.rotation)
-    reach = np.abs(first.rotation.T @ second.rotation) @ second.half
-    if (inner <= first.half + reach + SETTINGS.gap).all():
+    apart = np.abs((second.centre - first.centre) @ first.rotation)
+    if (apart <= first.half + _reach(first, second) + SETTINGS.gap).all():
         yield _around(first, [first, second])
 
 
 def _around(frame: Box, parts: Sequence[Box]) -> Box:
     """The smallest box with the orientation of ``frame`` that contains all parts."""
-    corners = np.concatenate([part.centre + (CORNERS * part.half) @ part.rotation.T for part in parts])
-    local = corners @ frame.rotation
-    low, high = local.min(0), local.max(0)
+    ends = [[part.centre @ frame.rotation + sign * _reach(frame, part) for part in parts] for sign in (-1, 1)]
+    low, high = np.min(ends[0], 0), np.max(ends[1], 0)
     return Box(frame.rotation @ ((low + high) / 2), frame.rotation, (high - low) / 2)
+
+
+def _reach(frame: Box, part: Box) -> FloatArray:
+    """Half extents (3,) of a part along the axes of a box."""
+    return np.abs(frame.rotation.T @ part.rotation) @ part.half
 
 
 def met(

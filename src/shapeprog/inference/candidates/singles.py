@@ -9,7 +9,6 @@ its misfit is clearly less.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 import torch
@@ -32,23 +31,9 @@ from shapeprog.language.unroll import Plan
 from shapeprog.space import Array, FloatArray
 
 
-class Target(NamedTuple):
-    """Points just above the surface close to the faces of each of B pieces, and its normals there (B, P, 3).
-
-    On the surface, the distance has no gradient.
-    """
-
-    points: Float[Tensor, "B P 3"]
-    normals: Float[Tensor, "B P 3"]
-
-    def take(self, rows: Array) -> Target:
-        """The target of some of the pieces."""
-        return Target(self.points[rows], self.normals[rows])
-
-
 def single_candidates(pieces: Pieces) -> list[Node]:
     """The simplest drawing statement for every piece with points, in the order of the pieces, and a closer one."""
-    target, indices = _target(pieces)
+    points, normals, indices = _target(pieces)
     half = np.maximum(pieces.boxes.half, THINNEST / 2)
     boxes = [Box(pieces.boxes.centre[piece], pieces.boxes.rotation[piece], half[piece]) for piece in indices]
     tried = [drawings(box) for box in boxes]
@@ -57,12 +42,12 @@ def single_candidates(pieces: Pieces) -> list[Node]:
             options += starts(declared, box)
     draws = [draw for options in tried for draw in options]
     owner = np.repeat(np.arange(len(boxes)), [len(options) for options in tried])
-    misfit = misfits(draws, target.take(owner))
+    misfit = misfits(draws, points[owner], normals[owner])
     best = _minimum(misfit, owner, len(boxes))[owner]
     unsure = np.flatnonzero((owner < SETTINGS.fitted) & (best > SETTINGS.good) & (misfit <= best + SETTINGS.worth))
-    better = fitted([draws[k] for k in unsure], target.take(owner[unsure]))
+    better = fitted([draws[k] for k in unsure], points[owner[unsure]])
+    misfit = np.append(misfit, misfits(better, points[owner[unsure]], normals[owner[unsure]]))
     draws, owner = [*draws, *better], np.append(owner, owner[unsure])
-    misfit = np.append(misfit, misfits(better, target.take(owner[len(misfit) :])))
     best = _minimum(misfit, owner, len(boxes))[owner]
     order = np.flatnonzero(misfit <= best + SETTINGS.slack).tolist()
     order.sort(key=lambda k: (numbers_written(draws[k]), misfit[k]), reverse=True)
@@ -83,8 +68,8 @@ def _minimum(misfit: FloatArray, owner: Array, count: int) -> FloatArray:
     return minimum
 
 
-def fitted(draws: Sequence[Draw], target: Target) -> list[Draw]:
-    """Statements fitted to their points by Gauss-Newton steps with a prior on their numbers, in one batch.
+def fitted(draws: Sequence[Draw], target: Float[Tensor, "B P 3"]) -> list[Draw]:
+    """Statements fitted to points (B, P, 3) by Gauss-Newton steps with a prior on their numbers, in one batch.
 
     Residuals are distances of the points to the surface; poses are differentiated by central differences.
     """
@@ -92,7 +77,7 @@ def fitted(draws: Sequence[Draw], target: Target) -> list[Draw]:
         return []
     code = encode([Program((draw,)) for draw in draws], dtype=torch.float64)
     ids, start = code.ids[:, :, :1], code.parameters[:, 0, 0]  # a drawing is the first step of its block
-    values, slots, points = start, start.shape[1], target.points.shape[1]
+    values, slots, points = start, start.shape[1], target.shape[1]
     free, low = torch.zeros(start.shape, dtype=torch.bool), torch.zeros_like(start)
     for row, draw in enumerate(draws):
         for slot, quantity in enumerate(language()[draw.name].quantities):
@@ -107,7 +92,7 @@ def fitted(draws: Sequence[Draw], target: Target) -> list[Draw]:
         by_number = ((placed[1 : slots + 1] - placed[slots + 1 :]) / (2 * STEP)).permute(1, 2, 0)
         fields = (scene.kind, scene.size, scene.centre, scene.rotation, scene.mask)
         single = Batch(*(field[0].repeat_interleave(points, 0) for field in fields))
-        distance, by_row, _ = distance_and_slopes(single, target.points.reshape(-1, 1, 3))
+        distance, by_row, _ = distance_and_slopes(single, target.reshape(-1, 1, 3))
         slopes = by_row.reshape(len(draws), points, -1) @ by_number
         residual = (distance.reshape(-1, points) - SETTINGS.offset).nan_to_num(0)
         weighted = ((SETTINGS.width**2 / (SETTINGS.width**2 + residual**2)) ** 2)[..., None] * slopes
@@ -118,26 +103,25 @@ def fitted(draws: Sequence[Draw], target: Target) -> list[Draw]:
     return [Draw(draw.name, tuple(row[: len(draw.values)])) for draw, row in rows]
 
 
-def misfits(draws: Sequence[Draw], target: Target) -> FloatArray:
-    """Misfit (B,) of each statement to its points: mean distance over ``SETTINGS.wrong`` plus 1 - the mean cosine."""
+def misfits(draws: Sequence[Draw], points: Float[Tensor, "B P 3"], normals: Float[Tensor, "B P 3"]) -> FloatArray:
+    """Misfit (B,) of each statement to points: mean distance over ``SETTINGS.wrong`` plus 1 - the mean cosine."""
     if not draws:
         return np.zeros(0)
-    distance, _, slopes = distance_and_slopes(scene_of(draws), target.points)
-    cosine = (slopes * target.normals).sum(-1).abs().mean(1)
+    distance, _, slopes = distance_and_slopes(scene_of(draws), points)
+    cosine = (slopes * normals).sum(-1).abs().mean(1)
     off = (distance.abs() / SETTINGS.wrong).clamp(max=1).mean(1) + 1 - cosine
     return off.nan_to_num(np.inf).numpy()
 
 
-def _target(pieces: Pieces) -> tuple[Target, Array]:
-    """Points of the surface close to the faces of the pieces, and the indices (N,) of the pieces with such points."""
+def _target(pieces: Pieces) -> tuple[Float[Tensor, "B P 3"], Float[Tensor, "B P 3"], Array]:
+    """Points just above the surface near the faces of B pieces, normals, and the indices (B,) of these pieces."""
     step = max(1, len(pieces.cloud.points) // SETTINGS.surface_points)
     points, normals = (np.ascontiguousarray(array[::step]) for array in (pieces.cloud.points, pieces.cloud.normals))
     mask = np.zeros((len(pieces.boxes.half), len(points)), np.bool_)
     near_boxes(points, *map(np.ascontiguousarray, pieces.boxes), SETTINGS.near, mask, np.zeros(len(mask)))
     indices = np.flatnonzero(mask.any(1))
-    inside = [np.flatnonzero(mask[piece]) for piece in indices]
-    share = np.arange(SETTINGS.points) / SETTINGS.points
-    selected = np.array([members[(share * len(members)).astype(np.int64)] for members in inside], np.int64)
-    selected = selected.reshape(-1, SETTINGS.points)
+    share, selected = np.arange(SETTINGS.points) / SETTINGS.points, np.empty((len(indices), SETTINGS.points), np.int64)
+    for row, members in enumerate(map(np.flatnonzero, mask[indices])):
+        selected[row] = members[(share * len(members)).astype(np.int64)]
     above = points[selected] + SETTINGS.offset * normals[selected]
-    return Target(torch.from_numpy(above), torch.from_numpy(normals[selected])), indices
+    return torch.from_numpy(above), torch.from_numpy(normals[selected]), indices

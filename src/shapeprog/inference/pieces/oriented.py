@@ -39,11 +39,6 @@ class Boxes(NamedTuple):
         signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], np.float64)
         return self.centre[:, None] + np.einsum("nij,nkj->nki", self.rotation, signs * self.half[:, None])
 
-    def area(self) -> FloatArray:
-        """Their surfaces (N,)."""
-        a, b, c = self.half.T
-        return 8 * (a * b + b * c + c * a)
-
 
 def join(parts: Sequence[Boxes]) -> Boxes:
     """All boxes of a list, in its order."""

@@ -140,11 +140,9 @@ def box_each(points, start, directions, frames, kind, floor, centre, rotation, h
         Output (G, 3), (G, 3, 3) with axes as columns, and (G, 3), initially zero.
     """
     selected, flat = np.empty((MANY, 3)), np.empty((MANY, 2))
-    world, frame, trial = np.zeros((3, 3)), np.empty((3, 3)), np.empty((3, 3))
-    for axis in range(3):
-        world[axis, axis] = 1.0
+    world, trial = np.eye(3), np.empty((3, 3))
     for g in range(len(start) - 1):
-        own = points[start[g] : start[g + 1]]
+        own, frame = points[start[g] : start[g + 1]], rotation[g]
         outer = outermost(own, directions, selected)
         flattened = kind[g] == FLAT
         simple = frames[g] if flattened else world
@@ -166,15 +164,12 @@ def box_each(points, start, directions, frames, kind, floor, centre, rotation, h
                 size = settle(outer, trial, floor, flat)
                 if size < best:
                     best, free = size, True
-                    copy(trial, rotation[g])
-            if free:
-                copy(rotation[g], frame)
-                if kind[g] == ROD:
-                    copy(frames[g], trial)
-                    turn_about(outer, trial, 0, floor, flat)
-                    if volume(outer, trial, floor) < SLACK * best:
-                        copy(trial, frame)
-        copy(frame, rotation[g])
+                    copy(trial, frame)
+            if free and kind[g] == ROD:
+                copy(frames[g], trial)
+                turn_about(outer, trial, 0, floor, flat)
+                if volume(outer, trial, floor) < SLACK * best:
+                    copy(trial, frame)
         for axis in range(3):
             low, high = extent(own, frame, axis)
             half[g, axis] = (high - low) / 2

@@ -12,15 +12,17 @@ from typing import NamedTuple
 import numpy as np
 
 from shapeprog.data.sampling import sample_with_faces
+from shapeprog.formats.parts import triangle_normals
 from shapeprog.inference.pieces.limbs import limbs
 from shapeprog.inference.pieces.oriented import Boxes, boxes_around, distinct, groups, join
 from shapeprog.inference.pieces.patches import planar_patches, sheets, slabs
 from shapeprog.inference.pieces.point_kernels import near_boxes
 from shapeprog.inference.pieces.rods import rods
 from shapeprog.inference.pieces.settings import SETTINGS
-from shapeprog.inference.surface.cloud import Cloud, cloud_of, denoised, is_clean
-from shapeprog.inference.surface.components import Components, IntArray, face_normals
+from shapeprog.inference.surface.cloud import Cloud, cloud_of, is_clean, projected
+from shapeprog.inference.surface.components import Components, IntArray
 from shapeprog.inference.surface.evidence import Evidence
+from shapeprog.inference.surface.settings import SURFACE
 
 
 class Source(IntEnum):
@@ -56,7 +58,8 @@ class Support:
         distance = max(SETTINGS.cover_distance, 2 * cloud.noise)
         near_boxes(points, *map(np.ascontiguousarray, boxes), distance, self.explained, fill)
         self.filled = fill >= SETTINGS.cover_filled
-        self.price = SETTINGS.cover_price * boxes.area() * (1 - fill) / (cloud.spacing**2 * every)
+        area = 8 * (boxes.half * np.roll(boxes.half, -1, 1)).sum(1)
+        self.price = SETTINGS.cover_price * area * (1 - fill) / (cloud.spacing**2 * every)
 
     def cover(self) -> IntArray:
         """The filled boxes that a greedy selection takes, best first."""
@@ -81,7 +84,9 @@ def find_pieces(evidence: Evidence) -> Pieces:
     """
     if evidence.mesh is not None:
         return _of_mesh(evidence.mesh)
-    cloud = denoised(cloud_of(evidence.surface))
+    cloud = cloud_of(evidence.surface)
+    if cloud.noise > SURFACE.noisy:
+        cloud = cloud_of(projected(cloud.points))
     return _ranked(cloud, _of_points(cloud, limbs(cloud) if is_clean(evidence.surface) else join([])))
 
 
@@ -96,8 +101,7 @@ def _of_mesh(mesh: Components) -> Pieces:
             points, face = sample_with_faces(mesh.vertices, mesh.faces[first:last], SETTINGS.component_points, 0)
             samples.append((points, face + first))
     points, face = (np.concatenate(column) for column in zip(*samples, strict=True))
-    normals = face_normals(mesh.vertices[mesh.faces[face]])
-    cloud = cloud_of(points, normals / np.linalg.norm(normals, axis=1, keepdims=True))
+    cloud = cloud_of(points, triangle_normals(mesh.vertices, mesh.faces[face])[1])
     parts = [(Source.COMPONENT, boxes), (Source.GROUP, groups(boxes)), *_of_points(cloud, join([]))]
     return _ranked(cloud, parts)
 

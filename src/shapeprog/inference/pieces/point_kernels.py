@@ -142,10 +142,7 @@ def count_rods(points, normals, centre, frame, radius, tolerance, cosine, counts
         for place in range(low, high):
             counts[rod, 0] += stretch[place]
         for b in range(BINS):
-            for place in range(low, high):
-                if sector[place, b]:
-                    counts[rod, 3] += 1.0 / BINS
-                    break
+            counts[rod, 3] += sector[low:high, b].any() / BINS
 
 
 @helper

@@ -18,30 +18,30 @@ def rods(cloud: Cloud) -> Boxes:
     """Boxes around round rods, best first; the first axis is that of the rod."""
     off, facing = cloud.tolerance, 0.85 if cloud.noise > SURFACE.noisy else 0.94
     centre, axis, radius = _through_pairs(cloud)
-    counts = np.zeros((len(radius), 4))
-    count_rods(cloud.points, cloud.normals, centre, _frames(axis), radius, off, facing, counts)
+    frames, counts = _frames(axis), np.zeros((len(radius), 4))
+    count_rods(cloud.points, cloud.normals, centre, frames, radius, off, facing, counts)
     support, start, end, share = counts.T
     length = end - start
     good = (support >= SETTINGS.rod_points) & (share >= SETTINGS.rod_round) & (length > 2 * radius)
     good &= support > SETTINGS.rod_dense * 2 * np.pi * radius * length * share / cloud.spacing**2
     centre = centre + axis * ((start + end) / 2)[:, None]
 
-    def on_rod(middle: FloatArray, axis: FloatArray, radius: float, half: float) -> npt.NDArray[np.bool_]:
+    def on_rod(middle: FloatArray, frame: FloatArray, radius: float, half: float) -> npt.NDArray[np.bool_]:
         """Whether points (N,) lie on a cylinder and face across its axis."""
         inside = np.zeros(len(cloud.points), np.bool_)
-        mark_rod(cloud.points, cloud.normals, middle, _frames(axis[None])[0], radius, half, off, facing, inside)
+        mark_rod(cloud.points, cloud.normals, middle, frame, radius, half, off, facing, inside)
         return inside
 
     used, result = np.zeros(len(cloud.points), np.bool_), list[Boxes]()
     for k in np.flatnonzero(good)[np.argsort(-support[good], kind="stable")]:
         if len(result) == SETTINGS.rods:
             break
-        inside = on_rod(centre[k], axis[k], radius[k], length[k] / 2)
+        inside = on_rod(centre[k], frames[k], radius[k], length[k] / 2)
         if inside.sum() < SETTINGS.rod_points or used[inside].mean() > 0.5:
             continue
         for _ in range(2):
             middle, frame, width, half = _fitted(cloud.points[inside], cloud.normals[inside])
-            inside = on_rod(middle, frame[:, 2], width, half + 0.5)
+            inside = on_rod(middle, frame, width, half + 0.5)
             if inside.sum() < SETTINGS.rod_points:
                 break
         else:

@@ -57,11 +57,6 @@ def cloud_of(points: Array, normals: Array | None = None) -> Cloud:
     return Cloud(points, normals, np.ascontiguousarray(nearest, np.int32), spacing, float(noise))
 
 
-def denoised(cloud: Cloud) -> Cloud:
-    """A noisy cloud projected onto planes; others as they are."""
-    return cloud_of(projected(cloud.points)) if cloud.noise > SURFACE.noisy else cloud
-
-
 def projected(points: FloatArray) -> FloatArray:
     """Points (N, 3) projected repeatedly onto weighted planes through their neighbours (Alexa et al. 2003)."""
     for _ in range(2):
@@ -83,10 +78,8 @@ def planes(points: FloatArray, neighbours: npt.NDArray[np.int64]) -> tuple[Float
 
 def points_of_scan(shape: Shape) -> FloatArray:
     """The points (P, 3) of a shape given as points: all of a clean scan, the default number of others."""
-    assert shape.points is not None
-    if shape.scan is not None and is_clean(np.asarray(shape.scan, np.float64)):
-        return np.asarray(shape.scan, np.float64)
-    return np.asarray(shape.points, np.float64)
+    clean = shape.scan is not None and is_clean(np.asarray(shape.scan, np.float64))
+    return np.asarray(shape.scan if clean else shape.points, np.float64)
 
 
 def is_clean(points: FloatArray) -> bool:

@@ -6,9 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from scipy.sparse import coo_matrix
+from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from shapeprog.formats.parts import triangle_normals
 from shapeprog.space import Array, FloatArray
 
 IntArray = npt.NDArray[np.int64]
@@ -75,7 +76,7 @@ def _unique_faces(vertices: FloatArray, faces: IntArray) -> tuple[IntArray, Floa
     _, pair = np.unique(ordered[:, 0] * count + ordered[:, 1], return_inverse=True)
     _, first = np.unique(pair * count + ordered[:, 2], return_index=True)
     faces = faces[np.sort(first)]
-    area = np.linalg.norm(face_normals(vertices[faces]), axis=1) / 2
+    area = np.linalg.norm(triangle_normals(vertices, faces)[0], axis=1) / 2
     return faces[area > 0], area[area > 0]
 
 
@@ -104,11 +105,6 @@ def _edges(faces: IntArray, count: int) -> tuple[IntArray, IntArray]:
     return edge, np.sign(end - start)
 
 
-def face_normals(corners: FloatArray) -> FloatArray:
-    """The normals (F, 3) of triangles (F, 3, 3), twice as long as their areas."""
-    return np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-
-
 def solid_sides(mesh: Components) -> IntArray:
     """For each face (F,) of a component that bounds a solid, 1 if it faces outwards and -1 if inwards; 0 for others.
 
@@ -116,12 +112,13 @@ def solid_sides(mesh: Components) -> IntArray:
     the faces point outwards.  Some 2 % of the edges may be open.  The solid is at least .2 cells thick on average: the
     sign of the volume of a crumpled sheet is random.
     """
-    counts, corners = np.diff(mesh.start), mesh.vertices[mesh.faces]
+    counts = np.diff(mesh.start)
     component = np.repeat(np.arange(len(counts)), counts)
     edge, direction = _edges(mesh.faces, len(mesh.vertices))
     uneven = np.bincount(edge, direction) != 0
     gaps = np.bincount(np.repeat(component, 3), uneven[edge], minlength=len(counts)) / (3 * counts)
-    volume = np.bincount(component, (corners[:, 0] * face_normals(corners)).sum(1), minlength=len(counts)) / 6
+    heights = mesh.vertices[mesh.faces[:, 0]] * triangle_normals(mesh.vertices, mesh.faces)[0]
+    volume = np.bincount(component, heights.sum(1), minlength=len(counts)) / 6
     solid = (gaps <= 0.02) & (2 * np.abs(volume) > 0.2 * mesh.area)
     sides: IntArray = np.where(solid, np.sign(volume), 0).astype(np.int64)[component]
     return sides
@@ -141,5 +138,5 @@ def simple_parts(mesh: Components, sides: IntArray, seen: IntArray) -> FloatArra
 
 def linked(pairs: Array, count: int) -> IntArray:
     """The connected component (count,) of each of ``count`` items, from linked pairs (P, 2)."""
-    graph = coo_matrix((np.ones(len(pairs), np.bool_), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
+    graph = coo_array((np.ones(len(pairs), np.bool_), pairs.T), (count, count))
     return np.asarray(connected_components(graph, directed=False)[1], np.int64)

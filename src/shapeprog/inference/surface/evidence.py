@@ -13,10 +13,11 @@ from scipy.spatial import cKDTree
 from shapeprog.data.sampling import sample_with_faces
 from shapeprog.data.shape import Shape
 from shapeprog.data.voxelise_kernels import mark_triangles
+from shapeprog.formats.parts import triangle_normals
 from shapeprog.geometry.arrays import over_threads
 from shapeprog.geometry.mesh import union_mesh
 from shapeprog.inference.surface.cloud import planes, points_of_scan, spiral
-from shapeprog.inference.surface.components import Components, components, face_normals, simple_parts, solid_sides
+from shapeprog.inference.surface.components import Components, components, simple_parts, solid_sides
 from shapeprog.inference.surface.evidence_kernels import look_out
 from shapeprog.inference.surface.settings import SURFACE
 from shapeprog.language.program import Program
@@ -91,8 +92,8 @@ def _of_mesh(mesh: Components, seed: int) -> Evidence:
     """The evidence of a mesh: samples by area; cells are free where they are visible from outside."""
     samples, face = sample_with_faces(mesh.vertices, mesh.faces, SURFACE.surface, seed)
     surface, corners = samples.astype(np.float64), mesh.vertices[mesh.faces]
-    sides, across = solid_sides(mesh), face_normals(corners)[face]
-    normals = np.where(sides[face] < 0, -1, 1)[:, None] * across / np.linalg.norm(across, axis=1, keepdims=True)
+    sides, (_, facing) = solid_sides(mesh), triangle_normals(mesh.vertices, mesh.faces)
+    normals = np.where(sides < 0, -1, 1)[face, None] * facing[face]
     barrier = np.zeros((SURFACE.looking,) * 3, np.bool_)
     # The longest side ends on cell boundaries: rounding would leave holes in faces there, which show the inside.
     mark_triangles(np.ascontiguousarray((corners + HALF) * (SURFACE.looking / RESOLUTION)), 0.5 + 1e-6, barrier)

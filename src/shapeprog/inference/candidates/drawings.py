@@ -97,8 +97,7 @@ def simplest(node: Node) -> Node:
     if language()[node.name].pivot is not None:
         return node
     (boxes,) = solid_boxes([node])
-    candidates = [replace(candidate, role=node.role) for candidate in drawings(boxes[0])] if len(boxes) == 1 else []
-    same = list(_drawing_the_same(candidates, node, np.ones(3)))
+    same = list(_drawing_the_same(drawings(boxes[0]), node, np.ones(3))) if len(boxes) == 1 else []
     if not same or is_unhinted(language()[node.name]):  # those of the paper are written as a solid with a role
         same.append(node)
     return min(same, key=numbers_written)
@@ -122,16 +121,16 @@ def canonical_side(node: Node) -> Node:
         return node
     turn = signs[:, None] * box.rotation * [1, 1, signs.prod()]  # a box is its own image along its last axis
     image = Box(signs * box.centre, turn, box.half)
-    candidates = [replace(candidate, role=drawing.role) for candidate in hinted(language()[drawing.name], image)]
-    match = next(_drawing_the_same(candidates, drawing, signs), None)
+    match = next(_drawing_the_same(hinted(language()[drawing.name], image), drawing, signs), None)
     return node if match is None else nest((*loops, match))
 
 
-def _drawing_the_same(candidates: Sequence[Draw], node: Node, signs: FloatArray) -> Iterator[Draw]:
-    """The candidates whose surface equals that of a node, or of its mirror image by these signs of the coordinates."""
+def _drawing_the_same(candidates: Sequence[Draw], node: Draw, signs: FloatArray) -> Iterator[Draw]:
+    """The candidates that draw a node, or its mirror image by these signs of the coordinates, with its role."""
     if not candidates:
         return
-    sample = sample_surface(scene_of([node]), SETTINGS.equal_points, torch.Generator().manual_seed(0))
+    sample = sample_surface(scene_of([node]), 64, torch.Generator().manual_seed(0))
     points = sample.points.double() * torch.from_numpy(signs)
     off = signed_distance(scene_of(candidates), points.expand(len(candidates), -1, -1)).abs().amax(-1).tolist()
-    yield from (candidate for candidate, far in zip(candidates, off, strict=True) if far < SETTINGS.equal_distance)
+    same = (candidate for candidate, far in zip(candidates, off, strict=True) if far < SETTINGS.equal_distance)
+    yield from (replace(candidate, role=node.role) for candidate in same)

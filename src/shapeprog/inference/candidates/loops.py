@@ -41,18 +41,6 @@ class Profiles(NamedTuple):
     half: FloatArray  # half extents (C, 3) of that box
     distance: FloatArray  # signed distances (C, 27) of the surface from its middle, corners, edges and faces
 
-    @property
-    def size(self) -> FloatArray:
-        """Half of the diagonal (C,) of the box."""
-        return np.sqrt((self.half**2).sum(1))
-
-    def copies(self) -> npt.NDArray[np.bool_]:
-        """Whether two candidates (C, C) are copies of each other by translation."""
-        alike = cdist(self.half, self.half, "chebyshev") <= SETTINGS.alike * self.size[:, None]
-        level = cdist(self.distance, self.distance, "chebyshev") <= SETTINGS.level
-        same: npt.NDArray[np.bool_] = alike & level & (self.kind[:, None] == self.kind)
-        return same
-
 
 def profiles(nodes: Sequence[Node]) -> Profiles:
     """The profiles of blocks, at least one."""
@@ -74,8 +62,9 @@ def distinct(nodes: Sequence[Node]) -> list[Node]:
     if not nodes:
         return []
     profile = profiles(nodes)
-    order = np.round(np.log2(np.maximum(profile.size, SETTINGS.same)))  # order of magnitude
-    features = np.concatenate([profile.middle, profile.half, profile.distance], 1)
+    size = np.linalg.norm(profile.half, axis=1)
+    order = np.round(np.log2(np.maximum(size, SETTINGS.same)))  # order of magnitude
+    features = np.concatenate(profile[1:], 1)
     key = np.column_stack([profile.kind, order, np.round(features / (SETTINGS.same * 2 ** order[:, None]))])
     return [nodes[k] for k in np.sort(np.unique(key, axis=0, return_index=True)[1])]
 
@@ -105,9 +94,11 @@ def _runs(nodes: Sequence[Node]) -> list[Node]:
     """Loops over candidates that are copies of each other at equal steps, the longest first."""
     if len(nodes) < 2:
         return []
-    profile = profiles(nodes)
-    step_of: dict[tuple[int, ...], FloatArray] = {}
-    groups = {tuple(np.flatnonzero(row)[: SETTINGS.most_alike].tolist()) for row in profile.copies()}
+    profile, step_of = profiles(nodes), dict[tuple[int, ...], FloatArray]()
+    kind, _, half, distance = profile
+    copies = cdist(half, half, "chebyshev") <= SETTINGS.alike * np.linalg.norm(half, axis=1)[:, None]
+    copies &= (cdist(distance, distance, "chebyshev") <= SETTINGS.level) & (kind[:, None] == kind)
+    groups = {tuple(np.flatnonzero(row)[: SETTINGS.most_alike].tolist()) for row in copies}
     for group in sorted(group for group in groups if len(group) > 1):
         positions = profile.middle[list(group)]
         for run in equal_steps(positions, profile.half[group[0]]):
@@ -140,8 +131,7 @@ def equal_steps(positions: FloatArray, half: FloatArray) -> list[list[int]]:
     first, second = np.nonzero(far & (nearest(positions[:, None] - steps) < 0))
     step = steps[first, second]
     forwards = np.sign(np.where(np.abs(step) < SETTINGS.centred, 0, step)) @ [9, 3, 1] > 0
-    onwards = (nearest(positions[second] + step * np.array([[[1]], [[2]]])) >= 0).any(0)
-    run, last, end, going = [first, second], second.copy(), np.ones(len(second), np.int64), onwards
+    run, last, end, going = [first, second], second, np.ones_like(second), np.ones(len(second), np.bool_)
     while going.any():
         start, copy = positions[first[going]], len(run)
         present = np.full(len(first), MISSING)

@@ -21,7 +21,7 @@ from shapeprog.inference.candidates.drawings import drawings, hinted, solid_boxe
 from shapeprog.inference.candidates.loops import images, mirror, mirrors, repeated, rows
 from shapeprog.inference.candidates.settings import SETTINGS
 from shapeprog.inference.fit.tunable import THINNEST
-from shapeprog.inference.pieces.oriented import boxes_around
+from shapeprog.inference.pieces.oriented import CORNERS, boxes_around
 from shapeprog.inference.surface.components import linked
 from shapeprog.inference.surface.evidence import Evidence
 from shapeprog.language.hints import STRAIGHT, Box
@@ -29,8 +29,6 @@ from shapeprog.language.program import Chain, Loop, Node, Program, nest
 from shapeprog.language.statement import language
 from shapeprog.language.unroll import unroll
 from shapeprog.space import DEPTH, SIDE, FloatArray
-
-CORNERS = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
 
 
 def neighbours(program: Program) -> list[Node]:

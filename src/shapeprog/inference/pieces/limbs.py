@@ -55,10 +55,7 @@ def _merged(centre: FloatArray, radius: FloatArray) -> tuple[IntArray, FloatArra
 
 
 def _inner_balls(cloud: Cloud, which: IntArray) -> tuple[FloatArray, FloatArray]:
-    """Centres (N, 3) and radii (N,) of the largest empty balls that touch the surface at some of its points.
-
-    Of the two balls at a point the smaller one counts: normals may have either sign, and furniture is thin.
-    """
+    """Centres (N, 3) and radii (N,) of the largest empty balls that touch the surface at some of its points."""
     tree = cKDTree(cloud.points)
     points = np.concatenate([cloud.points[which]] * 2)
     normals = np.concatenate([cloud.normals[which], -cloud.normals[which]])
@@ -75,6 +72,6 @@ def _inner_balls(cloud: Cloud, which: IntArray) -> tuple[FloatArray, FloatArray]
         radius[going] = square[smaller] / (2 * along[smaller])
         if not len(going):
             break
-    half = len(which)
+    half = len(which)  # the smaller of the two balls at a point: normals have either sign, and furniture is thin
     better = np.where(radius[:half] <= radius[half:], 0, half) + np.arange(half)
     return points[better] - normals[better] * radius[better, None], radius[better]

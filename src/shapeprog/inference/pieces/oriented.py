@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import combinations
+from itertools import combinations, product
 from typing import NamedTuple
 
 import numpy as np
@@ -15,6 +15,9 @@ from shapeprog.inference.pieces.settings import SETTINGS
 from shapeprog.inference.surface.cloud import spiral
 from shapeprog.inference.surface.components import IntArray
 from shapeprog.space import Array, FloatArray
+
+CORNERS = np.array(list(product((-1.0, 1.0), repeat=3)))
+"""The corners (8, 3) of a box of half extents 1."""
 
 LINES = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 0], [1, -1, 0], [1, 0, 1], [1, 0, -1], [0, 1, 1], [0, 1, -1]])
 """Directions along which boxes are compared."""
@@ -36,8 +39,7 @@ class Boxes(NamedTuple):
 
     def corners(self) -> FloatArray:
         """Their corners (N, 8, 3)."""
-        signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], np.float64)
-        return self.centre[:, None] + np.einsum("nij,nkj->nki", self.rotation, signs * self.half[:, None])
+        return self.centre[:, None] + np.einsum("nij,nkj->nki", self.rotation, CORNERS * self.half[:, None])
 
 
 def join(parts: Sequence[Boxes]) -> Boxes:

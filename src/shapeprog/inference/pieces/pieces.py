@@ -83,15 +83,27 @@ def find_pieces(evidence: Evidence) -> Pieces:
     each class, pieces that explain more points are first.
     """
     if evidence.mesh is not None:
-        return _of_mesh(evidence.mesh)
-    cloud = cloud_of(evidence.surface)
-    if cloud.noise > SURFACE.noisy:
-        cloud = cloud_of(projected(cloud.points))
-    return _ranked(cloud, _of_points(cloud, limbs(cloud) if is_clean(evidence.surface) else join([])))
+        cloud, parts = _of_mesh(evidence.mesh)
+    else:
+        cloud = cloud_of(evidence.surface)
+        if cloud.noise > SURFACE.noisy:
+            cloud = cloud_of(projected(cloud.points))
+        parts = _of_points(cloud, limbs(cloud) if is_clean(evidence.surface) else join([]))
+    boxes = join([part for _, part in parts])
+    source = np.repeat([source for source, _ in parts], [len(part.half) for _, part in parts])
+    unique = np.union1d(np.flatnonzero(source == Source.COMPONENT), distinct(boxes))  # each once but for components
+    boxes, source = boxes.take(unique), source[unique]
+    support = Support(cloud, boxes)
+    cover, first = support.cover(), np.full(len(unique), len(unique))
+    first[cover] = np.arange(len(cover))
+    turn = np.searchsorted([Source.COMPONENT, Source.LIMB], source)
+    value = support.explained.sum(1) - support.price
+    order = np.lexsort((-np.round(value, 6), turn, first))[: SETTINGS.pieces]
+    return Pieces(boxes.take(order), source[order], cloud)
 
 
-def _of_mesh(mesh: Components) -> Pieces:
-    """Pieces of a mesh: from its components, and from sampled points, with at least some on each large component."""
+def _of_mesh(mesh: Components) -> tuple[Cloud, list[tuple[Source, Boxes]]]:
+    """Pieces from the components of a mesh and from sampled points, with at least some on each large component."""
     runs = list(pairwise(mesh.start[: SETTINGS.components + 1]))
     boxes = boxes_around([mesh.vertices[np.unique(mesh.faces[first:last])] for first, last in runs])
     samples = [sample_with_faces(mesh.vertices, mesh.faces, SETTINGS.points, 0)]
@@ -102,8 +114,7 @@ def _of_mesh(mesh: Components) -> Pieces:
             samples.append((points, face + first))
     points, face = (np.concatenate(column) for column in zip(*samples, strict=True))
     cloud = cloud_of(points, triangle_normals(mesh.vertices, mesh.faces[face])[1])
-    parts = [(Source.COMPONENT, boxes), (Source.GROUP, groups(boxes)), *_of_points(cloud, join([]))]
-    return _ranked(cloud, parts)
+    return cloud, [(Source.COMPONENT, boxes), (Source.GROUP, groups(boxes)), *_of_points(cloud, join([]))]
 
 
 def _of_points(cloud: Cloud, along: Boxes) -> list[tuple[Source, Boxes]]:
@@ -123,18 +134,3 @@ def _of_points(cloud: Cloud, along: Boxes) -> list[tuple[Source, Boxes]]:
     ]
     boxes = join([part for _, part in parts])
     return [*parts, (Source.GROUP, groups(boxes.take(Support(cloud, boxes).cover())))]
-
-
-def _ranked(cloud: Cloud, parts: list[tuple[Source, Boxes]]) -> Pieces:
-    """All pieces, each once but for components, the most important first."""
-    boxes = join([part for _, part in parts])
-    source = np.repeat([source for source, _ in parts], [len(part.half) for _, part in parts])
-    unique = np.union1d(np.flatnonzero(source == Source.COMPONENT), distinct(boxes))
-    boxes, source = boxes.take(unique), source[unique]
-    support = Support(cloud, boxes)
-    cover, first = support.cover(), np.full(len(unique), len(unique))
-    first[cover] = np.arange(len(cover))
-    turn = np.searchsorted([Source.COMPONENT, Source.LIMB], source)
-    value = support.explained.sum(1) - support.price
-    order = np.lexsort((-np.round(value, 6), turn, first))[: SETTINGS.pieces]
-    return Pieces(boxes.take(order), source[order], cloud)

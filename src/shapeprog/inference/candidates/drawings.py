@@ -129,7 +129,7 @@ def _drawing_the_same(candidates: Sequence[Draw], node: Draw, signs: FloatArray)
     """The candidates that draw a node, or its mirror image by these signs of the coordinates, with its role."""
     if not candidates:
         return
-    sample = sample_surface(scene_of([node]), 64, torch.Generator().manual_seed(0))
+    sample = sample_surface(scene_of([node]), SETTINGS.equal_points, torch.Generator().manual_seed(0))
     points = sample.points.double() * torch.from_numpy(signs)
     off = signed_distance(scene_of(candidates), points.expand(len(candidates), -1, -1)).abs().amax(-1).tolist()
     same = (candidate for candidate, far in zip(candidates, off, strict=True) if far < SETTINGS.equal_distance)

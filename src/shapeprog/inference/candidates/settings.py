@@ -31,6 +31,7 @@ class Settings:
     better: float = 2 / 3  # share of its misfit below which the best statement is a candidate too
 
     # Equal candidates
+    equal_points: int = 64  # points of a surface by which two drawings are compared
     equal_distance: float = 0.1  # distance below which their surfaces are the same
     same: float = 0.03  # difference of positions and extents, as a share of the size, of equal candidates
     alike: float = 0.06  # difference of extents, as a share of the size, up to which candidates are copies

@@ -17,7 +17,7 @@ from shapeprog.formats.parts import triangle_normals
 from shapeprog.geometry.arrays import over_threads
 from shapeprog.geometry.mesh import union_mesh
 from shapeprog.inference.surface.cloud import planes, points_of_scan, spiral
-from shapeprog.inference.surface.components import Components, components, simple_parts, solid_sides
+from shapeprog.inference.surface.components import Components, IntArray, components, simple_parts, solid_sides
 from shapeprog.inference.surface.evidence_kernels import look_out
 from shapeprog.inference.surface.settings import SURFACE
 from shapeprog.language.program import Program
@@ -136,15 +136,10 @@ def _of_cells(voxels: Flags) -> Evidence:
 
     Parts that are one cell thick have .7 of that thickness: their two sides do not cross.
     """
-    sides, occupied = _exposed_sides(voxels), np.argwhere(voxels)
-    faces = np.ascontiguousarray(np.argwhere(sides))  # kernels need contiguous arrays
-    axis, sign, cells = faces[:, 0], 2 * faces[:, 1] - 1, faces[:, 2:]
-    low, high = occupied.min(0)[axis], occupied.max(0)[axis] + 1
-    coordinate = cells[np.arange(len(faces)), axis]
-    exact = (high - low == SPAN) & (coordinate == np.where(sign < 0, low, high - 1))
-    single = (sides[:, 0] & sides[:, 1])[(axis, *cells.T)]
+    axis, above, cells, exact = _exposed_faces(voxels)
+    normals = np.where(above, 1, -1)[:, None] * np.eye(3)[axis]
+    single = ~np.pad(voxels, 1)[tuple((cells + 1 - normals.astype(np.int64)).T)]  # one cell thick
     inset = np.where(exact, 0.0, np.where(single, 0.15, SURFACE.inset))
-    normals = sign[:, None] * np.eye(3)[axis]
     surface = cells + 0.5 - HALF + (0.5 - inset)[:, None] * normals
     count = len(surface)
     return Evidence(
@@ -160,23 +155,26 @@ def points_of_cells(voxels: npt.NDArray[np.bool_], count: int = 5000, *, seed: i
     Uniform on the exposed faces of the cells, moved inwards by ``depth``; a face at the end of the
     longest side is exact, since that side is 24 cells long by definition, and stays.
     """
-    occupied, random, rows = np.argwhere(voxels), np.random.default_rng(seed), np.arange(count)
-    low, high = occupied.min(0), occupied.max(0) + 1
-    faces = np.argwhere(_exposed_sides(voxels))
-    along, above, *cell = faces[random.integers(len(faces), size=count)].T
-    cells, full = np.stack(cell, 1), high - low == SPAN
-    ends = full[along] & (cells[rows, along] == np.where(above, high[along] - 1, low[along]))
-    inwards = np.where(ends, 0.0, SURFACE.depth)
+    occupied, random, faces = np.argwhere(voxels), np.random.default_rng(seed), _exposed_faces(voxels)
+    selected = random.integers(len(faces[0]), size=count)
+    axis, above, cells, exact = (column[selected] for column in faces)
+    inwards = np.where(exact, 0.0, SURFACE.depth)
     points = cells + random.random((count, 3))
-    points[rows, along] = cells[rows, along] + np.where(above, 1 - inwards, inwards)
-    points = np.clip(points, np.where(full, low, low + SURFACE.depth), np.where(full, high, high - SURFACE.depth))
-    return (points - HALF).astype(np.float32)
+    points[np.arange(count), axis] = cells[np.arange(count), axis] + np.where(above, 1 - inwards, inwards)
+    low, high = occupied.min(0), occupied.max(0) + 1
+    margin = np.where(high - low == SPAN, 0.0, SURFACE.depth)
+    return (np.clip(points, low + margin, high - margin) - HALF).astype(np.float32)
 
 
-def _exposed_sides(voxels: Flags) -> Flags:
-    """Whether a cell is touched and its neighbour along an axis, below and above, is not: (3, 2, 32, 32, 32)."""
-    padded, inner = np.pad(voxels, 1), np.s_[1:-1, 1:-1, 1:-1]
-    return np.array([[voxels & ~np.roll(padded, by, axis)[inner] for by in (1, -1)] for axis in range(3)])
+def _exposed_faces(voxels: Flags) -> tuple[IntArray, Flags, IntArray, Flags]:
+    """The axis of each exposed face of cells (F,), whether it is above its cell (F,), the cell (F, 3), and whether it
+    is at an end of a longest side (F,)."""
+    padded, occupied = np.pad(voxels, 1), np.argwhere(voxels)
+    sides = [[voxels & ~np.roll(padded, by, axis)[1:-1, 1:-1, 1:-1] for by in (1, -1)] for axis in range(3)]
+    axis, above, *cell = np.argwhere(sides).T
+    low, high = occupied.min(0)[axis], occupied.max(0)[axis]
+    exact = (high - low == SPAN - 1) & (np.choose(axis, cell) == np.where(above, high, low))
+    return axis, above == 1, np.stack(cell, 1), exact
 
 
 def _reach(tolerance: float, area: float, count: int) -> float:

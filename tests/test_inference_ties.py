@@ -16,13 +16,14 @@ import shapeprog as sp
 from shapeprog.cli.app import app
 from shapeprog.evaluation.editing import edit_scores
 from shapeprog.geometry.mesh import pieces, union_mesh
+from shapeprog.inference.fit.joints import find_joints
 from shapeprog.inference.surface.evidence import evidence_of_program
 from shapeprog.inference.ties import tying
 from shapeprog.inference.ties.anchors import anchors_of
 from shapeprog.inference.ties.expressions import solved
 from shapeprog.inference.ties.groups import grouped
 from shapeprog.inference.ties.layout import Layout, Slot
-from shapeprog.inference.ties.model import Model, closeness
+from shapeprog.inference.ties.model import Misfit, Model, closeness
 from shapeprog.inference.ties.relations import Relation, worthwhile
 from shapeprog.inference.ties.settings import TIES
 from shapeprog.inference.ties.text import named
@@ -745,6 +746,33 @@ def test_a_program_that_cannot_be_drawn_is_tied_for_less(monkeypatch):
     monkeypatch.setattr(tying._Ties, "tied", tied)
     assert free_numbers(tie(program, evidence_of_program(program))) < 20
     assert prices[1] == prices[0] / TIES.cheaper
+
+
+def test_of_attempts_that_all_lose_too_much_the_closest_is_kept(monkeypatch):
+    program, offered = sp.parse(TABLE), list[Program]()
+    losses = iter([0.4, 0.1, 0.2])
+    tied_at = tying._Ties.tied
+
+    def tied(ties: tying._Ties, price: float) -> Program:
+        offered.append(tied_at(ties, price))
+        return offered[-1]
+
+    monkeypatch.setattr(tying._Ties, "tied", tied)
+    monkeypatch.setattr(tying, "closeness", lambda *_: 1 - next(losses) if offered else 1.0)
+    assert tie(program, evidence_of_program(program)) is offered[1]
+    assert len(offered) == TIES.attempts
+
+
+def test_a_refit_goes_on_where_a_part_would_become_too_thin():
+    target = sp.parse("top(box(at=(4, -8, -12), size=(0.02, 16, 24)))\nbase(box(at=(-6, -8, -12), size=(2, 16, 24)))\n")
+    start = sp.parse("top(box(at=(4, -8, -12), size=(0.1, 16, 24)))\nbase(box(at=(-6, -8, -12), size=(2.4, 16, 24)))\n")
+    model = Model(Layout(placed(start).source))
+    joints = find_joints(model.scene(model.numbers), -1e6)
+    misfit = Misfit(model, evidence_of_program(target), joints, np.zeros(len(model.numbers)), 0)
+    fitted = misfit.refitted(model.numbers, np.zeros((0, len(model.numbers))))
+    (top, base) = model.scene(fitted).size[:, 0].tolist()
+    assert top >= 0.05 - 1e-6  # half of the least thickness
+    assert base == pytest.approx(1.0, abs=0.03)
 
 
 def test_what_lies_between_equal_clearances_is_written_with_one_number():

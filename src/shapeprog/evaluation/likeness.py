@@ -21,6 +21,7 @@ import torch
 
 from shapeprog.data.sampling import sample_with_faces
 from shapeprog.evaluation.outline_kernels import draw_outline
+from shapeprog.geometry.mesh import triangle_normals
 from shapeprog.geometry.nearest import nearest
 from shapeprog.space import Array
 
@@ -76,10 +77,8 @@ def box(points: Array) -> tuple[Array, float]:
 def sampled(mesh: Triangles, seed: int, count: int = POINTS) -> Samples:
     """Points uniform by area on a mesh, with the normals of their triangles."""
     points, face = sample_with_faces(mesh.vertices, mesh.faces, count, seed)
-    corners = np.asarray(mesh.vertices, np.float64)[np.asarray(mesh.faces)[face]]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    length = np.linalg.norm(normals, axis=1, keepdims=True)
-    return Samples(points.astype(np.float64), normals / np.where(length > 0, length, 1))
+    _, normals = triangle_normals(np.asarray(mesh.vertices, np.float64), np.asarray(mesh.faces)[face])
+    return Samples(points.astype(np.float64), normals)
 
 
 def likeness(predicted: Samples, target: Samples, diagonal: float) -> Likeness:

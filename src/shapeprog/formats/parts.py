@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from shapeprog.errors import OutputError, ShapeProgError
-from shapeprog.geometry.mesh import joined, part_meshes, union_mesh
+from shapeprog.geometry.mesh import joined, part_meshes, triangle_normals, union_mesh
 from shapeprog.language.parameters import LARGEST
 from shapeprog.language.program import Program
 from shapeprog.language.tensors import encode
@@ -161,11 +161,3 @@ def _shared_edges(faces: Faces) -> Faces:
     order = np.argsort(edge, kind="stable")
     shared = edge[order[1:]] == edge[order[:-1]]
     return np.stack([order[:-1][shared], order[1:][shared]])
-
-
-def triangle_normals(vertices: Vertices, faces: Faces) -> tuple[Vertices, Vertices]:
-    """Normals (F, 3) of triangles, as long as twice their area, and of unit length; 0 for triangles without area."""
-    corners = vertices[faces]
-    area = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    length = np.linalg.norm(area, axis=1, keepdims=True)
-    return area, area / np.where(length > 0, length, 1)

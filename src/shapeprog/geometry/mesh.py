@@ -203,3 +203,11 @@ def gaps(scene: Batch, within: float) -> dict[tuple[int, int], float]:
         if gap < within:
             results[parts[i].slot, parts[j].slot] = float(gap)
     return results
+
+
+def triangle_normals(vertices: FloatArray, faces: Array) -> tuple[FloatArray, FloatArray]:
+    """Normals (F, 3) of triangles, as long as twice their area, and of unit length; 0 for triangles without area."""
+    corners = vertices[faces]
+    area = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    length = np.linalg.norm(area, axis=1, keepdims=True)
+    return area, area / np.where(length > 0, length, 1)

@@ -10,8 +10,8 @@ import numpy as np
 
 from shapeprog.data.shape import Shape
 from shapeprog.formats.colours import colour
-from shapeprog.formats.parts import Part, crease_normals, part_normals, triangle_normals
-from shapeprog.geometry.mesh import joined
+from shapeprog.formats.parts import Part, crease_normals, part_normals
+from shapeprog.geometry.mesh import joined, triangle_normals
 from shapeprog.space import RESOLUTION, Array
 
 INPUT_COLOUR = (212, 215, 220)  # light grey of inputs

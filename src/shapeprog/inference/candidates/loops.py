@@ -64,7 +64,7 @@ def distinct(nodes: Sequence[Node]) -> list[Node]:
     profile = profiles(nodes)
     size = np.linalg.norm(profile.half, axis=1)
     order = np.round(np.log2(np.maximum(size, SETTINGS.same)))  # order of magnitude
-    features = np.concatenate(profile[1:], 1)
+    features = np.concatenate([profile.middle, profile.half, profile.distance], 1)
     key = np.column_stack([profile.kind, order, np.round(features / (SETTINGS.same * 2 ** order[:, None]))])
     return [nodes[k] for k in np.sort(np.unique(key, axis=0, return_index=True)[1])]
 

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from shapeprog.data.sampling import sample_with_faces
-from shapeprog.formats.parts import triangle_normals
+from shapeprog.geometry.mesh import triangle_normals
 from shapeprog.inference.pieces.limbs import limbs
 from shapeprog.inference.pieces.oriented import Boxes, boxes_around, distinct, groups, join
 from shapeprog.inference.pieces.patches import planar_patches, sheets, slabs

@@ -9,7 +9,7 @@ import numpy.typing as npt
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from shapeprog.formats.parts import triangle_normals
+from shapeprog.geometry.mesh import triangle_normals
 from shapeprog.space import Array, FloatArray
 
 IntArray = npt.NDArray[np.int64]

@@ -109,7 +109,10 @@ class Misfit:
         return slope + self.prior * (numbers - self.model.numbers), curvature + np.diag(self.prior)
 
     def refitted(self, numbers: FloatArray, rows: FloatArray) -> FloatArray:
-        """The numbers (P,) of the least misfit that differ from these only so that relations (M, P) hold as before."""
+        """The numbers (P,) of the least misfit that differ from these only so that relations (M, P) hold as before.
+
+        A thickness that a step would take below its bound is fixed, and the step is solved again (an active set).
+        """
         farthest, jacobian = TIES.farthest / self.reach, self.model.jacobian
         low = np.minimum(self.model.low, jacobian @ numbers) - HOLDS
         for _ in range(TIES.steps):
@@ -121,7 +124,7 @@ class Misfit:
                 thin = ~(jacobian @ onwards >= low)  # also where a part without length has no slopes
                 if not thin.any():
                     break
-                rows = np.vstack([rows, jacobian[thin]])  # what would be too thin keeps its thickness
+                rows = np.vstack([rows, jacobian[thin]])
             numbers = onwards
         return numbers
 

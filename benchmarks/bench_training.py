@@ -1,6 +1,6 @@
 """Speed of the generators: a step of pretraining and a single pass, as ratios to the published form in the same run.
 
-    OMP_WAIT_POLICY=PASSIVE python benchmarks/bench_training.py
+    OMP_WAIT_POLICY=PASSIVE python benchmarks/bench_training.py [--device cuda]
 
 ``published`` is the network as its authors ran it: every block encoded for every shape, statistics of the batch; the
 others learn from live blocks.  All in float32.  Weights are random, and no program ends before ten blocks.
@@ -8,6 +8,7 @@ others learn from live blocks.  All in float32.  Weights are random, and no prog
 
 from __future__ import annotations
 
+import argparse
 import time
 from collections.abc import Callable
 from dataclasses import replace
@@ -31,6 +32,8 @@ def seconds(work: Callable[[], object]) -> float:
     for _ in range(1 + REPEATS):
         start = time.perf_counter()
         work()
+        if torch.cuda.is_available():
+            torch.cuda.synchronize()
         times.append(time.perf_counter() - start)
     return min(times[1:])
 
@@ -41,7 +44,7 @@ def pretraining(generator: Generator, batch: TeacherForcingBatch) -> float:
     optimiser = torch.optim.Adam(generator.parameters(), 1e-4)
 
     def step() -> None:
-        loss = sum(generator.losses(generator.predict(batch)).values(), torch.zeros(()))
+        loss = sum(generator.losses(generator.predict(batch)).values(), torch.zeros((), device=batch.target.device))
         optimiser.zero_grad()
         loss.backward()
         optimiser.step()
@@ -64,24 +67,27 @@ def single_pass(generator: Generator, batch: TeacherForcingBatch) -> float:
 
 def main() -> None:
     """Print a line for each figure: name, shapes per second, ratio to the published form."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--device", default="cpu")
+    device = torch.device(parser.parse_args().device)
     tune_allocator()
     torch.manual_seed(0)
     made = PRIORS["narrow"].batch(BATCH, 0, 0)
-    live = teacher_forcing(made.voxels, made.code[:, : BLOCKS - 1], "written")  # and the end
+    live = teacher_forcing(made.voxels, made.code[:, : BLOCKS - 1], "written").to(device)  # and the end
     everything = replace(live, live=torch.ones_like(live.live))
     designs: dict[str, tuple[Generator, TeacherForcingBatch]] = {
-        "published": (Tian2019(PUBLISHED), everything),
-        "tian2019": (Tian2019(Tian2019Settings()), live),
-        "fast": (Fast(FastSettings()), live),
+        "published": (Tian2019(PUBLISHED).to(device), everything),
+        "tian2019": (Tian2019(Tian2019Settings()).to(device), live),
+        "fast": (Fast(FastSettings()).to(device), live),
     }
-    print(f"{torch.get_num_threads()} threads, batch {BATCH}, {BLOCKS} blocks, prior narrow")
+    print(f"{device}, {torch.get_num_threads()} threads, batch {BATCH}, {BLOCKS} blocks, prior narrow")
     for what, work in (("pretraining", pretraining), ("single pass", single_pass)):
         base = 0.0
         for name, setup in designs.items():
             rate = BATCH / work(*setup)
             base = base or rate
             print(f"{what}, {name:9} {rate:8.1f} shapes/s  {rate / base:6.1f} x", flush=True)
-    one = teacher_forcing(made.voxels[:1], made.code[:1])
+    one = teacher_forcing(made.voxels[:1], made.code[:1]).to(device)
     print(f"single pass, fast, one shape {1000 * single_pass(designs['fast'][0], one):8.1f} ms")
 
 

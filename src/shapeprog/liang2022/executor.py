@@ -46,6 +46,12 @@ class NeuralExecutor(nn.Module):
             nn.ConvTranspose3d(4, 2, 4, 2, 1, bias=False),
         )  # fmt: skip
 
+    def train(self, mode: bool = True) -> NeuralExecutor:
+        """Set the mode of all but the LSTM, which has no other: cuDNN has no backward pass in evaluation mode."""
+        super().train(mode)
+        self.lstm.train()
+        return self
+
     def forward(self, ids: Float[Tensor, "N J V"], numbers: Float[Tensor, "N J 7"]) -> Float[Tensor, "N 32 32 32"]:
         """Logits of occupied cells, for probabilities of the ids of each step."""
         inputs = torch.cat([self.pgm_embed(ids).relu(), self.param_embed(numbers).relu()], -1)

@@ -49,7 +49,6 @@ class Row:
 
 # As published: programs by arg-max, and no loss of ids but one that keeps them near those of the start.
 PUBLISHED: dict[str, Any] = {"prior": "narrow", "decoder": "argmax", "decoded_ids": 0.0, "kl": 1.0}
-TIAN: dict[str, Any] = PUBLISHED | {"num_shapes": 480, "batch_size": 8, "rehearsal": 4, "warm_up": 48}
 LONG: dict[str, Any] = PUBLISHED | {"kl": 3.0, "num_shapes": 3200, "validate_every": 800}
 GUIDED: dict[str, Any] = {"learning_rate": 3e-5}
 GUIDED_LONG: dict[str, Any] = LONG | {"learning_rate": 1e-5, "validate_every": 400}
@@ -63,8 +62,8 @@ ROWS: dict[str, Row] = {
     "guided-long": Row("`fast`, narrow prior, guided, 3,200 shapes", "fast-narrow", "guided", GUIDED_LONG, DECODERS),
     "direct-long": Row("`fast`, narrow prior, direct, 3,200 shapes", "fast-narrow", "direct", LONG, DECODERS),
     "tian2019-none": Row("`tian2019`", "tian2019-narrow", decoders=DECODERS),
-    "tian2019-guided": Row("`tian2019`, guided, 480 shapes", "tian2019-narrow", "guided", TIAN | GUIDED, DECODERS),
-    "tian2019-direct": Row("`tian2019`, direct, 480 shapes", "tian2019-narrow", "direct", TIAN, DECODERS),
+    "tian2019-guided": Row("`tian2019`, guided, 3,200 shapes", "tian2019-narrow", "guided", GUIDED_LONG, DECODERS),
+    "tian2019-direct": Row("`tian2019`, direct, 3,200 shapes", "tian2019-narrow", "direct", LONG, DECODERS),
     "wide-none": Row("wide prior", "fast-wide", decoders=DECODERS),
     "wide-guided": Row("wide prior, guided", "fast-wide", "guided", {}, DECODERS),
     "wide-direct": Row("wide prior, direct", "fast-wide", "direct", {}, DECODERS),

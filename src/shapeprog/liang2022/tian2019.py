@@ -106,6 +106,12 @@ class Tian2019(Generator):
         self.core = nn.LSTM(WIDTH, WIDTH, bias=False, batch_first=True)
         self.inner_net = StepNet()
 
+    def train(self, mode: bool = True) -> Tian2019:
+        """Set the mode of all but the block LSTM, which has no other: cuDNN has no backward pass in evaluation mode."""
+        super().train(mode)
+        self.core.train()
+        return self
+
     def encode(self, target: Grid, canvas: Grid, previous: Code, state: State) -> tuple[Float[Tensor, "B 64"], State]:
         """The block feature; the state holds the first convolution of the target and that of the block LSTM."""
         encoder = self.shape_feat

@@ -63,7 +63,9 @@ ROWS: dict[str, Row] = {
     "direct-long": Row("`fast`, narrow prior, direct, 3,200 shapes", "fast-narrow", "direct", LONG, DECODERS),
     "tian2019-none": Row("`tian2019`", "tian2019-narrow", decoders=DECODERS),
     "tian2019-guided": Row("`tian2019`, guided, 3,200 shapes", "tian2019-narrow", "guided", GUIDED_LONG, DECODERS),
-    "tian2019-direct": Row("`tian2019`, direct, 3,200 shapes", "tian2019-narrow", "direct", LONG, DECODERS),
+    "tian2019-direct": Row(
+        "`tian2019`, direct, 3,200 shapes", "tian2019-narrow", "direct", LONG | {"validate_every": 400}, DECODERS
+    ),
     "wide-none": Row("wide prior", "fast-wide", decoders=DECODERS),
     "wide-guided": Row("wide prior, guided", "fast-wide", "guided", {}, DECODERS),
     "wide-direct": Row("wide prior, direct", "fast-wide", "direct", {}, DECODERS),

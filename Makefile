@@ -14,7 +14,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 DOCS_READY := $(VENV)/.docs-ready
-PAPER_TESTS := $(wildcard tests/test_liang2022_*.py)
+PAPER_TESTS := $(wildcard tests/test_liang2022_*.py) tests/test_cuda.py
 PAPER := src/shapeprog/liang2022 tests/liang2022_toys.py $(PAPER_TESTS)
 
 .PHONY: demo test lint docs nightly clean

@@ -44,6 +44,13 @@ def room(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+def test_lstms_stay_in_training_mode_for_the_backward_pass_of_cudnn():
+    generator, executor = small("tian2019"), NeuralExecutor().eval()
+    assert generator.core.training
+    assert executor.lstm.training
+    assert not any(part.training for part in (generator, generator.shape_feat.BN1, executor.decoder))
+
+
 def task(room: Path, method: str = "direct", **options: Any) -> AdaptTask:
     values = {
         "initial": str(room / "fast.safetensors"), "decoder": "argmax",

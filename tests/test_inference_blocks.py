@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from shapeprog.data.random import outside_published
-from shapeprog.geometry.cells import pack, rasterise, voxels, words_of
+from shapeprog.geometry.cells import rasterise, voxels, words_of
 from shapeprog.inference.cells.block_kernels import (
     BACK,
     BOX,
@@ -20,9 +20,9 @@ from shapeprog.inference.cells.block_kernels import (
     SHIFT2,
     TILT,
     WIDTH,
+    cells_of,
     draw_all,
     draw_each,
-    layers,
 )
 from shapeprog.inference.cells.blocks import to_program
 from shapeprog.language.unroll import unroll
@@ -43,7 +43,7 @@ def random_block(form, random):
 
 
 def rows_of(program):
-    return words_of(rasterise(unroll(program))).reshape(-1)
+    return words_of(rasterise(unroll(program))).reshape(-1).view(np.uint64)
 
 
 @pytest.mark.parametrize("form", [BOX, DISC, BACK])
@@ -63,16 +63,14 @@ def test_names_change_no_cell():
         assert np.array_equal(draw_all(blocks), rows_of(to_program(blocks)))
 
 
-def test_the_cells_that_blocks_cover_lie_within_their_layers():
+def test_the_cells_of_blocks_together_are_those_of_each():
     random = np.random.default_rng(1)
     blocks = np.stack([random_block(form, random) for form in range(3)])
     drawn = draw_each(blocks)
-    for rows, block in zip(drawn, blocks, strict=True):
-        cells = voxels(unroll(to_program(block[None]))).numpy().astype(bool)
-        low, high = layers(block)
-        assert not cells[:low].any()
-        assert not cells[high:].any()
-        assert np.array_equal(rows, words_of(pack(cells)).reshape(-1))
+    for words, block in zip(drawn, blocks, strict=True):
+        program = to_program(block[None])
+        assert np.array_equal(words, rows_of(program))
+        assert np.array_equal(cells_of(words), voxels(unroll(program)).numpy().astype(bool))
     assert np.array_equal(draw_all(blocks), np.bitwise_or.reduce(drawn))
 
 

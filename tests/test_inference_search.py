@@ -8,7 +8,7 @@ import pytest
 from shapeprog.data.random import outside_published
 from shapeprog.geometry.cells import voxels as voxels_of
 from shapeprog.inference.budget import Deadline
-from shapeprog.inference.cells import editing, search
+from shapeprog.inference.cells import search
 from shapeprog.inference.cells.block_kernels import MOST_MOVES, WIDTH, draw_all, moves, statements, valid
 from shapeprog.inference.cells.blocks import to_program
 from shapeprog.inference.cells.search import search_structure
@@ -52,7 +52,7 @@ def iou_of(blocks, solid):
 
 
 def target(solid):
-    return editing.Target.of(solid, Settings(blocks=6, families=40))
+    return search.Target(solid, Settings(blocks=6, families=40))
 
 
 @pytest.mark.parametrize(
@@ -68,7 +68,8 @@ def test_planted_programs_are_found_again(text, iou, blocks):
     program = to_program(found)
     assert program.size == parse(text).size or iou_of(found, solid) < 1
     assert outside_published(program) == []
-    assert editing.iou(draw_all(found), target(solid)) == pytest.approx(iou_of(found, solid), abs=1e-12)
+    text_price = Settings().price * statements(found.T).sum()
+    assert search.value_of(found, target(solid)) == pytest.approx(iou_of(found, solid) - text_price, abs=1e-12)
 
 
 def test_the_same_seed_gives_the_same_blocks():
@@ -124,13 +125,13 @@ def test_descent_and_polish_never_lower_the_objective(seed):
     aim = target(solid)
     blocks = noisy_blocks(solid, seed)
     others = draw_all(blocks[1:])
-    better = editing.improve_block(blocks[0], others, aim)
+    better = search.improved(blocks[0], others, aim)
     before = iou_of(blocks, solid) - aim.settings.price * statements(blocks[0])
     after = iou_of(np.concatenate([better[None], blocks[1:]]), solid) - aim.settings.price * statements(better)
     assert after >= before
-    polished = editing.polish(blocks, aim)
-    start = editing.value_of(blocks, aim)
-    assert editing.value_of(polished, aim) >= start
+    polished = search.polish(blocks, aim)
+    start = search.value_of(blocks, aim)
+    assert search.value_of(polished, aim) >= start
     assert len(search.rebuilt(polished, aim, np.random.default_rng(seed))) <= 6
 
 
@@ -151,7 +152,7 @@ def test_a_block_that_does_not_pay_is_dropped():
     aim = target(solid)
     found, _ = search_structure(solid, Settings(rounds=20))
     useless = np.concatenate([found, found[:1]])
-    assert len(editing.polish(useless, aim)) == len(found)
+    assert len(search.polish(useless, aim)) == len(found)
 
 
 def test_full_grids_single_cells_and_flat_sheets_are_one_block():

@@ -16,7 +16,7 @@ slots      hold
 13 to 15   SHIFT2: its step
 =========  ============================================================================================
 
-Its cells are rows of bits, one word for the 32 cells of a row.
+Its cells are bits of words: the lowest bit of a word is the cell at the lowest height, depth and side.
 """
 
 from __future__ import annotations
@@ -39,8 +39,8 @@ RADIUS = FIRST + 4  # of a disc
 TILT = FIRST + 6  # of a back
 COUNT1, SHIFT1, COUNT2, SHIFT2 = 8, 9, 12, 13
 
-ROWS = 1024
-"""Rows of the grid: row 32 i + j holds the cells at height i and depth j."""
+WORDS = 512
+"""Words of 64 cells of the grid; as 1024 of 32, word 32 i + j holds the cells at height i and depth j."""
 
 MOST_MOVES = 80
 """An upper bound on the number of neighbours of a block."""
@@ -51,78 +51,69 @@ MOST_COPIES = 64
 GAIN = 1e-9
 """Smallest increase of the objective that is accepted, above rounding errors."""
 
-Rows = npt.NDArray[np.uint32]
+Words = npt.NDArray[np.uint64]
 
 
-def draw_each(blocks: FloatArray) -> Rows:
-    """Rows (P, 1024) of each block on its own."""
-    rows = np.zeros((len(blocks), ROWS), np.uint32)
-    draw_blocks(blocks, rows)
-    return rows
+def draw_each(blocks: FloatArray) -> Words:
+    """The cells (P, 512) of each block on its own."""
+    words = np.zeros((len(blocks), WORDS), np.uint64)
+    draw_blocks(blocks, words.view(np.uint32))
+    return words
 
 
-def draw_all(blocks: FloatArray) -> Rows:
-    """Rows (1024) of the union of blocks."""
-    rows = np.zeros((1, ROWS), np.uint32)
-    draw_blocks(blocks, rows)
-    return rows[0]
+def draw_all(blocks: FloatArray) -> Words:
+    """The cells (512) of the union of blocks."""
+    return np.asarray(np.bitwise_or.reduce(draw_each(blocks)))
 
 
-def cells_of(rows: Rows) -> npt.NDArray[np.bool_]:
-    """The cells (32, 32, 32) of rows (1024)."""
-    return np.unpackbits(rows.view(np.uint8), bitorder="little").view(np.bool_).reshape(32, 32, 32)
+def cells_of(words: Words) -> npt.NDArray[np.bool_]:
+    """Cells (32, 32, 32) from words (512)."""
+    return np.unpackbits(words.view(np.uint8), bitorder="little").view(np.bool_).reshape(32, 32, 32)
 
 
 @kernel("void(f8[:, ::1], u4[:, ::1])")
 def draw_blocks(blocks, rows):
-    """Set the cells of block k in row k of ``rows`` (P, 1024), or those of all blocks in its only row."""
-    step = 1 if len(rows) > 1 else 0
+    """Set the cells of each block in its row (P, 1024)."""
     for k in range(len(blocks)):
-        draw_block(rows[k * step], blocks[k])
+        draw_block(rows[k], blocks[k])
 
 
 @helper
 def draw_block(rows, block):
     """Set the cells of all copies of a block, clipped to the grid."""
-    form, p0, p1, p2 = int(block[FORM]), int(block[FIRST]), int(block[FIRST + 1]), int(block[FIRST + 2])
-    p3, p4, p5, last = int(block[EXTENT]), int(block[EXTENT + 1]), int(block[EXTENT + 2]), int(block[TILT])
+    up, depth, side = int(block[EXTENT]), int(block[EXTENT + 1]), int(block[EXTENT + 2])
     for i1 in range(int(block[COUNT1])):
         for i2 in range(int(block[COUNT2])):
-            s0 = int(i1 * block[SHIFT1] + i2 * block[SHIFT2])
-            s1 = int(i1 * block[SHIFT1 + 1] + i2 * block[SHIFT2 + 1])
-            s2 = int(i1 * block[SHIFT1 + 2] + i2 * block[SHIFT2 + 2])
-            if form == DISC:
-                draw_disc(rows, p0 + s0, p1 + s1, p2 + s2, p3, p4)
+            a = int(block[FIRST] + i1 * block[SHIFT1] + i2 * block[SHIFT2]) + 16
+            b = int(block[FIRST + 1] + i1 * block[SHIFT1 + 1] + i2 * block[SHIFT2 + 1]) + 16
+            c = int(block[FIRST + 2] + i1 * block[SHIFT1 + 2] + i2 * block[SHIFT2 + 2]) + 16
+            if block[FORM] == DISC:
+                draw_disc(rows, a, b, c, up, depth)
             else:
-                draw_back(rows, p0 + s0, p1 + s1, p2 + s2, p3, p4, p5, last if form == BACK else 0)
+                draw_back(rows, a, b, c, up, depth, side, block[TILT])
 
 
 @helper
-def draw_back(rows, a, b, c, ta, tb, tc, tilt):
-    """Set the cells of a box whose layers are shifted in depth by up to ``tilt``; an upright box has none."""
-    bits = span(c + 16, c + 16 + tc)
-    if bits == 0:
-        return
-    for i in range(max(-a - 16, 0), min(16 - a, ta)):
-        low = b + 16 if tilt == 0 else int(np.rint(b + tilt * i / ta)) + 16
-        for j in range(max(low, 0), min(low + tb, 32)):
-            rows[(a + i + 16) * 32 + j] |= bits
+def draw_back(rows, a, b, c, up, depth, side, tilt):
+    """Set the cells of a box whose layers are shifted in depth by up to ``tilt``, which is zero for upright boxes."""
+    bits = span(c, c + side)
+    for i in range(max(-a, 0), min(32 - a, up)):
+        front = int(np.rint(b + tilt * i / up))
+        for j in range(max(front, 0), min(front + depth, 32)):
+            rows[(a + i) * 32 + j] |= bits
 
 
 @helper
-def draw_disc(rows, a, yc, zc, t, r):
+def draw_disc(rows, a, b, c, up, radius):
     """Set the cells of an upright cylinder: centres within ``REACH`` radii of its axis."""
-    if r <= 0:
-        return
-    limit = (REACH * r) ** 2
-    for j in range(max(0, yc + 16 - r - 1), min(32, yc + 16 + r + 1)):
-        square = limit - (j - 15.5 - yc) ** 2
-        if square < 0:
-            continue
-        reach = np.sqrt(square)
-        bits = span(int(np.ceil(zc + 15.5 - reach)), int(np.floor(zc + 15.5 + reach)) + 1)
-        for i in range(max(a + 16, 0), min(a + 16 + t, 32)):
-            rows[i * 32 + j] |= bits
+    limit = (REACH * radius) ** 2
+    for j in range(max(0, b - radius - 1), min(32, b + radius + 1)):
+        square = limit - (j + 0.5 - b) ** 2
+        if square >= 0:
+            reach = np.sqrt(square)
+            bits = span(int(np.ceil(c - 0.5 - reach)), int(np.floor(c - 0.5 + reach)) + 1)
+            for i in range(max(a, 0), min(a + up, 32)):
+                rows[i * 32 + j] |= bits
 
 
 @helper
@@ -134,29 +125,17 @@ def statements(block):
 @helper
 def valid(block):
     """Whether the lengths are positive and no two neighbouring copies of a loop are drawn over each other."""
-    form = int(block[FORM])
+    disc = block[FORM] == DISC
     if block[COUNT1] < 1 or block[COUNT2] < 1 or block[COUNT1] * block[COUNT2] > MOST_COPIES:
         return False
     for level in (COUNT1, COUNT2):
-        if block[level] > 1:
-            separate = False
-            for axis in range(3):
-                extent = 2 * block[RADIUS] if form == DISC and axis > 0 else block[EXTENT + axis]
-                separate = separate or abs(block[level + 1 + axis]) >= extent
-            if not separate:
-                return False
-    return block[EXTENT] >= 1 and block[EXTENT + 1] >= 1 and (form == DISC or block[EXTENT + 2] >= 1)
-
-
-@helper
-def layers(block):
-    """First layer of the grid that a block can touch, and the one after the last."""
-    start, end = block[FIRST], block[FIRST] + block[EXTENT]
-    for level in (COUNT1, COUNT2):
-        reach = (block[level] - 1) * block[level + 1]
-        start += min(reach, 0.0)
-        end += max(reach, 0.0)
-    return max(int(np.floor(start)) + 16, 0), min(int(np.ceil(end)) + 16, 32)
+        separate = block[level] == 1
+        for axis in range(3):
+            extent = 2 * block[RADIUS] if disc and axis > 0 else block[EXTENT + axis]
+            separate = separate or abs(block[level + 1 + axis]) >= extent
+        if not separate:
+            return False
+    return block[EXTENT] >= 1 and block[EXTENT + 1] >= 1 and (disc or block[EXTENT + 2] >= 1)
 
 
 @helper
@@ -214,13 +193,7 @@ def descend(block, occupied, covered, price):
     price
         Price of a statement in IoU.
     """
-    rows, around = np.empty(ROWS, np.uint32), np.empty((MOST_MOVES, WIDTH))
-    words, gained, wasted = rows.view(np.uint64), occupied & ~covered, ~occupied & ~covered
-    inter = 0
-    union = 0
-    for i in range(len(occupied)):
-        inter += ones(occupied[i] & covered[i])
-        union += ones(occupied[i] | covered[i])
+    words, around = np.empty(WORDS, np.uint64), np.empty((MOST_MOVES, WIDTH))
     best = -np.inf
     around[0] = block
     number = 1  # the block alone first, its neighbours later
@@ -229,17 +202,14 @@ def descend(block, occupied, covered, price):
         for m in range(number):
             if step > 0 and not valid(around[m]):
                 continue
-            first, last = layers(around[m])
-            first, last = 16 * first, 16 * last  # a layer has 16 words
-            for i in range(first, last):
-                words[i] = 0
-            draw_block(rows, around[m])
-            good = inter
-            bad = union
-            for i in range(first, last):
-                good += ones(words[i] & gained[i])
-                bad += ones(words[i] & wasted[i])
-            value = good / max(bad, 1) - price * statements(around[m])
+            words[:] = covered
+            draw_block(words.view(np.uint32), around[m])
+            shared = 0
+            union = 0
+            for i in range(WORDS):
+                shared += ones(words[i] & occupied[i])
+                union += ones(words[i] | occupied[i])
+            value = shared / union - price * statements(around[m])
             if value > best + GAIN:
                 best = value
                 best_index = m

@@ -6,16 +6,61 @@ and recreate (Schrimpf et al. 2000) remove some and insert others, including dis
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import numpy.typing as npt
 
 from shapeprog.inference.budget import NEVER, Deadline, Progress
-from shapeprog.inference.cells.block_kernels import GAIN, WIDTH, draw_all
+from shapeprog.inference.cells.block_kernels import (
+    BACK,
+    DISC,
+    EXTENT,
+    FIRST,
+    FORM,
+    GAIN,
+    RADIUS,
+    TILT,
+    WIDTH,
+    Words,
+    cells_of,
+    descend,
+    draw_all,
+    draw_each,
+    statements,
+)
 from shapeprog.inference.cells.blocks import to_program
-from shapeprog.inference.cells.editing import Target, Whole, best_box, best_form, polish, value_of
+from shapeprog.inference.cells.proposal_kernels import families, propose
 from shapeprog.inference.cells.settings import Settings
 from shapeprog.language.program import Program
-from shapeprog.space import FloatArray
+from shapeprog.space import HALF, Array, FloatArray
+
+
+class Target:
+    """Target and objective of a search.
+
+    Attributes
+    ----------
+    cells
+        The solid as words (512).
+    low, inside
+        Low corner of the box around it, in the grid frame, and the solid in that box (A, B, C).
+    box
+        The slices of the grid that are the box.
+    table
+        The ways of repeating a box: rows of ``families``.
+    settings, statement
+        Limits and prices, and the price of a statement in cells.
+    """
+
+    def __init__(self, voxels: npt.NDArray[np.bool_], settings: Settings) -> None:
+        occupied = np.argwhere(voxels)
+        low, high = occupied.min(0), occupied.max(0) + 1
+        self.low, self.box = low - HALF, tuple(map(slice, low, high))
+        self.cells: Words = np.packbits(voxels, bitorder="little").view(np.uint64)
+        self.inside = voxels[self.box]
+        self.table = families(self.inside.shape, settings.copies)
+        self.settings, self.statement = settings, settings.price * len(occupied)
 
 
 def search_structure(
@@ -37,19 +82,17 @@ def search_structure(
     progress
         Called with the name of the current step and the completed share of it.
     """
-    target = Target.of(voxels, settings)
+    target = Target(voxels, settings)
     starts = [polish(greedy(target, waste, target.table), target) for waste in settings.starts]
     best = max(starts, key=lambda blocks: value_of(blocks, target))
     best_value = value_of(best, target)
     random = np.random.default_rng(seed)
-    gained, reason = 0, f"all {settings.rounds} rounds"
+    gained = 0
     for done in range(settings.rounds):
         if done - gained >= settings.patience:
-            reason = f"{done - gained} rounds without improvement"
-            break
+            return best, f"{done - gained} rounds without improvement"
         if deadline.passed(f"the search after {done} of {settings.rounds} rounds"):
-            reason = f"{done} of {settings.rounds} rounds, at the time limit"
-            break
+            return best, f"{done} of {settings.rounds} rounds, at the time limit"
         trial = rebuilt(best, target, random)
         value = value_of(trial, target)
         if value > best_value + GAIN:
@@ -58,7 +101,7 @@ def search_structure(
             best, best_value = trial, value
         if progress:
             progress("searching structure", (done + 1) / settings.rounds)
-    return best, reason
+    return best, f"all {settings.rounds} rounds"
 
 
 def greedy_boxes(voxels: npt.NDArray[np.bool_], boxes: int = 10) -> Program:
@@ -66,19 +109,14 @@ def greedy_boxes(voxels: npt.NDArray[np.bool_], boxes: int = 10) -> Program:
 
     No learning, no loops, no search beyond the exact maximum-sum box: a baseline for programs of equal size.
     """
-    target = Target.of(voxels, Settings(blocks=boxes, price=0.0))
+    target = Target(voxels, Settings(blocks=boxes, price=0.0))
     return to_program(greedy(target, 1.0, target.table[:1]))
 
 
-def greedy(target: Target, waste: float, table: Whole) -> FloatArray:
+def greedy(target: Target, waste: float, table: Array) -> FloatArray:
     """The repeated boxes with the largest gains, one after another, for one weight of an empty cell."""
-    blocks: FloatArray = np.zeros((0, WIDTH))
-    while len(blocks) < target.settings.blocks:
-        gain, block = best_box(draw_all(blocks), waste, table, target)
-        if gain <= 0:
-            break
-        blocks = np.concatenate([blocks, block[None]])
-    return blocks
+    none = np.zeros((0, WIDTH))
+    return extended(none, target.settings.blocks, lambda covered: best_box(covered, waste, table, target))
 
 
 def rebuilt(blocks: FloatArray, target: Target, random: np.random.Generator) -> FloatArray:
@@ -91,16 +129,93 @@ def rebuilt(blocks: FloatArray, target: Target, random: np.random.Generator) -> 
     count, waste = drops + 1, random.uniform(0.6, 1.1)
     if random.random() < 0.25:  # sometimes search for thin boards, and for more of them
         count, waste = count + int(random.integers(3)), random.uniform(1.0, 4.0)
-    for _ in range(min(count, settings.blocks - len(blocks))):
-        covered = draw_all(blocks)
+
+    def proposed(covered: Words) -> tuple[float, FloatArray]:
         picks = random.permutation(len(target.table))[: settings.families]
         picks[0] = 0  # the single box
-        gain, block = best_box(covered, waste, target.table[picks], target)
-        if gain > 0 and random.random() < settings.forms:
-            form_gain, form_block = best_form(covered, waste, block, target)
-            if form_gain > gain:
-                block = form_block
+        best = best_box(covered, waste, target.table[picks], target)
+        if best[0] > 0 and random.random() < settings.forms:
+            best = max(best, best_form(covered, waste, best[1], target), key=lambda proposal: proposal[0])
+        return best
+
+    return polish(extended(blocks, min(count, settings.blocks - len(blocks)), proposed), target)
+
+
+def extended(blocks: FloatArray, count: int, proposed: Callable[[Words], tuple[float, FloatArray]]) -> FloatArray:
+    """Blocks and up to ``count`` more, each proposed for the cells that are covered so far, while these gain."""
+    for _ in range(count):
+        gain, block = proposed(draw_all(blocks))
         if gain <= 0:
             break
         blocks = np.concatenate([blocks, block[None]])
-    return polish(blocks, target)
+    return blocks
+
+
+def value_of(blocks: FloatArray, target: Target) -> float:
+    """IoU minus price x statements."""
+    cells = draw_all(blocks)
+    shared, union = (np.bitwise_count(words).sum() for words in (cells & target.cells, cells | target.cells))
+    return float(shared / union - target.settings.price * statements(blocks.T).sum())
+
+
+def improved(block: FloatArray, covered: Words, target: Target) -> FloatArray:
+    """A block after descent on the value, with the other blocks fixed, which cover so many cells."""
+    better = block.copy()
+    descend(better, target.cells, covered, target.settings.price)
+    return better
+
+
+def polish(blocks: FloatArray, target: Target) -> FloatArray:
+    """Blocks after descent, three times one after another; a block that no longer pays is dropped."""
+    blocks, settled = blocks.copy(), np.zeros(len(blocks), np.bool_)
+    for k in [*range(len(blocks))] * 3:
+        if not settled[k]:
+            better = improved(blocks[k], draw_all(np.delete(blocks, k, 0)), target)
+            settled &= np.array_equal(better, blocks[k])
+            blocks[k], settled[k] = better, True
+    k, value = 0, value_of(blocks, target)
+    while k < len(blocks):
+        fewer = np.delete(blocks, k, 0)
+        without = value_of(fewer, target)
+        if without >= value:
+            blocks, value = fewer, without
+        else:
+            k += 1
+    return blocks
+
+
+def best_box(covered: Words, waste: float, table: Array, target: Target) -> tuple[float, FloatArray]:
+    """The repeated box with the largest gain on uncovered cells, after its gain in cells; that is zero if none gains.
+
+    Parameters
+    ----------
+    waste
+        Weight of an empty cell against an occupied one.
+    table
+        The ways of repeating a box to try.
+    """
+    block, done = np.zeros(WIDTH), cells_of(covered)[target.box]
+    weights = np.where(done, 0, np.where(target.inside, 1, -waste)).astype(np.float32)
+    gain = propose(weights, table, target.statement, block)
+    block[FIRST:EXTENT] += target.low
+    return gain, block
+
+
+def best_form(covered: Words, waste: float, box: FloatArray, target: Target) -> tuple[float, FloatArray]:
+    """The disc or sheared back with the largest gain in place of a box, after descent, after its gain in cells.
+
+    The disc is as wide as the box on average; the backs are sheared by up to five cells to either side.
+    """
+
+    def gains(blocks: FloatArray) -> FloatArray:
+        """Gain in cells of each block (P,)."""
+        new = draw_each(blocks) & ~covered
+        shared, wasted = (np.bitwise_count(words).sum(1) for words in (new & target.cells, new & ~target.cells))
+        return np.asarray(shared - waste * wasted - target.statement * statements(blocks.T))
+
+    forms, across = np.repeat(box[None], 11, 0), box[EXTENT + 1 : EXTENT + 3]
+    forms[0, FORM], forms[0, RADIUS], forms[0, RADIUS + 1] = DISC, max(1, np.rint(across.sum() / 4)), 0
+    forms[0, FIRST + 1 : EXTENT] = np.rint(box[FIRST + 1 : EXTENT] + across / 2)
+    forms[1:, FORM], forms[1:, TILT] = BACK, [-5, -4, -3, -2, -1, 1, 2, 3, 4, 5]
+    better = improved(forms[gains(forms).argmax()], covered, target)
+    return float(gains(better[None])[0]), better

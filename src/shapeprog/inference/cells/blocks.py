@@ -7,13 +7,13 @@ import numpy as np
 from shapeprog.inference.cells.block_kernels import BACK, BOX, COUNT1, COUNT2, DISC, EXTENT, FIRST, FORM, TILT
 from shapeprog.inference.roles.roles import roles_of_blocks
 from shapeprog.language.program import Draw, Loop, Node, Program, nest
-from shapeprog.space import FloatArray
+from shapeprog.space import DEPTH, SIDE, FloatArray
 
 FORMS = {BOX: "locker", BACK: "back", DISC: "support_cylinder"}
 """Statements of the paper that draw the forms."""
 
 BOXES = {
-    "seat": "top_rectangle", "top": "top_rectangle", "cushion": "top_rectangle", "mattress": "top_rectangle",
+    "seat": "top_square", "top": "top_square", "cushion": "top_square", "mattress": "top_square",
     "shelf": "layer", "base": "base_square", "leg": "leg", "foot": "leg", "post": "leg", "brace": "leg",
     "pedestal": "support_cuboid",
     "back": "back", "slat": "back_support", "arm_post": "chair_beam", "arm": "chair_beam", "rail": "chair_beam",
@@ -26,11 +26,14 @@ BOXES = {
 DISCS = {"seat": "top_circle", "top": "top_circle", "shelf": "top_circle", "base": "base_circle", "foot": "base_circle"}
 """The same for an upright cylinder; others are supports."""
 
-CORNER = {
-    "top_rectangle": "horizontal_bar", "layer": "horizontal_bar", "base_square": "horizontal_bar",
-    "support_cuboid": "leg", "sideboard": "vertical_board",
+CENTRED = {
+    "top_square": "top_rectangle", "top_rectangle": "horizontal_bar", "layer": "horizontal_bar",
+    "base_square": "horizontal_bar", "support_cuboid": "leg", "sideboard": "vertical_board",
 }  # fmt: skip
 """What draws the same as a statement given by its middle, which is on the grid for even numbers of cells alone."""
+
+SQUARES = {"top_square", "base_square", "support_cuboid"}
+"""Those that are as wide as deep."""
 
 
 def to_program(blocks: FloatArray) -> Program:
@@ -75,25 +78,21 @@ def _cells(block: FloatArray) -> float:
 
 def _node(block: FloatArray, role: str = "") -> Node:
     """The statement of the paper that draws a block with a role, and its loops."""
-    form, values = int(block[FORM]), block[FIRST:COUNT1]
+    form, numbers = int(block[FORM]), block[FIRST:COUNT1].tolist()
     name = {BOX: BOXES, DISC: DISCS}.get(form, {}).get(role, FORMS[form])
-    low, (up, depth, side) = values[:3], values[3:6]
-    middle = [low[0], low[1] + depth / 2, low[2] + side / 2, up, depth / 2]
-    even, square = depth % 2 == side % 2 == 0, depth == side
-    if form != BOX:
-        numbers = list(values[: 7 if form == BACK else 5])
-    elif name == "top_rectangle" and even and square:
-        name, numbers = "top_square", middle
-    elif name in ("top_rectangle", "layer") and even:
-        numbers = [*middle, side / 2]
-    elif name in ("base_square", "support_cuboid") and even and square:
-        numbers = middle
-    elif name == "sideboard" and depth % 2 == 0:
-        numbers = [low[0], middle[1], low[2], up, depth / 2, side]
-    else:
-        name = CORNER.get(name, name)
-        numbers = [*low, up, depth, side, *((0.0,) if name == "back" else ())]
+    if form == DISC:
+        numbers = numbers[:5]
+    if form == BOX:
+        at, size = block[FIRST:EXTENT].copy(), block[EXTENT:TILT].copy()
+        while name in CENTRED:
+            axes = [DEPTH] if name == "sideboard" else [DEPTH, SIDE]
+            if (size[axes] % 2 == 0).all() and (size[DEPTH] == size[SIDE] or name not in SQUARES):
+                size[axes] /= 2
+                at[axes] += size[axes]
+                break
+            name = CENTRED[name]
+        numbers = [*at.tolist(), *size.tolist()][: 5 if name in SQUARES else 6] + [0.0] * (name == "back")
     loops = (
         Loop("translate", tuple(block[loop : loop + 4].tolist()), ()) for loop in (COUNT1, COUNT2) if block[loop] > 1
     )
-    return nest((*loops, Draw(name, tuple(float(number) for number in numbers))))
+    return nest((*loops, Draw(name, tuple(numbers))))

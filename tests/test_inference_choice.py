@@ -15,7 +15,7 @@ from shapeprog.data.shape import Shape
 from shapeprog.geometry.batch import Batch
 from shapeprog.geometry.distance import each_distance
 from shapeprog.geometry.mesh import union_mesh
-from shapeprog.inference.choice.bits import FINE, covers, pack, sorted_by_cell
+from shapeprog.inference.choice.bits import covers, pack, sorted_by_cell
 from shapeprog.inference.choice.choice import choose, explained, value
 from shapeprog.inference.choice.coverage import Coverage, CoverageTable, Prices, shares
 from shapeprog.inference.choice.coverage_kernels import LIFT, TURNED
@@ -270,7 +270,7 @@ def test_samples_pay_what_all_pairs_say(table):
     normals = random.choice([-1, 1], (500, 1)) * np.eye(3)[random.integers(3, size=500)]
     wanted = shares_of_pairs(samples, normals, few)
     assert all((wanted == share).sum() >= 10 for share in (0, TURNED, 1))
-    assert np.array_equal(shares(samples, normals, few, sorted_by_cell(few.surface, few.surface_normals, FINE)), wanted)
+    assert np.array_equal(shares(samples, normals, few, sorted_by_cell(few.surface, few.surface_normals)), wanted)
 
 
 def test_the_inner_face_of_the_wall_of_a_solid_pays_for_facing_the_other_way(table):
@@ -278,13 +278,11 @@ def test_the_inner_face_of_the_wall_of_a_solid_pays_for_facing_the_other_way(tab
     top = table.surface[(table.surface_normals @ [1, 0, 0] > 0.9) & (table.surface[:, 0] > highest)]
     below = top[:200] - [0.5 * table.reach, 0, 0]
     facing = np.tile([1.0, 0, 0], (200, 1))
-    assert (shares(below, facing, table, sorted_by_cell(table.surface, table.surface_normals, FINE)) == 0).all()
-    assert (shares(below, -facing, table, sorted_by_cell(table.surface, table.surface_normals, FINE)) == TURNED).all()
+    assert (shares(below, facing, table, sorted_by_cell(table.surface, table.surface_normals)) == 0).all()
+    assert (shares(below, -facing, table, sorted_by_cell(table.surface, table.surface_normals)) == TURNED).all()
     unknown = replace(table, surface_outward=np.zeros(len(table.surface), np.bool_))
-    assert (shares(below, -facing, unknown, sorted_by_cell(table.surface, table.surface_normals, FINE)) == 0).all()
-    assert (
-        shares(below - [1, 0, 0], facing, table, sorted_by_cell(table.surface, table.surface_normals, FINE)) == 1
-    ).all()
+    assert (shares(below, -facing, unknown, sorted_by_cell(table.surface, table.surface_normals)) == 0).all()
+    assert (shares(below - [1, 0, 0], facing, table, sorted_by_cell(table.surface, table.surface_normals)) == 1).all()
 
 
 def looking_of_all(barrier: np.ndarray, starts: np.ndarray, steps: np.ndarray, wanted: int, *, through: bool):

@@ -10,14 +10,14 @@ import numpy.typing as npt
 
 from shapeprog.geometry.arrays import over_threads, table_of
 from shapeprog.geometry.batch import Batch
-from shapeprog.inference.choice.coverage_kernels import cover
+from shapeprog.inference.choice.coverage_kernels import CELLS, cover
 from shapeprog.space import HALF, RESOLUTION, FloatArray
 
 WORD = 64
 """Bits of a word."""
 
-COARSE, FINE = 16, 64
-"""Cells along each side of the grids that bin points: for tests against primitives, and against other points."""
+FINE = 64
+"""Cells along each side of the grid whose Morton codes sort points."""
 
 Bits = npt.NDArray[np.uint64]
 
@@ -30,7 +30,6 @@ class BinnedPoints(NamedTuple):
     normals: FloatArray
     order: npt.NDArray[np.int64]
     starts: npt.NDArray[np.int64]
-    cells: int
 
 
 def by_word(values: FloatArray) -> FloatArray:
@@ -67,12 +66,10 @@ def nearby(points: FloatArray) -> npt.NDArray[np.int64]:
     return np.sum(shifted, axis=0)
 
 
-def sorted_by_cell(points: FloatArray, normals: FloatArray | None = None, cells: int = COARSE) -> BinnedPoints:
+def sorted_by_cell(points: FloatArray, normals: FloatArray | None = None) -> BinnedPoints:
     """Points and normals (P, 3), zero if unknown, in the order of the cells of a grid."""
-    index = np.clip(((points + HALF) * (cells / RESOLUTION)).astype(np.int64), 0, cells - 1)
-    key = (index[:, 0] * cells + index[:, 1]) * cells + index[:, 2]
+    index = np.clip(((points + HALF) * (CELLS / RESOLUTION)).astype(np.int64), 0, CELLS - 1)
+    key = index @ [CELLS**2, CELLS, 1]
     order = np.argsort(key, kind="stable")
-    starts = np.concatenate([[0], np.bincount(key, minlength=cells**3).cumsum()])
-    return BinnedPoints(
-        points[order], (np.zeros_like(points) if normals is None else normals)[order], order, starts, cells
-    )
+    starts = np.concatenate([[0], np.bincount(key, minlength=CELLS**3).cumsum()])
+    return BinnedPoints(points[order], (np.zeros_like(points) if normals is None else normals)[order], order, starts)

@@ -30,16 +30,14 @@ def choose(
     of a few candidates cannot leave it.  So all points in interiors have a penalty at first.  It falls while the search
     continues from the best set.  The last of several searches starts from ``start``.
     """
-    gains = np.bitwise_count(table.rows[:, : len(table.weights)]) @ np.maximum(table.weights, 0) - table.prices
+    last = len(table.weights)
+    gains = np.bitwise_count(table.rows[:, :last]) @ np.maximum(table.weights, 0) - table.prices
     useful = gains > 0
     useful[list(start)] = True
-    index, last = np.flatnonzero(useful), len(table.weights)
-    rows = table.rows[np.ix_(index, [*range(last), *(last + index)])]
-    hidden, interior = np.ascontiguousarray(rows[:, last:].T), table.interior[index]
-    words, begins = _words(rows[:, :last])
-    bits = np.concatenate([row[row != 0] for row in rows[:, :last]]) if len(rows) else rows.reshape(-1)
+    index = np.flatnonzero(useful)
+    rows, interior = table.rows[np.ix_(index, [*range(last), *(last + index)])], table.interior[index]
     data = (
-        rows, interior, hidden, table.weights, words, bits, begins, *_words(interior), table.exposed[index],
+        rows, interior, table.weights, *_words(rows[:, :last]), *_words(interior), table.exposed[index],
         table.sample_price[index], table.prices[index] + SETTINGS.earlier * index / len(table.prices), gains[index],
     )  # fmt: skip
     levels = (*SETTINGS.interior, 0.0) if interior.any() else (0.0,)
@@ -66,13 +64,15 @@ def _words(rows: Bits) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
 
 def explained(table: CoverageTable, indices: Sequence[int] | Array) -> float:
     """Share of the target that some of the candidates explain together, and none has in its interior."""
-    visible = _union(table.rows[:, : table.evidence], indices) & ~_union(table.interior, indices)
+    visible = _union(table, indices)[: table.evidence]
     return float(np.bitwise_count(visible) @ table.weights[: table.evidence])
 
 
-def _union(rows: Bits, indices: Sequence[int] | Array) -> Bits:
-    """The bits that are set in any of the selected rows."""
-    union: Bits = np.bitwise_or.reduce(rows[list(indices)], axis=0, initial=0)
+def _union(table: CoverageTable, indices: Sequence[int] | Array) -> Bits:
+    """What the selected candidates cover together, less the points in the interior of one."""
+    selected = list(indices)
+    union: Bits = np.bitwise_or.reduce(table.rows[selected], axis=0, initial=0)
+    union[: table.evidence] &= ~np.bitwise_or.reduce(table.interior[selected], axis=0, initial=0)
     return union
 
 
@@ -80,7 +80,7 @@ def missed(table: CoverageTable, indices: tuple[int, ...]) -> Array:
     """The candidates that are not selected, ordered by how much of the unexplained points they would explain, less
     their prices."""
     rows = table.rows[:, : table.evidence]
-    done = _union(rows, indices) | _union(table.interior, indices)
+    done = np.bitwise_or.reduce((rows | table.interior)[list(indices)], axis=0, initial=0)
     gains = np.bitwise_count(rows & ~done) @ table.weights[: table.evidence] - table.prices
     order = np.argsort(-gains, kind="stable")
     return order[~np.isin(order, indices)]
@@ -88,11 +88,7 @@ def missed(table: CoverageTable, indices: tuple[int, ...]) -> Array:
 
 def value(table: CoverageTable, indices: tuple[int, ...]) -> float:
     """The value of a set of candidates, by its definition; the kernel adds it up incrementally."""
-    words, union = len(table.weights), _union(table.rows, indices)
-    union[: table.evidence] &= ~_union(table.interior, indices)
-    total = float(np.bitwise_count(union[:words]) @ table.weights)
-    for candidate in indices:
-        total -= table.prices[candidate] + table.sample_price[candidate] * int(
-            np.bitwise_count(table.exposed[candidate] & ~union[words + candidate])
-        )
-    return total
+    selected, words, union = list(indices), len(table.weights), _union(table, indices)
+    samples = np.bitwise_count(table.exposed[selected] & ~union[words:][selected])
+    costs = table.prices[selected] + table.sample_price[selected] * samples
+    return float(np.bitwise_count(union[:words]) @ table.weights - costs.sum())

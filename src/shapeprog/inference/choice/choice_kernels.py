@@ -16,17 +16,18 @@ THRESHOLD = 0.01
 
 @helper
 def gain(
-    rows, interior, hidden, weights, words, bits, begins, inner, starts, exposed, sample_price, prices, penalty,
+    rows, interior, weights, words, begins, inner, starts, exposed, sample_price, prices, penalty,
     cover, under, selected, count, candidate,
 ):  # fmt: skip
     """Increase in value of the selected candidates with one more candidate."""
     total, last = -prices[candidate], len(weights)
     for index in range(begins[candidate], begins[candidate + 1]):
-        total += weights[words[index]] * ones(bits[index] & ~cover[words[index]])
+        word = words[index]
+        total += weights[word] * ones(rows[candidate, word] & ~cover[word])
     total -= sample_price[candidate] * ones(exposed[candidate] & ~cover[last + candidate])
     for index in range(count):  # samples of the others that it hides are no longer charged
         peer = selected[index]
-        total += sample_price[peer] * ones(exposed[peer] & hidden[peer, candidate] & ~cover[last + peer])
+        total += sample_price[peer] * ones(exposed[peer] & rows[candidate, last + peer] & ~cover[last + peer])
     for index in range(starts[candidate], starts[candidate + 1]):  # explained points in its interior; and the penalty
         word = inner[index]
         new = interior[candidate, word] & ~under[word]
@@ -34,19 +35,12 @@ def gain(
     return total
 
 
-@helper
-def copy(values, count, result):
-    """Write the first values over those of another array; a loop compiles faster than an assignment of slices."""
-    for k in range(count):
-        result[k] = values[k]
-
-
 @kernel(
-    "void(u8[:, ::1], u8[:, ::1], u8[:, ::1], f8[::1], i8[::1], u8[::1], i8[::1], i8[::1], i8[::1], u8[::1], f8[::1],"
+    "void(u8[:, ::1], u8[:, ::1], f8[::1], i8[::1], i8[::1], i8[::1], i8[::1], u8[::1], f8[::1],"
     " f8[::1], f8[::1], f8, i8, f8, i8, i8[::1], f8[::1], i8[::1])"
 )
 def search(
-    rows, interior, hidden, weights, words, bits, begins, inner, starts, exposed, sample_price, prices, gains,
+    rows, interior, weights, words, begins, inner, starts, exposed, sample_price, prices, gains,
     penalty, rounds, blink, seed, initial_set, best_value, best_set,
 ):  # fmt: skip
     """Ruin and recreate: drop some of the selected, refill greedily, accept a set that is no worse.
@@ -61,12 +55,11 @@ def search(
         See ``CoverageTable``.
     gains
         Upper bounds (C,) of the gain of each candidate: what it explains, less the price of its text.
-    hidden
-        The last columns of ``rows``, transposed: the samples of each candidate (C, C) that every other hides.
-    words, bits, begins
-        Indices and bits of the weighted words of each candidate, one candidate after another, and the first of each.
+    words, begins
+        Indices of the weighted words of each candidate that hold bits, one candidate after another, and the first of
+        each.
     inner, starts
-        Indices of the words of each interior, likewise.
+        The same of each interior.
     penalty
         Price of interior points as a multiple of their weight, whether others explain them or not.
     rounds, blink, seed
@@ -77,50 +70,44 @@ def search(
         Input and output: the best value (1,) and its candidates (M,), -1 beyond the last, initially those of another
         search, or minus infinity and -1.
     """
-    max_size, total = len(best_set), len(exposed)
+    most, total, last = min(len(best_set), len(exposed)), len(exposed), len(weights)
     cover, under = np.empty(rows.shape[1], np.uint64), np.empty(interior.shape[1], np.uint64)
-    incumbent, selected = np.empty(max_size, np.int64), np.empty(max_size, np.int64)
-    bound = np.empty(total)
-    size, accepted, draws = len(initial_set), 0.0, 0
-    copy(initial_set, size, incumbent)
+    incumbent, selected = initial_set.copy(), np.empty(most, np.int64)
+    accepted, draws = 0.0, 0
     for turn in range(rounds + 1):
         share = RUIN_LEAST + (RUIN_MOST - RUIN_LEAST) * uniform(seed, draws)
-        dropped = int(uniform(seed, draws + 1) * size)
+        dropped = int(uniform(seed, draws + 1) * len(incumbent))
         draws += 2
-        count, step, value = 0, 0, 0.0
+        count, step, value, bound = 0, 0, 0.0, gains.copy()
         cover[:] = np.uint64(0)
         under[:] = np.uint64(0)
-        copy(gains, total, bound)
         while True:
-            best, best_candidate, trial = 0.0, -1, -1
-            if step < size:  # one of the incumbent that is not dropped
+            best, best_candidate = 0.0, -1
+            if step < len(incumbent):  # one of the incumbent that is not dropped
                 best_candidate = incumbent[step]
                 step += 1
                 draws += 1
                 if turn > 0 and (step - 1 == dropped or uniform(seed, draws) < share):
                     continue
                 best = gain(
-                    rows, interior, hidden, weights, words, bits, begins, inner, starts, exposed, sample_price, prices,
-                    penalty, cover, under, selected, count, best_candidate,
+                    rows, interior, weights, words, begins, inner, starts, exposed, sample_price, prices, penalty,
+                    cover, under, selected, count, best_candidate,
                 )  # fmt: skip
             else:
                 if value > best_value[0]:
                     best_value[0] = value
                     best_set[:] = -1
-                    copy(selected, count, best_set)
-                if count == min(max_size, total):
+                    best_set[:count] = selected[:count]
+                if count == most:
                     break
                 first = int(np.argmax(bound))  # the largest bound first: with its gain, most others are no better
-                while trial < total:
+                for trial in range(-1, total):
                     candidate = first if trial < 0 else trial
-                    trial += 1
-                    if bound[candidate] <= best:
-                        continue
-                    if turn > 0 and uniform(seed, draws + candidate) < blink:
+                    if bound[candidate] <= best or (turn > 0 and uniform(seed, draws + candidate) < blink):
                         continue
                     bound[candidate] = gain(
-                        rows, interior, hidden, weights, words, bits, begins, inner, starts, exposed, sample_price,
-                        prices, penalty, cover, under, selected, count, candidate,
+                        rows, interior, weights, words, begins, inner, starts, exposed, sample_price, prices, penalty,
+                        cover, under, selected, count, candidate,
                     )  # fmt: skip
                     if bound[candidate] > best:
                         best, best_candidate = bound[candidate], candidate
@@ -128,10 +115,9 @@ def search(
                 if best_candidate < 0:
                     break
             value += best
+            price, samples = sample_price[best_candidate], exposed[best_candidate]
             for candidate in range(total):  # samples of the one that the other hides are charged no longer
-                bound[candidate] += sample_price[best_candidate] * ones(
-                    exposed[best_candidate] & hidden[best_candidate, candidate]
-                )
+                bound[candidate] += price * ones(samples & rows[candidate, last + best_candidate])
             for word in range(len(cover)):
                 cover[word] |= rows[best_candidate, word]
             for word in range(len(under)):  # no later candidate gains there
@@ -140,5 +126,4 @@ def search(
             selected[count] = best_candidate
             count += 1
         if value >= accepted - THRESHOLD * (1.0 - turn / (rounds + 1.0)):
-            accepted, size = value, count
-            copy(selected, count, incumbent)
+            accepted, incumbent = value, selected[:count].copy()

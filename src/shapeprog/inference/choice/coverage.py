@@ -26,17 +26,7 @@ from shapeprog.geometry.batch import Batch
 from shapeprog.geometry.scene import Scene
 from shapeprog.geometry.surface import face_areas, sample_surface
 from shapeprog.inference.candidates.loops import mirrors
-from shapeprog.inference.choice.bits import (
-    FINE,
-    WORD,
-    BinnedPoints,
-    Bits,
-    by_word,
-    covers,
-    nearby,
-    pack,
-    sorted_by_cell,
-)
+from shapeprog.inference.choice.bits import WORD, BinnedPoints, Bits, by_word, covers, nearby, pack, sorted_by_cell
 from shapeprog.inference.choice.coverage_kernels import charged
 from shapeprog.inference.choice.settings import SETTINGS
 from shapeprog.inference.surface.evidence import Evidence
@@ -126,7 +116,7 @@ class Coverage:
         free = np.full(len(points), -self.prices.free * volume / max(evidence.area, 1e-9))
         parts = np.full(len(evidence.parts), self.prices.part / max(1.0, len(evidence.parts) / SETTINGS.parts))
         self._weights = np.concatenate([by_word(evidence.weights[order]), by_word(free), by_word(parts)])
-        self._surface = sorted_by_cell(evidence.surface, evidence.surface_normals, FINE)
+        self._surface = sorted_by_cell(evidence.surface, evidence.surface_normals)
         self._index: dict[Program, int] = {}
         self._rows: list[Array] = []
 
@@ -239,10 +229,8 @@ def shares(samples: FloatArray, normals: FloatArray, evidence: Evidence, binned:
     faces the other way, such as behind the wall of a solid, and one elsewhere.
     """
     share = np.zeros(len(samples))
-    data = (
-        samples, normals, binned.points, binned.normals,
-        evidence.surface_outward[binned.order], binned.starts, binned.cells, evidence.reach, evidence.agreement,
-        share,
-    )  # fmt: skip
+    points, sides, order, starts = binned
+    outward = evidence.surface_outward[order]
+    data = samples, normals, points, sides, outward, starts, evidence.reach, evidence.agreement, share
     over_threads(partial(charged, *data), len(samples), least=1024)
     return share

@@ -190,10 +190,9 @@ def search_family(weights, family, floor, block):
     if volume.size == 0:
         return floor
     # The scan along the last axis is the fast one, so the longest goes there; it takes no limit of its length.
-    last = 2
-    for axis in range(3):
-        free, last_free = limits[axis] == ANY, limits[last] == ANY
-        if (free and not last_free) or (free == last_free and volume.shape[axis] > volume.shape[last]):
+    free, last = np.where(limits == ANY, np.array(volume.shape), 0), 2
+    for axis in range(2):
+        if free[axis] > free[last]:
             last = axis
     first = 0 if last != 0 else 1
     order = (first, 3 - first - last, last)

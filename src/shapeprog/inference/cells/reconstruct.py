@@ -65,22 +65,21 @@ def reconstruct(
     reason
         Why the search stopped, as a sentence.
     """
-    found, stopped = search_structure(shape.voxels, settings, seed=seed, deadline=searching, progress=progress)
-    snapped = to_program(found)
+    blocks, stopped = search_structure(shape.voxels, settings, seed=seed, deadline=searching, progress=progress)
+    snapped = to_program(blocks)
     if tied:
         program = adjust(snapped, evidence, reach=REACH, seed=seed, deadline=refining, progress=progress)
     else:
         points = points_of_cells(shape.voxels) if shape.points is None else evidence.points
         program = refined(snapped, torch.from_numpy(points), seed=seed, deadline=refining)
-    reason = f"The search ended after {stopped}"
     if searching.cut:
-        reason += "."
+        advice = ""
     elif snapped.blocks >= settings.blocks:
-        reason += f"; the limit of --blocks {settings.blocks} is reached, raise it for more."
+        advice = f"; the limit of --blocks {settings.blocks} is reached, raise it for more"
     else:
-        reason += f"; {snapped.blocks} of {settings.blocks} drawing statements are in use, another would improve the "
-        reason += "fit too little."
-    return program, snapped, reason
+        used = f"{snapped.blocks} of {settings.blocks} drawing statements are in use"
+        advice = f"; {used}, another would improve the fit too little"
+    return program, snapped, f"The search ended after {stopped}{advice}."
 
 
 def description_length(program: Program, voxels: npt.NDArray[np.bool_], snapped: Program | None = None) -> float:

@@ -16,9 +16,6 @@ from shapeprog.space import HALF, RESOLUTION, FloatArray
 WORD = 64
 """Bits of a word."""
 
-FINE = 64
-"""Cells along each side of the grid whose Morton codes sort points."""
-
 Bits = npt.NDArray[np.uint64]
 
 
@@ -61,15 +58,18 @@ def nearby(points: FloatArray) -> npt.NDArray[np.int64]:
 
     In this order, the points of a word are neighbours, so a small candidate has bits in few words.
     """
-    index = np.clip(((points + HALF) * (FINE / RESOLUTION)).astype(np.int64), 0, FINE - 1)
-    shifted = [((index[:, axis] >> bit) & 1) << (3 * bit + axis) for bit in range(6) for axis in range(3)]
-    return np.sum(shifted, axis=0)
+    index, bits = _cells(points, 64), range(6)
+    return np.sum([((index[:, axis] >> bit) & 1) << (3 * bit + axis) for bit in bits for axis in range(3)], axis=0)
 
 
 def sorted_by_cell(points: FloatArray, normals: FloatArray | None = None) -> BinnedPoints:
     """Points and normals (P, 3), zero if unknown, in the order of the cells of a grid."""
-    index = np.clip(((points + HALF) * (CELLS / RESOLUTION)).astype(np.int64), 0, CELLS - 1)
-    key = index @ [CELLS**2, CELLS, 1]
+    key = _cells(points, CELLS) @ [CELLS**2, CELLS, 1]
     order = np.argsort(key, kind="stable")
     starts = np.concatenate([[0], np.bincount(key, minlength=CELLS**3).cumsum()])
     return BinnedPoints(points[order], (np.zeros_like(points) if normals is None else normals)[order], order, starts)
+
+
+def _cells(points: FloatArray, side: int) -> npt.NDArray[np.int64]:
+    """The cells (P, 3) of points (P, 3), or the nearest, in a grid of so many along each side."""
+    return np.clip(((points + HALF) * (side / RESOLUTION)).astype(np.int64), 0, side - 1)

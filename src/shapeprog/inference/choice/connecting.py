@@ -36,7 +36,7 @@ def _better_connected(program: Program, coverage: Coverage) -> Program | None:
     if not count:
         return None
     every = [program, *_options(program, loose)]
-    nodes = list(dict.fromkeys(node for option in every for node in option.body))
+    nodes = dict.fromkeys(node for option in every for node in option.body)
     index = {node: number for number, node in enumerate(nodes)}
     table = coverage.table([Program((node,)) for node in nodes])
     start, *values = (value(table, tuple(index[node] for node in option.body)) for option in every)
@@ -66,20 +66,19 @@ def _loose_parts(program: Program) -> list[list[bool]]:
 def _options(program: Program, loose: list[list[bool]]) -> list[Program]:
     """Programs without one floating block, and programs with one block extended to join floating and other parts."""
     body, chains, options = program.body, program.chains, list[Program]()
-    boxes, originals = solid_boxes(body), solid_boxes([chain[-1] for chain in chains])
-    for index, (copies, floats) in enumerate(zip(boxes, loose, strict=True)):
-        ways: list[tuple[Node, ...]] = [()] if any(floats) else []
-        for side in (True, False):
-            mine = [copy for copy, lone in zip(copies, floats, strict=True) if lone is side]
-            parts = [
-                part
-                for target in range(len(body))
-                for part, lone in zip(boxes[target], loose[target], strict=True)
-                if target != index and lone is not side
-            ]
-            if len(originals[index]) == 1 and mine and parts:
-                longer = _reaching(chains[index], originals[index][0], mine, parts)
-                ways += [(node,) for node in longer if node not in body]
+    originals = solid_boxes([chain[-1] for chain in chains])
+    parts = [
+        (owner, box, lone)
+        for owner, (boxes, floats) in enumerate(zip(solid_boxes(body), loose, strict=True))
+        for box, lone in zip(boxes, floats, strict=True)
+    ]
+    for index, chain in enumerate(chains):
+        ways: list[tuple[Node, ...]] = [()] if any(loose[index]) else []
+        for side in (True, False) if len(originals[index]) == 1 else ():
+            copies = [box for owner, box, lone in parts if owner == index and lone is side]
+            others = [box for owner, box, lone in parts if owner != index and lone is not side]
+            longer = _reaching(chain, originals[index][0], copies, others)
+            ways += [(node,) for node in longer if node not in body]
         options += [Program((*body[:index], *way, *body[index + 1 :])) for way in dict.fromkeys(ways)]
     return options
 

@@ -32,7 +32,6 @@ from shapeprog.inference.choice.settings import SETTINGS
 from shapeprog.inference.surface.evidence import Evidence
 from shapeprog.language.ast import Assignment, Comment
 from shapeprog.language.free import numbers_outside
-from shapeprog.language.printer import numbers_written
 from shapeprog.language.program import Loop, Program
 from shapeprog.language.unroll import unroll
 from shapeprog.library.length import outside
@@ -69,17 +68,12 @@ class Prices:
 
     def of(self, program: Program) -> float:
         """The price of the text of a program; function definitions cost nothing."""
-        if program.source is None:
-            nodes = list(program.walk())
-            loops = sum(isinstance(node, Loop) for node in nodes)
-            calls, numbers = 0, sum(map(numbers_written, nodes))
-            statements = len(nodes) - loops
-        else:
-            lines = [line for line in outside(program.source.lines) if not isinstance(line, Comment | Assignment)]
-            loops = sum(isinstance(line, Loop) for line in lines)
-            statements, numbers = len(lines) - loops, numbers_outside(program)
-            calls = program.blocks - statements
-        return float(self.statement * statements + self.loop * (loops + calls) + self.number * numbers)
+        lines = program.walk() if program.source is None else outside(program.source.lines)
+        priced = [line for line in lines if not isinstance(line, Comment | Assignment)]
+        loops = sum(isinstance(line, Loop) for line in priced)
+        statements = len(priced) - loops
+        more = program.blocks - statements  # those of calls
+        return float(self.statement * statements + self.loop * (loops + more) + self.number * numbers_outside(program))
 
 
 class CoverageTable(NamedTuple):
@@ -162,13 +156,12 @@ def centred(scene: Scene, candidates: Sequence[Program]) -> npt.NDArray[np.int64
     """
     share = (scene.mask / scene.mask.sum(1, keepdim=True).clamp(min=1)).numpy()
     middle = np.einsum("bn,bni->bi", share, scene.centre.numpy())
-    count = np.zeros(len(candidates), np.int64)
-    for axis in (SIDE, DEPTH):
-        around = [
-            any(mirrors(n, axis) or n.name.startswith("rotate") for n in program.walk()) for program in candidates
-        ]
-        count += (np.abs(middle[:, axis]) < SETTINGS.centred) & ~np.array(around, np.bool_)
-    return count
+    around = [
+        [any(mirrors(n, axis) or n.name.startswith("rotate") for n in program.walk()) for axis in (DEPTH, SIDE)]
+        for program in candidates
+    ]
+    near = np.abs(middle[:, [DEPTH, SIDE]]) < SETTINGS.centred
+    return np.sum(near & ~np.reshape(around, near.shape).astype(np.bool_), 1)
 
 
 def parts_drawn(scene: Scene, evidence: Evidence) -> npt.NDArray[np.bool_]:

@@ -30,10 +30,9 @@ class BinnedPoints(NamedTuple):
 
 
 def by_word(values: FloatArray) -> FloatArray:
-    """Means of the values that share a word, zero beyond the last."""
-    words = -(-len(values) // WORD)
-    counts = np.minimum(WORD, len(values) - WORD * np.arange(words))
-    return np.add.reduceat(values, WORD * np.arange(words)) / counts if words else np.zeros(0)
+    """Means of the values that share a word."""
+    starts = np.arange(0, len(values), WORD)
+    return np.add.reduceat(values, starts) / np.diff(starts, append=len(values))
 
 
 def pack(flags: npt.NDArray[np.bool_]) -> Bits:

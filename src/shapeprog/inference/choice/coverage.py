@@ -203,8 +203,6 @@ def unsupported(
     single = Batch(*(
         part.flatten(0, 1)[row][:, None] for part in (scene.kind, scene.size, scene.centre, scene.rotation, scene.mask)
     ))  # fmt: skip
-    if not len(row):
-        return np.zeros((0, 3)), np.zeros(0, np.int64), np.zeros(0)
     sample = sample_surface(single, SETTINGS.batch, torch.Generator().manual_seed(0))
     points, normals = (part.double().reshape(-1, 3).numpy() for part in (sample.points, sample.normals))
     share = shares(points, normals, evidence, binned)
@@ -221,9 +219,8 @@ def shares(samples: FloatArray, normals: FloatArray, evidence: Evidence, binned:
     It is zero where a point of the target within reach has a normal that agrees, ``TURNED`` where an outward normal
     faces the other way, such as behind the wall of a solid, and one elsewhere.
     """
-    share = np.zeros(len(samples))
-    points, sides, order, starts = binned
-    outward = evidence.surface_outward[order]
+    share, outward = np.zeros(len(samples)), evidence.surface_outward[binned.order]
+    points, sides, _, starts = binned
     data = samples, normals, points, sides, outward, starts, evidence.reach, evidence.agreement, share
     over_threads(partial(charged, *data), len(samples), least=1024)
     return share

@@ -8,6 +8,7 @@ thickness behind a sheet, do not change.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import torch
 from jaxtyping import Bool, Float
@@ -17,7 +18,7 @@ from shapeprog.data.shape import Shape
 from shapeprog.geometry.arrays import one_tensor_thread
 from shapeprog.inference.budget import NEVER, Deadline, Progress
 from shapeprog.inference.fit.joints import Joints, find_joints, joining, moved, needs
-from shapeprog.inference.fit.residuals import Pairs, Target, pull
+from shapeprog.inference.fit.residuals import System, Target, of_target
 from shapeprog.inference.fit.settings import FIT
 from shapeprog.inference.fit.tunable import Poses, Tunable
 from shapeprog.inference.surface.evidence import Evidence, evidence_of
@@ -67,7 +68,6 @@ def adjust(
         return program
     tunable = Tunable(program)
     values, low, high = tunable.values, (tunable.values - reach).maximum(tunable.low), tunable.values + reach
-    held = torch.zeros(len(tunable.values), dtype=torch.bool)
     generator, target, angles = torch.Generator().manual_seed(seed), Target(evidence), tunable.are("angle")
     narrow = FIT.explained * evidence.tolerance
     wide = max(1.2, narrow)  # in cells, at first
@@ -77,18 +77,15 @@ def adjust(
             if deadline.passed(f"the adjustment after {step} of {steps} steps"):
                 break
             done = min(step / max(steps - FIT.last, 1), 1.0)
-            if done == 1 and not held.any():
-                held = angles
+            closing = done == 1
+            if closing:
                 upright = values.abs() < 0.7  # degrees
-                values = torch.where(held, tunable.rounded(values * ~upright), values)
+                values = torch.where(angles, tunable.rounded(values * ~upright), values)
             poses = tunable.poses(values)
             joints = moved(poses.scene, joints)
             pairs = target.pairs(poses.scene, generator)
-            systems = [
-                of_target(poses, pairs, wide ** (1 - done) * narrow**done),
-                of_joints(poses, joints, closing=done == 1),
-            ]
-            values = (values + _move(systems, tunable, values, held)).clamp(low, high)
+            systems = of_target(poses, pairs, wide ** (1 - done) * narrow**done), of_joints(poses, joints, closing)
+            values = (values + _move(systems, tunable, values, ~(angles & closing))).clamp(low, high)
             if progress:
                 progress("adjusting", (step + 1) / steps)
     return tunable.settled(values)
@@ -102,18 +99,7 @@ def tidy(program: Program) -> Program:
     return tunable.settled(tunable.values)
 
 
-System = tuple[Float[Tensor, " F"], Float[Tensor, "F F"]]
-"""Half the slope of a sum of squares, and half its curvature by Gauss and Newton."""
-
-
-def of_target(poses: Poses, pairs: Pairs, width: float) -> System:
-    """The part of the distances to the target, where residuals of ``width`` cells have a quarter of the weight."""
-    asked, by = pull(poses.scene, pairs, width), poses.slopes
-    slope = (by * asked.slope[..., None]).sum((0, 1))
-    return slope, (by.mT @ asked.curvature @ by).sum(0)
-
-
-def of_joints(poses: Poses, joints: Joints, *, closing: bool) -> System:
+def of_joints(poses: Poses, joints: Joints, closing: bool) -> System:
     """The part of gaps, whose weight falls where the target opens them: it stretches a leg, but does not lift a seat.
 
     At the end the gaps up to a cell that would divide the program are closed, and feet up to .15 cells above the floor
@@ -131,19 +117,18 @@ def of_joints(poses: Poses, joints: Joints, *, closing: bool) -> System:
 
 
 def _move(
-    systems: list[System], tunable: Tunable, values: Float[Tensor, " F"], held: Bool[Tensor, " F"]
+    systems: Sequence[System], tunable: Tunable, values: Float[Tensor, " F"], free: Bool[Tensor, " F"]
 ) -> Float[Tensor, " F"]:
-    """The step to the minimum of the sum of squares, with the prior of every number at its start; some are held."""
+    """The step to the minimum of the sum of squares, with the prior of every number at its start; only some move."""
     slope, curvature = (sum(parts) for parts in zip(*systems, strict=True))
     measures = tunable.are("length") | tunable.are("angle")
-    gentle = torch.where(measures, FIT.measure_prior, FIT.place_prior).double() * tunable.scale**2
-    slope = slope + gentle * (values - tunable.values)
-    curvature = curvature + torch.diag(gentle)
-    free = (~held).nonzero()[:, 0]
+    prior = torch.where(measures, FIT.measure_prior, FIT.place_prior).double() * tunable.scale**2
+    slope = slope + prior * (values - tunable.values)
+    curvature = curvature + torch.diag(prior)
     move = torch.zeros_like(values)
-    move[free] = -torch.linalg.solve(curvature[free[:, None], free], slope[free])
+    move[free] = -torch.linalg.solve(curvature[free][:, free], slope[free])
     farthest = 0.7 / tunable.scale  # so far, in cells, one number may move the surface in a step
-    return torch.minimum(torch.maximum(move, -farthest), farthest)
+    return move.clamp(-farthest, farthest)
 
 
 def _floor(evidence: Evidence) -> float:

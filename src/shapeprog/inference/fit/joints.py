@@ -16,9 +16,9 @@ from torch import Tensor
 
 from shapeprog.geometry.batch import Batch
 from shapeprog.geometry.distance import projected, signed_distance
+from shapeprog.geometry.primitive import SIZES
 from shapeprog.geometry.primitives import primitives
 from shapeprog.geometry.scene import Scene
-from shapeprog.inference.fit.residuals import rows_of
 from shapeprog.inference.fit.settings import FIT
 
 
@@ -60,9 +60,9 @@ def find_joints(scene: Scene, floor: float) -> Joints:
     area = scene.bounds.prod(-1)
     swap = area[first] > area[second]  # the smaller part comes first
     first, second = torch.where(swap, second, first), torch.where(swap, first, second)
-    points = between(scene, first, second, ((start + end) / 2)[first, second], 24)
-    inner, outer = (signed_distance(rows_of(scene, slots)[0], points[:, None])[:, 0] for slots in (second, first))
-    gap = (inner + outer.clamp(min=0)).detach()
+    points = projected(scene[torch.stack([first, second], 1)], ((start + end) / 2)[first, second], rounds=24)
+    inner, outer = (signed_distance(scene[slots[:, None]], points[:, None])[:, 0] for slots in (second, first))
+    gap = inner + outer.clamp(min=0)
     selected = (joining(first, second, gap, count, FIT.nearly) | (gap <= FIT.touching)).nonzero()[:, 0]
     lowest = _lowest(scene, torch.arange(count))[:, 0]
     standing = ((lowest - floor).abs() <= FIT.nearly).nonzero()[:, 0]
@@ -85,34 +85,33 @@ def moved(scene: Scene, joints: Joints) -> Joints:
     """The same joints after their parts have moved: the points deepest in both parts, or nearest to both."""
     if not len(joints.first):
         return joints
-    points = _placed(rows_of(scene, joints.first)[0], joints.normalized).detach()
-    points = between(scene, joints.first, joints.second, points, 6)
+    points = _placed(scene[joints.first[:, None]], joints.normalized)
+    points = projected(scene[torch.stack([joints.first, joints.second], 1)], points, rounds=6)
     return joints._replace(normalized=_inner(scene, joints.first, points))
 
 
 def needs(scene: Scene, slopes: Float[Tensor, "N 16 F"], joints: Joints) -> Needs:
     """Gap of every joint, zero if it is closed, and height above the floor of every part that should touch it."""
-    first, by_first = rows_of(scene, joints.first)
-    second, by_second = rows_of(scene, joints.second)
+    first, by_first = _rows_of(scene, joints.first)
+    second, by_second = _rows_of(scene, joints.second)
     gap = signed_distance(second, _placed(first, joints.normalized)[:, None])[:, 0]
     gap = gap + 0.02  # into the other part, by more than rounding takes away
     on_first, on_second = torch.autograd.grad(gap.sum(), [by_first, by_second])
     joined = _by_number(on_first, slopes[joints.first]) + _by_number(on_second, slopes[joints.second])
     joined = torch.where((gap >= 0)[:, None], joined, 0.0)  # on an axis the slope of a depth is no number
-    feet, by_feet = rows_of(scene, joints.standing)
+    feet, by_feet = _rows_of(scene, joints.standing)
     low = _inner(scene, joints.standing, _lowest(scene, joints.standing))
     height = _placed(feet, low)[:, 0] - joints.floor
     standing = _by_number(torch.autograd.grad(height.sum(), by_feet)[0], slopes[joints.standing])
     return Needs(torch.cat([gap.clamp(min=0), height]).detach(), torch.cat([joined, standing]))
 
 
-def between(
-    scene: Scene, first: Int[Tensor, " C"], second: Int[Tensor, " C"], points: Float[Tensor, "C 3"], rounds: int
-) -> Float[Tensor, "C 3"]:
-    """Points moved between two primitives each of a scene."""
-    slots = torch.stack([first, second], 1)
-    pairs = (tensor[slots] for tensor in (scene.kind, scene.size, scene.centre, scene.rotation, scene.mask))
-    return projected(Batch(*pairs), points, rounds)
+def _rows_of(scene: Scene, slots: Int[Tensor, " R"]) -> tuple[Batch, Float[Tensor, "R 16"]]:
+    """The primitives in some slots as a batch (R, 1), and the sizes, centres and rotations to differentiate it by."""
+    rows = torch.cat([scene.size, scene.centre, scene.rotation.flatten(-2)], -1)[slots].requires_grad_()
+    size, centre, rotation = rows[:, None].split([SIZES, 3, 9], -1)
+    kind, mask = scene.kind[slots][:, None], scene.mask[slots][:, None]
+    return Batch(kind, size, centre, rotation.unflatten(-1, (3, 3)), mask), rows
 
 
 def _by_number(rows: Float[Tensor, "R 16"], slopes: Float[Tensor, "R 16 F"]) -> Float[Tensor, "R F"]:

@@ -17,14 +17,12 @@ from jaxtyping import Bool, Float, Int
 from scipy.spatial import cKDTree
 from torch import Tensor
 
-from shapeprog.geometry.batch import Batch
 from shapeprog.geometry.distance import distance_and_slopes, nearest_primitive
-from shapeprog.geometry.primitive import SIZES
 from shapeprog.geometry.scene import Scene
 from shapeprog.geometry.surface import SurfaceSample, sample_surface
 from shapeprog.inference.choice.bits import nearby
 from shapeprog.inference.fit.settings import FIT
-from shapeprog.inference.fit.tunable import ROW
+from shapeprog.inference.fit.tunable import Poses
 from shapeprog.inference.surface.evidence import Evidence
 from shapeprog.space import FloatArray
 
@@ -60,11 +58,8 @@ class Pairs(NamedTuple):
     anywhere: Bool[Tensor, " R"]
 
 
-class Pull(NamedTuple):
-    """Sum of weighted squared residuals to second order in the numbers of each primitive, by Gauss and Newton."""
-
-    slope: Float[Tensor, "N 16"]
-    curvature: Float[Tensor, "N 16 16"]
+System = tuple[Float[Tensor, " F"], Float[Tensor, "F F"]]
+"""Half the slope of a sum of squares, and half its curvature by Gauss and Newton."""
 
 
 class Target:
@@ -88,63 +83,60 @@ class Target:
         Plain distances of points to the union have little weight: they alone determine how far a part reaches along a
         sheet that has no edges.
         """
-        sample = sample_surface(scene, FIT.samples, generator)
-        samples, facing = sample.points, sample.normals
-        jitter = torch.rand(FIT.points, generator=generator, dtype=torch.float64).numpy()
-        stratum = self._shares[-1] / FIT.points  # evenly over the surface
-        thresholds = (np.arange(FIT.points) + jitter) * stratum
+        sample = sample_surface(scene, FIT.pairs, generator)
+        jitter = torch.rand(FIT.pairs, generator=generator, dtype=torch.float64).numpy()
+        stratum = self._shares[-1] / FIT.pairs  # evenly over the surface
+        thresholds = (np.arange(FIT.pairs) + jitter) * stratum
         place = np.searchsorted(self._shares, thresholds).clip(0, len(self._points) - 1)
-        selected = torch.from_numpy(self._order[place])
-        points, normals, sides = self._points[selected], self._normals[selected], self._sides[selected]
-        tree = cKDTree(_joint(samples, facing))
+        drawn = torch.from_numpy(self._order[place])
+        points, normals = self._points[drawn], self._normals[drawn]
+        tree = cKDTree(_joint(sample.points, sample.normals))
         candidates = _nearest(tree, points, normals)
-        if len(unsure := (~sides).nonzero()[:, 0]):
+        if len(unsure := (~self._sides[drawn]).nonzero()[:, 0]):
             behind = candidates.clone()
             behind[unsure] = _nearest(tree, points[unsure], -normals[unsure])
             candidates = torch.cat([candidates, behind], 1)
-        best, offset = self._closest(selected[:, None], candidates, sample)
-        partner = candidates.gather(1, best)[:, 0]
-        back = self._owner[_nearest(self._tree, samples, facing)]
-        best, back_offset = self._closest(back, torch.arange(len(back))[:, None], sample)
-        back_partner = back.gather(1, best)[:, 0]
-        union = nearest_primitive(scene, points)[0]
-        along = torch.cat([(normals * facing[partner]).sum(1), (self._normals[back_partner] * facing).sum(1)])
-        either = ~torch.cat([sides, self._sides[back_partner]]) & (along.abs() >= FIT.same)
-        zeros, ones = torch.zeros(FIT.points, dtype=torch.float64), torch.ones(FIT.points, dtype=torch.float64)
-        back_weights = torch.full((FIT.samples,), 0.5 / FIT.samples).double()
+        there = self._closest(drawn[:, None], candidates, sample)
+        owners = self._owner[_nearest(self._tree, sample.points, sample.normals)]
+        back = self._closest(owners, torch.arange(FIT.pairs)[:, None], sample)
+        paired, partner, offset = map(torch.cat, zip(there, back, strict=True))
+        every = torch.cat([paired, drawn])
+        facing = torch.cat([sample.normals[partner], normals])
+        along = (self._normals[every] * facing).sum(1)
+        ones, half = torch.ones(FIT.pairs, dtype=torch.float64), torch.full((FIT.pairs,), 0.5 / FIT.pairs).double()
         return Pairs(
-            torch.cat([points, self._points[back_partner], points]),
-            torch.cat([samples[partner], samples, points]),
-            torch.cat([facing[partner], facing, normals]),
-            torch.cat([sample.slot[partner], sample.slot, union]),
-            torch.cat([offset, back_offset, zeros]),
-            torch.cat([ones / FIT.points, back_weights, 0.03 * ones / FIT.points]),
-            torch.cat([either, torch.zeros(FIT.points).bool()]),
-            torch.cat([torch.zeros(FIT.points + FIT.samples), ones]).bool(),
+            points=self._points[every],
+            samples=torch.cat([sample.points[partner], points]),
+            normals=facing,
+            slots=torch.cat([sample.slot[partner], nearest_primitive(scene, points)[0]]),
+            offset=torch.cat([offset, torch.zeros_like(offset[: FIT.pairs])]),
+            weights=torch.cat([ones / FIT.pairs, half, 0.03 * ones / FIT.pairs]),
+            either=~self._sides[every] & (along.abs() >= FIT.same),
+            anywhere=torch.arange(len(every)) >= len(paired),
         )
 
     def _closest(
-        self, at: Int[Tensor, "R k"], candidates: Int[Tensor, "R k"], sample: SurfaceSample
-    ) -> tuple[Int[Tensor, "R 1"], Float[Tensor, " R"]]:
-        """Which (R, 1) of several pairs (R, k) of points and samples is the best, and its squared penalty besides the
-        distance along the normal."""
-        facing, normals = sample.normals[candidates], self._normals[at]
-        away = self._points[at] - sample.points[candidates]
+        self, points: Int[Tensor, "R k"], samples: Int[Tensor, "R k"], sample: SurfaceSample
+    ) -> tuple[Int[Tensor, " R"], Int[Tensor, " R"], Float[Tensor, " R"]]:
+        """The best of several pairs (R, k) of points and samples, and its squared penalty besides the distance along
+        the normal."""
+        facing, normals = sample.normals[samples], self._normals[points]
+        away = self._points[points] - sample.points[samples]
         plane, cosine = (away * facing).sum(-1), (normals * facing).sum(-1)
-        spacing = 1.5 * math.sqrt(self.evidence.area / min(FIT.samples, len(self._points)))
+        spacing = 1.5 * math.sqrt(self.evidence.area / min(FIT.pairs, len(self._points)))
         along = ((away**2).sum(-1) - plane**2).clamp(min=0).sqrt() - spacing
-        turned = torch.where(self._sides[at] & (cosine < 0), NEVER, 1 - cosine**2).clamp(min=0)
+        turned = torch.where(self._sides[points] & (cosine < 0), NEVER, 1 - cosine**2).clamp(min=0)
         known = (normals**2).sum(-1) > 0.25
         against = along.clamp(min=0) ** 2 + FIT.turned**2 * torch.where(known, turned, 0.0)
         best = (plane**2 + against).argmin(1, keepdim=True)
-        return best, against.gather(1, best)[:, 0]
+        point, partner, offset = (item.expand_as(against).gather(1, best)[:, 0] for item in (points, samples, against))
+        return point, partner, offset
 
 
-def pull(scene: Scene, pairs: Pairs, width: float) -> Pull:
-    """Slope and curvature of the misfit, where residuals of ``width`` cells have a quarter of the weight."""
-    fields = (scene.kind, scene.size, scene.centre, scene.rotation, scene.mask)
-    single = Batch(*(field[pairs.slots][:, None] for field in fields))
-    value, by_row, slope = (result[:, 0] for result in distance_and_slopes(single, pairs.points[:, None]))
+def of_target(poses: Poses, pairs: Pairs, width: float) -> System:
+    """The misfit of pairs to second order in the numbers; residuals of ``width`` cells have a quarter of the weight."""
+    parts = poses.scene[pairs.slots[:, None]]
+    value, by_row, slope = (result[:, 0] for result in distance_and_slopes(parts, pairs.points[:, None]))
     cosine = (slope * pairs.normals).sum(1)
     plane = ((pairs.points - pairs.samples) * pairs.normals).sum(1)
     same = (cosine >= FIT.same) | pairs.anywhere
@@ -153,27 +145,15 @@ def pull(scene: Scene, pairs: Pairs, width: float) -> Pull:
     explained = pairs.either & ~same & (value.abs() < plane.abs() / 2)
     if len(off_face := (~same).nonzero()[:, 0]):  # the nearest point is on another face: use the plane at the sample
         samples = (pairs.samples + 1e-3 * pairs.normals)[off_face, None]
-        by_row[off_face] = distance_and_slopes(single[off_face], samples)[1][:, 0]
+        by_row[off_face] = distance_and_slopes(parts[off_face], samples)[1][:, 0]
     robust = (width**2 / (width**2 + residual**2 + pairs.offset)) ** 2
     weight = torch.where(explained, 0.0, pairs.weights * robust)
-    count = len(scene.mask)
-    result = Pull(by_row.new_zeros(count, ROW), by_row.new_zeros(count, ROW, ROW))
-    order = torch.argsort(pairs.slots)
-    counts = torch.bincount(pairs.slots, minlength=count).tolist()
-    weighted = (weight[:, None] * by_row)[order].split(counts)
-    for slot, (left, right, off) in enumerate(
-        zip(weighted, by_row[order].split(counts), residual[order].split(counts), strict=True)
-    ):
-        result.slope[slot], result.curvature[slot] = off @ left, left.T @ right
-    return result
-
-
-def rows_of(scene: Scene, slots: Int[Tensor, " R"]) -> tuple[Batch, Float[Tensor, "R 16"]]:
-    """The primitives in some slots as a batch (R, 1), and the sizes, centres and rotations to differentiate it by."""
-    rows = torch.cat([scene.size, scene.centre, scene.rotation.flatten(-2)], -1)[slots].requires_grad_()
-    size, centre, rotation = rows[:, None].split([SIZES, 3, 9], -1)
-    kind, mask = scene.kind[slots][:, None], scene.mask[slots][:, None]
-    return Batch(kind, size, centre, rotation.unflatten(-1, (3, 3)), mask), rows
+    order, by_number = torch.argsort(pairs.slots), poses.slopes
+    counts = torch.bincount(pairs.slots, minlength=len(by_number)).tolist()
+    columns = (column[order].split(counts) for column in (weight[:, None] * by_row, by_row, residual))
+    systems = [(off @ weighted, weighted.T @ plain) for weighted, plain, off in zip(*columns, strict=True)]
+    by_slot, curvature = map(torch.stack, zip(*systems, strict=True))
+    return (by_number * by_slot[..., None]).sum((0, 1)), (by_number.mT @ curvature @ by_number).sum(0)
 
 
 def _joint(points: Float[Tensor, "P 3"], normals: Float[Tensor, "P 3"]) -> FloatArray:

@@ -16,8 +16,7 @@ class FitSettings:
     place_prior: float = 1e-6  # the same of a position
     nearly: float = 0.3  # gap up to which parts nearly touch
     touching: float = 0.05  # gap up to which they touch
-    points: int = 1_200  # points of the target that one step uses
-    samples: int = 1_200  # the same of samples on the surface of the program
+    pairs: int = 1_200  # points of the target, and of the surface of the program, that one step uses
     partners: int = 6  # samples among which the partner of a point is found, and points for a sample
     turned: float = 0.5  # distance that counts as much as a normal at a right angle
     same: float = 0.5  # least cosine between normals on one face

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from itertools import count
 from typing import NamedTuple
@@ -13,17 +13,14 @@ import torch
 from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
-from shapeprog.geometry.primitive import SIZES
 from shapeprog.geometry.scene import Scene
+from shapeprog.language.ast import changed_lines
 from shapeprog.language.parameters import Kind, Quantity, to_float32
 from shapeprog.language.program import Loop, Node, Program
 from shapeprog.language.statement import language
 from shapeprog.language.tensors import Code, encode
 from shapeprog.language.unroll import Plan
 from shapeprog.space import HALF
-
-ROW = SIZES + 3 + 9
-"""Numbers that place one primitive: sizes, centre and rotation."""
 
 THINNEST = 0.1
 """Least thickness in cells of any part; the eye takes thinner ones for slivers."""
@@ -63,8 +60,8 @@ class Tunable:
         Where the numbers are at the start (F,), and of which kind each is.
     low
         Lower bounds (F,): a thickness of ``THINNEST`` for lengths.
-    nodes, moving
-        The nodes in the order of the text, and for every number (F) the index of its node, and its slot there.
+    moving
+        For every number (F) the index of its node in the order of the text, and its slot there.
     scale
         How many cells the surface moves for one unit of each (F,), at most: 1 for places and lengths, more for shifts
         of many copies, a lever for angles.
@@ -75,12 +72,11 @@ class Tunable:
         nodes = list(program.walk())
         code = encode(program, dtype=torch.float64)
         self._start = code.parameters
-        self.nodes, self.moving = nodes, [(n, slot) for n, node in enumerate(nodes) for slot in _moving(node)]
+        self.moving = [(n, slot) for n, node in enumerate(nodes) for slot in _moving(node)]
         # The same program with the number of every value, from 1, in its place; 0 where it stays.
-        numbered = {(n, slot): 0.0 for n, node in enumerate(nodes) for slot in range(len(node.values))}
-        numbered |= {key: float(f) for f, key in enumerate(self.moving, 1)}
-        index = encode(Program(_rebuilt(program.body, count(), numbered)), dtype=torch.float64).parameters
-        self._index: Int[Tensor, "K J slots"] = index.long() - 1
+        place = {key: float(f) for f, key in enumerate(self.moving, 1)}
+        numbered = _changed(program, lambda key, value: place.get(key, 0.0))
+        self._index: Int[Tensor, "K J slots"] = encode(numbered, dtype=torch.float64).parameters.long() - 1
         quantities = [language()[nodes[n].name].quantities[slot] for n, slot in self.moving]
         self.kinds: list[Kind] = [quantity.kind for quantity in quantities]
         self.values = torch.tensor([nodes[n].values[slot] for n, slot in self.moving], dtype=torch.float64)
@@ -106,7 +102,7 @@ class Tunable:
         """The program with these numbers, rounded."""
         tidy = self.rounded(values).tolist()
         table = {key: to_float32(value) for key, value in zip(self.moving, tidy, strict=True)}
-        return Program(_rebuilt(self.program.body, count(), table))
+        return _changed(self.program, lambda key, value: table.get(key, value))
 
     def rounded(self, values: Float[Tensor, " F"]) -> Float[Tensor, " F"]:
         """The numbers with as many decimals as their kind keeps."""
@@ -118,9 +114,8 @@ class Tunable:
         return torch.tensor([item == kind for item in self.kinds], dtype=torch.bool)
 
     def _filled(self, values: Float[Tensor, "*batch F"]) -> Float[Tensor, "*batch K J slots"]:
-        if not values.shape[-1]:
-            return self._start.expand(*values.shape[:-1], *self._start.shape)
-        return torch.where(self._index >= 0, values[..., self._index.clamp(min=0)], self._start)
+        padded = torch.nn.functional.pad(values, (0, 1))  # at index -1
+        return torch.where(self._index >= 0, padded[..., self._index], self._start)
 
     def _scales(self, nodes: Sequence[Node], scene: Scene) -> Float[Tensor, " F"]:
         reach = scene.bounds.norm(dim=-1)
@@ -152,13 +147,12 @@ def _moving(node: Node) -> Iterator[int]:
             yield slot
 
 
-def _rebuilt(body: Sequence[Node], counter: Iterator[int], table: dict[tuple[int, int], float]) -> tuple[Node, ...]:
-    """The nodes with the numbers of a table by node and slot."""
-    nodes: list[Node] = []
-    for node in body:
+def _changed(program: Program, change: Callable[[tuple[int, int], float], float]) -> Program:
+    """The program with a change made to all numbers, given the index of the node and the slot of each."""
+    counter = count()
+
+    def changed(node: Node) -> Node:
         n = next(counter)
-        values = tuple(table.get((n, slot), value) for slot, value in enumerate(node.values))
-        if isinstance(node, Loop):
-            node = replace(node, body=_rebuilt(node.body, counter, table))
-        nodes.append(replace(node, values=values))
-    return tuple(nodes)
+        return replace(node, values=tuple(change((n, slot), value) for slot, value in enumerate(node.values)))
+
+    return Program(changed_lines(program.body, changed))  # type: ignore[arg-type]

@@ -11,9 +11,8 @@ from shapeprog.geometry.distance import signed_distance
 from shapeprog.geometry.scene import Scene
 from shapeprog.geometry.separation import OrientedBoxes
 from shapeprog.geometry.surface import sample_surface
-from shapeprog.inference.fit.adjustment import of_target
 from shapeprog.inference.fit.joints import Joints, moved, needs
-from shapeprog.inference.fit.residuals import Target
+from shapeprog.inference.fit.residuals import Target, of_target
 from shapeprog.inference.fit.settings import FIT
 from shapeprog.inference.fit.tunable import Poses, Tunable
 from shapeprog.inference.surface.evidence import Evidence

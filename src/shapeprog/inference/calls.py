@@ -7,7 +7,6 @@ where the call draws them if the program loses little value, as a call costs les
 
 from __future__ import annotations
 
-import itertools
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -24,7 +23,7 @@ from shapeprog.language.ast import Call, Source
 from shapeprog.language.parameters import to_float32
 from shapeprog.language.program import Loop, Node, Program, nest
 from shapeprog.language.statement import language
-from shapeprog.library.blocks import Kind, forms_of
+from shapeprog.library.blocks import Block, forms_of
 from shapeprog.library.matching import EXACT, Form, Pattern
 from shapeprog.library.rewriting import within
 from shapeprog.library.store import Library
@@ -49,16 +48,11 @@ class Candidate(NamedTuple):
 
 
 class Option(NamedTuple):
-    """A block of a program inside of some of its loops: its index, these loops and their numbers, its numbers (M,)."""
+    """A block of a program inside of some of its loops: its index, these loops, and its form without a role."""
 
     place: int
     around: tuple[Loop, ...]
-    outer: FloatArray
-    values: FloatArray
-
-
-Options = dict[tuple[Kind, tuple[int, ...], tuple[tuple[float | str, ...], ...]], list[Option]]
-"""Blocks by kind, without role, by counts, and by the names and discrete numbers of the loops around."""
+    block: Block
 
 
 def with_calls(program: Program, libraries: Sequence[Library], coverage: Coverage) -> tuple[Program, frozenset[int]]:
@@ -80,8 +74,9 @@ def with_calls(program: Program, libraries: Sequence[Library], coverage: Coverag
     """
     nodes = list(program.flat().body)
     options = _options(program)
-    patterns = [pattern for library in libraries for pattern in library.patterns if pattern.shortens]
-    candidates = [candidate for pattern in patterns for candidate in _candidates(pattern, options)]
+    patterns = (pattern for library in libraries for pattern in library.patterns)
+    several = (pattern for pattern in patterns if pattern.shortens and pattern.blocks > 1)
+    candidates = [candidate for pattern in several for candidate in _candidates(pattern, options)]
     candidates.sort(key=lambda candidate: (-len(candidate.replaced), candidate.difference))
     table = coverage.table([*(Program((node,)) for node in nodes), *(candidate.program for candidate in candidates)])
     selected, drawn, loose = frozenset(range(len(nodes))), set[int](), len(floating(Program(tuple(nodes))))
@@ -106,63 +101,60 @@ def _with_one_role(candidate: Candidate, nodes: Sequence[Node]) -> Iterator[Node
         yield nest((*loops, replace(draw, role=role) if role and role != draw.name else draw))
 
 
-def _options(program: Program) -> Options:
-    options: Options = {}
+def _options(program: Program) -> list[Option]:
+    options: list[Option] = []
     for index, chain in enumerate(program.chains):
+        loops = tuple(node for node in chain if isinstance(node, Loop))
         for depth in range(len(chain)):
-            around = tuple(node for node in chain[:depth] if isinstance(node, Loop))
-            discrete, outer = list[tuple[float | str, ...]](), list[float]()
-            for loop in around:
-                is_discrete = [quantity.discrete for quantity in language()[loop.name].quantities]
-                discrete.append((loop.name, *itertools.compress(loop.values, is_discrete)))
-                outer += itertools.compress(loop.values, np.logical_not(is_discrete))
-            for block in forms_of(chain[depth:]):
-                key = replace(block.kind, word=""), block.counts, tuple(discrete)
-                options.setdefault(key, []).append(Option(index, around, np.array(outer), block.values))
+            blocks = (block._replace(kind=replace(block.kind, word="")) for block in forms_of(chain[depth:]))
+            options += (Option(index, loops[:depth], block) for block in blocks)
     return options
 
 
-def _candidates(pattern: Pattern, options: Options) -> list[Candidate]:
+def _candidates(pattern: Pattern, options: Sequence[Option]) -> list[Candidate]:
     """The calls of a function that draw nearly the same as some blocks, the nearest first."""
     candidates: list[Candidate] = []
-    for around in {around for _, _, around in options}:
-        for counts in pattern.choices(counts for _, counts, other in options if other == around):
-            usual = pattern.arguments | counts
-            start = np.array([usual[name] for name in pattern.measures])
-            for forms in pattern.forms(counts) if pattern.blocks > 1 else ():
-                keys = ((replace(form.block.kind, word=""), form.block.counts, around) for form in forms)
-                for blocks in _assignments(forms, [options.get(key, []) for key in keys], start):
-                    measures, difference = _solved(forms, blocks, start)
-                    arguments = usual | dict(zip(pattern.measures, measures.tolist(), strict=True))
-                    if (program := called(pattern, arguments, blocks[0].around)) is not None:
-                        candidates.append(Candidate(program, tuple(block.place for block in blocks), difference))
+    for counts in pattern.choices(option.block.counts for option in options):
+        usual = pattern.arguments | counts
+        start = np.array([usual[name] for name in pattern.measures])
+        for forms in pattern.forms(counts):
+            for blocks in _assigned(forms, options, start):
+                measures, difference = _solved(forms, blocks, start)
+                arguments = usual | dict(zip(pattern.measures, measures.tolist(), strict=True))
+                if (program := called(pattern, arguments, blocks[0].around)) is not None:
+                    candidates.append(Candidate(program, tuple(block.place for block in blocks), difference))
     return sorted(candidates, key=lambda candidate: candidate.difference)[:OFFERED]
 
 
-def _assignments(
-    forms: Sequence[Form], options: Sequence[Sequence[Option]], start: FloatArray, *blocks: Option
-) -> Iterator[tuple[Option, ...]]:
-    """Blocks for all forms of a function, as near to those of one call as ``LOOSE``."""
-    if len(blocks) == len(forms):
-        yield blocks
-        return
-    for option in options[len(blocks)]:
-        longer = (*blocks, option)
-        if option.place not in {block.place for block in blocks} and _solved(forms, longer, start)[1] <= LOOSE:
-            yield from _assignments(forms, options, start, *longer)
+def _assigned(forms: Sequence[Form], options: Sequence[Option], start: FloatArray) -> list[tuple[Option, ...]]:
+    """Different blocks for all forms of a function, in loops of one kind, as near to those of one call as ``LOOSE``."""
+    assigned: list[tuple[Option, ...]] = [()]
+    for form in forms:
+        like = replace(form.block.kind, word=""), form.block.counts
+        fitting = [option for option in options if (option.block.kind, option.block.counts) == like]
+        longer = ((*blocks, option) for blocks in assigned for option in fitting)
+        assigned = [blocks for blocks in longer if _are_near(forms, blocks, start)]
+    return assigned
+
+
+def _are_near(forms: Sequence[Form], blocks: Sequence[Option], start: FloatArray) -> bool:
+    kinds = {tuple(loop.name for loop in block.around) for block in blocks}
+    apart = len({block.place for block in blocks}) == len(blocks)
+    return apart and len(kinds) == 1 and _solved(forms, blocks, start)[1] <= LOOSE
 
 
 def _solved(forms: Sequence[Form], blocks: Sequence[Option], start: FloatArray) -> tuple[FloatArray, float]:
     """The measures of a call by least squares, and the largest difference of its blocks and of the loops around them.
 
-    Measures that the first forms do not determine keep their values of ``start``.
+    Measures that the first forms do not determine keep their values of ``start``.  Counts and axes of loops differ by
+    more than ``LOOSE`` where they differ.
     """
     factors = np.concatenate([form.factors for form in forms[: len(blocks)]])
     constants = np.concatenate([form.constants for form in forms[: len(blocks)]])
-    away = np.concatenate([block.values for block in blocks]) - constants - factors @ start
+    away = np.concatenate([option.block.values for option in blocks]) - constants - factors @ start
     change = np.linalg.lstsq(factors, away, rcond=None)[0]
-    outer = np.array([block.outer - blocks[0].outer for block in blocks])
-    return start + change, float(max(np.abs(factors @ change - away).max(), np.abs(outer).max(initial=0)))
+    outer = np.array([[value for loop in option.around for value in loop.values] for option in blocks])
+    return start + change, float(max(np.abs(factors @ change - away).max(), np.abs(outer - outer[0]).max(initial=0)))
 
 
 def called(pattern: Pattern, arguments: Mapping[str, float], loops: Sequence[Loop] = ()) -> Program | None:

@@ -27,11 +27,11 @@ class Parts:
     """
 
     def __init__(self, scene: Scene, turns: int = 0) -> None:
-        mask = scene.mask.numpy()
+        scene = scene[scene.mask]
         half = scene.bounds.double().numpy()
-        centre, pose = turned(scene.centre.double().numpy()[mask], turns), scene.rotation.double().numpy()[mask]
-        half, pose = half[mask], np.swapaxes(turned(np.swapaxes(pose, -1, -2), turns), -1, -2)
-        self.block = scene.block.numpy()[mask]  # the block that drew each part
+        centre, pose = turned(scene.centre.double().numpy(), turns), turned(scene.rotation.double().mT.numpy(), turns)
+        pose = np.swapaxes(pose, -1, -2)
+        self.block = scene.block.numpy()  # the block that drew each part
         self.count = len(half)
         reach = (np.abs(pose) @ half[..., None])[..., 0]
         self.low, self.high = centre - reach, centre + reach  # bounds (N, 3)
@@ -39,7 +39,7 @@ class Parts:
         self.size = self.high.max(0) - self.low.min(0)  # extents of the whole (3,)
         self.near = 0.04 * max(float(self.size.max()), 1e-6)  # what counts as near; a point has no size
         self.floor = float(self.bottom.min())  # height of the lowest point
-        self._form(half, pose, (scene.kind == primitives.index(ARC)).numpy()[mask])
+        self._form(half, pose, (scene.kind == primitives.index(ARC)).numpy())
         self._main_surface()
         self._places()
         self._case()
@@ -66,7 +66,6 @@ class Parts:
         self.upright: Mask = self.slender & (self.rise >= 0.75)
         self.level: Mask = self.slender & (self.rise <= 0.35)
         self.board: Mask = (self.thin <= 0.3 * self.middle) & ~bent
-        self.plank: Mask = self.board & self.level & (self.up == self.thin)
         self.facing_front: Mask = self.board & ~self.slender & (self.depth == self.thin)
         self.facing_side: Mask = self.board & ~self.slender & (self.side == self.thin)
         self.small: Mask = self.long <= 0.12 * self.size.max()
@@ -85,7 +84,9 @@ class Parts:
         first, last = self.low.min(0), self.high.max(0)
         off = (self.low + self.high - first - last) / 2
         central = (off[:, DEPTH] <= 0.15 * self.size[DEPTH]) & (np.abs(off[:, SIDE]) <= self.size[SIDE] / 4)
-        fitting, cover = self.lying & central, self._cover()
+        fitting = self.lying & central
+        # How much is covered by what lies at about the height of each part.
+        cover = (np.abs(self.top[:, None] - self.top) <= self.near) @ np.where(self.lying, self.face, 0)
         if not fitting.any():  # an upholstered seat that reaches the floor
             cover = self.face
             fitting = self.squat & central & (self.top <= self.floor + 0.75 * self.size[UP])
@@ -101,12 +102,6 @@ class Parts:
             level = (self.lying | fitting) & (np.abs(self.top - self.top[able].max()) <= self.near)
             self.main = level & (self.face >= 0.3 * self.face[level].max())  # with all slats of a seat
             self.main_low, self.main_high = self.low[self.main].min(0), self.high[self.main].max(0)
-
-    def _cover(self) -> FloatArray:
-        """How much is covered by what lies at about the height of each part."""
-        level = np.abs(self.top[:, None] - self.top) <= self.near
-        covered: FloatArray = level @ np.where(self.lying, self.face, 0)
-        return covered
 
     def _places(self) -> None:
         """Where the parts are from the main surface."""

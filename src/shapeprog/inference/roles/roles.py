@@ -9,6 +9,7 @@ different roles becomes two statements.
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import cycle
@@ -49,7 +50,6 @@ SEATING: tuple[Rule, ...] = (
     ("cushion", lambda p: p.wide & p.alongside & p.padded & (p.bottom >= p.main_low[UP] - p.near)),
     ("base", lambda p: p.main & ~p.lying & p.grounded),
     ("seat", lambda p: p.main | (p.wide & (p.alongside | p.below) & (p.top <= p.main_high[UP] + 2 * p.near))),
-    ("seat", lambda p: p.plank & p.alongside & ~p.rising & (p.equal >= 3)),
     # A part from the ground to above the seat is a leg as well.
     ("leg", lambda p: p.rising & p.grounded & p.upright),
     # Behind: a back, its rails and slats, its posts.
@@ -148,9 +148,8 @@ def _shifted(draw: Node, shift: Sequence[float]) -> Node:
 def named_anew(program: Program) -> Program:
     """The program with each block drawn by the plainest statement, with a role by its neighbours, and in order;
     existing roles are ignored."""
-    plain = (replace(draw, role="") for draw in program.draws)
-    blocks = (nest((*loops, draw)) for (*loops, _), draw in zip(program.chains, plain, strict=True))
-    return in_order(with_roles(Program(tuple(map(simplest, blocks)))))
+    plain = (simplest(nest((*loops, Draw(draw.name, draw.values)))) for *loops, draw in program.chains)
+    return in_order(with_roles(Program(tuple(plain))))
 
 
 def in_order(program: Program) -> Program:
@@ -174,14 +173,14 @@ def in_order(program: Program) -> Program:
 def roles_of_blocks(program: Program) -> list[str]:
     """The role of each block: that of most of the surface of its copies, none where it draws nothing."""
     scene = unroll(program)
-    shares: list[dict[str, float]] = [{} for _ in range(program.blocks)]
+    shares = [defaultdict[str, float](float) for _ in range(program.blocks)]
     if scene.mask.any():
         parts = _facing(scene)
         roles = np.full(parts.count, "", object)
         for role, fits in (("body", anything),) if parts.count == 1 else _kind(parts):
             roles[(roles == "") & fits(parts)] = role
         for block, role, surface in zip(parts.block.tolist(), roles, parts.surface.tolist(), strict=True):
-            shares[block][role] = shares[block].get(role, 0.0) + surface
+            shares[block][role] += surface
     return [_common(share) for share in shares]
 
 

@@ -51,23 +51,11 @@ def components(vertices: Array, faces: Array) -> Components:
 
 def _weld(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArray]:
     """The mesh with vertices merged that round to the same multiple of 2^-12 cells, 10^-5 of the longest side."""
-    used = np.zeros(len(vertices), np.bool_)
-    used[faces.reshape(-1)] = True
+    used, corner = np.unique(faces, return_inverse=True)
     cell = np.round(vertices[used] * 2**12 + 0.3).astype(np.int64)  # round numbers are well inside their cell
-    cell -= cell.min(0)
-    size = cell.max(0) + 1
-    key = (cell[:, 0] * size[1] + cell[:, 1]) * size[2] + cell[:, 2]
+    key = np.ravel_multi_index((cell - cell.min(0)).T, np.ptp(cell, 0) + 1)
     _, unique, name = np.unique(key, return_index=True, return_inverse=True)
-    corner = name[np.cumsum(used)[faces.reshape(-1)] - 1]
-    first, rank = _in_order(corner)
-    return vertices[used][unique][corner[first]], rank.reshape(-1, 3)
-
-
-def _in_order(keys: IntArray) -> tuple[IntArray, IntArray]:
-    """The position of the first of each kind of key, ascending, and the kind (N,) of each key in this order."""
-    _, first, name = np.unique(keys, return_index=True, return_inverse=True)
-    order = np.argsort(first)
-    return first[order], np.argsort(order)[name]
+    return vertices[used[unique]], name[corner.reshape(-1, 3)]
 
 
 def _unique_faces(vertices: FloatArray, faces: IntArray) -> tuple[IntArray, FloatArray]:
@@ -81,7 +69,7 @@ def _unique_faces(vertices: FloatArray, faces: IntArray) -> tuple[IntArray, Floa
 
 
 def _separated(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArray]:
-    """The mesh with separate vertices for each closed surface.
+    """The mesh with separate vertices for each closed surface, in the order of the faces.
 
     Faces belong to one surface if edges that exactly two faces share link them.  It is closed if equally many of its
     faces run in both directions at each edge.
@@ -94,8 +82,10 @@ def _separated(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, IntAr
     own, name = np.unique(surface[face] * len(edge) + edge, return_inverse=True)
     closed = np.bincount(own // len(edge), np.bincount(name, direction) != 0) == 0
     surface = np.where(closed[surface], surface + 1, 0)
-    first, rank = _in_order((faces + len(vertices) * surface[:, None]).reshape(-1))
-    return vertices[faces.reshape(-1)[first]], rank.reshape(-1, 3)
+    corner = (faces + len(vertices) * surface[:, None]).reshape(-1)
+    _, first, name = np.unique(corner, return_index=True, return_inverse=True)
+    order = np.argsort(first)
+    return vertices[faces.reshape(-1)[first[order]]], np.argsort(order)[name].reshape(-1, 3)
 
 
 def _edges(faces: IntArray, count: int) -> tuple[IntArray, IntArray]:

@@ -74,9 +74,8 @@ def with_calls(program: Program, libraries: Sequence[Library], coverage: Coverag
     """
     nodes = list(program.flat().body)
     options = _options(program)
-    patterns = (pattern for library in libraries for pattern in library.patterns)
-    several = (pattern for pattern in patterns if pattern.shortens and pattern.blocks > 1)
-    candidates = [candidate for pattern in several for candidate in _candidates(pattern, options)]
+    patterns = [item for library in libraries for item in library.patterns if item.shortens and item.blocks > 1]
+    candidates = [candidate for pattern in patterns for candidate in _candidates(pattern, options)]
     candidates.sort(key=lambda candidate: (-len(candidate.replaced), candidate.difference))
     table = coverage.table([*(Program((node,)) for node in nodes), *(candidate.program for candidate in candidates)])
     selected, drawn, loose = frozenset(range(len(nodes))), set[int](), len(floating(Program(tuple(nodes))))
@@ -127,28 +126,25 @@ def _candidates(pattern: Pattern, options: Sequence[Option]) -> list[Candidate]:
 
 
 def _assigned(forms: Sequence[Form], options: Sequence[Option], start: FloatArray) -> list[tuple[Option, ...]]:
-    """Different blocks for all forms of a function, in loops of one kind, as near to those of one call as ``LOOSE``."""
+    """Blocks for all forms of a function, as near to those of one call as ``LOOSE``."""
     assigned: list[tuple[Option, ...]] = [()]
     for form in forms:
         like = replace(form.block.kind, word=""), form.block.counts
         fitting = [option for option in options if (option.block.kind, option.block.counts) == like]
         longer = ((*blocks, option) for blocks in assigned for option in fitting)
-        assigned = [blocks for blocks in longer if _are_near(forms, blocks, start)]
+        assigned = [blocks for blocks in longer if _solved(forms, blocks, start)[1] <= LOOSE]
     return assigned
-
-
-def _are_near(forms: Sequence[Form], blocks: Sequence[Option], start: FloatArray) -> bool:
-    kinds = {tuple(loop.name for loop in block.around) for block in blocks}
-    apart = len({block.place for block in blocks}) == len(blocks)
-    return apart and len(kinds) == 1 and _solved(forms, blocks, start)[1] <= LOOSE
 
 
 def _solved(forms: Sequence[Form], blocks: Sequence[Option], start: FloatArray) -> tuple[FloatArray, float]:
     """The measures of a call by least squares, and the largest difference of its blocks and of the loops around them.
 
-    Measures that the first forms do not determine keep their values of ``start``.  Counts and axes of loops differ by
-    more than ``LOOSE`` where they differ.
+    Measures that the first forms do not determine keep their values of ``start``.  The difference is infinite if a
+    block occurs twice or its loops are of other kinds; counts and axes of loops differ by 1, more than ``LOOSE``.
     """
+    kinds = {tuple(loop.name for loop in option.around) for option in blocks}
+    if len({option.place for option in blocks}) < len(blocks) or len(kinds) > 1:
+        return start, np.inf
     factors = np.concatenate([form.factors for form in forms[: len(blocks)]])
     constants = np.concatenate([form.constants for form in forms[: len(blocks)]])
     away = np.concatenate([option.block.values for option in blocks]) - constants - factors @ start

@@ -148,7 +148,7 @@ def test_joints_are_points_where_parts_touch_or_nearly_do():
         poses = tunable.poses(tunable.values)
         known = find_joints(poses.scene, -12.0)
         gaps = needs(poses.scene, poses.slopes, known).residual
-        assert len(known.first) == count
+        assert len(known.pairs) == count
         assert known.standing.tolist() == [0]
         assert gaps[:count].tolist() == pytest.approx([height + 4.02] * count, abs=1e-3)
 

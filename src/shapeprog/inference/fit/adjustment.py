@@ -108,8 +108,8 @@ def of_joints(poses: Poses, joints: Joints, closing: bool) -> System:
     gaps = needs(poses.scene, poses.slopes, joints)
     weight = 0.003 * (FIT.nearly**2 / (FIT.nearly**2 + gaps.residual**2)) ** 2
     if closing:
-        count = len(joints.first)
-        needed = joining(joints.first, joints.second, gaps.residual[:count], len(poses.scene.mask), 1.0)
+        count = len(joints.pairs)
+        needed = joining(joints.pairs, gaps.residual[:count], len(poses.scene.mask), 1.0)
         needed = torch.cat([needed, gaps.residual[count:].abs() < 0.15])
         weight = torch.where(needed, 0.03, weight)
     weighted = weight[:, None] * gaps.slopes

@@ -27,8 +27,8 @@ class Joints(NamedTuple):
 
     Parameters
     ----------
-    first, second
-        Slots (C,) of the two.
+    pairs
+        Slots (C, 2) of the two.
     normalized
         Point of each joint (C, 3) in the box of the first primitive, in units of its half extents.
     standing
@@ -37,8 +37,7 @@ class Joints(NamedTuple):
         Height of the floor.
     """
 
-    first: Int[Tensor, " C"]
-    second: Int[Tensor, " C"]
+    pairs: Int[Tensor, "C 2"]
     normalized: Float[Tensor, "C 3"]
     standing: Int[Tensor, " S"]
     floor: float
@@ -56,48 +55,41 @@ def find_joints(scene: Scene, floor: float) -> Joints:
     count = len(scene.mask)
     low, high = scene.centre - scene.reach, scene.centre + scene.reach
     start, end = torch.maximum(low[:, None], low), torch.minimum(high[:, None], high)  # of what both boxes contain
-    first, second = ((start - end).amax(-1) < 1.0).triu(1).nonzero(as_tuple=True)
-    area = scene.bounds.prod(-1)
-    swap = area[first] > area[second]  # the smaller part comes first
-    first, second = torch.where(swap, second, first), torch.where(swap, first, second)
-    points = projected(scene[torch.stack([first, second], 1)], ((start + end) / 2)[first, second], rounds=24)
+    pairs = ((start - end).amax(-1) < 1.0).triu(1).nonzero()
+    volume = scene.bounds.prod(-1)[pairs]
+    pairs = torch.where(volume[:, :1] > volume[:, 1:], pairs.flip(1), pairs)  # the smaller part comes first
+    first, second = pairs.unbind(1)
+    points = projected(scene[pairs], ((start + end) / 2)[first, second], rounds=24)
     inner, outer = (signed_distance(scene[slots[:, None]], points[:, None])[:, 0] for slots in (second, first))
     gap = inner + outer.clamp(min=0)
-    selected = (joining(first, second, gap, count, FIT.nearly) | (gap <= FIT.touching)).nonzero()[:, 0]
+    selected = joining(pairs, gap, count, FIT.nearly) | (gap <= FIT.touching)
     lowest = _lowest(scene, torch.arange(count))[:, 0]
     standing = ((lowest - floor).abs() <= FIT.nearly).nonzero()[:, 0]
-    normalized = _inner(scene, first[selected], points[selected])
-    return Joints(first[selected], second[selected], normalized, standing, floor)
+    return Joints(pairs[selected], _inner(scene, first[selected], points[selected]), standing, floor)
 
 
-def joining(
-    first: Int[Tensor, " C"], second: Int[Tensor, " C"], gap: Float[Tensor, " C"], count: int, widest: float
-) -> Bool[Tensor, " C"]:
+def joining(pairs: Int[Tensor, "C 2"], gap: Float[Tensor, " C"], count: int, widest: float) -> Bool[Tensor, " C"]:
     """Which pairs it takes to join all of so many primitives that gaps up to the widest divide: those of a minimum
     spanning tree."""
     weights = 1 + gap.numpy() - gap.numpy().min(initial=0)  # zero would be no pair
-    pairs = first.numpy(), second.numpy()
-    tree = minimum_spanning_tree(coo_array((weights, pairs), shape=(count, count)))
-    return (gap <= widest) & torch.from_numpy(tree.toarray()[pairs] > 0)
+    tree = minimum_spanning_tree(coo_array((weights, pairs.T.numpy()), shape=(count, count)))
+    return (gap <= widest) & torch.from_numpy(tree.toarray()[tuple(pairs.T.numpy())] > 0)
 
 
 def moved(scene: Scene, joints: Joints) -> Joints:
     """The same joints after their parts have moved: the points deepest in both parts, or nearest to both."""
-    if not len(joints.first):
-        return joints
-    points = _placed(scene[joints.first[:, None]], joints.normalized)
-    points = projected(scene[torch.stack([joints.first, joints.second], 1)], points, rounds=6)
-    return joints._replace(normalized=_inner(scene, joints.first, points))
+    first = joints.pairs[:, 0]
+    points = projected(scene[joints.pairs], _placed(scene[first[:, None]], joints.normalized), rounds=6)
+    return joints._replace(normalized=_inner(scene, first, points))
 
 
 def needs(scene: Scene, slopes: Float[Tensor, "N 16 F"], joints: Joints) -> Needs:
     """Gap of every joint, zero if it is closed, and height above the floor of every part that should touch it."""
-    first, by_first = _rows_of(scene, joints.first)
-    second, by_second = _rows_of(scene, joints.second)
+    (first, by_first), (second, by_second) = (_rows_of(scene, slots) for slots in joints.pairs.unbind(1))
     gap = signed_distance(second, _placed(first, joints.normalized)[:, None])[:, 0]
     gap = gap + 0.02  # into the other part, by more than rounding takes away
     on_first, on_second = torch.autograd.grad(gap.sum(), [by_first, by_second])
-    joined = _by_number(on_first, slopes[joints.first]) + _by_number(on_second, slopes[joints.second])
+    joined = _by_number(on_first, slopes[joints.pairs[:, 0]]) + _by_number(on_second, slopes[joints.pairs[:, 1]])
     joined = torch.where((gap >= 0)[:, None], joined, 0.0)  # on an axis the slope of a depth is no number
     feet, by_feet = _rows_of(scene, joints.standing)
     low = _inner(scene, joints.standing, _lowest(scene, joints.standing))

@@ -100,7 +100,7 @@ class Misfit:
         poses = self.model.poses(numbers)
         systems = [of_target(poses, self.target.pairs(poses.scene, self.generator), self.width) for _ in range(draws)]
         slope, curvature = (sum(parts).numpy() / draws for parts in zip(*systems, strict=True))
-        if joined and len(self.joints.first):
+        if joined and len(self.joints.pairs):
             gaps = needs(poses.scene, poses.slopes, moved(poses.scene, self.joints))
             wide = TIES.together * gaps.slopes
             slope = slope + (wide.T @ gaps.residual).numpy()

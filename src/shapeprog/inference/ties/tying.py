@@ -12,7 +12,6 @@ import math
 from collections.abc import Collection, Sequence
 
 import numpy as np
-import torch
 
 from shapeprog.errors import ShapeProgError
 from shapeprog.geometry.arrays import one_tensor_thread
@@ -109,7 +108,7 @@ class _Ties:
         minimum = np.where(self.fixed, 1e6, TIES.known if known else 0.0)
         self.misfit = Misfit(self.model, evidence, joints, minimum, seed)
         self.decimals = CELLS if known else CELLS + 1  # what is inferred is rounded again
-        parts, pairs = layout.parts, scene.block[torch.stack([joints.first, joints.second], 1)].tolist()
+        parts, pairs = layout.parts, scene.block[joints.pairs].tolist()
         self.touching = {(parts[min(pair)], parts[max(pair)]) for pair in pairs}
         self.loose = self._loose(self.model.numbers)
 

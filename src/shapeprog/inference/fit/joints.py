@@ -6,6 +6,7 @@ them is narrowest, found by projecting onto the one and the other in turn.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import torch
@@ -14,7 +15,6 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import minimum_spanning_tree
 from torch import Tensor
 
-from shapeprog.geometry.batch import Batch
 from shapeprog.geometry.distance import projected, signed_distance
 from shapeprog.geometry.primitive import SIZES
 from shapeprog.geometry.primitives import primitives
@@ -63,9 +63,8 @@ def find_joints(scene: Scene, floor: float) -> Joints:
     inner, outer = (signed_distance(scene[slots[:, None]], points[:, None])[:, 0] for slots in (second, first))
     gap = inner + outer.clamp(min=0)
     selected = joining(pairs, gap, count, FIT.nearly) | (gap <= FIT.touching)
-    lowest = _lowest(scene, torch.arange(count))[:, 0]
-    standing = ((lowest - floor).abs() <= FIT.nearly).nonzero()[:, 0]
-    return Joints(pairs[selected], _inner(scene, first[selected], points[selected]), standing, floor)
+    standing = ((_lowest(scene)[:, 0] - floor).abs() <= FIT.nearly).nonzero()[:, 0]
+    return Joints(pairs[selected], _inner(scene[first[selected]], points[selected]), standing, floor)
 
 
 def joining(pairs: Int[Tensor, "C 2"], gap: Float[Tensor, " C"], count: int, widest: float) -> Bool[Tensor, " C"]:
@@ -78,9 +77,9 @@ def joining(pairs: Int[Tensor, "C 2"], gap: Float[Tensor, " C"], count: int, wid
 
 def moved(scene: Scene, joints: Joints) -> Joints:
     """The same joints after their parts have moved: the points deepest in both parts, or nearest to both."""
-    first = joints.pairs[:, 0]
-    points = projected(scene[joints.pairs], _placed(scene[first[:, None]], joints.normalized), rounds=6)
-    return joints._replace(normalized=_inner(scene, first, points))
+    parts = scene[joints.pairs]
+    points = projected(parts, _placed(parts, joints.normalized), rounds=6)
+    return joints._replace(normalized=_inner(scene[joints.pairs[:, 0]], points))
 
 
 def needs(scene: Scene, slopes: Float[Tensor, "N 16 F"], joints: Joints) -> Needs:
@@ -92,18 +91,18 @@ def needs(scene: Scene, slopes: Float[Tensor, "N 16 F"], joints: Joints) -> Need
     joined = _by_number(on_first, slopes[joints.pairs[:, 0]]) + _by_number(on_second, slopes[joints.pairs[:, 1]])
     joined = torch.where((gap >= 0)[:, None], joined, 0.0)  # on an axis the slope of a depth is no number
     feet, by_feet = _rows_of(scene, joints.standing)
-    low = _inner(scene, joints.standing, _lowest(scene, joints.standing))
-    height = _placed(feet, low)[:, 0] - joints.floor
-    standing = _by_number(torch.autograd.grad(height.sum(), by_feet)[0], slopes[joints.standing])
-    return Needs(torch.cat([gap.clamp(min=0), height]).detach(), torch.cat([joined, standing]))
+    standing = scene[joints.standing]
+    height = _placed(feet, _inner(standing, _lowest(standing)))[:, 0] - joints.floor
+    lifted = _by_number(torch.autograd.grad(height.sum(), by_feet)[0], slopes[joints.standing])
+    return Needs(torch.cat([gap.clamp(min=0), height]).detach(), torch.cat([joined, lifted]))
 
 
-def _rows_of(scene: Scene, slots: Int[Tensor, " R"]) -> tuple[Batch, Float[Tensor, "R 16"]]:
-    """The primitives in some slots as a batch (R, 1), and the sizes, centres and rotations to differentiate it by."""
+def _rows_of(scene: Scene, slots: Int[Tensor, " R"]) -> tuple[Scene, Float[Tensor, "R 16"]]:
+    """The primitives in some slots (R, 1), and the sizes, centres and rotations to differentiate them by."""
     rows = torch.cat([scene.size, scene.centre, scene.rotation.flatten(-2)], -1)[slots].requires_grad_()
     size, centre, rotation = rows[:, None].split([SIZES, 3, 9], -1)
-    kind, mask = scene.kind[slots][:, None], scene.mask[slots][:, None]
-    return Batch(kind, size, centre, rotation.unflatten(-1, (3, 3)), mask), rows
+    parts = replace(scene[slots[:, None]], size=size, centre=centre, rotation=rotation.unflatten(-1, (3, 3)))
+    return parts, rows
 
 
 def _by_number(rows: Float[Tensor, "R 16"], slopes: Float[Tensor, "R 16 F"]) -> Float[Tensor, "R F"]:
@@ -111,25 +110,24 @@ def _by_number(rows: Float[Tensor, "R 16"], slopes: Float[Tensor, "R 16 F"]) -> 
     return product
 
 
-def _placed(parts: Batch, normalized: Float[Tensor, "C 3"]) -> Float[Tensor, "C 3"]:
-    """Points given in the boxes of primitives (C, 1), in units of the half extents."""
+def _placed(parts: Scene, normalized: Float[Tensor, "C 3"]) -> Float[Tensor, "C 3"]:
+    """Points given in the boxes of the first of primitives (C, k), in units of the half extents."""
     local = (parts.bounds[:, 0] * normalized)[..., None]
     points: Tensor = parts.centre[:, 0] + (parts.rotation[:, 0] @ local)[..., 0]
     return points
 
 
-def _inner(scene: Scene, slots: Int[Tensor, " C"], points: Float[Tensor, "C 3"]) -> Float[Tensor, "C 3"]:
-    """Points in the boxes of primitives, in units of the half extents."""
-    local = ((points - scene.centre[slots])[..., None] * scene.rotation[slots]).sum(-2)
-    return local / scene.bounds[slots].clamp(min=1e-6)
+def _inner(scene: Scene, points: Float[Tensor, "C 3"]) -> Float[Tensor, "C 3"]:
+    """Points in the boxes of primitives (C,), in units of the half extents."""
+    local = ((points - scene.centre)[..., None] * scene.rotation).sum(-2)
+    return local / scene.bounds.clamp(min=1e-6)
 
 
-def _lowest(scene: Scene, slots: Int[Tensor, " S"]) -> Float[Tensor, "S 3"]:
-    """The lowest points of primitives."""
-    points = torch.zeros(len(slots), 3, dtype=scene.centre.dtype)
-    for n, slot in enumerate(slots.tolist()):
-        vertices, _ = primitives[int(scene.kind[slot])].mesh(scene.size[slot].double().numpy())
-        placed = torch.from_numpy(vertices) @ scene.rotation[slot].T + scene.centre[slot]
-        lowest = placed[:, 0] <= placed[:, 0].min() + 1e-6
-        points[n] = placed[lowest].mean(0)
+def _lowest(scene: Scene) -> Float[Tensor, "S 3"]:
+    """The lowest points of primitives (S,)."""
+    points = torch.zeros_like(scene.centre)
+    for n, kind in enumerate(scene.kind.tolist()):
+        vertices, _ = primitives[kind].mesh(scene.size[n].double().numpy())
+        placed = torch.from_numpy(vertices) @ scene.rotation[n].T + scene.centre[n]
+        points[n] = placed[placed[:, 0] <= placed[:, 0].min() + 1e-6].mean(0)
     return points

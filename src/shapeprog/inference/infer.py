@@ -45,10 +45,13 @@ SEARCH_SHARE = 0.65
 """Share of the time budget after which the search on cells hands over to fitting."""
 
 SURFACE_KERNELS = (
-    "geometry/distance", "geometry/surface", "inference/choice/coverage", "inference/surface/", "inference/fit/",
-    "inference/candidates/", "inference/pieces/", "inference/choice/choice",
-)  # fmt: skip
-CELL_KERNELS = ("geometry/cell", "inference/cells/")
+    "geometry/distance",
+    "geometry/surface",
+    "inference/choice/",
+    "inference/surface/",
+    "inference/pieces/",
+)
+CELL_KERNELS = "geometry/cell", "inference/cells/"
 """Where the kernels of the search on the surface and of that on cells are; those with the same helpers together."""
 
 

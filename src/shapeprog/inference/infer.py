@@ -45,12 +45,8 @@ SEARCH_SHARE = 0.65
 """Share of the time budget after which the search on cells hands over to fitting."""
 
 SURFACE_KERNELS = (
-    "geometry/distance",
-    "geometry/surface",
-    "inference/choice/",
-    "inference/surface/",
-    "inference/pieces/",
-)
+    "geometry/distance", "geometry/surface", "inference/choice/", "inference/pieces/", "inference/surface/",
+)  # fmt: skip
 CELL_KERNELS = "geometry/cell", "inference/cells/"
 """Where the kernels of the search on the surface and of that on cells are; those with the same helpers together."""
 

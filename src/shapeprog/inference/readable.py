@@ -40,13 +40,10 @@ def unit_of_result(shape: Shape, program: Program, name: str = "") -> Unit | Non
         Name of the unit, or ``cells``; empty for that of the file, which may have no name.  Voxels are then left in
         cells unless somebody has named the unit of the file.  Statements in cells have no unit.
     """
-    if name == CELLS or program.scale is None:
+    plain_voxels = shape.kind == "voxels" and not (name or shape.unit)
+    if name == CELLS or plain_voxels or program.scale is None:
         return None
-    if name:
-        return Unit.of(shape.frame, name, shape.file_unit)
-    if not shape.unit and shape.kind == "voxels":
-        return None
-    return Unit(shape.file_unit, shape.frame.scale)
+    return Unit.of(shape.frame, name, shape.file_unit) if name else Unit(shape.file_unit, shape.frame.scale)
 
 
 def in_readable_unit(program: Program, unit: Unit | None) -> Program:

@@ -71,8 +71,10 @@ def adjust(
     generator, target, angles = torch.Generator().manual_seed(seed), Target(evidence), tunable.are("angle")
     narrow = FIT.explained * evidence.tolerance
     wide = max(1.2, narrow)  # in cells, at first
+    # The lowest points of scans are noise: the floor is a tolerance above them.
+    floor = float(evidence.surface[:, 0].min()) + evidence.tolerance * (evidence.tolerance > SURFACE.tolerance)
     with one_tensor_thread(kernels=1):
-        joints = find_joints(tunable.scene(values), _floor(evidence))
+        joints = find_joints(tunable.scene(values), floor)
         for step in range(steps):
             if deadline.passed(f"the adjustment after {step} of {steps} steps"):
                 break
@@ -129,9 +131,3 @@ def _move(
     move[free] = -torch.linalg.solve(curvature[free][:, free], slope[free])
     farthest = 0.7 / tunable.scale  # so far, in cells, one number may move the surface in a step
     return move.clamp(-farthest, farthest)
-
-
-def _floor(evidence: Evidence) -> float:
-    """Height of the lowest point; of scans, whose lowest points are noise, a tolerance above it."""
-    above = evidence.tolerance if evidence.tolerance > SURFACE.tolerance else 0.0
-    return float(evidence.surface[:, 0].min()) + above

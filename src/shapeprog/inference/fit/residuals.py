@@ -67,13 +67,12 @@ class Target:
 
     def __init__(self, evidence: Evidence) -> None:
         self.evidence = evidence
-        self._points = torch.from_numpy(evidence.points)
-        normals, sides = evidence.normals, evidence.outward
-        self._normals, self._sides = torch.from_numpy(normals), torch.from_numpy(sides)
+        arrays = evidence.points, evidence.normals, evidence.outward
+        self._points, self._normals, self._sides = map(torch.from_numpy, arrays)
         self._order = np.argsort(nearby(evidence.points), kind="stable")
         self._shares = np.cumsum(evidence.weights[self._order])
-        unsure = np.flatnonzero(~sides)
-        self._owner = torch.from_numpy(np.concatenate([np.arange(len(sides)), unsure]))
+        unsure = np.flatnonzero(~evidence.outward)
+        self._owner = torch.from_numpy(np.concatenate([np.arange(len(self._sides)), unsure]))
         both = _joint(self._points, self._normals), _joint(self._points[unsure], -self._normals[unsure])
         self._tree = cKDTree(np.concatenate(both), 24, balanced_tree=False)  # faster than by default
 

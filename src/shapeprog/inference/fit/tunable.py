@@ -33,15 +33,8 @@ DEGREES, CELLS = 1, 2
 
 
 class Poses(NamedTuple):
-    """The primitives of a program and their derivatives.
-
-    Parameters
-    ----------
-    scene
-        The primitives (N,), without gradient.
-    slopes
-        Derivatives (N, 16, F) of sizes, centre and rotation of each by the numbers of the vector.
-    """
+    """The primitives (N,) of a program, without gradient, and the slopes (N, 16, F) of the sizes, the centre and the
+    rotation of each by the numbers of the vector."""
 
     scene: Scene
     slopes: Float[Tensor, "N 16 F"]

@@ -133,18 +133,17 @@ def _unharmed(adjusted: Program, start: Program, coverage: Coverage) -> Program:
     A block loses a loop, or nested loops become one row, where the text becomes cheaper and that costs less than .001,
     the error of the coverage.
     """
-    count = len(start.body)
-    shortened = [(index, node) for index, block in enumerate(adjusted.body) for node in shorter(block)]
-    options = [*enumerate(adjusted.body), *enumerate(start.body), *shortened]
-    table = _table([node for _, node in options], coverage)
-    selected = tuple(range(count))
-    for option, (index, _) in enumerate(options[count:], count):
+    restored = [(index, node, 0.005) for index, node in enumerate(start.body)]
+    shortened = [(index, node, -0.001) for index, block in enumerate(adjusted.body) for node in shorter(block)]
+    options = [*restored, *shortened]
+    nodes = [*adjusted.body, *(node for _, node, _ in options)]
+    table, selected = _table(nodes, coverage), tuple(range(len(restored)))
+    for option, (index, _, least) in enumerate(options, len(selected)):
         trial = (*selected[:index], option, *selected[index + 1 :])
-        restored, cheaper = option < 2 * count, table.prices[option] < table.prices[selected[index]]
-        least = value(table, selected) + (0.005 if restored else -0.001)
-        if (restored or cheaper) and value(table, trial) > least:
+        cheaper = table.prices[option] < table.prices[selected[index]]
+        if (least > 0 or cheaper) and value(table, trial) > value(table, selected) + least:
             selected = trial
-    return Program(tuple(options[option][1] for option in selected))
+    return Program(tuple(nodes[option] for option in selected))
 
 
 def _table(nodes: Sequence[Node], coverage: Coverage) -> CoverageTable:

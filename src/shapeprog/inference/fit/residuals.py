@@ -115,7 +115,7 @@ class Target:
         )
 
     def _closest(
-        self, points: Int[Tensor, "R #k"], samples: Int[Tensor, "R #k"], sample: SurfaceSample
+        self, points: Int[Tensor, "R _"], samples: Int[Tensor, "R _"], sample: SurfaceSample
     ) -> tuple[Int[Tensor, " R"], Int[Tensor, " R"], Float[Tensor, " R"]]:
         """The best of several pairs (R, k) of points and samples, and its squared penalty besides the distance along
         the normal."""

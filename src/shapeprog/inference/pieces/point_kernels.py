@@ -1,15 +1,10 @@
-"""Kernels over the points of a surface: planar patches, points on round rods, and points that boxes explain."""
+"""Kernels over the points of a surface: planar patches, and points that boxes explain."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from shapeprog.kernels.compile import helper, kernel
-
-BINS = 16  # sectors around the axis of a rod
-EVERY = 2  # stride over the points that are tested on rods
-REACH = 0.5  # length in cells of the stretches along the axis of a rod; an empty one ends it
-STRETCHES = 128  # stretches along the longest rod: more than the diagonal of the grid
 
 
 @kernel("void(f8[:, ::1], f8[:, ::1], i4[:, ::1], i8[::1], f8, f8, i8, i8[::1])")
@@ -82,67 +77,6 @@ def local(point, centre, frame, at):
         at[axis] = 0.0
         for row in range(3):
             at[axis] += (point[row] - centre[row]) * frame[row, axis]
-
-
-@helper
-def about_axis(point, normal, centre, frame, at):
-    """The same, and the distance of the point from the last column, and how far it faces away from it."""
-    local(point, centre, frame, at)
-    at[3], at[4] = np.sqrt(at[0] * at[0] + at[1] * at[1]), 0.0
-    for row in range(3):
-        at[4] += (point[row] - centre[row] - at[2] * frame[row, 2]) * normal[row]
-
-
-@kernel("void(f8[:, ::1], f8[:, ::1], f8[::1], f8[:, ::1], f8, f8, f8, f8, b1[::1])")
-def mark_rod(points, normals, centre, frame, radius, half, tolerance, cosine, inside):
-    """Write which points (N, 3) with normals (N, 3) lie on a cylinder and face across its axis (N,)."""
-    at = np.empty(5)
-    for k in range(len(points)):
-        about_axis(points[k], normals[k], centre, frame, at)
-        inside[k] = abs(at[2]) <= half and abs(at[3] - radius) < tolerance and abs(at[4]) > cosine * at[3]
-
-
-@kernel("void(f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, :, ::1], f8[::1], f8, f8, f8[:, ::1])")
-def count_rods(points, normals, centre, frame, radius, tolerance, cosine, counts):
-    """Count the points on endless cylinders, along the stretch of their axes from the centre that has points.
-
-    Parameters
-    ----------
-    points, normals
-        Points (N, 3) with unit normals (N, 3) of either sign.
-    centre, frame, radius
-        Points on the axes (T, 3), frames (T, 3, 3) whose last columns are the axes, and radii (T,).
-    tolerance, cosine
-        How far a point may be from the cylinder, and how well its normal agrees with it.
-    counts
-        Output (T, 4): number of points, start and end of the stretch along the axis, share of sectors with points.
-    """
-    at = np.empty(5)
-    stretch = np.empty(STRETCHES, np.int64)
-    sector = np.empty((STRETCHES, BINS), np.bool_)
-    middle = STRETCHES // 2
-    for rod in range(len(radius)):
-        stretch[:] = 0
-        sector[:] = False
-        for k in range(0, len(points), EVERY):
-            about_axis(points[k], normals[k], centre[rod], frame[rod], at)
-            if abs(at[3] - radius[rod]) < tolerance and abs(at[4]) > cosine * at[3]:
-                place = int(np.floor(at[2] / REACH)) + middle
-                if 0 <= place < STRETCHES:
-                    stretch[place] += EVERY
-                    turn = np.arctan2(at[1], at[0]) / (2 * np.pi) + 0.5
-                    sector[place, min(int(turn * BINS), BINS - 1)] = True
-        low, high = middle, middle
-        while low > 0 and stretch[low - 1] > 0:
-            low -= 1
-        while high < STRETCHES and stretch[high] > 0:
-            high += 1
-        counts[rod, 0], counts[rod, 3] = 0.0, 0.0
-        counts[rod, 1], counts[rod, 2] = REACH * (low - middle), REACH * (high - middle)
-        for place in range(low, high):
-            counts[rod, 0] += stretch[place]
-        for b in range(BINS):
-            counts[rod, 3] += sector[low:high, b].any() / BINS
 
 
 @helper

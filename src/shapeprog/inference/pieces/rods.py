@@ -2,57 +2,85 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
-import numpy.typing as npt
 
 from shapeprog.inference.pieces.oriented import Boxes, join
 from shapeprog.inference.pieces.patches import upright
-from shapeprog.inference.pieces.point_kernels import count_rods, mark_rod
 from shapeprog.inference.pieces.settings import SETTINGS
 from shapeprog.inference.surface.cloud import Cloud
+from shapeprog.inference.surface.components import IntArray
 from shapeprog.inference.surface.settings import SURFACE
 from shapeprog.space import FloatArray
 
 
+class Rod(NamedTuple):
+    """A cylinder: its middle (3,), a frame (3, 3) whose last column is its axis, its radius and its half length."""
+
+    middle: FloatArray
+    frame: FloatArray
+    radius: float
+    half: float
+
+
 def rods(cloud: Cloud) -> Boxes:
     """Boxes around round rods, best first; the first axis is that of the rod."""
-    off, facing = cloud.tolerance, 0.85 if cloud.noise > SURFACE.noisy else 0.94
-    centre, axis, radius = _through_pairs(cloud)
-    frames, counts = _frames(axis), np.zeros((len(radius), 4))
-    count_rods(cloud.points, cloud.normals, centre, frames, radius, off, facing, counts)
-    support, start, end, share = counts.T
-    length = end - start
-    good = (support >= SETTINGS.rod_points) & (share >= SETTINGS.rod_round) & (length > 2 * radius)
-    good &= support > SETTINGS.rod_dense * 2 * np.pi * radius * length * share / cloud.spacing**2
-    centre = centre + axis * ((start + end) / 2)[:, None]
-
-    def on_rod(middle: FloatArray, frame: FloatArray, radius: float, half: float) -> npt.NDArray[np.bool_]:
-        """Whether points (N,) lie on a cylinder and face across its axis."""
-        inside = np.zeros(len(cloud.points), np.bool_)
-        mark_rod(cloud.points, cloud.normals, middle, frame, radius, half, off, facing, inside)
-        return inside
-
+    trials = _through_pairs(cloud)
+    cloud = cloud._replace(points=np.asfortranarray(cloud.points))  # columns are read one by one
+    sparse = cloud._replace(points=np.asfortranarray(cloud.points[::2]), normals=cloud.normals[::2])  # enough to rank
+    ranked = sorted((_bounded(rod, sparse) for rod in trials), key=lambda trial: -trial[1])
     used, result = np.zeros(len(cloud.points), np.bool_), list[Boxes]()
-    for k in np.flatnonzero(good)[np.argsort(-support[good], kind="stable")]:
-        if len(result) == SETTINGS.rods:
+    for rod, support in ranked:
+        if not support or len(result) == SETTINGS.rods:
             break
-        inside = on_rod(centre[k], frames[k], radius[k], length[k] / 2)
-        if inside.sum() < SETTINGS.rod_points or used[inside].mean() > 0.5:
+        on, _ = _points_on(rod, cloud)
+        if len(on) < SETTINGS.rod_points or used[on].mean() > 0.5:
             continue
         for _ in range(2):
-            middle, frame, width, half = _fitted(cloud.points[inside], cloud.normals[inside])
-            inside = on_rod(middle, frame, width, half + 0.5)
-            if inside.sum() < SETTINGS.rod_points:
+            rod = _fitted(cloud.points[on], cloud.normals[on])
+            on, _ = _points_on(rod._replace(half=rod.half + 0.5), cloud)
+            if len(on) < SETTINGS.rod_points:
                 break
         else:
-            middle, frame, width, half = _fitted(cloud.points[inside], cloud.normals[inside])
-            used |= inside
-            result.append(Boxes(middle[None], frame[:, [2, 0, 1]][None], np.array([[half, width, width]])))
+            used[on] = True
+            rod = _fitted(cloud.points[on], cloud.normals[on])
+            half = np.array([[rod.half, rod.radius, rod.radius]])
+            result.append(Boxes(rod.middle[None], rod.frame[None, :, [2, 0, 1]], half))
     return join(result)
 
 
-def _through_pairs(cloud: Cloud) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Points on the axes (T, 3), axes (T, 3) and radii (T,) of cylinders through pairs of points that are near.
+def _points_on(rod: Rod, cloud: Cloud) -> tuple[IntArray, FloatArray]:
+    """Which points (K,) lie on a cylinder and face across its axis, and their places (3, K) in its frame."""
+    x, y, z = at = rod.frame.T @ (cloud.points.T - rod.middle[:, None])
+    away = np.sqrt(x * x + y * y)
+    near = np.flatnonzero(np.abs(away - rod.radius) < cloud.tolerance)
+    outwards = np.einsum("ni,in->n", cloud.normals[near] @ rod.frame[:, :2], at[:2, near])
+    facing = np.abs(outwards) > (0.85 if cloud.noise > SURFACE.noisy else 0.94) * away[near]
+    near = near[facing & (np.abs(z[near]) <= rod.half)]
+    return near, at[:, near]
+
+
+def _bounded(rod: Rod, cloud: Cloud) -> tuple[Rod, int]:
+    """A cylinder cut to the stretch of its axis from its middle that has points, and how many; 0 where it is no rod.
+
+    The cloud has half of the points.  A stretch ends where half a cell is empty.
+    """
+    _, (x, y, z) = _points_on(rod, cloud)
+    place = np.floor(2 * z)
+    empty = np.setdiff1d(np.arange(-64, 65), place)  # beyond the diagonal of the grid
+    start, end = empty[empty < 0].max() + 1, empty[empty >= 0].min()
+    here = (place >= start) & (place < end)
+    sectors = np.floor(8 * np.arctan2(y[here], x[here]) / np.pi) % 16
+    support, length, share = 2 * len(sectors), (end - start) / 2, len(np.unique(sectors)) / 16
+    least = max(SETTINGS.rod_points, SETTINGS.rod_dense * 2 * np.pi * rod.radius * length * share / cloud.spacing**2)
+    good = support >= least and length > 2 * rod.radius and share >= SETTINGS.rod_round
+    middle = rod.middle + rod.frame[:, 2] * (start + end) / 4
+    return Rod(middle, rod.frame, rod.radius, length / 2), support if good else 0
+
+
+def _through_pairs(cloud: Cloud) -> list[Rod]:
+    """Endless cylinders through pairs of points that are near.
 
     The axis is normal to both normals, and passes through their intersection (as in Schnabel, Wahl and Klein 2007).
     """
@@ -75,7 +103,8 @@ def _through_pairs(cloud: Cloud) -> tuple[FloatArray, FloatArray, FloatArray]:
     radius = (np.abs(s) + np.abs(t)) / 2
     good = np.abs(np.abs(s) - np.abs(t)) <= cloud.tolerance + 0.1 * radius
     good &= (radius <= SETTINGS.rod_radius) & (radius >= 0.5 * cloud.tolerance)
-    return (points[first] + s[:, None] * p)[good], axis[good], radius[good]
+    fields = points[first] + s[:, None] * p, _frames(axis), radius, np.full(len(axis), np.inf)
+    return [Rod(*row) for row in zip(*(field[good] for field in fields), strict=True)]
 
 
 def _frames(axis: FloatArray) -> FloatArray:
@@ -83,11 +112,11 @@ def _frames(axis: FloatArray) -> FloatArray:
     side = np.eye(3)[np.where(np.abs(axis[:, 0]) < 0.6, 0, 1)]
     across = np.cross(axis, side)
     across /= np.linalg.norm(across, axis=1, keepdims=True)
-    return np.ascontiguousarray(np.stack([np.cross(across, axis), across, axis], 2))
+    return np.stack([np.cross(across, axis), across, axis], 2)
 
 
-def _fitted(points: FloatArray, normals: FloatArray) -> tuple[FloatArray, FloatArray, float, float]:
-    """Middle, frame about the axis (3, 3), radius and half length of the cylinder that fits points (N, 3) best.
+def _fitted(points: FloatArray, normals: FloatArray) -> Rod:
+    """The cylinder that fits points (N, 3) best.
 
     The axis is the direction that the normals are least along; the circle is Kasa's (1976).
     """
@@ -99,4 +128,4 @@ def _fitted(points: FloatArray, normals: FloatArray) -> tuple[FloatArray, FloatA
     radius = float(np.sqrt(max(solved[2] + solved[:2] @ solved[:2], 0.0)))
     along = (points - mean) @ axis
     low, high = along.min(), along.max()
-    return mean + across @ solved[:2] + axis * (low + high) / 2, frame, radius, float(high - low) / 2
+    return Rod(mean + across @ solved[:2] + axis * (low + high) / 2, frame, radius, float(high - low) / 2)

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from shapeprog.geometry.separation import OrientedBoxes, touching
-from shapeprog.inference.pieces.oriented_kernels import COMPACT, FLAT, MANY, ROD, box_each
+from shapeprog.inference.pieces.oriented_kernels import COMPACT, FLAT, ROD, turn_each
 from shapeprog.inference.pieces.settings import SETTINGS
 from shapeprog.inference.surface.cloud import spiral
 from shapeprog.inference.surface.components import IntArray
@@ -22,7 +22,7 @@ CORNERS = np.array(list(product((-1.0, 1.0), repeat=3)))
 LINES = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 0], [1, -1, 0], [1, 0, 1], [1, 0, -1], [0, 1, 1], [0, 1, -1]])
 """Directions along which boxes are compared."""
 
-SPHERE = spiral((np.arange(MANY // 2) + 0.5) / (MANY // 2))[:, [1, 2, 0]].copy()
+SPHERE = spiral((np.arange(80) + 0.5) / 80)[:, [1, 2, 0]]
 """Evenly spread unit vectors, one of each opposite pair, that define the outermost points."""
 
 
@@ -60,16 +60,26 @@ def boxes_around(sets: Sequence[Array], frames: FloatArray | None = None, floor:
     floor
         Shorter sides count as so long in the selection of directions.
     """
-    boxes = Boxes(np.zeros((len(sets), 3)), np.zeros((len(sets), 3, 3)), np.zeros((len(sets), 3)))
     if not sets:
-        return boxes
-    kind = np.full(len(sets), FLAT)
+        return join([])
+    kind, rotation = np.full(len(sets), FLAT), np.empty((len(sets), 3, 3))
     if frames is None:
         spread, frames = principal_axes(sets)
         rod = (spread[:, 0] > SETTINGS.slender * spread[:, 1]) & (spread[:, 2] > SETTINGS.even * spread[:, 1])
         kind = np.where(rod, ROD, COMPACT)
-    box_each(*_joined(sets), SPHERE, np.ascontiguousarray(frames), kind, floor, *boxes)
-    return boxes
+    turn_each(*_joined(list(map(_outermost, sets))), np.ascontiguousarray(frames), kind, floor, rotation)
+    points, start = _joined(sets)
+    at = np.einsum("pi,pij->pj", points, np.repeat(rotation, np.diff(start), 0))
+    low, high = np.minimum.reduceat(at, start[:-1]), np.maximum.reduceat(at, start[:-1])
+    return Boxes(np.einsum("nij,nj->ni", rotation, (low + high) / 2), rotation, (high - low) / 2)
+
+
+def _outermost(points: Array) -> Array:
+    """The points that lie farthest out along some directions, or all of a few; they determine the smallest box."""
+    if len(points) <= 2 * len(SPHERE):
+        return points
+    along = SPHERE @ points.T
+    return points[np.stack([along.argmin(1), along.argmax(1)], 1).reshape(-1)]
 
 
 def _joined(sets: Sequence[Array]) -> tuple[FloatArray, IntArray]:

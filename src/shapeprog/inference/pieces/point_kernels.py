@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from shapeprog.kernels.compile import helper, kernel
+from shapeprog.kernels.compile import kernel
 
 
 @kernel("void(f8[:, ::1], f8[:, ::1], i4[:, ::1], i8[::1], f8, f8, i8, i8[::1])")
@@ -70,21 +70,6 @@ def grow_patches(points, normals, neighbours, order, cosine, tolerance, min_size
             patches += 1
 
 
-@helper
-def local(point, centre, frame, at):
-    """Write where a point is along the columns of a frame."""
-    for axis in range(3):
-        at[axis] = 0.0
-        for row in range(3):
-            at[axis] += (point[row] - centre[row]) * frame[row, axis]
-
-
-@helper
-def square_of(place, half, count):
-    """Into which of the squares along a side a place falls."""
-    return min(max(int(count * (place / half + 1) / 2), 0), count - 1) if half > 0 else 0
-
-
 @kernel("void(f8[:, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8, b1[:, ::1], f8[::1])")
 def near_boxes(points, centre, rotation, half, tolerance, explained, fill):
     """Which points are near the surface of each box, and the share of the box's surface near which points lie.
@@ -102,32 +87,34 @@ def near_boxes(points, centre, rotation, half, tolerance, explained, fill):
     explained, fill
         Output (B, N) and (B,), initially false.
     """
-    covered, at, count = np.empty((6, 8, 8), np.bool_), np.empty(3), np.empty(3, np.int64)
+    covered, at, count, square = np.empty((6, 8, 8), np.bool_), np.empty(3), np.empty(3, np.int64), np.empty(3, np.int64)
     for b in range(len(centre)):
+        size = half[b]
+        reach = 1.001 * ((size + tolerance) ** 2).sum()
         covered[:] = False
         for axis in range(3):
-            count[axis] = min(max(int(np.ceil(half[b, axis])), 1), 8)
-        size, far = half[b], half[b] + tolerance
-        reach = 1.001 * (far[0] * far[0] + far[1] * far[1] + far[2] * far[2])
+            count[axis] = min(max(int(np.ceil(size[axis])), 1), 8)
         for k in range(len(points)):
             x, y, z = points[k, 0] - centre[b, 0], points[k, 1] - centre[b, 1], points[k, 2] - centre[b, 2]
             if x * x + y * y + z * z > reach:  # most points are outside this ball
                 continue
-            local(points[k], centre[b], rotation[b], at)
-            if abs(at[0]) > far[0] or abs(at[1]) > far[1] or abs(at[2]) > far[2]:
-                continue
             for axis in range(3):
-                if abs(abs(at[axis]) - size[axis]) <= tolerance:
-                    explained[b, k] = True
-                    i, j = (axis + 1) % 3, (axis + 2) % 3
-                    u, v = square_of(at[i], size[i], count[i]), square_of(at[j], size[j], count[j])
-                    covered[2 * axis + (1 if at[axis] > 0 else 0), u, v] = True
+                at[axis] = x * rotation[b, 0, axis] + y * rotation[b, 1, axis] + z * rotation[b, 2, axis]
+                if abs(at[axis]) > size[axis] + tolerance:
+                    break
+            else:
+                for axis in range(3):
+                    place = int(count[axis] * (at[axis] / size[axis] + 1) / 2)
+                    square[axis] = min(max(place, 0), count[axis] - 1)
+                for axis in range(3):
+                    if size[axis] - abs(at[axis]) <= tolerance:
+                        face = 2 * axis + (1 if at[axis] > 0 else 0)
+                        explained[b, k] = covered[face, square[(axis + 1) % 3], square[(axis + 2) % 3]] = True
         total, filled = 0.0, 0.0
         for face in range(6):
             i, j = (face // 2 + 1) % 3, (face // 2 + 2) % 3
-            square = size[i] * size[j] / (count[i] * count[j])
-            for u in range(count[i]):
-                for v in range(count[j]):
-                    total += square
-                    filled += square if covered[face, u, v] else 0.0
+            area = size[i] * size[j] / (count[i] * count[j])
+            for flag in covered[face, : count[i], : count[j]].flat:
+                total += area
+                filled += area if flag else 0.0
         fill[b] = filled / total if total > 0 else 0.0

@@ -67,6 +67,8 @@ def _bounded(rod: Rod, cloud: Cloud) -> tuple[Rod, int]:
     The cloud has half of the points.  A stretch ends where half a cell is empty.
     """
     _, (x, y, z) = _points_on(rod, cloud)
+    if 2 * len(z) < SETTINGS.rod_points:
+        return rod, 0
     place = np.floor(2 * z)
     empty = np.setdiff1d(np.arange(-64, 65), place)  # beyond the diagonal of the grid
     start, end = empty[empty < 0].max() + 1, empty[empty >= 0].min()

@@ -22,8 +22,8 @@ CORNERS = np.array(list(product((-1.0, 1.0), repeat=3)))
 LINES = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 0], [1, -1, 0], [1, 0, 1], [1, 0, -1], [0, 1, 1], [0, 1, -1]])
 """Directions along which boxes are compared."""
 
-SPHERE = spiral((np.arange(80) + 0.5) / 80)[:, [1, 2, 0]]
-"""Evenly spread unit vectors, one of each opposite pair, that define the outermost points."""
+SPHERE = np.ascontiguousarray(spiral((np.arange(80) + 0.5) / 80)[:, [1, 2, 0]].T)
+"""Evenly spread unit vectors (3, 80), one of each opposite pair, that define the outermost points."""
 
 
 class Boxes(NamedTuple):
@@ -67,19 +67,11 @@ def boxes_around(sets: Sequence[Array], frames: FloatArray | None = None, floor:
         spread, frames = principal_axes(sets)
         rod = (spread[:, 0] > SETTINGS.slender * spread[:, 1]) & (spread[:, 2] > SETTINGS.even * spread[:, 1])
         kind = np.where(rod, ROD, COMPACT)
-    turn_each(*_joined(list(map(_outermost, sets))), np.ascontiguousarray(frames), kind, floor, rotation)
     points, start = _joined(sets)
+    turn_each(points, start, SPHERE, np.ascontiguousarray(frames), kind, floor, rotation)
     at = np.einsum("pi,pij->pj", points, np.repeat(rotation, np.diff(start), 0))
     low, high = np.minimum.reduceat(at, start[:-1]), np.maximum.reduceat(at, start[:-1])
     return Boxes(np.einsum("nij,nj->ni", rotation, (low + high) / 2), rotation, (high - low) / 2)
-
-
-def _outermost(points: Array) -> Array:
-    """The points that lie farthest out along some directions, or all of a few; they determine the smallest box."""
-    if len(points) <= 2 * len(SPHERE):
-        return points
-    along = SPHERE @ points.T
-    return points[np.stack([along.argmin(1), along.argmax(1)], 1).reshape(-1)]
 
 
 def _joined(sets: Sequence[Array]) -> tuple[FloatArray, IntArray]:

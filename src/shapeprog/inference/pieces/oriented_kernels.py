@@ -19,6 +19,18 @@ def along(points, frame, axis):
 
 
 @helper
+def outermost(points, directions):
+    """The points that lie farthest out along some directions (3, D), or all of a few; they determine the smallest box."""
+    if len(points) <= 2 * directions.shape[1]:
+        return points
+    selected = np.empty((directions.shape[1], 2), np.int64)
+    for d in range(directions.shape[1]):
+        at = along(points, directions, d)
+        selected[d, 0], selected[d, 1] = at.argmin(), at.argmax()
+    return points[selected.ravel()]
+
+
+@helper
 def volume(points, frame, floor):
     """The volume of the box of points along a frame, each side at least ``floor``."""
     product = 1.0
@@ -83,8 +95,8 @@ def settled(points, frame, floor):
     return frame, best
 
 
-@kernel("void(f8[:, ::1], i8[::1], f8[:, :, ::1], i8[::1], f8, f8[:, :, ::1])")
-def turn_each(points, start, frames, kind, floor, rotation):
+@kernel("void(f8[:, ::1], i8[::1], f8[:, ::1], f8[:, :, ::1], i8[::1], f8, f8[:, :, ::1])")
+def turn_each(points, start, directions, frames, kind, floor, rotation):
     """The axes of a small oriented box around each run of points.
 
     The world's axes where no other direction is much better, then one turned about one of them, then the smallest.
@@ -93,6 +105,8 @@ def turn_each(points, start, frames, kind, floor, rotation):
     ----------
     points, start
         Points (P, 3); run g holds those from ``start[g]`` to ``start[g + 1] - 1``, at least one.
+    directions
+        Unit vectors (3, D), one of each opposite pair, that define the outermost points.
     frames, kind
         Frames (G, 3, 3) and kinds (G,): ``COMPACT``, initial principal axes, longest first; ``ROD``, the same of a long
         thin part, whose first axis is preferred to that of the smallest box; ``FLAT``, turned only about the last axis.
@@ -102,7 +116,7 @@ def turn_each(points, start, frames, kind, floor, rotation):
         Output (G, 3, 3), axes as columns.
     """
     for g in range(len(start) - 1):
-        own, flattened = points[start[g] : start[g + 1]], kind[g] == FLAT
+        own, flattened = outermost(points[start[g] : start[g + 1]], directions), kind[g] == FLAT
         frame = simple = frames[g] if flattened else np.eye(3)
         current = volume(own, simple, floor)
         best = WORTH * current

@@ -60,18 +60,12 @@ def _inner_balls(cloud: Cloud, which: IntArray) -> tuple[FloatArray, FloatArray]
     points = np.concatenate([cloud.points[which]] * 2)
     normals = np.concatenate([cloud.normals[which], -cloud.normals[which]])
     radius = np.full(len(points), SETTINGS.ball_radius)
-    going = np.arange(len(points))
-    for _ in range(SETTINGS.ball_rounds):
-        middle = points[going] - normals[going] * radius[going, None]
-        distance, nearest = tree.query(middle, workers=2)
-        off = points[going] - cloud.points[nearest]
-        along = np.einsum("ni,ni->n", off, normals[going])
-        square = np.einsum("ni,ni->n", off, off)
-        smaller = (distance < radius[going] * 0.98 - 0.01) & (along > 0.15 * np.sqrt(square)) & (square > 1e-8)
-        going = going[smaller]
-        radius[going] = square[smaller] / (2 * along[smaller])
-        if not len(going):
-            break
+    for _ in range(8):  # shrunk until it is empty
+        distance, nearest = tree.query(points - normals * radius[:, None], workers=2)
+        off = points - cloud.points[nearest]
+        along, square = np.einsum("ni,ni->n", off, normals), np.einsum("ni,ni->n", off, off)
+        smaller = (distance < radius * 0.98 - 0.01) & (along > 0.15 * np.sqrt(square)) & (square > 1e-8)
+        np.divide(square, 2 * along, out=radius, where=smaller)
     half = len(which)  # the smaller of the two balls at a point: normals have either sign, and furniture is thin
     better = np.where(radius[:half] <= radius[half:], 0, half) + np.arange(half)
     return points[better] - normals[better] * radius[better, None], radius[better]

@@ -56,7 +56,6 @@ class Settings:
     # Limbs, from the balls that fit in a solid
     ball_points: int = 5000  # points whose balls are computed
     ball_radius: float = 3.0  # radius of the largest
-    ball_rounds: int = 8  # rounds of shrinking a ball until it is empty
     merged: float = 0.25  # distance within which balls are merged
     merged_radius: float = 0.25  # difference of the logarithms of the radii within which balls are merged
     limb_neighbours: int = 24  # neighbouring centres from which a direction is estimated

@@ -17,6 +17,7 @@ from shapeprog.inference.pieces.point_kernels import grow_patches
 from shapeprog.inference.pieces.settings import SETTINGS
 from shapeprog.inference.surface.cloud import Cloud
 from shapeprog.inference.surface.settings import SURFACE
+from shapeprog.language.hints import STRAIGHT
 from shapeprog.space import FloatArray
 
 
@@ -43,7 +44,7 @@ def upright(normal: FloatArray) -> FloatArray:
     """Frames (P, 3, 3) about normals (P, 3), which snap to near axes of the world; so do the first columns."""
     normal = normal * np.sign(np.take_along_axis(normal, np.abs(normal).argmax(1)[:, None], 1))
     nearest = np.eye(3)[np.abs(normal).argmax(1)]
-    snapped = np.abs(normal).max(1) > np.cos(np.radians(SETTINGS.snap))
+    snapped = np.abs(normal).max(1) > STRAIGHT
     normal = np.where(snapped[:, None], nearest, normal)
     axis = np.eye(3)[np.abs(normal).argmin(1)]
     across = axis - normal * np.sum(axis * normal, 1, keepdims=True)
@@ -73,12 +74,12 @@ def _bars_of(grid: npt.NDArray[np.bool_]) -> list[tuple[tuple[int, int], tuple[i
     for axis in range(2):
         runs, _ = label_regions(grid, np.swapaxes([[0, 0, 0], [1, 1, 1], [0, 0, 0]], axis, 1))
         length = np.bincount(runs.reshape(-1))[runs] * grid
-        for share in SETTINGS.bar_runs:
+        for share in (0.6, 0.25, 0.1):  # of the length of the rectangle
             regions, _ = label_regions(length >= max(share * grid.shape[axis], 3))
             for number, place in enumerate(find_objects(regions), 1):
                 rows, columns = place
                 region = regions[place] == number
-                if region.sum() >= SETTINGS.bar_full * region.size:
+                if region.sum() >= 0.7 * region.size:
                     corners[(rows.start, columns.start), (rows.stop, columns.stop)] = None
     return list(corners)
 

@@ -62,7 +62,7 @@ def _options(parameter: Parameter, box: Box) -> FloatArray:
     elif quantity.kind == "length" and width == len(reach):
         rows = [half * reach]
     elif quantity.kind in ("position", "length"):
-        sizes = half * np.concatenate([reach, box.half, [0.3 * box.half.min()]])  # the last for the wall of hollow solids
+        sizes = half * np.concatenate([reach, box.half, [0.3 * box.half.min()]])  # the last for hollow solids
         rows = product(np.unique((box.centre if quantity.kind == "position" else sizes).round(3)), repeat=width)
     elif quantity.discrete:
         last = 3.0 if quantity.kind == "turn" else 6.0

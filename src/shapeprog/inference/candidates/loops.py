@@ -29,9 +29,6 @@ from shapeprog.language.parameters import to_float32
 from shapeprog.language.program import Loop, Node, Program, nest
 from shapeprog.space import DEPTH, SIDE, FloatArray
 
-MISSING = -1
-"""Index of a missing copy."""
-
 
 class Profiles(NamedTuple):
     """Profiles of candidates: equal for copies by translation, whatever the order of the axes of their solids."""
@@ -102,7 +99,7 @@ def _runs(nodes: Sequence[Node]) -> list[Node]:
     for group in sorted(group for group in groups if len(group) > 1):
         positions = profile.middle[list(group)]
         for run in equal_steps(positions, profile.half[group[0]]):
-            members = tuple(group[index] if index != MISSING else MISSING for index in run)
+            members = tuple(group[index] if index >= 0 else -1 for index in run)
             step_of.setdefault(members, (positions[run[-1]] - positions[run[0]]) / (len(run) - 1))
     longest = sorted(step_of, key=lambda members: (-len(members), members))[: SETTINGS.most_runs]
     return distinct([_translated(nodes[members[0]], len(members), step_of[members]) for members in longest])
@@ -116,16 +113,16 @@ def _translated(node: Node, count: int, step: FloatArray) -> Loop:
 def equal_steps(positions: FloatArray, half: FloatArray) -> list[list[int]]:
     """Runs of two or more positions (N, 3) at equal steps, as indices, upwards or to the rear or to the left.
 
-    A copy may be missing, as ``MISSING``, if most are present: the copy that fills the gap has no support, which lowers
+    A copy may be missing, as -1, if most are present: the copy that fills the gap has no support, which lowers
     its score.  ``half`` (3,) are the half extents of a copy.
     """
     steps = positions[None] - positions[:, None]
     tree, count = cKDTree(positions), len(positions)
 
     def nearest(targets: FloatArray) -> npt.NDArray[np.int64]:
-        """The index of the position at each target (..., 3); ``MISSING`` if none."""
+        """The index of the position at each target (..., 3); -1 if none."""
         index = tree.query(targets, p=np.inf, distance_upper_bound=SETTINGS.stray)[1]
-        return np.where(index < count, index, MISSING)
+        return np.where(index < count, index, -1)
 
     far = (np.abs(steps) > np.maximum(SETTINGS.apart * half, SETTINGS.least_step)).any(-1)
     first, second = np.nonzero(far & (nearest(positions[:, None] - steps) < 0))
@@ -134,9 +131,9 @@ def equal_steps(positions: FloatArray, half: FloatArray) -> list[list[int]]:
     run, last, end, going = [first, second], second, np.ones_like(second), np.ones(len(second), np.bool_)
     while going.any():
         start, copy = positions[first[going]], len(run)
-        present = np.full(len(first), MISSING)
+        present = np.full(len(first), -1)
         present[going] = nearest(start + copy * (positions[last[going]] - start) / end[going, None])
-        present[present == last] = MISSING
+        present[present == last] = -1
         run.append(present)
         last, end = np.where(present >= 0, present, last), np.where(present >= 0, copy, end)
         going &= copy - end <= 1  # one copy may be missing at once
@@ -195,30 +192,25 @@ def images(nodes: Sequence[Node], surface: FloatArray) -> list[Node]:
         return share
 
     share = on(points)
-    supported = np.flatnonzero(share >= SETTINGS.supported)
-    nodes, points = [nodes[k] for k in supported.tolist()], points[supported]
-    least = SETTINGS.as_well * share[supported]
+    supported = share >= SETTINGS.supported
 
     def kept(index: npt.NDArray[np.int64], image: FloatArray) -> npt.NDArray[np.int64]:
         """Those candidates whose images (C, P, 3) lie on the surface."""
-        return index[on(image) >= least[index]] if len(index) else index
+        return index[on(image) >= SETTINGS.as_well * share[index]]
 
-    one_sided = (points.min(1) > 0) | (points.max(1) < 0)
+    one_sided = ((points.min(1) > 0) | (points.max(1) < 0)) & supported[:, None]
     left, front = mirror(SIDE), mirror(DEPTH)
     side, depth = (np.flatnonzero(one_sided[:, axis]) for axis in (SIDE, DEPTH))
     side, depth = kept(side, points[side] * [1, 1, -1]), kept(depth, points[depth] * [1, -1, 1])
     four = np.intersect1d(side, depth)
     four = kept(four, points[four] * [1, -1, -1])
-    result = [
-        nest((*loops, nodes[k]))
-        for loops, index in (((left,), side), ((front,), depth), ((left, front), four))
-        for k in index
-    ]
-    plain = np.array([not isinstance(node, Loop) for node in nodes], np.bool_)
+    mirrored = ((left,), side), ((front,), depth), ((left, front), four)
+    result = [nest((*loops, nodes[k])) for loops, index in mirrored for k in index]
+    plain = np.flatnonzero(supported & [not isinstance(node, Loop) for node in nodes])
     for axis, count in itertools.product(_axes(scene), SETTINGS.turns):
-        around = (points[..., DEPTH] - axis[0]) + 1j * (points[..., SIDE] - axis[1])
+        around = (points[plain, :, DEPTH] - axis[0]) + 1j * (points[plain, :, SIDE] - axis[1])
         turn = np.angle(around * around.mean(1, keepdims=True).conj())
-        index = np.flatnonzero(plain & ((np.abs(turn) < np.pi / count).mean(1) >= SETTINGS.sector))
+        index = plain[(np.abs(turn) < np.pi / count).mean(1) >= SETTINGS.sector]
         index = np.setdiff1d(index, [*side, *depth]) if count == 4 else index  # mirrors follow changes of the width
         step = 2 * np.pi / count
         index = kept(index, _turned(points[index, ::6], axis, step))  # few points settle most candidates

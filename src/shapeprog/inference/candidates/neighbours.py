@@ -131,9 +131,7 @@ def _reach(frame: Box, part: Box) -> FloatArray:
     return np.abs(frame.rotation.T @ part.rotation) @ part.half
 
 
-def met(
-    box: Box, parts: Sequence[Box], within: Sequence[float] = (0.8,), *, longer: bool = False
-) -> Iterator[Box]:
+def met(box: Box, parts: Sequence[Box], within: Sequence[float] = (0.8,), *, longer: bool = False) -> Iterator[Box]:
     """A box with one face moved to where a line normal to the face, at its middle or near a corner, enters a part.
 
     ``within`` are the distances from the middle to the lines, as shares of those to the corners.  ``longer`` restricts

@@ -13,6 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 import torch
 from jaxtyping import Float
+from scipy.ndimage import minimum
 from torch import Tensor
 
 from shapeprog.geometry.batch import Batch
@@ -41,14 +42,16 @@ def single_candidates(pieces: Pieces) -> list[Node]:
         for box, options in zip(boxes[: SETTINGS.fitted], tried, strict=False):
             options += starts(declared, box)
     draws = [draw for options in tried for draw in options]
+    if not draws:
+        return []
     owner = np.repeat(np.arange(len(boxes)), [len(options) for options in tried])
     misfit = misfits(draws, points[owner], normals[owner])
-    best = _minimum(misfit, owner, len(boxes))[owner]
+    best = minimum(misfit, owner, owner)  # of the same piece
     unsure = np.flatnonzero((owner < SETTINGS.fitted) & (best > SETTINGS.good) & (misfit <= best + SETTINGS.worth))
     better = fitted([draws[k] for k in unsure], points[owner[unsure]])
     misfit = np.append(misfit, misfits(better, points[owner[unsure]], normals[owner[unsure]]))
     draws, owner = [*draws, *better], np.append(owner, owner[unsure])
-    best = _minimum(misfit, owner, len(boxes))[owner]
+    best = minimum(misfit, owner, owner)
     order = np.flatnonzero(misfit <= best + SETTINGS.slack).tolist()
     order.sort(key=lambda k: (numbers_written(draws[k]), misfit[k]), reverse=True)
     simplest = {int(owner[k]): k for k in order}
@@ -59,13 +62,6 @@ def single_candidates(pieces: Pieces) -> list[Node]:
         if misfit[closest[piece]] < min(SETTINGS.good, SETTINGS.better * misfit[k]):
             result.append(draws[closest[piece]])
     return result
-
-
-def _minimum(misfit: FloatArray, owner: Array, count: int) -> FloatArray:
-    """The least misfit for each piece; infinite where there is none."""
-    minimum = np.full(count, np.inf)
-    np.minimum.at(minimum, owner, misfit)
-    return minimum
 
 
 def fitted(draws: Sequence[Draw], target: Float[Tensor, "B P 3"]) -> list[Draw]:

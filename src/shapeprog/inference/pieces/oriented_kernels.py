@@ -9,7 +9,6 @@ from shapeprog.kernels.compile import helper, kernel
 WORTH = 0.93  # largest volume relative to a simpler orientation at which a less restricted one is selected
 SLACK = 1.05  # largest volume relative to the smallest box at which the box along the axis of a rod is selected
 COMPACT, ROD, FLAT = 0, 1, 2  # kinds of point sets
-SWEEPS = 6  # rounds that turn a box about each of its axes to minimise its volume, at most
 
 
 @helper
@@ -20,7 +19,7 @@ def along(points, frame, axis):
 
 @helper
 def outermost(points, directions):
-    """The points that lie farthest out along some directions (3, D), or all of a few; they determine the smallest box."""
+    """The points that lie farthest out along some directions (3, D), or all of a few: these determine its box."""
     if len(points) <= 2 * directions.shape[1]:
         return points
     selected = np.empty((directions.shape[1], 2), np.int64)
@@ -85,7 +84,7 @@ def turned(points, frame, axis, floor):
 def settled(points, frame, floor):
     """A frame turned about its axes in turn while the box becomes smaller, and the volume of the box."""
     best = volume(points, frame, floor)
-    for _ in range(SWEEPS):
+    for _ in range(6):
         before = best
         for axis in range(3):
             frame = turned(points, frame, axis, floor)

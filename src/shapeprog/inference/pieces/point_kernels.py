@@ -64,8 +64,7 @@ def grow_patches(points, normals, neighbours, order, cosine, tolerance, min_size
                 for axis in range(3):
                     normal[axis] = total[axis] / np.sqrt(length)
         if size < min_size:
-            for k in range(size):
-                label[stack[k]] = -1
+            label[stack[:size]] = -1
         else:
             patches += 1
 
@@ -87,7 +86,8 @@ def near_boxes(points, centre, rotation, half, tolerance, explained, fill):
     explained, fill
         Output (B, N) and (B,), initially false.
     """
-    covered, at, count, square = np.empty((6, 8, 8), np.bool_), np.empty(3), np.empty(3, np.int64), np.empty(3, np.int64)
+    covered, at = np.empty((6, 8, 8), np.bool_), np.empty(3)
+    count, square = np.empty(3, np.int64), np.empty(3, np.int64)
     for b in range(len(centre)):
         size = half[b]
         reach = 1.001 * ((size + tolerance) ** 2).sum()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import combinations, product
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -115,7 +115,7 @@ def groups(boxes: Boxes) -> Boxes:
     at -= np.einsum("ic,icd->id", boxes.centre, boxes.rotation)[:, None, None]
     within = np.abs(at).max(2) <= boxes.half[:, None] + SETTINGS.group_gap
     unique: dict[bytes, FloatArray] = {}
-    for held in (held for count in (1, 2, 0) for held in combinations(range(3), count)):
+    for held in ([0], [1], [2], [0, 1], [0, 2], [1, 2], []):
         for row in _reachable(adjacent, within[:, :, held].all(2)):
             if row.sum() > 1:
                 unique.setdefault(row.tobytes(), corners[row].reshape(-1, 3))

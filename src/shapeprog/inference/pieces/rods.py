@@ -70,7 +70,8 @@ def _bounded(rod: Rod, cloud: Cloud) -> tuple[Rod, int]:
     if 2 * len(z) < SETTINGS.rod_points:
         return rod, 0
     place = np.floor(2 * z)
-    empty = np.setdiff1d(np.arange(-64, 65), place)  # beyond the diagonal of the grid
+    farthest = np.abs(place).max()
+    empty = np.setdiff1d(np.arange(-farthest - 1, farthest + 2), place)
     start, end = empty[empty < 0].max() + 1, empty[empty >= 0].min()
     here = (place >= start) & (place < end)
     sectors = np.floor(8 * np.arctan2(y[here], x[here]) / np.pi) % 16

@@ -188,8 +188,6 @@ def residual_candidates(program: Program, evidence: Evidence) -> list[Node]:
     tensor = torch.from_numpy(evidence.points)
     far = signed_distance(unroll(program), tensor).abs().numpy() > SETTINGS.far * evidence.tolerance
     points = evidence.points[far & (evidence.weights > evidence.weights.max() / 2)]
-    if len(points) < SETTINGS.cluster_points:
-        return []
     reach = SETTINGS.cluster_reach * (evidence.area / len(evidence.points)) ** 0.5
     cluster = linked(cKDTree(points).query_pairs(reach, output_type="ndarray"), len(points))
     size = np.bincount(cluster)

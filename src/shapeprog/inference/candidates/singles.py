@@ -48,10 +48,11 @@ def single_candidates(pieces: Pieces) -> list[Node]:
     misfit = misfits(draws, points[owner], normals[owner])
     best = minimum(misfit, owner, owner)  # of the same piece
     unsure = np.flatnonzero((owner < SETTINGS.fitted) & (best > SETTINGS.good) & (misfit <= best + SETTINGS.worth))
-    better = fitted([draws[k] for k in unsure], points[owner[unsure]])
-    misfit = np.append(misfit, misfits(better, points[owner[unsure]], normals[owner[unsure]]))
-    draws, owner = [*draws, *better], np.append(owner, owner[unsure])
-    best = minimum(misfit, owner, owner)
+    if len(unsure):
+        better = fitted([draws[k] for k in unsure], points[owner[unsure]])
+        misfit = np.append(misfit, misfits(better, points[owner[unsure]], normals[owner[unsure]]))
+        draws, owner = [*draws, *better], np.append(owner, owner[unsure])
+        best = minimum(misfit, owner, owner)
     order = np.flatnonzero(misfit <= best + SETTINGS.slack).tolist()
     order.sort(key=lambda k: (numbers_written(draws[k]), misfit[k]), reverse=True)
     simplest = {int(owner[k]): k for k in order}
@@ -65,12 +66,10 @@ def single_candidates(pieces: Pieces) -> list[Node]:
 
 
 def fitted(draws: Sequence[Draw], target: Float[Tensor, "B P 3"]) -> list[Draw]:
-    """Statements fitted to points (B, P, 3) by Gauss-Newton steps with a prior on their numbers, in one batch.
+    """At least one statement, fitted to points (B, P, 3) by Gauss-Newton steps with a prior on its numbers, in a batch.
 
     Residuals are distances of the points to the surface; poses are differentiated by central differences.
     """
-    if not draws:
-        return []
     code = encode([Program((draw,)) for draw in draws], dtype=torch.float64)
     ids, start = code.ids[:, :, :1], code.parameters[:, 0, 0]  # a drawing is the first step of its block
     values, slots, points = start, start.shape[1], target.shape[1]
@@ -101,8 +100,6 @@ def fitted(draws: Sequence[Draw], target: Float[Tensor, "B P 3"]) -> list[Draw]:
 
 def misfits(draws: Sequence[Draw], points: Float[Tensor, "B P 3"], normals: Float[Tensor, "B P 3"]) -> FloatArray:
     """Misfit (B,) of each statement to points: mean distance over ``SETTINGS.wrong`` plus 1 - the mean cosine."""
-    if not draws:
-        return np.zeros(0)
     distance, _, slopes = distance_and_slopes(scene_of(draws), points)
     cosine = (slopes * normals).sum(-1).abs().mean(1)
     off = (distance.abs() / SETTINGS.wrong).clamp(max=1).mean(1) + 1 - cosine

@@ -42,10 +42,9 @@ def planar_patches(cloud: Cloud) -> Boxes:
 
 def upright(normal: FloatArray) -> FloatArray:
     """Frames (P, 3, 3) about normals (P, 3), which snap to near axes of the world; so do the first columns."""
-    normal = normal * np.sign(np.take_along_axis(normal, np.abs(normal).argmax(1)[:, None], 1))
     nearest = np.eye(3)[np.abs(normal).argmax(1)]
-    snapped = np.abs(normal).max(1) > STRAIGHT
-    normal = np.where(snapped[:, None], nearest, normal)
+    cosine = np.sum(nearest * normal, 1, keepdims=True)
+    normal = np.where(np.abs(cosine) > STRAIGHT, nearest, np.sign(cosine) * normal)
     axis = np.eye(3)[np.abs(normal).argmin(1)]
     across = axis - normal * np.sum(axis * normal, 1, keepdims=True)
     across /= np.linalg.norm(across, axis=1, keepdims=True)
@@ -63,14 +62,14 @@ def _bars(sets: list[FloatArray], patches: Boxes, side: float) -> Iterator[Boxes
         if grid.mean() > SETTINGS.full or shape.max() < 6:
             continue
         for corners in _bars_of(grid):
-            ends = np.array(corners) / shape * 2 * half[:2] - half[:2]
+            ends = np.array(corners) / shape * extent - half[:2]
             centre, half_bar = middle + axes[:, :2] @ ends.mean(0), np.append((ends[1] - ends[0]) / 2, 0)
             yield Boxes(centre[None], axes[None], half_bar[None])
 
 
 def _bars_of(grid: npt.NDArray[np.bool_]) -> list[tuple[tuple[int, int], tuple[int, int]]]:
     """Rectangles of cells, low and high corners, formed by long runs along either axis of a grid."""
-    corners: dict[tuple[tuple[int, int], tuple[int, int]], None] = {}
+    corners = []
     for axis in range(2):
         runs, _ = label_regions(grid, np.swapaxes([[0, 0, 0], [1, 1, 1], [0, 0, 0]], axis, 1))
         length = np.bincount(runs.reshape(-1))[runs] * grid
@@ -80,8 +79,8 @@ def _bars_of(grid: npt.NDArray[np.bool_]) -> list[tuple[tuple[int, int], tuple[i
                 rows, columns = place
                 region = regions[place] == number
                 if region.sum() >= 0.7 * region.size:
-                    corners[(rows.start, columns.start), (rows.stop, columns.stop)] = None
-    return list(corners)
+                    corners.append(((rows.start, columns.start), (rows.stop, columns.stop)))
+    return list(dict.fromkeys(corners))
 
 
 def slabs(patches: Boxes) -> Boxes:

@@ -106,16 +106,8 @@ def _through_pairs(cloud: Cloud) -> list[Rod]:
     radius = (np.abs(s) + np.abs(t)) / 2
     good = np.abs(np.abs(s) - np.abs(t)) <= cloud.tolerance + 0.1 * radius
     good &= (radius <= SETTINGS.rod_radius) & (radius >= 0.5 * cloud.tolerance)
-    fields = points[first] + s[:, None] * p, _frames(axis), radius, np.full(len(axis), np.inf)
+    fields = points[first] + s[:, None] * p, upright(axis), radius, np.full(len(axis), np.inf)
     return [Rod(*row) for row in zip(*(field[good] for field in fields), strict=True)]
-
-
-def _frames(axis: FloatArray) -> FloatArray:
-    """Frames (T, 3, 3) whose last columns are axes (T, 3)."""
-    side = np.eye(3)[np.where(np.abs(axis[:, 0]) < 0.6, 0, 1)]
-    across = np.cross(axis, side)
-    across /= np.linalg.norm(across, axis=1, keepdims=True)
-    return np.stack([np.cross(across, axis), across, axis], 2)
 
 
 def _fitted(points: FloatArray, normals: FloatArray) -> Rod:

@@ -18,92 +18,68 @@ from jaxtyping import Float
 from torch import Tensor
 
 from shapeprog.geometry.primitive import SIZES
+from shapeprog.geometry.scene import Scene
 from shapeprog.geometry.separation import touching
-from shapeprog.inference.ties.elements import HIGH, LOW, MIDDLE, Anchors, Element, Key
+from shapeprog.inference.ties.layout import HIGH, LOW, MIDDLE, Anchors, Element, Key, Layout
 from shapeprog.inference.ties.model import Model, boxes_of
 from shapeprog.inference.ties.settings import TIES
 from shapeprog.language.placement import AXES
 from shapeprog.space import Array, FloatArray
 
 
-class _Motion:
-    """How the boxes of the N primitives of a program move with its numbers (P,), about where they are; all faces are
-    measured from the low side."""
-
-    def __init__(self, model: Model) -> None:
-        self.layout = model.layout
-        scene, rows = model.poses(model.numbers)
-
-        def ends(change: Float[Tensor, "N 16"]) -> FloatArray:
-            """The low and high ends (2, 3, N) of the boxes where sizes, centres and rotations change (N, 16)."""
-            size, centre, rotation = change.split([SIZES, 3, 9], 1)
-            boxes = boxes_of(replace(
-                scene, size=scene.size + size, centre=scene.centre + centre,
-                rotation=scene.rotation + rotation.reshape(-1, 3, 3),
-            ))  # fmt: skip
-            reach = np.abs(boxes.edges).sum(1)
-            return np.stack([boxes.centre - reach, boxes.centre + reach]).swapaxes(1, 2)
-
-        scale, (width, depth, _) = self.layout.source.scale, self.layout.extents
-        assert scale is not None
-        corner = np.array([-width / 2, scale.middle - depth / 2, scale.floor])[:, None]
-        self.ends = ends(0 * rows[..., 0]) - corner  # from the low sides of the whole
-        changes = (1e-3 * rows).unbind(-1)
-        self.end_slopes = np.stack([(ends(change) - ends(-change)) / 2e-3 for change in changes], -1)  # (2, 3, N, P)
-        self.first, self.second = touching(boxes_of(scene), TIES.touch)  # pairs (C,)
-
-    def by_element(self, elements: list[Element], slopes: FloatArray) -> FloatArray:
-        """Slopes (..., P) by the numbers as those by the low and high coordinate of elements (..., K, 2)."""
-        index, result = self.layout.index, np.zeros((*slopes.shape[:-1], len(elements), 2))
-        for k, element in enumerate(elements):
-            words = AXES[element.axis]
-            if element.kind == "interval":
-                result[..., k, 1] = slopes[..., index[element.line, words.size]]
-                result[..., k, 0] = -result[..., k, 1]
-            if element.key != "across":
-                low = f"{element.key}.{words.low}" if element.key else words.low
-                result[..., k, 0] += slopes[..., index[element.line, low]]
-        return result
-
-
 class _AxisAnchors:
-    """The anchors of the K elements of one axis."""
+    """The anchors of the K elements of one axis.
 
-    def __init__(self, motion: _Motion, axis: int) -> None:
-        self.motion, self.axis = motion, axis
-        self.extent = extent = motion.layout.extents[axis]
-        self.elements = [element for element in motion.layout.elements.values() if element.axis == axis]
+    Parameters
+    ----------
+    layout, axis
+        The program, with all faces measured from the low side, and the axis.
+    ends, slopes
+        The low and high ends (2, N) of its primitives from the low side of the whole, and how these move with its
+        numbers (2, N, P).
+    pairs
+        Slots of primitives that touch (C,), (C,).
+    """
+
+    def __init__(
+        self, layout: Layout, axis: int, ends: FloatArray, slopes: FloatArray, pairs: tuple[Array, Array]
+    ) -> None:
+        self.axis, self.extent, self.pairs, self.ends = axis, layout.extents[axis], pairs, ends
+        self.elements = [element for element in layout.elements.values() if element.axis == axis]
         index = {(element.line, element.key): k for k, element in enumerate(self.elements)}
-        self.rows = {k: index[motion.layout.first(line)] for (line, key), k in index.items() if key == "last"}
+        self.rows = {k: index[layout.first(line)] for (line, key), k in index.items() if key == "last"}
         self.choices: list[Sequence[Anchors]] = [self._choices(element) for element in self.elements]
         self.spans: list[tuple[int, int, float]] = []  # both ends of a rod, and the cost of different anchors
         for (line, key), end in index.items():
             if key in ("end", "through") and (line, "start") in index:
                 self._add_span(index[line, "start"], end)
-        count = len(self.elements)
-        most = max(map(len, self.choices), default=1)
+        count, most = len(self.elements), max(map(len, self.choices), default=1)
         self.costs = np.full((count, most), np.inf)
         self.shifts = np.zeros((count, most, 2))  # share of the growth of the whole by which low and high ends move
+        by_ends = np.zeros((slopes.shape[-1], count, 2))  # how the numbers follow from the ends of the elements
         for k, (element, choices) in enumerate(zip(self.elements, self.choices, strict=True)):
             self.costs[k, : len(choices)] = [self._unary(element, anchors) for anchors in choices]
-            self.shifts[k, : len(choices)] = [(ends[0] / HIGH, ends[-1] / HIGH) for ends in choices]
-        slopes = motion.by_element(self.elements, motion.end_slopes[:, axis])  # (2, N, K, 2)
-        self.slopes = slopes.reshape(*slopes.shape[:2], -1).swapaxes(1, 2)  # (2, 2 K, N)
+            self.shifts[k, : len(choices)] = [(anchors[0] / HIGH, anchors[-1] / HIGH) for anchors in choices]
+            if element.kind == "interval":
+                by_ends[layout.index[element.line, AXES[axis].size], k] = -1, 1
+            if element.key != "across":
+                by_ends[layout.index[element.line, f"{element.key}.{AXES[axis].low}".lstrip(".")], k, 0] = 1
+        self.slopes = (slopes @ by_ends.reshape(-1, 2 * count)).swapaxes(1, 2)  # (2, 2 K, N)
         # Mirror images move with the high side of the whole while all coordinates stay.
-        self.base = motion.end_slopes[:, axis, :, axis] + 0.5
-        low, high = motion.ends[:, axis]
-        self.share, self.long = motion.ends[:, axis] / extent, high - low >= TIES.spanning * extent
-        reach, near = TIES.reach * extent, (1 - TIES.beyond) * extent / 2
+        self.base = slopes[..., axis] + 0.5
+        low, high = ends
+        self.share, self.long = ends / self.extent, high - low >= TIES.spanning * self.extent
+        reach, near = TIES.reach * self.extent, (1 - TIES.beyond) * self.extent / 2
         reaches = np.stack([low <= low.min() + reach, high >= high.max() - reach])
-        beyond = np.stack([high <= near, low >= extent - near])
+        beyond = np.stack([high <= near, low >= self.extent - near])
         if axis == 2:
-            beyond = np.stack([reaches[0], high >= high.max() - TIES.below * extent])
+            beyond = np.stack([reaches[0], high >= high.max() - TIES.below * self.extent])
         self.weights = np.where(reaches, TIES.reaching, TIES.side) * (reaches | beyond)  # of faces that do not move
         self.overlap = self._overlaps(low, high)
-        moves = (np.abs(slopes).max((0, 3)) > 0).astype(int)  # (N, K)
-        shared = moves.T @ moves + moves[motion.first].T @ moves[motion.second]
+        moves = self.slopes.any(0).reshape(count, 2, -1).any(1).astype(int)  # (K, N)
+        shared = moves @ moves.T + moves[:, pairs[0]] @ moves[:, pairs[1]].T
         # Elements of parts that touch are often better changed together.
-        self.together = [(int(a), int(b)) for a, b in np.argwhere(np.triu(shared + shared.T, 1) > 0)]
+        self.together = np.argwhere(np.triu(shared + shared.T, 1) > 0).tolist()
 
     def _choices(self, element: Element) -> Sequence[Anchors]:
         centred = abs(element.middle - self.extent / 2) < TIES.off_middle * self.extent and self.axis < 2
@@ -143,9 +119,9 @@ class _AxisAnchors:
     def solved(self) -> list[Anchors]:
         """The anchors of every element."""
         starts = [self.costs.argmin(1)]
-        for side in (LOW, HIGH):  # all faces measured from one side
-            one_sided = [[set(anchors) == {side} for anchors in choices] for choices in self.choices]
-            starts.append(np.array([int(np.argmax(flags)) for flags in one_sided], np.int64))  # else the first
+        for side in (LOW, HIGH):  # all faces measured from one side, or in the first way
+            one_sided = [[{*anchors} == {side} for anchors in choices] for choices in self.choices]
+            starts.append(np.array([flags.index(True) if any(flags) else 0 for flags in one_sided], np.int64))
         best = min((self._descent(start) for start in starts), key=lambda result: round(result[0], 6))
         return [choices[k] for choices, k in zip(self.choices, best[1], strict=True)]
 
@@ -167,12 +143,12 @@ class _AxisAnchors:
 
     def _overlaps(self, low: FloatArray, high: FloatArray) -> FloatArray:
         """How far pairs (..., C) of primitives that touch overlap along the axis, from their ends (..., N)."""
-        first, second = self.motion.first, self.motion.second
+        first, second = self.pairs
         return np.minimum(high[..., first], high[..., second]) - np.maximum(low[..., first], low[..., second])
 
     def _costs(self, states: Array) -> FloatArray:
         """The costs (S,) of choices of anchors (S, K)."""
-        elements, motion = np.arange(states.shape[1]), self.motion
+        elements, (below, above) = np.arange(states.shape[1]), self.ends
         shifts, cost = self.shifts[elements, states], self.costs[elements, states].sum(1)  # (S, K, 2), (S,)
         for start, end, penalty in self.spans:
             cost += penalty * (states[:, start] != states[:, end])
@@ -186,18 +162,33 @@ class _AxisAnchors:
         rigid = self.long & (high - low < self.share[1] - self.share[0] - 0.5)
         per_copy = stays @ self.weights[0] + lags @ self.weights[1] + TIES.rigid * rigid.sum(1)
         growth = TIES.growth * self.extent
-        below, above = motion.ends[:, self.axis]
         grown = self._overlaps(below + growth * low, above + growth * high)
         per_copy += TIES.separated * (grown < np.minimum(self.overlap, 0) - TIES.touch).sum(1)
         return cost + per_copy / max(1.0, low.shape[1] / len(elements))
 
 
+def _ends(scene: Scene, change: Float[Tensor, "N 16"]) -> FloatArray:
+    """The low and high ends (2, 3, N) of the boxes of primitives where sizes, centres and rotations change."""
+    size, centre, rotation = change.split([SIZES, 3, 9], 1)
+    rotation = scene.rotation + rotation.reshape(-1, 3, 3)
+    boxes = boxes_of(replace(scene, size=scene.size + size, centre=scene.centre + centre, rotation=rotation))
+    reach = np.abs(boxes.edges).sum(1)
+    return np.stack([boxes.centre - reach, boxes.centre + reach]).swapaxes(1, 2)
+
+
 def anchors_of(model: Model) -> dict[Key, Anchors]:
     """The anchors of all elements of a program, given with all faces measured from the low side."""
-    motion = _Motion(model)
+    layout, (scene, rows) = model.layout, model.poses(model.numbers)
+    scale, (width, depth, _) = layout.source.scale, layout.extents
+    assert scale is not None
+    corner = np.array([-width / 2, scale.middle - depth / 2, scale.floor])[:, None]
+    ends = _ends(scene, 0 * rows[..., 0]) - corner
+    changes = (1e-3 * rows).unbind(-1)
+    slopes = np.stack([(_ends(scene, change) - _ends(scene, -change)) / 2e-3 for change in changes], -1)
+    pairs = touching(boxes_of(scene), TIES.touch)
     result: dict[Key, Anchors] = {}
     for axis in range(3):
-        solver = _AxisAnchors(motion, axis)
+        solver = _AxisAnchors(layout, axis, ends[:, axis], slopes[:, axis], pairs)
         for element, anchors in zip(solver.elements, solver.solved(), strict=True):
             result[element.line, element.key, axis] = anchors
         for last, first in solver.rows.items():

@@ -1,19 +1,35 @@
-"""A placed program in which every face is measured from its anchor, and every number has a name."""
+"""A placed program in which every face is measured from its anchor, and every number has a name.
+
+The position of a part is given by *elements*: an interval (a box), the axis of a round part with its radius, or a
+single coordinate (an end of a rod, the plane of a mirror, the last copy of a row).  Each end of an element is measured
+from an anchor, the low side, the middle or the high side of the whole, see :mod:`shapeprog.inference.ties.anchors`.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
-from shapeprog.inference.ties.elements import ALIGNED, HIGH, LOW, MIDDLE, Anchors, Element, Key, ends_of
 from shapeprog.inference.ties.settings import TIES
-from shapeprog.language.ast import Argument, Assignment, Group, Line, Part, Point, Source, changed_lines
-from shapeprog.language.expression import Binary, Linear, Name, Value
-from shapeprog.language.placement import AXES, POINTS, ROUND, SIZES
+from shapeprog.language.ast import Argument, Assignment, Group, Keywords, Line, Part, Point, Source, changed_lines
+from shapeprog.language.expression import Binary, Name, Value, value_at
+from shapeprog.language.placement import AXES, POINTS, ROUND, SIZES, coordinate_of, interval_of
 from shapeprog.space import FloatArray
+
+LOW, MIDDLE, HIGH = 0, 1, 2  # anchors
+ALIGNED = 1e-5  # cells by which coordinates may differ that are the same
+
+Anchors = tuple[int, ...]
+"""The anchors of both ends of an interval, or of a single coordinate."""
+
+ElementKind = Literal["interval", "round", "coordinate"]
+
+Key = tuple[int, str, int]
+"""Line, key and axis of an element."""
+
 
 Kind = Literal["extent", "clearance", "offset", "size", "radius", "edge", "angle", "length"]
 
@@ -21,6 +37,41 @@ KINDS: dict[str, Kind] = {
     "radius": "radius", "edge": "edge", "tilt": "angle", "turn": "angle", "step": "angle", "lean": "length"
 }  # fmt: skip
 """What keywords measure that are not measured from a side."""
+
+
+@dataclass(frozen=True)
+class Element:
+    """The coordinates of a line along one axis.
+
+    Parameters
+    ----------
+    line
+        Number of the line, in the order of the text.
+    key
+        Empty for the box of a part; else ``start``, ``through``, ``end``, ``across`` (the size of a bar), ``plane``,
+        ``centre`` or ``last``.
+    axis
+        0 left-right, 1 front-rear, 2 vertical.
+    kind
+        Whether it is an interval, the axis of a round part, or a single coordinate.
+    low, high
+        Ends from the low side of the whole, in the unit of the text; the same for a single coordinate.
+    anchors
+        From where they are measured.
+    """
+
+    line: int
+    key: str
+    axis: int
+    kind: ElementKind
+    low: float
+    high: float
+    anchors: Anchors
+
+    @property
+    def middle(self) -> float:
+        """Half-way between its ends."""
+        return (self.low + self.high) / 2
 
 
 @dataclass(frozen=True)
@@ -33,8 +84,6 @@ class Slot:
         Number of the line, and keyword; that of a point begins with ``start.`` or such.
     kind, axis
         The quantity that it measures, along an axis 0, 1 or 2, else -1.
-    anchor
-        From where a clearance or offset is measured.
     value
         Its value, in the unit of the text, or in degrees.
     """
@@ -43,7 +92,6 @@ class Slot:
     word: str
     kind: Kind
     axis: int
-    anchor: int
     value: float
 
 
@@ -71,8 +119,11 @@ class Layout:
         The lines of cylinders that are nearly as wide as the whole, which then has one diameter.
     elements
         All elements, by line, key and axis.
-    slots, names, forms
-        The numbers (P,), the three sizes of the whole first, their names, and linear forms by these names.
+    slots, names
+        The numbers (P,), the three sizes of the whole first, and their names.
+    forms
+        What each name is (P + 1,) where one of all numbers is 1 and the others are 0, and where all are 0: a linear
+        function of the numbers is given by these values of it.
     index
         The number of every line and keyword.
     named, body, source
@@ -89,21 +140,16 @@ class Layout:
         if self.filling:
             self.sizes["depth"] = self.sizes["width"]
         self.extents = tuple(float(self.sizes[size]) for size in SIZES)
-        self.loops_around: list[list[int]] = [[] for _ in self.lines]
-        for index, loop in enumerate(self.lines):
-            for inner in range(index + 1, index + sum(1 for _ in Source((loop,)).walk())):
-                self.loops_around[inner].append(index)
-        elements = (element for index in range(len(self.lines)) for element in self._elements(index))
-        self.elements: dict[Key, Element] = {(each.line, each.key, each.axis): each for each in elements}
-        self.anchors = anchors or {
-            key: (LOW, LOW) if element.kind == "interval" else (LOW,) for key, element in self.elements.items()
-        }
-        self.slots = [Slot(-1, word, "extent", axis, LOW, self.extents[axis]) for axis, word in enumerate(SIZES)]
+        last = [index + sum(1 for _ in Source((line,)).walk()) - 1 for index, line in enumerate(self.lines)]
+        self.loops_around = [[loop for loop in range(n) if n <= last[loop]] for n in range(len(self.lines))]
+        self.elements: dict[Key, Element] = {}
+        self._anchors = anchors or {}
+        self.slots = [Slot(-1, word, "extent", axis, self.extents[axis]) for axis, word in enumerate(SIZES)]
         self.index: dict[tuple[int, str], int] = {}
         self.names = [*SIZES]
         self.named: list[Part | Group] = []
         self.body = changed_lines(tree, self._with_names)
-        self.forms = {name: Linear.of(name) for name in self.names}
+        self.forms = dict(zip(self.names, np.eye(len(self.names) + 1), strict=False))
         self._numbers = {name: slot.value for name, slot in zip(self.names, self.slots, strict=True)}
         pairs = tuple(self._numbers.items())
         lines = Assignment(pairs[:3]), Assignment(pairs[3:]), *self.body
@@ -113,11 +159,6 @@ class Layout:
         """The first part inside of a loop, and the key of its elements: a row is measured by it."""
         index = next(index for index in self.parts if index > loop)
         return index, "start" if "start" in dict(self.lines[index].keywords) else ""
-
-    def row(self, form: Linear) -> FloatArray:
-        """The factors (P,) of a linear form."""
-        factors = dict(form.factors)
-        return np.array([factors.get(name, 0.0) for name in self.names])
 
     def fixed(self) -> FloatArray:
         """Relations (M, P) that always hold: the width and the depth of a round part that fills the whole are equal."""
@@ -132,11 +173,11 @@ class Layout:
         """Every element that is measured by numbers, and how its low and high coordinate from the low side of the whole
         follow from them (P,)."""
         for (index, key, axis), element in self.elements.items():
-            if key == "across" and self.anchors[index, key, axis] != (LOW, HIGH):
+            if key == "across" and element.anchors != (LOW, HIGH):
                 continue
-            low, high = map(self.row, ends_of(self.named[index], key, axis, self._numbers, self.forms))
+            low, high = ends_of(self.named[index], key, axis, self._numbers, self.forms)
             if low[3:].any():
-                yield element, low, high
+                yield element, low[:-1], high[:-1]
 
     def _with_radius(self, line: Line) -> Line:
         """An upright round part with a radius in place of a width or depth; in the middle if it fills the whole."""
@@ -158,103 +199,96 @@ class Layout:
         off = max(abs(left + right - width) / 2, abs(front + rear - width) / 2, abs(width - depth))
         return min(right - left, rear - front) > TIES.fills * width and off < TIES.off_middle * width
 
-    def _elements(self, index: int) -> Iterator[Element]:
-        """The elements of a line."""
+    def _ends(self, index: int, key: str, axis: int) -> tuple[float, float] | None:
+        """The ends of an element of a line; ``None`` if a point is not given along this axis."""
         line = self.lines[index]
         keywords = dict(line.keywords)
-        for axis, words in enumerate(AXES):
-            if isinstance(line, Part) and "start" not in keywords:
-                is_round = axis < 2 and line.kind in ROUND and index not in self.filling
-                ends = ends_of(line, "", axis, self.sizes)
-                yield Element(index, "", axis, "round" if is_round else "interval", *ends)
-            elif isinstance(line, Part):
-                points = {key: ends_of(line, key, axis, self.sizes) for key in POINTS if key in keywords}
-                if self._is_across(line, axis):
-                    yield Element(index, "across", axis, "interval", *ends_of(line, "across", axis, self.sizes))
-                for key, ends in points.items():
-                    if key == "start" or abs(ends[0] - points["start"][0]) > ALIGNED:
-                        yield Element(index, key, axis, "coordinate", *ends)
-            elif line.kind == "translate":
-                if step := keywords.get("xyz"[axis]):
-                    first, key = self.first(index)
-                    away = max(1, round(float(line.count)) - 1) * float(step)  # type: ignore[arg-type]
-                    low, high = ends_of(self.lines[first], key, axis, self.sizes)
-                    yield Element(index, "last", axis, "coordinate", low + away, high + away)
-            elif not keywords.keys().isdisjoint(words) or (line.kind == "rotate" and axis < 2):
-                key = "plane" if line.kind == "mirror" else "centre"
-                yield Element(index, key, axis, "coordinate", *ends_of(line, key, axis, self.sizes))
+        if key == "last":
+            assert isinstance(line, Group)
+            if not (step := keywords.get("xyz"[axis])):
+                return None
+            first, inner = self.first(index)
+            away = max(1, round(float(line.count)) - 1) * float(step)  # type: ignore[arg-type]
+            low, high = ends_of(self.lines[first], inner, axis, self.sizes)
+            return low + away, high + away
+        if key in ("plane", "centre") and keywords.keys().isdisjoint(AXES[axis]) and (key == "plane" or axis == 2):
+            return None
+        ends = ends_of(line, key, axis, self.sizes)
+        if key in ("through", "end") and abs(ends[0] - ends_of(line, "start", axis, self.sizes)[0]) <= ALIGNED:
+            return None
+        return ends
 
-    def _is_across(self, bar: Part, axis: int) -> bool:
-        """Whether a bar has a size along an axis, across its direction, and lies in the middle of the whole."""
-        keywords, extent = dict(bar.keywords), self.extents[axis]
-        if SIZES[axis] not in keywords or axis == 2 or abs(float(keywords.get("turn", 0))) > TIES.degrees:  # type: ignore[arg-type]
-            return False
-        ends = (ends_of(bar, key, axis, self.sizes)[0] for key in ("start", "end"))
-        return max(abs(end - extent / 2) for end in ends) < TIES.off_middle * extent
+    def _element(self, index: int, key: str, axis: int, kind: ElementKind, ends: tuple[float, float]) -> Element:
+        anchors = self._anchors.get((index, key, axis), (LOW, LOW) if kind == "interval" else (LOW,))
+        self.elements[index, key, axis] = element = Element(index, key, axis, kind, *ends, anchors)
+        return element
 
     def _with_names(self, line: Line) -> Line:
         """A line with a name for every number, measured from the anchors; lines are given in the order of the text."""
         assert isinstance(line, Part | Group)
-        index = len(self.named)
-        self.named.append(self._part(index, line) if isinstance(line, Part) else self._group(index, line))
-        return self.named[-1]
-
-    def _part(self, index: int, line: Part) -> Part:
-        keywords: list[tuple[str, Argument]] = []
-        arguments = dict(line.keywords)
+        index, kind = len(self.named), "row" if line.kind == "translate" else line.kind
         plain = [(word, self._plain(index, word, argument)) for word, argument in line.keywords
                  if word in KINDS and index not in self.filling]  # fmt: skip
-        if "start" in arguments:
-            keywords += [(word, self._point(index, word)) for word in POINTS if word in arguments]
-            sizes = [(word, axis) for axis, word in enumerate(SIZES) if word in arguments]
-            keywords += [(word, self._across(index, word, axis, float(arguments[word]))) for word, axis in sizes]  # type: ignore[arg-type]
+        self.named.append(replace(line, kind=kind, keywords=(*self._placed(index), *plain)))
+        return self.named[-1]
+
+    def _placed(self, index: int) -> Iterator[tuple[str, Argument]]:
+        """The keywords of a line that are measured from sides, or across a bar."""
+        line = self.lines[index]
+        given = dict(line.keywords)
+        if line.kind == "translate":
+            yield "last", self._point(index, "last")
+        elif isinstance(line, Group):
+            yield from self._point(index, "plane" if line.kind == "mirror" else "centre").keywords
+        elif "start" in given:
+            yield from ((word, self._point(index, word)) for word in POINTS if word in given)
+            yield from ((word, self._across(index, axis)) for axis, word in enumerate(SIZES) if word in given)
         else:
             for axis in range(3):
-                keywords += self._placed(self.elements[index, "", axis])
-        return replace(line, keywords=(*keywords, *plain))
+                yield from self._along(index, axis)
 
-    def _group(self, index: int, line: Group) -> Group:
-        if line.kind == "translate":
-            return replace(line, kind="row", keywords=(("last", self._point(index, "last")),))
-        place = self._point(index, "plane" if line.kind == "mirror" else "centre").keywords
-        step = [(word, self._plain(index, word, argument)) for word, argument in line.keywords if word == "step"]
-        return replace(line, keywords=(*place, *step))
-
-    def _placed(self, element: Element) -> Iterator[tuple[str, Argument]]:
-        """The keywords of an element: clearances, size and offset, by its anchors."""
-        line, axis, words = element.line, element.axis, AXES[element.axis]
-        anchors = self.anchors[line, element.key, axis]
-        if len(set(anchors)) == 1:
-            yield self._distance(element, anchors[0])
-            if element.kind != "round":
-                yield words.size, self._slot(line, words.size, "size", axis, LOW, element.high - element.low)
+    def _along(self, index: int, axis: int) -> Iterator[tuple[str, Argument]]:
+        """The keywords of a part in a box along an axis: clearances, size and offset, by its anchors."""
+        line, words, extent = self.lines[index], AXES[axis], self.extents[axis]
+        is_round = axis < 2 and line.kind in ROUND and index not in self.filling
+        ends = ends_of(line, "", axis, self.sizes)
+        element = self._element(index, "", axis, "round" if is_round else "interval", ends)
+        if len(set(element.anchors)) == 1:
+            yield self._distance(element, element.anchors[0])
+            if not is_round:
+                yield words.size, self._slot(index, words.size, "size", axis, element.high - element.low)
             return
-        extent = self.extents[axis]
-        for word, anchor, distance in zip(words, anchors, (element.low, extent - element.high), strict=False):
+        for word, anchor, distance in zip(words, element.anchors, (element.low, extent - element.high), strict=False):
             if anchor == MIDDLE:  # half of the whole, and as much more or less
-                value = self._slot(line, word, "offset", axis, anchor, distance - extent / 2)
+                value = self._slot(index, word, "offset", axis, distance - extent / 2)
                 yield word, Binary("+", Binary("/", Name(SIZES[axis]), 2.0), value)
             else:
-                yield word, self._slot(line, word, "clearance", axis, anchor, distance)
+                yield word, self._slot(index, word, "clearance", axis, distance)
 
     def _point(self, index: int, key: str) -> Point:
         pairs: list[tuple[str, Value]] = []
         for axis, words in enumerate(AXES):
-            element = self.elements.get((index, key, axis))
-            if element is not None:
-                (anchor,), off = self.anchors[index, key, axis], element.middle - self.extents[axis] / 2
+            if ends := self._ends(index, key, axis):
+                element = self._element(index, key, axis, "coordinate", ends)
+                (anchor,), off = element.anchors, element.middle - self.extents[axis] / 2
                 if key not in ("plane", "centre") or anchor != MIDDLE or abs(off) >= ALIGNED:
                     pairs.append(self._distance(element, anchor))
                 elif key == "plane":
                     pairs.append((words.offset, 0.0))
         return Point(tuple(pairs))
 
-    def _across(self, index: int, word: str, axis: int, size: float) -> Value:
+    def _across(self, index: int, axis: int) -> Value:
         """A size of a bar: a number, or the extent of the whole less two equal clearances."""
-        if self.anchors.get((index, "across", axis)) != (LOW, HIGH):
-            return self._slot(index, word, "size", axis, LOW, size)
-        value = self._slot(index, AXES[axis].low, "clearance", axis, LOW, (self.extents[axis] - size) / 2)
-        return Binary("-", Name(SIZES[axis]), Binary("*", 2.0, value))
+        bar, extent = self.lines[index], self.extents[axis]
+        straight = abs(float(dict(bar.keywords).get("turn", 0))) <= TIES.degrees  # type: ignore[arg-type]
+        off = max(abs(ends_of(bar, key, axis, self.sizes)[0] - extent / 2) for key in ("start", "end"))
+        low, high = ends_of(bar, "across", axis, self.sizes)
+        if axis < 2 and straight and off < TIES.off_middle * extent:
+            element = self._element(index, "across", axis, "interval", (low, high))
+            if element.anchors == (LOW, HIGH):
+                value = self._slot(index, AXES[axis].low, "clearance", axis, (extent - (high - low)) / 2)
+                return Binary("-", Name(SIZES[axis]), Binary("*", 2.0, value))
+        return self._slot(index, SIZES[axis], "size", axis, high - low)
 
     def _distance(self, element: Element, anchor: int) -> tuple[str, Name]:
         """The keyword and the number of a distance from an anchor."""
@@ -262,17 +296,50 @@ class Layout:
         word = (AXES[axis].low, AXES[axis].offset, AXES[axis].high)[anchor]
         value = (element.low, element.middle - extent / 2, extent - element.high)[anchor]
         key = f"{element.key}.{word}" if element.key else word
-        return word, self._slot(element.line, key, "offset" if anchor == MIDDLE else "clearance", axis, anchor, value)
+        return word, self._slot(element.line, key, "offset" if anchor == MIDDLE else "clearance", axis, value)
 
     def _plain(self, index: int, word: str, argument: Argument) -> Argument:
         """A number, or a pair of radii, that is not measured from a side."""
         if isinstance(argument, tuple):
             return self._plain(index, f"{word}.0", argument[0]), self._plain(index, f"{word}.1", argument[1])  # type: ignore[return-value]
         kind = KINDS[word.partition(".")[0]]
-        return self._slot(index, word, kind, -1, LOW, float(argument))  # type: ignore[arg-type]
+        return self._slot(index, word, kind, -1, float(argument))  # type: ignore[arg-type]
 
-    def _slot(self, line: int, word: str, kind: Kind, axis: int, anchor: int, value: float) -> Name:
+    def _slot(self, line: int, word: str, kind: Kind, axis: int, value: float) -> Name:
         self.index[line, word] = len(self.slots)
         self.names.append(f"n{len(self.slots)}")
-        self.slots.append(Slot(line, word, kind, axis, anchor, value))
+        self.slots.append(Slot(line, word, kind, axis, value))
         return Name(self.names[-1])
+
+
+def ends_of(
+    line: Part | Group, key: str, axis: int, numbers: Mapping[str, float], forms: Mapping[str, Any] | None = None
+) -> tuple[Any, Any]:
+    """The low and high coordinate of an element from the low side of the whole.
+
+    Parameters
+    ----------
+    line, key, axis
+        As of :class:`Element`.
+    numbers
+        The values of all names.
+    forms
+        What names stand for in the result, such as linear forms; by default their values.
+    """
+    keywords, values = dict(line.keywords), numbers if forms is None else forms
+    pairs: Keywords = line.keywords
+    if key in (*POINTS, "last"):
+        argument = keywords[key]
+        assert isinstance(argument, Point)
+        pairs = argument.keywords
+    given = {word: value_at(value, values) for word, value in pairs if word in AXES[axis]}  # type: ignore[arg-type]
+    sides = 0.0, values[SIZES[axis]]
+    if key in ("", "across"):
+        if "radius" in keywords and axis < 2:
+            radii = keywords["radius"] if isinstance(keywords["radius"], tuple) else (keywords["radius"],)
+            largest = max(radii, key=lambda radius: value_at(radius, numbers))
+            given[SIZES[axis]] = 2 * value_at(largest, values)  # type: ignore[arg-type]
+        return interval_of(axis, given, *sides)
+    start = ends_of(line, "start", axis, numbers, forms)[0] if key in ("through", "end") else None
+    coordinate = coordinate_of(axis, given, *sides, start)
+    return coordinate, coordinate

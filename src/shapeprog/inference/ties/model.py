@@ -20,7 +20,6 @@ from shapeprog.inference.ties.layout import Layout
 from shapeprog.inference.ties.relations import HOLDS
 from shapeprog.inference.ties.settings import TIES
 from shapeprog.language.evaluate import expanded, symbolic
-from shapeprog.language.expression import Linear
 from shapeprog.language.program import Program
 from shapeprog.space import FloatArray
 
@@ -50,9 +49,11 @@ class Model:
         assert scale is not None
         floor = scale.floor + (layout.extents[2] - layout.forms["height"]) * 0.5  # the middle of the whole stays
         nodes = list(Program(symbolic(layout.source, layout.forms, (floor, scale.middle))).walk())
-        forms = [Linear() + nodes[n].values[slot] for n, slot in self.tunable.moving]
-        self.jacobian: FloatArray = np.array([layout.row(form) for form in forms]).reshape(-1, len(self.slots))
-        self._offset = np.array([form.constant for form in forms])
+        values = np.zeros((len(self.tunable.moving), len(self.slots) + 1))
+        for value, (n, slot) in zip(values, self.tunable.moving, strict=True):
+            value += nodes[n].values[slot]
+        self.jacobian: FloatArray = values[:, :-1] - values[:, -1:]
+        self._offset = values[:, -1]
         self.low: FloatArray = self.tunable.low.numpy() - self._offset
 
     def values(self, numbers: FloatArray) -> torch.Tensor:

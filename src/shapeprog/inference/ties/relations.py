@@ -15,8 +15,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from shapeprog.inference.ties.elements import HIGH, LOW, MIDDLE, Element
-from shapeprog.inference.ties.layout import Layout, Slot
+from shapeprog.inference.ties.layout import HIGH, LOW, MIDDLE, Element, Layout, Slot
 from shapeprog.inference.ties.settings import TIES
 from shapeprog.language.ast import Part
 from shapeprog.library.independence import beside
@@ -173,7 +172,7 @@ def _of_numbers(layout: Layout, numbers: FloatArray) -> Iterator[Relation]:
     floor = TIES.at_floor * numbers[2]
     for k, slot in enumerate(slots):
         if slot.kind == "clearance":
-            if slot.axis == 2 and slot.anchor == LOW and numbers[k] < floor:
+            if slot.word.endswith("bottom") and numbers[k] < floor:
                 yield Relation(eye[k], TIES.floor, limit=max(TIES.within, floor))
             else:
                 yield Relation(eye[k], TIES.equal)

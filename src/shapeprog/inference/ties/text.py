@@ -10,10 +10,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from shapeprog.inference.ties.elements import ends_of
 from shapeprog.inference.ties.expressions import Solution
 from shapeprog.inference.ties.groups import grouped, simplified
-from shapeprog.inference.ties.layout import Layout
+from shapeprog.inference.ties.layout import Layout, ends_of
 from shapeprog.inference.ties.settings import TIES
 from shapeprog.language.ast import Assignment, Group, Line, Part, Point, Source, changed_lines, changed_values, values
 from shapeprog.language.expression import Expression, Linear, Name, Value, combined, names_in, replaced, value_at
@@ -45,24 +44,16 @@ def written(layout: Layout, solution: Solution, free: FloatArray, *, group: bool
     group
         Whether lines are grouped where that is shorter.
     """
-    shared, table = _expressions(layout, solution, free)
-    header: list[Assignment] = []
-    extents: list[Value] = (solution.factors[:3] @ free).tolist()
-    if np.array_equal(solution.factors[0], solution.factors[1]):
-        header.append(Assignment((("diameter", extents[0]),)))
-        extents[:2] = [Name("diameter")] * 2
+    is_round = np.array_equal(solution.factors[0], solution.factors[1])
+    width, depth, height = (solution.factors[:3] @ free).tolist()
+    header = [Assignment((("diameter", width),))] if is_round else []
+    extents = (Name("diameter"), Name("diameter"), height) if is_round else (width, depth, height)
     header.append(Assignment(tuple(zip(SIZES, extents, strict=True))))
+    shared, table = _expressions(layout, solution, free, "diameter" if is_round else "")
+    body, shared = _inlined(_changed(layout.body, table), shared)
     known = Source((*header, Assignment(tuple(shared.items())))).evaluated_numbers()
-    body = changed_lines(_changed(layout.body, table), simplified)
-    body = grouped(body, known) if group else merged_lines(body)
-    uses = Counter(name for line in Source(body).walk() for value in values(line) for name in names_in(value))
-    uses += Counter(name for value in shared.values() for name in names_in(value))
-    once: dict[str, Value] = {}
-    for name, value in shared.items():  # sums come last
-        if uses[name] < 2:
-            once[name] = _with(value, once)
-    shared = {name: _with(value, once) for name, value in shared.items() if name not in once}
-    body = _changed(body, once)
+    body = changed_lines(body, simplified)
+    body, shared = _inlined(grouped(body, known) if group else merged_lines(body), shared)
     names = named(body, shared, known)
     final: dict[str, Value] = {provisional: Name(name) for provisional, name in names.items()}
     pairs = [(names[name], _with(value, final)) for name, value in shared.items()]
@@ -74,31 +65,37 @@ def written(layout: Layout, solution: Solution, free: FloatArray, *, group: bool
     return Source((*header, *_changed(body, final)), layout.source.unit, replace(scale, floor=floor))
 
 
-def _expressions(layout: Layout, solution: Solution, at_free: FloatArray) -> tuple[dict[str, Value], dict[str, Value]]:
-    """The numbers and sums that several numbers of a program share, by provisional name, and all of its numbers."""
-    slots, names, factors, free = layout.slots, layout.names, solution.factors, solution.free
+def _expressions(
+    layout: Layout, solution: Solution, at_free: FloatArray, diameter: str
+) -> tuple[dict[str, Value], dict[str, Value]]:
+    """The free numbers, and sums that several numbers are, by provisional name; and all numbers by these names."""
+    names, factors, free = layout.names, solution.factors, solution.free
+    atoms = [Name(names[k] if k > 1 else diameter or names[k]) for k in free]
+    order = sorted((layout.slots[k].line, k, float(value) + 0.0) for k, value in zip(free, at_free, strict=True))
+    shared: dict[str, Value] = {names[k]: value for _, k, value in order if k > 2}
     alike: dict[bytes, list[int]] = {}  # numbers that follow from the free ones in the same way
-    for p in range(3, len(slots)):
+    for p in range(3, len(names)):
         alike.setdefault(factors[p].round(6).tobytes(), []).append(p)
-    rows = factors[[members[0] for members in alike.values()]]
-    single = np.array([len(members) == 1 for members in alike.values()])
-    terms: list[Value] = [0.0] * len(free)
-    shared: dict[str, Value] = {}
-    for z in sorted(range(len(free)), key=lambda z: (slots[free[z]].line, free[z])):
-        k = free[z]
-        terms[z] = float(at_free[z]) + 0.0
-        if k < 3:
-            terms[z] = Name("diameter" if k < 2 and np.array_equal(factors[0], factors[1]) else SIZES[k])
-        elif (used := rows[:, z] != 0).sum() > 1 or (used & ~single & ((rows != 0).sum(1) == 1)).any():
-            shared[names[k]], terms[z] = terms[z], Name(names[k])
     table: dict[str, Value] = {}
-    for members in alike.values():
-        row, name = factors[members[0]], names[members[0]]
-        value = combined(0.0, sorted(((terms[z], float(row[z])) for z in np.flatnonzero(row)), key=lambda t: t[1] < 0))
-        if len(members) > 1 and isinstance(value, Expression) and not isinstance(value, Name):
+    for first, *others in alike.values():
+        name = f"{names[first]}_sum"
+        terms = [(atoms[z], float(factors[first, z])) for z in np.flatnonzero(factors[first])]
+        value = combined(0.0, sorted(terms, key=lambda term: term[1] < 0))
+        if others and isinstance(value, Expression) and not isinstance(value, Name):
             shared[name], value = value, Name(name)
-        table |= {names[k]: value for k in members}
+        table |= {names[k]: value for k in (first, *others)}
     return shared, table
+
+
+def _inlined(lines: tuple[Line, ...], shared: Mapping[str, Value]) -> tuple[tuple[Line, ...], dict[str, Value]]:
+    """Lines and named values without the names that are used once."""
+    uses = Counter(name for line in Source(lines).walk() for value in values(line) for name in names_in(value))
+    uses += Counter(name for value in shared.values() for name in names_in(value))
+    once: dict[str, Value] = {}
+    for name, value in shared.items():  # sums come last
+        if uses[name] < 2:
+            once[name] = _with(value, once)
+    return _changed(lines, once), {name: _with(value, once) for name, value in shared.items() if name not in once}
 
 
 def _with(value: Value, table: Mapping[str, Value]) -> Value:
@@ -116,16 +113,14 @@ def _changed(lines: tuple[Line, ...], table: Mapping[str, Value]) -> tuple[Line,
     return changed_lines(lines, lambda line: changed_values(line, lambda value: _with(value, table)))
 
 
-def _assignments(pairs: list[tuple[str, Value]]) -> Iterator[Assignment]:
+def _assignments(pairs: list[tuple[str, Value]]) -> list[Assignment]:
     """Names and their values on as many lines as it takes."""
-    line: list[tuple[str, Value]] = []
+    lines: list[list[tuple[str, Value]]] = [[]]
     for pair in pairs:
-        if line and sum(len(f"{name}{value}") + 4 for name, value in [*line, pair]) > 118:
-            yield Assignment(tuple(line))
-            line = []
-        line.append(pair)
-    if line:
-        yield Assignment(tuple(line))
+        if sum(len(f"{name}{value}") + 4 for name, value in [*lines[-1], pair]) > 118:
+            lines.append([])
+        lines[-1].append(pair)
+    return [Assignment(tuple(line)) for line in lines if line]
 
 
 class Use(NamedTuple):

@@ -10,19 +10,17 @@ reduction of a lattice basis.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
 from itertools import product
+from typing import NamedTuple
 
 import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from shapeprog.geometry.separation import gaps, touching
-from shapeprog.inference.fit.tunable import DEGREES
 from shapeprog.inference.ties.layout import Slot
 from shapeprog.inference.ties.model import Model, boxes_of
 from shapeprog.inference.ties.settings import TIES
-from shapeprog.language.parameters import to_float32
 from shapeprog.library.independence import independent
 from shapeprog.space import Array, FloatArray
 
@@ -32,8 +30,7 @@ ELIMINATED = {"clearance": 0, "offset": 0, "edge": 1, "radius": 2, "size": 3, "l
 NOTHING = 1e-7  # factors up to this are zero
 
 
-@dataclass(frozen=True)
-class Solution:
+class Solution(NamedTuple):
     """Free numbers, and how all numbers follow from them.
 
     Parameters
@@ -46,17 +43,6 @@ class Solution:
 
     factors: FloatArray
     free: list[int]
-
-    def values(self, numbers: FloatArray) -> FloatArray:
-        """The free numbers (Z,) that give these numbers (P,)."""
-        values, *_ = np.linalg.lstsq(self.factors, numbers)
-        return np.asarray(values, np.float64)
-
-    def rounded(self, slots: list[Slot], numbers: FloatArray, decimals: int) -> FloatArray:
-        """The free numbers (Z,) that give these numbers (P,), with so many decimals, angles with one."""
-        pairs = zip(self.free, self.values(numbers).tolist(), strict=True)
-        digits = ((DEGREES if slots[k].kind == "angle" else decimals, value) for k, value in pairs)
-        return np.array([to_float32(round(value, count)) for count, value in digits])
 
 
 def solved(slots: list[Slot], rows: FloatArray) -> Solution:
@@ -104,12 +90,12 @@ def _cost(factors: FloatArray, sizes: Array) -> float:
     return float(operators[composite[first]].sum() + TIES.repeated * (len(composite) - len(first)))
 
 
-def carried(solution: Solution, model: Model, numbers: FloatArray) -> Solution:
+def carried(solution: Solution, model: Model, numbers: FloatArray) -> tuple[Solution, FloatArray]:
     """The numbers (P,) of a program as expressions of other free ones, so that fewer parts are separated when a shared
-    one changes."""
-    contacts, slots = _Contacts(model, numbers), model.slots
-    factors, values = solution.factors.copy(), solution.values(numbers)
-    for z, k in enumerate(solution.free):
+    one changes; and the values of these (Z,)."""
+    contacts, slots, free = _Contacts(model, numbers), model.slots, solution.free
+    factors, values = solution.factors.copy(), numbers[free]
+    for z, k in enumerate(free):
         alone = np.count_nonzero(factors[k]) == 1  # not measured from another one
         if slots[k].kind in ("extent", "angle") or np.count_nonzero(factors[:, z]) < 2 or not alone:
             continue
@@ -125,7 +111,7 @@ def carried(solution: Solution, model: Model, numbers: FloatArray) -> Solution:
             y, way = best
             factors[:, z] += way * factors[:, y]
             values[y] -= way * values[z]
-    return replace(solution, factors=factors)
+    return Solution(factors, free), values
 
 
 def _carriable(factors: FloatArray, model: Model, lost: set[int], z: int) -> list[int]:

@@ -19,7 +19,7 @@ from shapeprog.geometry.mesh import pieces_of_parts
 from shapeprog.inference.budget import Progress
 from shapeprog.inference.candidates.drawings import solid_boxes
 from shapeprog.inference.fit.joints import find_joints
-from shapeprog.inference.fit.tunable import CELLS
+from shapeprog.inference.fit.tunable import CELLS, DEGREES
 from shapeprog.inference.surface.evidence import Evidence
 from shapeprog.inference.ties.anchors import anchors_of
 from shapeprog.inference.ties.expressions import Solution, carried, solved
@@ -119,8 +119,9 @@ class _Ties:
         """
         slots, untied = self.layout.slots, set[int]()
         for _ in range(TIES.untied):
-            solution, numbers = self._solved(price, self.fixed | np.array([slot.line in untied for slot in slots]))
-            free = solution.rounded(slots, numbers, self.decimals)
+            solution, values = self._solved(price, self.fixed | np.array([slot.line in untied for slot in slots]))
+            digits = (DEGREES if slots[k].kind == "angle" else self.decimals for k in solution.free)
+            free = np.array([to_float32(number) for number in map(round, values.tolist(), digits)])
             loose = self._loose(solution.factors @ free) - self.loose
             if not loose:
                 break
@@ -134,7 +135,7 @@ class _Ties:
         return {self.layout.parts[block] for block in scene.block[pieces_of_parts(scene) > 0].tolist()}
 
     def _solved(self, price: float, fixed: Array) -> tuple[Solution, FloatArray]:
-        """The free numbers at a price of a number, and all numbers (P,); some (P,) are in no relation."""
+        """The free numbers at a price of a number, and their values (Z,); some numbers (P,) are in no relation."""
         numbers, rows = self.model.numbers, self.layout.fixed()
         for step in range(TIES.rounds):
             offered = relations(self.layout, numbers, self.touching)
@@ -150,7 +151,7 @@ class _Ties:
             if step and len(rows) == before:
                 break
             numbers = self.misfit.refitted(optimum, rows)
-        return carried(solved(self.layout.slots, rows), self.model, numbers), numbers
+        return carried(solved(self.layout.slots, rows), self.model, numbers)
 
 
 def between_ends(program: Program) -> Program:

@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import combinations
+from typing import Any
 
 import numpy as np
 
@@ -68,62 +69,54 @@ def grouped(lines: Sequence[Line], numbers: dict[str, float]) -> tuple[Line, ...
             single += [replace(line, body=(inner,)) for inner in line.body]
         else:
             single.append(line)
-    divided = changed_lines(single, lambda line: _divided(line, numbers) if isinstance(line, Group) else line)
+    divided = changed_lines(single, lambda line: _divided(line, numbers))
     return _in_boxes(merged_lines(divided), numbers)
 
 
-def _divided(loop: Group, numbers: dict[str, float]) -> Group:
-    """A row, or a mirror, of a part whose copies are neighbours as the division of a box."""
-    if loop.kind not in ("row", "mirror") or len(loop.body) != 1 or len(loop.keywords) != 1:
-        return loop
-    (part,), ((word, place),) = loop.body, loop.keywords
-    further: Keywords = ()
-    if isinstance(place, Point):
-        (word, place), *further = place.keywords  # type: ignore[assignment]
-    keywords = dict(part.keywords) if isinstance(part, Part) else {}
-    if not isinstance(part, Part) or part.kind not in ("box", "cushion") or {"tilt", "lean"} & keywords.keys():
-        return loop
-    axis = axis_of(word)
-    words, size = AXES[axis], keywords.get(AXES[axis].size, "")
-    clearances: dict[str, Argument]
-    if loop.kind == "row":
-        first, count = words.high if word == words.low else words.low, loop.count
-        if word == words.offset or further or not (first in keywords or first == "bottom"):
+def _divided(loop: Line, numbers: dict[str, float]) -> Line:
+    """A row, or a mirror, of a part whose copies are neighbours as the division of a box; other lines as they are."""
+    match loop:
+        case Group("row", ((_, Point(((word, place),))),), (Part("box" | "cushion", pairs) as part,), float(count)):
+            words, keywords = AXES[axis_of(word)], dict(pairs)
+            first = words.high if word == words.low else words.low
+            if word == words.offset or not (first in keywords or first == "bottom"):
+                return loop
+            clearances: dict[str, Any] = {word: place, first: keywords.get(first, 0.0)}
+            sized = isinstance(keywords.get(words.size), float)
+        case Group("mirror", (("x" | "y" as word, 0.0),), (Part("box" | "cushion", pairs) as part,)):
+            words, keywords, count = AXES[axis_of(word)], dict(pairs), 2.0
+            sides = (keywords[side] for side in words[:2] if side in keywords)
+            given = sorted(sides, key=lambda value: value_at(value, numbers))  # type: ignore[arg-type]
+            if not given:
+                return loop
+            clearances = dict.fromkeys(words[:2], given[0])
+            # The inner side is in the middle, or the size is a number.
+            sized = isinstance(keywords.get(words.size), float) or names_in(given[-1]) == [words.size]  # type: ignore[arg-type]
+        case _:
             return loop
-        clearances, sized = {word: place, first: keywords.get(first, 0.0)}, isinstance(size, float)
-    else:  # the inner side is in the middle, or the size is a number
-        given = sorted((keywords[side] for side in words[:2] if side in keywords), key=lambda v: value_at(v, numbers))  # type: ignore[arg-type]
-        if axis == 2 or place != 0 or word != words.offset or not given:
-            return loop
-        count, clearances = 2.0, dict.fromkeys(words[:2], given[0])
-        sized = isinstance(size, float) or [*names_in(given[-1])] == [SIZES[axis]]  # type: ignore[arg-type]
+    axis = AXES.index(words)
     low, high = ends_of(part, "", axis, numbers)
-    if not sized or not isinstance(count, float | int) or high - low < TIES.divided:
+    if not sized or high - low < TIES.divided or {"tilt", "lean"} & keywords.keys():
         return loop
-    occupied = sum(value_at(clearance, numbers) for clearance in clearances.values()) + count * (high - low)  # type: ignore[arg-type]
+    occupied = sum(value_at(clearance, numbers) for clearance in clearances.values()) + count * (high - low)
     gap = to_float32(round((numbers[SIZES[axis]] - occupied) / (count - 1), 2))
     if not 0 <= gap <= TIES.gap * (high - low):
         return loop
     shared = [pair for pair in part.keywords if pair[0] in BOX and pair[0] not in words]
     remaining = tuple(pair for pair in part.keywords if pair[0] not in BOX)
     sides = [(side, clearances[side]) for side in words[:2] if clearances[side] != 0]
-    box = ordered((*sides, *shared))
-    if gap:
-        box = (("gap", gap), *box)
-    return Group("divide", box, (replace(part, keywords=remaining),), float(count), "xyz"[axis])
+    spacing = (("gap", gap),) if gap else ()
+    box = (*spacing, *ordered((*sides, *shared)))
+    return Group("divide", box, (replace(part, keywords=remaining),), count, "xyz"[axis])
 
 
 def _in_boxes(lines: tuple[Line, ...], numbers: dict[str, float]) -> tuple[Line, ...]:
     """Parts and loops with equal clearances moved into boxes, while that saves words."""
-
-    def place(side: tuple[str, Argument]) -> int:
-        return BOX.index(side[0])
-
     while True:
         sides = {line: _sides(line) for line in lines if not isinstance(line, Group) or line.kind != "inside"}
         frames = {one & other for one, other in combinations(sides.values(), 2)} - {frozenset()}
         best, saved = lines, 0
-        for frame in sorted((tuple(sorted(frame, key=place)) for frame in frames), key=str):
+        for frame in sorted((tuple(sorted(frame, key=lambda side: BOX.index(side[0]))) for frame in frames), key=str):
             inner = {line: _inside(line, frame) for line in sides}
             members = [
                 line for line in sides

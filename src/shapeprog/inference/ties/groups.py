@@ -104,9 +104,9 @@ def _divided(loop: Line, numbers: dict[str, float]) -> Line:
         return loop
     shared = [pair for pair in part.keywords if pair[0] in BOX and pair[0] not in words]
     remaining = tuple(pair for pair in part.keywords if pair[0] not in BOX)
-    sides = [(side, clearances[side]) for side in words[:2] if clearances[side] != 0]
+    shared += [(side, clearances[side]) for side in words[:2] if clearances[side] != 0]
     spacing = (("gap", gap),) if gap else ()
-    box = (*spacing, *ordered((*sides, *shared)))
+    box = (*spacing, *ordered(tuple(shared)))
     return Group("divide", box, (replace(part, keywords=remaining),), count, "xyz"[axis])
 
 

@@ -109,9 +109,9 @@ class Layout:
     ----------
     sizes, extents
         Width, depth and height of the whole, by name and in this order.
-    lines, parts
-        Its parts and loops, in the order of the text, and the numbers of those that are parts; upright round parts have
-        a radius.
+    lines, words, parts
+        Its parts and loops, in the order of the text, their roles, or else kinds, and the numbers of those that are
+        parts; upright round parts have a radius.
     top, loops_around
         For every line the index at the top level of the line that it is inside of, and the numbers of the loops around
         it.
@@ -135,6 +135,7 @@ class Layout:
         tree = changed_lines([line for line in source.lines if isinstance(line, Part | Group)], self._with_radius)
         self.lines = [line for line in Source(tree).walk() if isinstance(line, Part | Group)]
         self.top = [index for index, line in enumerate(tree) for _ in Source((line,)).walk()]
+        self.words = [(isinstance(line, Part) and line.role) or line.kind for line in self.lines]
         self.parts = [index for index, line in enumerate(self.lines) if isinstance(line, Part)]
         self.filling = {index for index in self.parts if self._fills(self.lines[index])}  # type: ignore[arg-type]
         if self.filling:

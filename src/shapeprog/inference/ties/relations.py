@@ -17,7 +17,6 @@ import numpy.typing as npt
 
 from shapeprog.inference.ties.layout import HIGH, LOW, MIDDLE, Element, Layout, Slot
 from shapeprog.inference.ties.settings import TIES
-from shapeprog.language.ast import Part
 from shapeprog.library.independence import beside
 from shapeprog.space import FloatArray
 
@@ -198,10 +197,7 @@ def _of_numbers(layout: Layout, numbers: FloatArray) -> Iterator[Relation]:
 
 def _comparable(layout: Layout, slot: Slot, other: Slot, larger: float) -> bool:
     """Whether two sizes measure the same quantity of parts of one role, or of two sections."""
-    one, two = layout.lines[slot.line], layout.lines[other.line]
-    assert isinstance(one, Part)  # loops have no sizes
-    assert isinstance(two, Part)
-    same = (one.role or one.kind) == (two.role or two.kind)
+    same = layout.words[slot.line] == layout.words[other.line]
     sections = same or (_is_section(layout, slot) and _is_section(layout, other))
     return (sections and larger < TIES.section) or (same and slot.axis == other.axis)
 

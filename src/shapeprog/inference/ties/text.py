@@ -144,11 +144,12 @@ def named(lines: Sequence[Line], wanted: Mapping[str, Value], numbers: dict[str,
         What all names evaluate to.
     """
     every = [*_uses(lines)]
-    alone = {name: [use for use, value in every if value == Name(name)] for name in wanted}
-    in_sums = {name: [use for use, value in every if name in names_in(value)] for name in wanted}  # used if not alone
-    for name, value in reversed([*wanted.items()]):
-        for inner in {*names_in(value)} & wanted.keys():
-            in_sums[inner] += alone[name] or in_sums[name]
+    uses: dict[str, list[Use]] = {}  # of numbers that are used in sums alone, those of the sums
+    for name in reversed([*wanted]):
+        uses[name] = [use for use, value in every if value == Name(name)] or [
+            *(use for use, value in every if name in names_in(value)),
+            *(use for outer in uses if name in names_in(wanted[outer]) for use in uses[outer]),
+        ]
     words = language()
     used = {*SIZES, "diameter", *RESERVED, *words.names, *words.roles, *(_role(use.part) for use, _ in every)}
     used -= {"gap", "edge", "radius"}
@@ -161,14 +162,12 @@ def named(lines: Sequence[Line], wanted: Mapping[str, Value], numbers: dict[str,
             less, larger = FURTHER.get(base.rpartition("_")[2], ("small", "large"))
             return f"{larger if abs(number) > abs(values.get(base, 0.0)) else less}_{base}"
 
-        uses = alone[provisional] or in_sums[provisional]
-        shared, own = _candidates(uses, numbers)
+        shared, own = _candidates(uses[provisional], numbers)
         offered = [*shared, *(further(base) for base in shared if base in FURTHER), *own, *map(further, own)]
-        offered += (f"{_role(use.part)}_{use.word}" for use in uses if use.word not in SIZES)
+        offered += (f"{_role(use.part)}_{use.word}" for use in uses[provisional] if use.word not in SIZES)
         offered += (f"{own[0]}_{count}" for count in range(2, len(wanted) + 2))
-        result[provisional] = name = next(name for name in offered if name not in used)
+        result[provisional] = name = next(name for name in offered if name not in used | values.keys())
         values[name] = number
-        used.add(name)
     return result
 
 

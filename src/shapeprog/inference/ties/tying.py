@@ -138,10 +138,10 @@ class _Ties:
         """The free numbers at a price of a number, and their values (Z,); some numbers (P,) are in no relation."""
         numbers, rows = self.model.numbers, self.layout.fixed()
         for step in range(TIES.rounds):
-            offered = relations(self.layout, numbers, self.touching)
-            offered = [relation for relation in offered if not relation.row[fixed].any()]
-            if step == 0:
-                offered = [relation for relation in offered if relation.trust in (TIES.contact, TIES.floor)]
+            offered = [
+                relation for relation in relations(self.layout, numbers, self.touching)
+                if not relation.row[fixed].any() and (step > 0 or relation.trust in (TIES.contact, TIES.floor))
+            ]  # fmt: skip
             before = len(rows)
             _, curvature = self.misfit.at(numbers, TIES.draws)
             rows, optimum = worthwhile(

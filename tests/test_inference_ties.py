@@ -23,7 +23,7 @@ from shapeprog.inference.ties.anchors import anchors_of
 from shapeprog.inference.ties.expressions import solved
 from shapeprog.inference.ties.groups import grouped
 from shapeprog.inference.ties.layout import Layout, Slot
-from shapeprog.inference.ties.model import Misfit, Model, closeness
+from shapeprog.inference.ties.misfit import Misfit, closeness
 from shapeprog.inference.ties.relations import Relation, worthwhile
 from shapeprog.inference.ties.settings import TIES
 from shapeprog.inference.ties.text import named
@@ -556,7 +556,7 @@ def test_long_parts_span_and_short_ones_keep_their_size(end: float, expected: tu
     source = placed(
         sp.parse(f"width, depth, height = 24, 6, 4\nbox(left=0, right={24 - end - 0.5})\nbox(right=0, width=1)\n")
     )
-    found = anchors_of(Model(Layout(source.source)))
+    found = anchors_of(Layout(source.source))
     assert found[0, "", 0] == expected
     assert found[1, "", 0] == (2, 2)
 
@@ -575,7 +575,7 @@ def test_a_round_part_that_fills_the_whole_gives_it_one_diameter():
 
 
 def slots(*kinds: str) -> list[Slot]:
-    return [Slot(k, "width", kind, 0, 0, 1.0) for k, kind in enumerate(kinds)]  # type: ignore[arg-type]
+    return [Slot(k, "width", kind, 0, 1.0) for k, kind in enumerate(kinds)]  # type: ignore[arg-type]
 
 
 def test_equal_numbers_have_one_free_number_and_sums_follow():
@@ -766,11 +766,11 @@ def test_of_attempts_that_all_lose_too_much_the_closest_is_kept(monkeypatch):
 def test_a_refit_goes_on_where_a_part_would_become_too_thin():
     target = sp.parse("top(box(at=(4, -8, -12), size=(0.02, 16, 24)))\nbase(box(at=(-6, -8, -12), size=(2, 16, 24)))\n")
     start = sp.parse("top(box(at=(4, -8, -12), size=(0.1, 16, 24)))\nbase(box(at=(-6, -8, -12), size=(2.4, 16, 24)))\n")
-    model = Model(Layout(placed(start).source))
-    joints = find_joints(model.scene(model.numbers), -1e6)
-    misfit = Misfit(model, evidence_of_program(target), joints, np.zeros(len(model.numbers)), 0)
-    fitted = misfit.refitted(model.numbers, np.zeros((0, len(model.numbers))))
-    (top, base) = model.scene(fitted).size[:, 0].tolist()
+    layout = Layout(placed(start).source)
+    joints = find_joints(layout.scene(layout.numbers), -1e6)
+    misfit = Misfit(layout, evidence_of_program(target), joints, np.zeros(len(layout.numbers)), 0)
+    fitted = misfit.refitted(layout.numbers, np.zeros((0, len(layout.numbers))))
+    (top, base) = layout.scene(fitted).size[:, 0].tolist()
     assert top >= 0.05 - 1e-6  # half of the least thickness
     assert base == pytest.approx(1.0, abs=0.03)
 

@@ -20,8 +20,7 @@ from torch import Tensor
 from shapeprog.geometry.primitive import SIZES
 from shapeprog.geometry.scene import Scene
 from shapeprog.geometry.separation import touching
-from shapeprog.inference.ties.layout import HIGH, LOW, MIDDLE, Anchors, Element, Key, Layout
-from shapeprog.inference.ties.model import Model, boxes_of
+from shapeprog.inference.ties.layout import HIGH, LOW, MIDDLE, Anchors, Element, Key, Layout, boxes_of
 from shapeprog.inference.ties.settings import TIES
 from shapeprog.language.placement import AXES
 from shapeprog.space import Array, FloatArray
@@ -176,10 +175,9 @@ def _ends(scene: Scene, change: Float[Tensor, "N 16"]) -> FloatArray:
     return np.stack([boxes.centre - reach, boxes.centre + reach]).swapaxes(1, 2)
 
 
-def anchors_of(model: Model) -> dict[Key, Anchors]:
+def anchors_of(layout: Layout) -> dict[Key, Anchors]:
     """The anchors of all elements of a program, given with all faces measured from the low side."""
-    layout, (scene, rows) = model.layout, model.poses(model.numbers)
-    scale, (width, depth, _) = layout.source.scale, layout.extents
+    (scene, rows), (width, depth, _), scale = layout.poses(layout.numbers), layout.extents, layout.source.scale
     assert scale is not None
     corner = np.array([-width / 2, scale.middle - depth / 2, scale.floor])[:, None]
     ends = _ends(scene, 0 * rows[..., 0]) - corner

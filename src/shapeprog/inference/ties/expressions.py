@@ -18,8 +18,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from shapeprog.geometry.separation import gaps, touching
-from shapeprog.inference.ties.layout import Slot
-from shapeprog.inference.ties.model import Model, boxes_of
+from shapeprog.inference.ties.layout import Layout, Slot, boxes_of
 from shapeprog.inference.ties.settings import TIES
 from shapeprog.library.independence import independent
 from shapeprog.space import Array, FloatArray
@@ -90,10 +89,10 @@ def _cost(factors: FloatArray, sizes: Array) -> float:
     return float(operators[composite[first]].sum() + TIES.repeated * (len(composite) - len(first)))
 
 
-def carried(solution: Solution, model: Model, numbers: FloatArray) -> tuple[Solution, FloatArray]:
+def carried(solution: Solution, layout: Layout, numbers: FloatArray) -> tuple[Solution, FloatArray]:
     """The numbers (P,) of a program as expressions of other free ones, so that fewer parts are separated when a shared
     one changes; and the values of these (Z,)."""
-    contacts, slots, free = _Contacts(model, numbers), model.slots, solution.free
+    contacts, slots, free = _Contacts(layout, numbers), layout.slots, solution.free
     factors, values = solution.factors.copy(), numbers[free]
     for z, k in enumerate(free):
         alone = np.count_nonzero(factors[k]) == 1  # not measured from another one
@@ -102,7 +101,7 @@ def carried(solution: Solution, model: Model, numbers: FloatArray) -> tuple[Solu
         cost, lost = contacts.cost(factors[:, z], values[z])
         for _ in range(TIES.operations if cost else 0):
             best = None
-            for y, way in product(_carriable(factors, model, lost, z), (1.0, -1.0)):
+            for y, way in product(_carriable(factors, layout, lost, z), (1.0, -1.0)):
                 less, separated = contacts.cost(factors[:, z] + way * factors[:, y], values[z], cost)
                 if less < cost:
                     best, cost, lost = (y, way), less, separated
@@ -114,10 +113,10 @@ def carried(solution: Solution, model: Model, numbers: FloatArray) -> tuple[Solu
     return Solution(factors, free), values
 
 
-def _carriable(factors: FloatArray, model: Model, lost: set[int], z: int) -> list[int]:
+def _carriable(factors: FloatArray, layout: Layout, lost: set[int], z: int) -> list[int]:
     """Free numbers that alone move one of these lines along an axis along which another free number moves parts."""
-    slots = model.slots
-    lines = {around for line in lost for around in (line, *model.layout.loops_around[line])}
+    slots = layout.slots
+    lines = {around for line in lost for around in (line, *layout.loops_around[line])}
     axes = {slots[p].axis for p in np.flatnonzero(factors[:, z])} - {-1}
     result = set()
     for p, slot in enumerate(slots):
@@ -132,10 +131,10 @@ def _carriable(factors: FloatArray, model: Model, lost: set[int], z: int) -> lis
 class _Contacts:
     """Which parts of a program touch, and how many of them come apart when its numbers change."""
 
-    def __init__(self, model: Model, numbers: FloatArray) -> None:
-        self.model, self.numbers = model, numbers
-        scene = model.scene(numbers)
-        self.line = np.array(model.layout.parts)[scene.block.numpy()]
+    def __init__(self, layout: Layout, numbers: FloatArray) -> None:
+        self.layout, self.numbers = layout, numbers
+        scene = layout.scene(numbers)
+        self.line = np.array(layout.parts)[scene.block.numpy()]
         self.first, self.second = touching(boxes_of(scene), TIES.touch)
         self.pieces = self._pieces(np.ones(len(self.first), bool))
 
@@ -145,7 +144,7 @@ class _Contacts:
         total, lost = 0.0, set[int]()
         for factor in TIES.changes:
             if total < least:
-                scene = self.model.scene(self.numbers + (factor - 1) * value * along)
+                scene = self.layout.scene(self.numbers + (factor - 1) * value * along)
                 kept = gaps(boxes_of(scene), self.first, self.second) < TIES.touch
                 total += self._pieces(kept) - self.pieces
                 lost |= {*self.line[[*self.first[~kept], *self.second[~kept]]].tolist()}

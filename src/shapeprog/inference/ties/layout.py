@@ -12,11 +12,18 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
+import torch
+from torch import Tensor
 
+from shapeprog.geometry.scene import Scene
+from shapeprog.geometry.separation import OrientedBoxes
+from shapeprog.inference.fit.tunable import Poses, Tunable
 from shapeprog.inference.ties.settings import TIES
 from shapeprog.language.ast import Argument, Assignment, Group, Keywords, Line, Part, Point, Source, changed_lines
+from shapeprog.language.evaluate import expanded, symbolic
 from shapeprog.language.expression import Binary, Name, Value, value_at
 from shapeprog.language.placement import AXES, POINTS, ROUND, SIZES, coordinate_of, interval_of
+from shapeprog.language.program import Program
 from shapeprog.space import FloatArray
 
 LOW, MIDDLE, HIGH = 0, 1, 2  # anchors
@@ -96,7 +103,7 @@ class Slot:
 
 
 class Layout:
-    """A placed program whose parts are all placed in the whole, measured from anchors, with names for its numbers.
+    """A placed program as a function of its numbers: all parts are placed in the whole and measured from anchors.
 
     Parameters
     ----------
@@ -128,6 +135,11 @@ class Layout:
         The number of every line and keyword.
     named, body, source
         The parts and loops with names, as ``lines``; as lines of a program; and this program.
+    numbers
+        Where the numbers are at the start (P,).
+    tunable, jacobian, low
+        Its statements in cells; how their numbers follow from those of the text (F, P), up to constants; and lower
+        bounds (F,) of the products of both: no part may become thinner than ``THINNEST``.
     """
 
     def __init__(self, source: Source, anchors: Mapping[Key, Anchors] | None = None) -> None:
@@ -155,6 +167,30 @@ class Layout:
         pairs = tuple(self._numbers.items())
         lines = Assignment(pairs[:3]), Assignment(pairs[3:]), *self.body
         self.source = Source(lines, source.unit, source.scale)
+        self.numbers: FloatArray = np.array([slot.value for slot in self.slots])
+        self.tunable, scale = Tunable(Program(expanded(self.source))), source.scale
+        assert scale is not None
+        floor = scale.floor + (self.extents[2] - self.forms["height"]) * 0.5  # the middle of the whole stays
+        nodes = list(Program(symbolic(self.source, self.forms, (floor, scale.middle))).walk())
+        values = np.zeros((len(self.tunable.moving), len(self.slots) + 1))
+        for value, (n, slot) in zip(values, self.tunable.moving, strict=True):
+            value += nodes[n].values[slot]
+        self.jacobian: FloatArray = values[:, :-1] - values[:, -1:]
+        self._offset = values[:, -1]
+        self.low: FloatArray = self.tunable.low.numpy() - self._offset
+
+    def values(self, numbers: FloatArray) -> Tensor:
+        """The numbers of the statements in cells (F,) where those of the text are these (P,)."""
+        return torch.from_numpy(self.jacobian @ numbers + self._offset)
+
+    def scene(self, numbers: FloatArray) -> Scene:
+        """The primitives (N,)."""
+        return self.tunable.scene(self.values(numbers))
+
+    def poses(self, numbers: FloatArray) -> Poses:
+        """The primitives, and their slopes (N, 16, P) by the numbers."""
+        poses = self.tunable.poses(self.values(numbers))
+        return Poses(poses.scene, poses.slopes @ torch.from_numpy(self.jacobian))
 
     def first(self, loop: int) -> tuple[int, str]:
         """The first part inside of a loop, and the key of its elements: a row is measured by it."""
@@ -344,3 +380,9 @@ def ends_of(
     start = ends_of(line, "start", axis, numbers, forms)[0] if key in ("through", "end") else None
     coordinate = coordinate_of(axis, given, *sides, start)
     return coordinate, coordinate
+
+
+def boxes_of(scene: Scene) -> OrientedBoxes:
+    """The boxes around the primitives of a scene (N,), for a person in front: to the right, to the rear, upwards."""
+    edges = scene.rotation.transpose(1, 2) * scene.bounds[..., None]
+    return OrientedBoxes(*(vectors.numpy()[..., ::-1] * [-1, 1, 1] for vectors in (scene.centre, edges)))

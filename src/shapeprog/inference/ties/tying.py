@@ -9,7 +9,7 @@ then named.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Collection
 
 import numpy as np
 
@@ -24,7 +24,7 @@ from shapeprog.inference.surface.evidence import Evidence
 from shapeprog.inference.ties.anchors import anchors_of
 from shapeprog.inference.ties.expressions import Solution, carried, solved
 from shapeprog.inference.ties.layout import Layout
-from shapeprog.inference.ties.model import Misfit, Model, closeness
+from shapeprog.inference.ties.misfit import Misfit, closeness
 from shapeprog.inference.ties.relations import relations, worthwhile
 from shapeprog.inference.ties.settings import TIES
 from shapeprog.inference.ties.text import written
@@ -99,18 +99,17 @@ class _Ties:
     """Everything about a program that does not depend on the price of a number."""
 
     def __init__(self, source: Source, evidence: Evidence, seed: int, *, known: bool, held: Collection[int]) -> None:
-        flat = Model(Layout(source))
+        flat = Layout(source)
         scene = flat.scene(flat.numbers)
         joints = find_joints(scene, floor=-1e6)  # that no part touches: on the floor, clearances are zero
         self.layout = layout = Layout(source, anchors_of(flat))
-        self.model = Model(layout)
         self.fixed = np.array([slot.line >= 0 and layout.top[slot.line] in held for slot in layout.slots])
         minimum = np.where(self.fixed, 1e6, TIES.known if known else 0.0)
-        self.misfit = Misfit(self.model, evidence, joints, minimum, seed)
+        self.misfit = Misfit(layout, evidence, joints, minimum, seed)
         self.decimals = CELLS if known else CELLS + 1  # what is inferred is rounded again
         parts, pairs = layout.parts, scene.block[joints.pairs].tolist()
         self.touching = {(parts[min(pair)], parts[max(pair)]) for pair in pairs}
-        self.loose = self._loose(self.model.numbers)
+        self.loose = self._loose(layout.numbers)
 
     def tied(self, price: float) -> Program:
         """The program tied at a price of a number, in the unit of the misfit.
@@ -131,12 +130,12 @@ class _Ties:
 
     def _loose(self, numbers: FloatArray) -> set[int]:
         """The lines with parts outside the largest connected solid."""
-        scene = self.model.scene(numbers)
+        scene = self.layout.scene(numbers)
         return {self.layout.parts[block] for block in scene.block[pieces_of_parts(scene) > 0].tolist()}
 
     def _solved(self, price: float, fixed: Array) -> tuple[Solution, FloatArray]:
         """The free numbers at a price of a number, and their values (Z,); some numbers (P,) are in no relation."""
-        numbers, rows = self.model.numbers, self.layout.fixed()
+        numbers, rows = self.layout.numbers, self.layout.fixed()
         for step in range(TIES.rounds):
             offered = [
                 relation for relation in relations(self.layout, numbers, self.touching)
@@ -145,13 +144,13 @@ class _Ties:
             before = len(rows)
             _, curvature = self.misfit.at(numbers, TIES.draws)
             rows, optimum = worthwhile(
-                offered, numbers, curvature, price, fixed=rows, low=self.model.low, bounded=self.model.jacobian,
+                offered, numbers, curvature, price, fixed=rows, low=self.layout.low, bounded=self.layout.jacobian,
                 far=TIES.far / self.misfit.reach,
             )  # fmt: skip
             if step and len(rows) == before:
                 break
             numbers = self.misfit.refitted(optimum, rows)
-        return carried(solved(self.layout.slots, rows), self.model, numbers)
+        return carried(solved(self.layout.slots, rows), self.layout, numbers)
 
 
 def between_ends(program: Program) -> Program:
@@ -166,24 +165,21 @@ def between_ends(program: Program) -> Program:
 def _between_ends(node: Line) -> Line:
     if not isinstance(node, Draw) or node.name not in ("board", "bar"):
         return node
+    name, values = node.name, [*node.values]
     ((box,),) = solid_boxes([node])
     main = np.abs(box.rotation).argmax(0)  # the axes of the grid that its own run along most
     off = box.half * np.linalg.norm(np.where(main == np.arange(3)[:, None], 0.0, box.rotation), axis=0)
+    rising, side = (int(np.abs(box.rotation[axis]).argmax()) for axis in (UP, SIDE))
     if off.max() < TIES.upright and len({*main}) == 3:
         half = box.half[np.argsort(main)]
-        return _drawn("box", [*(box.centre - half), *(2 * half)], node)
-    if abs(node.values[-1]) < TIES.leaning:
+        name, values = "box", [*(box.centre - half), *(2 * half)]
+    elif abs(values[-1]) < TIES.leaning:
         return node
-    rising = int(np.abs(box.rotation[UP]).argmax())
-    if node.name == "bar":
-        values, flat = bar_along(box, rising), box.half[rising] == box.half.min()
-        return node if flat or abs(values[-1]) >= TIES.leaning else _drawn("bar", [*values[:-1], 0.0], node)
-    side = int(np.abs(box.rotation[SIDE]).argmax())
-    if abs(box.centre[SIDE]) > TIES.board_off and 2 * box.half[side] > TIES.board_wide:
-        return node
-    long = int(np.where(np.arange(3) == side, 0.0, box.half).argmax())
-    return _drawn("bar", [*bar_along(box, long)[:-1], 0.0], node)
-
-
-def _drawn(name: str, values: Sequence[float], node: Draw) -> Draw:
+    elif name == "bar":
+        upwards = bar_along(box, rising)
+        if box.half[rising] > box.half.min() and abs(upwards[-1]) < TIES.leaning:
+            values = [*upwards[:-1], 0.0]
+    elif abs(box.centre[SIDE]) <= TIES.board_off or 2 * box.half[side] <= TIES.board_wide:
+        long = int(np.where(np.arange(3) == side, 0.0, box.half).argmax())
+        name, values = "bar", [*bar_along(box, long)[:-1], 0.0]
     return Draw(name, tuple(map(to_float32, values)), node.role)

@@ -1,5 +1,4 @@
-"""A placed program as a function of its numbers: its primitives, its distance from the target, and refits while
-relations hold."""
+"""The distance of a placed program from the target, and refits of its numbers while relations hold."""
 
 from __future__ import annotations
 
@@ -9,18 +8,14 @@ from scipy.spatial import cKDTree
 
 from shapeprog.geometry.distance import signed_distance
 from shapeprog.geometry.scene import Scene
-from shapeprog.geometry.separation import OrientedBoxes
 from shapeprog.geometry.surface import sample_surface
 from shapeprog.inference.fit.joints import Joints, moved, needs
 from shapeprog.inference.fit.residuals import Target, of_target
 from shapeprog.inference.fit.settings import FIT
-from shapeprog.inference.fit.tunable import Poses, Tunable
 from shapeprog.inference.surface.evidence import Evidence
 from shapeprog.inference.ties.layout import Layout
 from shapeprog.inference.ties.relations import HOLDS
 from shapeprog.inference.ties.settings import TIES
-from shapeprog.language.evaluate import expanded, symbolic
-from shapeprog.language.program import Program
 from shapeprog.space import FloatArray
 
 PRIOR = {
@@ -30,52 +25,12 @@ PRIOR = {
 """Weights of a squared move from the start, by kind: numbers that nothing determines do not change."""
 
 
-class Model:
-    """A placed program as a function of its numbers (P,), those of its layout.
-
-    Attributes
-    ----------
-    numbers
-        Where they are at the start (P,).
-    jacobian, low
-        How the numbers of the statements follow from these (F, P), up to constants, and lower bounds (F,) of the
-        products of both: no part may become thinner than ``THINNEST``.
-    """
-
-    def __init__(self, layout: Layout) -> None:
-        self.layout, self.slots = layout, layout.slots
-        self.numbers: FloatArray = np.array([slot.value for slot in self.slots])
-        self.tunable, scale = Tunable(Program(expanded(layout.source))), layout.source.scale
-        assert scale is not None
-        floor = scale.floor + (layout.extents[2] - layout.forms["height"]) * 0.5  # the middle of the whole stays
-        nodes = list(Program(symbolic(layout.source, layout.forms, (floor, scale.middle))).walk())
-        values = np.zeros((len(self.tunable.moving), len(self.slots) + 1))
-        for value, (n, slot) in zip(values, self.tunable.moving, strict=True):
-            value += nodes[n].values[slot]
-        self.jacobian: FloatArray = values[:, :-1] - values[:, -1:]
-        self._offset = values[:, -1]
-        self.low: FloatArray = self.tunable.low.numpy() - self._offset
-
-    def values(self, numbers: FloatArray) -> torch.Tensor:
-        """The numbers of the statements in cells (F,)."""
-        return torch.from_numpy(self.jacobian @ numbers + self._offset)
-
-    def scene(self, numbers: FloatArray) -> Scene:
-        """The primitives (N,)."""
-        return self.tunable.scene(self.values(numbers))
-
-    def poses(self, numbers: FloatArray) -> Poses:
-        """The primitives, and their slopes (N, 16, P) by the numbers."""
-        poses = self.tunable.poses(self.values(numbers))
-        return Poses(poses.scene, poses.slopes @ torch.from_numpy(self.jacobian))
-
-
 class Misfit:
-    """How far the surface of a model is from that of a target, about its numbers.
+    """How far the surface of a program is from that of a target, about its numbers.
 
     Parameters
     ----------
-    model, evidence
+    layout, evidence
         The program and the target.
     joints
         Where its parts touch; a refit keeps them together.
@@ -85,20 +40,20 @@ class Misfit:
         Of the pairs of points that are drawn.
     """
 
-    def __init__(self, model: Model, evidence: Evidence, joints: Joints, minimum: FloatArray, seed: int) -> None:
-        self.model, self.target, self.joints = model, Target(evidence), joints
+    def __init__(self, layout: Layout, evidence: Evidence, joints: Joints, minimum: FloatArray, seed: int) -> None:
+        self.layout, self.target, self.joints = layout, Target(evidence), joints
         self.width = FIT.explained * evidence.tolerance
         self.generator = torch.Generator().manual_seed(seed)
-        scale = np.maximum(model.tunable.scale.numpy() @ np.abs(model.jacobian), 1e-3)
+        scale = np.maximum(layout.tunable.scale.numpy() @ np.abs(layout.jacobian), 1e-3)
         self.reach: FloatArray = np.maximum(scale, 1.0)  # cells that the surface moves for one unit of every number
-        prior = np.maximum([PRIOR[slot.kind] for slot in model.slots], minimum)
-        angles = np.array([slot.kind == "angle" for slot in model.slots])
+        prior = np.maximum([PRIOR[slot.kind] for slot in layout.slots], minimum)
+        angles = np.array([slot.kind == "angle" for slot in layout.slots])
         self.prior: FloatArray = np.where(angles, prior * scale**2, prior)
 
     def at(self, numbers: FloatArray, draws: int, *, joined: bool = False) -> tuple[FloatArray, FloatArray]:
         """Half the slope (P,) and half the curvature (P, P) of the mean squared distance where the numbers are these
         (P,), with the prior, and with gaps at joints if joined; pairs of points are drawn so many times."""
-        poses = self.model.poses(numbers)
+        poses = self.layout.poses(numbers)
         systems = [of_target(poses, self.target.pairs(poses.scene, self.generator), self.width) for _ in range(draws)]
         slope, curvature = (sum(parts).numpy() / draws for parts in zip(*systems, strict=True))
         if joined and len(self.joints.pairs):
@@ -106,15 +61,15 @@ class Misfit:
             wide = TIES.together * gaps.slopes
             slope = slope + (wide.T @ gaps.residual).numpy()
             curvature = curvature + (wide.T @ gaps.slopes).numpy()
-        return slope + self.prior * (numbers - self.model.numbers), curvature + np.diag(self.prior)
+        return slope + self.prior * (numbers - self.layout.numbers), curvature + np.diag(self.prior)
 
     def refitted(self, numbers: FloatArray, rows: FloatArray) -> FloatArray:
         """The numbers (P,) of the least misfit that differ from these only so that relations (M, P) hold as before.
 
         A thickness that a step would take below its bound is fixed, and the step is solved again (an active set).
         """
-        farthest, jacobian = TIES.farthest / self.reach, self.model.jacobian
-        low = np.minimum(self.model.low, jacobian @ numbers) - HOLDS
+        farthest, jacobian = TIES.farthest / self.reach, self.layout.jacobian
+        low = np.minimum(self.layout.low, jacobian @ numbers) - HOLDS
         for _ in range(TIES.steps):
             slope, curvature = self.at(numbers, 1, joined=True)
             while True:
@@ -143,9 +98,3 @@ def closeness(scene: Scene, evidence: Evidence, seed: int) -> float:
     away = cKDTree(surface).query(sample.points.numpy(), distance_upper_bound=reach)[0]
     precision = float(np.isfinite(away).mean())
     return 2 * precision * recall / (precision + recall) if precision + recall else 0.0
-
-
-def boxes_of(scene: Scene) -> OrientedBoxes:
-    """The boxes around the primitives of a scene (N,), for a person in front: to the right, to the rear, upwards."""
-    edges = scene.rotation.transpose(1, 2) * scene.bounds[..., None]
-    return OrientedBoxes(*(vectors.numpy()[..., ::-1] * [-1, 1, 1] for vectors in (scene.centre, edges)))

@@ -337,10 +337,9 @@ class Layout:
 
     def _plain(self, index: int, word: str, argument: Argument) -> Argument:
         """A number, or a pair of radii, that is not measured from a side."""
-        if isinstance(argument, tuple):
-            return self._plain(index, f"{word}.0", argument[0]), self._plain(index, f"{word}.1", argument[1])  # type: ignore[return-value]
-        kind = KINDS[word.partition(".")[0]]
-        return self._slot(index, word, kind, -1, float(argument))  # type: ignore[arg-type]
+        numbers = argument if isinstance(argument, tuple) else (argument,)
+        names = tuple(self._slot(index, word, KINDS[word], -1, float(number)) for number in numbers)  # type: ignore[arg-type]
+        return names[0] if len(names) == 1 else names  # type: ignore[return-value]
 
     def _slot(self, line: int, word: str, kind: Kind, axis: int, value: float) -> Name:
         self.index[line, word] = len(self.slots)

@@ -94,7 +94,7 @@ def worthwhile(
     *,
     fixed: FloatArray,
     low: FloatArray,
-    bounded: FloatArray | None = None,
+    bounded: FloatArray,
     far: FloatArray | float = np.inf,
 ) -> tuple[FloatArray, FloatArray]:
     """The selected relations (M, V), those that are fixed first; and the optimum (V,) where they hold.
@@ -113,8 +113,7 @@ def worthwhile(
     fixed
         Relations (M, V) that hold in any case.
     low, bounded
-        Lower bounds (F,) of the products of these rows (F, V) with the numbers, by default of the numbers themselves;
-        no relation may violate them.
+        Lower bounds (F,) of the products of these rows (F, V) with the numbers; no relation may violate them.
     far
         Farthest that relations together may move a number (V,): the quadratic model is valid near the optimum alone.
     """
@@ -122,7 +121,6 @@ def worthwhile(
     if not len(rows):
         return fixed, numbers
     imposed, free, start = [*fixed], np.linalg.inv(curvature), numbers
-    bounded = np.eye(len(numbers)) if bounded is None else bounded
     low = np.minimum(low, bounded @ numbers) - HOLDS
     axes: FloatArray = np.linalg.qr(fixed.T)[0].T
     meeting = [(k, *pair) for k, relation in enumerate(candidates, len(fixed)) for pair in relation.meetings]

@@ -165,27 +165,25 @@ def test_a_relation_is_worth_having_where_its_price_is_below_that_of_a_number():
     # The misfit (x - 1)^2 + (y - 1.2)^2 rises by .02 where x = y, which is then 1.1.
     equal = Relation(np.array([1.0, -1.0]), 1.0)
     start, low = np.array([1.0, 1.2]), np.full(2, -np.inf)
-    rows, at = worthwhile([equal], start, np.eye(2), 0.021, fixed=np.zeros((0, 2)), low=low, bounded=np.eye(2))
+    rows, at = worthwhile([equal], start, np.eye(2), 0.021, low=low, bounded=np.eye(2))
     np.testing.assert_allclose(at, [1.1, 1.1])
     assert len(rows) == 1
-    rows, at = worthwhile([equal], start, np.eye(2), 0.019, fixed=np.zeros((0, 2)), low=low, bounded=np.eye(2))
+    rows, at = worthwhile([equal], start, np.eye(2), 0.019, low=low, bounded=np.eye(2))
     np.testing.assert_allclose(at, start)
     assert not len(rows)
 
 
 def test_no_relation_moves_a_number_below_its_least():
     same = Relation(np.array([1.0, -1.0]), 1.0)
-    low, none = np.array([0.9, 1.15]), np.zeros((0, 2))
-    rows, _ = worthwhile([same], np.array([1.0, 1.2]), np.eye(2), 1.0, fixed=none, low=low, bounded=np.eye(2))
+    low = np.array([0.9, 1.15])
+    rows, _ = worthwhile([same], np.array([1.0, 1.2]), np.eye(2), 1.0, low=low, bounded=np.eye(2))
     assert not len(rows)
 
 
 def test_no_relation_takes_the_thickness_of_a_part_between_two_faces():
     together = Relation(np.array([1.0, -1.0]), 1.0)
     faces, between = np.array([1.0, 1.15]), np.array([[-1.0, 1.0]])
-    rows, at = worthwhile(
-        [together], faces, np.eye(2), 1.0, fixed=np.zeros((0, 2)), low=np.array([0.1]), bounded=between
-    )
+    rows, at = worthwhile([together], faces, np.eye(2), 1.0, low=np.array([0.1]), bounded=between)
     assert not len(rows)
     np.testing.assert_allclose(at, faces)
 
@@ -194,10 +192,10 @@ def test_parts_that_meet_along_one_axis_do_not_along_another():
     meetings = [frozenset({(0, 1, axis)}) for axis in (0, 2)]
     first, second = (Relation(np.eye(2)[k], 1.0, meeting) for k, meeting in enumerate(meetings))
     other = Relation(np.eye(2)[1], 1.0, frozenset({(1, 2, 2)}))
-    start, low, none = np.array([0.01, 0.02]), np.full(2, -np.inf), np.zeros((0, 2))
-    rows, _ = worthwhile([first, second], start, np.eye(2), 1.0, fixed=none, low=low, bounded=np.eye(2))
+    start, low = np.array([0.01, 0.02]), np.full(2, -np.inf)
+    rows, _ = worthwhile([first, second], start, np.eye(2), 1.0, low=low, bounded=np.eye(2))
     assert rows.tolist() == [[1, 0]]  # else they would touch along an edge
-    rows, _ = worthwhile([first, other], start, np.eye(2), 1.0, fixed=none, low=low, bounded=np.eye(2))
+    rows, _ = worthwhile([first, other], start, np.eye(2), 1.0, low=low, bounded=np.eye(2))
     assert len(rows) == 2
 
 
@@ -402,8 +400,7 @@ def test_no_relation_is_kept_that_follows_from_others(seed: int):
     rows = np.stack([*rows, *(one + sign * two for one, two in combinations(rows, 2) for sign in (1, -1))])
     offered = [Relation(row, 1.0) for row in rows]
     numbers, low = random.normal(0, 0.01, count), np.full(count, -np.inf)
-    curvature, none = (curvature + curvature.T) / 2, np.zeros((0, count))
-    kept, _ = worthwhile(offered, numbers, curvature, 1.0, fixed=none, low=low, bounded=np.eye(count))
+    kept, _ = worthwhile(offered, numbers, (curvature + curvature.T) / 2, 1.0, low=low, bounded=np.eye(count))
     assert 0 < len(kept) == np.linalg.matrix_rank(kept)
 
 

@@ -92,12 +92,10 @@ def worthwhile(
     curvature: FloatArray,
     price: float,
     *,
-    fixed: FloatArray,
     low: FloatArray,
     bounded: FloatArray,
-    far: FloatArray | float = np.inf,
 ) -> tuple[FloatArray, FloatArray]:
-    """The selected relations (M, V), those that are fixed first; and the optimum (V,) where they hold.
+    """The rows (M, V) of the selected relations, and the optimum (V,) where they hold.
 
     Near its optimum the misfit of a program is quadratic.  With H its curvature and p the numbers, imposing c p = 0
     costs (c p)^2 / (c H^-1 c'), so thousands of relations are priced without a refit; the cheapest is imposed, H^-1 and
@@ -106,27 +104,23 @@ def worthwhile(
 
     Parameters
     ----------
+    candidates
+        The relations; those of infinite trust hold in any case.
     numbers, curvature
         The optimum (V,), and half the curvature (V, V) of the misfit there.
     price
         Price of a number, in the unit of the misfit.
-    fixed
-        Relations (M, V) that hold in any case.
     low, bounded
         Lower bounds (F,) of the products of these rows (F, V) with the numbers; no relation may violate them.
-    far
-        Farthest that relations together may move a number (V,): the quadratic model is valid near the optimum alone.
     """
-    rows: FloatArray = np.array([*fixed, *(relation.row for relation in candidates)]).reshape(-1, len(numbers))
+    rows: FloatArray = np.array([relation.row for relation in candidates]).reshape(-1, len(numbers))
     if not len(rows):
-        return fixed, numbers
-    imposed, free, start = [*fixed], np.linalg.inv(curvature), numbers
+        return rows, numbers
+    imposed, free, axes, edges = list[FloatArray](), np.linalg.inv(curvature), rows[:0], 0
     low = np.minimum(low, bounded @ numbers) - HOLDS
-    axes: FloatArray = np.linalg.qr(fixed.T)[0].T
-    meeting = [(k, *pair) for k, relation in enumerate(candidates, len(fixed)) for pair in relation.meetings]
-    edges = 0
+    meeting = [(k, *pair) for k, relation in enumerate(candidates) for pair in relation.meetings]
     spread, off = np.einsum("kv,vw,kw->k", rows, free, rows, optimize=True), rows @ numbers
-    benefit = price * np.array([np.inf] * len(fixed) + [relation.trust for relation in candidates])
+    benefit = price * np.array([relation.trust for relation in candidates])
     # Below this share of its freedom a relation holds already: for numbers that nothing determines, rounding alone
     # leaves more, so independence is tested on the rows themselves.
     minimum = 1e-9 * spread
@@ -140,18 +134,12 @@ def worthwhile(
         across = rows @ along
         off_then, spread_then = off - across * off[best] / spread[best], spread - across**2 / spread[best]
         edges_then = _edges(meeting, (spread_then <= minimum) & (np.abs(off_then) < HOLDS))
-        if best >= len(fixed):
-            new = beside(rows[best], axes)
-            if (
-                new is None
-                or (bounded @ moved < low).any()
-                or (np.abs(moved - start) > far).any()
-                or edges_then > edges
-            ):
-                spread[best] = 0.0
-                continue
-            imposed.append(rows[best])
-            axes = np.vstack([axes, new])
+        new, worse = beside(rows[best], axes), (bounded @ moved < low).any() or edges_then > edges
+        if new is None or (worse and benefit[best] < np.inf):
+            spread[best] = 0.0
+            continue
+        imposed.append(rows[best])
+        axes = np.vstack([axes, new])
         free = free - np.outer(along, along) / spread[best]
         numbers, off, spread, edges = moved, off_then, spread_then, edges_then
         spread[best] = 0.0

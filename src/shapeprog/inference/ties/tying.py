@@ -25,7 +25,7 @@ from shapeprog.inference.ties.anchors import anchors_of
 from shapeprog.inference.ties.expressions import Solution, carried, solved
 from shapeprog.inference.ties.layout import Layout
 from shapeprog.inference.ties.misfit import Misfit, closeness
-from shapeprog.inference.ties.relations import relations, worthwhile
+from shapeprog.inference.ties.relations import Relation, relations, worthwhile
 from shapeprog.inference.ties.settings import TIES
 from shapeprog.inference.ties.text import written
 from shapeprog.language.ast import Draw, Fault, Line, Source, changed_lines
@@ -137,16 +137,14 @@ class _Ties:
         """The free numbers at a price of a number, and their values (Z,); some numbers (P,) are in no relation."""
         numbers, rows = self.layout.numbers, self.layout.fixed()
         for step in range(TIES.rounds):
-            offered = [
+            candidates = [
                 relation for relation in relations(self.layout, numbers, self.touching)
                 if not relation.row[fixed].any() and (step > 0 or relation.trust in (TIES.contact, TIES.floor))
             ]  # fmt: skip
-            before = len(rows)
+            candidates, before = [*(Relation(row, math.inf) for row in rows), *candidates], len(rows)
             _, curvature = self.misfit.at(numbers, TIES.draws)
-            rows, optimum = worthwhile(
-                offered, numbers, curvature, price, fixed=rows, low=self.layout.low, bounded=self.layout.jacobian,
-                far=TIES.far / self.misfit.reach,
-            )  # fmt: skip
+            low, bounded = self.layout.low, self.layout.jacobian
+            rows, optimum = worthwhile(candidates, numbers, curvature, price, low=low, bounded=bounded)
             if step and len(rows) == before:
                 break
             numbers = self.misfit.refitted(optimum, rows)

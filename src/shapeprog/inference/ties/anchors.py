@@ -54,7 +54,8 @@ class _AxisAnchors:
                 self._add_span(index[line, "start"], end)
         count, most = len(self.elements), max(map(len, self.choices), default=1)
         self.costs = np.full((count, most), np.inf)
-        self.shifts = np.zeros((count, most, 2))  # share of the growth of the whole by which low and high ends move
+        # By which share of the growth of the whole low and high ends move.
+        self.shifts = np.full((count, most, 2), np.nan)
         by_ends = np.zeros((slopes.shape[-1], count, 2))  # how the numbers follow from the ends of the elements
         for k, (element, choices) in enumerate(zip(self.elements, self.choices, strict=True)):
             self.costs[k, : len(choices)] = [self._unary(element, anchors) for anchors in choices]
@@ -117,10 +118,9 @@ class _AxisAnchors:
 
     def solved(self) -> list[Anchors]:
         """The anchors of every element."""
-        starts = [self.costs.argmin(1)]
-        for side in (LOW, HIGH):  # all faces measured from one side, or in the first way
-            one_sided = [[{*anchors} == {side} for anchors in choices] for choices in self.choices]
-            starts.append(np.array([flags.index(True) if any(flags) else 0 for flags in one_sided], np.int64))
+        # From one side, or where that is no choice in the first way.
+        one_sided = [(self.shifts == side / HIGH).all(2).argmax(1) for side in (LOW, HIGH)]
+        starts = [self.costs.argmin(1), *one_sided]
         best = min((self._descent(start) for start in starts), key=lambda result: round(result[0], 6))
         return [choices[k] for choices, k in zip(self.choices, best[1], strict=True)]
 

@@ -163,7 +163,7 @@ def _of_numbers(layout: Layout, numbers: FloatArray) -> Iterator[Relation]:
                 yield Relation(eye[k], TIES.equal)
         elif slot.kind == "offset":
             yield Relation(eye[k], TIES.symmetric(slot.axis), limit=TIES.askew)
-        elif slot.kind == "angle" and not slot.word.startswith("step"):
+        elif slot.kind == "angle" and slot.word != "step":
             yield Relation(eye[k], TIES.equal, limit=TIES.degrees)
     for (a, slot), (b, other) in combinations(enumerate(slots), 2):
         if slot.kind != other.kind:
@@ -234,7 +234,7 @@ def _pair(layout: Layout, face: _Face, other: _Face, touching: set[tuple[int, in
     lines = sorted(layout.first(each.line)[0] if each.key == "last" else each.line for each in (first, second))
     touches = lines[0] != lines[1] and tuple(lines) in touching
     if face.anchor != other.anchor:
-        if {face.anchor, other.anchor} == {LOW, HIGH} and single and axis < 2 and not middles:
+        if {face.anchor, other.anchor} == {LOW, HIGH} and single and axis < 2:
             trust = TIES.contact if "last" in keys else TIES.equal
             yield Relation(image, TIES.symmetric(axis), limit=TIES.askew) if same else Relation(image, trust)
     elif middles:

@@ -119,9 +119,8 @@ class Layout:
     lines, words, parts
         Its parts and loops, in the order of the text, their roles, or else kinds, and the numbers of those that are
         parts; upright round parts have a radius.
-    top, loops_around
-        For every line the index at the top level of the line that it is inside of, and the numbers of the loops around
-        it.
+    loops_around
+        For every line the numbers of the loops around it.
     filling
         The lines of cylinders that are nearly as wide as the whole, which then has one diameter.
     elements
@@ -146,7 +145,6 @@ class Layout:
         self.sizes: dict[str, float] = source.evaluated_numbers()
         tree = changed_lines([line for line in source.lines if isinstance(line, Part | Group)], self._with_radius)
         self.lines = [line for line in Source(tree).walk() if isinstance(line, Part | Group)]
-        self.top = [index for index, line in enumerate(tree) for _ in Source((line,)).walk()]
         self.words = [(isinstance(line, Part) and line.role) or line.kind for line in self.lines]
         self.parts = [index for index, line in enumerate(self.lines) if isinstance(line, Part)]
         self.filling = {index for index in self.parts if self._fills(self.lines[index])}  # type: ignore[arg-type]
@@ -164,9 +162,7 @@ class Layout:
         self.body = changed_lines(tree, self._with_names)
         self.forms = dict(zip(self.names, np.eye(len(self.names) + 1), strict=False))
         self._numbers = {name: slot.value for name, slot in zip(self.names, self.slots, strict=True)}
-        pairs = tuple(self._numbers.items())
-        lines = Assignment(pairs[:3]), Assignment(pairs[3:]), *self.body
-        self.source = Source(lines, source.unit, source.scale)
+        self.source = Source((Assignment(tuple(self._numbers.items())), *self.body), source.unit, source.scale)
         self.numbers: FloatArray = np.array([slot.value for slot in self.slots])
         self.tunable, scale = Tunable(Program(expanded(self.source))), source.scale
         assert scale is not None

@@ -184,7 +184,7 @@ def _of_numbers(layout: Layout, numbers: FloatArray) -> Iterator[Relation]:
 def _comparable(layout: Layout, slot: Slot, other: Slot, larger: float) -> bool:
     """Whether two sizes measure the same quantity of parts of one role, or of two sections."""
     same = layout.words[slot.line] == layout.words[other.line]
-    sections = same or (_is_section(layout, slot) and _is_section(layout, other))
+    sections = same or all(_is_section(layout, each) for each in (slot, other))
     return (sections and larger < TIES.section) or (same and slot.axis == other.axis)
 
 

@@ -130,6 +130,11 @@ class Use(NamedTuple):
     point: str
     word: str
 
+    @property
+    def role(self) -> str:
+        """The role of the part, or else its kind."""
+        return self.part.role or self.part.kind
+
 
 def named(lines: Sequence[Line], wanted: Mapping[str, Value], numbers: dict[str, float]) -> dict[str, str]:
     """A name for each of some numbers.
@@ -151,7 +156,7 @@ def named(lines: Sequence[Line], wanted: Mapping[str, Value], numbers: dict[str,
             *(use for outer in uses if name in names_in(wanted[outer]) for use in uses[outer]),
         ]
     words = language()
-    used = {*SIZES, "diameter", *RESERVED, *words.names, *words.roles, *(_role(use.part) for use, _ in every)}
+    used = {*SIZES, "diameter", *RESERVED, *words.names, *words.roles, *(use.role for use, _ in every)}
     used -= {"gap", "edge", "radius"}
     values: dict[str, float] = {}  # of the names given
     result: dict[str, str] = {}
@@ -164,7 +169,7 @@ def named(lines: Sequence[Line], wanted: Mapping[str, Value], numbers: dict[str,
 
         shared, own = _candidates(uses[provisional], numbers)
         offered = [*shared, *(further(base) for base in shared if base in FURTHER), *own, *map(further, own)]
-        offered += (f"{_role(use.part)}_{use.word}" for use in uses[provisional] if use.word not in SIZES)
+        offered += (f"{use.role}_{use.word}" for use in uses[provisional] if use.word not in SIZES)
         offered += (f"{own[0]}_{count}" for count in range(2, len(wanted) + 2))
         result[provisional] = name = next(name for name in offered if name not in used | values.keys())
         values[name] = number
@@ -192,25 +197,21 @@ def _candidates(uses: Sequence[Use], numbers: dict[str, float]) -> tuple[list[st
     quantities = {use: _quantity(use, numbers) for use in uses}
     selected = [use for use in uses if quantities[use] not in FURTHER] or uses
     kinds = Counter(quantities[use] for use in selected)
-    roles = Counter(_role(use.part) for use in selected)
+    roles = Counter(use.role for use in selected)
     (kind, _), *others = kinds.most_common()
     if others and kind in FURTHER:
         kind = "inset" if kinds.keys() <= {"inset", "setback"} else "clearance"
-    most, count = Counter(use.part for use in selected).most_common(1)[0]
+    part, count = Counter(use.part for use in selected).most_common(1)[0]
     shared = []
     if kind in SIZES and count > 1:  # the section of a square part
-        shared = [f"{_role(most)}_width"]
+        shared = [f"{part.role or part.kind}_width"]
     elif len(roles) > 1 and kind not in ("drop", "bottom", "offset"):
         shared = ["board_width"] if kind in SIZES else [kind]
         shared += ["board_thickness"] if kind == "thickness" else []
     own = [f"{role}_{kind}" for role, _ in roles.most_common()]
-    own += [f"{_role(use.part)}_{quantities[use]}" for use in selected]
-    own += [f"{_role(use.part)}_{use.point}_{quantities[use]}" for use in selected if use.point]
+    own += [f"{use.role}_{quantities[use]}" for use in selected]
+    own += [f"{use.role}_{use.point}_{quantities[use]}" for use in selected if use.point]
     return shared, own
-
-
-def _role(part: Part) -> str:
-    return part.role or part.kind
 
 
 def _quantity(use: Use, numbers: dict[str, float]) -> str:
@@ -222,6 +223,6 @@ def _quantity(use: Use, numbers: dict[str, float]) -> str:
         low = "bottom" if use.word == "bottom" else "drop"
         return "offset" if use.word == AXES[axis].offset else ("inset", "setback", low)[axis]
     lengths = [high - low for low, high in (ends_of(part, "", each, numbers) for each in range(3))]
-    flat = axis == 2 and _role(part) in FLAT
+    flat = axis == 2 and use.role in FLAT
     least, second, _ = sorted(lengths)
     return "thickness" if flat or lengths[axis] <= least <= TIES.thin * second else SIZES[axis]

@@ -103,7 +103,8 @@ class _Ties:
         scene = flat.scene(flat.numbers)
         joints = find_joints(scene, floor=-1e6)  # that no part touches: on the floor, clearances are zero
         self.layout = layout = Layout(source, anchors_of(flat))
-        self.fixed = np.array([slot.line >= 0 and layout.top[slot.line] in held for slot in layout.slots])
+        top = [index for index, line in enumerate(layout.body) for _ in Source((line,)).walk()]
+        self.fixed = np.array([slot.line >= 0 and top[slot.line] in held for slot in layout.slots])
         minimum = np.where(self.fixed, 1e6, TIES.known if known else 0.0)
         self.misfit = Misfit(layout, evidence, joints, minimum, seed)
         self.decimals = CELLS if known else CELLS + 1  # what is inferred is rounded again

@@ -144,8 +144,8 @@ class _Ties:
             ]  # fmt: skip
             candidates, before = [*(Relation(row, math.inf) for row in rows), *candidates], len(rows)
             _, curvature = self.misfit.at(numbers, TIES.draws)
-            low, bounded = self.layout.low, self.layout.jacobian
-            rows, optimum = worthwhile(candidates, numbers, curvature, price, low=low, bounded=bounded)
+            low, bounded, far = self.layout.low, self.layout.jacobian, TIES.far / self.misfit.reach
+            rows, optimum = worthwhile(candidates, numbers, curvature, price, low=low, bounded=bounded, far=far)
             if step and len(rows) == before:
                 break
             numbers = self.misfit.refitted(optimum, rows)

@@ -20,9 +20,10 @@ from shapeprog.inference.fit.joints import find_joints
 from shapeprog.inference.surface.evidence import evidence_of_program
 from shapeprog.inference.ties import tying
 from shapeprog.inference.ties.anchors import anchors_of
+from shapeprog.inference.ties.elements import Slot
 from shapeprog.inference.ties.expressions import solved
 from shapeprog.inference.ties.groups import grouped
-from shapeprog.inference.ties.layout import Layout, Slot
+from shapeprog.inference.ties.layout import Layout
 from shapeprog.inference.ties.misfit import Misfit, closeness
 from shapeprog.inference.ties.relations import Relation, worthwhile
 from shapeprog.inference.ties.settings import TIES

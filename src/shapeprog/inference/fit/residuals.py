@@ -117,8 +117,8 @@ class Target:
     def _closest(
         self, points: Int[Tensor, "R _"], samples: Int[Tensor, "R _"], sample: SurfaceSample
     ) -> tuple[Int[Tensor, " R"], Int[Tensor, " R"], Float[Tensor, " R"]]:
-        """The best of several pairs (R, k) of points and samples (k is 1 for one of the two), and its squared penalty besides the distance along
-        the normal."""
+        """The best of several pairs (R, k) of points and samples, of which one may be the same for all, and its squared
+        penalty besides the distance along the normal."""
         facing, normals = sample.normals[samples], self._normals[points]
         away = self._points[points] - sample.points[samples]
         plane, cosine = (away * facing).sum(-1), (normals * facing).sum(-1)

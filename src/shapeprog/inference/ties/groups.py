@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from shapeprog.errors import ShapeProgError
-from shapeprog.inference.ties.layout import ends_of
+from shapeprog.inference.ties.elements import ends_of
 from shapeprog.inference.ties.settings import TIES
 from shapeprog.language.ast import Argument, Assignment, Group, Keywords, Line, Part, Point, Source, changed_lines
 from shapeprog.language.convert.forms import cost

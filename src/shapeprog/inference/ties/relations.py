@@ -15,7 +15,8 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from shapeprog.inference.ties.layout import HIGH, LOW, MIDDLE, Element, Layout, Slot
+from shapeprog.inference.ties.elements import HIGH, LOW, MIDDLE, Element, Slot
+from shapeprog.inference.ties.layout import Layout
 from shapeprog.inference.ties.settings import TIES
 from shapeprog.library.independence import beside
 from shapeprog.space import FloatArray

@@ -111,8 +111,7 @@ def groups(boxes: Boxes) -> Boxes:
     adjacent = np.eye(len(edges), dtype=np.float32)  # products of floats are faster than those of flags
     adjacent[first, second] = adjacent[second, first] = 1
     corners = boxes.corners()
-    at = np.einsum("jkc,icd->ijkd", corners, boxes.rotation)
-    at -= np.einsum("ic,icd->id", boxes.centre, boxes.rotation)[:, None, None]
+    at = np.einsum("ijkc,icd->ijkd", corners - boxes.centre[:, None, None], boxes.rotation)
     within = np.abs(at).max(2) <= boxes.half[:, None] + SETTINGS.group_gap
     unique: dict[bytes, FloatArray] = {}
     for held in ([0], [1], [2], [0, 1], [0, 2], [1, 2], []):

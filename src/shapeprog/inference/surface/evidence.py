@@ -195,7 +195,7 @@ def _turned_outward(normals: FloatArray, front: Flags, back: Flags) -> tuple[Flo
     It is known where only the front or only the back of a point is free.  It is known everywhere, thin parts included,
     if nearly all such normals agree, as in a mesh with consistent winding.
     """
-    oriented = (front != back) & ((normals**2).sum(1) > 0.25)
+    oriented = front != back
     share = float(front[oriented].mean()) if oriented.any() else 0.5
     if max(share, 1 - share) >= 0.95:
         return normals * (1.0 if share > 0.5 else -1.0), np.ones(len(oriented), np.bool_)

@@ -77,8 +77,8 @@ class Batch:
     def __iter__(self: Some) -> Iterator[Some]:
         return (self[index] for index in range(len(self)))
 
-    def __getitem__(self: Some, index: int | slice | Bool[Tensor, " B"] | Int[Tensor, "*chosen"]) -> Some:
-        """The element or elements at an index, or a choice, of the first dimension."""
+    def __getitem__(self: Some, index: int | slice | Tensor | tuple[slice | Tensor, Tensor]) -> Some:
+        """The element or elements at an index, or a choice, of the first dimensions."""
         return self._map(lambda tensor: tensor[index])
 
     def flatten(self: Some) -> Some:

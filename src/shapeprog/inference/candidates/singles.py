@@ -16,7 +16,6 @@ from jaxtyping import Float
 from scipy.ndimage import minimum
 from torch import Tensor
 
-from shapeprog.geometry.batch import Batch
 from shapeprog.geometry.distance import distance_and_slopes
 from shapeprog.inference.candidates.drawings import drawings, is_unhinted, scene_of, starts
 from shapeprog.inference.candidates.settings import SETTINGS
@@ -85,8 +84,7 @@ def fitted(draws: Sequence[Draw], target: Float[Tensor, "B P 3"]) -> list[Draw]:
         scene = plan.scene((values + away * free)[:, :, None, None])
         placed = torch.cat([scene.size, scene.centre, scene.rotation.flatten(-2)], -1).flatten(2)
         by_number = ((placed[1 : slots + 1] - placed[slots + 1 :]) / (2 * STEP)).permute(1, 2, 0)
-        fields = (scene.kind, scene.size, scene.centre, scene.rotation, scene.mask)
-        single = Batch(*(field[0].repeat_interleave(points, 0) for field in fields))
+        single = scene[0][torch.arange(len(draws)).repeat_interleave(points)]
         distance, by_row, _ = distance_and_slopes(single, target.reshape(-1, 1, 3))
         slopes = by_row.reshape(len(draws), points, -1) @ by_number
         residual = (distance.reshape(-1, points) - SETTINGS.offset).nan_to_num(0)

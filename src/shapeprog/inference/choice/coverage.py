@@ -22,7 +22,6 @@ import numpy.typing as npt
 import torch
 
 from shapeprog.geometry.arrays import over_threads
-from shapeprog.geometry.batch import Batch
 from shapeprog.geometry.scene import Scene
 from shapeprog.geometry.surface import face_areas, sample_surface
 from shapeprog.inference.candidates.loops import mirrors
@@ -198,19 +197,16 @@ def unsupported(
     total = area.sum(1, keepdims=True)
     samples = total.clip(SETTINGS.least_samples, SETTINGS.most_samples) / SETTINGS.batch
     expected = area / np.where(total > 0, total, 1) * samples
-    times = np.where(area > 0, np.maximum(np.rint(expected), 1), 0).astype(np.int64).reshape(-1)
-    row = torch.from_numpy(np.repeat(np.arange(len(times)), times))
-    single = Batch(*(
-        part.flatten(0, 1)[row][:, None] for part in (scene.kind, scene.size, scene.centre, scene.rotation, scene.mask)
-    ))  # fmt: skip
-    sample = sample_surface(single, SETTINGS.batch, torch.Generator().manual_seed(0))
+    times = np.where(area > 0, np.maximum(np.rint(expected), 1), 0).astype(np.int64)
+    places = np.repeat(np.argwhere(times >= 0), times.reshape(-1), axis=0)  # candidate and slot of every batch
+    owner, slot = torch.from_numpy(places)[..., None].unbind(1)
+    sample = sample_surface(scene[owner, slot], SETTINGS.batch, torch.Generator().manual_seed(0))
     points, normals = (part.double().reshape(-1, 3).numpy() for part in (sample.points, sample.normals))
     share = shares(points, normals, evidence, binned)
     bare = share > 0
-    source = np.repeat(row.numpy(), SETTINGS.batch)[bare]
+    source = tuple(places[np.flatnonzero(bare) // SETTINGS.batch].T)
     lifted = points[bare] + SETTINGS.skin * evidence.tolerance * normals[bare]
-    charged_area = share[bare] * area.reshape(-1)[source] / (SETTINGS.batch * times[source])
-    return lifted, source // scene.mask.shape[1], charged_area
+    return lifted, source[0], share[bare] * area[source] / (SETTINGS.batch * times[source])
 
 
 def shares(samples: FloatArray, normals: FloatArray, evidence: Evidence, binned: BinnedPoints) -> FloatArray:

@@ -108,7 +108,7 @@ class Target:
             samples=torch.cat([sample.points[partner], points]),
             normals=facing,
             slots=torch.cat([sample.slot[partner], nearest_primitive(scene, points)[0]]),
-            offset=torch.cat([offset, torch.zeros_like(offset[: FIT.pairs])]),
+            offset=torch.nn.functional.pad(offset, (0, FIT.pairs)),
             weights=torch.cat([ones / FIT.pairs, half, 0.03 * ones / FIT.pairs]),
             either=~self._sides[every] & (along.abs() >= FIT.same),
             anywhere=torch.arange(len(every)) >= len(paired),

@@ -62,10 +62,10 @@ def _options(parameter: Parameter, box: Box) -> FloatArray:
     elif quantity.kind == "length" and width == len(reach):
         rows = [half * reach]
     elif quantity.kind in ("position", "length"):
-        sizes = half * np.concatenate([reach, box.half, [0.3 * box.half.min()]])  # the last for hollow solids
+        sizes = half * np.concatenate([reach, box.half, [SETTINGS.wall * box.half.min()]])
         rows = product(np.unique((box.centre if quantity.kind == "position" else sizes).round(3)), repeat=width)
     elif quantity.discrete:
-        last = 3.0 if quantity.kind == "turn" else 6.0
+        last = 3.0 if quantity.kind == "turn" else float(SETTINGS.counts)
         rows = [[float(n)] * width for n in range(max(round(quantity.low), 0), round(min(quantity.high, last)) + 1)]
     else:
         rows = [[0.0] * width]
@@ -129,7 +129,7 @@ def _drawing_the_same(candidates: Sequence[Draw], node: Draw, signs: FloatArray)
     """The candidates that draw a node, or its mirror image by these signs of the coordinates, with its role."""
     if not candidates:
         return
-    sample = sample_surface(scene_of([node]), 64, torch.Generator().manual_seed(0))
+    sample = sample_surface(scene_of([node]), SETTINGS.equal_points, torch.Generator().manual_seed(0))
     points = sample.points.double() * torch.from_numpy(signs)
     off = signed_distance(scene_of(candidates), points.expand(len(candidates), -1, -1)).abs().amax(-1).tolist()
     same = (candidate for candidate, far in zip(candidates, off, strict=True) if far < SETTINGS.equal_distance)

@@ -183,7 +183,7 @@ def images(nodes: Sequence[Node], surface: FloatArray) -> list[Node]:
     if not nodes:
         return []
     scene = scene_of(nodes)
-    points = sample_surface(scene, 48, torch.Generator().manual_seed(0)).points.numpy()
+    points = sample_surface(scene, SETTINGS.image_points, torch.Generator().manual_seed(0)).points.numpy()
     tree = cKDTree(surface)
 
     def on(image: FloatArray) -> FloatArray:

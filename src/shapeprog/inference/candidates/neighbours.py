@@ -131,7 +131,9 @@ def _reach(frame: Box, part: Box) -> FloatArray:
     return np.abs(frame.rotation.T @ part.rotation) @ part.half
 
 
-def met(box: Box, parts: Sequence[Box], within: Sequence[float] = (0.8,), *, longer: bool = False) -> Iterator[Box]:
+def met(
+    box: Box, parts: Sequence[Box], within: Sequence[float] = (SETTINGS.within,), *, longer: bool = False
+) -> Iterator[Box]:
     """A box with one face moved to where a line normal to the face, at its middle or near a corner, enters a part.
 
     ``within`` are the distances from the middle to the lines, as shares of those to the corners.  ``longer`` restricts
@@ -150,7 +152,7 @@ def met(box: Box, parts: Sequence[Box], within: Sequence[float] = (0.8,), *, lon
             ends = _crossed(starts, along, around)
             for end in sorted(ends[ends > minimum].tolist(), key=lambda end: abs(end - box.half[axis]))[:4]:
                 length = (box.half[axis] + end) / 2
-                if abs(end - box.half[axis]) <= SETTINGS.reach and length >= THINNEST:
+                if abs(end - box.half[axis]) <= SETTINGS.reach and length >= SETTINGS.shortest / 2:
                     half = box.half.copy()
                     half[axis] = length
                     yield Box(box.centre + (end - box.half[axis]) / 2 * along, box.rotation, half)
@@ -164,7 +166,7 @@ def centred(box: Box) -> Iterator[Box]:
     for axis in (SIDE, DEPTH):
         along = int(np.abs(box.rotation[axis]).argmax())
         off = abs(float(box.centre[axis]))
-        near = 0.02 < off < min(2.5, box.half[along] / 2)
+        near = SETTINGS.off_least < off < min(SETTINGS.off_most, box.half[along] / 2)
         if near and np.abs(box.rotation[axis, along]) >= STRAIGHT:
             for more in (-off, off):
                 centre, half = box.centre.copy(), box.half.copy()

@@ -11,6 +11,8 @@ class Settings:
 
     # Statements without a hint
     starts: int = 192  # most starts in one box
+    wall: float = 0.3  # share of the least extent that is tried as a length too: the wall of hollow solids
+    counts: int = 6  # largest initial value of a count
 
     # Statements on pieces
     near: float = 0.3  # distance from a piece within which points of the surface belong to it
@@ -19,14 +21,17 @@ class Settings:
     fitted: int = 48  # pieces to which statements are fitted, and on which those without a hint are tried
     good: float = 0.08  # misfit up to which no fitting is needed
     worth: float = 0.3  # largest excess over the best misfit of a statement that is fitted
+    steps: int = 8  # Gauss-Newton steps of fitting
     width: float = 0.3  # residual whose weight is a quarter
     prior: float = 3e-2  # weight of a squared move by a cell from the start, per point
+    farthest: float = 2.0  # largest change of one number in a step
     wrong: float = 0.5  # distance that has the same misfit as a normal at a right angle
     offset: float = 0.01  # height above the surface of the points: on it, the distance has no gradient
     slack: float = 0.05  # largest excess over the best misfit of a statement with fewer numbers
     better: float = 2 / 3  # share of its misfit below which the best statement is a candidate too
 
     # Equal candidates
+    equal_points: int = 64  # points of a surface by which two drawings are compared
     equal_distance: float = 0.1  # distance below which their surfaces are the same
     same: float = 0.03  # difference of positions and extents, as a share of the size, of equal candidates
     alike: float = 0.06  # difference of extents, as a share of the size, up to which candidates are copies
@@ -46,6 +51,7 @@ class Settings:
     centred: float = 0.2  # distance within which a step is along an axis, and an axis of turns in the middle
 
     # Mirror images and turned copies
+    image_points: int = 48  # points on each candidate whose images are tested
     image_distance: float = 0.4  # largest distance of a point on the surface
     supported: float = 0.6  # least share of the points of a candidate on the surface
     as_well: float = 0.8  # least ratio of the share of its image to that
@@ -57,7 +63,11 @@ class Settings:
     # Changed boxes
     reach: float = 4.0  # largest move of a face to meet another part
     into: float = 0.05  # depth to which it enters that part
+    shortest: float = 0.2  # least length of a shortened part
+    within: float = 0.8  # share of a face, along each side, within which lines across it are followed
     gap: float = 1.5  # largest gap between parts that may be merged
+    off_least: float = 0.02  # least and largest distance from the middle plane of a part that may be centred
+    off_most: float = 2.5
 
     # Boxes around unexplained points
     far: float = 1.5  # distance from a program, in tolerances, from which a point is not explained

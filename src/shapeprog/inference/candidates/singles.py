@@ -80,7 +80,7 @@ def fitted(draws: Sequence[Draw], target: Float[Tensor, "B P 3"]) -> list[Draw]:
     away = torch.cat([torch.zeros_like(away[:1]), away, -away])[:, None]
     plan = Plan(Code(*(part.expand(len(away), *part.shape) for part in (ids, code.parameters[:, :, :1]))))
     prior = torch.where(free, SETTINGS.prior * points, 1.0)
-    for _ in range(8):
+    for _ in range(SETTINGS.steps):
         scene = plan.scene((values + away * free)[:, :, None, None])
         placed = torch.cat([scene.size, scene.centre, scene.rotation.flatten(-2)], -1).flatten(2)
         by_number = ((placed[1 : slots + 1] - placed[slots + 1 :]) / (2 * STEP)).permute(1, 2, 0)
@@ -91,7 +91,7 @@ def fitted(draws: Sequence[Draw], target: Float[Tensor, "B P 3"]) -> list[Draw]:
         weighted = ((SETTINGS.width**2 / (SETTINGS.width**2 + residual**2)) ** 2)[..., None] * slopes
         slope = (weighted * residual[..., None]).sum(1) + prior * (values - start)
         move = torch.linalg.solve(weighted.mT @ slopes + torch.diag_embed(prior), slope)
-        values = torch.maximum(values - move.clamp(-2, 2), low)
+        values = torch.maximum(values - move.clamp(-SETTINGS.farthest, SETTINGS.farthest), low)
     rows = zip(draws, values.float().tolist(), strict=True)
     return [Draw(draw.name, tuple(row[: len(draw.values)])) for draw, row in rows]
 

@@ -26,7 +26,8 @@ def limbs(cloud: Cloud) -> Boxes:
     if not len(which):
         return boxes_around([])
     name, centre, radius = _merged(centre, radius)
-    distance, nearest = cKDTree(centre).query(centre, k=range(1, min(24, len(centre)) + 1), workers=2)
+    count = min(SETTINGS.limb_neighbours, len(centre))
+    distance, nearest = cKDTree(centre).query(centre, k=range(1, count + 1), workers=2)
     reach = 2 * radius[:, None] + 2.5 * SETTINGS.merged
     close = (distance < reach) & (np.abs(np.log(radius[nearest] / radius[:, None])) < 2 * SETTINGS.merged_radius)
     weight = close.astype(np.float64)[..., None]

@@ -48,7 +48,7 @@ def join(parts: Sequence[Boxes]) -> Boxes:
     return Boxes(*(np.concatenate(column) for column in zip(empty, *parts, strict=True)))
 
 
-def boxes_around(sets: Sequence[Array], frames: FloatArray | None = None, floor: float = 0.05) -> Boxes:
+def boxes_around(sets: Sequence[Array], frames: FloatArray | None = None, floor: float = SETTINGS.thin) -> Boxes:
     """A small box around each set of points, along the world's axes or turned about one of them where that is small.
 
     Parameters
@@ -65,7 +65,7 @@ def boxes_around(sets: Sequence[Array], frames: FloatArray | None = None, floor:
     kind, rotation = np.full(len(sets), FLAT), np.empty((len(sets), 3, 3))
     if frames is None:
         spread, frames = principal_axes(sets)
-        rod = (spread[:, 0] > 8 * spread[:, 1]) & (spread[:, 2] > spread[:, 1] / 2)  # long, about as wide as thick
+        rod = (spread[:, 0] > SETTINGS.slender * spread[:, 1]) & (spread[:, 2] > SETTINGS.even * spread[:, 1])
         kind = np.where(rod, ROD, COMPACT)
     points, start = _joined(sets)
     turn_each(points, start, SPHERE, np.ascontiguousarray(frames), kind, floor, rotation)

@@ -73,12 +73,12 @@ def _bars_of(grid: npt.NDArray[np.bool_]) -> list[tuple[tuple[int, int], tuple[i
     for axis in range(2):
         runs, _ = label_regions(grid, np.swapaxes([[0, 0, 0], [1, 1, 1], [0, 0, 0]], axis, 1))
         length = np.bincount(runs.reshape(-1))[runs] * grid
-        for share in (0.6, 0.25, 0.1):  # of the length of the rectangle
+        for share in SETTINGS.bar_runs:
             regions, _ = label_regions(length >= max(share * grid.shape[axis], 3))
             for number, place in enumerate(find_objects(regions), 1):
                 rows, columns = place
                 region = regions[place] == number
-                if region.sum() >= 0.7 * region.size:
+                if region.sum() >= SETTINGS.bar_full * region.size:
                     corners.append(((rows.start, columns.start), (rows.stop, columns.stop)))
     return list(dict.fromkeys(corners))
 

@@ -88,9 +88,9 @@ def _through_pairs(cloud: Cloud) -> list[Rod]:
     The axis is normal to both normals, and passes through their intersection (as in Schnabel, Wahl and Klein 2007).
     """
     points, normals, neighbours = cloud.points, cloud.normals, cloud.neighbours
-    draws = np.random.default_rng(0).integers(1 << 32, size=(1200, 8))  # trials, and steps of a walk
+    draws = np.random.default_rng(0).integers(1 << 32, size=(SETTINGS.rod_trials, SETTINGS.rod_walk))
     first = second = draws[:, 0] % len(points)
-    cosine = np.ones(len(draws))
+    cosine = np.ones(SETTINGS.rod_trials)
     for draw in draws[:, 1:].T:  # walk until the normals differ
         going = np.abs(cosine) >= SETTINGS.rod_parallel
         second = np.where(going, neighbours[second, draw % neighbours.shape[1]], second)

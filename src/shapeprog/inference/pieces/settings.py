@@ -34,10 +34,17 @@ class Settings:
     group_gap: float = 0.3  # distance between touching boxes, and by which others may exceed the extent of the first
     grouped: int = 120  # boxes that are grouped, the first ones
 
+    # Boxes around points
+    thin: float = 0.05  # side below which thickness is ignored in the selection of directions
+    slender: float = 8.0  # variance along a rod as a multiple of that across it, at least
+    even: float = 0.5  # smaller variance across a rod as a share of the larger one, at least
+
     # Patches, and the bars that they consist of
     patches: int = 160
     patch_points: int = 16  # points of the smallest
     full: float = 0.8  # share of a rectangle that its patch fills, below which its bars are detected as well
+    bar_full: float = 0.7  # share of its rectangle that a bar fills
+    bar_runs: tuple[float, ...] = (0.6, 0.25, 0.1)  # lengths of bars, as shares of the rectangle that they lie in
 
     # Slabs between two patches
     parallel: float = 8.0  # angle between the normals, at most
@@ -50,12 +57,15 @@ class Settings:
     ball_radius: float = 3.0  # radius of the largest
     merged: float = 0.25  # distance within which balls are merged
     merged_radius: float = 0.25  # difference of the logarithms of the radii within which balls are merged
+    limb_neighbours: int = 24  # neighbouring centres from which a direction is estimated
     linear: float = 0.3  # standard deviation across a line of centres, as a share of that along it, at most
     bend: float = 25.0  # angle between directions of neighbours in one limb, at most
     limb_points: int = 20  # points of the smallest
 
     # Rods
     rod_points: int = 24  # points of the smallest
+    rod_trials: int = 1200  # pairs of points tried
+    rod_walk: int = 8  # longest walk from one to the other
     rod_parallel: float = 0.8  # cosine above which their normals determine no axis
     rod_radius: float = 5.0  # largest radius
     rod_round: float = 0.6  # share of the sectors around a rod that have points

@@ -18,6 +18,7 @@ from shapeprog.language.unroll import draw_blocks
 from shapeprog.liang2022.generator import IDS, vocabulary
 from shapeprog.liang2022.prior import PRIORS, SyntheticBatch, scramble
 from shapeprog.liang2022.settings import ExecutorSettings
+from shapeprog.liang2022.tian2019 import LSTM
 
 INITIAL_SCALE = 0.1  # scale of the initial weights of numbers, which reach 32 and would saturate the LSTM
 EMPTY_LOGIT = -20.0  # logit of a cell that no block draws; its cross-entropy stays finite
@@ -34,7 +35,7 @@ class NeuralExecutor(nn.Module):
         self.pgm_embed, self.param_embed = nn.Linear(IDS, 64), nn.Linear(SLOTS, 64)
         with torch.no_grad():
             self.param_embed.weight *= INITIAL_SCALE
-        self.lstm = nn.LSTM(128, 128, bias=False, batch_first=True)
+        self.lstm = LSTM(128, 128, bias=False, batch_first=True)
         self.pgm_param_feat = nn.Linear(128, 128)
         self.decoder = nn.Sequential(
             nn.ConvTranspose3d(128, 64, 4, 1, 0, bias=False), nn.BatchNorm3d(64), nn.ReLU(inplace=True),
@@ -45,12 +46,6 @@ class NeuralExecutor(nn.Module):
             nn.Conv3d(4, 4, 3, 1, 1, bias=False), nn.BatchNorm3d(4), nn.ReLU(inplace=True),
             nn.ConvTranspose3d(4, 2, 4, 2, 1, bias=False),
         )  # fmt: skip
-
-    def train(self, mode: bool = True) -> NeuralExecutor:
-        """Set the mode of all but the LSTM, which has no other: cuDNN has no backward pass in evaluation mode."""
-        super().train(mode)
-        self.lstm.train()
-        return self
 
     def forward(self, ids: Float[Tensor, "N J V"], numbers: Float[Tensor, "N J 7"]) -> Float[Tensor, "N 32 32 32"]:
         """Logits of occupied cells, for probabilities of the ids of each step."""

@@ -39,6 +39,14 @@ class Tian2019Settings:
 PUBLISHED = Tian2019Settings(published=True)
 
 
+class LSTM(nn.LSTM):
+    """An LSTM that stays in training mode, which only dropout tells apart: cuDNN has no backward pass in the other."""
+
+    def train(self, mode: bool = True) -> LSTM:
+        """Stay in training mode."""
+        return super().train()
+
+
 class ShapeEncoder(nn.Module):
     """Eight convolutions with batch norm and ReLU, the mean over the last 4^3 cells, and a linear layer."""
 
@@ -103,14 +111,8 @@ class Tian2019(Generator):
     def __init__(self, settings: Tian2019Settings) -> None:
         super().__init__(settings)
         self.shape_feat = ShapeEncoder(running_statistics=not settings.published)
-        self.core = nn.LSTM(WIDTH, WIDTH, bias=False, batch_first=True)
+        self.core = LSTM(WIDTH, WIDTH, bias=False, batch_first=True)
         self.inner_net = StepNet()
-
-    def train(self, mode: bool = True) -> Tian2019:
-        """Set the mode of all but the block LSTM, which has no other: cuDNN has no backward pass in evaluation mode."""
-        super().train(mode)
-        self.core.train()
-        return self
 
     def encode(self, target: Grid, canvas: Grid, previous: Code, state: State) -> tuple[Float[Tensor, "B 64"], State]:
         """The block feature; the state holds the first convolution of the target and that of the block LSTM."""

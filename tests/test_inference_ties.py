@@ -608,12 +608,12 @@ def grouped_text(text: str) -> str:
 
 
 def test_neighbours_that_fill_a_box_are_its_division():
+    for size, text in ((7, "for _ in divide(3, x, gap=0.5, left=inset, right=inset"), (3, "for _ in row(3")):
+        drawers = f"for _ in row(3, last=at(right=1)):\n    drawer(left=1, width={size}, front=0, depth=2)\n"
+        program = sp.parse(f"width, depth, height = 24, 12, 12\nback(rear=0, depth=1)\n{drawers}")
+        tied = format_program(tie(program, evidence_of_program(program), known=True))
+        assert text in tied.replace("drawer_inset", "inset")
     head = "width, depth, height = 24, 12, 12\na = 1\n"
-    row = "for _ in row(3, last=at(right=a)):\n    drawer(left=a, width=7, front=0, depth=1)\n"
-    assert grouped_text(head + row).startswith(
-        "for _ in divide(3, x, gap=0.5, left=a, right=a, front=0, depth=1):\n    drawer()"
-    )
-    assert grouped_text(head + row.replace("width=7", "width=3")).startswith("for _ in row(3")  # far apart
     for place in ("left=a, right=width / 2 + 0.1", "right=a, width=10.9"):
         doors = f"for _ in mirror(x=0):\n    door({place}, front=0, depth=1)\n"
         assert grouped_text(head + doors).startswith(

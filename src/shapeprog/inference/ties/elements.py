@@ -26,10 +26,11 @@ ElementKind = Literal["interval", "round", "coordinate"]
 Key = tuple[int, str, int]
 """Line, key and axis of an element."""
 
-Kind = Literal["extent", "clearance", "offset", "size", "radius", "edge", "angle", "length"]
+Kind = Literal["extent", "clearance", "offset", "size", "radius", "edge", "gap", "angle", "length"]
 
 KINDS: dict[str, Kind] = {
-    "radius": "radius", "edge": "edge", "tilt": "angle", "turn": "angle", "step": "angle", "lean": "length"
+    "radius": "radius", "edge": "edge", "gap": "gap", "lean": "length",
+    "tilt": "angle", "turn": "angle", "step": "angle",
 }  # fmt: skip
 """What keywords measure that are not measured from a side."""
 

@@ -24,7 +24,9 @@ from shapeprog.inference.ties.settings import TIES
 from shapeprog.library.independence import independent
 from shapeprog.space import Array, FloatArray
 
-ELIMINATED = {"clearance": 0, "offset": 0, "edge": 1, "radius": 2, "size": 3, "length": 3, "angle": 3, "extent": 9}
+ELIMINATED = {
+    "clearance": 0, "offset": 0, "edge": 1, "gap": 1, "radius": 2, "size": 3, "length": 3, "angle": 3, "extent": 9
+}  # fmt: skip
 """Which kinds of numbers rather follow from others: small ones first."""
 
 NOTHING = 1e-7  # factors up to this are zero

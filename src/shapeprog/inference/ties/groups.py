@@ -1,4 +1,4 @@
-"""Lines of a tied program written shorter: without redundant keywords, neighbours that fill a box as its division, and
+"""Lines of a tied program written shorter: without redundant keywords, mirror images side by side as a division, and
 parts with equal clearances inside of a new box."""
 
 from __future__ import annotations
@@ -6,7 +6,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import combinations
-from typing import Any
 
 import numpy as np
 
@@ -31,9 +30,9 @@ def simplified(line: Line) -> Line:
     if isinstance(line, Group) and "last" in arguments:
         first = next(inner for inner in Source(line.body).walk() if isinstance(inner, Part))
         return replace(line, keywords=(("last", _without(arguments["last"], _start(first))),))
-    if not isinstance(line, Part):
+    if not isinstance(line, Part | Group) or (isinstance(line, Group) and line.kind != "divide"):
         return line
-    defaults = {"tilt", "lean", "turn"}  # what can be left out where it is zero
+    defaults = {"tilt", "lean", "turn", "gap"}  # what can be left out where it is zero
     for axis, words in enumerate(AXES):
         sized = words.size in arguments or (axis < 2 and line.kind in ROUND and "radius" in arguments)
         defaults |= {words.low if axis == 2 else words.offset} if sized else {words.low, words.high, words.offset}
@@ -49,7 +48,7 @@ def simplified(line: Line) -> Line:
     return replace(line, keywords=tuple(keywords))
 
 
-def _start(part: Part) -> dict[str, Argument]:
+def _start(part: Part | Group) -> dict[str, Argument]:
     """The keywords of the point that a part starts from, or of its box."""
     start = dict(part.keywords).get("start")
     return dict(start.keywords if isinstance(start, Point) else part.keywords)
@@ -74,40 +73,31 @@ def grouped(lines: Sequence[Line], numbers: dict[str, float]) -> tuple[Line, ...
 
 
 def _divided(loop: Line, numbers: dict[str, float]) -> Line:
-    """A row, or a mirror, of a part whose copies are neighbours as the division of a box; other lines as they are."""
+    """A mirror of a part beside its image as the division of a box; other lines as they are."""
     match loop:
-        case Group("row", ((_, Point(((word, place),))),), (Part("box" | "cushion", pairs) as part,), float(count)):
-            words, keywords = AXES[axis_of(word)], dict(pairs)
-            first = words.high if word == words.low else words.low
-            if word == words.offset or not (first in keywords or first == "bottom"):
-                return loop
-            clearances: dict[str, Any] = {word: place, first: keywords.get(first, 0.0)}
-            sized = isinstance(keywords.get(words.size), float)
         case Group("mirror", (("x" | "y" as word, 0.0),), (Part("box" | "cushion", pairs) as part,)):
-            words, keywords, count = AXES[axis_of(word)], dict(pairs), 2.0
-            sides = (keywords[side] for side in words[:2] if side in keywords)
-            given = sorted(sides, key=lambda value: value_at(value, numbers))  # type: ignore[arg-type]
-            if not given:
-                return loop
-            clearances = dict.fromkeys(words[:2], given[0])
-            # The inner side is in the middle, or the size is a number.
-            sized = isinstance(keywords.get(words.size), float) or names_in(given[-1]) == [words.size]  # type: ignore[arg-type]
+            words, keywords = AXES[axis_of(word)], dict(pairs)
         case _:
             return loop
+    sides = (keywords[side] for side in words[:2] if side in keywords)
+    given = sorted(sides, key=lambda value: value_at(value, numbers))  # type: ignore[arg-type]
+    if not given:
+        return loop
+    # The inner side is in the middle, or the size is a number.
+    sized = isinstance(keywords.get(words.size), float) or names_in(given[-1]) == [words.size]  # type: ignore[arg-type]
     axis = AXES.index(words)
     low, high = ends_of(part, "", axis, numbers)
     if not sized or high - low < TIES.divided or {"tilt", "lean"} & keywords.keys():
         return loop
-    occupied = sum(value_at(clearance, numbers) for clearance in clearances.values()) + count * (high - low)
-    gap = to_float32(round((numbers[SIZES[axis]] - occupied) / (count - 1), 2))
+    gap = to_float32(round(numbers[SIZES[axis]] - 2 * (value_at(given[0], numbers) + high - low), 2))  # type: ignore[arg-type]
     if not 0 <= gap <= TIES.gap * (high - low):
         return loop
     shared = [pair for pair in part.keywords if pair[0] in BOX and pair[0] not in words]
     remaining = tuple(pair for pair in part.keywords if pair[0] not in BOX)
-    shared += [(side, clearances[side]) for side in words[:2] if clearances[side] != 0]
+    shared += [(side, given[0]) for side in words[:2] if given[0] != 0]
     spacing = (("gap", gap),) if gap else ()
     box = (*spacing, *ordered(tuple(shared)))
-    return Group("divide", box, (replace(part, keywords=remaining),), count, "xyz"[axis])
+    return Group("divide", box, (replace(part, keywords=remaining),), 2.0, "xyz"[axis])
 
 
 def _in_boxes(lines: tuple[Line, ...], numbers: dict[str, float]) -> tuple[Line, ...]:

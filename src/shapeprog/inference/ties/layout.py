@@ -30,7 +30,7 @@ from shapeprog.inference.ties.settings import TIES
 from shapeprog.language.ast import Argument, Assignment, Group, Line, Part, Point, Source, changed_lines
 from shapeprog.language.evaluate import expanded, symbolic
 from shapeprog.language.expression import Binary, Name, Value
-from shapeprog.language.placement import AXES, POINTS, ROUND, SIZES
+from shapeprog.language.placement import AXES, BOX, POINTS, ROUND, SIZES
 from shapeprog.language.program import Program
 from shapeprog.space import FloatArray
 
@@ -44,6 +44,8 @@ class Layout:
         A placed program of plain numbers, without groups, functions and names but the sizes of the whole.
     anchors
         The anchors of all elements; by default the low side.
+    divide
+        Whether rows of neighbours become divisions of a box.
 
     Attributes
     ----------
@@ -74,12 +76,16 @@ class Layout:
         bounds (F,) of the products of both: no part may become thinner than ``THINNEST``.
     """
 
-    def __init__(self, source: Source, anchors: Mapping[Key, Anchors] | None = None) -> None:
+    def __init__(self, source: Source, anchors: Mapping[Key, Anchors] | None = None, *, divide: bool = True) -> None:
         self.sizes: dict[str, float] = source.evaluated_numbers()
-        tree = changed_lines([line for line in source.lines if isinstance(line, Part | Group)], self._with_radius)
+        drawing = [line for line in source.lines if isinstance(line, Part | Group)]
+        tree = changed_lines(changed_lines(drawing, self._divisions) if divide else drawing, self._with_radius)
         self.lines = [line for line in Source(tree).walk() if isinstance(line, Part | Group)]
-        self.words = [(isinstance(line, Part) and line.role) or line.kind for line in self.lines]
-        self.parts = [index for index, line in enumerate(self.lines) if isinstance(line, Part)]
+        parts = [(index, line) for index, line in enumerate(self.lines) if isinstance(line, Part)]
+        self.words = [line.kind for line in self.lines]
+        for index, part in parts:
+            self.words[index] = self.words[index - self._divided(index)] = part.role or part.kind
+        self.parts = [index - self._divided(index) for index, _ in parts]
         self.filling = {index for index in self.parts if self._fills(self.lines[index])}  # type: ignore[arg-type]
         if self.filling:
             self.sizes["depth"] = self.sizes["width"]
@@ -145,6 +151,24 @@ class Layout:
             if low[3:].any():
                 yield element, low[:-1], high[:-1]
 
+    def _divided(self, index: int) -> bool:
+        """Whether a line is that of a part which fills a division; this has its box, and stands for it."""
+        return self.lines[index - 1].kind == "divide"
+
+    def _divisions(self, line: Line) -> Line:
+        """A row of neighbours as the division of a box."""
+        match line:
+            case Group("translate", ((axis, step),), (Part("box" | "cushion", pairs) as part,), float(count)):
+                words, given = AXES["xyz".index(axis)], dict(pairs)
+                low, high = ends_of(part, "", "xyz".index(axis), self.sizes)
+                gap, away = abs(float(step)) - (high - low), (count - 1) * float(step)  # type: ignore[arg-type]
+                if given.keys().isdisjoint({"tilt", "lean"}) and -TIES.within < gap <= TIES.gap * (high - low):
+                    box = {word: value for word, value in pairs if word in BOX and word not in words}
+                    box |= {words.low: low + min(away, 0.0), words.size: high - low + abs(away)}
+                    inner = tuple(pair for pair in pairs if pair[0] not in BOX)
+                    return Group("divide", (*box.items(), ("gap", gap)), (replace(part, keywords=inner),), count, axis)
+        return line
+
     def _with_radius(self, line: Line) -> Line:
         """An upright round part with a radius in place of a width or depth; in the middle if it fills the whole."""
         arguments = dict(line.keywords) if isinstance(line, Part) else {}
@@ -195,7 +219,9 @@ class Layout:
         index, kind = len(self.named), "row" if line.kind == "translate" else line.kind
         plain = [(word, self._plain(index, word, argument)) for word, argument in line.keywords
                  if word in KINDS and index not in self.filling]  # fmt: skip
-        self.named.append(replace(line, kind=kind, keywords=(*self._placed(index), *plain)))
+        placed = [*self._placed(index)]
+        keywords = (*plain, *placed) if kind == "divide" else (*placed, *plain)
+        self.named.append(replace(line, kind=kind, keywords=keywords))
         return self.named[-1]
 
     def _placed(self, index: int) -> Iterator[tuple[str, Argument]]:
@@ -204,12 +230,12 @@ class Layout:
         given = dict(line.keywords)
         if line.kind == "translate":
             yield "last", self._point(index, "last")
-        elif isinstance(line, Group):
+        elif isinstance(line, Group) and line.kind != "divide":
             yield from self._point(index, "plane" if line.kind == "mirror" else "centre").keywords
         elif "start" in given:
             yield from ((word, self._point(index, word)) for word in POINTS if word in given)
             yield from ((word, self._across(index, axis)) for axis, word in enumerate(SIZES) if word in given)
-        else:
+        elif not self._divided(index):
             for axis in range(3):
                 yield from self._along(index, axis)
 

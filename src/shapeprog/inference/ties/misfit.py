@@ -19,8 +19,8 @@ from shapeprog.inference.ties.settings import TIES
 from shapeprog.space import FloatArray
 
 PRIOR = {
-    "clearance": 2e-4, "offset": 2e-4, "length": 2e-4, "size": 1e-3, "radius": 1e-3, "edge": 1e-3, "angle": 1e-3,
-    "extent": 1e-2,
+    "clearance": 2e-4, "offset": 2e-4, "length": 2e-4, "size": 1e-3, "radius": 1e-3, "edge": 1e-3, "gap": 1e-3,
+    "angle": 1e-3, "extent": 1e-2,
 }  # fmt: skip
 """Weights of a squared move from the start, by kind: numbers that nothing determines do not change."""
 

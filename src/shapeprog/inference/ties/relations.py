@@ -167,6 +167,8 @@ def _of_numbers(layout: Layout, numbers: FloatArray) -> Iterator[Relation]:
                 yield Relation(eye[k], TIES.floor, limit=max(TIES.within, floor))
             else:
                 yield Relation(eye[k], TIES.equal)
+        elif slot.kind == "gap":
+            yield Relation(eye[k], TIES.equal)
         elif slot.kind == "offset":
             yield Relation(eye[k], TIES.symmetric(slot.axis), limit=TIES.askew)
         elif slot.kind == "angle" and slot.word != "step":
@@ -181,7 +183,7 @@ def _of_numbers(layout: Layout, numbers: FloatArray) -> Iterator[Relation]:
             corner = slot.line == other.line and {slot.axis, other.axis} == {0, 1}
             if corner and TIES.within < min(numbers[a], numbers[b]) and larger < TIES.section:
                 yield equal
-        elif slot.kind in ("size", "radius", "edge", "length"):
+        elif slot.kind in ("size", "radius", "edge", "gap", "length"):
             near = abs(numbers[a] - numbers[b]) <= TIES.alike * larger + TIES.rounding
             if near and (slot.kind != "size" or _comparable(layout, slot, other, larger)):
                 yield equal

@@ -99,10 +99,10 @@ class _Ties:
     """Everything about a program that does not depend on the price of a number."""
 
     def __init__(self, source: Source, evidence: Evidence, seed: int, *, known: bool, held: Collection[int]) -> None:
-        flat = Layout(source)
+        flat = Layout(source, divide=not held)
         scene = flat.scene(flat.numbers)
         joints = find_joints(scene, floor=-1e6)  # that no part touches: on the floor, clearances are zero
-        self.layout = layout = Layout(source, anchors_of(flat))
+        self.layout = layout = Layout(source, anchors_of(flat), divide=not held)
         top = [index for index, line in enumerate(layout.body) for _ in Source((line,)).walk()]
         self.fixed = np.array([slot.line >= 0 and top[slot.line] in held for slot in layout.slots])
         minimum = np.where(self.fixed, 1e6, TIES.known if known else 0.0)

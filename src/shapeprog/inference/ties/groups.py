@@ -1,5 +1,5 @@
-"""Lines of a tied program written shorter: without redundant keywords, mirror images side by side as a division, and
-parts with equal clearances inside of a new box."""
+"""Lines of a tied program written shorter: without redundant keywords, and parts with equal clearances inside of a new
+box."""
 
 from __future__ import annotations
 
@@ -10,16 +10,12 @@ from itertools import combinations
 import numpy as np
 
 from shapeprog.errors import ShapeProgError
-from shapeprog.inference.ties.elements import ends_of
-from shapeprog.inference.ties.settings import TIES
-from shapeprog.language.ast import Argument, Assignment, Group, Keywords, Line, Part, Point, Source, changed_lines
+from shapeprog.language.ast import Argument, Assignment, Group, Keywords, Line, Part, Point, Source
 from shapeprog.language.convert.forms import cost
-from shapeprog.language.convert.parts import ordered
 from shapeprog.language.evaluate import placed_source, symbolic
-from shapeprog.language.expression import Expression, names_in, value_at
+from shapeprog.language.expression import Expression
 from shapeprog.language.merging import merged_lines
-from shapeprog.language.parameters import to_float32
-from shapeprog.language.placement import AXES, BOX, ROUND, SIZES, axis_of
+from shapeprog.language.placement import AXES, BOX, ROUND, axis_of
 from shapeprog.language.program import Program
 from shapeprog.space import FloatArray
 
@@ -62,42 +58,7 @@ def _without(point: Argument, known: Mapping[str, Argument]) -> Point:
 
 def grouped(lines: Sequence[Line], numbers: dict[str, float]) -> tuple[Line, ...]:
     """Lines that draw, without groups but loops, in fewer words, for these values of all names."""
-    single: list[Line] = []  # mirrors around one line each
-    for line in lines:
-        if isinstance(line, Group) and line.kind == "mirror":
-            single += [replace(line, body=(inner,)) for inner in line.body]
-        else:
-            single.append(line)
-    divided = changed_lines(single, lambda line: _divided(line, numbers))
-    return _in_boxes(merged_lines(divided), numbers)
-
-
-def _divided(loop: Line, numbers: dict[str, float]) -> Line:
-    """A mirror of a part beside its image as the division of a box; other lines as they are."""
-    match loop:
-        case Group("mirror", (("x" | "y" as word, 0.0),), (Part("box" | "cushion", pairs) as part,)):
-            words, keywords = AXES[axis_of(word)], dict(pairs)
-        case _:
-            return loop
-    sides = (keywords[side] for side in words[:2] if side in keywords)
-    given = sorted(sides, key=lambda value: value_at(value, numbers))  # type: ignore[arg-type]
-    if not given:
-        return loop
-    # The inner side is in the middle, or the size is a number.
-    sized = isinstance(keywords.get(words.size), float) or names_in(given[-1]) == [words.size]  # type: ignore[arg-type]
-    axis = AXES.index(words)
-    low, high = ends_of(part, "", axis, numbers)
-    if not sized or high - low < TIES.divided or {"tilt", "lean"} & keywords.keys():
-        return loop
-    gap = to_float32(round(numbers[SIZES[axis]] - 2 * (value_at(given[0], numbers) + high - low), 2))  # type: ignore[arg-type]
-    if not 0 <= gap <= TIES.gap * (high - low):
-        return loop
-    shared = [pair for pair in part.keywords if pair[0] in BOX and pair[0] not in words]
-    remaining = tuple(pair for pair in part.keywords if pair[0] not in BOX)
-    shared += [(side, given[0]) for side in words[:2] if given[0] != 0]
-    spacing = (("gap", gap),) if gap else ()
-    box = (*spacing, *ordered(tuple(shared)))
-    return Group("divide", box, (replace(part, keywords=remaining),), 2.0, "xyz"[axis])
+    return _in_boxes(merged_lines(lines), numbers)
 
 
 def _in_boxes(lines: tuple[Line, ...], numbers: dict[str, float]) -> tuple[Line, ...]:

@@ -45,7 +45,7 @@ class Layout:
     anchors
         The anchors of all elements; by default the low side.
     divide
-        Whether rows of neighbours become divisions of a box.
+        Whether neighbours become divisions of a box, and mirrors about the middle are written around one line each.
 
     Attributes
     ----------
@@ -78,7 +78,12 @@ class Layout:
 
     def __init__(self, source: Source, anchors: Mapping[Key, Anchors] | None = None, *, divide: bool = True) -> None:
         self.sizes: dict[str, float] = source.evaluated_numbers()
-        drawing = [line for line in source.lines if isinstance(line, Part | Group)]
+        drawing: list[Line] = []
+        for line in source.lines:
+            if divide and isinstance(line, Group) and line.kind == "mirror" and line.keywords[0][1] == 0:
+                drawing += [replace(line, body=(inner,)) for inner in line.body]  # some may be divided, or in a box
+            elif isinstance(line, Part | Group):
+                drawing.append(line)
         tree = changed_lines(changed_lines(drawing, self._divisions) if divide else drawing, self._with_radius)
         self.lines = [line for line in Source(tree).walk() if isinstance(line, Part | Group)]
         parts = [(index, line) for index, line in enumerate(self.lines) if isinstance(line, Part)]
@@ -156,18 +161,24 @@ class Layout:
         return self.lines[index - 1].kind == "divide"
 
     def _divisions(self, line: Line) -> Line:
-        """A row of neighbours as the division of a box."""
+        """A row of neighbours, or a part beside its mirror image, as the division of a box."""
         match line:
-            case Group("translate", ((axis, step),), (Part("box" | "cushion", pairs) as part,), float(count)):
-                words, given = AXES["xyz".index(axis)], dict(pairs)
-                low, high = ends_of(part, "", "xyz".index(axis), self.sizes)
-                gap, away = abs(float(step)) - (high - low), (count - 1) * float(step)  # type: ignore[arg-type]
-                if given.keys().isdisjoint({"tilt", "lean"}) and -TIES.within < gap <= TIES.gap * (high - low):
-                    box = {word: value for word, value in pairs if word in BOX and word not in words}
-                    box |= {words.low: low + min(away, 0.0), words.size: high - low + abs(away)}
-                    inner = tuple(pair for pair in pairs if pair[0] not in BOX)
-                    return Group("divide", (*box.items(), ("gap", gap)), (replace(part, keywords=inner),), count, axis)
-        return line
+            case Group("translate", ((word, step),), (Part("box" | "cushion") as part,), float(count)):
+                least, away = 0.0, (count - 1) * float(step)  # type: ignore[arg-type]
+            case Group("mirror", (("x" | "y" as word, 0.0),), (Part("box" | "cushion") as part,)):
+                least, away, count = TIES.divided, self.sizes[SIZES["xy".index(word)]], 2.0
+                away -= sum(ends_of(part, "", "xy".index(word), self.sizes))
+            case _:
+                return line
+        words, given = AXES["xyz".index(word)], dict(part.keywords)
+        low, high = ends_of(part, "", "xyz".index(word), self.sizes)
+        size, gap = high - low, abs(away) / (count - 1) - (high - low)
+        if size < least or not -TIES.within < gap <= TIES.gap * size or {"tilt", "lean"} & given.keys():
+            return line
+        box = {key: value for key, value in given.items() if key in BOX and key not in words}
+        box |= {words.low: low + min(away, 0.0), words.size: size + abs(away)}
+        inner = replace(part, keywords=tuple(pair for pair in part.keywords if pair[0] not in BOX))
+        return Group("divide", (*box.items(), ("gap", gap)), (inner,), count, word)
 
     def _with_radius(self, line: Line) -> Line:
         """An upright round part with a radius in place of a width or depth; in the middle if it fills the whole."""

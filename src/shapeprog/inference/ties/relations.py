@@ -168,7 +168,7 @@ def _of_numbers(layout: Layout, numbers: FloatArray) -> Iterator[Relation]:
             else:
                 yield Relation(eye[k], TIES.equal)
         elif slot.kind == "gap":
-            yield Relation(eye[k], TIES.equal)
+            yield Relation(eye[k], TIES.equal, limit=TIES.touch)
         elif slot.kind == "offset":
             yield Relation(eye[k], TIES.symmetric(slot.axis), limit=TIES.askew)
         elif slot.kind == "angle" and slot.word != "step":

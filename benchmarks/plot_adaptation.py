@@ -1,6 +1,6 @@
 """Plot the sample efficiency of adaptation from finished runs, and the extrapolation of renderer and neural executor.
 
-shapeprog paper table PACKS --results RESULTS
+shapeprog paper table PACKS --results RESULTS --seeds 3
 python -m benchmarks.plot_adaptation PACKS RESULTS docs
 """
 
@@ -26,12 +26,12 @@ from shapeprog.liang2022.prior import PRIORS
 from shapeprog.liang2022.settings import LOG, AdaptSettings
 from shapeprog.liang2022.weights import load_executor, load_generator
 
-CURVES = {"guided-long": "C1.-", "direct-long": "C0.-", "wide-guided": "C1.--", "wide-direct": "C0.--"}
+CURVES = {"tian2019-guided": "C1.-", "tian2019-direct": "C0.-"}
 """Rows whose adaptation is plotted, with matplotlib's format of their curves."""
 
 
 def plot_efficiency(packs: Path, results: Path, out: Path) -> None:
-    """CD of validation shapes against shapes seen in adaptation, a curve for each seed."""
+    """CD of validation shapes against presentations of training shapes, a curve for each seed."""
     figure = Figure((4.5 * len(CATEGORIES), 3.6), layout="constrained")
     curves: dict[str, Line2D] = {}
     for axis, category in zip(figure.subplots(1, len(CATEGORIES)), CATEGORIES, strict=True):
@@ -44,7 +44,7 @@ def plot_efficiency(packs: Path, results: Path, out: Path) -> None:
                 records = [record for record in (first, *read_log(folder / LOG)) if cd in record]
                 shapes = [record["samples_seen"] for record in records]
                 curves[row], *_ = axis.plot(shapes, [1000 * record[cd] for record in records], style)
-        axis.set(title=category, xlabel="shapes seen", ylabel="CD x 1000", ylim=(0, None))
+        axis.set(title=category, xlabel="presentations", ylabel="CD x 1000", ylim=(0, None))
     figure.legend(curves.values(), curves.keys(), loc="outside lower center", ncols=len(curves))
     figure.savefig(out, dpi=120)
 

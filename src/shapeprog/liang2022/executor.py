@@ -25,6 +25,7 @@ EMPTY_LOGIT = -20.0  # logit of a cell that no block draws; its cross-entropy st
 OCCUPIED_WEIGHT = (30.0, 5.0)  # weight of an occupied cell at the start of training, and at its end as published
 MOVED_BY, MAX_COUNT = 6, 8  # cells that a widened number is moved by at most, and its largest loop count
 VALIDATION_BLOCKS = 512
+BLOCKS_OF_PROGRAM = 3  # blocks that are taken of each synthetic program, in the mean; a program has four
 
 
 class NeuralExecutor(nn.Module):
@@ -74,15 +75,15 @@ class ExecutorTask:
         self._validation = {name: self._blocks(VALIDATION_BLOCKS, -1, 0, share) for name, share in shares.items()}
 
     def batch(self, index: int) -> SyntheticBatch:
-        """One block (N, J) of each synthetic program, a share of them widened, and their cells."""
+        """Blocks (N, J) of synthetic programs, a share of them widened, and their cells."""
         return self._blocks(self._settings.batch_size, self._settings.seed, index, self._settings.widened)
 
     def _blocks(self, count: int, seed: int, index: int, share: float) -> SyntheticBatch:
-        code = PRIORS[self._settings.prior].batch(count, seed, index).code
+        code = PRIORS[self._settings.prior].batch(-(-count // BLOCKS_OF_PROGRAM), seed, index).code
         rng = torch.Generator().manual_seed(scramble(self._settings.seed, 1, index))
-        block = torch.multinomial((code.ids > 0).any(-1).float(), 1, generator=rng)[:, 0]
-        row, widened = torch.arange(len(block)), round(share * len(block))
-        ids, numbers = code.ids[row, block], code.parameters[row, block]
+        drawing = (code.ids > 0).any(-1).nonzero()
+        row, block = drawing[torch.randperm(len(drawing), generator=rng)[:count]].unbind(-1)
+        ids, numbers, widened = code.ids[row, block], code.parameters[row, block], round(share * len(row))
         numbers[:widened] = _widened(ids, numbers, rng)[:widened]
         cells = draw_blocks(Code(ids[:, None], numbers[:, None]))[:, 0]
         return SyntheticBatch(Code(ids, numbers), unpack(cells))

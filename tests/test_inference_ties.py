@@ -607,20 +607,35 @@ def grouped_text(text: str) -> str:
     return "\n".join(format_program(program).splitlines()[len(header) :])
 
 
-def test_neighbours_that_fill_a_box_are_its_division():
-    drawers = "for _ in row(3, last=at(right=1)):\n    drawer(left=1, width={}, front=0, depth=3)\n"
-    doors = "for _ in mirror(x=0):\n    handle(left=9, width=0.3, front=-1, depth=1, bottom=4, height=3)\n"
-    doors += "    door({}, front=0, depth=3)\n"
-    for lines, text in (
-        (drawers.format(7), "divide(3, x, gap=0.5, left=inset, right=inset"),
-        (drawers.format(3), "row(3, last"),
-        (doors.format("left=2, right=12.3"), "divide(2, x, gap=0.6, left=inset, right=inset"),
-        (doors.format("right=2, width=9.7"), "divide(2, x, gap=0.6, left=inset, right=inset"),
-        (doors.format("left=2, width=6"), "    door("),
-    ):
-        program = sp.parse(f"width, depth, height = 24, 12, 12\nback(rear=0, depth=1)\n{lines}")
-        tied = format_program(tie(program, evidence_of_program(program), known=True))
-        assert text in tied.replace("drawer_inset", "inset").replace("door_inset", "inset"), tied
+ROW = "for _ in row(3, last=at(right=1)):\n    drawer(left=1, width={}, front=0, depth=3)\n"
+HANDLE = "    handle(left=9, width=0.3, front=-1, depth=1, bottom=4, height=3)\n"
+DOORS = f"for _ in mirror({{}}):\n{HANDLE}    door({{}}, front=0, depth=3)\n"
+
+
+@pytest.mark.parametrize(
+    ("lines", "expected"),
+    [
+        (ROW.format(7), "divide(3, x, gap=0.5, left=drawer_inset, right=drawer_inset"),
+        (
+            ROW.format(7).replace("right=1", "right=1, rear=8.95"),
+            "divide(3, x, gap=0.5, left=drawer_inset, right=drawer_inset",
+        ),
+        (ROW.format(7.15), "divide(3, x, gap=0.27, left=drawer_inset, right=drawer_inset"),
+        (ROW.format(7).replace("row(3, last=at(right=1))", "translate(1, x=5)"), "drawer(left="),
+        (ROW.format(3), "row(3, last"),
+        (ROW.format(0.2).replace("right=1", "left=1.1"), "row(3, last"),  # they overlap
+        (DOORS.format("x=0", "left=2, right=12.3"), "divide(2, x, gap=0.6, left=door_inset, right=door_inset"),
+        (
+            DOORS.format("x=0.03", "right=2, width=9.7").replace(HANDLE, ""),
+            "divide(2, x, gap=0.54, left=door_inset, right=door_inset",
+        ),
+        (DOORS.format("x=0", "left=2, width=6"), "    door("),
+    ],
+)
+def test_neighbours_that_fill_a_box_are_its_division(lines: str, expected: str):
+    program = sp.parse(f"width, depth, height = 24, 12, 12\nback(rear=0, depth=1)\n{lines}")
+    tied = format_program(tie(program, evidence_of_program(program), known=True))
+    assert expected in tied, tied
 
 
 def test_parts_with_equal_clearances_are_drawn_in_a_box_if_that_is_shorter():

@@ -108,10 +108,11 @@ class _AxisAnchors:
         cost, centred = 0.0, abs(element.middle - extent / 2) <= TIES.off_middle * extent and len(set(anchors)) == 1
         ends = (element.low, element.high) if len(anchors) > 1 else (element.middle,)
         for end, anchor in zip(ends, anchors, strict=True):
-            share = (end if anchor == LOW else extent - end) / extent
             if anchor == MIDDLE:
                 cost += TIES.middle * (not centred)
-            elif self.axis < 2 or element.key == "last":  # heights are measured from the floor as well as from the top
+                continue
+            share = (end if anchor == LOW else extent - end) / extent
+            if self.axis < 2 or element.key == "last":  # heights are measured from the floor as well as from the top
                 cost += TIES.farther * max(0.0, 2 * share - 1)
             elif share > min(TIES.changes):  # beyond the other side if the whole is made smaller
                 cost += TIES.outside

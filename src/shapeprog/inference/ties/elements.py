@@ -44,8 +44,8 @@ class Element:
     line
         Number of the line, in the order of the text.
     key
-        Empty for the box of a part; else ``start``, ``through``, ``end``, ``across`` (the size of a bar), ``plane``,
-        ``centre`` or ``last``.
+        Empty for the box of a part or a division; else ``start``, ``through``, ``end``, ``across`` (the size of a bar),
+        ``plane``, ``centre`` or ``last``.
     axis
         0 left-right, 1 front-rear, 2 vertical.
     kind

@@ -24,9 +24,10 @@ def simplified(line: Line) -> Line:
     """The line without redundant keywords."""
     arguments = dict(line.keywords) if isinstance(line, Part | Group) else {}
     if isinstance(line, Group) and "last" in arguments:
-        first = next(inner for inner in Source(line.body).walk() if isinstance(inner, Part))
+        inside = (inner for inner in Source(line.body).walk() if isinstance(inner, Part | Group))
+        first = next(inner for inner in inside if isinstance(inner, Part) or inner.kind == "divide")
         return replace(line, keywords=(("last", _without(arguments["last"], _start(first))),))
-    if not isinstance(line, Part | Group) or (isinstance(line, Group) and line.kind != "divide"):
+    if not (isinstance(line, Part) or (isinstance(line, Group) and line.kind == "divide")):
         return line
     defaults = {"tilt", "lean", "turn", "gap"}  # what can be left out where it is zero
     for axis, words in enumerate(AXES):
@@ -57,12 +58,16 @@ def _without(point: Argument, known: Mapping[str, Argument]) -> Point:
 
 
 def grouped(lines: Sequence[Line], numbers: dict[str, float]) -> tuple[Line, ...]:
-    """Lines that draw, without groups but loops, in fewer words, for these values of all names."""
-    return _in_boxes(merged_lines(lines), numbers)
+    """Lines that draw, merged, and with parts and loops of equal clearances in boxes where that saves words.
 
-
-def _in_boxes(lines: tuple[Line, ...], numbers: dict[str, float]) -> tuple[Line, ...]:
-    """Parts and loops with equal clearances moved into boxes, while that saves words."""
+    Parameters
+    ----------
+    lines
+        Lines that draw, without groups but loops.
+    numbers
+        The values of all names.
+    """
+    lines = merged_lines(lines)
     while True:
         sides = {line: _sides(line) for line in lines if not isinstance(line, Group) or line.kind != "inside"}
         frames = {one & other for one, other in combinations(sides.values(), 2)} - {frozenset()}

@@ -30,7 +30,7 @@ from shapeprog.inference.ties.settings import TIES
 from shapeprog.language.ast import Argument, Assignment, Group, Line, Part, Point, Source, changed_lines
 from shapeprog.language.evaluate import expanded, symbolic
 from shapeprog.language.expression import Binary, Name, Value
-from shapeprog.language.placement import AXES, BOX, POINTS, ROUND, SIZES
+from shapeprog.language.placement import AXES, BOX, POINTS, ROUND, SIZES, axis_of
 from shapeprog.language.program import Program
 from shapeprog.space import FloatArray
 
@@ -45,7 +45,7 @@ class Layout:
     anchors
         The anchors of all elements; by default the low side.
     divide
-        Whether neighbours become divisions of a box, and mirrors about the middle are written around one line each.
+        Whether neighbours become divisions of a box, and outer mirrors about the middle are around one line each.
 
     Attributes
     ----------
@@ -53,7 +53,7 @@ class Layout:
         Width, depth and height of the whole, by name and in this order.
     lines, words, parts
         Its parts and loops, in the order of the text, their roles, or else kinds, and the numbers of those that are
-        parts; upright round parts have a radius.
+        parts; upright round parts have a radius. A division stands for its part, with its role.
     loops_around
         For every line the numbers of the loops around it.
     filling
@@ -80,8 +80,10 @@ class Layout:
         self.sizes: dict[str, float] = source.evaluated_numbers()
         drawing: list[Line] = []
         for line in source.lines:
-            if divide and isinstance(line, Group) and line.kind == "mirror" and line.keywords[0][1] == 0:
-                drawing += [replace(line, body=(inner,)) for inner in line.body]  # some may be divided, or in a box
+            middle = isinstance(line, Group) and {*line.keywords} <= {("x", 0.0), ("y", 0.0)}
+            if divide and isinstance(line, Group) and line.kind == "mirror" and middle:
+                # Each may become a division, or move into a box, alone; the text joins the others again.
+                drawing += [replace(line, body=(inner,)) for inner in line.body]
             elif isinstance(line, Part | Group):
                 drawing.append(line)
         tree = changed_lines(changed_lines(drawing, self._divisions) if divide else drawing, self._with_radius)
@@ -91,7 +93,7 @@ class Layout:
         for index, part in parts:
             self.words[index] = self.words[index - self._divided(index)] = part.role or part.kind
         self.parts = [index - self._divided(index) for index, _ in parts]
-        self.filling = {index for index in self.parts if self._fills(self.lines[index])}  # type: ignore[arg-type]
+        self.filling = {index for index in self.parts if self._fills(self.lines[index])}
         if self.filling:
             self.sizes["depth"] = self.sizes["width"]
         self.extents = tuple(float(self.sizes[size]) for size in SIZES)
@@ -157,28 +159,34 @@ class Layout:
                 yield element, low[:-1], high[:-1]
 
     def _divided(self, index: int) -> bool:
-        """Whether a line is that of a part which fills a division; this has its box, and stands for it."""
+        """Whether a line is a part that fills a division; the division has the box of the part, and stands for it."""
         return self.lines[index - 1].kind == "divide"
 
     def _divisions(self, line: Line) -> Line:
         """A row of neighbours, or a part beside its mirror image, as the division of a box."""
         match line:
-            case Group("translate", ((word, step),), (Part("box" | "cushion") as part,), float(count)):
-                least, away = 0.0, (count - 1) * float(step)  # type: ignore[arg-type]
-            case Group("mirror", (("x" | "y" as word, 0.0),), (Part("box" | "cushion") as part,)):
-                least, away, count = TIES.divided, self.sizes[SIZES["xy".index(word)]], 2.0
-                away -= sum(ends_of(part, "", "xy".index(word), self.sizes))
+            case Group("translate", keywords, (Part("box" | "cushion") as part,), float(count)) if count > 1:
+                ways = ((axis_of(word), (count - 1) * float(step)) for word, step in keywords)  # type: ignore[arg-type]
+                moving, least = [(axis, way) for axis, way in ways if abs(way) >= TIES.touch], 0.0
+            case Group("mirror", ((word, _),), (Part("box" | "cushion") as part,)) if axis_of(word) < 2:
+                axis, least, count = axis_of(word), TIES.divided, 2.0
+                plane, _ = ends_of(line, "plane", axis, self.sizes)
+                moving = [(axis, 2 * plane - sum(ends_of(part, "", axis, self.sizes)))]
             case _:
                 return line
-        words, given = AXES["xyz".index(word)], dict(part.keywords)
-        low, high = ends_of(part, "", "xyz".index(word), self.sizes)
-        size, gap = high - low, abs(away) / (count - 1) - (high - low)
-        if size < least or not -TIES.within < gap <= TIES.gap * size or {"tilt", "lean"} & given.keys():
+        given = dict(part.keywords)
+        if len(moving) != 1 or not given.keys().isdisjoint({"tilt", "lean"}):
             return line
-        box = {key: value for key, value in given.items() if key in BOX and key not in words}
+        ((axis, away),) = moving
+        words, (low, high) = AXES[axis], ends_of(part, "", axis, self.sizes)
+        size = high - low
+        gap = abs(away) / (count - 1) - size
+        if size < least or not -min(TIES.within, TIES.gap * size) < gap <= TIES.gap * size:
+            return line
+        box = {word: value for word, value in given.items() if word in BOX and word not in words}
         box |= {words.low: low + min(away, 0.0), words.size: size + abs(away)}
         inner = replace(part, keywords=tuple(pair for pair in part.keywords if pair[0] not in BOX))
-        return Group("divide", (*box.items(), ("gap", gap)), (inner,), count, word)
+        return Group("divide", (*box.items(), ("gap", gap)), (inner,), count, "xyz"[axis])
 
     def _with_radius(self, line: Line) -> Line:
         """An upright round part with a radius in place of a width or depth; in the middle if it fills the whole."""
@@ -191,7 +199,7 @@ class Layout:
         keywords = tuple(pair for pair in line.keywords if pair[0] not in left_out)
         return replace(line, keywords=(*keywords, ("radius", radius)))
 
-    def _fills(self, part: Part) -> bool:
+    def _fills(self, part: Part | Group) -> bool:
         """Whether a cylinder is nearly as wide as the whole."""
         if part.kind != "cylinder":
             return False
@@ -230,9 +238,8 @@ class Layout:
         index, kind = len(self.named), "row" if line.kind == "translate" else line.kind
         plain = [(word, self._plain(index, word, argument)) for word, argument in line.keywords
                  if word in KINDS and index not in self.filling]  # fmt: skip
-        placed = [*self._placed(index)]
-        keywords = (*plain, *placed) if kind == "divide" else (*placed, *plain)
-        self.named.append(replace(line, kind=kind, keywords=keywords))
+        keywords = sorted((*self._placed(index), *plain), key=lambda pair: pair[0] != "gap")
+        self.named.append(replace(line, kind=kind, keywords=tuple(keywords)))
         return self.named[-1]
 
     def _placed(self, index: int) -> Iterator[tuple[str, Argument]]:
@@ -241,7 +248,7 @@ class Layout:
         given = dict(line.keywords)
         if line.kind == "translate":
             yield "last", self._point(index, "last")
-        elif isinstance(line, Group) and line.kind != "divide":
+        elif line.kind in ("mirror", "rotate"):
             yield from self._point(index, "plane" if line.kind == "mirror" else "centre").keywords
         elif "start" in given:
             yield from ((word, self._point(index, word)) for word in POINTS if word in given)

@@ -167,8 +167,8 @@ def _of_numbers(layout: Layout, numbers: FloatArray) -> Iterator[Relation]:
                 yield Relation(eye[k], TIES.floor, limit=max(TIES.within, floor))
             else:
                 yield Relation(eye[k], TIES.equal)
-        elif slot.kind == "gap":
-            yield Relation(eye[k], TIES.equal, limit=TIES.touch)
+        elif slot.kind == "gap" and abs(slot.value) <= TIES.touch:
+            yield Relation(eye[k], TIES.equal)
         elif slot.kind == "offset":
             yield Relation(eye[k], TIES.symmetric(slot.axis), limit=TIES.askew)
         elif slot.kind == "angle" and slot.word != "step":

@@ -9,6 +9,10 @@ from dataclasses import dataclass
 class TieSettings:
     """Numbers of ties; lengths in cells, angles in degrees, chosen on validation shapes unless a reason is given."""
 
+    # Layout
+    gap: float = 0.25  # neighbours divide a box if the gap between them is at most this share of their size
+    divided: float = 2.0  # least size of a part that divides a box with its mirror image
+
     # Search
     price: float = 3e-4  # of a free number, as a mean squared distance
     known_price: float = 1.2e-3  # the same in a program that somebody wrote (planted programs)
@@ -48,8 +52,7 @@ class TieSettings:
     rigid: float = 5.0  # of a copy of a long part that keeps its size
     middle: float = 2.0  # of an end measured from the middle, where the middle of the part is not that of the whole
     farther: float = 3.0  # of an end measured from the farther of two sides, times how much farther, as a share
-
-    outside: float = 2.0  # of a height that would be outside of a whole as low as ``changes`` make it
+    outside: float = 2.0  # of a height above the whole when that is as low as the least of ``changes`` makes it
 
     # Shares of the whole
     reach: float = 0.02  # up to this a face reaches a side
@@ -76,8 +79,6 @@ class TieSettings:
     # Text
     negative: float = 1.5  # operators that a size is worth which may become negative: a difference
     repeated: float = 0.3  # operators that every use of a sum after the first is worth, as it can be named
-    gap: float = 0.25  # neighbours divide a box if the gap between them is at most this share of their size
-    divided: float = 2.0  # least size of such neighbours, where a mirror draws them
     upright: float = 0.12  # cells by which the ends of an upright part may be off its axis
     leaning: float = 1.0  # angle from which a board is written as a bar, which has no left and right side,
     board_off: float = 0.5  # if it is off the middle by no more than this

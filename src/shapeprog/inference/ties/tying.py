@@ -12,6 +12,7 @@ import math
 from collections.abc import Collection
 
 import numpy as np
+import torch
 
 from shapeprog.errors import ShapeProgError
 from shapeprog.geometry.arrays import one_tensor_thread
@@ -99,9 +100,13 @@ class _Ties:
     """Everything about a program that does not depend on the price of a number."""
 
     def __init__(self, source: Source, evidence: Evidence, seed: int, *, known: bool, held: Collection[int]) -> None:
-        flat = Layout(source, divide=not held)
+        flat = Layout(source, divide=not held)  # lines are held by their numbers, which divisions change
         scene = flat.scene(flat.numbers)
         joints = find_joints(scene, floor=-1e6)  # that no part touches: on the floor, clearances are zero
+        blocks = scene.block[joints.pairs]
+        division = torch.tensor([flat.lines[line].kind == "divide" for line in flat.parts])[blocks[:, 0]]
+        apart = ~(division & (blocks[:, 0] == blocks[:, 1]))  # the gap of a division is a number of its own
+        joints = joints._replace(pairs=joints.pairs[apart], normalized=joints.normalized[apart])
         self.layout = layout = Layout(source, anchors_of(flat), divide=not held)
         top = [index for index, line in enumerate(layout.body) for _ in Source((line,)).walk()]
         self.fixed = np.array([slot.line >= 0 and top[slot.line] in held for slot in layout.slots])

@@ -63,7 +63,6 @@ class Likeness(NamedTuple):
     normals: float
 
 
-UNKNOWN = Likeness(math.nan, math.nan, math.nan)
 NOTHING = Likeness(0.0, 0.0, 0.0)
 """The likeness of a prediction that has no surface."""
 

@@ -124,11 +124,6 @@ class Prediction:
         """Log-probability of the ids of each block, zero where it is not live."""
         return self.scatter(self.logits.gather(-1, self.ids[..., None])[..., 0].sum(-1))
 
-    def number_log_prob(self) -> Float[Tensor, "B K"]:
-        """Log-probability of the numbers of each block, for designs that predict a distribution."""
-        nll = self.generator.number_loss(self.hidden, self.ids, self.inputs)
-        return self.scatter(-(nll * self.generator.used[self.ids]).sum((-1, -2)))
-
 
 class Generator(nn.Module, ABC):
     """A network that writes programs block by block; its settings are a frozen dataclass of JSON values."""

@@ -1,6 +1,6 @@
 """The neural executor of Tian et al. 2019, which draws a block whose ids are probabilities, and its training.
 
-The published one was trained on 27 million blocks; to learn from a hundredth of that, blocks are endless, the Dice loss
+The published one was trained on 27 million blocks; to learn from a twentieth of that, blocks are endless, the Dice loss
 is added, and occupied cells weigh more at first: a network that has learned to draw none does not recover.
 """
 

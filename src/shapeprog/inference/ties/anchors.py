@@ -112,9 +112,9 @@ class _AxisAnchors:
                 cost += TIES.middle * (not centred)
                 continue
             share = (end if anchor == LOW else extent - end) / extent
-            if self.axis < 2 or element.key == "last":  # heights are measured from the floor as well as from the top
+            if self.axis < 2 or element.key == "last":
                 cost += TIES.farther * max(0.0, 2 * share - 1)
-            elif share > min(TIES.changes):  # beyond the other side if the whole is made smaller
+            elif share > min(TIES.changes):  # any other height may be measured from either side
                 cost += TIES.outside
         if len(set(anchors)) > 1:
             cost += TIES.resized * max(0.0, 1 - (element.high - element.low) / extent / TIES.spanning)

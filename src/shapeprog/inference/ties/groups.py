@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import combinations
+from typing import TypeGuard
 
 import numpy as np
 
@@ -24,10 +25,9 @@ def simplified(line: Line) -> Line:
     """The line without redundant keywords."""
     arguments = dict(line.keywords) if isinstance(line, Part | Group) else {}
     if isinstance(line, Group) and "last" in arguments:
-        inside = (inner for inner in Source(line.body).walk() if isinstance(inner, Part | Group))
-        first = next(inner for inner in inside if isinstance(inner, Part) or inner.kind == "divide")
+        first = next(inner for inner in Source(line.body).walk() if _has_box(inner))
         return replace(line, keywords=(("last", _without(arguments["last"], _start(first))),))
-    if not (isinstance(line, Part) or (isinstance(line, Group) and line.kind == "divide")):
+    if not _has_box(line):
         return line
     defaults = {"tilt", "lean", "turn", "gap"}  # what can be left out where it is zero
     for axis, words in enumerate(AXES):
@@ -43,6 +43,11 @@ def simplified(line: Line) -> Line:
     if line.kind == "taper" and isinstance(radius, tuple) and radius[0] == radius[1]:
         return replace(line, kind="rod", keywords=tuple((w, radius[0] if w == "radius" else v) for w, v in keywords))
     return replace(line, keywords=tuple(keywords))
+
+
+def _has_box(line: Line) -> TypeGuard[Part | Group]:
+    """Whether a line has a box and draws in it: a part, or a division, whose part has no other box."""
+    return isinstance(line, Part) or (isinstance(line, Group) and line.kind == "divide")
 
 
 def _start(part: Part | Group) -> dict[str, Argument]:
@@ -91,16 +96,15 @@ def grouped(lines: Sequence[Line], numbers: dict[str, float]) -> tuple[Line, ...
 def _sides(line: Line) -> frozenset[tuple[str, Argument]]:
     """The named clearances of the parts in a line, with their keywords."""
     words = {word for words in AXES for word in words[:2]}
-    drawn = (inner for inner in Source((line,)).walk() if isinstance(inner, Part | Group))
-    pairs = (pair for inner in drawn if isinstance(inner, Part) or inner.kind == "divide" for pair in inner.keywords)
+    pairs = (pair for inner in Source((line,)).walk() if _has_box(inner) for pair in inner.keywords)
     return frozenset(pair for pair in pairs if pair[0] in words and isinstance(pair[1], Expression))
 
 
 def _inside(line: Line, frame: Keywords) -> Line:
     """The line in a box with these clearances, which its parts then do not have."""
-    if isinstance(line, Group) and line.kind != "divide":
+    if not _has_box(line):
+        assert isinstance(line, Group)
         return replace(line, body=tuple(_inside(inner, frame) for inner in line.body))
-    assert isinstance(line, Part | Group)
     arguments, keywords = dict(line.keywords), list[tuple[str, Argument]]()
     for word, value in line.keywords:
         if (word, value) not in frame:

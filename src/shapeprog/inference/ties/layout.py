@@ -80,12 +80,12 @@ class Layout:
         self.sizes: dict[str, float] = source.evaluated_numbers()
         drawing: list[Line] = []
         for line in source.lines:
-            middle = isinstance(line, Group) and {*line.keywords} <= {("x", 0.0), ("y", 0.0)}
-            if divide and isinstance(line, Group) and line.kind == "mirror" and middle:
-                # Each may become a division, or move into a box, alone; the text joins the others again.
-                drawing += [replace(line, body=(inner,)) for inner in line.body]
-            elif isinstance(line, Part | Group):
-                drawing.append(line)
+            match line:
+                case Group("mirror", keywords, body) if divide and {*keywords} <= {("x", 0.0), ("y", 0.0)}:
+                    # Each may become a division, or move into a box, alone; the text joins the others again.
+                    drawing += [replace(line, body=(inner,)) for inner in body]
+                case Part() | Group():
+                    drawing.append(line)
         tree = changed_lines(changed_lines(drawing, self._divisions) if divide else drawing, self._with_radius)
         self.lines = [line for line in Source(tree).walk() if isinstance(line, Part | Group)]
         parts = [(index, line) for index, line in enumerate(self.lines) if isinstance(line, Part)]

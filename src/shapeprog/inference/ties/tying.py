@@ -113,7 +113,7 @@ class _Ties:
         minimum = np.where(self.fixed, 1e6, TIES.known if known else 0.0)
         self.misfit = Misfit(layout, evidence, joints, minimum, seed)
         self.decimals = CELLS if known else CELLS + 1  # what is inferred is rounded again
-        parts, pairs = layout.parts, scene.block[joints.pairs].tolist()
+        parts, pairs = layout.parts, blocks[apart].tolist()
         self.touching = {(parts[min(pair)], parts[max(pair)]) for pair in pairs}
         self.loose = self._loose(layout.numbers)
 

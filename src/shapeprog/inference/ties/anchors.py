@@ -116,6 +116,8 @@ class _AxisAnchors:
                 cost += TIES.farther * max(0.0, 2 * share - 1)
             elif share > min(TIES.changes):  # any other height may be measured from either side
                 cost += TIES.outside
+            elif anchor == HIGH and share > TIES.below:
+                cost += TIES.from_top
         if len(set(anchors)) > 1:
             cost += TIES.resized * max(0.0, 1 - (element.high - element.low) / extent / TIES.spanning)
         return cost

@@ -53,6 +53,7 @@ class TieSettings:
     middle: float = 2.0  # of an end measured from the middle, where the middle of the part is not that of the whole
     farther: float = 3.0  # of an end measured from the farther of two sides, times how much farther, as a share
     outside: float = 2.0  # of a height above the whole when that is as low as the least of ``changes`` makes it
+    from_top: float = 0.25  # of a height measured from the top by a part that is not near it: people expect the floor
 
     # Shares of the whole
     reach: float = 0.02  # up to this a face reaches a side

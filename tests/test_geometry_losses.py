@@ -1,6 +1,10 @@
+from dataclasses import replace
+
+import pytest
 import torch
 from geometry_helpers import make_scene, random_scene, with_leaves
 
+import shapeprog as sp
 from shapeprog.geometry.distance import each_distance
 from shapeprog.geometry.losses import coverage, excess
 from shapeprog.language import Draw, Loop, Program, unroll
@@ -52,3 +56,12 @@ def test_a_loop_equals_its_copies_on_every_path():
     assert (one.voxels() == two.voxels()).all()
     g = [torch.Generator().manual_seed(1) for _ in range(2)]
     torch.testing.assert_close(one.sample(50, g[0]), two.sample(50, g[1]))
+
+
+def test_second_derivatives_are_refused_instead_of_zero():
+    scene = make_scene(["cuboid"], [[2.0, 2, 2]], [[0.0, 0, 0]])
+    size = scene.size.clone().requires_grad_()
+    scene = replace(scene, size=size)
+    for loss in (coverage(scene, torch.full((5, 3), 4.0)), sp.sample(scene, 5).points.sum()):
+        with pytest.raises(sp.ShapeProgError, match="no second derivatives"):
+            torch.autograd.grad(loss, size, create_graph=True)

@@ -1,28 +1,25 @@
-"""A part whose length shrinks to nothing keeps a gradient, and only where gradients are recorded."""
+"""With ``shortest``, a part that shrinks to nothing keeps a gradient; without, parts are differentiated as written."""
 
 from __future__ import annotations
-
-from collections.abc import Callable
 
 import pytest
 import torch
 
 import shapeprog as sp
 from shapeprog.data.synthetic.furniture import furniture
-from shapeprog.language.unroll import THINNEST, Plan, draw_blocks
+from shapeprog.language.unroll import draw_blocks
+from shapeprog.liang2022.losses import SHORTEST
 
 BOARD = "vertical_board(at=(-8, -8, -1), size=(16, 16, 1))"
 
 
-def fitted(
-    code: sp.Code, target: torch.Tensor, steps: int, unroll: Callable[[sp.Code], sp.Scene] = sp.unroll
-) -> sp.Code:
+def fitted(code: sp.Code, target: torch.Tensor, steps: int, shortest: float = SHORTEST) -> sp.Code:
     """The loop of the README with Adam."""
     parameters = code.parameters.clone().requires_grad_()
     optimiser = torch.optim.Adam([parameters], lr=0.05)
     generator = torch.Generator().manual_seed(0)
     for _ in range(steps):
-        sample = sp.sample(unroll(code.having(parameters)), 200, generator)
+        sample = sp.sample(sp.unroll(code.having(parameters), shortest=shortest), 200, generator)
         optimiser.zero_grad()
         sp.chamfer(sample.points, target, weights=sample.weights).sum().backward()
         optimiser.step()
@@ -46,7 +43,7 @@ def test_a_board_of_one_cell_fitted_to_a_sheet_is_kept() -> None:
     target = torch.rand(400, 3, generator=torch.Generator().manual_seed(0)) * 16 - 8
     target[:, 2] = -0.5
     with pytest.raises(sp.ShapeProgError, match="no surface"):
-        fitted(code, target, 100, lambda code: Plan(code).scene(code.parameters))
+        fitted(code, target, 100, shortest=0.0)
     assert sp.unroll(fitted(code, target, 100)).mask.all()
 
 
@@ -54,8 +51,8 @@ def test_a_short_length_is_drawn_and_grows_under_any_gradient() -> None:
     code = sp.encode(sp.parse(BOARD.replace("16, 1)", "16, -3)")))
     parameters = code.parameters.clone().requires_grad_()
     for sign in (1, -1):
-        scene = sp.unroll(code.having(parameters))
-        assert scene.size[0, :3].tolist() == pytest.approx([8, 8, THINNEST / 2])
+        scene = sp.unroll(code.having(parameters), shortest=SHORTEST)
+        assert scene.size[0, :3].tolist() == pytest.approx([8, 8, SHORTEST / 2])
         (gradient,) = torch.autograd.grad(sign * scene.size.sum(), parameters)
         assert gradient[0, 0, 3:6].tolist() == [sign / 2, sign / 2, -1 / 2]
 
@@ -69,8 +66,21 @@ def test_what_is_drawn_without_gradient_is_as_it_was() -> None:
     plain = sp.unroll(shrunk)
     assert not plain.mask.all()
     with torch.no_grad():
-        assert torch.equal(sp.unroll(recorded).mask, plain.mask)
-    kept = sp.unroll(recorded)
+        assert torch.equal(sp.unroll(recorded, shortest=SHORTEST).mask, plain.mask)
+    kept = sp.unroll(recorded, shortest=SHORTEST)
     for name in ("size", "centre", "rotation"):
-        long = plain.mask & ((kept.size == 0) | (plain.size >= THINNEST)).all(-1)
+        long = plain.mask & ((kept.size == 0) | (plain.size >= SHORTEST)).all(-1)
         torch.testing.assert_close(getattr(kept, name)[long], getattr(plain, name)[long], rtol=0, atol=0)
+
+
+def test_by_default_thin_parts_are_drawn_and_differentiated_as_written() -> None:
+    code = sp.encode(sp.parse(BOARD.replace("16, 1)", "16, 0.05)")), dtype=torch.float64)
+    parameters = code.parameters.clone().requires_grad_()
+    scene = sp.unroll(code.having(parameters))
+    assert torch.equal(scene.size.detach(), sp.unroll(code).size)
+    points = sp.sample(sp.unroll(code), 500, torch.Generator().manual_seed(0)).points + 0.3
+
+    def loss(parameters: torch.Tensor) -> torch.Tensor:
+        return sp.coverage(sp.unroll(code.having(parameters)), points, surface=True)
+
+    assert torch.autograd.gradcheck(loss, parameters, eps=1e-6, atol=1e-5)

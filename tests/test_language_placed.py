@@ -15,7 +15,6 @@ from shapeprog.errors import ProgramError
 from shapeprog.geometry.primitives import KINDS
 from shapeprog.language.parser import parse
 from shapeprog.language.printer import format_program
-from shapeprog.language.unroll import Plan
 
 WHOLE = "width, depth, height = 100, 60, 80\n"
 """From -50 to 50 left-right, from -30 to 30 front-rear, from 0 to 80 vertically."""
@@ -564,7 +563,7 @@ def test_gradients_are_finite_differences_for_every_name(seed: int) -> None:
     assert set(chair.names) == {name.name for name in sp.names(program) if name.free}
 
     def scene(values: torch.Tensor) -> torch.Tensor:
-        drawn = Plan(chair.code).scene(chair.at(values).parameters, clamp=False)
+        drawn = sp.unroll(chair.at(values))
         return torch.cat([drawn.centre, drawn.size], 1)
 
     slopes = torch.autograd.functional.jacobian(scene, chair.values, vectorize=True)

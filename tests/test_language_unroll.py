@@ -9,6 +9,7 @@ import pytest
 import torch
 from declared import LANGUAGE, STATEMENTS, middle, name_of
 
+import shapeprog as sp
 from shapeprog.data.random import random_program
 from shapeprog.errors import ShapeProgError
 from shapeprog.geometry.scene import Scene
@@ -134,6 +135,24 @@ def test_gradients_agree_with_differences(name: str) -> None:
         return torch.cat([scene.size.flatten(), scene.centre.flatten(), scene.rotation.flatten()])
 
     assert torch.autograd.gradcheck(flat, code.parameters.clone().requires_grad_(), atol=1e-6)
+
+
+@pytest.mark.parametrize("step", [30, 45, 60, 72, 90])
+def test_the_gradient_of_a_step_is_right_at_quarter_turns_too(step: float) -> None:
+    foot = "foot(left=1, width=3, front=2, depth=4, height=s / 20)"
+    chair = sp.Parametric(
+        parse(f"width, depth, height = 12, 12, 12\ns = {step}\nfor _ in rotate(4, step=s):\n    {foot}")
+    )
+    points = torch.rand(500, 3, generator=torch.Generator().manual_seed(0), dtype=torch.float64) * 12 - 6
+
+    def value(values: torch.Tensor) -> torch.Tensor:
+        return sp.coverage(unroll(chair.at(values)), points)
+
+    values = chair.values.clone().requires_grad_()
+    (slope,) = torch.autograd.grad(value(values), values)
+    moved = 1e-3 * torch.tensor([float(name == "s") for name in chair.names])  # nearer to a quarter, turns are rounded
+    difference = (value(chair.values + moved) - value(chair.values - moved)) / 2e-3
+    assert float(slope[chair.names.index("s")]) == pytest.approx(float(difference), rel=1e-2)
 
 
 def test_batches_of_any_shape_agree_with_single_programs() -> None:

@@ -6,10 +6,12 @@ import os
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
-from functools import cache
+from functools import cache, wraps
+from typing import Any
 
 import numpy as np
 
+from shapeprog.errors import ShapeProgError
 from shapeprog.geometry.batch import Batch
 from shapeprog.kernels.table import CENTRE, ROTATION, SIZE, WIDTH
 from shapeprog.lazy_torch import Tensor, torch
@@ -45,6 +47,20 @@ def gradients(table: Array, like: Tensor, *shape: int) -> tuple[Tensor, Tensor, 
     """Gradient by sizes, centres and rotations of primitives (B, N) from rows of gradient by :func:`table_of`."""
     tensors = torch.from_numpy(table).to(like).reshape(*shape, WIDTH)
     return tensors[..., SIZE:CENTRE], tensors[..., CENTRE:ROTATION], tensors[..., ROTATION:].unflatten(-1, (3, 3))
+
+
+def first_order(backward: Callable[..., Any]) -> Callable[..., Any]:
+    """Declare a backward step whose own derivative is not known: asked for it, torch would take zero."""
+
+    @wraps(backward)
+    def checked(*arguments: Any) -> Any:
+        if torch.is_grad_enabled():  # create_graph=True
+            raise ShapeProgError(
+                "the renderer has no second derivatives", "call backward or torch.autograd.grad without create_graph"
+            )
+        return backward(*arguments)
+
+    return checked
 
 
 _kernel_threads = 0  # threads that kernels run in; 0 for as many as torch has

@@ -13,10 +13,9 @@ import numpy as np
 import torch
 from jaxtyping import Float, Int
 from torch import Tensor
-from torch.autograd.function import once_differentiable
 
 from shapeprog.geometry import distance_kernels as kernels
-from shapeprog.geometry.arrays import array, gradients, numbers, over_threads, table_of
+from shapeprog.geometry.arrays import array, first_order, gradients, numbers, over_threads, table_of
 from shapeprog.geometry.batch import Batch
 from shapeprog.geometry.primitive import SIZES
 from shapeprog.geometry.primitives import primitives
@@ -100,7 +99,7 @@ class _UnionDistance(torch.autograd.Function):
         return values
 
     @staticmethod
-    @once_differentiable
+    @first_order
     def backward(ctx: Any, slope: Tensor) -> tuple[Tensor | None, ...]:
         points, slots = ctx.saved_tensors
         to_table, to_points = _pulled(ctx.table, slots, points, slope)

@@ -33,8 +33,8 @@ def chamfer(
     points, target
         Clouds (..., P, 3) and (..., Q, 3) in cells, with gradient to both.
     weights, target_weights
-        How much each point counts in the mean of its cloud; evenly by default.  Those of :func:`shapeprog.sample` make
-        the gradient exact.
+        How much each point counts in the mean of its cloud; evenly by default.  Those of :func:`shapeprog.sample` add
+        to the gradient how the areas of faces change.
 
     Returns
     -------
@@ -49,7 +49,7 @@ def coverage(scene: Batch, target: Cloud, *, surface: bool = False) -> Values:
     """How far the target is from the union on average: the coverage loss, equation 1 of section 4.3.2.
 
     The distance to a union is equation 2, that to a cuboid equation 3, to a primitive in any pose equation 4; that to
-    a cylinder is appendix A, mended.  A target point inside a primitive costs nothing, so alone it is minimised by one
+    a cylinder is appendix A, corrected.  A target point inside a primitive costs nothing, so alone it is minimised by a
     box that fills everything: add :func:`shapeprog.geometry.losses.excess`.
 
     Parameters

@@ -6,8 +6,9 @@ without gradient; then only its place is differentiated.
 *Weighting.*  Faces are chosen in proportion to their area, so a plain mean over points is the mean over the surface,
 but the choice has no gradient: growing a face moves its points and does not yet increase its weight.  Every point
 therefore has a weight of value 1 whose gradient is that of the logarithm of the area of its face.  A mean weighted
-by it has the gradient of the mean over the surface, for faces that ``place`` stretches evenly, as those of cuboid
-and cylinder.  The line along which a part becomes hidden in another is held still.
+by it has the gradient of the mean over the surface where ``place`` stretches faces evenly, as those of cuboid and
+cylinder, and no part hides another.  It leaves out that points of a taper move along it as its radii change, and that
+the line along which one part becomes hidden in another moves: errors of the first order in both cases.
 """
 
 from __future__ import annotations
@@ -19,11 +20,10 @@ import numpy as np
 import torch
 from jaxtyping import Float, Int
 from torch import Tensor
-from torch.autograd.function import once_differentiable
 
 from shapeprog.errors import ShapeProgError
 from shapeprog.geometry import surface_kernels as kernels
-from shapeprog.geometry.arrays import cast, gradients, numbers, over_threads, table_of
+from shapeprog.geometry.arrays import cast, first_order, gradients, numbers, over_threads, table_of
 from shapeprog.geometry.batch import Batch
 from shapeprog.geometry.distance_kernels import FARTHEST
 from shapeprog.geometry.primitives import primitives
@@ -80,8 +80,8 @@ def sample_surface(batch: Batch, n: int, generator: torch.Generator | None = Non
     Returns
     -------
     SurfaceSample
-        Points, weights with which a mean over them has the gradient of the mean over the surface, the primitive of each
-        point and its normal.
+        Points, weights that add the change of areas to the gradient of a mean over them (see the module), the
+        primitive of each point and its normal.
 
     Raises
     ------
@@ -163,7 +163,7 @@ class _Placed(torch.autograd.Function):
         return points, cast(np.ones(points.shape[:-1]), size)
 
     @staticmethod
-    @once_differentiable
+    @first_order
     def backward(ctx: Any, slope: Tensor, weigh: Tensor) -> tuple[Tensor | None, ...]:
         (areas,) = ctx.saved_tensors
         scenes, per_scene, faces = areas.shape

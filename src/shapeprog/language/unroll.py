@@ -27,22 +27,21 @@ MOST_COPIES = 1 << 17
 
 MOST_PRIMITIVES = 1 << 20  # most copies that one batch may unroll to; more is a mistake in a loop count
 
-THINNEST = 0.2
-"""Cells; a shorter length is drawn as this where gradients are recorded.
 
-Four steps of Adam at a rate of .05: with less, the momentum of a length that shrinks carries it below zero.
-"""
-
-
-def unroll(program: Program | Sequence[Program] | Code) -> Scene:
+def unroll(program: Program | Sequence[Program] | Code, *, shortest: float = 0.0) -> Scene:
     """The scene of a program, or scenes (B, N) of a batch; N is the largest number of primitives in it.
 
     Blocks that are not loops followed by one drawing statement draw nothing, nor do loops without copies, nor
     primitives with a negative extent.
 
-    Where gradients are recorded (``code.parameters`` requires one), no part vanishes: a length below ``THINNEST`` is
-    drawn as that, and the sign of its gradient is made negative, so that descent lengthens it.  The parameters and
-    the scene without gradient do not change.
+    Parameters
+    ----------
+    program
+        A program, several, or the tensors of either, whose parameters may require a gradient.
+    shortest
+        Where gradients are recorded, lengths below this many cells are drawn as this long, and their gradient ``g`` is
+        ``-|g|``, so that descent lengthens them: no part vanishes while its network is trained.  The parameters, and
+        the scene without gradient, do not change.  By default gradients are those of the program as it is written.
 
     Raises
     ------
@@ -50,7 +49,8 @@ def unroll(program: Program | Sequence[Program] | Code) -> Scene:
         If a program makes more than ``MOST_COPIES`` copies, or the batch more than ``MOST_PRIMITIVES``.
     """
     code = program if isinstance(program, Code) else encode(program)
-    return Plan(code).scene(code.parameters, clamp=torch.is_grad_enabled() and code.parameters.requires_grad)
+    recorded = torch.is_grad_enabled() and code.parameters.requires_grad
+    return Plan(code).scene(code.parameters, shortest=shortest * recorded)
 
 
 def on_numpy_if_shipped(program: Program) -> AbstractContextManager[None]:
@@ -125,12 +125,12 @@ class Plan:
                 self._levels.append(_Level(language()[number], moved, slot, index[moved, level], quarter[moved]))
         self._known: _Layout | None = None
 
-    def scene(self, parameters: Float[Tensor, "*batch K J slots"], *, clamp: bool = False) -> Scene:
-        """The scenes for parameters of the same programs, with gradient; see :func:`unroll` for clamped lengths."""
+    def scene(self, parameters: Float[Tensor, "*batch K J slots"], *, shortest: float = 0.0) -> Scene:
+        """The scenes for parameters of the same programs, with gradient; lengths below ``shortest`` are drawn as it."""
         values = parameters.reshape(-1, parameters.shape[-1])
         numbers = values.index_select(0, self._place)
-        if clamp:
-            numbers = _clamped(numbers, self._thinnest(numbers))
+        if shortest:
+            numbers = _clamped(numbers, self._least(numbers, shortest))
         pieces = numbers.split(self._counts)
         results = [declared.solids(piece) for declared, piece in zip(self._kinds, pieces, strict=True)]
         layout = self._layout(tuple(tuple(solids.kind for solids in group) for group in results))
@@ -159,10 +159,10 @@ class Plan:
             pose = torch.where(mask[..., None, None], slots[..., SIZES + 3 :].unflatten(-1, (3, 3)), pose)
         return Scene(size=size, centre=centre, rotation=pose, mask=mask, **layout.fixed)
 
-    def _thinnest(self, values: Float[Tensor, "M slots"]) -> Float[Tensor, "M slots"]:
+    def _least(self, values: Float[Tensor, "M slots"], shortest: float) -> Float[Tensor, "M slots"]:
         """The least that each number of the drawing statements is drawn as; only lengths are bounded."""
-        lengths = [[quantity.kind == "length" for quantity in declared.quantities] for declared in self._kinds]
-        rows = [[THINNEST if is_length else -math.inf for is_length in row] for row in lengths]
+        kinds = [[quantity.kind for quantity in declared.quantities] for declared in self._kinds]
+        rows = [[shortest if kind == "length" else -math.inf for kind in row] for row in kinds]
         padded = [row + [-math.inf] * (values.shape[1] - len(row)) for row in rows]
         index = [row for row, count in enumerate(self._counts) for _ in range(count)]
         return values.new_tensor(padded).reshape(-1, values.shape[1])[index]
@@ -300,6 +300,9 @@ def _turned(turn: Float[Tensor, "*batch"]) -> Float[Tensor, "*batch 3 3"]:
     exact = (turn * 4 - nearest).abs() < 1e-6
     table = torch.tensor([[1, 0, -1, 0], [0, 1, 0, -1]], device=turn.device).to(turn)[:, nearest.long() % 4]
     angle = 2 * torch.pi * turn
-    cos, sin = torch.where(exact, table[0], angle.cos()), torch.where(exact, table[1], angle.sin())
+    cos, sin = (
+        way + torch.where(exact, rounded - way, 0.0).detach()
+        for way, rounded in zip((angle.cos(), angle.sin()), table, strict=True)
+    )
     zero, unit = torch.zeros_like(turn), torch.ones_like(turn)
     return torch.stack([unit, zero, zero, zero, cos, -sin, zero, sin, cos], -1).unflatten(-1, (3, 3))

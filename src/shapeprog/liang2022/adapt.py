@@ -10,7 +10,7 @@ an error if a program has no surface.  After ``import torch, shapeprog as sp``, 
     for cells, points in TargetStream(["packs/chair_train.npz"]):  # voxels, surface points in cells
         decoded = decode(generator, cells, decoder="argmax")
         code = predicted_code(generator.predict(decoded))
-        sample = sp.sample(sp.unroll(code), 5000)
+        sample = sp.sample(sp.unroll(code, shortest=0.2), 5000)  # no part vanishes
         loss = sp.chamfer(sample.points, points, weights=sample.weights).mean()
         optimiser.zero_grad()
         loss.backward()
@@ -38,7 +38,15 @@ from shapeprog.language.statement import EMPTY
 from shapeprog.liang2022.decode import Decoded, decode
 from shapeprog.liang2022.evaluate import scores_on_packs
 from shapeprog.liang2022.generator import IDS, STEPS, Prediction, TeacherForcingBatch
-from shapeprog.liang2022.losses import Comparison, NvilBaseline, compute, leave_one_out, parse_losses, reinforce_loss
+from shapeprog.liang2022.losses import (
+    SHORTEST,
+    Comparison,
+    NvilBaseline,
+    compute,
+    leave_one_out,
+    parse_losses,
+    reinforce_loss,
+)
 from shapeprog.liang2022.pretrain import teacher_forcing
 from shapeprog.liang2022.prior import PRIORS, scramble
 from shapeprog.liang2022.settings import METHODS, NEURAL, AdaptSettings
@@ -139,7 +147,7 @@ class AdaptTask:
         ids = torch.where(draws, code.ids, dot.ids.to(code.ids))
         numbers = torch.where(draws[..., None], code.parameters, dot.parameters.to(code.parameters))
         canvas = Code(ids, numbers - draws[..., None] * prediction.scatter(prediction.offsets))
-        scene, cells = unroll(Code(ids, numbers)), prediction.batch.target
+        scene, cells = unroll(Code(ids, numbers), shortest=SHORTEST), prediction.batch.target
         values = compute(Comparison(scene, points, cells, self._settings.points, rng, canvas), self._losses)
         if self._executor is not None:
             executor, one_hot = self._executor.to(rng.device), torch.nn.functional.one_hot(code.ids, IDS).float()

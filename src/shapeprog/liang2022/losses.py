@@ -29,6 +29,10 @@ from shapeprog.liang2022.settings import NEURAL
 from shapeprog.space import HALF, RESOLUTION
 
 SHARPNESS = 4.0  # slope of the logit of a soft cell, per cell of distance
+SHORTEST = 0.2
+"""Cells; lengths below are drawn as long in training: four steps of Adam at a rate of .05, beyond which its momentum
+would carry a length that shrinks below zero."""
+
 DECAY = 0.9  # decay of the running mean and variance of costs, as published for NVIL
 
 
@@ -91,7 +95,7 @@ def soft_iou(comparison: Comparison) -> Values:
         index.append(torch.multinomial(mask + 1e-12, half, replacement=True, generator=comparison.generator))
         weight.append((mask.sum(1, keepdim=True) / half).expand(-1, half))
     sampled, weights = torch.cat(index, 1), torch.cat(weight, 1)
-    scene = comparison.scene if comparison.canvas is None else unroll(comparison.canvas)
+    scene = comparison.scene if comparison.canvas is None else unroll(comparison.canvas, shortest=SHORTEST)
     axes = [sampled.div(RESOLUTION**power, rounding_mode="floor") % RESOLUTION for power in (2, 1, 0)]
     distance = signed_distance(scene, torch.stack(axes, -1).to(scene.centre) + 0.5 - HALF)
     logits = -SHARPNESS * distance.clamp(-1e3, 1e3)

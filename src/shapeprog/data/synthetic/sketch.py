@@ -1,7 +1,7 @@
 """A sketch: one piece of furniture, part by part, in centimetres that become cells.
 
 Heights count from the floor, depth from the middle to the rear, left-right from the middle.  Lengths in
-cells are rounded at once, so parts that share a plane share its number.
+cells are rounded at once, and those of parts when they are added, so parts that share a plane share its number.
 """
 
 from __future__ import annotations
@@ -105,7 +105,7 @@ class Sketch:
         mirror: str = "", **repeat: float,
     ) -> None:  # fmt: skip
         """A part from where to where it reaches along each axis; ``more`` are the other numbers of its statement."""
-        at, end = zip(up, depth, side, strict=True)
+        at, end = ([*map(tidy, corner)] for corner in zip(up, depth, side, strict=True))
         size = [b - a for a, b in zip(at, end, strict=True)]
         self.add(role, solid, at, size, *more, mirror=mirror, **repeat)
 
@@ -114,10 +114,11 @@ class Sketch:
         mirror: str = "", **repeat: float,
     ) -> None:  # fmt: skip
         """A part between two points; ``thick`` raises it by the lowest edge of its foot."""
-        along = np.subtract(head, foot)
+        start, end = ([*map(tidy, point)] for point in (foot, head))
+        along = np.subtract(end, start)
         lean = math.hypot(along[1], along[2]) / max(float(np.linalg.norm(along)), 1e-9)
-        raised = (tidy(foot[0] + thick / 2 * lean), *foot[1:])
-        self.add(role, solid, raised, head, *numbers, mirror=mirror, **repeat)
+        start[0] += thick / 2 * lean
+        self.add(role, solid, start, end, *numbers, mirror=mirror, **repeat)
 
 
 def between(foot: Point, head: Point, height: float) -> Point:

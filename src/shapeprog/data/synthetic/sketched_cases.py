@@ -27,10 +27,7 @@ def table(s: Sketch) -> None:
         if low and s.chance(0.4):
             shelf = tidy(0.42 * under)
             s.box(
-                "shelf",
-                (shelf, tidy(shelf + s.cm(1.8))),
-                (tidy(s.cm(5) - deep), tidy(deep - s.cm(5))),
-                (tidy(s.cm(6) - half), tidy(half - s.cm(6))),
+                "shelf", (shelf, shelf + s.cm(1.8)), (s.cm(5) - deep, deep - s.cm(5)), (s.cm(6) - half, half - s.cm(6))
             )
     elif kind == "square":
         _square(s, under, deep, half, low)
@@ -48,36 +45,30 @@ def desk(s: Sketch) -> None:
         tall = s.cm(9, 13)
         low = tidy(under - tall)
         edge = s.cm(3, 5)
-        s.box("body", (low, under), (tidy(edge - deep), tidy(deep - edge)), (tidy(edge - half), tidy(half - edge)))
+        s.box("body", (low, under), (edge - deep, deep - edge), (edge - half, half - edge))
         drawers = s.whole(2, 3)
         pitch = tidy((2 * half - 2 * edge) / drawers)
         gap = s.cm(0.6)
         s.box(
-            "drawer", (tidy(low + gap), tidy(under - gap)), (tidy(edge - deep - s.cm(1.6)), tidy(edge - deep)),
-            (tidy(edge - half + gap), tidy(edge - half + pitch - gap)), count=drawers, side_step=pitch,
+            "drawer", (low + gap, under - gap), (edge - deep - s.cm(1.6), edge - deep),
+            (edge - half + gap, edge - half + pitch - gap), count=drawers, side_step=pitch,
         )  # fmt: skip
         _splayed(s, low, tall, tidy(deep - s.cm(8, 10)), tidy(half - s.cm(9, 14)))
         return
     left = (-half, tidy(wide - half))
-    s.box("body", (0, under), (tidy(s.cm(3) - deep), deep), left)
+    s.box("body", (0, under), (s.cm(3) - deep, deep), left)
     drawers = s.whole(3, 4)
     pitch = tidy((under - s.cm(4)) / drawers)
     gap = s.cm(0.8)
     s.box(
-        "drawer", (tidy(s.cm(4) + gap), tidy(s.cm(4) + pitch - gap)), (tidy(s.cm(1.2) - deep), tidy(s.cm(3) - deep)),
-        (tidy(left[0] + gap), tidy(left[1] - gap)), count=drawers, up_step=pitch,
+        "drawer", (s.cm(4) + gap, s.cm(4) + pitch - gap), (s.cm(1.2) - deep, s.cm(3) - deep),
+        (left[0] + gap, left[1] - gap), count=drawers, up_step=pitch,
     )  # fmt: skip
     leg = s.cm(4, 6)
     if s.chance(0.5):
-        s.box("leg", (0, under), (tidy(s.cm(2) - deep), tidy(deep - s.cm(2))), (tidy(half - leg), half))
+        s.box("leg", (0, under), (s.cm(2) - deep, deep - s.cm(2)), (half - leg, half))
     else:
-        s.box(
-            "leg",
-            (0, under),
-            (tidy(deep - leg - s.cm(2)), tidy(deep - s.cm(2))),
-            (tidy(half - leg), half),
-            mirror="depth",
-        )
+        s.box("leg", (0, under), (deep - leg - s.cm(2), deep - s.cm(2)), (half - leg, half), mirror="depth")
 
 
 def cabinet(s: Sketch) -> None:
@@ -86,29 +77,23 @@ def cabinet(s: Sketch) -> None:
     board, feet = s.cm(1.8, 3), s.cm(8, 20)
     height = tidy(feet + s.cm(45, 110))
     floor = tidy(feet + board)
-    s.box("side", (feet, height), (-deep, deep), (tidy(half - board), half), mirror="side")
+    s.box("side", (feet, height), (-deep, deep), (half - board, half), mirror="side")
     inner = tidy(half - board)
     s.box("base", (feet, floor), (-deep, deep), (-inner, inner))
-    s.box("top", (tidy(height - board), height), (-deep, deep), (-inner, inner))
-    s.box("panel", (floor, tidy(height - board)), (tidy(deep - s.cm(1)), deep), (-inner, inner))
+    s.box("top", (height - board, height), (-deep, deep), (-inner, inner))
+    s.box("panel", (floor, height - board), (deep - s.cm(1), deep), (-inner, inner))
     gap, front = s.cm(0.4), s.cm(1.8)
     if s.chance(0.6):
-        s.box("door", (floor, tidy(height - board)), (-deep, tidy(front - deep)), (gap, inner), mirror="side")
+        s.box("door", (floor, height - board), (-deep, front - deep), (gap, inner), mirror="side")
         middle = tidy((floor + height) / 2)
         grip = s.cm(5, 9)
         if s.chance(0.5):
-            s.box(
-                "handle",
-                (middle, tidy(middle + grip)),
-                (tidy(-deep - s.cm(2, 3)), -deep),
-                (s.cm(3), s.cm(4.4)),
-                mirror="side",
-            )
+            s.box("handle", (middle, middle + grip), (-deep - s.cm(2, 3), -deep), (s.cm(3), s.cm(4.4)), mirror="side")
         else:
             s.add(
                 "handle",
                 "rod",
-                (middle, tidy(-deep - s.cm(2.5)), s.cm(4)),
+                (middle, -deep - s.cm(2.5), s.cm(4)),
                 (middle, -deep, s.cm(4)),
                 s.cm(1, 1.5),
                 mirror="side",
@@ -118,8 +103,8 @@ def cabinet(s: Sketch) -> None:
         pitch = tidy((height - board - floor) / rows)
         s.box(
             "drawer",
-            (tidy(floor + gap), tidy(floor + pitch - gap)),
-            (tidy(-deep - s.cm(1)), tidy(front - deep)),
+            (floor + gap, floor + pitch - gap),
+            (-deep - s.cm(1), front - deep),
             (-inner, inner),
             count=rows,
             up_step=pitch,
@@ -129,8 +114,8 @@ def cabinet(s: Sketch) -> None:
         s.add(
             "handle",
             "rod",
-            (at, tidy(-deep - s.cm(1.8)), -grip),
-            (at, tidy(-deep - s.cm(1.8)), grip),
+            (at, -deep - s.cm(1.8), -grip),
+            (at, -deep - s.cm(1.8), grip),
             s.cm(0.9, 1.2),
             count=rows,
             up_step=pitch,
@@ -153,16 +138,16 @@ def bookshelf(s: Sketch) -> None:
         )
         s.stick("post", "bar", foot, head, (post, post), thick=post if lean else 0.0, mirror="side depth")
         pitch = tidy((height - board - low) / (shelves - 1))
-        s.box("shelf", (low, tidy(low + board)), (-deep, deep), (-half, half), count=shelves, up_step=pitch)
+        s.box("shelf", (low, low + board), (-deep, deep), (-half, half), count=shelves, up_step=pitch)
         return
     inner = tidy(half - board)
     s.box("side", (0, height), (-deep, deep), (inner, half), mirror="side")
     low = s.cm(4, 9)
     pitch = tidy((height - board - low) / shelves)
-    s.box("shelf", (low, tidy(low + board)), (-deep, deep), (-inner, inner), count=shelves, up_step=pitch)
-    s.box("top", (tidy(height - board), height), (-deep, deep), (-inner, inner))
+    s.box("shelf", (low, low + board), (-deep, deep), (-inner, inner), count=shelves, up_step=pitch)
+    s.box("top", (height - board, height), (-deep, deep), (-inner, inner))
     if s.chance(0.7):
-        s.box("panel", (low, height), (deep, tidy(deep + s.cm(0.8))), (-half, half))
+        s.box("panel", (low, height), (deep, deep + s.cm(0.8)), (-half, half))
 
 
 def bed(s: Sketch) -> None:
@@ -170,26 +155,26 @@ def bed(s: Sketch) -> None:
     half, deep = s.cm(45, 90), s.cm(98, 104)
     legs, beam, thick = s.cm(12, 22), s.cm(10, 16), s.cm(2.5, 4)
     frame = tidy(legs + beam)
-    s.box("side", (legs, frame), (-deep, deep), (tidy(half - thick), half), mirror="side")
+    s.box("side", (legs, frame), (-deep, deep), (half - thick, half), mirror="side")
     inner = tidy(half - thick)
-    s.box("footboard", (legs, tidy(frame + s.cm(0, 20))), (tidy(-deep - thick), -deep), (-half, half))
+    s.box("footboard", (legs, frame + s.cm(0, 20)), (-deep - thick, -deep), (-half, half))
     slats = tidy(frame - s.cm(4, 7))
-    s.box("base", (tidy(slats - s.cm(2.5)), slats), (-deep, deep), (-inner, inner))
+    s.box("base", (slats - s.cm(2.5), slats), (-deep, deep), (-inner, inner))
     mattress = tidy(slats + s.cm(18, 24))
     s.box("mattress", (slats, mattress), (-deep, deep), (-inner, inner), solid="cushion", more=[s.cm(2, 5)])
     high = tidy(mattress + s.cm(30, 55))
     if s.chance(0.5):
-        s.box("headboard", (0, high), (deep, tidy(deep + thick)), (-half, half))
+        s.box("headboard", (0, high), (deep, deep + thick), (-half, half))
     else:
-        s.add("headboard", "board", (tidy(legs), deep, -half), (tidy(high - legs), thick, 2 * half), s.any(5, 12))
-        s.box("leg", (0, legs), (deep, tidy(deep + thick)), (tidy(half - 2 * thick), half), mirror="side")
+        s.add("headboard", "board", (legs, deep, -half), (high - legs, thick, 2 * half), s.any(5, 12))
+        s.box("leg", (0, legs), (deep, deep + thick), (half - 2 * thick, half), mirror="side")
     wide = s.cm(2.5, 4)
     s.add(
         "foot",
         "taper",
-        (0, tidy(wide - deep), tidy(half - wide)),
-        (tidy(legs + thick), tidy(wide - deep), tidy(half - wide)),
-        (tidy(0.6 * wide), wide),
+        (0, wide - deep, half - wide),
+        (legs + thick, wide - deep, half - wide),
+        (0.6 * wide, wide),
         mirror="side",
     )
     if s.chance(0.7):
@@ -197,10 +182,9 @@ def bed(s: Sketch) -> None:
         pillow_width = tidy(2 * inner / pillows)
         edge = s.cm(4, 7)
         s.box(
-            "pillow", (tidy(mattress - s.cm(1)), tidy(mattress + s.cm(9, 13))),
-            (tidy(deep - s.cm(38, 45)), tidy(deep - s.cm(2))), (tidy(edge - inner), tidy(pillow_width - edge - inner)),
-            solid="cushion", more=[s.cm(3.5, 4.4)], count=pillows,
-            side_step=pillow_width,
+            "pillow", (mattress - s.cm(1), mattress + s.cm(9, 13)), (deep - s.cm(38, 45), deep - s.cm(2)),
+            (edge - inner, pillow_width - edge - inner), solid="cushion", more=[s.cm(3.5, 4.4)],
+            count=pillows, side_step=pillow_width,
         )  # fmt: skip
 
 
@@ -211,14 +195,14 @@ def _splayed(s: Sketch, under: float, thick: float, deep: float, half: float, tu
     up = tidy(under + min(thick / 2, wide))
     if turns == 3:
         foot: Point = (0.0, tidy(1.2 * deep + out), 0.0)
-        s.stick("leg", "taper", foot, (up, deep, 0.0), (tidy(0.6 * wide), wide), thick=1.2 * wide, turns=3)
+        s.stick("leg", "taper", foot, (up, deep, 0.0), (0.6 * wide, wide), thick=1.2 * wide, turns=3)
         return
     foot, head = (0.0, tidy(deep + out), tidy(half + out)), (up, deep, half)
     if s.chance(0.7):
         thin = tidy(wide * s.any(0.55, 0.8))
         s.stick("leg", "taper", foot, head, (thin, wide), thick=2 * thin, mirror="side depth")
     else:
-        s.stick("leg", "bar", foot, head, (tidy(2 * wide), tidy(1.5 * wide)), thick=2 * wide, mirror="side depth")
+        s.stick("leg", "bar", foot, head, (2 * wide, 1.5 * wide), thick=2 * wide, mirror="side depth")
 
 
 def _column(s: Sketch, under: float, radius: float) -> None:
@@ -226,44 +210,27 @@ def _column(s: Sketch, under: float, radius: float) -> None:
     bore = s.cm(3, 6)
     if s.chance(0.5):
         plate = s.cm(1.5, 3)
-        s.add("base", "cylinder", (0, 0, 0), plate, tidy(radius * s.any(0.5, 0.65)))
-        s.add("pedestal", "taper", (plate, 0, 0), (under, 0, 0), (bore, tidy(bore * s.any(0.55, 1))))
+        s.add("base", "cylinder", (0, 0, 0), plate, radius * s.any(0.5, 0.65))
+        s.add("pedestal", "taper", (plate, 0, 0), (under, 0, 0), (bore, bore * s.any(0.55, 1)))
         return
     low, wide = s.cm(10, 16), s.cm(3, 4)
-    s.add("pedestal", "cylinder", (low, 0, 0), tidy(under - low), bore)
+    s.add("pedestal", "cylinder", (low, 0, 0), under - low, bore)
     foot = (0.0, tidy(radius * s.any(0.55, 0.75)), 0.0)
-    s.stick("base", "bar", foot, (tidy(low + bore), 0.0, 0.0), (wide, wide), thick=wide, turns=s.whole(3, 4))
+    s.stick("base", "bar", foot, (low + bore, 0.0, 0.0), (wide, wide), thick=wide, turns=s.whole(3, 4))
 
 
 def _square(s: Sketch, under: float, deep: float, half: float, low: bool) -> None:
     """Upright square legs at the corners, with beams under the edge or between them."""
     leg, inset = s.cm(4, 8), s.cm(0, 6)
     d, w = tidy(deep - inset), tidy(half - inset)
-    s.box("leg", (0, under), (tidy(d - leg), d), (tidy(w - leg), w), mirror="side depth")
+    s.box("leg", (0, under), (d - leg, d), (w - leg, w), mirror="side depth")
     if s.chance(0.6):
         beam, thin = s.cm(6, 10), tidy(0.4 * leg)
-        s.box(
-            "apron",
-            (tidy(under - beam), under),
-            (tidy(d - thin - 0.3 * leg), tidy(d - 0.3 * leg)),
-            (tidy(leg - w), tidy(w - leg)),
-            mirror="depth",
-        )
-        s.box(
-            "apron",
-            (tidy(under - beam), under),
-            (tidy(leg - d), tidy(d - leg)),
-            (tidy(w - thin - 0.3 * leg), tidy(w - 0.3 * leg)),
-            mirror="side",
-        )
+        s.box("apron", (under - beam, under), (d - thin - 0.3 * leg, d - 0.3 * leg), (leg - w, w - leg), mirror="depth")
+        s.box("apron", (under - beam, under), (leg - d, d - leg), (w - thin - 0.3 * leg, w - 0.3 * leg), mirror="side")
     if low and s.chance(0.5):
         shelf = tidy(under * s.any(0.25, 0.45))
-        s.box(
-            "shelf",
-            (shelf, tidy(shelf + s.cm(2))),
-            (tidy(0.5 * leg - d), tidy(d - 0.5 * leg)),
-            (tidy(0.5 * leg - w), tidy(w - 0.5 * leg)),
-        )
+        s.box("shelf", (shelf, shelf + s.cm(2)), (0.5 * leg - d, d - 0.5 * leg), (0.5 * leg - w, w - 0.5 * leg))
 
 
 def _trestles(s: Sketch, under: float, deep: float, half: float) -> None:
@@ -272,30 +239,18 @@ def _trestles(s: Sketch, under: float, deep: float, half: float) -> None:
     foot, head = (0.0, tidy(deep - s.cm(4, 8)), end), (tidy(under + s.cm(1)), tidy(0.3 * deep), end)
     s.stick("leg", "bar", foot, head, (wide, wide), thick=wide, mirror="side depth")
     at = between(foot, head, tidy(under * s.any(0.3, 0.5)))
-    s.add("stretcher", "bar", (at[0], -at[1], end), (at[0], at[1], end), (wide, tidy(0.6 * wide)), mirror="side")
-    s.add("stretcher", "bar", (at[0], 0, -end), (at[0], 0, end), (wide, tidy(0.6 * wide)))
+    s.add("stretcher", "bar", (at[0], -at[1], end), (at[0], at[1], end), (wide, 0.6 * wide), mirror="side")
+    s.add("stretcher", "bar", (at[0], 0, -end), (at[0], 0, end), (wide, 0.6 * wide))
     if s.chance(0.5):
         run = tidy(0.75 * (under - at[0]))
-        s.add(
-            "brace",
-            "bar",
-            (at[0], 0, tidy(end - run)),
-            (under, 0, tidy(0.15 * end)),
-            (tidy(0.6 * wide), tidy(0.6 * wide)),
-            mirror="side",
-        )
+        s.add("brace", "bar", (at[0], 0, end - run), (under, 0, 0.15 * end), (0.6 * wide, 0.6 * wide), mirror="side")
 
 
 def _feet(s: Sketch, feet: float, half: float, deep: float) -> None:
     """The base of a case: tapered legs, splayed or upright, round feet, or a plinth."""
     kind = s.pick("splayed", "splayed", "round", "plinth")
     if kind == "plinth":
-        s.box(
-            "base",
-            (0, feet),
-            (tidy(s.cm(3, 5) - deep), tidy(deep - s.cm(1))),
-            (tidy(s.cm(2, 4) - half), tidy(half - s.cm(3))),
-        )
+        s.box("base", (0, feet), (s.cm(3, 5) - deep, deep - s.cm(1)), (s.cm(2, 4) - half, half - s.cm(3)))
         return
     wide = s.cm(1.8, 2.8)
     d, w = tidy(deep - s.cm(4, 6)), tidy(half - s.cm(5, 9))

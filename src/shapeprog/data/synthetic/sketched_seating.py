@@ -40,7 +40,7 @@ def stool(s: Sketch) -> None:
     if kind == "column":
         base, plate, bore = s.cm(1.5, 3), tidy(radius * s.any(0.9, 1.2)), s.cm(1.8, 3.5)
         s.add("base", "cylinder", (0, 0, 0), base, plate)
-        s.add("pedestal", "cylinder", (base, 0, 0), tidy(seat[0] - base), bore)
+        s.add("pedestal", "cylinder", (base, 0, 0), seat[0] - base, bore)
         return
     thin, wide = s.cm(1.1, 1.6), s.cm(1.8, 2.6)
     up = tidy(seat[0] + 0.5 * thick)
@@ -78,23 +78,17 @@ def bench(s: Sketch) -> None:
         return
     wide = s.cm(3, 6)
     if kind == "panel":
-        s.box("leg", (0, seat[0]), (front, rear), (end, tidy(end + wide)), mirror="side")
+        s.box("leg", (0, seat[0]), (front, rear), (end, end + wide), mirror="side")
     else:
         beam = s.cm(4, 7)
-        s.box("apron", (tidy(seat[0] - beam), seat[0]), (front, rear), (end, tidy(end + wide)), mirror="side")
+        s.box("apron", (seat[0] - beam, seat[0]), (front, rear), (end, end + wide), mirror="side")
         foot = (0.0, front, tidy(end + wide / 2))
         middle = tidy((front + rear) / 2 - s.cm(2, 5))
         head = (tidy(seat[0] - beam / 2), middle, foot[2])
         s.stick("leg", "bar", foot, head, (wide, wide), thick=wide, mirror="side")
         rear_foot: Point = (0.0, rear, foot[2])
         s.stick(
-            "leg",
-            "bar",
-            rear_foot,
-            (head[0], tidy(front + rear - middle), foot[2]),
-            (wide, wide),
-            thick=wide,
-            mirror="side",
+            "leg", "bar", rear_foot, (head[0], front + rear - middle, foot[2]), (wide, wide), thick=wide, mirror="side"
         )
     if s.chance(0.6):
         tilt, tall = s.any(6, 14), s.cm(30, 42)
@@ -102,10 +96,10 @@ def bench(s: Sketch) -> None:
         rise = tidy(tall - board)
         start: Point = (tidy(top - thick / 2), tidy(rear - post), tidy(end + wide / 2))
         lean = tidy(rise * tilt / 60)
-        s.add("post", "bar", start, (tidy(top + tall), tidy(start[1] + lean), start[2]), (post, wide), mirror="side")
+        s.add("post", "bar", start, (top + tall, start[1] + lean, start[2]), (post, wide), mirror="side")
         for share in (0.45, 0.95):
             at = between(start, (tidy(top + tall), tidy(start[1] + lean), start[2]), tidy(top + share * rise))
-            s.add("rail", "board", (at[0], tidy(at[1] - post / 2 - s.cm(1)), -half), (board, s.cm(2.2), 2 * half), tilt)
+            s.add("rail", "board", (at[0], at[1] - post / 2 - s.cm(1), -half), (board, s.cm(2.2), 2 * half), tilt)
 
 
 def sofa(s: Sketch) -> None:
@@ -121,16 +115,16 @@ def sofa(s: Sketch) -> None:
     s.box("base", (feet, floor), (-deep, deep), (-inner, inner))
     seat_width = tidy(2 * inner / seats)
     s.box(
-        "cushion", (floor, tidy(floor + cushion)), (-deep, rear), (-inner, tidy(seat_width - inner)), solid="cushion",
-        more=[s.cm(2.5, 4.5)], count=seats, side_step=seat_width,
+        "cushion", (floor, floor + cushion), (-deep, rear), (-inner, seat_width - inner),
+        solid="cushion", more=[s.cm(2.5, 4.5)], count=seats, side_step=seat_width,
     )  # fmt: skip
     high = tidy(floor + cushion + s.cm(30, 42))
     s.box("back", (feet, high), (rear, deep), (-half, half), solid="cushion", more=[s.cm(1.5, 4)])
     if seats > 1 and s.chance(0.5):
         low = tidy(floor + cushion)
         s.box(
-            "pillow", (low, tidy(low + s.cm(24, 29))), (tidy(rear - s.cm(9, 12)), rear),
-            (-inner, tidy(seat_width - inner)), solid="cushion", more=[s.cm(2.5, 4)], count=seats, side_step=seat_width,
+            "pillow", (low, low + s.cm(24, 29)), (rear - s.cm(9, 12), rear), (-inner, seat_width - inner),
+            solid="cushion", more=[s.cm(2.5, 4)], count=seats, side_step=seat_width,
         )  # fmt: skip
     arm_top = tidy(floor + cushion + s.cm(10, 18))
     s.box(
@@ -146,7 +140,7 @@ def sofa(s: Sketch) -> None:
     start = (0.0, tidy(deep - s.cm(3, 5)), tidy(half - s.cm(3, 5)))
     head = (tidy(feet + s.cm(1)), tidy(deep - s.cm(7)), tidy(half - s.cm(7)))
     if s.chance(0.6):
-        s.stick("foot", "taper", start, head, (tidy(0.6 * wide), wide), thick=1.2 * wide, mirror="side depth")
+        s.stick("foot", "taper", start, head, (0.6 * wide, wide), thick=1.2 * wide, mirror="side depth")
     else:
         s.add("foot", "cylinder", (0, head[1], head[2]), feet, wide, mirror="side depth")
 
@@ -162,7 +156,7 @@ def _four_legs(s: Sketch, seat: Span, half: float, deep: float) -> tuple[Point, 
         thin = tidy(wide * s.any(0.55, 0.8))
         s.stick("leg", "taper", foot, head, (thin, wide), thick=2 * thin, mirror="side depth")
     else:
-        s.stick("leg", "bar", foot, head, (tidy(2 * wide), tidy(1.6 * wide)), thick=2 * wide, mirror="side depth")
+        s.stick("leg", "bar", foot, head, (2 * wide, 1.6 * wide), thick=2 * wide, mirror="side depth")
     return foot, head
 
 
@@ -184,9 +178,7 @@ def _leaning_back(s: Sketch, seat: Span, half: float, deep: float, height: float
     start: Point = (middle, tidy(deep - s.cm(3, 4)), side)
     head: Point = (height, tidy(start[1] + run), side)
     if kind == "board":
-        s.add(
-            "back", "board", (tidy(seat[1] - s.cm(1)), start[1], -side), (tidy(height - seat[1]), thick, 2 * side), tilt
-        )
+        s.add("back", "board", (seat[1] - s.cm(1), start[1], -side), (height - seat[1], thick, 2 * side), tilt)
         return
     radius = s.cm(1, 1.6)
     if kind == "hoop":
@@ -202,13 +194,13 @@ def _leaning_back(s: Sketch, seat: Span, half: float, deep: float, height: float
         at = between(start, head, low)
         step = tidy(pitch * (head[1] - start[1]) / (head[0] - start[0]))
         s.add(
-            "slat" if rails > 2 else "rail", "board", (low, tidy(at[1] - thick / 2), -side), (tall, thick, 2 * side),
+            "slat" if rails > 2 else "rail", "board", (low, at[1] - thick / 2, -side), (tall, thick, 2 * side),
             tilt, count=rails, up_step=pitch, depth_step=step,
         )  # fmt: skip
         return
     rail, spindles = s.cm(5, 8), s.whole(4, 6)
     at = between(start, head, tidy(height - rail))
-    s.add("rail", "board", (at[0], tidy(at[1] - thick / 2), -half), (rail, thick, 2 * half), tilt)
+    s.add("rail", "board", (at[0], at[1] - thick / 2, -half), (rail, thick, 2 * half), tilt)
     inner = tidy(0.7 * side)
     end: Point = (tidy(at[0] + rail / 2), tidy(at[1] + 0.5 * rail * tilt / 57), -inner)
     s.add(
@@ -218,7 +210,7 @@ def _leaning_back(s: Sketch, seat: Span, half: float, deep: float, height: float
         end,
         s.cm(0.6, 0.9),
         count=spindles,
-        side_step=tidy(2 * inner / (spindles - 1)),
+        side_step=2 * inner / (spindles - 1),
     )
 
 
@@ -232,17 +224,17 @@ def _arms(s: Sketch, seat: Span, half: float, deep: float) -> None:
             "arm",
             "bent_rod",
             (seat[0], front, side),
-            (tidy(high + s.cm(2)), tidy((front + rear) / 2), tidy(side + s.cm(2, 4))),
-            (tidy(seat[1] - 0.1), rear, side),
+            (high + s.cm(2), (front + rear) / 2, side + s.cm(2, 4)),
+            (seat[1] - 0.1, rear, side),
             radius,
             mirror="side",
         )
         return
     s.box(
         "arm",
-        (high, tidy(high + s.cm(2, 3))),
-        (tidy(front - s.cm(3)), tidy(rear + s.cm(3, 4))),
-        (tidy(side - radius), tidy(side + 2 * radius)),
+        (high, high + s.cm(2, 3)),
+        (front - s.cm(3), rear + s.cm(3, 4)),
+        (side - radius, side + 2 * radius),
         mirror="side",
     )
     s.add("arm_post", "rod", (seat[0], front, side), (high, front, side), radius, mirror="side")
@@ -252,7 +244,7 @@ def _rising_frame(s: Sketch, seat: Span, half: float, deep: float, height: float
     """Square legs, those at the rear going on as leaning posts with a back between them."""
     wide, run = s.cm(2.8, 4.5), s.cm(2, 8)
     side = (tidy(half - wide), half)
-    s.box("leg", (0, seat[0]), (-deep, tidy(wide - deep)), side, mirror="side")
+    s.box("leg", (0, seat[0]), (-deep, wide - deep), side, mirror="side")
     foot, knee = (
         (0.0, tidy(deep + wide / 2 + 0.4 * run), tidy(half - wide / 2)),
         (tidy((seat[0] + seat[1]) / 2), tidy(deep - wide / 2), tidy(half - wide / 2)),
@@ -265,44 +257,22 @@ def _rising_frame(s: Sketch, seat: Span, half: float, deep: float, height: float
     if s.chance(0.5):
         tall = s.cm(5, 8)
         at = between(knee, head, tidy(height - tall - s.cm(1, 3)))
-        s.add("rail", "board", (at[0], tidy(at[1] - thick / 2), -side[1]), (tall, thick, 2 * half), tilt)
+        s.add("rail", "board", (at[0], at[1] - thick / 2, -side[1]), (tall, thick, 2 * half), tilt)
         slats, low = s.whole(3, 5), knee
         pitch = tidy(1.5 * inner / (slats - 1))
         end = (tidy(at[0] + tall / 2), tidy(at[1] + tall / 2 * run / (height - knee[0])), tidy(-0.75 * inner))
         s.add(
-            "slat",
-            "bar",
-            (low[0], low[1], tidy(-0.75 * inner)),
-            end,
-            (tidy(0.4 * thick), s.cm(2, 4)),
-            count=slats,
-            side_step=pitch,
+            "slat", "bar", (low[0], low[1], -0.75 * inner), end, (0.4 * thick, s.cm(2, 4)), count=slats, side_step=pitch
         )
     else:
         at = between(knee, head, tidy(seat[1] + s.cm(8, 14)))
         s.add(
-            "back",
-            "board",
-            (at[0], tidy(at[1] - thick / 2), -side[1]),
-            (tidy(height - at[0] - s.cm(0, 2)), thick, 2 * half),
-            tilt,
+            "back", "board", (at[0], at[1] - thick / 2, -side[1]), (height - at[0] - s.cm(0, 2), thick, 2 * half), tilt
         )
     apron = s.cm(4, 7)
     if s.chance(0.6):
-        s.box(
-            "apron",
-            (tidy(seat[0] - apron), seat[0]),
-            (tidy(0.3 * wide - deep), tidy(0.7 * wide - deep)),
-            (-side[0], side[0]),
-        )
+        s.box("apron", (seat[0] - apron, seat[0]), (0.3 * wide - deep, 0.7 * wide - deep), (-side[0], side[0]))
     if s.chance(0.3):
         height = tidy(seat[0] * s.any(0.25, 0.5))
         behind = between(foot, knee, height)
-        s.add(
-            "stretcher",
-            "bar",
-            (height, tidy(wide / 2 - deep), behind[2]),
-            behind,
-            (tidy(0.5 * wide), tidy(0.5 * wide)),
-            mirror="side",
-        )
+        s.add("stretcher", "bar", (height, wide / 2 - deep, behind[2]), behind, (0.5 * wide, 0.5 * wide), mirror="side")

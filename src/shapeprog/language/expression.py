@@ -185,6 +185,11 @@ def replaced(value: Value, change: Callable[[float | Name], Value]) -> Value:
     return value
 
 
+def rounded(value: Value, digits: int) -> Value:
+    """The same number or expression with so many decimals of every plain number in it."""
+    return replaced(value, lambda leaf: leaf if isinstance(leaf, Name) else round(leaf, digits) + 0.0)
+
+
 def names_in(value: Value) -> list[str]:
     """The names in a number or expression, in the order of its text, with repetitions."""
     return [name.name for name in value.names()] if isinstance(value, Expression) else []
@@ -215,6 +220,11 @@ class Linear:
     def at(self, numbers: Mapping[str, float]) -> float:
         """Its value for these named numbers."""
         return self.constant + sum(factor * numbers[name] for name, factor in self.factors)
+
+    def written(self) -> Value:
+        """The form as a person writes it, positive terms first."""
+        terms = sorted(self.factors, key=lambda term: term[1] < 0)
+        return combined(self.constant, [(Name(name), factor) for name, factor in terms])
 
     def __add__(self, other: Linear | float) -> Linear:
         if not isinstance(other, Linear):

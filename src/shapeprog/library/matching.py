@@ -21,7 +21,7 @@ from shapeprog.errors import ShapeProgError
 from shapeprog.language.ast import Call, Function, Source
 from shapeprog.language.convert import call_in_cells
 from shapeprog.language.dimensions import counted_names
-from shapeprog.language.expression import Linear, Name, Value, combined, value_at
+from shapeprog.language.expression import Linear, Value, value_at
 from shapeprog.language.parameters import to_float32
 from shapeprog.language.placement import BOX_IN_CELLS, SIZES
 from shapeprog.language.program import Loop, Node, Program
@@ -348,6 +348,5 @@ class Matcher:
 
     def _sum(self, row: FloatArray) -> Value:
         """The expression of a row (N + 1,): factors of the names, and a constant."""
-        parts = [(Name(name), factor) for name, factor in zip(self.numbers, np.round(row, 5).tolist(), strict=False)]
-        parts = sorted((part for part in parts if part[1]), key=lambda part: part[1] < 0)
-        return combined(round(float(row[-1]), 4) + 0.0, parts)
+        factors = tuple(zip(self.numbers, np.round(row[:-1], 5).tolist(), strict=True))
+        return Linear(round(float(row[-1]), 4) + 0.0, factors).written()

@@ -23,7 +23,7 @@ from shapeprog.language.ast import (
 from shapeprog.language.convert import named_cells, placed, placed_again
 from shapeprog.language.dimensions import in_unit
 from shapeprog.language.evaluate import evaluated
-from shapeprog.language.expression import Expression, Name, replaced
+from shapeprog.language.expression import Expression, rounded
 from shapeprog.language.merging import merged_lines, separate_loops
 from shapeprog.language.printer import source_of
 from shapeprog.language.program import Program
@@ -160,11 +160,7 @@ def matchers_of(source: Source) -> Iterator[tuple[Matcher, tuple[Loop, ...]]]:
 
 def _frame(loop: Loop) -> Loop:
     """A loop without its body, and its numbers without rounding errors of unit conversion."""
-
-    def rounded(value: float | Name) -> float | Name:
-        return value if isinstance(value, Name) else round(value, 4)
-
-    return replace(loop, values=tuple(replaced(value, rounded) for value in loop.values), body=())
+    return replace(loop, values=tuple(rounded(value, 4) for value in loop.values), body=())
 
 
 def _selected(source: Source, patterns: Sequence[Pattern]) -> list[Offer]:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from shapeprog.language.ast import Draw, Function, Line, Loop, Source, values
-from shapeprog.language.expression import Binary, Expression, Name, Value, combined
+from shapeprog.language.expression import Binary, Expression, Linear, Name, Value
 from shapeprog.language.placement import BOX_IN_CELLS, RESERVED
 from shapeprog.language.statement import language
 from shapeprog.library.blocks import PAIR, Kind, solid_of
@@ -132,5 +132,4 @@ def _names(group: Group, selected: Sequence[Measure]) -> tuple[str, ...]:
 
 
 def _sum(row: FloatArray, names: Sequence[str]) -> Value:
-    parts = [(Name(name), float(factor)) for name, factor in zip(names, np.round(row, 6) + 0.0, strict=True) if factor]
-    return combined(0.0, [*sorted(parts, key=lambda part: part[1] < 0)])
+    return Linear(0.0, tuple(zip(names, np.round(row, 6).tolist(), strict=True))).written()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import textwrap
 from dataclasses import dataclass, replace
+from functools import partial
 
 from shapeprog.language.ast import (
     Assignment,
@@ -18,7 +19,7 @@ from shapeprog.language.ast import (
     changed_values,
 )
 from shapeprog.language.evaluate import provenance
-from shapeprog.language.expression import Name, Value, replaced, text_of
+from shapeprog.language.expression import rounded, text_of
 from shapeprog.language.printer import printed, source_of
 from shapeprog.language.program import Program
 from shapeprog.language.unit import Unit
@@ -56,7 +57,8 @@ def listing(program: Program, digits: int | None = DIGITS) -> list[Row]:
     source, shown = source_of(program), source_of(program)
     if digits is not None:
         decimals = digits_in(source.unit, digits)
-        shown = replace(source, lines=changed_lines(source.lines, lambda line: _rounded(line, decimals)))
+        round_values = partial(changed_values, change=lambda value: rounded(value, decimals))
+        shown = replace(source, lines=changed_lines(source.lines, round_values))
     blocks, words = provenance(source), [draw.word for draw in program.draws]
     rows = []
     for (text, _), (_, line) in zip(printed(shown), printed(source), strict=True):
@@ -102,10 +104,3 @@ def _word(line: Line) -> str:
     if isinstance(line, Draw | Part | Call) and line.role:
         return line.role
     return line.kind if isinstance(line, Part | Group) else line.name  # type: ignore[union-attr]
-
-
-def _rounded(line: Line, digits: int) -> Line:
-    def rounded(leaf: float | Name) -> Value:
-        return leaf if isinstance(leaf, Name) else round(leaf, digits) + 0.0
-
-    return changed_values(line, lambda value: replaced(value, rounded))

@@ -12,7 +12,7 @@ from shapeprog.language.ast import Assignment, Call, Draw, Loop, Scale, Source, 
 from shapeprog.language.convert.forms import EVEN
 from shapeprog.language.dimensions import counted_names, in_unit
 from shapeprog.language.evaluate import symbolic
-from shapeprog.language.expression import Expression, Linear, Name, combined
+from shapeprog.language.expression import Expression, Linear, Name
 from shapeprog.language.placement import BOX_IN_CELLS, SIZES
 from shapeprog.language.printer import source_of
 from shapeprog.language.program import Node, Program
@@ -75,8 +75,7 @@ def _written(node: Node) -> Node:
     new = []
     for value in node.values:
         if isinstance(value, Linear):
-            terms = sorted(((Name(name), factor) for name, factor in value.factors), key=lambda term: term[1] < 0)
-            value = combined(value.constant, terms)
+            value = value.written()
         new.append(value if isinstance(value, Expression) else value + 0.0)
     node = replace(node, values=tuple(new))
     return replace(node, body=tuple(map(_written, node.body))) if isinstance(node, Loop) else node

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from typing import NamedTuple, TypeAlias
 
 from shapeprog.language.ast import Keywords, Point
-from shapeprog.language.expression import APPLY, Binary, Expression, Linear, Name, Negative, Value, combined
-from shapeprog.language.parameters import shortest, to_float32
+from shapeprog.language.expression import APPLY, Binary, Expression, Linear, Name, Negative, Value
+from shapeprog.language.parameters import shortest
 from shapeprog.language.placement import AXES
 
 NOTHING = 2e-6  # cells; a length up to this is none
@@ -63,14 +63,8 @@ class Forms:
         return Linear(float(shortest(value)))  # type: ignore[arg-type]
 
     def written(self, form: Linear, *, exact: bool = False) -> Value:
-        """A linear form as a person writes it, positive terms first; without terms near zero, unless exact."""
-        form = form if exact else self._clean(form)
-        terms = [(Name(name), factor) for name, factor in form.factors]
-        terms.sort(key=lambda term: term[1] < 0)
-        if terms and terms[0][1] < 0 and form.constant > 0:
-            negated = combined(0.0, [(name, -factor) for name, factor in terms])
-            return Binary("-", to_float32(form.constant), negated) if len(terms) == 1 else _differences(form, terms)
-        return combined(form.constant, terms)
+        """A linear form as a person writes it; without terms near zero, unless exact."""
+        return (form if exact else self._clean(form)).written()
 
     def number(self, form: Linear) -> float:
         """The value of a form with the numbers in force."""
@@ -155,11 +149,3 @@ def _cost(value: Value) -> Cost:
         case Expression():
             return 0, 1
     return 0, 2 if value < 0 else 1
-
-
-def _differences(form: Linear, terms: Sequence[tuple[Expression, float]]) -> Value:
-    """A positive number from which everything else is subtracted."""
-    total: Value = to_float32(form.constant)
-    for atom, factor in terms:
-        total = Binary("-", total, combined(0.0, [(atom, -factor)]))
-    return total

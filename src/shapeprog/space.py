@@ -37,17 +37,24 @@ def grid_axes(up: str, front: str) -> FloatArray:
     ``up`` and ``front`` are signed axis names such as ``"+y"``, ``"-z"`` or ``"x"``.  Depth points away from ``front``;
     left-right completes a right-handed frame, so nothing is mirrored.  A ``ValueError`` if they are no two axes.
     """
-    rise, rear = _axis(up), -_axis(front)
+    rise, rear = axis_direction(up), -axis_direction(front)
     if abs(rise @ rear) > 0:
         raise ValueError(f"up {up!r} and front {front!r} lie on the same line; they must be perpendicular")
     return np.stack([rise, rear, np.cross(rise, rear)], axis=1)
 
 
-def _axis(name: str) -> FloatArray:
+def axis_direction(name: str) -> FloatArray:
+    """The direction (3,) of a signed axis name; a ``ValueError`` if it is none."""
     found = re.fullmatch("([+-]?)([xyz])", name.strip().lower())
     if found is None:
         raise ValueError(f"{name!r} is not an axis; use x, y or z with an optional sign, as in +y or -z")
     return (-1.0 if found[1] == "-" else 1.0) * np.eye(3)["xyz".index(found[2])]
+
+
+def axis_name(direction: FloatArray) -> str:
+    """The signed name, such as ``+y``, of the axis that a direction (3,) lies along."""
+    axis = int(np.abs(direction).argmax())
+    return ("-" if direction[axis] < 0 else "+") + "xyz"[axis]
 
 
 @dataclass(frozen=True)
@@ -67,9 +74,14 @@ class Frame:
         """The frame that centres the world box ``[low, high]`` and makes its longest side 24 cells."""
         lowest, highest = np.asarray(low, np.float64), np.asarray(high, np.float64)
         longest = float((highest - lowest).max())
-        rotation = np.eye(3) if axes is None else np.asarray(axes, np.float64)
         scale = longest / SPAN if longest > 0 else 1.0
-        return Frame(scale, _triple((lowest + highest) / 2), tuple(_triple(row) for row in rotation))
+        return Frame.of(scale, (lowest + highest) / 2, np.eye(3) if axes is None else axes)
+
+    @staticmethod
+    def of(scale: float, centre: npt.ArrayLike, axes: npt.ArrayLike) -> Frame:
+        """The frame of a scale, a centre (3,) and axes (3, 3)."""
+        x, y, z = np.asarray(centre, np.float64).tolist()
+        return Frame(float(scale), (x, y, z), tuple((a, b, c) for a, b, c in np.asarray(axes, np.float64).tolist()))
 
     def to_world(self, points: npt.ArrayLike) -> FloatArray:
         """World positions (..., 3) of grid positions (..., 3)."""
@@ -85,7 +97,3 @@ class Frame:
         matrix[:3, :3] = self.scale * np.asarray(self.axes)
         matrix[:3, 3] = self.centre
         return matrix
-
-
-def _triple(values: FloatArray) -> tuple[float, float, float]:
-    return (float(values[0]), float(values[1]), float(values[2]))

@@ -124,9 +124,7 @@ def shape_from_voxels(
     low, high = np.where(np.isin(range(3), backward), (size - high, size - low), (low, high))
     middle, longest = (low + high) / 2 - HALF, (high - low).max()
     if size == RESOLUTION and abs(longest - SPAN) <= 2 and np.abs(middle).max() <= 1.5:
-        centre = start + cell * HALF
-        same_frame = Frame(cell, (float(centre[0]), float(centre[1]), float(centre[2])), frame.axes)
-        return Shape(name, np.ascontiguousarray(turned), frame=same_frame, source=source)
+        return Shape(name, np.ascontiguousarray(turned), frame=Frame.of(cell, start + cell * HALF, turn), source=source)
     ends = frame.to_grid([start, start + cell * size])
     return Shape(name, resample_voxels(turned, ends.min(0), cell / frame.scale), frame=frame, source=source)
 

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from shapeprog.space import FloatArray
+from shapeprog.space import FloatArray, axis_name
 
 WEIGHTS = {
     "height": 1.82,
@@ -62,7 +62,7 @@ def find_up(
         Where the front is, if that is known: up is along another axis.
     """
     turn = np.eye(3) if axes is None else axes
-    names = [name_of(sign * turn[:, axis]) for axis in range(3) for sign in (1, -1)]
+    names = [axis_name(sign * turn[:, axis]) for axis in range(3) for sign in (1, -1)]
     score = measures(cells) @ np.array(list(WEIGHTS.values()))
     if usual is not None:
         score += np.log([USUAL if name == usual else (1 - USUAL) / (len(names) - 1) for name in names])
@@ -71,12 +71,6 @@ def find_up(
     share = np.exp(score - score.max())
     best = int(share.argmax())
     return Upright(names[best], float(share[best] / share.sum()))
-
-
-def name_of(direction: FloatArray) -> str:
-    """The signed name of a direction along an axis of the world."""
-    axis = int(np.abs(direction).argmax())
-    return ("+" if direction[axis] > 0 else "-") + "xyz"[axis]
 
 
 def measures(cells: Cells) -> FloatArray:

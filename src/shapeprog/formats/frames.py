@@ -32,7 +32,7 @@ from shapeprog.language.printer import source_of
 from shapeprog.language.program import Program
 from shapeprog.language.text import Text
 from shapeprog.language.unit import METRES, assumed_unit, metres
-from shapeprog.space import SPAN, Array, FloatArray, Frame, grid_axes
+from shapeprog.space import SPAN, FloatArray, Frame, axis_direction, axis_name, grid_axes
 
 _LINE_END = r"(?:\r?\n|\r(?!\n))"
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
@@ -110,10 +110,11 @@ def placement(
     if frame is not None and on_input and not up:
         if not unit and chosen.unit != "text":
             return Placement(frame)
-        return Placement(_frame(per_cell, per_cell / frame.scale * np.array(frame.centre), np.array(frame.axes)), name)
+        centre = per_cell / frame.scale * np.array(frame.centre)
+        return Placement(Frame.of(per_cell, centre, frame.axes), name)
     matrix = grid_axes(*(UP[up.removeprefix("+")] if up else chosen.axes))
     centre = -per_cell * (matrix @ _ground(program)) + 0.0 if chosen.maker else np.zeros(3)
-    return Placement(_frame(per_cell, centre, matrix), name)
+    return Placement(Frame.of(per_cell, centre, matrix), name)
 
 
 def _cell_size(chosen: Format, program: Program, frame: Frame | None, unit: str, file_unit: str) -> tuple[float, str]:
@@ -158,13 +159,13 @@ def frame_of_text(frame: Frame, scale: Scale) -> Frame:
     """The map from x, y, z of a text to the world, given that from the grid."""
     axes = np.asarray(frame.axes) @ _GRID
     origin = np.asarray(frame.centre) + frame.scale * (axes @ [0.0, scale.middle, scale.floor])
-    return _frame(frame.scale * scale.cells_per_unit, origin, axes)
+    return Frame.of(frame.scale * scale.cells_per_unit, origin, axes)
 
 
 def frame_of_grid(text: Frame, scale: Scale) -> Frame:
     """The map from the grid to the world, given that from x, y, z of a text."""
     size, axes = text.scale / scale.cells_per_unit, np.asarray(text.axes)
-    return _frame(size, np.asarray(text.centre) - size * (axes @ [0.0, scale.middle, scale.floor]), axes @ _GRID.T)
+    return Frame.of(size, np.asarray(text.centre) - size * (axes @ [0.0, scale.middle, scale.floor]), axes @ _GRID.T)
 
 
 def in_grid_of(program: Program, frame: Frame | None, other: Frame) -> Program:
@@ -232,27 +233,21 @@ def split_frame(text: str, name: str) -> tuple[str, Frame | None]:
         if not np.allclose(rotation.T @ rotation, np.eye(3), atol=1e-6):
             wrong = "up and front are not perpendicular unit directions"
         elif np.isfinite([*origin, size]).all() and size > 0:
-            return text[: comment.end(1)] + text[comment.end() :], _frame(size, np.array(origin), rotation @ _GRID)
+            return text[: comment.end(1)] + text[comment.end() :], Frame.of(size, np.array(origin), rotation @ _GRID)
     row, column = len(re.findall(_LINE_END, comment[1])) + 1, comment.start(2) - comment.end(1) + 1
     cure = "write it as # placed: up y, front z, origin 0 0.5 0, 1 unit = 1, or remove it"
     raise Text(text, name).at(row, column, wrong, cure)
 
 
-def _frame(scale: float, centre: Array, axes: Array) -> Frame:
-    x, y, z = centre.tolist()
-    return Frame(float(scale), (x, y, z), tuple((a, b, c) for a, b, c in axes.tolist()))
-
-
 def _direction(text: str) -> FloatArray:
     """A signed axis, or a direction of three numbers, each at most 2."""
     if text[-1] in "xyz":
-        return (-1.0 if text.startswith("-") else 1.0) * np.eye(3)["xyz".index(text[-1])]
+        return axis_direction(text)
     return np.clip([float(word) for word in text.split()], -2, 2)
 
 
 def _direction_text(direction: FloatArray) -> str:
     """The same as text."""
-    axis = int(np.abs(direction).argmax())
     if np.abs(direction - np.rint(direction)).max() > _ALIGNED:
         return " ".join(f"{value:.9g}" for value in direction)
-    return ("-" if direction[axis] < 0 else "") + "xyz"[axis]
+    return axis_name(direction).removeprefix("+")

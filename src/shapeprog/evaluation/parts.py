@@ -17,7 +17,7 @@ from shapeprog.evaluation.likeness import Triangles
 from shapeprog.geometry.distance import each_distance
 from shapeprog.geometry.primitives import primitives
 from shapeprog.geometry.scene import Scene
-from shapeprog.space import Array
+from shapeprog.language.hints import Box
 
 ENOUGH = 0.5
 """IoU from which a primitive counts as a part."""
@@ -34,14 +34,6 @@ class PartScores(NamedTuple):
 
     part_recall: float
     part_precision: float
-
-
-class Box(NamedTuple):
-    """An oriented box: centre (3,), axes (3, 3) as columns, and half extents (3,)."""
-
-    centre: Array
-    axes: Array
-    half: Array
 
 
 def oriented_box(part: Triangles) -> Box:
@@ -63,7 +55,7 @@ def overlaps(parts: Sequence[Box], scene: Scene, seed: int = 0) -> npt.NDArray[n
     sampled = np.random.default_rng(seed).uniform(-1, 1, (POINTS, 3))
     table = np.zeros((len(parts), len(slots)))
     for row, part in enumerate(parts):
-        points = torch.from_numpy(part.centre + (sampled * part.half) @ part.axes.T)
+        points = torch.from_numpy(part.centre + (sampled * part.half) @ part.rotation.T)
         inside = (each_distance(scene, points.to(scene.size.dtype)) <= 0).double().mean(0)[slots].numpy()
         box_volume = float(np.prod(2 * part.half))
         shared = inside * box_volume

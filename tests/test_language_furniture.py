@@ -132,7 +132,7 @@ def test_a_role_is_refused_that_is_there_or_no_word():
         for name, said in (("plinth", "declared twice"), ("a b", "not a Python identifier")):
             with pytest.raises(DeclarationError, match=said):
                 other.add_role(name, "again")
-        assert other.word(other.roles["plinth"].id) == "plinth"
+        assert other.role(other.roles["plinth"].id) == other.roles["plinth"]
 
 
 @pytest.mark.parametrize("declared", [each for each in language() if each.hint], ids=lambda each: each.name)

@@ -229,11 +229,6 @@ class Language:
         """What parts are called by a word: a role, or a statement that is none."""
         return self.roles[word] if word in self.roles else self._by_name[word]
 
-    def word(self, number: int) -> str:
-        """The role or statement with this id."""
-        result = self.role(number)
-        return self._by_id[number].name if result is None else result.name
-
     def _faults(self, declared: Statement) -> Iterator[tuple[str, str]]:
         """The mistakes in a declaration, found without drawing it, each with its cure."""
         what = f"statement {declared.name!r}"

@@ -16,7 +16,7 @@ The last three may be missing.
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, overload
@@ -91,9 +91,6 @@ class Pack(Sequence[Shape]):
             kind="voxels" if points is None else "mesh",
             split="" if self.split is None else str(self.split[index]),
         )
-
-    def __iter__(self) -> Iterator[Shape]:
-        return (self[index] for index in range(len(self)))
 
     def take(self, indices: npt.ArrayLike) -> Pack:
         """The pack of the shapes at ``places`` (numbers, or a mask)."""

@@ -7,19 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from shapeprog.kernels.compile import helper, kernel
-
-
-@helper
-def least_of(a, b, c):
-    """The least of three."""
-    return min(min(a, b), c)
-
-
-@helper
-def most_of(a, b, c):
-    """The largest of three."""
-    return max(max(a, b), c)
+from shapeprog.kernels.compile import kernel
 
 
 @kernel("void(f8[:, :, ::1], f8, b1[:, :, ::1])")
@@ -49,8 +37,8 @@ def mark_triangles(triangles, half, cells):
         corner = triangles[face]
         empty = False
         for axis in range(3):
-            smallest = least_of(corner[0, axis], corner[1, axis], corner[2, axis])
-            largest = most_of(corner[0, axis], corner[1, axis], corner[2, axis])
+            smallest = min(corner[0, axis], corner[1, axis], corner[2, axis])
+            largest = max(corner[0, axis], corner[1, axis], corner[2, axis])
             low[axis] = max(int(np.ceil(smallest - half - 0.5)), 0)
             high[axis] = min(int(np.floor(largest + half - 0.5)), size - 1)
             empty |= low[axis] > high[axis]
@@ -74,8 +62,8 @@ def mark_triangles(triangles, half, cells):
                 b = edge[side, second] * corner[1, third] - edge[side, third] * corner[1, second]
                 c = edge[side, second] * corner[2, third] - edge[side, third] * corner[2, second]
                 radius = half * (abs(edge[side, second]) + abs(edge[side, third]))
-                least[3 * side + axis] = least_of(a, b, c) - radius
-                most[3 * side + axis] = most_of(a, b, c) + radius
+                least[3 * side + axis] = min(a, b, c) - radius
+                most[3 * side + axis] = max(a, b, c) + radius
         for i in range(low[0], high[0] + 1):
             x = i + 0.5
             for j in range(low[1], high[1] + 1):

@@ -1,10 +1,11 @@
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
 import torch
 
+from shapeprog.data.shape import Shape
 from shapeprog.evaluation.metrics import Metrics, evaluate_program, summarise, target_samples, world_scale
 from shapeprog.geometry.cells import voxels
 from shapeprog.geometry.mesh import union_mesh
@@ -22,20 +23,11 @@ TABLE = Program(
 )
 
 
-@dataclass(frozen=True)
-class Target:
-    name: str
-    voxels: np.ndarray
-    points: np.ndarray | None = None
-    vertices: np.ndarray | None = None
-    faces: np.ndarray | None = None
-
-
 @pytest.fixture(scope="module")
 def table():
     scene = unroll(TABLE)
     vertices, faces = union_mesh(scene)
-    return Target("table", voxels(scene).numpy().astype(bool), None, vertices, faces)
+    return Shape("table", voxels(scene).numpy().astype(bool), vertices=vertices, faces=faces)
 
 
 def moved(program, up):
@@ -64,7 +56,7 @@ def test_distances_are_squared_world_lengths_and_a_cell_is_a_cell(table):
     plate = Program((Draw("locker", (0.0, -6.0, -6.0, 0.0, 12.0, 12.0)),))
     flat = np.random.default_rng(0).uniform(-6, 6, (20000, 3)) * [0, 1, 1]
     for height, f1 in ((0.9, 1.0), (1.1, 0.0)):
-        target = Target("plate", np.zeros((32, 32, 32), bool), flat + np.array([height, 0, 0]))
+        target = Shape("plate", np.zeros((32, 32, 32), bool), flat + np.array([height, 0, 0]))
         row = evaluate_program(plate, target, points=10000)
         assert row.to_target == pytest.approx(height**2 / 288, rel=0.02)
         assert row.cd == pytest.approx(row.to_target + row.from_target)
@@ -80,11 +72,11 @@ def test_iou_is_of_the_snapped_program_and_cd_of_the_program_as_it_is(table):
 
 
 def test_targets_without_a_surface_have_an_iou_only(table):
-    row = evaluate_program(TABLE, Target("cells", table.voxels))
+    row = evaluate_program(TABLE, Shape("cells", table.voxels))
     assert row.iou == 1
     assert math.isnan(row.cd)
     assert math.isnan(row.f1)
-    assert target_samples(Target("cells", table.voxels), 10, 0) is None
+    assert target_samples(Shape("cells", table.voxels), 10, 0) is None
 
 
 def test_a_program_that_draws_nothing_has_the_worst_figures(table):
@@ -95,7 +87,7 @@ def test_a_program_that_draws_nothing_has_the_worst_figures(table):
 
 def test_the_two_samplings_of_points_share_none():
     points = torch.rand(100, 3).numpy()
-    one, two = target_samples(Target("p", np.zeros((32, 32, 32), bool), points), 80, 0)
+    one, two = target_samples(Shape("p", np.zeros((32, 32, 32), bool), points), 80, 0)
     assert len(one) == len(two) == 50
     assert not set(map(tuple, one.tolist())) & set(map(tuple, two.tolist()))
 

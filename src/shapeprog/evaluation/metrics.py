@@ -25,16 +25,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
-from typing import Any, Protocol, runtime_checkable
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
-import numpy.typing as npt
 import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from shapeprog.data.sampling import sample_surface as sample_triangles
+from shapeprog.data.shape import Shape
 from shapeprog.data.touched import occupied
 from shapeprog.errors import ShapeProgError
 from shapeprog.evaluation import likeness, structure
@@ -47,6 +45,7 @@ from shapeprog.geometry.surface import sample_surface
 from shapeprog.language.free import numbers
 from shapeprog.language.program import Program
 from shapeprog.language.unroll import unroll
+from shapeprog.space import Array
 
 POINTS = 5000
 """Points drawn on each of the two surfaces."""
@@ -55,34 +54,6 @@ CELL = 1.0
 """Distance in cells within which a point counts as found."""
 
 Cloud = Float[Tensor, "P 3"]
-
-
-@runtime_checkable
-class Target(Protocol):
-    """The attributes of a target; ``shapeprog.data.Shape`` has them.
-
-    Positions are in the grid frame.  Where there is neither a mesh nor points, distances are not a number.
-    """
-
-    @property
-    def name(self) -> str:
-        """Its name."""
-
-    @property
-    def voxels(self) -> npt.NDArray[np.bool_]:
-        """Touched cells (32, 32, 32)."""
-
-    @property
-    def points(self) -> npt.NDArray[np.float32] | None:
-        """Points (P, 3) uniform by area on its surface."""
-
-    @property
-    def vertices(self) -> npt.NDArray[np.float32] | None:
-        """Vertices (V, 3) of its mesh."""
-
-    @property
-    def faces(self) -> npt.NDArray[np.int32] | None:
-        """Triangles (F, 3) of its mesh."""
 
 
 @dataclass(frozen=True)
@@ -151,7 +122,7 @@ class Summary:
 
 def evaluate_program(
     program: Program,
-    target: Target,
+    target: Shape,
     snapped: Program | None = None,
     points: int = POINTS,
     seed: int = 0,
@@ -199,27 +170,23 @@ def evaluate_program(
     )
 
 
-def with_likeness(row: Metrics, predicted: Triangles | None, target: Target, seed: int = 0) -> Metrics:
+def with_likeness(row: Metrics, predicted: Triangles | None, target: Shape, seed: int = 0) -> Metrics:
     """The measures with the likeness of a predicted mesh, ``None`` where it has no surface, to the target."""
-    count = likeness.POINTS
-    if target.vertices is not None and target.faces is not None and len(target.faces):
-        mesh = Triangles(target.vertices, target.faces)
-        diagonal = likeness.box(np.asarray(mesh.vertices, np.float64)[np.unique(mesh.faces)])[1]
-        seeds = np.random.SeedSequence((seed, 1)).generate_state(3).tolist()
-        first, second = (likeness.sampled(mesh, sample_seed, count) for sample_seed in seeds[:2])
-    elif target.points is not None and len(target.points) > 1:
-        mixed = np.asarray(target.points, np.float64)[np.random.default_rng(seed).permutation(len(target.points))]
-        mesh, diagonal, seeds = None, likeness.box(mixed)[1], [0, 0, seed]
-        first, second = Samples(mixed[: len(mixed) // 2]), Samples(mixed[len(mixed) // 2 :])
+    mesh, halves, prediction_seed = _mesh(target), _halves(target, seed), seed
+    if mesh is not None:
+        *seeds, prediction_seed = np.random.SeedSequence((seed, 1)).generate_state(3).tolist()
+        first, second = (likeness.sampled(mesh, sample_seed) for sample_seed in seeds)
+        surface = first
+    elif halves is not None:
+        first, second, surface = map(Samples, (*halves, np.concatenate(halves)))
     else:
         return row
+    diagonal = _diagonal(target)
     floor = likeness.likeness(first, second, diagonal)
-    if predicted is None:
-        scores, outlines = likeness.NOTHING, 0.0
-    else:
-        surface = first if mesh is not None else Samples(np.concatenate([first.points, second.points]))
-        scores = likeness.likeness(likeness.sampled(predicted, seeds[2], count), surface, diagonal)
-        outlines = likeness.silhouette(predicted, mesh) if mesh is not None else math.nan
+    scores, outlines = likeness.NOTHING, 0.0
+    if predicted is not None:
+        scores = likeness.likeness(likeness.sampled(predicted, prediction_seed), surface, diagonal)
+        outlines = math.nan if mesh is None else likeness.silhouette(predicted, mesh)
     if mesh is None:
         outlines, scores = math.nan, scores._replace(normals=math.nan)
     return replace(
@@ -232,28 +199,24 @@ def with_likeness(row: Metrics, predicted: Triangles | None, target: Target, see
 def summarise(rows: Sequence[Metrics]) -> dict[str, Summary]:
     """Mean, standard error and median of every measure over shapes; those that are not a number are left out."""
     summary = {}
-    columns: dict[str, list[Any]] = {}
-    for row in rows:
-        for name, value in asdict(row).items():
-            columns.setdefault(name, []).append(value)
-    for name, values in columns.items():
-        if name == "name":
-            continue
-        numbers = np.asarray(values, np.float64)
+    for column in fields(Metrics)[1:] if rows else ():  # the first is the name
+        numbers = np.array([getattr(row, column.name) for row in rows], np.float64)
         numbers = numbers[~np.isnan(numbers)]
         count = len(numbers)
-        finite = bool(count) and bool(np.isfinite(numbers).all())
-        error = float(numbers.std(ddof=1) / np.sqrt(count)) if finite and count > 1 else float("nan")
-        mean, median = (float(numbers.mean()), float(np.median(numbers))) if count else (float("nan"), float("nan"))
-        summary[name] = Summary(mean, error, median, count)
+        mean, median = (float(numbers.mean()), float(np.median(numbers))) if count else (math.nan, math.nan)
+        known = count > 1 and np.isfinite(numbers).all()
+        error = float(numbers.std(ddof=1) / np.sqrt(count)) if known else math.nan
+        summary[column.name] = Summary(mean, error, median, count)
     return summary
 
 
-def world_scale(target: Target) -> float:
-    """World units per cell of a target whose bounding box has diagonal 1.
+def world_scale(target: Shape) -> float:
+    """World units per cell of a target whose bounding box has diagonal 1."""
+    return 1 / _diagonal(target)
 
-    The box is that of its mesh, else of its points, else of its cells.
-    """
+
+def _diagonal(target: Shape) -> float:
+    """The diagonal in cells of the bounding box of the mesh of a target, else of its points, else of its cells."""
     if target.vertices is not None and len(target.vertices):
         span = np.ptp(np.asarray(target.vertices, np.float64), axis=0)
     elif target.points is not None and len(target.points):
@@ -261,35 +224,48 @@ def world_scale(target: Target) -> float:
     else:
         cells = np.argwhere(target.voxels)
         span = np.ptp(cells, axis=0) + 1.0 if len(cells) else np.ones(3)
-    diagonal = float(np.linalg.norm(span))
-    return 1 / diagonal if diagonal > 0 else 1.0
+    return float(np.linalg.norm(span)) or 1.0
 
 
-def target_samples(target: Target, points: int, seed: int) -> tuple[Cloud, Cloud] | None:
+def _mesh(target: Shape) -> Triangles | None:
+    if target.vertices is None or target.faces is None or not len(target.faces):
+        return None
+    return Triangles(target.vertices, target.faces)
+
+
+def _halves(target: Shape, seed: int) -> tuple[Array, Array] | None:
+    """The points of a target in two random halves; ``None`` where it has none."""
+    if target.points is None or len(target.points) < 2:
+        return None
+    mixed = np.asarray(target.points, np.float64)[np.random.default_rng(seed).permutation(len(target.points))]
+    return mixed[: len(mixed) // 2], mixed[len(mixed) // 2 :]
+
+
+def target_samples(target: Shape, points: int, seed: int) -> tuple[Cloud, Cloud] | None:
     """Two independent samplings of the surface of a target, or None where it is known as cells only.
 
     From a mesh both have ``points`` points.  Otherwise they are two halves of the points at hand, each of at most
     ``points``: with fewer than twice as many at hand the noise floor reads too high.
     """
-    if target.vertices is not None and target.faces is not None and len(target.faces):
-        mesh, seeds = (target.vertices, target.faces), np.random.SeedSequence(seed).generate_state(2).tolist()
-        first, second = (np.asarray(sample_triangles(*mesh, points, sample_seed), np.float64) for sample_seed in seeds)
-        return torch.from_numpy(first), torch.from_numpy(second)
-    if target.points is None or len(target.points) < 2:
+    mesh, halves = _mesh(target), _halves(target, seed)
+    if mesh is not None:
+        seeds = np.random.SeedSequence(seed).generate_state(2).tolist()
+        first, second = (likeness.sampled(mesh, sample_seed, points).points for sample_seed in seeds)
+    elif halves is not None:
+        first, second = (half[:points] for half in halves)
+    else:
         return None
-    mixed = np.asarray(target.points, np.float64)[np.random.default_rng(seed).permutation(len(target.points))]
-    half = len(mixed) // 2
-    return torch.from_numpy(mixed[:half][:points].copy()), torch.from_numpy(mixed[half:][:points].copy())
+    return torch.from_numpy(first), torch.from_numpy(second)
 
 
-def _distances(scene: Scene, target: Target, points: int, seed: int) -> tuple[float, float, float, float]:
+def _distances(scene: Scene, target: Shape, points: int, seed: int) -> tuple[float, float, float, float]:
     """Prediction to target, target to prediction, F1, and noise floor."""
     samples = target_samples(target, points, seed)
     if samples is None:
         return float("nan"), float("nan"), float("nan"), float("nan")
     square = world_scale(target) ** 2
     floor = noise_floor(samples, square)
-    surface = samples[0] if target.vertices is not None and target.faces is not None else _all_points(target, points)
+    surface = _all_points(target, points) if _mesh(target) is None else samples[0]
     try:
         sampled = sample_surface(scene, points, torch.Generator().manual_seed(seed)).points.double()
     except ShapeProgError:  # no primitive has a surface
@@ -310,7 +286,7 @@ def cloud_distances(sampled: Cloud, surface: Float[Tensor, "Q 3"], square: float
     return float(to_target.mean()) * square, float(from_target.mean()) * square, f1
 
 
-def _all_points(target: Target, points: int) -> Cloud:
+def _all_points(target: Shape, points: int) -> Cloud:
     assert target.points is not None
     mixed = np.random.default_rng(0).permutation(len(target.points))[:points]  # files list them place after place
     return torch.from_numpy(np.asarray(target.points[np.sort(mixed)], np.float64))

@@ -16,13 +16,12 @@ The last three may be missing.
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, overload
+from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from shapeprog.data.arrays import members, read_head, read_numpy
 from shapeprog.data.reading import POINTS, check_count, few, in_words
@@ -38,7 +37,7 @@ _CURE = "make packs with 'shapeprog prepare'; the module shapeprog.data.packs do
 
 
 @dataclass(frozen=True)
-class Pack(Sequence[Shape]):
+class Pack:
     """The shapes of a pack, unpacked on access.
 
     Parameters
@@ -59,13 +58,7 @@ class Pack(Sequence[Shape]):
     def __len__(self) -> int:
         return len(self.ids)
 
-    @overload
-    def __getitem__(self, index: int) -> Shape: ...
-    @overload
-    def __getitem__(self, index: slice) -> Pack: ...
-    def __getitem__(self, index: int | slice) -> Shape | Pack:
-        if isinstance(index, slice):
-            return self.take(np.arange(len(self))[index])
+    def __getitem__(self, index: int) -> Shape:
         if not -len(self) <= index < len(self):
             raise IndexError(
                 f"{self.source.name} holds {len(self)} shapes, numbered from 0; {index} is not one of them"
@@ -92,27 +85,8 @@ class Pack(Sequence[Shape]):
             split="" if self.split is None else str(self.split[index]),
         )
 
-    def take(self, indices: npt.ArrayLike) -> Pack:
-        """The pack of the shapes at ``places`` (numbers, or a mask)."""
-        rows = np.asarray(indices)
-        parts = (self.points, self.longest_side, self.split)
-        return Pack(self.source, self.ids[rows], self.voxels[rows], *(p if p is None else p[rows] for p in parts))
-
-    def only(self, split: str) -> Pack:
-        """The shapes of one split: train, val or test.
-
-        Raises
-        ------
-        InputError
-            If the pack has no splits, or none of that name.
-        """
-        if self.split is None:
-            raise InputError(f"{self.source.name} has no splits", "read the whole pack, or the file of that split")
-        mask = self.split == split
-        if not mask.any():
-            held = ", ".join(sorted(set(self.split.tolist())))
-            raise InputError(f"{self.source.name} has no split {split!r}", f"choose one of {held}")
-        return self.take(mask)
+    def __iter__(self) -> Iterator[Shape]:
+        return map(self.__getitem__, range(len(self)))
 
 
 def is_pack(path: Path) -> bool:
@@ -132,15 +106,13 @@ def is_pack(path: Path) -> bool:
         return len(shape) == 2 and shape[1] == _BYTES and dtype == np.uint8
 
 
-def read_pack(path: str | os.PathLike[str], split: str | None = None, *, whole: bool = True) -> Pack:
+def read_pack(path: str | os.PathLike[str], *, whole: bool = True) -> Pack:
     """The shapes of a pack, in the order of the file.
 
     Parameters
     ----------
     path
         An NPZ file with the arrays listed at the head of this module.
-    split
-        Only the shapes of this split: train, val or test.
     whole
         Whether a single shape without cells or of no usable size is an error; otherwise it is one on access.
 
@@ -163,7 +135,7 @@ def read_pack(path: str | os.PathLike[str], split: str | None = None, *, whole: 
         good = pack.voxels.any(1) & (True if pack.longest_side is None else _usable(pack.longest_side))
         for index in np.flatnonzero(~good)[:1]:
             pack[int(index)]  # raises the error
-    return pack if split is None else pack.only(split)
+    return pack
 
 
 def _check(name: str, arrays: dict[str, Array]) -> None:

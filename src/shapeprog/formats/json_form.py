@@ -24,7 +24,7 @@ import numpy as np
 
 from shapeprog.errors import InputError, ShapeProgError
 from shapeprog.formats.frames import frame_of_text, scale_of
-from shapeprog.formats.shape import LARGEST_FILE, program_in, program_text, read_text
+from shapeprog.formats.shape import program_in, program_text, read_text
 from shapeprog.language.ast import Draw, Part
 from shapeprog.language.evaluate import provenance
 from shapeprog.language.parameters import LARGEST
@@ -64,7 +64,7 @@ class Result(NamedTuple):
 
 def read_result(path: Path) -> Result:
     """The contents of a JSON file; raises what :func:`program_from_json` does."""
-    return result_from_json(read_text(path, LARGEST_FILE), str(path))
+    return result_from_json(read_text(path), str(path))
 
 
 def result_from_json(text: str, name: str) -> Result:
@@ -117,8 +117,8 @@ def program_to_json(program: Program, frame: Frame | None = None, **more: Any) -
 
 def _solids(program: Program, framed: bool) -> list[dict[str, Any]]:
     """The line, role, kind and bounds of each solid that a program draws; ``framed`` if a comment is above its text."""
-    from shapeprog.formats.parts import exact_scene  # reading a program needs no geometry
-    from shapeprog.geometry.mesh import bounds
+    from shapeprog.geometry.mesh import bounds  # reading a program needs no geometry
+    from shapeprog.language.unroll import exact_scene
 
     if program.size > MOST_SOLIDS:
         raise ShapeProgError(f"more than {MOST_SOLIDS} solids")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 import stat
 from pathlib import Path
@@ -19,7 +18,7 @@ LARGEST_FILE = 16_000_000  # bytes of the largest program file
 
 def read_shape(path: Path) -> tuple[Program, Frame | None]:
     """The program of a text file, and its frame if it has one."""
-    return program_in(read_text(path, LARGEST_FILE), str(path))
+    return program_in(read_text(path), str(path))
 
 
 def program_in(text: str, name: str) -> tuple[Program, Frame | None]:
@@ -34,17 +33,17 @@ def program_text(program: Program, frame: Frame | None) -> str:
     return frame_comment(frame, program) + format_program(program)
 
 
-def read_text(path: str | os.PathLike[str], largest: float = math.inf) -> str:
-    """The text of a UTF-8 file of limited size, with or without a byte order mark; an ``InputError`` if the file cannot
-    be read, is no regular file, is larger, or is not UTF-8."""
+def read_text(path: str | os.PathLike[str]) -> str:
+    """The text of a UTF-8 file, with or without a byte order mark; an ``InputError`` if the file cannot be read, is no
+    regular file, is larger than ``LARGEST_FILE``, or is not UTF-8."""
     try:
         status = os.stat(path)
         if stat.S_ISDIR(status.st_mode):
             raise InputError(f"{path} is a folder, not a file", "name a file in it")
         if not stat.S_ISREG(status.st_mode):
             raise InputError(f"{path} is not a regular file", "name a file on a disk")
-        if status.st_size > largest:
-            raise InputError(f"{path} is larger than {largest / 1e6:.0f} MB", "check that it is a program")
+        if status.st_size > LARGEST_FILE:
+            raise InputError(f"{path} is larger than {LARGEST_FILE / 1e6:.0f} MB", "check that it is a program")
         return Path(path).read_bytes().decode("utf-8-sig")
     except FileNotFoundError as error:
         raise InputError(f"there is no file {path}", "check the path") from error
